@@ -18,7 +18,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import closing, contextmanager
 from pathlib import Path
 
-from bridges import log
+from bridges.host import log
 from bridges.settings.load import SettingsError, load
 from drivers import DriverError
 from hal_fakes.control import Control

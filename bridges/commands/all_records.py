@@ -16,10 +16,10 @@ from collections.abc import Collection
 from contextlib import suppress
 from pathlib import Path
 
-from bridges import log
 from bridges.commands import dead
-from bridges.log import pairs
-from bridges.serve.places import SERVICE_STATE
+from bridges.host import log
+from bridges.host.log import pairs
+from bridges.host.places import SERVICE_STATE
 from bridges.serve.record import PATTERN, read
 from bridges.settings.problems import SettingsError
 from drivers.profiles import texts

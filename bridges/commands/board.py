@@ -13,8 +13,8 @@ from typing import Final
 from msgspec import Struct
 from msgspec.structs import asdict, replace
 
-from bridges.commands.columns import aligned
 from bridges.commands.graph import SILENT_AFTER_S
+from bridges.host.columns import aligned
 from bridges.recording.heard import Heard
 from bridges.rmf import definitions as d
 from bridges.rmf import words

@@ -3,7 +3,8 @@
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from bridges.serve import directory, guard, places, record
+from bridges.host import places
+from bridges.serve import directory, guard, record
 from bridges.settings.load import Config
 from drivers import Driver, DriverError
 from drivers.hal import Bus

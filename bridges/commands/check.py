@@ -14,7 +14,7 @@ import msgspec
 
 from bridges.commands.sheets import text
 from bridges.commands.sheets.findings import Findings, findings, wrong
-from bridges.commands.written import not_written
+from bridges.host.written import not_written
 from bridges.settings.across import Found, across
 from bridges.settings.load import Config, Problem, SettingsError, load
 

@@ -10,12 +10,12 @@ import os
 from collections.abc import Mapping
 from pathlib import Path
 
-from bridges import log
-from bridges.log import pairs
+from bridges.host import log
+from bridges.host.log import pairs
+from bridges.host.places import Places, act_as_owner, by_hand, work_somewhere
 from bridges.serve import directory as runtime
 from bridges.serve import last_mark, signals
 from bridges.serve.last_shown import ages
-from bridges.serve.places import Places, act_as_owner, by_hand, work_somewhere
 from bridges.serve.record import Record, Records
 from bridges.serve.switch_off import outputs_off
 from bridges.settings.config import Config

@@ -15,12 +15,12 @@ from typing import TYPE_CHECKING, Final, TextIO
 import msgspec
 from msgspec.structs import replace
 
-from bridges import log
 from bridges.commands.by_hand import NoDevice, device_of
 from bridges.commands.completion import completed_by, device_names
 from bridges.commands.doctoring.finding import Finding, exit_code
 from bridges.commands.graph import TRANSPORTS, command_line, interruptible, overridden, seconds
-from bridges.commands.paint import bold, red
+from bridges.host import log
+from bridges.host.paint import bold, red
 from bridges.rmf.words import printable
 from bridges.settings.load import Config, SettingsError, load
 
@@ -106,7 +106,7 @@ def run(args: argparse.Namespace) -> int:
 def _form(config: Config, found: Sequence[Finding], out: Path) -> int:
     from bridges.commands.doctoring.form import form
     from bridges.commands.doctoring.machine import Machine
-    from bridges.commands.written import not_written
+    from bridges.host.written import not_written
 
     try:
         out.write_text(form(config, found, Machine()), encoding="utf-8")

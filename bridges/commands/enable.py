@@ -26,8 +26,8 @@ from bridges.commands.services import (
     switch_off,
     unit,
 )
+from bridges.host.places import GROUPS
 from bridges.serve import drop_in
-from bridges.serve.places import GROUPS
 from bridges.settings.across import taken
 from bridges.settings.load import Config, Problem, SettingsError, load
 

@@ -7,7 +7,7 @@ import time
 from datetime import datetime
 from pathlib import Path
 
-from bridges.commands.written import no_folder, not_written
+from bridges.host.written import no_folder, not_written
 from bridges.recording.bags import INSTALL
 from bridges.recording.incident import AFTER_S, BEFORE_S, Incident, Note, part
 from bridges.recording.ring import DIED, NAME, Read, RingError

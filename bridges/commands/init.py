@@ -24,7 +24,7 @@ from bridges.commands.drafts.answers import (
     Level,
     Wiring,
 )
-from bridges.commands.written import no_folder, not_written
+from bridges.host.written import no_folder, not_written
 from bridges.settings.building_map import BuildingMap, load_map
 from bridges.settings.load import understood
 from bridges.settings.nodes import SettingsError

@@ -11,8 +11,8 @@ from typing import NoReturn
 from bridges.commands.completion import completed_by, device_names, service_names
 from bridges.commands.services import CONFIG
 from bridges.commands.status import daemons, units
-from bridges.log import pairs
-from bridges.serve.places import runtimes
+from bridges.host.log import pairs
+from bridges.host.places import runtimes
 
 EX_UNAVAILABLE = 69
 ETC = Path("/") / CONFIG

@@ -14,9 +14,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Final
 
-from bridges import log
 from bridges.commands.graph import add_graph_arguments, command_line, complain, open_graph
-from bridges.serve import places
+from bridges.host import log, places
 
 INSTALL: Final = "pip install 'rmf-bridges[page]', or apt install ./rmf-bridges-page_*.deb"
 PORT: Final = 8080

@@ -10,7 +10,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from bridges.commands.completion import Completer, completed_by, device_names
-from bridges.serve.places import as_given, by_hand, opened
+from bridges.host.places import as_given, by_hand, opened
 
 ANSWER_S = 5.0
 

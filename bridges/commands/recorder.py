@@ -6,11 +6,11 @@ import sys
 from contextlib import suppress
 from pathlib import Path
 
-from bridges import log
+from bridges.host import log, places
 from bridges.recording.bags import INSTALL
 from bridges.recording.recorder import Recorder
 from bridges.recording.shelf import Shelf
-from bridges.serve import places, signals
+from bridges.serve import signals
 from bridges.serve.clock import machine_s
 from bridges.serve.notify import notify
 

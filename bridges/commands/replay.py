@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Final
 
 from bridges.commands.recordings import unreadable
-from bridges.log import plain
+from bridges.host.log import plain
 from bridges.recording.entries import Head
 from bridges.recording.files import opened
 from bridges.recording.replayed import Cores, Course, Difference, Replay, of_head

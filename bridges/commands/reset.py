@@ -5,9 +5,9 @@ import os
 import sys
 from pathlib import Path
 
+from bridges.host.places import Places, act_as_owner
 from bridges.serve import holder
 from bridges.serve.directory import find
-from bridges.serve.places import Places, act_as_owner
 from bridges.serve.signals import RESET
 
 

@@ -8,12 +8,12 @@ from pathlib import Path
 
 from msgspec.structs import replace
 
-from bridges import log
 from bridges.commands.graph import TRANSPORTS, overridden
+from bridges.host import log, places
 from bridges.rmf import ros_setup
 from bridges.rmf.transport import TransportError
 from bridges.serve import directory as runtime
-from bridges.serve import drop_in, guard, places, signals
+from bridges.serve import drop_in, guard, signals
 from bridges.serve.notify import watchdog_s
 from bridges.settings.load import Config, SettingsError, load
 from drivers.hal import HalError

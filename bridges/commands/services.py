@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from bridges.serve.files import replace
-from bridges.serve.places import SERVICE_STATE
+from bridges.host.files import replace
+from bridges.host.places import SERVICE_STATE
 from bridges.serve.record import PATTERN
 
 CONFIG: Final = Path("etc/rmf-bridges")

@@ -16,9 +16,9 @@ from contextlib import ExitStack
 from datetime import datetime
 from pathlib import Path
 
-from bridges import log
 from bridges.commands.by_hand import NoDevice, device_of, guarded
 from bridges.commands.completion import completed_by, device_names
+from bridges.host import log
 from bridges.serve import directory as runtime
 from bridges.serve import guard, signals
 from bridges.settings.load import Config, SettingsError, load

@@ -23,7 +23,7 @@ from bridges.commands.graph import (
     open_graph,
 )
 from bridges.commands.live import Ear
-from bridges.commands.paint import coloured
+from bridges.host.paint import coloured
 from bridges.rmf import topics
 from bridges.rmf.transport import Transport, TransportError
 

@@ -276,7 +276,7 @@ def _floor(floor: str, runs: Tone) -> Tone:
 
 
 def _outputs(told: str) -> Iterator[tuple[str, str]]:
-    """`agv_request yes, call L3` as the status file says it (`bridges.log.plain`)."""
+    """`agv_request yes, call L3` as the status file says it (`bridges.host.log.plain`)."""
     for part in told.split(", ") if told != "-" else ():
         name, _, value = part.partition(" ")
         if value != "0":  # of a counter

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from bridges.log import pairs
+from bridges.host.log import pairs
 from bridges.page.site import DeviceView
 from bridges.rmf import definitions as d
 from bridges.rmf.words import printable

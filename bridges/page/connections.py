@@ -11,7 +11,7 @@ from nicegui import core
 from nicegui.server import Server
 
 from bridges.core.durations import AGES_AGO
-from bridges.log import pairs
+from bridges.host.log import pairs
 from bridges.page.silent import Silent
 
 log = logging.getLogger(__name__)

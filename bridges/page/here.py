@@ -13,10 +13,10 @@ from pathlib import Path
 
 from bridges.commands.plants import ask
 from bridges.commands.status import Daemon, daemons
+from bridges.host.places import runtimes
 from bridges.page.actions import Local
 from bridges.page.levels import Levels, Rows
 from bridges.serve.diagnostics import CONTACTS
-from bridges.serve.places import runtimes
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,7 +8,7 @@ from contextlib import closing
 from queue import Empty, Full, Queue
 from typing import Final
 
-from bridges.log import pairs
+from bridges.host.log import pairs
 from bridges.page.site import HEARD, Site
 from bridges.recording.heard import Heard, bounded
 from bridges.rmf.definitions import Message

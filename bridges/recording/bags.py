@@ -13,8 +13,8 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Final
 
-from bridges import user_files
-from bridges.log import pairs
+from bridges.host import user_files
+from bridges.host.log import pairs
 from bridges.recording.entries import Spoken
 from bridges.recording.heard import Heard, Own, bounded
 from bridges.recording.incident import timed

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from pathlib import Path
 
-from bridges import user_files
+from bridges.host import user_files
 from bridges.recording.bags import INSTALL, continuous
 from bridges.recording.entries import AnyEntry, Head
 from bridges.recording.ring import MAGIC, Read, RingError

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Final
 
 from bridges.core.durations import AGES_AGO
-from bridges.log import pairs
+from bridges.host.log import pairs
 from bridges.recording.bags import CONTINUOUS
 from bridges.recording.entries import AnyEntry, Clocks, Died, Ended, Head, Known, Step
 from bridges.recording.incident import AFTER_S, BEFORE_S, Incident, Note, part

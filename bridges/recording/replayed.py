@@ -13,7 +13,7 @@ from typing import Any, Final
 
 from bridges.core.decision import Decision, IoFailed, Sampled
 from bridges.core.graph_kind import GraphKind
-from bridges.log import plain
+from bridges.host.log import plain
 from bridges.recording.entries import (
     LATEST_S,
     AnyEntry,

@@ -14,7 +14,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import IO, Final
 
-from bridges import user_files
+from bridges.host import user_files
 from bridges.recording import entries
 from bridges.recording.entries import AnyEntry, Head
 

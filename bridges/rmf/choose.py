@@ -11,7 +11,7 @@ import os
 import re
 from collections.abc import Mapping, Sequence
 
-from bridges.log import pairs
+from bridges.host.log import pairs
 from bridges.rmf.cyclone import static_peers
 from bridges.rmf.definitions import PACKAGES
 from bridges.rmf.releases import RELEASES, Release

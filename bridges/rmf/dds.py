@@ -26,7 +26,7 @@ from cyclonedds.pub import DataWriter
 from cyclonedds.qos import Policy, Qos
 from cyclonedds.topic import Topic as DdsTopic
 
-from bridges.log import pairs
+from bridges.host.log import pairs
 from bridges.rmf import addresses, cyclone, notices
 from bridges.rmf.dds_ends import DdsPublisher, DdsSubscription
 from bridges.rmf.dds_peers import DdsPeers

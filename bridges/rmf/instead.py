@@ -7,7 +7,7 @@
 import logging
 from typing import Final
 
-from bridges.log import pairs
+from bridges.host.log import pairs
 from bridges.rmf.definitions import Alert, Bool, EmergencySignal, Message
 from bridges.rmf.releases import RELEASES
 from bridges.rmf.topics import EMERGENCY_SIGNAL, FIRE_ALARM_TRIGGER, AnyTopic

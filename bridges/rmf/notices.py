@@ -2,7 +2,7 @@
 
 import logging
 
-from bridges.log import pairs
+from bridges.host.log import pairs
 from bridges.rmf.cdr import CdrError
 from bridges.rmf.definitions import Message
 from bridges.rmf.topics import AnyTopic

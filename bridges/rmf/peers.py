@@ -14,7 +14,7 @@ from typing import Final
 
 from msgspec import Struct
 
-from bridges.log import pairs
+from bridges.host.log import pairs
 from bridges.rmf import notices
 from bridges.rmf.definitions import Alert, EmergencySignal, FleetState
 from bridges.rmf.releases import DEFAULT, Release

@@ -16,7 +16,7 @@ from typing import Final
 
 from rclpy.node import Node
 
-from bridges.log import pairs
+from bridges.host.log import pairs
 from bridges.rmf import addresses, notices, ros_peers
 from bridges.rmf.ros_ends import Ends, Ros2Publisher, Ros2Subscription
 from bridges.rmf.ros_stay import REFUSALS, Stay

@@ -9,7 +9,7 @@ import logging
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from bridges.log import pairs
+from bridges.host.log import pairs
 from bridges.rmf.settings import Rmf
 from bridges.rmf.transport import TransportError
 

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import ClassVar, Final
 
-from bridges.log import pairs
+from bridges.host.log import pairs
 from bridges.rmf import addresses, wall_clock
 from bridges.rmf.peers import Peers
 from bridges.rmf.releases import Release

@@ -22,7 +22,7 @@ from typing import Final
 import zenoh
 from zenoh.handlers import Callback
 
-from bridges.log import pairs
+from bridges.host.log import pairs
 from bridges.rmf import addresses, notices, zenoh_config
 from bridges.rmf.releases import Release
 from bridges.rmf.settings import Zenoh

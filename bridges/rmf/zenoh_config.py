@@ -7,7 +7,7 @@ Source: ros2/rmw_zenoh, jazzy, DEFAULT_RMW_ZENOH_SESSION_CONFIG.json5; zenoh's D
 import re
 from typing import Final
 
-from bridges import user_files
+from bridges.host import user_files
 from bridges.rmf.settings import Zenoh, ZenohTls
 from bridges.rmf.transport import TransportError
 

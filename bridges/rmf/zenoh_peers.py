@@ -13,7 +13,7 @@ from typing import Final
 import zenoh
 from zenoh.handlers import Callback
 
-from bridges.log import pairs
+from bridges.host.log import pairs
 from bridges.rmf.peers import Announced, Peers
 from bridges.rmf.zenoh_keys import Keys, Peer
 

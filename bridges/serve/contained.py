@@ -11,7 +11,7 @@ from typing import Final, Generic, TypeVar
 
 from bridges.core.decision import O, X
 from bridges.core.durations import AGES_AGO
-from bridges.log import pairs
+from bridges.host.log import pairs
 from bridges.serve.clock import Clock
 from drivers import Driver, DriverError, OnContacts
 

@@ -15,7 +15,7 @@ from typing import Any
 import msgspec
 
 from bridges import VERSION
-from bridges.log import pairs
+from bridges.host.log import pairs
 from bridges.recording.entries import Head
 from bridges.recording.ring import Ring
 from bridges.rmf.choose import open_transport

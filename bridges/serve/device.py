@@ -24,7 +24,7 @@ from bridges.core.decision import (
 )
 from bridges.core.durations import AGES_AGO
 from bridges.core.kind import Answer, DeviceEvent, E, Kind, L, S
-from bridges.log import pairs, plain
+from bridges.host.log import pairs, plain
 from bridges.rmf.definitions import Message
 from bridges.rmf.stamps import ClockError
 from bridges.rmf.topics import Topic

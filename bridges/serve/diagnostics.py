@@ -15,7 +15,7 @@ from collections.abc import Iterator, Mapping
 from itertools import islice
 from typing import Final
 
-from bridges.log import plain
+from bridges.host.log import plain
 from bridges.rmf.definitions import (
     DiagnosticArray,
     DiagnosticLevel,

@@ -19,10 +19,9 @@ from pathlib import Path
 
 import msgspec
 
-from bridges.log import pairs
-from bridges.serve import files, holder
-from bridges.serve.holder import HOLDER, STATUS, LockHolder
-from bridges.serve.places import (
+from bridges.host import files
+from bridges.host.log import pairs
+from bridges.host.places import (
     SERVICE_RUN,
     SERVICE_STATE,
     Distrusted,
@@ -34,6 +33,8 @@ from bridges.serve.places import (
     opened,
     state_base,
 )
+from bridges.serve import holder
+from bridges.serve.holder import HOLDER, STATUS, LockHolder
 from bridges.serve.record import Record, Records, paths, read
 
 log = logging.getLogger(__name__)
@@ -51,7 +52,7 @@ class AlreadyRunning(Exception):
 
 
 def find(file: Path, given: str | None) -> Places:
-    """The directories of this file's daemon, by the one rule (`bridges/serve/places.py`).
+    """The directories of this file's daemon, by the one rule (`bridges/host/places.py`).
 
     Raises PermissionError if the service's directory cannot be read.
     """

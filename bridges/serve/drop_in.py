@@ -9,9 +9,9 @@ import ipaddress
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from typing import Final
 
+from bridges.host.places import GROUPS
 from bridges.rmf.settings import Rmf, Zenoh
 from bridges.rmf.zenoh_config import mode
-from bridges.serve.places import GROUPS
 from bridges.settings.config import Config
 from drivers.hal import Needs
 

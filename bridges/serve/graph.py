@@ -13,7 +13,7 @@ from bridges.core.decision import Fault, M, OperatorReset, R, RequestRefused
 from bridges.core.durations import NEVER
 from bridges.core.graph_kind import GraphEvent, GraphKind, MaySpeak, Woken
 from bridges.core.kind import E, L, S
-from bridges.log import pairs
+from bridges.host.log import pairs
 from bridges.rmf.definitions import Message
 from bridges.rmf.stamps import ClockError, stamp
 from bridges.rmf.topics import Topic

@@ -11,8 +11,8 @@ from typing import Final
 
 import msgspec
 
-from bridges.serve.files import read
-from bridges.serve.places import Distrusted, Places, cannot_be_seen, named, opened
+from bridges.host.files import read
+from bridges.host.places import Distrusted, Places, cannot_be_seen, named, opened
 
 HOLDER: Final = "holder.json"
 STATUS: Final = "status.json"

@@ -12,7 +12,7 @@ from bridges.core.decision import Fault, M, R
 from bridges.core.durations import AGES_AGO, NEVER
 from bridges.core.graph_kind import GraphKind
 from bridges.core.kind import E, L, S
-from bridges.log import pairs
+from bridges.host.log import pairs
 from bridges.serve.clock import Pace
 from bridges.serve.subject import Publish
 

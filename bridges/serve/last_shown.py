@@ -4,9 +4,9 @@ from collections.abc import Mapping
 
 import msgspec
 
-from bridges.serve.files import read
+from bridges.host.files import read
+from bridges.host.places import Places
 from bridges.serve.holder import STATUS, STATUS_MAX
-from bridges.serve.places import Places
 
 
 class _Device(msgspec.Struct):

@@ -13,7 +13,7 @@ import logging
 from collections.abc import Collection, Sequence
 
 from bridges.core.durations import AGES_AGO, NEVER
-from bridges.log import pairs
+from bridges.host.log import pairs
 from bridges.serve.clock import Clock
 from bridges.serve.device import AnyNode
 from bridges.serve.inbox import Inbox

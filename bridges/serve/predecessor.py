@@ -12,7 +12,7 @@ import time
 from collections.abc import Callable, Collection, Sequence
 from typing import Any
 
-from bridges.log import pairs
+from bridges.host.log import pairs
 from bridges.serve.record import Record, Records
 from drivers import Driver
 

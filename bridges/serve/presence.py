@@ -13,7 +13,7 @@ from bridges.core.decision import Fault
 from bridges.core.durations import AGES_AGO, NEVER
 from bridges.core.graph_kind import LISTENS
 from bridges.core.names import LONGEST_NAME
-from bridges.log import pairs
+from bridges.host.log import pairs
 from bridges.rmf.definitions import Message
 from bridges.rmf.topics import Topic
 from bridges.rmf.transport import Subscription, Transport

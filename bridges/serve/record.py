@@ -18,10 +18,10 @@ from pathlib import Path
 import msgspec
 
 from bridges import BUILD, VERSION
-from bridges.log import pairs
+from bridges.host import files
+from bridges.host.log import pairs
+from bridges.host.places import Places, named, opened
 from bridges.rmf.settings import Rmf
-from bridges.serve import files
-from bridges.serve.places import Places, named, opened
 from bridges.settings import names
 from bridges.settings.config import Config
 from drivers.profiles import texts

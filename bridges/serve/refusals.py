@@ -5,7 +5,7 @@ import threading
 from collections import Counter
 
 from bridges.core.decision import EXPECTED
-from bridges.log import pairs
+from bridges.host.log import pairs
 
 log = logging.getLogger(__name__)
 

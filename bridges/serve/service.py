@@ -13,7 +13,7 @@ from bridges.core.decision import Attended, OperatorReset
 from bridges.core.graph_kind import GraphKind
 from bridges.core.kind import AnyDeviceKind
 from bridges.core.names import LONGEST_NAME
-from bridges.log import pairs
+from bridges.host.log import pairs
 from bridges.rmf.definitions import Message
 from bridges.rmf.topics import M_co, Topic
 from bridges.rmf.transport import Subscription, Transport

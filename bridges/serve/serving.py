@@ -6,7 +6,7 @@ import time
 from collections.abc import Sequence
 from typing import Protocol
 
-from bridges.log import pairs
+from bridges.host.log import pairs
 from bridges.serve.clock import Clock
 from bridges.serve.contained import LeftOn
 

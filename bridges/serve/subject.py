@@ -9,7 +9,7 @@ from msgspec import Struct
 
 from bridges.core.decision import Decision, Fault, M, O, R
 from bridges.core.durations import NEVER
-from bridges.log import pairs, plain
+from bridges.host.log import pairs, plain
 from bridges.rmf.definitions import Message
 from bridges.rmf.topics import Topic
 from bridges.serve.clock import Clock

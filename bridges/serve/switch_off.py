@@ -10,7 +10,7 @@ import threading
 import time
 from collections.abc import Collection, Mapping, Sequence
 
-from bridges.log import pairs
+from bridges.host.log import pairs
 from bridges.settings.config import Config
 from drivers import DriverError
 from drivers.hal import Bus, HalError

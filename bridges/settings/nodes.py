@@ -14,7 +14,7 @@ from msgspec import Struct
 from yaml import AliasEvent, MappingNode, Mark, MarkedYAMLError, Node, ScalarNode, SequenceNode
 from yaml.reader import ReaderError
 
-from bridges import user_files
+from bridges.host import user_files
 from bridges.rmf.words import printable
 from bridges.settings import slips
 from bridges.settings.problems import Problem as Problem

@@ -12,9 +12,9 @@ import pytest
 
 from bridges import cli
 from bridges.commands import log
-from bridges.log import pairs
+from bridges.host.log import pairs
+from bridges.host.places import by_hand
 from bridges.serve.directory import RuntimeDirectory
-from bridges.serve.places import by_hand
 
 LINES = [
     pairs("state", device="Lift1", mode="AGV"),

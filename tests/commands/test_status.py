@@ -11,8 +11,8 @@ import pytest
 from bridges import cli
 from bridges.commands import faults, status
 from bridges.commands.status import DOWN, FAULTY, NONE, WELL, Daemon, daemons, show
+from bridges.host.places import Places
 from bridges.serve.holder import HOLDER
-from bridges.serve.places import Places
 from bridges.serve.record import Records, of
 from bridges.settings.load import load
 from tests.commands.runtime import served

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from bridges.serve import places
+from bridges.host import places
 from tests.serve.site import Graph, Module
 
 

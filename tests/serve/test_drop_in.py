@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 
 from bridges.commands.run import too_slow
+from bridges.host.places import GROUPS
 from bridges.serve.drop_in import FITS, fits, misfit, text, watchdog_s
-from bridges.serve.places import GROUPS
 from bridges.settings.examples import device_yamls
 from bridges.settings.load import Config, load, understood
 

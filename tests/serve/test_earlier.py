@@ -14,8 +14,8 @@ import pytest
 from bridges.charger_coordinator import keep as coordinator
 from bridges.door_supervisor import keep as doors
 from bridges.door_supervisor.settings import Settings as DoorSupervisor
+from bridges.host.places import Places
 from bridges.serve.drop_in import FITS, misfit
-from bridges.serve.places import Places
 from bridges.serve.record import PATTERN, Records, read
 from bridges.settings.load import load
 from drivers.profiles import texts

@@ -11,10 +11,10 @@ from pathlib import Path
 
 import pytest
 
+from bridges.host.places import Places
 from bridges.serve import record
 from bridges.serve.directory import LOCK, RuntimeDirectory
 from bridges.serve.holder import HOLDER
-from bridges.serve.places import Places
 from bridges.settings.load import load
 from tests.serve.hostile import NOBODY, group_member, unit
 from tests.serve.site import Graph, Module, command, daemon, environment, hold_open

@@ -10,9 +10,10 @@ import pytest
 
 from bridges import cli
 from bridges.commands import status
-from bridges.serve import directory, holder, places
+from bridges.host import places
+from bridges.host.places import Distrusted, Places, opened
+from bridges.serve import directory, holder
 from bridges.serve.directory import KEPT, MemoryFile, RuntimeDirectory, state_file
-from bridges.serve.places import Distrusted, Places, opened
 from bridges.serve.record import Record
 
 NOBODY = 65534

@@ -11,6 +11,7 @@ import msgspec
 import pytest
 from msgspec.structs import replace
 
+from bridges.host.places import Places
 from bridges.serve.directory import (
     LOCK,
     AlreadyRunning,
@@ -20,7 +21,6 @@ from bridges.serve.directory import (
     state_file,
 )
 from bridges.serve.holder import HOLDER, LockHolder, look, ourselves
-from bridges.serve.places import Places
 from bridges.serve.record import Record
 from tests.depth import depth
 
@@ -184,7 +184,7 @@ def test_a_directory_that_was_removed_is_made_again_with_its_lock_and_its_record
 def test_a_start_waits_while_outputs_are_being_switched_off(tmp_path: Path) -> None:
     text = (
         "import sys; from pathlib import Path; from bridges.serve.directory import *;"
-        "from bridges.serve.places import Places; p = Path(sys.argv[1]);"
+        "from bridges.host.places import Places; p = Path(sys.argv[1]);"
         "d = RuntimeDirectory(Places(p, p), Path('x'), serves=False);"
         "print('held', flush=True); sys.stdin.read()"
     )

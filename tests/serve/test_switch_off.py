@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
+from bridges.host.places import Places
 from bridges.serve.last_shown import ages
-from bridges.serve.places import Places
 from bridges.serve.switch_off import outputs_off
 from bridges.settings.load import load
 from tests.drivers.hal.modbus.module import Module, door

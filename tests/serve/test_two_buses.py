@@ -11,9 +11,9 @@ import pytest
 from msgspec.structs import replace
 
 from bridges.commands import dead
+from bridges.host.places import Places
 from bridges.rmf.definitions import DoorModeValue
 from bridges.serve import record
-from bridges.serve.places import Places
 from bridges.serve.record import Records
 from bridges.settings.load import Config, load
 from tests.depth import depth

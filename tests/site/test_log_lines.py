@@ -10,7 +10,7 @@ from collections.abc import Callable
 
 import pytest
 
-from bridges import log
+from bridges.host import log
 from bridges.rmf import definitions as d
 from bridges.rmf import topics
 from bridges.rmf.transport import TransportError

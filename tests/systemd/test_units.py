@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from bridges.host.places import GROUPS
 from bridges.serve.drop_in import text
-from bridges.serve.places import GROUPS
 from bridges.settings.examples import device_yamls
 from bridges.settings.load import load
 

@@ -8,9 +8,9 @@ import tempfile
 import threading
 from pathlib import Path
 
+from bridges.host.places import Distrusted, Places
 from bridges.serve import holder
 from bridges.serve.directory import RuntimeDirectory
-from bridges.serve.places import Distrusted, Places
 from tests.serve.hostile import (
     NOBODY,
     group_member,

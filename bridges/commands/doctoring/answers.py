@@ -12,7 +12,7 @@ from typing import Any, Final
 import msgspec
 
 from bridges.commands.doctoring.finding import Finding, note, ok, warning, wrong
-from bridges.log import plain
+from bridges.host.log import plain
 from bridges.settings.load import Config
 from drivers import DriverError
 from drivers.hal import Bus, HalError

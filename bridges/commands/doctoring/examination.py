@@ -14,9 +14,9 @@ from bridges.commands.doctoring.machine import Machine
 from bridges.commands.doctoring.served import DAEMON, NOT_ASKED, Served, served, unseen
 from bridges.commands.doctoring.users import User, user, users
 from bridges.commands.graph import CommandLine
+from bridges.host import places as kept
+from bridges.host.places import Places
 from bridges.serve import directory
-from bridges.serve import places as kept
-from bridges.serve.places import Places
 from bridges.settings.load import Config
 from drivers.hal.gpio.header import canonical
 

@@ -8,7 +8,7 @@ from typing import Final
 from bridges.commands.doctoring.finding import Finding, note, ok, warning, wrong
 from bridges.commands.doctoring.machine import Machine
 from bridges.commands.doctoring.users import User
-from bridges.serve.places import Places
+from bridges.host.places import Places
 
 FREE_LEAST: Final = 50 << 20
 """With less free space than this (bytes) a growing log soon fills the disk."""

@@ -18,7 +18,7 @@ from typing import Final
 
 from bridges.commands.doctoring.finding import Finding, ok, warning, wrong
 from bridges.commands.walking.core import Step
-from bridges.serve.places import Places
+from bridges.host.places import Places
 from bridges.serve.record import Records
 
 KILL_TEST: Final = "kill test"

@@ -11,8 +11,8 @@ from typing import Final
 from bridges.commands.doctoring.finding import Finding, note, ok, warning, wrong
 from bridges.commands.faults import remedies
 from bridges.commands.status import Daemon, daemons
+from bridges.host.places import Places
 from bridges.serve import holder
-from bridges.serve.places import Places
 from bridges.serve.record import Records
 from bridges.serve.subject import Status
 

@@ -12,7 +12,7 @@ from typing import Final
 
 from bridges.commands.doctoring.finding import Finding, note, ok, wrong
 from bridges.commands.doctoring.machine import Machine
-from bridges.serve.places import GROUPS, SERVICE_USER
+from bridges.host.places import GROUPS, SERVICE_USER
 
 UNITS: Final = ("/etc/systemd/system", "/usr/lib/systemd/system", "/lib/systemd/system")
 UNIT: Final = "rmf-bridge@.service"

@@ -2,9 +2,9 @@
 
 from collections.abc import Iterator, Sequence
 
-from bridges.commands.columns import aligned
 from bridges.commands.sheets.findings import MEANINGS, WIRES, BusShown, Findings, Part
 from bridges.core.table import Table
+from bridges.host.columns import aligned
 
 
 def lines(findings: Findings) -> list[str]:

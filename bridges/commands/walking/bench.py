@@ -11,7 +11,7 @@ from bridges.commands.by_hand import not_off
 from bridges.commands.walking import core
 from bridges.commands.walking.core import Event, Lost, Memory, Read, Step, Tick
 from bridges.commands.walking.tap import Tap
-from bridges.log import plain
+from bridges.host.log import plain
 from drivers import Driver, DriverError
 from drivers.hal.points import Wire
 

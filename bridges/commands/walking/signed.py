@@ -10,7 +10,7 @@ from typing import Any
 from bridges import VERSION
 from bridges.commands.walking.bench import Input
 from bridges.commands.walking.core import Memory, Step
-from bridges.serve.files import replace
+from bridges.host.files import replace
 
 NOT_TRIED = "not tried"
 

@@ -12,7 +12,7 @@ from bridges.commands.doctoring.finding import Finding, exit_code, note, ok, war
 from bridges.commands.doctoring.machine import Machine
 from bridges.commands.doctoring.ports import port
 from bridges.commands.doctoring.users import UNIT, user, users
-from bridges.serve.places import Places
+from bridges.host.places import Places
 from tests.commands.doctoring.made_up import OTHERS, OURS, MadeUp
 
 BY_ID = "/dev/serial/by-id/usb-FTDI_RS485-if00-port0"

@@ -9,8 +9,8 @@ from msgspec import Struct
 
 from bridges.core.decision import OperatorReset
 from bridges.door.signals import DoorOutputs
+from bridges.host.log import Seldom, _Formatter, _Json, pairs, plain
 from bridges.lift.signals import LiftOutputs, Side
-from bridges.log import Seldom, _Formatter, _Json, pairs, plain
 from bridges.rmf.definitions import LiftMode
 
 
