@@ -4,10 +4,10 @@ import signal
 import sys
 import threading
 
+from bridges.messages.definitions import LiftRequest, LiftState
+from bridges.messages.topics import LIFT_REQUESTS, LIFT_STATES
 from bridges.rmf.choose import open_transport
-from bridges.rmf.definitions import LiftRequest, LiftState
 from bridges.rmf.settings import Rmf
-from bridges.rmf.topics import LIFT_REQUESTS, LIFT_STATES
 from hal_fakes.wire import Wire
 
 

@@ -19,9 +19,9 @@ from bench.charger_servers import PERIOD_S, TIMEOUT_S, chargers_at, http_charger
 from bench.daemons import SETTLE_S, Content, daemon, graph, ready
 from bench.figures import Row, Rows, Tables, percentiles
 from bench.idle import doors
-from bridges.rmf.definitions import ChargerState, DoorState
-from bridges.rmf.stamps import in_seconds
-from bridges.rmf.topics import CHARGER_STATES, DOOR_STATES
+from bridges.messages.definitions import ChargerState, DoorState
+from bridges.messages.stamps import in_seconds
+from bridges.messages.topics import CHARGER_STATES, DOOR_STATES
 from bridges.settings.load import Config, load
 from drivers.door.dry_contact import create
 from drivers.hal.can import CanBus, Frame, Settings, Wanted

@@ -15,10 +15,10 @@ from typing import Any
 
 from msgspec.structs import replace
 
-from bridges.recording.heard import Heard
-from bridges.rmf import definitions as d
-from bridges.rmf.releases import NEWEST
-from bridges.rmf.stamps import stamp
+from bridges.messages import definitions as d
+from bridges.messages.heard import Heard
+from bridges.messages.releases import NEWEST
+from bridges.messages.stamps import stamp
 
 DAY_S, RIDES = 86400, 4000
 EPOCH = 1_800_000_000.0

@@ -14,9 +14,9 @@ from typing import Any
 from msgspec.structs import replace
 
 from bench.daemons import DOMAIN, cpu_s, daemon, memory_mb, ready, shipped
+from bridges.messages.definitions import LiftRequest, LiftState
+from bridges.messages.topics import LIFT_REQUESTS, LIFT_STATES
 from bridges.rmf.dds import DdsTransport
-from bridges.rmf.definitions import LiftRequest, LiftState
-from bridges.rmf.topics import LIFT_REQUESTS, LIFT_STATES
 from bridges.rmf.transport import Publisher
 
 SECONDS = 60.0

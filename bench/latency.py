@@ -24,9 +24,9 @@ from bench.daemons import (
     shipped,
 )
 from bench.figures import Rows, Tables, compared
+from bridges.messages.definitions import LiftMode, LiftRequest, LiftRequestType, LiftState
+from bridges.messages.topics import LIFT_REQUESTS, LIFT_STATES
 from bridges.rmf.choose import missing_of_ros
-from bridges.rmf.definitions import LiftMode, LiftRequest, LiftRequestType, LiftState
-from bridges.rmf.topics import LIFT_REQUESTS, LIFT_STATES
 from bridges.rmf.transport import Transport
 from bridges.settings.load import load
 from drivers.hal.gpio import canonical

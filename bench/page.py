@@ -24,9 +24,9 @@ from msgspec.structs import replace
 from playwright.sync_api import Page, Playwright, sync_playwright
 
 from bench.figures import Row, Rows, Tables, percentiles
-from bridges.rmf import definitions as d
-from bridges.rmf import topics
-from bridges.rmf.stamps import stamp
+from bridges.messages import definitions as d
+from bridges.messages import topics
+from bridges.messages.stamps import stamp
 from bridges.serve.diagnostics import diagnosis
 from hal_fakes.domain import free_domain
 from hal_fakes.wire import join, wire

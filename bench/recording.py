@@ -15,6 +15,8 @@ from bridges.core.decision import Sampled
 from bridges.lift import KIND
 from bridges.lift.messages import state_message
 from bridges.lift.signals import Door, Ended, LiftSample, Requested
+from bridges.messages.definitions import LiftRequest, Time
+from bridges.messages.releases import JAZZY
 from bridges.recording.bags import heard_in
 from bridges.recording.entries import Head
 from bridges.recording.files import opened
@@ -24,8 +26,6 @@ from bridges.recording.ring import Ring
 from bridges.recording.settings import Recording
 from bridges.recording.shelf import Shelf
 from bridges.recording.sources import Notes
-from bridges.rmf.definitions import LiftRequest, Time
-from bridges.rmf.releases import JAZZY
 from bridges.serve.clock import Clock
 from bridges.serve.refusals import Refusals
 from bridges.serve.subject import Core, Subject

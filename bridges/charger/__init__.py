@@ -7,7 +7,7 @@ from bridges.charger.settings import ChargerSettings
 from bridges.charger.signals import Cancelled, ChargerOutputs, ChargerSample, Requested
 from bridges.core.kind import Kind
 from bridges.core.recorded import Recorded
-from bridges.rmf.topics import (
+from bridges.messages.topics import (
     CHARGER_CANCELS,
     CHARGER_REFUSALS,
     CHARGER_REQUESTS,

@@ -7,7 +7,7 @@ from bridges.charger.settings import ChargerSettings
 from bridges.charger.signals import Cancelled, Requested
 from bridges.core.decision import RequestRefused
 from bridges.core.names import check_length
-from bridges.rmf.definitions import (
+from bridges.messages.definitions import (
     ChargerCancel,
     ChargerRequest,
     ChargerState,
@@ -15,7 +15,7 @@ from bridges.rmf.definitions import (
     Duration,
     Time,
 )
-from bridges.rmf.stamps import duration, in_seconds
+from bridges.messages.stamps import duration, in_seconds
 
 LONGEST_TIMEOUT_S = 86400.0
 """A day. A longer timeout must be a mistaken unit."""

@@ -15,8 +15,8 @@ from bridges.charger.settings import Robot
 from bridges.charger.signals import Requested
 from bridges.core.kind import Answer
 from bridges.core.names import LONGEST_NAME
-from bridges.rmf.definitions import ChargerRequest, DiagnosticLevel, DiagnosticStatus, KeyValue
-from bridges.rmf.topics import CHARGER_REFUSALS
+from bridges.messages.definitions import ChargerRequest, DiagnosticLevel, DiagnosticStatus, KeyValue
+from bridges.messages.topics import CHARGER_REFUSALS
 
 NAME = "ChargerRequest refused"
 OCCUPIED = "charger occupied"

@@ -16,7 +16,7 @@ from bridges.charger.session import cleared_to_start
 from bridges.charger.settings import Robot
 from bridges.charger.signals import CURRENT_FLOWS, Activity, ChargerSample, Measured
 from bridges.core.decision import Fault
-from bridges.rmf.definitions import ChargerStateValue
+from bridges.messages.definitions import ChargerStateValue
 
 IDLE = ChargerStateValue.CHARGER_IDLE
 ASSIGNED = ChargerStateValue.CHARGER_ASSIGNED

@@ -15,7 +15,7 @@ from bridges.charger_coordinator.signals import (
 from bridges.core.fields import quiet_s
 from bridges.core.graph_kind import GraphKind
 from bridges.core.recorded import Recorded
-from bridges.rmf.topics import (
+from bridges.messages.topics import (
     ADAPTER_CHARGER_CANCELS,
     ADAPTER_CHARGER_REQUESTS,
     ALERT,

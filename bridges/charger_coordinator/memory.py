@@ -14,7 +14,7 @@ from bridges.charger_coordinator.settings import Settings
 from bridges.charger_coordinator.signals import Sighting, Wanted
 from bridges.core.durations import AGES_AGO
 from bridges.core.graph_kind import LISTENS
-from bridges.rmf.definitions import ChargerStateValue, ChargingAssignments
+from bridges.messages.definitions import ChargerStateValue, ChargingAssignments
 
 K = TypeVar("K")
 V = TypeVar("V")

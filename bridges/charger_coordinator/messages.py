@@ -27,10 +27,10 @@ from bridges.charger_coordinator.signals import (
 from bridges.core.decision import RequestRefused
 from bridges.core.kind import Answer
 from bridges.core.names import LONGEST_TEXT, check_length
-from bridges.rmf import definitions as d
-from bridges.rmf.definitions import Time
-from bridges.rmf.stamps import in_seconds
-from bridges.rmf.topics import CHARGER_REFUSALS
+from bridges.messages import definitions as d
+from bridges.messages.definitions import Time
+from bridges.messages.stamps import in_seconds
+from bridges.messages.topics import CHARGER_REFUSALS
 
 CHARGE = d.ChargingMode.MODE_CHARGE
 CHARGES = (d.RobotModeValue.MODE_CHARGING, d.RobotModeValue.MODE_DOCKING)

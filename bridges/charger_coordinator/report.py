@@ -33,9 +33,9 @@ from bridges.charger_coordinator.memory import (
 from bridges.charger_coordinator.reasons import queued, reasons
 from bridges.core.decision import Fault
 from bridges.core.durations import due_at
-from bridges.rmf import definitions as d
-from bridges.rmf.stamps import duration
-from bridges.rmf.topics import (
+from bridges.messages import definitions as d
+from bridges.messages.stamps import duration
+from bridges.messages.topics import (
     ALERT,
     CHARGER_CANCELS,
     CHARGER_REQUESTS,

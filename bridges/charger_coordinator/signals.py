@@ -9,7 +9,7 @@ from bridges.charger.settings import Robot
 from bridges.charger_coordinator.schedule import LocalTime
 from bridges.core.decision import OperatorReset
 from bridges.core.graph_kind import MaySpeak, Woken
-from bridges.rmf.definitions import ChargerStateValue
+from bridges.messages.definitions import ChargerStateValue
 
 _DISPATCHED: Final = re.compile(r"(?!charge)[^.]+\.dispatch-")
 """RMF's dispatcher names a task CATEGORY.dispatch-NUMBER, and its adapters call their own charging task

@@ -15,9 +15,9 @@ from msgspec.structs import asdict, replace
 
 from bridges.commands.graph import SILENT_AFTER_S
 from bridges.host.columns import aligned
-from bridges.recording.heard import Heard
-from bridges.rmf import definitions as d
-from bridges.rmf import words
+from bridges.messages import definitions as d
+from bridges.messages import words
+from bridges.messages.heard import Heard
 from bridges.serve import diagnostics
 
 KINDS: Final = {d.LiftState: "lift", d.DoorState: "door", d.ChargerState: "charger"}

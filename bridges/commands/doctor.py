@@ -21,7 +21,7 @@ from bridges.commands.doctoring.finding import Finding, exit_code
 from bridges.commands.graph import TRANSPORTS, command_line, interruptible, overridden, seconds
 from bridges.host import log
 from bridges.host.paint import bold, red
-from bridges.rmf.words import printable
+from bridges.messages.words import printable
 from bridges.settings.load import Config, SettingsError, load
 
 if TYPE_CHECKING:

@@ -11,7 +11,7 @@ from typing import Final
 
 from bridges.commands.graph import SILENT_AFTER_S
 from bridges.commands.requests import Done, Failed, Obstacle, Request, Seen
-from bridges.rmf import words
+from bridges.messages import words
 
 REPEAT_S: Final = 1.0
 PATIENCE_S: Final = 2.0

@@ -13,7 +13,7 @@ from types import FrameType
 
 import msgspec
 
-from bridges.rmf import words
+from bridges.messages import words
 from bridges.rmf.renamed import Renamed
 from bridges.rmf.settings import Rmf
 from bridges.rmf.transport import Transport, TransportError

@@ -31,10 +31,10 @@ from bridges.judge.law import Verdict, shown
 from bridges.judge.plays import FLEET, Charge, Passages, Performance, Ride
 from bridges.judge.report import Report, as_json, junit, markdown, report, text, verdict
 from bridges.judge.stage import Stage
-from bridges.recording.heard import Heard
+from bridges.messages import topics
+from bridges.messages.definitions import Message
+from bridges.messages.heard import Heard
 from bridges.recording.sources import BagError
-from bridges.rmf import topics
-from bridges.rmf.definitions import Message
 from bridges.rmf.transport import Publisher, Transport, TransportError
 from bridges.rmf_rules import NEVER, Said
 

@@ -6,10 +6,10 @@ from functools import partial
 from queue import Empty, SimpleQueue
 from typing import Final
 
-from bridges.recording.heard import Heard, bounded
-from bridges.rmf import topics
-from bridges.rmf.definitions import Message
-from bridges.rmf.topics import AnyTopic
+from bridges.messages import topics
+from bridges.messages.definitions import Message
+from bridges.messages.heard import Heard, bounded
+from bridges.messages.topics import AnyTopic
 from bridges.rmf.transport import Subscription, Transport
 
 OF_DEVICES: Final[tuple[AnyTopic, ...]] = (

@@ -12,10 +12,10 @@ from pathlib import Path
 from bridges.commands.graph import complain
 from bridges.explain import noted
 from bridges.explain.noted import OWN_TOPICS
+from bridges.messages import topics
+from bridges.messages.heard import Heard, Own
 from bridges.recording.bags import Keep, all_in
-from bridges.recording.heard import Heard, Own
 from bridges.recording.sources import BagError, Notes
-from bridges.rmf import topics
 
 CLOCK = re.compile(r"(?:(\d{4}-\d\d-\d\d)[ T])?(\d\d?):(\d\d)(?::(\d\d(?:\.\d+)?))?")
 SAME_S = 2.4

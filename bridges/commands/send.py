@@ -28,10 +28,10 @@ from bridges.commands.requests import Done, Failed, Request, Seen
 from bridges.commands.requests.charger import Charge, ChargeCancel, QueuedCancel, QueuedCharge
 from bridges.commands.requests.door import DoorMove
 from bridges.commands.requests.lift import LiftEnd, LiftRide
-from bridges.recording.heard import Heard
-from bridges.rmf import definitions as d
-from bridges.rmf import topics, words
-from bridges.rmf.stamps import stamp
+from bridges.messages import definitions as d
+from bridges.messages import topics, words
+from bridges.messages.heard import Heard
+from bridges.messages.stamps import stamp
 from bridges.rmf.transport import Publisher, Transport, TransportError
 
 NODE_NAME = "rmf_bridge_send"

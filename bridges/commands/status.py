@@ -21,7 +21,7 @@ from bridges.commands.faults import Remedy, here, remedies, values
 from bridges.host import files
 from bridges.host.paint import bold, red
 from bridges.host.places import SERVICE_RUN, SERVICE_STATE, Places, owner_of, runtimes, state_base
-from bridges.rmf.words import printable
+from bridges.messages.words import printable
 from bridges.serve import holder
 from bridges.serve.record import paths, read
 from bridges.serve.subject import Status

@@ -24,7 +24,7 @@ from bridges.commands.graph import (
 )
 from bridges.commands.live import Ear
 from bridges.host.paint import coloured
-from bridges.rmf import topics
+from bridges.messages import topics
 from bridges.rmf.transport import Transport, TransportError
 
 REDRAW_S = 0.5

@@ -10,8 +10,8 @@ from typing import Generic, Protocol, TypeVar
 
 import msgspec
 
-from bridges.rmf.definitions import Message
-from bridges.rmf.topics import Topic
+from bridges.messages.definitions import Message
+from bridges.messages.topics import Topic
 
 X = TypeVar("X")
 """A sample, as a driver decodes it."""

@@ -28,7 +28,7 @@ from msgspec.structs import replace
 
 from bridges.core.decision import RequestRefused
 from bridges.core.durations import AGES_AGO, FORGOTTEN_S, NEVER
-from bridges.rmf.definitions import Time
+from bridges.messages.definitions import Time
 
 REPLAY_S: Final = 1.0
 """A replay comes in a burst; a live requester repeats itself at 1 Hz."""

@@ -13,8 +13,8 @@ from msgspec import Struct
 from bridges.core.decision import Decision, M, OperatorReset, R
 from bridges.core.kind import Answer, AnyDeviceKind, E, L, Place, S
 from bridges.core.table import Table
-from bridges.rmf.definitions import Message, Time
-from bridges.rmf.topics import Topic
+from bridges.messages.definitions import Message, Time
+from bridges.messages.topics import Topic
 
 LISTENS: Final = "for the end of the quiet start"
 

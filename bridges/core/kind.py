@@ -20,8 +20,8 @@ from bridges.core.decision import (
     Sampled,
     X,
 )
-from bridges.rmf.definitions import Message, Time
-from bridges.rmf.topics import Topic
+from bridges.messages.definitions import Message, Time
+from bridges.messages.topics import Topic
 
 S = TypeVar("S")
 """The settings of one device, or of a kind without hardware."""

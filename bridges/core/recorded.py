@@ -8,8 +8,8 @@ from collections.abc import Mapping
 from typing import Any, Final
 
 from bridges.core import debounce, decision, freshness, graph_kind
-from bridges.rmf import constants
-from bridges.rmf.definitions import PACKAGES
+from bridges.messages import constants
+from bridges.messages.definitions import PACKAGES
 
 Recorded = Mapping[str, type[Any]]
 """Name -> type. A type has one name, under which it is written; it begins with that of its kind."""

@@ -8,7 +8,7 @@ from bridges.door.memory import DoorLimits, Memory
 from bridges.door.report import DoorReport
 from bridges.door.settings import DoorSettings
 from bridges.door.signals import CloseRequested, DoorOutputs, DoorSample, OpenRequested
-from bridges.rmf import topics
+from bridges.messages import topics
 
 KIND: Kind[
     DoorSettings,

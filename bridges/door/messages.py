@@ -7,7 +7,7 @@ from bridges.core.names import check_length
 from bridges.door.report import DoorReport
 from bridges.door.settings import DoorSettings
 from bridges.door.signals import CloseRequested, OpenRequested
-from bridges.rmf.definitions import DoorMode, DoorModeValue, DoorRequest, DoorState, Time
+from bridges.messages.definitions import DoorMode, DoorModeValue, DoorRequest, DoorState, Time
 
 
 def accept(message: DoorRequest, settings: DoorSettings) -> OpenRequested | CloseRequested:

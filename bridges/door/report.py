@@ -15,7 +15,7 @@ from bridges.door.memory import (
     travel_ends_at,
 )
 from bridges.door.sensing import View, released_by_fire
-from bridges.rmf.definitions import DoorModeValue
+from bridges.messages.definitions import DoorModeValue
 
 
 class DoorReport(msgspec.Struct, frozen=True):

@@ -8,7 +8,7 @@ from bridges.door_supervisor.memory import Limits, Memory
 from bridges.door_supervisor.report import DoorHoldReport
 from bridges.door_supervisor.settings import Settings, speaks_of
 from bridges.door_supervisor.signals import CloseRequested, OpenRequested, StateHeard
-from bridges.rmf.topics import (
+from bridges.messages.topics import (
     ADAPTER_DOOR_REQUESTS,
     DOOR_REQUESTS,
     DOOR_STATES,

@@ -33,8 +33,8 @@ from bridges.core.graph_kind import MaySpeak
 from bridges.door_supervisor.memory import Holder, Limits, Memory
 from bridges.door_supervisor.report import DoorHoldReport, report
 from bridges.door_supervisor.signals import CloseRequested, Event, OpenRequested, StateHeard
-from bridges.rmf.definitions import DoorMode, DoorRequest
-from bridges.rmf.topics import DOOR_REQUESTS
+from bridges.messages.definitions import DoorMode, DoorRequest
+from bridges.messages.topics import DOOR_REQUESTS
 
 REQUESTER_ID: Final = "door_supervisor"
 """The requester_id that RMF's own uses (door_supervisor/Node.hpp)."""

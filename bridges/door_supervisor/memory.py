@@ -9,7 +9,7 @@ from bridges.core.durations import AGES_AGO, NEVER, SILENT_S
 from bridges.core.freshness import Requesters
 from bridges.core.graph_kind import LISTENS
 from bridges.door_supervisor.settings import Settings
-from bridges.rmf.definitions import DoorModeValue
+from bridges.messages.definitions import DoorModeValue
 
 VISIT_S: Final = 2.5
 """A waiting robot repeats OPEN at 1 Hz. An OPEN after a longer silence than this is a new visit."""

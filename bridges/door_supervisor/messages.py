@@ -11,7 +11,13 @@ from bridges.door_supervisor.core import REQUESTER_ID
 from bridges.door_supervisor.report import DoorHoldReport
 from bridges.door_supervisor.settings import Settings
 from bridges.door_supervisor.signals import CloseRequested, OpenRequested, StateHeard
-from bridges.rmf.definitions import DoorModeValue, DoorRequest, DoorState, SupervisorHeartbeat, Time
+from bridges.messages.definitions import (
+    DoorModeValue,
+    DoorRequest,
+    DoorState,
+    SupervisorHeartbeat,
+    Time,
+)
 
 
 def accept_request(

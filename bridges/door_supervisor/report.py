@@ -13,14 +13,14 @@ import msgspec
 from bridges.core.decision import Fault
 from bridges.core.freshness import SECOND_NS
 from bridges.door_supervisor.memory import Holder, Limits, Memory
-from bridges.rmf.definitions import (
+from bridges.messages.definitions import (
     DoorModeValue,
     DoorSessions,
     Session,
     SupervisorHeartbeat,
     Time,
 )
-from bridges.rmf.topics import DOOR_SUPERVISOR_HEARTBEAT, AnyTopic
+from bridges.messages.topics import DOOR_SUPERVISOR_HEARTBEAT, AnyTopic
 
 
 class DoorHoldReport(msgspec.Struct, frozen=True):

@@ -4,7 +4,7 @@ import msgspec
 
 from bridges.core.decision import OperatorReset
 from bridges.core.graph_kind import MaySpeak, Woken
-from bridges.rmf.definitions import DoorModeValue
+from bridges.messages.definitions import DoorModeValue
 
 
 class OpenRequested(msgspec.Struct, frozen=True):

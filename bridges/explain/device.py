@@ -11,7 +11,7 @@ from bridges.explain.noted import Noted
 from bridges.explain.phrases import Moment, lasted
 from bridges.explain.rows import label
 from bridges.explain.timeline import Kind
-from bridges.rmf import definitions as d
+from bridges.messages import definitions as d
 from bridges.serve import diagnostics
 
 MOST_LINES: Final = 600

@@ -5,9 +5,9 @@ from bridges.explain.device import Device, Fact
 from bridges.explain.phrases import Moment, lasted
 from bridges.explain.rows import label
 from bridges.explain.timeline import Kind
-from bridges.rmf import definitions as d
-from bridges.rmf import words
-from bridges.rmf.stamps import in_seconds
+from bridges.messages import definitions as d
+from bridges.messages import words
+from bridges.messages.stamps import in_seconds
 
 OPEN = "open"
 CLOSED = "closed"

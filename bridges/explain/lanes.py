@@ -16,9 +16,9 @@ from bridges.explain import tones
 from bridges.explain.noted import levels, noted
 from bridges.explain.rows import Row, label
 from bridges.explain.timeline import LANES, Kind, Lane, LaneName, Level, Timeline, Tone
-from bridges.recording.heard import Heard, Own
-from bridges.rmf import definitions as d
-from bridges.rmf import words
+from bridges.messages import definitions as d
+from bridges.messages import words
+from bridges.messages.heard import Heard, Own
 from bridges.serve import diagnostics
 
 MOST_ROWS: Final = 12

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from typing import Final
 
 from bridges.explain.timeline import Mark, Span, Tone
-from bridges.rmf import words
+from bridges.messages import words
 
 LONGEST_LABEL: Final = 120
 MOST_SPANS: Final = 2000

@@ -23,9 +23,9 @@ from bridges.explain.noted import noted
 from bridges.explain.phrases import Clock, Moment, lasted, on_graph
 from bridges.explain.rows import label
 from bridges.explain.timeline import Kind
-from bridges.recording.heard import Heard, Own
-from bridges.rmf import definitions as d
-from bridges.rmf import words
+from bridges.messages import definitions as d
+from bridges.messages import words
+from bridges.messages.heard import Heard, Own
 
 MOST_DEVICES: Final = 100
 """The most devices of each kind; those heard first stay."""

@@ -1,7 +1,7 @@
 """The tone of each value of RMF's states; that of a number which RMF does not define is `unknown`."""
 
 from bridges.explain.timeline import Tone
-from bridges.rmf import definitions as d
+from bridges.messages import definitions as d
 
 
 def door(mode: int) -> Tone:

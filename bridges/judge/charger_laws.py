@@ -15,9 +15,9 @@ from bridges.judge.charger_scene import (
 from bridges.judge.law import KEPT, Doubt, Finding, Law, shown
 from bridges.judge.scene import NOT_YET
 from bridges.judge.shared_laws import ANSWERED, ONE, RATE, STAMP, fresh, named, stamped
-from bridges.rmf import definitions as d
-from bridges.rmf import words
-from bridges.rmf.stamps import in_seconds
+from bridges.messages import definitions as d
+from bridges.messages import words
+from bridges.messages.stamps import in_seconds
 
 LATE_S: Final = 10.0
 CANCELLED_WITHIN_S: Final = 5.0

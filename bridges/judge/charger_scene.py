@@ -3,8 +3,8 @@
 from typing import Final
 
 from bridges.judge.scene import NOT_YET, Scene, keep
-from bridges.recording.heard import Heard
-from bridges.rmf import definitions as d
+from bridges.messages import definitions as d
+from bridges.messages.heard import Heard
 
 IDLE: Final = d.ChargerStateValue.CHARGER_IDLE
 ASSIGNED: Final = d.ChargerStateValue.CHARGER_ASSIGNED

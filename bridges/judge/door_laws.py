@@ -6,7 +6,7 @@ from typing import Final
 from bridges.judge.door_scene import CLOSED, OPEN, DoorScene
 from bridges.judge.law import KEPT, Doubt, Finding, Law
 from bridges.judge.shared_laws import ANSWERED, ONE, RATE, STAMP, fresh, named, stamped
-from bridges.rmf import definitions as d
+from bridges.messages import definitions as d
 
 OPENS_WITHIN_S: Final = 30.0
 ASKED: Final = 5

@@ -4,9 +4,9 @@ from collections import deque
 from typing import Final
 
 from bridges.judge.scene import NOT_YET, Scene
-from bridges.recording.heard import Heard
-from bridges.rmf import definitions as d
-from bridges.rmf import topics
+from bridges.messages import definitions as d
+from bridges.messages import topics
+from bridges.messages.heard import Heard
 
 CLOSED: Final = d.DoorModeValue.MODE_CLOSED
 OPEN: Final = d.DoorModeValue.MODE_OPEN

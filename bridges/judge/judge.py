@@ -11,7 +11,7 @@ from bridges.judge.door_scene import DoorScene
 from bridges.judge.law import Doubt, Evidence, Judged, Law, Verdict
 from bridges.judge.lift_scene import LiftScene
 from bridges.judge.scene import Scene
-from bridges.recording.heard import Heard
+from bridges.messages.heard import Heard
 
 Kind = Literal["lift", "door", "charger"]
 KINDS: Final[tuple[Kind, ...]] = ("lift", "door", "charger")

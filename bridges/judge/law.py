@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Final, Generic, TypeVar
 
-from bridges.rmf import words
+from bridges.messages import words
 
 S_contra = TypeVar("S_contra", contravariant=True)
 

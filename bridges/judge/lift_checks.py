@@ -5,8 +5,8 @@ from typing import Final
 from bridges.judge.law import KEPT, Doubt, Finding, shown
 from bridges.judge.lift_scene import GRACE_S, HAZARDS, LATE_S, LiftScene
 from bridges.judge.scene import NOT_YET
-from bridges.rmf import definitions as d
-from bridges.rmf import words
+from bridges.messages import definitions as d
+from bridges.messages import words
 
 ENDS_WITHIN_S: Final = 3.0
 """A state period of 2 s, and one scan."""

@@ -5,9 +5,9 @@ from dataclasses import dataclass, field
 from typing import Final
 
 from bridges.judge.scene import NOT_YET, SILENT_S, Scene, keep
-from bridges.recording.heard import Heard
-from bridges.rmf import definitions as d
-from bridges.rmf import topics
+from bridges.messages import definitions as d
+from bridges.messages import topics
+from bridges.messages.heard import Heard
 
 HAZARDS: Final = (d.LiftMode.MODE_FIRE, d.LiftMode.MODE_OFFLINE, d.LiftMode.MODE_EMERGENCY)
 GRACE_S: Final = 65.0

@@ -9,8 +9,8 @@ from collections import deque
 from collections.abc import Callable, Iterator
 from typing import Final
 
-from bridges.rmf import definitions as d
-from bridges.rmf import topics, words
+from bridges.messages import definitions as d
+from bridges.messages import topics, words
 from bridges.rmf_rules import NEVER, Party, Said
 from bridges.rmf_rules.robot import Phase, Robot
 

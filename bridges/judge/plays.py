@@ -8,10 +8,10 @@ from typing import Final
 from bridges.judge.law import shown
 from bridges.judge.lift_scene import HAZARDS
 from bridges.judge.play import Play, Step, Traveller
-from bridges.rmf import definitions as d
-from bridges.rmf import topics, words
-from bridges.rmf.stamps import duration, stamp
-from bridges.rmf.topics import AnyTopic
+from bridges.messages import definitions as d
+from bridges.messages import topics, words
+from bridges.messages.stamps import duration, stamp
+from bridges.messages.topics import AnyTopic
 from bridges.rmf_rules import NEVER, Said, door_request
 from bridges.rmf_rules.phases import DoorClose, DoorOpen, EndLiftSession, RequestLift
 from bridges.rmf_rules.robot import Robot

@@ -9,7 +9,7 @@ import msgspec
 
 from bridges.judge.judge import LAWS, Judge, Kind
 from bridges.judge.law import Evidence, Judged, Verdict, shown
-from bridges.rmf import words
+from bridges.messages import words
 
 ORDER: Final = (Verdict.BROKEN, Verdict.KEPT, Verdict.NOT_SEEN)
 OTHERS: Final = 5

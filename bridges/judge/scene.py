@@ -10,9 +10,9 @@ from typing import ClassVar, Final, Generic, TypeVar
 
 from msgspec.structs import replace
 
-from bridges.recording.heard import Heard
-from bridges.rmf import definitions as d
-from bridges.rmf import words
+from bridges.messages import definitions as d
+from bridges.messages import words
+from bridges.messages.heard import Heard
 
 SILENT_S: Final = 5.0
 """The slowest pace in the contract is a state every 2 s; after this long two are missing."""

@@ -6,7 +6,7 @@ from typing import Any, Final
 
 from bridges.judge.law import KEPT, Finding, Law
 from bridges.judge.scene import BURST, SILENT_S, Scene
-from bridges.rmf import words
+from bridges.messages import words
 
 AnyScene = Scene[Any]
 

@@ -11,7 +11,7 @@ from typing import Final
 from bridges.judge.judge import Judge
 from bridges.judge.plays import LEAVES_S, REPEAT_S, Performance
 from bridges.judge.shared_laws import BURST_WITHIN_S
-from bridges.recording.heard import Heard
+from bridges.messages.heard import Heard
 from bridges.rmf_rules import NEVER, Said
 
 LISTENS_S: Final = 4.0

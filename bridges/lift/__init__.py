@@ -7,7 +7,7 @@ from bridges.lift.memory import LiftLimits, Memory
 from bridges.lift.report import LiftReport
 from bridges.lift.settings import LiftSettings
 from bridges.lift.signals import Asked, LiftOutputs, LiftSample
-from bridges.rmf.topics import LIFT_REQUESTS, LIFT_STATES
+from bridges.messages.topics import LIFT_REQUESTS, LIFT_STATES
 
 KIND: Kind[
     LiftSettings,

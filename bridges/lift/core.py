@@ -59,8 +59,8 @@ from bridges.lift.signals import (
     LiftSample,
     Requested,
 )
-from bridges.rmf.definitions import Bool, EmergencySignal
-from bridges.rmf.topics import EMERGENCY_SIGNAL, FIRE_ALARM_TRIGGER
+from bridges.messages.definitions import Bool, EmergencySignal
+from bridges.messages.topics import EMERGENCY_SIGNAL, FIRE_ALARM_TRIGGER
 
 NOT_RMFS = frozenset(
     {

@@ -8,7 +8,7 @@ from bridges.core.names import check_length
 from bridges.lift.report import LiftReport
 from bridges.lift.settings import LiftSettings
 from bridges.lift.signals import Ended, FromAdapter, Requested
-from bridges.rmf.definitions import (
+from bridges.messages.definitions import (
     LiftMode,
     LiftRequest,
     LiftRequestDoor,
@@ -17,7 +17,12 @@ from bridges.rmf.definitions import (
     Message,
     Time,
 )
-from bridges.rmf.topics import ADAPTER_LIFT_REQUESTS, EMERGENCY_SIGNAL, FIRE_ALARM_TRIGGER, Topic
+from bridges.messages.topics import (
+    ADAPTER_LIFT_REQUESTS,
+    EMERGENCY_SIGNAL,
+    FIRE_ALARM_TRIGGER,
+    Topic,
+)
 
 OWN_REQUESTS = ADAPTER_LIFT_REQUESTS.live()
 """What fleet adapters send to RMF's supervisor. We listen to it for the robot that has the lift."""

@@ -8,7 +8,7 @@ from bridges.lift import drive, forgotten
 from bridges.lift.memory import LiftLimits, Memory, Relays, Session
 from bridges.lift.sensing import View
 from bridges.lift.signals import Hazard, LiftOutputs, Motion
-from bridges.rmf.definitions import LiftDoor, LiftMode, LiftMotion
+from bridges.messages.definitions import LiftDoor, LiftMode, LiftMotion
 
 NOT_FRESH = "INPUTS_NOT_FRESH"
 OFFLINE = frozenset({"OUTPUTS_NOT_WRITTEN", "TWO_NODES_FOR_ONE_DEVICE"})

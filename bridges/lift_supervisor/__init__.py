@@ -8,7 +8,7 @@ from bridges.lift_supervisor.memory import Limits, Memory
 from bridges.lift_supervisor.report import SupervisorReport
 from bridges.lift_supervisor.settings import Settings, speaks_of
 from bridges.lift_supervisor.signals import Ended, Requested, StateHeard
-from bridges.rmf.topics import ADAPTER_LIFT_REQUESTS, LIFT_REQUESTS, LIFT_STATES
+from bridges.messages.topics import ADAPTER_LIFT_REQUESTS, LIFT_REQUESTS, LIFT_STATES
 
 KIND: GraphKind[
     Settings,

@@ -37,8 +37,8 @@ from bridges.core.graph_kind import MaySpeak
 from bridges.lift_supervisor.memory import Claim, Limits, Memory, Turn
 from bridges.lift_supervisor.report import SupervisorReport, alarms, report
 from bridges.lift_supervisor.signals import Ended, Event, Requested, StateHeard
-from bridges.rmf.definitions import LiftRequest, LiftRequestDoor, LiftRequestType
-from bridges.rmf.topics import LIFT_REQUESTS
+from bridges.messages.definitions import LiftRequest, LiftRequestDoor, LiftRequestType
+from bridges.messages.topics import LIFT_REQUESTS
 
 MAX_CLAIMS: Final = 100
 

@@ -9,7 +9,7 @@ from bridges.core.freshness import FUTURE_S, Requesters, Rules
 from bridges.core.graph_kind import LISTENS
 from bridges.lift_supervisor.settings import Settings
 from bridges.lift_supervisor.signals import StateHeard, Target
-from bridges.rmf.definitions import LiftMode, LiftRequest
+from bridges.messages.definitions import LiftMode, LiftRequest
 
 NOBODY_IS_SENT: Final = (LiftMode.MODE_FIRE, LiftMode.MODE_EMERGENCY, LiftMode.MODE_OFFLINE)
 """The modes in which no robot is sent to a lift."""

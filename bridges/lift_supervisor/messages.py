@@ -11,7 +11,7 @@ from bridges.core.names import check_length, check_listed
 from bridges.lift_supervisor.report import SupervisorReport
 from bridges.lift_supervisor.settings import Settings
 from bridges.lift_supervisor.signals import Ended, Requested, StateHeard, Target
-from bridges.rmf.definitions import (
+from bridges.messages.definitions import (
     LiftRequest,
     LiftRequestDoor,
     LiftRequestType,

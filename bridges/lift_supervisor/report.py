@@ -8,7 +8,7 @@ import msgspec
 from bridges.core.decision import Fault
 from bridges.core.durations import SILENT_S
 from bridges.lift_supervisor.memory import Limits, Memory
-from bridges.rmf.definitions import LiftMode
+from bridges.messages.definitions import LiftMode
 
 SILENT: Final = "LIFT_SILENT"
 OVERDUE_S: Final = 30.0

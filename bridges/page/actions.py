@@ -19,9 +19,9 @@ from pathlib import Path
 from typing import Final
 
 from bridges.host.log import pairs
+from bridges.messages import definitions as d
+from bridges.messages.words import printable
 from bridges.page.site import DeviceView
-from bridges.rmf import definitions as d
-from bridges.rmf.words import printable
 
 log = logging.getLogger(__name__)
 

@@ -9,9 +9,9 @@ from html import escape
 from typing import Final
 from urllib.parse import quote
 
+from bridges.messages import definitions as d
+from bridges.messages import words
 from bridges.page.site import DeviceView, Robot, Stands
-from bridges.rmf import definitions as d
-from bridges.rmf import words
 
 OLD: Final = ' class="old"'
 LONGEST: Final = 160

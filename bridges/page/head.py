@@ -6,8 +6,8 @@ from typing import Final
 from fastapi import Request
 from nicegui import ui
 
+from bridges.messages.words import printable
 from bridges.page.login import Login
-from bridges.rmf.words import printable
 
 BLUE: Final = "#005a93"
 """The colour of buttons: white text is readable on it in both themes."""

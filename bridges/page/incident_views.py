@@ -12,11 +12,11 @@ from fastapi.responses import FileResponse
 from nicegui import Client, app, ui
 
 from bridges.explain.picture import svg
+from bridges.messages.words import printable
 from bridges.page import incidents
 from bridges.page.head import head, main, part
 from bridges.page.login import Login
 from bridges.page.why import explanation, story, timeline
-from bridges.rmf.words import printable
 
 
 class IncidentViews:

@@ -21,8 +21,8 @@ from bridges.explain.answer import Remedies
 from bridges.explain.explanation import Explanation
 from bridges.explain.lanes import Drawing
 from bridges.explain.timeline import Timeline
+from bridges.messages.heard import Heard
 from bridges.recording.bags import heard_in
-from bridges.recording.heard import Heard
 from bridges.recording.sources import BagError, Notes
 
 SUFFIX: Final = ".mcap"

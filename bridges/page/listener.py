@@ -9,10 +9,10 @@ from queue import Empty, Full, Queue
 from typing import Final
 
 from bridges.host.log import pairs
+from bridges.messages.definitions import Message
+from bridges.messages.heard import Heard, bounded
+from bridges.messages.topics import AnyTopic
 from bridges.page.site import HEARD, Site
-from bridges.recording.heard import Heard, bounded
-from bridges.rmf.definitions import Message
-from bridges.rmf.topics import AnyTopic
 from bridges.rmf.transport import Transport, TransportError
 
 log = logging.getLogger(__name__)

@@ -16,8 +16,8 @@ from fastapi import Request, Response
 from fastapi.requests import HTTPConnection
 from fastapi.responses import HTMLResponse, RedirectResponse
 
+from bridges.messages.words import printable
 from bridges.page.access import Door, Sessions
-from bridges.rmf.words import printable
 
 COOKIE: Final = "rmf_bridge_page"
 STYLE: Final = (Path(__file__).parent / "style.css").read_text(encoding="utf-8")

@@ -17,11 +17,11 @@ from bridges.explain.answer import Remedies
 from bridges.explain.explanation import Explanation
 from bridges.explain.lanes import Drawing
 from bridges.explain.timeline import KINDS, Kind, Timeline
-from bridges.recording.heard import Heard
-from bridges.rmf import definitions as d
-from bridges.rmf import topics, words
-from bridges.rmf.topics import AnyTopic
-from bridges.rmf.words import Requested, Stated
+from bridges.messages import definitions as d
+from bridges.messages import topics, words
+from bridges.messages.heard import Heard
+from bridges.messages.topics import AnyTopic
+from bridges.messages.words import Requested, Stated
 from bridges.serve import diagnostics
 
 KEPT_S: Final = 600.0

@@ -21,16 +21,16 @@ import yaml
 from msgspec.structs import replace
 
 from bridges.core.graph_kind import GraphKind
+from bridges.messages import cdr
+from bridges.messages.definitions import Message
+from bridges.messages.heard import FREE_TEXTS
+from bridges.messages.releases import RELEASES
+from bridges.messages.texts import MESSAGES
 from bridges.recording.entries import AnyEntry, Clocks, Died, Ended, Head, Known, Lost, Spoken, Step
-from bridges.recording.heard import FREE_TEXTS
 from bridges.recording.incident import Incident
 from bridges.recording.replayed import of_head
 from bridges.recording.sources import TOPICS
-from bridges.recording.texts import MESSAGES
 from bridges.recording.trees import HOLDS, TYPE, Tree
-from bridges.rmf import cdr
-from bridges.rmf.definitions import Message
-from bridges.rmf.releases import RELEASES
 from bridges.settings import names as known
 from bridges.settings.config import Config
 from bridges.settings.reference import schema

@@ -15,12 +15,12 @@ from typing import Final
 
 from bridges.host import user_files
 from bridges.host.log import pairs
+from bridges.messages import cdr
+from bridges.messages.heard import Heard, Own, bounded
 from bridges.recording.entries import Spoken
-from bridges.recording.heard import Heard, Own, bounded
 from bridges.recording.incident import timed
 from bridges.recording.ring import MAGIC, Read, RingError
 from bridges.recording.sources import BagError, Notes, Raw, releases, source
-from bridges.rmf import cdr
 
 __all__ = ["BagError", "Keep", "Notes", "all_in", "heard_in"]
 

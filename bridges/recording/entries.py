@@ -11,10 +11,10 @@ from typing import Annotated, Final, TypeVar
 import msgspec
 from msgspec import Meta
 
+from bridges.messages.releases import RELEASES
+from bridges.messages.texts import MESSAGES
 from bridges.recording.settings import Recording
-from bridges.recording.texts import MESSAGES
 from bridges.recording.trees import Tree
-from bridges.rmf.releases import RELEASES
 
 LATEST_S: Final = 4e9
 """Within this time, before and after zero, every sum of three is a date, and fits into an MCAP file."""

@@ -6,13 +6,13 @@ from pathlib import Path
 import msgspec
 from mcap.records import Channel, Message, Metadata
 
+from bridges.messages import cdr
 from bridges.recording import entries
 from bridges.recording.entries import AnyEntry, Head
 from bridges.recording.incident import Note
 from bridges.recording.mcap_read import Damaged, records
 from bridges.recording.mcap_write import ENTRIES, HEAD, NOTES, String
 from bridges.recording.sources import BagError, Notes, NotReplayable
-from bridges.rmf import cdr
 
 NONE = "{} has no entries of an rmf-bridge daemon: only a recording that has them can be replayed"
 

@@ -7,9 +7,9 @@ from typing import Final
 from mcap.records import Channel, Header, McapRecord, Message, Schema
 
 from bridges.explain.noted import OWN_TOPICS
+from bridges.messages.releases import Release
 from bridges.recording.mcap_read import Damaged, records
 from bridges.recording.sources import Notes, Raw, Source, releases, source
-from bridges.rmf.releases import Release
 
 LIBRARY: Final = "rmf-bridges"
 """How the `library` in the header of our own files begins."""

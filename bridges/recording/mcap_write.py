@@ -15,15 +15,15 @@ from mcap.writer import CompressionType, Writer
 
 from bridges import __version__
 from bridges.explain.noted import OWN_TOPICS
+from bridges.messages import cdr, topics
+from bridges.messages.releases import RELEASES
+from bridges.messages.rihs01 import type_hash
+from bridges.messages.texts import MESSAGES, text
 from bridges.recording import entries
 from bridges.recording.entries import AnyEntry, Spoken, Step
 from bridges.recording.incident import Incident, readable, timed
 from bridges.recording.mcap_bags import LIBRARY
-from bridges.recording.texts import MESSAGES, text
 from bridges.recording.trees import Tree
-from bridges.rmf import cdr, topics
-from bridges.rmf.releases import RELEASES
-from bridges.rmf.rihs01 import type_hash
 
 ENTRIES: Final = f"{OWN_TOPICS}entries"
 NOTES: Final = f"{OWN_TOPICS}notes"

@@ -6,11 +6,11 @@ from dataclasses import dataclass, field
 from typing import Final, NamedTuple
 
 from bridges.core.names import LONGEST_NAME
-from bridges.recording.texts import MESSAGES, releases_of
-from bridges.rmf import cdr, topics
-from bridges.rmf.definitions import Message
-from bridges.rmf.releases import NEWEST, RELEASES, Release
-from bridges.rmf.rihs01 import releases_of as releases_of_hash
+from bridges.messages import cdr, topics
+from bridges.messages.definitions import Message
+from bridges.messages.releases import NEWEST, RELEASES, Release
+from bridges.messages.rihs01 import releases_of as releases_of_hash
+from bridges.messages.texts import MESSAGES, releases_of
 
 TOPICS: Final = frozenset(topic.name for topic in topics.every())
 

@@ -6,8 +6,8 @@ from pathlib import Path
 from rosbags.interfaces import Connection
 from rosbags.rosbag2 import Reader
 
+from bridges.messages.releases import Release
 from bridges.recording.sources import BagError, Notes, Raw, releases, source
-from bridges.rmf.releases import Release
 
 
 def raw_in(path: Path, notes: Notes) -> Iterator[Raw]:

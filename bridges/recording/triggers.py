@@ -12,12 +12,8 @@ from typing import Final
 
 from bridges.core.decision import EXPECTED
 from bridges.core.durations import AGES_AGO
-from bridges.recording.entries import AnyEntry, Died, Forgotten, Known, Spoken, Step
-from bridges.recording.incident import Note
-from bridges.recording.texts import MESSAGES
-from bridges.recording.trees import Tree
-from bridges.rmf import cdr
-from bridges.rmf.definitions import (
+from bridges.messages import cdr
+from bridges.messages.definitions import (
     ChargerState,
     ChargerStateValue,
     DoorModeValue,
@@ -29,7 +25,11 @@ from bridges.rmf.definitions import (
     LiftState,
     Message,
 )
-from bridges.rmf.releases import RELEASES
+from bridges.messages.releases import RELEASES
+from bridges.messages.texts import MESSAGES
+from bridges.recording.entries import AnyEntry, Died, Forgotten, Known, Spoken, Step
+from bridges.recording.incident import Note
+from bridges.recording.trees import Tree
 
 AGAIN_S: Final = 600.0
 GONE_S: Final = 10.0

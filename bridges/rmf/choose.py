@@ -12,9 +12,9 @@ import re
 from collections.abc import Mapping, Sequence
 
 from bridges.host.log import pairs
+from bridges.messages.definitions import PACKAGES
+from bridges.messages.releases import RELEASES, Release
 from bridges.rmf.cyclone import static_peers
-from bridges.rmf.definitions import PACKAGES
-from bridges.rmf.releases import RELEASES, Release
 from bridges.rmf.settings import Rmf
 from bridges.rmf.transport import Transport, TransportError
 

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from typing import Final
 from xml.sax.saxutils import quoteattr
 
-from bridges.rmf.cdr import LONGEST
+from bridges.messages.cdr import LONGEST
 
 MOST_PROCESSES: Final = 32
 INTERNAL: Final = (

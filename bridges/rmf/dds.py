@@ -27,14 +27,14 @@ from cyclonedds.qos import Policy, Qos
 from cyclonedds.topic import Topic as DdsTopic
 
 from bridges.host.log import pairs
+from bridges.messages.releases import Release
+from bridges.messages.topics import AnyTopic, Topic
 from bridges.rmf import addresses, cyclone, notices
 from bridges.rmf.dds_ends import DdsPublisher, DdsSubscription
 from bridges.rmf.dds_peers import DdsPeers
 from bridges.rmf.graph import NodeOnGraph
 from bridges.rmf.idl import sample_type
-from bridges.rmf.releases import Release
 from bridges.rmf.threaded import LOOK_EVERY_S, Threaded
-from bridges.rmf.topics import AnyTopic, Topic
 from bridges.rmf.transport import M, TransportError, any_type
 
 log = logging.getLogger(__name__)

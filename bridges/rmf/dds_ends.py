@@ -15,14 +15,15 @@ from cyclonedds.qos import Policy, Qos
 from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic as DdsTopic
 
-from bridges.rmf import notices, topics
-from bridges.rmf.cdr import CdrError
-from bridges.rmf.definitions import Message
+from bridges.messages import topics
+from bridges.messages.cdr import CdrError
+from bridges.messages.definitions import Message
+from bridges.messages.releases import Release
+from bridges.messages.rihs01 import type_hash
+from bridges.messages.topics import AnyTopic
+from bridges.rmf import notices
 from bridges.rmf.idl import Sample, sample_type
 from bridges.rmf.peers import Peers
-from bridges.rmf.releases import Release
-from bridges.rmf.rihs01 import type_hash
-from bridges.rmf.topics import AnyTopic
 from bridges.rmf.transport import Receive, TransportError
 
 WRITE_BLOCKS_NS: Final = 20_000_000

@@ -12,10 +12,10 @@ from typing import Protocol
 from cyclonedds.idl import IdlStruct, annotations
 from cyclonedds.idl import types as idl_types
 
-from bridges.rmf import cdr
-from bridges.rmf.definitions import PACKAGES, Message
-from bridges.rmf.releases import NEWEST, Release
-from bridges.rmf.rihs01 import type_hash
+from bridges.messages import cdr
+from bridges.messages.definitions import PACKAGES, Message
+from bridges.messages.releases import NEWEST, Release
+from bridges.messages.rihs01 import type_hash
 
 
 class Sample(Protocol):

@@ -10,10 +10,11 @@ import time
 from collections import defaultdict, deque
 from collections.abc import Callable
 
-from bridges.rmf import cdr, notices
-from bridges.rmf.definitions import Message
-from bridges.rmf.releases import NEWEST, Release
-from bridges.rmf.topics import AnyTopic, Topic
+from bridges.messages import cdr
+from bridges.messages.definitions import Message
+from bridges.messages.releases import NEWEST, Release
+from bridges.messages.topics import AnyTopic, Topic
+from bridges.rmf import notices
 from bridges.rmf.transport import M, Receive, TransportError, any_type
 
 

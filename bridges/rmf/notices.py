@@ -3,9 +3,9 @@
 import logging
 
 from bridges.host.log import pairs
-from bridges.rmf.cdr import CdrError
-from bridges.rmf.definitions import Message
-from bridges.rmf.topics import AnyTopic
+from bridges.messages.cdr import CdrError
+from bridges.messages.definitions import Message
+from bridges.messages.topics import AnyTopic
 from bridges.rmf.transport import Receive
 
 log = logging.getLogger(__name__)

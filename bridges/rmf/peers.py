@@ -15,11 +15,11 @@ from typing import Final
 from msgspec import Struct
 
 from bridges.host.log import pairs
+from bridges.messages.definitions import Alert, EmergencySignal, FleetState
+from bridges.messages.releases import DEFAULT, Release
+from bridges.messages.rihs01 import releases_of, type_hash, type_name
+from bridges.messages.topics import AnyTopic
 from bridges.rmf import notices
-from bridges.rmf.definitions import Alert, EmergencySignal, FleetState
-from bridges.rmf.releases import DEFAULT, Release
-from bridges.rmf.rihs01 import releases_of, type_hash, type_name
-from bridges.rmf.topics import AnyTopic
 
 log = logging.getLogger(__name__)
 

@@ -3,9 +3,9 @@
 from collections.abc import Callable, Mapping
 from typing import TypeVar
 
-from bridges.rmf.definitions import Message
-from bridges.rmf.releases import Release
-from bridges.rmf.topics import Topic
+from bridges.messages.definitions import Message
+from bridges.messages.releases import Release
+from bridges.messages.topics import Topic
 from bridges.rmf.transport import Publisher, Subscription, Transport
 
 M = TypeVar("M", bound=Message)

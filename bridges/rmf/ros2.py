@@ -17,12 +17,12 @@ from typing import Final
 from rclpy.node import Node
 
 from bridges.host.log import pairs
+from bridges.messages.topics import AnyTopic, Topic
 from bridges.rmf import addresses, notices, ros_peers
 from bridges.rmf.ros_ends import Ends, Ros2Publisher, Ros2Subscription
 from bridges.rmf.ros_stay import REFUSALS, Stay
 from bridges.rmf.ros_types import installed
 from bridges.rmf.threaded import LOOK_EVERY_S, Threaded
-from bridges.rmf.topics import AnyTopic, Topic
 from bridges.rmf.transport import M, TransportError, any_type
 
 log = logging.getLogger(__name__)

@@ -22,11 +22,12 @@ from rclpy.qos import (
 )
 from rclpy.subscription import Subscription as RosSubscription
 
-from bridges.rmf import cdr, notices, topics
-from bridges.rmf.definitions import Message
-from bridges.rmf.releases import Release
+from bridges.messages import cdr, topics
+from bridges.messages.definitions import Message
+from bridges.messages.releases import Release
+from bridges.messages.topics import AnyTopic
+from bridges.rmf import notices
 from bridges.rmf.ros_types import ros_type
-from bridges.rmf.topics import AnyTopic
 from bridges.rmf.transport import Receive, TransportError
 
 UNHEARD: Final = 256

@@ -3,8 +3,8 @@
 from collections.abc import Iterable, Sequence
 from typing import Protocol
 
+from bridges.messages.topics import AnyTopic
 from bridges.rmf.peers import Announced, Peers
-from bridges.rmf.topics import AnyTopic
 
 
 class EndpointInfo(Protocol):

@@ -8,8 +8,8 @@ import importlib
 import typing
 from typing import Protocol
 
-from bridges.rmf.definitions import PACKAGES
-from bridges.rmf.releases import DEFAULT, DIFFERING, NEWEST, RELEASES, Release
+from bridges.messages.definitions import PACKAGES
+from bridges.messages.releases import DEFAULT, DIFFERING, NEWEST, RELEASES, Release
 from bridges.rmf.transport import TransportError
 
 NAMES = {str: "string", bool: "boolean", "byte": "octet", "float32": "float", "float64": "double"}

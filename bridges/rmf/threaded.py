@@ -9,9 +9,9 @@ from contextlib import contextmanager
 from typing import ClassVar, Final
 
 from bridges.host.log import pairs
+from bridges.messages.releases import Release
 from bridges.rmf import addresses, wall_clock
 from bridges.rmf.peers import Peers
-from bridges.rmf.releases import Release
 from bridges.rmf.transport import TransportError
 
 log = logging.getLogger(__name__)

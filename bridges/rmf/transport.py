@@ -6,9 +6,9 @@ Each has a file beside this one; `bridges/rmf/choose.py` opens the one that the 
 from collections.abc import Callable
 from typing import Protocol, TypeVar, cast
 
-from bridges.rmf.definitions import Message
-from bridges.rmf.releases import Release
-from bridges.rmf.topics import Topic
+from bridges.messages.definitions import Message
+from bridges.messages.releases import Release
+from bridges.messages.topics import Topic
 
 M = TypeVar("M", bound=Message)
 M_contra = TypeVar("M_contra", bound=Message, contravariant=True)

@@ -23,11 +23,11 @@ import zenoh
 from zenoh.handlers import Callback
 
 from bridges.host.log import pairs
+from bridges.messages.releases import Release
+from bridges.messages.topics import AnyTopic, Topic
 from bridges.rmf import addresses, notices, zenoh_config
-from bridges.rmf.releases import Release
 from bridges.rmf.settings import Zenoh
 from bridges.rmf.threaded import LOOK_EVERY_S, Threaded
-from bridges.rmf.topics import AnyTopic, Topic
 from bridges.rmf.transport import M, TransportError, any_type
 from bridges.rmf.zenoh_alone import ROUTER_MET, WHY_AWAY, Alone
 from bridges.rmf.zenoh_ends import ZenohEnd, ZenohPublisher, ZenohSubscription

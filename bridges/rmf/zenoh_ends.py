@@ -20,11 +20,12 @@ import zenoh
 from zenoh import CongestionControl, Locality, Reliability, Sample, SampleKind, ext
 from zenoh.handlers import Callback
 
-from bridges.rmf import cdr, notices, zenoh_keys
-from bridges.rmf.cdr import CdrError
-from bridges.rmf.definitions import Message
-from bridges.rmf.releases import NEWEST
-from bridges.rmf.topics import AnyTopic
+from bridges.messages import cdr
+from bridges.messages.cdr import CdrError
+from bridges.messages.definitions import Message
+from bridges.messages.releases import NEWEST
+from bridges.messages.topics import AnyTopic
+from bridges.rmf import notices, zenoh_keys
 from bridges.rmf.transport import Receive, TransportError
 from bridges.rmf.zenoh_keys import Keys, Kind
 from bridges.rmf.zenoh_peers import Merged, Order

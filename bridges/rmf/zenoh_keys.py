@@ -17,11 +17,11 @@ from typing import Final, Literal, Protocol
 import xxhash
 from msgspec import Struct
 
-from bridges.rmf.definitions import PACKAGES
+from bridges.messages.definitions import PACKAGES
+from bridges.messages.releases import NEWEST, Release
+from bridges.messages.rihs01 import type_hash
+from bridges.messages.topics import AnyTopic, Qos
 from bridges.rmf.peers import WITNESSES, Announced
-from bridges.rmf.releases import NEWEST, Release
-from bridges.rmf.rihs01 import type_hash
-from bridges.rmf.topics import AnyTopic, Qos
 
 Kind = Literal["MP", "MS"]
 """A publisher or a subscription: rmw_zenoh's Message Publisher and Message Subscription."""

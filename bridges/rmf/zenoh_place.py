@@ -4,10 +4,10 @@ from collections.abc import Callable
 
 import zenoh
 
+from bridges.messages.rihs01 import type_hash
+from bridges.messages.topics import AnyTopic
 from bridges.rmf import zenoh_keys
 from bridges.rmf.peers import Announced
-from bridges.rmf.rihs01 import type_hash
-from bridges.rmf.topics import AnyTopic
 from bridges.rmf.zenoh_keys import Keys, Kind
 from bridges.rmf.zenoh_peers import Order, Tokens
 

@@ -12,9 +12,9 @@ from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from typing import Final
 
-from bridges.rmf import definitions as d
-from bridges.rmf.stamps import stamp
-from bridges.rmf.topics import AnyTopic
+from bridges.messages import definitions as d
+from bridges.messages.stamps import stamp
+from bridges.messages.topics import AnyTopic
 
 Said = tuple[AnyTopic, d.Message]
 """One message and the topic that it is published on."""

@@ -8,7 +8,7 @@ from typing import Final
 
 from msgspec.structs import replace
 
-from bridges.rmf import definitions as d
+from bridges.messages import definitions as d
 from bridges.rmf_rules import Said, has_session
 from bridges.rmf_rules.robot import LiftDestination, Phase, Robot
 

@@ -10,9 +10,9 @@ from collections.abc import Sequence
 
 from msgspec import Struct
 
-from bridges.rmf import definitions as d
-from bridges.rmf import topics
-from bridges.rmf.stamps import stamp
+from bridges.messages import definitions as d
+from bridges.messages import topics
+from bridges.messages.stamps import stamp
 from bridges.rmf_rules import NEVER, Party, Said, door_request, has_session
 
 

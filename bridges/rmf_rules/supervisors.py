@@ -10,9 +10,9 @@ from typing import Final
 
 from msgspec.structs import replace
 
-from bridges.rmf import definitions as d
-from bridges.rmf import topics
-from bridges.rmf.stamps import stamp
+from bridges.messages import definitions as d
+from bridges.messages import topics
+from bridges.messages.stamps import stamp
 from bridges.rmf_rules import Party, Said, door_request
 
 

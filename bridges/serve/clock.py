@@ -6,8 +6,8 @@ from collections.abc import Callable
 from msgspec import Struct
 
 from bridges.core.durations import AGES_AGO
-from bridges.rmf import stamps
-from bridges.rmf.definitions import Time
+from bridges.messages import stamps
+from bridges.messages.definitions import Time
 
 TELL_EVERY_S = 1.0
 TELL_GAP_S = 0.1

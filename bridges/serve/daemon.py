@@ -16,12 +16,12 @@ import msgspec
 
 from bridges import VERSION
 from bridges.host.log import pairs
+from bridges.messages.definitions import DiagnosticArray
+from bridges.messages.stamps import stamp
+from bridges.messages.topics import DIAGNOSTICS
 from bridges.recording.entries import Head
 from bridges.recording.ring import Ring
 from bridges.rmf.choose import open_transport
-from bridges.rmf.definitions import DiagnosticArray
-from bridges.rmf.stamps import stamp
-from bridges.rmf.topics import DIAGNOSTICS
 from bridges.rmf.transport import Publisher, TransportError
 from bridges.serve import guard, last_mark, record, signals
 from bridges.serve.diagnostics import diagnosis

@@ -25,9 +25,9 @@ from bridges.core.decision import (
 from bridges.core.durations import AGES_AGO
 from bridges.core.kind import Answer, DeviceEvent, E, Kind, L, S
 from bridges.host.log import pairs, plain
-from bridges.rmf.definitions import Message
-from bridges.rmf.stamps import ClockError
-from bridges.rmf.topics import Topic
+from bridges.messages.definitions import Message
+from bridges.messages.stamps import ClockError
+from bridges.messages.topics import Topic
 from bridges.serve import diagnostics
 from bridges.serve.answers import Answers
 from bridges.serve.clock import Clock, Pace

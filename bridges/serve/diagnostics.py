@@ -16,7 +16,7 @@ from itertools import islice
 from typing import Final
 
 from bridges.host.log import plain
-from bridges.rmf.definitions import (
+from bridges.messages.definitions import (
     DiagnosticArray,
     DiagnosticLevel,
     DiagnosticStatus,

@@ -14,9 +14,9 @@ from bridges.core.durations import NEVER
 from bridges.core.graph_kind import GraphEvent, GraphKind, MaySpeak, Woken
 from bridges.core.kind import E, L, S
 from bridges.host.log import pairs
-from bridges.rmf.definitions import Message
-from bridges.rmf.stamps import ClockError, stamp
-from bridges.rmf.topics import Topic
+from bridges.messages.definitions import Message
+from bridges.messages.stamps import ClockError, stamp
+from bridges.messages.topics import Topic
 from bridges.rmf.transport import Subscription, Transport
 from bridges.serve.answers import Answers
 from bridges.serve.clock import Clock

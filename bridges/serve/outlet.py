@@ -5,9 +5,9 @@ import threading
 from collections.abc import Callable, Iterable
 
 from bridges.core.decision import Fault
-from bridges.rmf.definitions import Message
-from bridges.rmf.instead import INSTEAD, converted
-from bridges.rmf.topics import Topic
+from bridges.messages.definitions import Message
+from bridges.messages.instead import INSTEAD, converted
+from bridges.messages.topics import Topic
 from bridges.rmf.transport import Publisher, Transport, TransportError
 from bridges.serve.directory import Once
 from bridges.serve.witness import NOBODY, Nobody
@@ -19,8 +19,8 @@ Named = Callable[[Topic[Message]], Topic[Message]]
 class Outlet:
     """Publishers that are declared while their node may speak.
 
-    Where RMF's release lacks a topic's message, `bridges/rmf/instead.py` says what is sent. An alarm
-    and its end take the same way, even if the release changes in between.
+    Where RMF's release lacks a topic's message, `bridges/messages/instead.py` says what is sent.
+    An alarm and its end take the same way, even if the release changes in between.
     """
 
     def __init__(self, transport: Transport, named: Named, witness: Nobody = NOBODY) -> None:

@@ -14,10 +14,10 @@ from bridges.core.durations import AGES_AGO, NEVER
 from bridges.core.graph_kind import LISTENS
 from bridges.core.names import LONGEST_NAME
 from bridges.host.log import pairs
-from bridges.rmf.definitions import Message
-from bridges.rmf.topics import Topic
+from bridges.messages.definitions import Message
+from bridges.messages.topics import Topic
+from bridges.messages.words import printable
 from bridges.rmf.transport import Subscription, Transport
-from bridges.rmf.words import printable
 
 log = logging.getLogger(__name__)
 

@@ -14,8 +14,8 @@ from bridges.core.graph_kind import GraphKind
 from bridges.core.kind import AnyDeviceKind
 from bridges.core.names import LONGEST_NAME
 from bridges.host.log import pairs
-from bridges.rmf.definitions import Message
-from bridges.rmf.topics import M_co, Topic
+from bridges.messages.definitions import Message
+from bridges.messages.topics import M_co, Topic
 from bridges.rmf.transport import Subscription, Transport
 from bridges.serve.clock import Clock, machine_s
 from bridges.serve.device import AnyNode, Node

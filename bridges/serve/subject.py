@@ -10,8 +10,8 @@ from msgspec import Struct
 from bridges.core.decision import Decision, Fault, M, O, R
 from bridges.core.durations import NEVER
 from bridges.host.log import pairs, plain
-from bridges.rmf.definitions import Message
-from bridges.rmf.topics import Topic
+from bridges.messages.definitions import Message
+from bridges.messages.topics import Topic
 from bridges.serve.clock import Clock
 from bridges.serve.refusals import Refusals
 from bridges.serve.witness import NOBODY, Nobody

@@ -14,14 +14,14 @@ from typing import Any, Final
 
 from bridges.core.decision import IoFailed, Sampled
 from bridges.core.durations import AGES_AGO, NEVER
+from bridges.messages import cdr
+from bridges.messages.definitions import Message
+from bridges.messages.releases import Release
+from bridges.messages.rihs01 import type_name
 from bridges.recording import entries
 from bridges.recording.entries import AnyEntry, Clocks, Forgotten, Published, Same, Spoken
 from bridges.recording.ring import FRAME, Ring
 from bridges.recording.seen import AnyDecision, Seen, known, step
-from bridges.rmf import cdr
-from bridges.rmf.definitions import Message
-from bridges.rmf.releases import Release
-from bridges.rmf.rihs01 import type_name
 from bridges.serve.clock import Clock
 from bridges.serve.directory import Once
 

@@ -22,8 +22,8 @@ from yaml import MappingNode, Node, ScalarNode
 from bridges.core.fields import DeviceSettings, Name
 from bridges.core.graph_kind import AnyGraphKind, AnyKind, GraphKind
 from bridges.core.spelling import either, unknown
+from bridges.messages import topics
 from bridges.recording.settings import Recording
-from bridges.rmf import topics
 from bridges.rmf.settings import Rmf
 from bridges.settings import names as named
 from bridges.settings.buses import BusRead, read_bus

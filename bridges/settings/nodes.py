@@ -15,7 +15,7 @@ from yaml import AliasEvent, MappingNode, Mark, MarkedYAMLError, Node, ScalarNod
 from yaml.reader import ReaderError
 
 from bridges.host import user_files
-from bridges.rmf.words import printable
+from bridges.messages.words import printable
 from bridges.settings import slips
 from bridges.settings.problems import Problem as Problem
 from bridges.settings.problems import SettingsError as SettingsError

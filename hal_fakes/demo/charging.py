@@ -12,9 +12,9 @@ from itertools import groupby
 from pathlib import Path
 from typing import Final
 
-from bridges.rmf import definitions as d
-from bridges.rmf import topics, words
-from bridges.rmf.stamps import duration
+from bridges.messages import definitions as d
+from bridges.messages import topics, words
+from bridges.messages.stamps import duration
 from bridges.settings.load import load
 from hal_fakes.demo.journal import Journal
 from hal_fakes.demo.stage import Demo

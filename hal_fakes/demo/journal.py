@@ -5,8 +5,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Literal
 
-from bridges.rmf import words
-from bridges.rmf.words import Requested, Stated
+from bridges.messages import words
+from bridges.messages.words import Requested, Stated
 from hal_fakes.plants.plant import Edge
 
 What = Literal["robot", "request", "relay", "sensor", "state", "place", "alert", "demo"]

@@ -11,9 +11,9 @@ from itertools import count, cycle
 from pathlib import Path
 from typing import Final
 
-from bridges.rmf import definitions as d
-from bridges.rmf import topics
-from bridges.rmf.stamps import duration
+from bridges.messages import definitions as d
+from bridges.messages import topics
+from bridges.messages.stamps import duration
 from bridges.rmf_rules.phases import DoorClose, DoorOpen, EndLiftSession, RequestLift
 from bridges.rmf_rules.robot import Phase, Robot
 from hal_fakes.demo.stage import Demo

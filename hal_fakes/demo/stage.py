@@ -15,8 +15,8 @@ from pathlib import Path
 from types import FrameType
 from typing import Final
 
-from bridges.rmf import words
-from bridges.rmf.topics import AnyTopic
+from bridges.messages import words
+from bridges.messages.topics import AnyTopic
 from bridges.rmf.transport import Transport, TransportError
 from bridges.settings.load import load
 from hal_fakes.demo.daemons import Daemon, Page, Wrong, stop_all

@@ -10,11 +10,11 @@ from contextlib import contextmanager
 from queue import Empty, SimpleQueue
 from typing import Final
 
-from bridges.rmf import definitions as d
-from bridges.rmf import topics, words
-from bridges.rmf.topics import AnyTopic
+from bridges.messages import definitions as d
+from bridges.messages import topics, words
+from bridges.messages.topics import AnyTopic
+from bridges.messages.words import Requested, Stated
 from bridges.rmf.transport import Publisher, Transport
-from bridges.rmf.words import Requested, Stated
 from bridges.rmf_rules import Party, Said
 from hal_fakes.demo.daemons import Daemon, Wrong
 from hal_fakes.demo.journal import SETTLES_S, Journal

@@ -11,8 +11,8 @@ from typing import Final
 
 from bridges.charger.settings import Robot
 from bridges.charger_coordinator.settings import Settings
-from bridges.rmf import definitions as d
-from bridges.rmf.topics import CHARGING_ASSIGNMENTS, DIAGNOSTICS, AnyTopic
+from bridges.messages import definitions as d
+from bridges.messages.topics import CHARGING_ASSIGNMENTS, DIAGNOSTICS, AnyTopic
 from bridges.rmf_rules import Party, Said
 from hal_fakes.demo.world import World
 from hal_fakes.rmf.fleet import Finishing, Fleet, FleetRobot

@@ -21,8 +21,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final, Literal
 
-from bridges.rmf import definitions as d
-from bridges.rmf.topics import CHARGING_ASSIGNMENTS, FLEET_STATES, AnyTopic
+from bridges.messages import definitions as d
+from bridges.messages.topics import CHARGING_ASSIGNMENTS, FLEET_STATES, AnyTopic
 from bridges.rmf_rules import Party, Said
 
 EVERY_S: Final = 1.0

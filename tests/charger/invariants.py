@@ -6,7 +6,7 @@ whether a request still holds the station.
 
 from bridges.charger.signals import Activity
 from bridges.core.decision import IoFailed, OperatorReset, Sampled
-from bridges.rmf.definitions import ChargerStateValue as State
+from bridges.messages.definitions import ChargerStateValue as State
 from tests.charger.walk import CLEAR_S, RIVAL_S, Step
 
 FLOWS = (Activity.CHARGING, Activity.STOPPING)

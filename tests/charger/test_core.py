@@ -14,7 +14,7 @@ from bridges.charger.signals import (
     Requested,
 )
 from bridges.core.decision import Fault, Sampled
-from bridges.rmf.definitions import ChargerStateValue as State
+from bridges.messages.definitions import ChargerStateValue as State
 from tests.charger.story import (
     AMR1,
     AMR2,

@@ -9,7 +9,7 @@ from bridges.charger.report import ChargerReport
 from bridges.charger.settings import ChargerSettings, Durations
 from bridges.charger.signals import Cancelled, Measured, Requested
 from bridges.core.decision import RequestRefused
-from bridges.rmf.definitions import (
+from bridges.messages.definitions import (
     ChargerCancel,
     ChargerRequest,
     ChargerState,
@@ -17,7 +17,7 @@ from bridges.rmf.definitions import (
     Duration,
     Time,
 )
-from bridges.rmf.topics import CHARGER_CANCELS, CHARGER_REQUESTS
+from bridges.messages.topics import CHARGER_CANCELS, CHARGER_REQUESTS
 
 SETTINGS = ChargerSettings(limits=Durations(misses=5))
 RIGHT = ChargerRequest("charger_a", "tiny", "AMR01", Duration(30, 500_000_000), "coordinator-7")

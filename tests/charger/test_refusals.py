@@ -10,8 +10,8 @@ from bridges.charger.memory import ChargerLimits
 from bridges.charger.refusals import Refusal, read
 from bridges.charger.settings import ChargerSettings
 from bridges.charger.signals import Activity, ChargerOutputs, ChargerSample
-from bridges.rmf import topics
-from bridges.rmf.definitions import (
+from bridges.messages import topics
+from bridges.messages.definitions import (
     ChargerCancel,
     ChargerRequest,
     ChargerState,

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from bridges.rmf.definitions import ChargerState, ChargerStateValue
+from bridges.messages.definitions import ChargerState, ChargerStateValue
+from bridges.messages.topics import CHARGER_STATES
 from bridges.rmf.memory import MemoryNetwork, MemoryTransport
-from bridges.rmf.topics import CHARGER_STATES
 from bridges.serve.service import service
 from bridges.serve.serving import stop
 from bridges.settings.load import load

@@ -10,7 +10,7 @@ from bridges.charger.settings import Durations
 from bridges.charger.signals import Activity as A
 from bridges.charger.signals import Cancelled, ChargerOutputs, ChargerSample, Measured, Requested
 from bridges.core.decision import Fault, Sampled, WriteFailed
-from bridges.rmf.definitions import ChargerStateValue as State
+from bridges.messages.definitions import ChargerStateValue as State
 from tests.charger.story import (
     AMR1,
     AMR2,

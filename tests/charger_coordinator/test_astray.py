@@ -23,7 +23,7 @@ from bridges.charger_coordinator.memory import (
 )
 from bridges.charger_coordinator.signals import Sighting
 from bridges.core.durations import NEVER
-from bridges.rmf.definitions import ChargerStateValue
+from bridges.messages.definitions import ChargerStateValue
 from tests.charger_coordinator.yard import settings
 
 SITE = Site.of(settings())

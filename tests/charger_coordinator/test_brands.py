@@ -7,8 +7,8 @@ import pytest
 from bridges.charger.settings import Robot
 from bridges.charger_coordinator import messages
 from bridges.charger_coordinator.signals import ReceiverHeard
-from bridges.rmf import definitions as d
-from bridges.rmf import topics
+from bridges.messages import definitions as d
+from bridges.messages import topics
 from tests.charger_coordinator.yard import PLACES, Yard, settings, two_brands
 
 

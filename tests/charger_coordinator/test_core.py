@@ -22,7 +22,7 @@ from bridges.charger_coordinator.memory import (
 from bridges.charger_coordinator.report import SiteReport
 from bridges.charger_coordinator.signals import Event, FleetSeen, Sighting, StateHeard, Wanted
 from bridges.core.graph_kind import MaySpeak, Woken
-from bridges.rmf import definitions as d
+from bridges.messages import definitions as d
 from tests.charger_coordinator.yard import RECEIVERS, settings
 from tests.core import alone
 

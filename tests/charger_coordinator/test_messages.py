@@ -11,7 +11,7 @@ from bridges.charger_coordinator import KIND, messages
 from bridges.charger_coordinator.memory import CHARGING
 from bridges.charger_coordinator.signals import Dedicated, Sighting, StateHeard
 from bridges.core.decision import RequestRefused
-from bridges.rmf import definitions as d
+from bridges.messages import definitions as d
 from bridges.settings.load import SettingsError, load
 from tests.charger_coordinator.yard import settings
 

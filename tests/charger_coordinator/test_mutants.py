@@ -26,7 +26,7 @@ from bridges.charger_coordinator.signals import (
 )
 from bridges.core.decision import OperatorReset
 from bridges.core.graph_kind import MaySpeak, Woken
-from bridges.rmf import definitions as d
+from bridges.messages import definitions as d
 from tests.charger_coordinator.test_core import ONE, SETTINGS, THREE, TWO, A, Alone, B, busy
 
 SITE = Site.of(SETTINGS)

@@ -18,7 +18,7 @@ from bridges.charger_coordinator.memory import (
 from bridges.charger_coordinator.reasons import queued, reasons
 from bridges.charger_coordinator.schedule import Charging
 from bridges.charger_coordinator.signals import Sighting
-from bridges.rmf.definitions import ChargerStateValue
+from bridges.messages.definitions import ChargerStateValue
 from tests.charger_coordinator.yard import settings
 
 ONE, TWO, THREE = (Robot("tiny", f"AMR0{i}") for i in (1, 2, 3))

@@ -7,8 +7,8 @@ from msgspec.structs import replace
 
 from bridges.charger.refusals import Refusal, read
 from bridges.charger_coordinator import KIND
-from bridges.rmf import topics
-from bridges.rmf.definitions import ChargerRequest, Duration
+from bridges.messages import topics
+from bridges.messages.definitions import ChargerRequest, Duration
 from bridges.rmf.memory import MemoryNetwork, MemoryTransport
 from bridges.serve.clock import Clock
 from bridges.serve.graph import GraphNode

@@ -10,7 +10,7 @@ import pytest
 
 from bridges.charger_coordinator.schedule import Charging
 from bridges.core.decision import OperatorReset
-from bridges.rmf import definitions as d
+from bridges.messages import definitions as d
 from hal_fakes.rmf.fleet import Finishing
 from tests.charger_coordinator.yard import Yard, settings
 

@@ -7,8 +7,8 @@ from msgspec.structs import replace
 
 from bridges.charger.settings import Robot
 from bridges.core.decision import OperatorReset
-from bridges.rmf import definitions as d
-from bridges.rmf import topics
+from bridges.messages import definitions as d
+from bridges.messages import topics
 from bridges.rmf.transport import Publisher
 from tests.charger_coordinator.yard import Yard
 

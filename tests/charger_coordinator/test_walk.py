@@ -34,7 +34,7 @@ from bridges.charger_coordinator.signals import (
 )
 from bridges.core.decision import OperatorReset
 from bridges.core.graph_kind import MaySpeak, Woken
-from bridges.rmf import definitions as d
+from bridges.messages import definitions as d
 from tests.charger_coordinator.yard import settings
 from tests.depth import depth, examples
 from tests.walk import histories

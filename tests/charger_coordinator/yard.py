@@ -14,9 +14,9 @@ from bridges.charger_coordinator.settings import (
 )
 from bridges.charger_coordinator.settings import RobotSettings, Settings, Station, Waypoint
 from bridges.core.decision import IoFailed, RequestRefused, Sampled
-from bridges.rmf import definitions as d
-from bridges.rmf import topics, words
-from bridges.rmf.stamps import duration
+from bridges.messages import definitions as d
+from bridges.messages import topics, words
+from bridges.messages.stamps import duration
 from bridges.serve.graph import GraphNode
 from hal_fakes.rmf.fleet import Finishing, Fleet
 from tests.serve.virtual_graph import EPOCH, Disk, Served, Ticking, World, in_order

@@ -10,11 +10,11 @@ from bridges import cli
 from bridges.commands import live
 from bridges.commands.recordings import FIRST_OF_OTHERS, Sieve
 from bridges.explain.site import Site
-from bridges.recording.heard import Heard
-from bridges.rmf import topics
-from bridges.rmf.definitions import LiftState
+from bridges.messages import topics
+from bridges.messages.definitions import LiftState
+from bridges.messages.heard import Heard
+from bridges.messages.releases import NEWEST
 from bridges.rmf.memory import MemoryNetwork, MemoryTransport
-from bridges.rmf.releases import NEWEST
 from hal_fakes.wire import wire
 from tests.explain.scenes import fire, held_by_another
 from tests.recording.written import MCAP, SQLITE, write

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from bridges import cli
-from bridges.rmf.releases import NEWEST
+from bridges.messages.releases import NEWEST
 from tests.recording.written import write
 
 READERS = (

@@ -13,9 +13,9 @@ from bridges.commands.exchange import step
 from bridges.commands.graph import CommandLine
 from bridges.commands.requests import Done, Failed, Seen
 from bridges.commands.requests.lift import LiftEnd
-from bridges.recording.heard import Heard
-from bridges.rmf import definitions as d
-from bridges.rmf import topics
+from bridges.messages import definitions as d
+from bridges.messages import topics
+from bridges.messages.heard import Heard
 from bridges.rmf.memory import MemoryNetwork, MemoryTransport
 from tests.commands.test_exchange import GRANTED, LIFT, ME
 

@@ -23,13 +23,13 @@ from bridges.commands.requests import Request
 from bridges.commands.requests.charger import Charge, ChargeCancel
 from bridges.commands.requests.door import DoorMove
 from bridges.commands.requests.lift import LiftEnd, LiftRide
-from bridges.rmf import definitions as d
-from bridges.rmf import topics
+from bridges.messages import definitions as d
+from bridges.messages import topics
+from bridges.messages.topics import Topic
 from bridges.rmf.choose import open_transport
 from bridges.rmf.memory import MemoryNetwork, MemoryTransport
 from bridges.rmf.renamed import Renamed
 from bridges.rmf.settings import Rmf
-from bridges.rmf.topics import Topic
 from bridges.rmf.transport import Transport
 from bridges.settings.load import load
 from hal_fakes.wire import Wire, runs_here

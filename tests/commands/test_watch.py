@@ -17,9 +17,9 @@ from bridges.commands.board import (
     repaint,
     table,
 )
-from bridges.recording.heard import Heard
-from bridges.rmf import definitions as d
-from bridges.rmf.stamps import stamp
+from bridges.messages import definitions as d
+from bridges.messages.heard import Heard
+from bridges.messages.stamps import stamp
 from bridges.serve.diagnostics import diagnosis
 
 WALL = 1_700_000_000.0

@@ -6,7 +6,7 @@ from typing import Generic, TypeVar
 
 from bridges.core.decision import Decision, Report
 from bridges.core.graph_kind import MaySpeak, Woken
-from bridges.rmf.definitions import Message
+from bridges.messages.definitions import Message
 
 M = TypeVar("M")
 L = TypeVar("L")

@@ -6,7 +6,7 @@ import pytest
 
 from bridges.core.decision import RequestRefused
 from bridges.core.freshness import Requester, Rules, in_ns
-from bridges.rmf.definitions import Time
+from bridges.messages.definitions import Time
 
 STAMP = 1_800_000_000.0
 STARTED = Rules(most_s=5.0)

@@ -9,7 +9,7 @@ from bridges.core.decision import Sampled, WriteFailed
 from bridges.door.core import decide
 from bridges.door.memory import DoorLimits, Memory
 from bridges.door.signals import OpenRequested
-from bridges.rmf.definitions import DoorModeValue
+from bridges.messages.definitions import DoorModeValue
 from tests.door.walk import UNLIKE, Step, World, burns, fresh, reading, sighted
 
 

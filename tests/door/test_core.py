@@ -10,7 +10,7 @@ from bridges.door.memory import DoorLimits
 from bridges.door.report import DoorReport
 from bridges.door.settings import Durations, Pulse
 from bridges.door.signals import CloseRequested, DoorOutputs, DoorSample, OpenRequested
-from bridges.rmf.definitions import DoorModeValue
+from bridges.messages.definitions import DoorModeValue
 from tests.door.virtual import BETWEEN, BOTH, CLOSED, DEBOUNCED, OPEN, CoreAlone
 
 OPENS, CLOSES = OpenRequested("door_supervisor"), CloseRequested("door_supervisor")

@@ -7,8 +7,8 @@ from bridges.door import KIND, messages
 from bridges.door.memory import DoorLimits
 from bridges.door.report import DoorReport
 from bridges.door.signals import CloseRequested, OpenRequested
-from bridges.rmf import topics
-from bridges.rmf.definitions import DoorMode, DoorModeValue, DoorRequest, DoorState, Time
+from bridges.messages import topics
+from bridges.messages.definitions import DoorMode, DoorModeValue, DoorRequest, DoorState, Time
 from tests.door.virtual import settings
 
 SETTINGS = settings()

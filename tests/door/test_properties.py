@@ -12,7 +12,7 @@ from bridges.door.core import decide, initial
 from bridges.door.memory import DoorLimits, Memory
 from bridges.door.settings import Durations, Pulse
 from bridges.door.signals import CloseRequested, DoorSample, Event, OpenRequested
-from bridges.rmf.definitions import DoorModeValue
+from bridges.messages.definitions import DoorModeValue
 from tests.depth import examples
 from tests.door.virtual import DEBOUNCED, Decided
 

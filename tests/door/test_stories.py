@@ -3,9 +3,9 @@
 from typing import Any
 
 from bridges.door import messages
-from bridges.rmf import topics
-from bridges.rmf.definitions import DoorModeValue, DoorRequest
-from bridges.rmf.stamps import stamp
+from bridges.messages import topics
+from bridges.messages.definitions import DoorModeValue, DoorRequest
+from bridges.messages.stamps import stamp
 from bridges.rmf_rules import door_request
 from bridges.rmf_rules.supervisors import DoorSupervisor
 from tests.door.virtual import FIRE, OBSTRUCTION, SCAN_S, Door

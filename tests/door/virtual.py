@@ -9,7 +9,7 @@ from bridges.door.core import decide, initial
 from bridges.door.memory import DoorLimits, Memory
 from bridges.door.report import DoorReport
 from bridges.door.signals import CloseRequested, DoorOutputs, DoorSample, Event, OpenRequested
-from bridges.rmf.definitions import DoorModeValue
+from bridges.messages.definitions import DoorModeValue
 from drivers import DriverError
 from drivers.door.dry_contact import DryContactDoor, Settings, create, debounce, wires
 from hal_fakes.plants.door import build

@@ -4,7 +4,7 @@ from bridges.door_supervisor import core
 from bridges.door_supervisor.memory import Limits, Memory
 from bridges.door_supervisor.report import DoorHoldReport
 from bridges.door_supervisor.signals import CloseRequested, Event, OpenRequested, StateHeard
-from bridges.rmf.definitions import DoorModeValue, DoorRequest, Message
+from bridges.messages.definitions import DoorModeValue, DoorRequest, Message
 from tests.core import alone
 
 SECOND_NS = 10**9

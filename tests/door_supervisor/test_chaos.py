@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from bridges.rmf import topics
+from bridges.messages import topics
 from tests.depth import depth
 from tests.door_supervisor.world import (
     DoorDaemon,

@@ -9,7 +9,7 @@ from bridges.door_supervisor import core
 from bridges.door_supervisor.memory import Limits
 from bridges.door_supervisor.report import DoorHoldReport
 from bridges.door_supervisor.signals import CloseRequested, OpenRequested
-from bridges.rmf.definitions import DoorModeValue
+from bridges.messages.definitions import DoorModeValue
 from tests.door_supervisor.alone import Alone
 
 

@@ -10,8 +10,8 @@ from bridges.door_supervisor.memory import Holder, Limits, Memory
 from bridges.door_supervisor.report import DoorHoldReport
 from bridges.door_supervisor.settings import Settings
 from bridges.door_supervisor.signals import CloseRequested, OpenRequested, StateHeard
-from bridges.rmf import definitions as d
-from bridges.rmf import topics
+from bridges.messages import definitions as d
+from bridges.messages import topics
 
 ANY = Settings()
 AT = d.Time(5, 7)

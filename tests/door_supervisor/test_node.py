@@ -6,10 +6,10 @@ import pytest
 
 from bridges.door_supervisor import KIND
 from bridges.door_supervisor.settings import Settings
-from bridges.rmf import definitions as d
-from bridges.rmf import topics
+from bridges.messages import definitions as d
+from bridges.messages import topics
+from bridges.messages.stamps import stamp
 from bridges.rmf.memory import MemoryNetwork, MemoryTransport
-from bridges.rmf.stamps import stamp
 from bridges.serve import graph as graph_node
 from bridges.serve.clock import Clock
 from bridges.serve.graph import GraphNode

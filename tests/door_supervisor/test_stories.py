@@ -1,8 +1,8 @@
 """Whole stories: a door and its daemon, robots as RMF drives them, and the supervisor between."""
 
 from bridges.door_supervisor import keep
-from bridges.rmf import definitions as d
-from bridges.rmf import topics
+from bridges.messages import definitions as d
+from bridges.messages import topics
 from bridges.rmf_rules import NEVER, door_request
 from tests.door_supervisor.world import (
     WARD,

@@ -19,7 +19,7 @@ from bridges.door_supervisor import core, keep
 from bridges.door_supervisor.memory import OPEN, Limits, Memory
 from bridges.door_supervisor.settings import Settings
 from bridges.door_supervisor.signals import CloseRequested, OpenRequested, StateHeard
-from bridges.rmf.definitions import DoorModeValue, DoorRequest
+from bridges.messages.definitions import DoorModeValue, DoorRequest
 from tests.depth import depth, examples
 from tests.walk import histories
 

@@ -9,9 +9,9 @@ from typing import Any
 from bridges.door import messages as door_messages
 from bridges.door_supervisor import KIND, keep
 from bridges.door_supervisor.settings import Settings
-from bridges.rmf import definitions as d
-from bridges.rmf import topics
-from bridges.rmf.stamps import stamp
+from bridges.messages import definitions as d
+from bridges.messages import topics
+from bridges.messages.stamps import stamp
 from bridges.rmf_rules.phases import DoorClose, DoorOpen
 from bridges.rmf_rules.robot import Phase, Robot
 from bridges.rmf_rules.supervisors import DoorSupervisor

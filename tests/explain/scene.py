@@ -11,11 +11,11 @@ from bridges.charger_coordinator import KIND as COORDINATOR
 from bridges.core.graph_kind import AnyGraphKind
 from bridges.door_supervisor import KIND as DOOR_SUPERVISOR
 from bridges.lift_supervisor import KIND as LIFT_SUPERVISOR
-from bridges.recording.heard import Heard
-from bridges.rmf import definitions as d
-from bridges.rmf import topics
-from bridges.rmf.stamps import stamp
-from bridges.rmf.topics import Topic
+from bridges.messages import definitions as d
+from bridges.messages import topics
+from bridges.messages.heard import Heard
+from bridges.messages.stamps import stamp
+from bridges.messages.topics import Topic
 from bridges.rmf_rules.phases import DoorClose, DoorOpen, EndLiftSession, RequestLift
 from bridges.rmf_rules.robot import Phase, Robot
 from bridges.serve import diagnostics

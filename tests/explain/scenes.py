@@ -11,10 +11,10 @@ from msgspec.structs import replace
 from bridges.charger.pad import Misplaced
 from bridges.charger.settings import Robot
 from bridges.explain.timeline import Kind
-from bridges.recording.heard import Heard
-from bridges.rmf import definitions as d
-from bridges.rmf import topics
-from bridges.rmf.stamps import stamp
+from bridges.messages import definitions as d
+from bridges.messages import topics
+from bridges.messages.heard import Heard
+from bridges.messages.stamps import stamp
 from tests.explain.scene import Guest, Scene
 from tests.site.network import Place
 from tests.site.timeline import EPOCH

@@ -9,9 +9,9 @@ from bridges.explain.lift_facts import LiftFacts
 from bridges.explain.site import MOST_DEVICES, Site
 from bridges.explain.text import lines
 from bridges.explain.timeline import KINDS
-from bridges.recording.heard import Heard
-from bridges.rmf import definitions as d
-from bridges.rmf.stamps import stamp
+from bridges.messages import definitions as d
+from bridges.messages.heard import Heard
+from bridges.messages.stamps import stamp
 
 WALL = 1_800_000_000.0
 STATE = d.LiftState(

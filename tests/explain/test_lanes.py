@@ -10,9 +10,9 @@ from msgspec.structs import replace
 from bridges.explain.lanes import MOST_ROWS, Drawing, lanes
 from bridges.explain.rows import LONGEST_LABEL, MOST_SPANS
 from bridges.explain.timeline import Lane, Level, Mark, Span, Timeline
-from bridges.recording.heard import Heard
-from bridges.rmf import definitions as d
-from bridges.rmf.stamps import stamp
+from bridges.messages import definitions as d
+from bridges.messages.heard import Heard
+from bridges.messages.stamps import stamp
 from tests.explain.scene import Scene
 
 WALL = 1_000_000.0

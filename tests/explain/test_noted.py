@@ -11,8 +11,8 @@ from bridges.explain.lanes import Drawing
 from bridges.explain.noted import MOST, Noted, levels, noted
 from bridges.explain.site import Site
 from bridges.explain.timeline import Level
-from bridges.recording.heard import Heard, Own
-from bridges.rmf import definitions as d
+from bridges.messages import definitions as d
+from bridges.messages.heard import Heard, Own
 from bridges.serve.diagnostics import diagnosis
 
 CORPUS = Path(__file__).parents[1] / "recording" / "corpus"

@@ -12,9 +12,9 @@ from bridges.commands.faults import for_explain
 from bridges.explain.explanation import Explanation
 from bridges.explain.phrases import JOINS, on_graph
 from bridges.explain.site import Site
-from bridges.recording.heard import Heard
-from bridges.rmf import definitions as d
-from bridges.rmf.stamps import stamp
+from bridges.messages import definitions as d
+from bridges.messages.heard import Heard
+from bridges.messages.stamps import stamp
 from tests.explain.scenes import SCENES
 
 GRAPH = ("--config", "our site.yaml", "--domain-id", "7", "--transport", "zenoh", "--localhost")

@@ -5,9 +5,9 @@ from datetime import UTC
 import pytest
 
 from bridges.explain.site import Site
-from bridges.recording.heard import Heard
-from bridges.rmf import definitions as d
-from bridges.rmf.stamps import stamp
+from bridges.messages import definitions as d
+from bridges.messages.heard import Heard
+from bridges.messages.stamps import stamp
 
 WALL = 1_800_000_000.0
 EITHER = "the supervisor, or a person with `send --direct`,"

@@ -11,7 +11,7 @@ from bridges.core.decision import OperatorReset
 from bridges.door.signals import DoorOutputs
 from bridges.host.log import Seldom, _Formatter, _Json, pairs, plain
 from bridges.lift.signals import LiftOutputs, Side
-from bridges.rmf.definitions import LiftMode
+from bridges.messages.definitions import LiftMode
 
 
 class Asked(Struct, frozen=True):

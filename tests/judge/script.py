@@ -2,10 +2,10 @@
 
 from collections.abc import Sequence
 
-from bridges.rmf import definitions as d
-from bridges.rmf import topics
-from bridges.rmf.stamps import stamp
-from bridges.rmf.topics import AnyTopic
+from bridges.messages import definitions as d
+from bridges.messages import topics
+from bridges.messages.stamps import stamp
+from bridges.messages.topics import AnyTopic
 from bridges.rmf_rules import NEVER, Party, Said
 from tests.site.timeline import EPOCH
 

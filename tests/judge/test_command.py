@@ -8,10 +8,10 @@ from xml.etree import ElementTree
 import pytest
 
 from bridges.cli import main
-from bridges.recording.heard import Heard
-from bridges.rmf import definitions as d
-from bridges.rmf.releases import JAZZY
-from bridges.rmf.stamps import stamp
+from bridges.messages import definitions as d
+from bridges.messages.heard import Heard
+from bridges.messages.releases import JAZZY
+from bridges.messages.stamps import stamp
 from tests.judge.script import lift
 from tests.recording.written import MCAP, SQLITE, write
 from tests.site.timeline import EPOCH

@@ -2,7 +2,7 @@
 
 import pytest
 
-from bridges.rmf import topics
+from bridges.messages import topics
 from bridges.rmf_rules import Party
 from bridges.rmf_rules.supervisors import DoorSupervisor
 from tests.judge.nodes.close_drives_shut import CloseDrivesShut

@@ -2,8 +2,8 @@
 
 import pytest
 
-from bridges.rmf import definitions as d
-from bridges.rmf import topics
+from bridges.messages import definitions as d
+from bridges.messages import topics
 from bridges.rmf_rules import Party
 from bridges.rmf_rules.supervisors import LiftSupervisor
 from tests.judge.nodes.any_end_ends import AnyEndEnds

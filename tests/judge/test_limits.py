@@ -7,11 +7,11 @@ import pytest
 
 from bridges.judge.judge import Judge, Kind
 from bridges.judge.law import Verdict
-from bridges.recording.heard import Heard
-from bridges.rmf import definitions as d
-from bridges.rmf import topics
-from bridges.rmf.stamps import stamp
-from bridges.rmf.topics import AnyTopic
+from bridges.messages import definitions as d
+from bridges.messages import topics
+from bridges.messages.heard import Heard
+from bridges.messages.stamps import stamp
+from bridges.messages.topics import AnyTopic
 from tests.judge.script import door as door_request
 from tests.judge.script import lift as lift_request
 

@@ -8,10 +8,10 @@ from bridges.judge.law import Verdict
 from bridges.judge.plays import Charge, Passages, Performance, Ride
 from bridges.judge.report import as_json, junit, report, text
 from bridges.judge.stage import Stage
-from bridges.recording.heard import Heard
-from bridges.rmf import definitions as d
-from bridges.rmf import topics
-from bridges.rmf.stamps import stamp
+from bridges.messages import definitions as d
+from bridges.messages import topics
+from bridges.messages.heard import Heard
+from bridges.messages.stamps import stamp
 from tests.judge.nodes.right_charger import RightCharger
 from tests.judge.nodes.right_door import RightDoor
 from tests.judge.nodes.right_lift import RightLift

@@ -6,10 +6,10 @@ from msgspec.structs import replace
 
 from bridges.judge.judge import Judge
 from bridges.judge.law import Verdict
-from bridges.recording.heard import Heard
-from bridges.rmf import definitions as d
-from bridges.rmf import topics
-from bridges.rmf.stamps import stamp
+from bridges.messages import definitions as d
+from bridges.messages import topics
+from bridges.messages.heard import Heard
+from bridges.messages.stamps import stamp
 
 IDLE, ASSIGNED, CHARGING, RELEASED = 1, 2, 3, 4
 NOBODYS = "unrequested/bay1"

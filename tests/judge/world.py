@@ -7,10 +7,10 @@ from bridges.judge.judge import Judge, Kind
 from bridges.judge.law import Verdict
 from bridges.judge.plays import Charge, Passages, Performance, Ride
 from bridges.judge.stage import Stage
-from bridges.recording.heard import Heard
-from bridges.rmf import topics
-from bridges.rmf.definitions import Message
-from bridges.rmf.topics import AnyTopic
+from bridges.messages import topics
+from bridges.messages.definitions import Message
+from bridges.messages.heard import Heard
+from bridges.messages.topics import AnyTopic
 from bridges.rmf.transport import Publisher
 from bridges.rmf_rules import Party, Said
 from tests.site.network import CLEAR, Air, Place

@@ -11,7 +11,7 @@ from bridges.lift.core import decide
 from bridges.lift.memory import LiftLimits, Memory
 from bridges.lift.report import LiftReport
 from bridges.lift.signals import Door, Ended, FromAdapter, Hazard, LiftOutputs, Motion, Requested
-from bridges.rmf.definitions import LiftDoor
+from bridges.messages.definitions import LiftDoor
 from tests.lift.walk import Step, World, reading
 
 RIVAL_S = 5.0

@@ -3,13 +3,8 @@
 from collections.abc import Callable, Sequence
 
 from bridges.lift.messages import OWN_REQUESTS
-from bridges.rmf.definitions import LiftRequest, LiftState, Message
-from bridges.rmf.topics import (
-    ADAPTER_LIFT_REQUESTS,
-    LIFT_REQUESTS,
-    LIFT_STATES,
-    AnyTopic,
-)
+from bridges.messages.definitions import LiftRequest, LiftState, Message
+from bridges.messages.topics import ADAPTER_LIFT_REQUESTS, LIFT_REQUESTS, LIFT_STATES, AnyTopic
 from bridges.rmf_rules import Party, Said
 from bridges.rmf_rules.phases import EndLiftSession, RequestLift
 from bridges.rmf_rules.robot import Robot

@@ -16,7 +16,7 @@ from bridges.lift import KIND
 from bridges.lift.memory import LiftLimits
 from bridges.lift.settings import Durations, Floor, LiftSettings
 from bridges.lift.signals import Door, Hazard, LiftOutputs, LiftSample, Motion
-from bridges.rmf.definitions import (
+from bridges.messages.definitions import (
     LiftDoor,
     LiftMode,
     LiftMotion,
@@ -25,7 +25,7 @@ from bridges.rmf.definitions import (
     LiftState,
     Message,
 )
-from bridges.rmf.topics import LIFT_REQUESTS, LIFT_STATES, Topic
+from bridges.messages.topics import LIFT_REQUESTS, LIFT_STATES, Topic
 from bridges.serve.clock import Clock
 from bridges.serve.device import Node
 from drivers import DriverError

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import pytest
 
 from bridges.lift.signals import LiftOutputs
-from bridges.rmf.definitions import LiftState
+from bridges.messages.definitions import LiftState
 from bridges.rmf_rules.robot import Robot
 from drivers.lift.dry_contact import wires
 from hal_fakes.plants.lift import FAILS

@@ -10,8 +10,8 @@ import pytest
 
 from bridges.lift.messages import OWN_REQUESTS
 from bridges.lift.signals import LiftOutputs
-from bridges.rmf.definitions import LiftRequest
-from bridges.rmf.stamps import stamp
+from bridges.messages.definitions import LiftRequest
+from bridges.messages.stamps import stamp
 from bridges.rmf_rules.robot import Robot
 from tests.lift.rmf_world import World
 from tests.lift.story import AGV, END, WALL, Building, Controller, Story

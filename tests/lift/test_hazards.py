@@ -6,8 +6,8 @@ from msgspec.structs import replace
 from bridges.lift.messages import alarm_topics
 from bridges.lift.settings import LiftSettings
 from bridges.lift.signals import Door, Hazard, LiftOutputs, LiftSample, Motion, Side
-from bridges.rmf.definitions import Bool, EmergencySignal
-from bridges.rmf.topics import EMERGENCY_SIGNAL, FIRE_ALARM_TRIGGER, RETAINED
+from bridges.messages.definitions import Bool, EmergencySignal
+from bridges.messages.topics import EMERGENCY_SIGNAL, FIRE_ALARM_TRIGGER, RETAINED
 from tests.lift.story import Building, Controller, Story
 
 CLOSED_AT_L1 = LiftSample("L1", Door.CLOSED, motion=Motion.STOPPED, agv=True)

@@ -8,8 +8,8 @@ END for its robot's session (RobotContext.cpp, _check_lift_state).
 import pytest
 
 from bridges.lift.signals import Hazard, LiftOutputs
-from bridges.rmf.definitions import LiftRequest
-from bridges.rmf.stamps import stamp
+from bridges.messages.definitions import LiftRequest
+from bridges.messages.stamps import stamp
 from bridges.rmf_rules.robot import Robot
 from bridges.rmf_rules.supervisors import LiftSupervisor
 from tests.lift.rmf_world import World

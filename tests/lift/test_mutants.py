@@ -29,7 +29,7 @@ from bridges.lift.signals import (
     Requested,
     Side,
 )
-from bridges.rmf.definitions import LiftMode
+from bridges.messages.definitions import LiftMode
 
 DEBOUNCE = {"floor": 0.08, "door": 0.03, "rear_door": 0.04, "agv_mode": 0.05, Hazard.FIRE: 0.06}
 AT_L1 = LiftSample("L1", Door.OPEN, motion=Motion.STOPPED, agv=True)

@@ -5,8 +5,8 @@ import logging
 import pytest
 
 from bridges.lift.signals import Door, LiftOutputs, LiftSample, Motion
-from bridges.rmf.definitions import LiftState, Time
-from bridges.rmf.stamps import in_seconds
+from bridges.messages.definitions import LiftState, Time
+from bridges.messages.stamps import in_seconds
 from tests.lift.story import WALL, Building, Controller, Story
 
 OPEN_AT_L1 = LiftSample("L1", Door.OPEN, motion=Motion.STOPPED, agv=True)

@@ -4,7 +4,7 @@ import logging
 
 import pytest
 
-from bridges.rmf.definitions import LiftRequest
+from bridges.messages.definitions import LiftRequest
 from bridges.rmf_rules.robot import Robot
 from bridges.rmf_rules.supervisors import LiftSupervisor
 from tests.lift.rmf_world import World

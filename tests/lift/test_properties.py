@@ -11,7 +11,7 @@ from msgspec.structs import replace
 from bridges.core.decision import Sampled
 from bridges.lift import KIND, core
 from bridges.lift.signals import Door, Hazard, LiftSample, Motion
-from bridges.rmf.definitions import LiftDoor, LiftRequest, LiftState
+from bridges.messages.definitions import LiftDoor, LiftRequest, LiftState
 from bridges.rmf_rules.robot import Robot
 from tests.depth import examples
 from tests.lift.invariants import check

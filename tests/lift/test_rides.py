@@ -7,8 +7,8 @@ from bridges.core.decision import RequestRefused
 from bridges.lift import messages
 from bridges.lift.settings import Floor, LiftSettings
 from bridges.lift.signals import Door, LiftOutputs, LiftSample, Motion, Side
-from bridges.rmf.definitions import LiftMode, LiftMotion, LiftRequest, LiftState, Time
-from bridges.rmf.stamps import in_seconds
+from bridges.messages.definitions import LiftMode, LiftMotion, LiftRequest, LiftState, Time
+from bridges.messages.stamps import in_seconds
 from tests.lift.story import (
     AGV,
     END,

@@ -12,7 +12,7 @@ from bridges.core.decision import RequestRefused
 from bridges.lift import KIND, messages
 from bridges.lift.settings import LiftSettings
 from bridges.lift.signals import Door, Hazard, LiftOutputs, LiftSample, Motion
-from bridges.rmf.definitions import LiftRequest, Time
+from bridges.messages.definitions import LiftRequest, Time
 from tests.lift.story import AGV, HUMAN, Building, Controller, Story
 
 OPEN_AT_L1 = LiftSample("L1", Door.OPEN, motion=Motion.STOPPED, agv=True)

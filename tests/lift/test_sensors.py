@@ -7,8 +7,8 @@ from bridges.core.decision import Fault, Sampled
 from bridges.lift.core import decide
 from bridges.lift.memory import Memory
 from bridges.lift.signals import Door, Hazard, LiftOutputs, LiftSample, Motion, Requested
-from bridges.rmf.definitions import LiftMotion
-from bridges.rmf.stamps import in_seconds
+from bridges.messages.definitions import LiftMotion
+from bridges.messages.stamps import in_seconds
 from tests.lift.story import WALL, Building, Controller, Story
 
 OPEN_AT_L1 = LiftSample("L1", Door.OPEN, motion=Motion.STOPPED, agv=True)

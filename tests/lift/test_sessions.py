@@ -5,7 +5,7 @@ import pytest
 from bridges.lift import KIND
 from bridges.lift.core import decide
 from bridges.lift.signals import Door, Hazard, LiftOutputs, LiftSample, Motion, Requested
-from bridges.rmf.definitions import LiftRequest, LiftState
+from bridges.messages.definitions import LiftRequest, LiftState
 from tests.lift.story import HUMAN, Building, Controller, Story
 
 OPEN_AT_L1 = LiftSample("L1", Door.OPEN, motion=Motion.STOPPED, agv=True)

@@ -5,7 +5,7 @@ from itertools import pairwise
 import pytest
 
 from bridges.lift.signals import Door, LiftOutputs, LiftSample, Motion, Side
-from bridges.rmf.stamps import in_seconds
+from bridges.messages.stamps import in_seconds
 from tests.lift.story import WALL, Building, Controller, Story
 
 HELD = LiftOutputs(agv_request=True, hold_door=Side.FRONT)

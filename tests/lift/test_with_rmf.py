@@ -3,7 +3,7 @@
 import pytest
 
 from bridges.lift.signals import Hazard, LiftOutputs
-from bridges.rmf.definitions import LiftRequest, Time
+from bridges.messages.definitions import LiftRequest, Time
 from bridges.rmf_rules.robot import Robot
 from tests.lift.rmf_world import World
 from tests.lift.story import AGV, END, Controller, Story

@@ -4,7 +4,7 @@ from bridges.lift_supervisor import core
 from bridges.lift_supervisor.memory import Limits, Memory
 from bridges.lift_supervisor.report import SupervisorReport
 from bridges.lift_supervisor.signals import Ended, Event, Requested, StateHeard, Target
-from bridges.rmf.definitions import LiftMode, LiftRequest, Message
+from bridges.messages.definitions import LiftMode, LiftRequest, Message
 from tests.core import alone
 
 MODES = {"AGV": LiftMode.MODE_AGV, "FIRE": LiftMode.MODE_FIRE, "OFFLINE": LiftMode.MODE_OFFLINE}

@@ -8,7 +8,7 @@ from bridges.lift_supervisor import messages
 from bridges.lift_supervisor.report import SupervisorReport
 from bridges.lift_supervisor.settings import Settings
 from bridges.lift_supervisor.signals import Ended, Requested, StateHeard, Target
-from bridges.rmf.definitions import LiftRequest, LiftState, Time
+from bridges.messages.definitions import LiftRequest, LiftState, Time
 
 ANY = Settings()
 AGV = LiftRequest("Lift1", Time(100, 500_000_000), "fleet/a", 1, "L3", 2)

@@ -10,7 +10,7 @@ from bridges.lift_supervisor import core
 from bridges.lift_supervisor.memory import Limits, Memory
 from bridges.lift_supervisor.settings import Settings
 from bridges.lift_supervisor.signals import StateHeard
-from bridges.rmf.definitions import LiftRequest
+from bridges.messages.definitions import LiftRequest
 from tests.lift_supervisor.alone import Alone
 
 

@@ -14,7 +14,7 @@ from bridges.core.graph_kind import MaySpeak, Woken
 from bridges.lift_supervisor import core
 from bridges.lift_supervisor.memory import NOBODY_IS_SENT, Limits, Memory
 from bridges.lift_supervisor.signals import Ended, Requested, StateHeard, Target
-from bridges.rmf.definitions import LiftMode
+from bridges.messages.definitions import LiftMode
 from tests.depth import depth, examples
 from tests.lift_supervisor.alone import words
 from tests.lift_supervisor.world import LiftNode, OurSupervisor, Rider, requests

@@ -11,9 +11,9 @@ from bridges.commands.requests import Seen
 from bridges.commands.requests.lift import LiftEnd
 from bridges.lift.signals import Hazard
 from bridges.lift_supervisor.settings import Settings
-from bridges.rmf.definitions import LiftRequest
-from bridges.rmf.stamps import stamp
-from bridges.rmf.topics import ADAPTER_LIFT_REQUESTS, LIFT_REQUESTS
+from bridges.messages.definitions import LiftRequest
+from bridges.messages.stamps import stamp
+from bridges.messages.topics import ADAPTER_LIFT_REQUESTS, LIFT_REQUESTS
 from tests.lift_supervisor.world import (
     LiftNode,
     OurSupervisor,

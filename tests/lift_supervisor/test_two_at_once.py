@@ -6,8 +6,8 @@ from typing import Any
 
 from bridges.lift_supervisor import KIND
 from bridges.lift_supervisor.settings import Settings
+from bridges.messages.topics import Topic
 from bridges.rmf.memory import MemoryNetwork, MemoryTransport
-from bridges.rmf.topics import Topic
 from bridges.rmf.transport import Subscription
 from bridges.serve.clock import Clock
 from bridges.serve.graph import GraphNode

@@ -10,8 +10,8 @@ from bridges.lift import KIND as LIFT
 from bridges.lift.settings import LiftSettings
 from bridges.lift_supervisor import KIND as SUPERVISOR
 from bridges.lift_supervisor.settings import Settings
-from bridges.rmf.definitions import Message
-from bridges.rmf.topics import LIFT_REQUESTS, LIFT_STATES, Topic
+from bridges.messages.definitions import Message
+from bridges.messages.topics import LIFT_REQUESTS, LIFT_STATES, Topic
 from bridges.rmf_rules.phases import EndLiftSession, RequestLift
 from bridges.rmf_rules.robot import Phase, Robot
 from bridges.rmf_rules.supervisors import LiftSupervisor

@@ -5,16 +5,16 @@ from pathlib import Path
 from msgspec.structs import replace
 
 from bridges import __version__
+from bridges.messages import cdr
+from bridges.messages import definitions as d
+from bridges.messages.definitions import Message
+from bridges.messages.releases import RELEASES
+from bridges.messages.rihs01 import type_name
+from bridges.messages.stamps import stamp
 from bridges.recording import mcap_write
 from bridges.recording.entries import AnyEntry, Clocks, Head, Spoken
 from bridges.recording.incident import Incident, Note
 from bridges.recording.settings import Recording
-from bridges.rmf import cdr
-from bridges.rmf import definitions as d
-from bridges.rmf.definitions import Message
-from bridges.rmf.releases import RELEASES
-from bridges.rmf.rihs01 import type_name
-from bridges.rmf.stamps import stamp
 
 WALL = 1_795_000_000.0
 LIFT = d.LiftState(

@@ -12,9 +12,9 @@ from websockets import Origin
 from websockets.exceptions import WebSocketException
 from websockets.sync.client import connect
 
-from bridges.rmf import definitions as d
-from bridges.rmf import topics
-from bridges.rmf.cdr import LONGEST_FLAT
+from bridges.messages import definitions as d
+from bridges.messages import topics
+from bridges.messages.cdr import LONGEST_FLAT
 from bridges.rmf.transport import Transport
 from tests.page.browser.test_safety import ask
 

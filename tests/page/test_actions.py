@@ -4,9 +4,9 @@ import pytest
 
 from bridges.cli import whole_parser
 from bridges.commands.board import Row
+from bridges.messages import definitions as d
 from bridges.page.actions import Action, Local, actions, fail, press, queue
 from bridges.page.site import DeviceView
-from bridges.rmf import definitions as d
 
 GRAPH = ("--domain-id", "7", "--localhost")
 HOSTILE = "--config=/etc/shadow"

@@ -5,10 +5,10 @@ from xml.etree import ElementTree
 import pytest
 
 from bridges.commands.board import Row
+from bridges.messages import definitions as d
+from bridges.messages.words import Stated
 from bridges.page import drawing
 from bridges.page.site import DeviceView, Robot, Stands
-from bridges.rmf import definitions as d
-from bridges.rmf.words import Stated
 
 HOSTILE = "<script>alert(1)</script>\"'&"
 LIFT = d.LiftState(

@@ -5,10 +5,10 @@ import re
 
 from msgspec.structs import replace
 
+from bridges.messages.heard import Heard
 from bridges.page.gallery import Gallery, place_of, script
 from bridges.page.listener import Listener
 from bridges.page.site import Site
-from bridges.recording.heard import Heard
 from bridges.rmf.transport import Transport, TransportError
 from tests.page.test_site import LIFT, lift
 

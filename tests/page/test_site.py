@@ -2,12 +2,12 @@
 
 from msgspec.structs import replace
 
+from bridges.messages import definitions as d
+from bridges.messages import topics
+from bridges.messages.heard import Heard
+from bridges.messages.stamps import stamp
+from bridges.messages.topics import AnyTopic
 from bridges.page.site import GONE_AFTER_S, KEPT_S, MOST_DEVICES, MOST_ROBOTS, Site, Stands
-from bridges.recording.heard import Heard
-from bridges.rmf import definitions as d
-from bridges.rmf import topics
-from bridges.rmf.stamps import stamp
-from bridges.rmf.topics import AnyTopic
 from bridges.serve.diagnostics import diagnosis
 
 WALL = 1_700_000_000.0

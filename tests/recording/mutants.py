@@ -20,6 +20,11 @@ from mcap.writer import CompressionType, Writer
 from msgspec.structs import replace
 
 from bridges import cli
+from bridges.messages import cdr
+from bridges.messages.definitions import Message
+from bridges.messages.releases import RELEASES
+from bridges.messages.rihs01 import type_name
+from bridges.messages.texts import MESSAGES, text
 from bridges.page.incidents import read
 from bridges.page.levels import Levels
 from bridges.recording import entries
@@ -31,11 +36,6 @@ from bridges.recording.recorder import Recorder
 from bridges.recording.ring import FRAME, MAGIC, MARK, PAGE, SEGMENTS, TOP
 from bridges.recording.shelf import Shelf
 from bridges.recording.sources import BagError, Notes
-from bridges.recording.texts import MESSAGES, text
-from bridges.rmf import cdr
-from bridges.rmf.definitions import Message
-from bridges.rmf.releases import RELEASES
-from bridges.rmf.rihs01 import type_name
 
 CORPUS: Final = Path(__file__).parent / "corpus"
 NUMBERS: Final = (

@@ -10,8 +10,8 @@ from typing import Any
 import msgspec
 
 from bridges.core.decision import Decision
-from bridges.rmf import constants
-from bridges.rmf.definitions import Message
+from bridges.messages import constants
+from bridges.messages.definitions import Message
 from bridges.settings.names import kind_called, kind_names
 
 PLAIN: dict[Any, Any] = {bool: True, int: 1, float: 1.5, str: "a", None: None, type(None): None}

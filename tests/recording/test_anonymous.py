@@ -7,6 +7,9 @@ from pathlib import Path
 import pytest
 
 from bridges import lift
+from bridges.messages import cdr
+from bridges.messages.definitions import LiftState
+from bridges.messages.releases import KILTED
 from bridges.recording import mcap_write
 from bridges.recording.anonymous import anonymous, our_words
 from bridges.recording.entries import Head, Spoken
@@ -16,9 +19,6 @@ from bridges.recording.incidents import notes_in
 from bridges.recording.replayed import Cores, Replay, of_head
 from bridges.recording.settings import Recording
 from bridges.recording.sources import Notes
-from bridges.rmf import cdr
-from bridges.rmf.definitions import LiftState
-from bridges.rmf.releases import KILTED
 from tests.recording.test_replay import CORPUS
 
 NAMES = (b"Lift1", b"Lift2", b"red", b"green", b"white", b"black", b"bay1", b"bay2", b"ward", b"L3")

@@ -6,11 +6,7 @@ from pathlib import Path
 import pytest
 from rosbags.rosbag2 import StoragePlugin
 
-from bridges.recording.bags import BagError, Notes, heard_in
-from bridges.recording.heard import Heard
-from bridges.recording.sources import releases
-from bridges.recording.texts import MESSAGES, releases_of, text
-from bridges.rmf.definitions import (
+from bridges.messages.definitions import (
     Bool,
     DoorMode,
     DoorRequest,
@@ -21,8 +17,12 @@ from bridges.rmf.definitions import (
     RobotState,
     Time,
 )
-from bridges.rmf.releases import JAZZY, KILTED, RELEASES, Release
-from bridges.rmf.rihs01 import type_name
+from bridges.messages.heard import Heard
+from bridges.messages.releases import JAZZY, KILTED, RELEASES, Release
+from bridges.messages.rihs01 import type_name
+from bridges.messages.texts import MESSAGES, releases_of, text
+from bridges.recording.bags import BagError, Notes, heard_in
+from bridges.recording.sources import releases
 from tests.recording.written import MCAP, SQLITE, store, write
 
 WALL = 1_800_000_000.0

@@ -13,12 +13,12 @@ import zstandard
 from mcap.opcode import Opcode
 from mcap.writer import CompressionType, Writer
 
+from bridges.messages import cdr
+from bridges.messages.definitions import LiftState
+from bridges.messages.releases import KILTED
+from bridges.messages.texts import text
 from bridges.recording.bags import BagError, Notes, heard_in
 from bridges.recording.mcap_read import FIRST_UNPACKED, LONGEST_RECORD, MAGIC, MOST_DECLARED
-from bridges.recording.texts import text
-from bridges.rmf import cdr
-from bridges.rmf.definitions import LiftState
-from bridges.rmf.releases import KILTED
 from tests.recording.test_bags import RIDE
 from tests.recording.written import SQLITE, write
 

@@ -11,12 +11,12 @@ from bridges.core.decision import IoFailed
 from bridges.door.core import decide as decide_door
 from bridges.lift.core import decide as decide_lift
 from bridges.lift.signals import Door
+from bridges.messages import definitions as d
+from bridges.messages.heard import LONGEST_SENTENCE, MOST_PARTS, bounded
 from bridges.recording import entries
 from bridges.recording.entries import DEEPEST, Clocks, Invalid, Known, Spoken
-from bridges.recording.heard import LONGEST_SENTENCE, MOST_PARTS, bounded
 from bridges.recording.trees import UnknownValue, tree
 from bridges.recording.typed import typed, types_of
-from bridges.rmf import definitions as d
 from tests.depth import depth
 from tests.recording.mutants import Mutator, as_ring, corpus, ended, endings, write_file
 

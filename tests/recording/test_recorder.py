@@ -12,6 +12,15 @@ from bridges.core.decision import Decision, Fault, IoFailed, Sampled
 from bridges.core.durations import NEVER
 from bridges.lift.report import LiftReport
 from bridges.lift.signals import Door, LiftOutputs, LiftSample, Requested
+from bridges.messages.definitions import (
+    LiftDoor,
+    LiftMode,
+    LiftMotion,
+    LiftRequest,
+    LiftState,
+    Message,
+)
+from bridges.messages.releases import KILTED
 from bridges.recording import shelf as shelves
 from bridges.recording.bags import Notes, heard_in
 from bridges.recording.entries import Head, Step
@@ -20,15 +29,6 @@ from bridges.recording.recorder import Recorder
 from bridges.recording.ring import DIED, Read, Ring
 from bridges.recording.settings import Recording
 from bridges.recording.shelf import Shelf
-from bridges.rmf.definitions import (
-    LiftDoor,
-    LiftMode,
-    LiftMotion,
-    LiftRequest,
-    LiftState,
-    Message,
-)
-from bridges.rmf.releases import KILTED
 from bridges.serve.clock import Clock
 from bridges.serve.witness import Witness
 

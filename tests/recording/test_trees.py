@@ -12,9 +12,9 @@ from bridges.core.durations import NEVER
 from bridges.core.graph_kind import MaySpeak, Woken
 from bridges.lift.memory import Channel, Memory, Relays, Senses, Session
 from bridges.lift.signals import Door, Hazard, LiftOutputs, LiftSample, Requested, Side
+from bridges.messages.constants import LiftDoor
+from bridges.messages.definitions import LiftRequest, Time
 from bridges.recording.trees import UnknownValue, first_difference, tree, value
-from bridges.rmf.constants import LiftDoor
-from bridges.rmf.definitions import LiftRequest, Time
 
 VALUES: list[Any] = [
     None,

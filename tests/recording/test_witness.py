@@ -11,6 +11,8 @@ import pytest
 from bridges.core.decision import Decision, Sampled
 from bridges.core.durations import NEVER
 from bridges.lift.signals import Door, LiftOutputs, LiftSample
+from bridges.messages.definitions import LiftState, Message
+from bridges.messages.releases import KILTED
 from bridges.recording.bags import heard_in
 from bridges.recording.entries import AnyEntry, Clocks, Head, Known, Lost, Same, Spoken, Step
 from bridges.recording.incident import Incident, timed
@@ -18,8 +20,6 @@ from bridges.recording.mcap_write import write
 from bridges.recording.replayed import times
 from bridges.recording.ring import Read, Ring
 from bridges.recording.settings import Recording
-from bridges.rmf.definitions import LiftState, Message
-from bridges.rmf.releases import KILTED
 from bridges.serve.clock import Clock
 from bridges.serve.witness import Witness
 from tests.recording.test_recorder import REPORT, WALL

@@ -7,11 +7,11 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from rosbags.typesys.store import Typestore
 
-from bridges.recording.heard import Heard
-from bridges.recording.texts import text
-from bridges.rmf import cdr
-from bridges.rmf.releases import Release
-from bridges.rmf.rihs01 import type_name
+from bridges.messages import cdr
+from bridges.messages.heard import Heard
+from bridges.messages.releases import Release
+from bridges.messages.rihs01 import type_name
+from bridges.messages.texts import text
 
 MCAP, SQLITE = StoragePlugin.MCAP, StoragePlugin.SQLITE3
 

@@ -1,4 +1,5 @@
-"""What each topic of ours must be on the graph, typed by hand: `bridges/rmf/topics.py` is not asked.
+"""What each topic of ours must be on the graph, typed by hand: `bridges/messages/topics.py` is not
+asked.
 
 A row is (type, QoS of the end that publishes, QoS of the end that subscribes). Line numbers are of
 rmf_ros2 9dedd0f (2026-05) unless said otherwise.

@@ -3,8 +3,8 @@
 import importlib
 from collections.abc import Callable
 
+from bridges.messages.releases import NEWEST, Release
 from bridges.rmf.choose import missing_of_ros
-from bridges.rmf.releases import NEWEST, Release
 from bridges.rmf.ros_types import installed
 from bridges.rmf.settings import Zenoh
 from bridges.rmf.transport import Transport

@@ -19,10 +19,10 @@ from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic as DdsTopic
 from msgspec.structs import replace
 
+from bridges.messages.definitions import DoorRequest, DoorState, field_types
+from bridges.messages.topics import every
 from bridges.rmf.cyclone import FOUND_AGAIN, INTERNAL, LOOPBACK
-from bridges.rmf.definitions import DoorRequest, DoorState, field_types
 from bridges.rmf.idl import sample_type
-from bridges.rmf.topics import every
 
 AS_RMF: Final = LOOPBACK.replace(INTERNAL, "").replace(FOUND_AGAIN, "")
 """Loopback with Cyclone's defaults, as RMF's own nodes have them."""

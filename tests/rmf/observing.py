@@ -4,8 +4,8 @@ from typing import Any
 
 from cyclonedds import builtin
 
+from bridges.messages.topics import Topic
 from bridges.rmf.dds_peers import BuiltinReader
-from bridges.rmf.topics import Topic
 from tests.waiting import wait_until
 
 PUBLICATION = builtin.BuiltinTopicDcpsPublication

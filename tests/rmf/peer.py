@@ -13,8 +13,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from bridges.rmf import topics
-from bridges.rmf.topics import Topic
+from bridges.messages import topics
+from bridges.messages.topics import Topic
 from bridges.rmf.transport import Publisher
 from tests.rmf import zenoh_hostile
 from tests.rmf.joining import RELEASE, joining

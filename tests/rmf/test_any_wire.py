@@ -6,8 +6,8 @@ import threading
 import pytest
 from msgspec.structs import replace
 
-from bridges.rmf import definitions as d
-from bridges.rmf.topics import FIRE_ALARM_TRIGGER, LIFT_REQUESTS, LIFT_STATES, VOLATILE
+from bridges.messages import definitions as d
+from bridges.messages.topics import FIRE_ALARM_TRIGGER, LIFT_REQUESTS, LIFT_STATES, VOLATILE
 from tests.rmf import peer
 from tests.rmf.joining import Join
 from tests.waiting import wait_until

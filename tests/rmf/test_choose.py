@@ -10,8 +10,8 @@ from typing import Literal
 import msgspec
 import pytest
 
+from bridges.messages.definitions import PACKAGES
 from bridges.rmf.choose import domain_id, open_transport, stays_on_loopback
-from bridges.rmf.definitions import PACKAGES
 from bridges.rmf.settings import Rmf, Zenoh
 from bridges.rmf.transport import TransportError
 from bridges.settings.load import Problem, SettingsError, load

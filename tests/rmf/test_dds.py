@@ -11,12 +11,12 @@ from cyclonedds.qos import Policy, Qos
 from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic as DdsTopic
 
-from bridges.rmf import definitions as d
+from bridges.messages import definitions as d
+from bridges.messages.topics import LIFT_REQUESTS, LIFT_STATES, Topic
 from bridges.rmf import graph
 from bridges.rmf.cyclone import LOOPBACK
 from bridges.rmf.dds import DdsTransport
 from bridges.rmf.dds_peers import BuiltinReader
-from bridges.rmf.topics import LIFT_REQUESTS, LIFT_STATES, Topic
 from bridges.rmf.transport import TransportError
 from tests.rmf import peer
 from tests.rmf.domains import domain_of_this_run

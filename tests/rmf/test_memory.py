@@ -1,8 +1,8 @@
 from msgspec.structs import replace
 
-from bridges.rmf import definitions as d
+from bridges.messages import definitions as d
+from bridges.messages.topics import FIRE_ALARM_TRIGGER, LIFT_STATES, Qos
 from bridges.rmf.memory import MemoryNetwork, MemoryTransport
-from bridges.rmf.topics import FIRE_ALARM_TRIGGER, LIFT_STATES, Qos
 
 
 def test_a_message_is_there_when_publish_returns() -> None:

@@ -11,9 +11,9 @@ from cyclonedds.pub import DataWriter
 from cyclonedds.qos import Policy, Qos
 from cyclonedds.topic import Topic
 
-from bridges.rmf import definitions as d
+from bridges.messages import definitions as d
+from bridges.messages.topics import LIFT_REQUESTS
 from bridges.rmf.dds import DdsTransport
-from bridges.rmf.topics import LIFT_REQUESTS
 from tests.waiting import wait_until
 
 # mypy knows nothing of cyclonedds.

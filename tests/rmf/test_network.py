@@ -5,10 +5,10 @@ from contextlib import suppress
 
 import pytest
 
+from bridges.messages import definitions as d
+from bridges.messages.topics import DOOR_STATES, FIRE_ALARM_TRIGGER
 from bridges.rmf import addresses, cyclone
-from bridges.rmf import definitions as d
 from bridges.rmf.cyclone import LOOPBACK
-from bridges.rmf.topics import DOOR_STATES, FIRE_ALARM_TRIGGER
 from bridges.rmf.transport import TransportError
 from tests.rmf import peer
 from tests.rmf.conftest import ROS2

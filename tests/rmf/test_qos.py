@@ -4,10 +4,10 @@ from typing import Any
 
 import pytest
 
-from bridges.rmf import definitions as d
-from bridges.rmf import topics
+from bridges.messages import definitions as d
+from bridges.messages import topics
+from bridges.messages.topics import Topic
 from bridges.rmf.memory import MemoryNetwork, MemoryTransport
-from bridges.rmf.topics import Topic
 from tests.rmf.golden_qos import GOLDEN, PLAIN, RETAINED, Qos
 
 TOPICS = {topic.name: topic for topic in vars(topics).values() if isinstance(topic, Topic)}

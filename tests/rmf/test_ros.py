@@ -10,19 +10,19 @@ from typing import Any
 
 import pytest
 
-from bridges.rmf import definitions as d
+from bridges.messages import definitions as d
+from bridges.messages.releases import JAZZY
+from bridges.messages.rihs01 import type_hash
+from bridges.messages.stamps import stamp
+from bridges.messages.topics import LIFT_REQUESTS, LIFT_STATES, Topic
 from bridges.rmf.choose import missing_of_ros
-from bridges.rmf.releases import JAZZY
-from bridges.rmf.rihs01 import type_hash
 from bridges.rmf.ros_types import fields_of
-from bridges.rmf.stamps import stamp
-from bridges.rmf.topics import LIFT_REQUESTS, LIFT_STATES, Topic
 from bridges.rmf.transport import TransportError
+from tests.messages.test_definitions import NOT_IN_JAZZY
 from tests.rmf import peer
 from tests.rmf.conftest import ROS2
 from tests.rmf.domains import domain_of_this_run
 from tests.rmf.joining import RELEASE, Join, joining, on_fast_dds
-from tests.rmf.test_definitions import NOT_IN_JAZZY
 from tests.waiting import wait_until
 
 pytestmark = pytest.mark.ros

@@ -6,13 +6,14 @@ from types import ModuleType
 
 import pytest
 
-from bridges.rmf import definitions as d
-from bridges.rmf import ros_peers, topics
+from bridges.messages import definitions as d
+from bridges.messages import topics
+from bridges.messages.releases import JAZZY, KILTED, RELEASES, Release
+from bridges.messages.rihs01 import type_hash
+from bridges.messages.topics import AnyTopic
+from bridges.rmf import ros_peers
 from bridges.rmf.peers import Peers
-from bridges.rmf.releases import JAZZY, KILTED, RELEASES, Release
-from bridges.rmf.rihs01 import type_hash
 from bridges.rmf.ros_types import fields_of, installed, ros_type
-from bridges.rmf.topics import AnyTopic
 from bridges.rmf.transport import TransportError
 
 

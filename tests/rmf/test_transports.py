@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 from msgspec.structs import replace
 
-from bridges.rmf import definitions as d
-from bridges.rmf.topics import RETAINED, VOLATILE, Topic
+from bridges.messages import definitions as d
+from bridges.messages.topics import RETAINED, VOLATILE, Topic
 from bridges.rmf.transport import Publisher, Subscription, TransportError
 from tests.rmf.joining import RELEASE, Join
 from tests.rmf.values import MESSAGE_TYPES, repeatable, values

@@ -5,9 +5,9 @@ from contextlib import suppress
 
 import pytest
 
-from bridges.rmf import definitions as d
+from bridges.messages import definitions as d
+from bridges.messages.topics import DOOR_STATES, FIRE_ALARM_TRIGGER
 from bridges.rmf import wall_clock
-from bridges.rmf.topics import DOOR_STATES, FIRE_ALARM_TRIGGER
 from bridges.rmf.transport import TransportError
 from bridges.rmf.wall_clock import WallClock
 from tests.rmf import peer

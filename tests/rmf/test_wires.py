@@ -12,9 +12,9 @@ from cyclonedds.qos import Policy, Qos
 from cyclonedds.topic import Topic as DdsTopic
 from hypothesis import given
 
-from bridges.rmf import definitions as d
-from bridges.rmf.rihs01 import type_hash
-from bridges.rmf.topics import LIFT_REQUESTS, LIFT_STATES, Topic
+from bridges.messages import definitions as d
+from bridges.messages.rihs01 import type_hash
+from bridges.messages.topics import LIFT_REQUESTS, LIFT_STATES, Topic
 from tests.rmf import golden_qos, peer
 from tests.rmf.conftest import ROS2
 from tests.rmf.domains import domain_of_this_run

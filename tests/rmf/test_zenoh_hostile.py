@@ -5,9 +5,9 @@ import sys
 
 import pytest
 
-from bridges.rmf import definitions as d
-from bridges.rmf.cdr import encode
-from bridges.rmf.topics import LIFT_REQUESTS
+from bridges.messages import definitions as d
+from bridges.messages.cdr import encode
+from bridges.messages.topics import LIFT_REQUESTS
 from bridges.rmf.zenoh import ZenohTransport
 from tests.rmf.zenoh_hostile import FLOOD, GOOD, arguments
 from tests.waiting import wait_until

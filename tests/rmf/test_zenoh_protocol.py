@@ -8,11 +8,16 @@ from typing import Any
 
 import pytest
 
-from bridges.rmf import definitions as d
+from bridges.messages import definitions as d
+from bridges.messages.cdr import encode
+from bridges.messages.definitions import LiftState
+from bridges.messages.topics import (
+    ADAPTER_LIFT_REQUESTS,
+    FIRE_ALARM_TRIGGER,
+    LIFT_REQUESTS,
+    LIFT_STATES,
+)
 from bridges.rmf import zenoh_keys
-from bridges.rmf.cdr import encode
-from bridges.rmf.definitions import LiftState
-from bridges.rmf.topics import ADAPTER_LIFT_REQUESTS, FIRE_ALARM_TRIGGER, LIFT_REQUESTS, LIFT_STATES
 from bridges.rmf.zenoh import ZenohTransport
 from tests.rmf import rmw_zenoh_reader
 from tests.rmf.domains import domain_of_this_run

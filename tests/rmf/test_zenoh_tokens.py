@@ -9,9 +9,9 @@ from contextlib import closing, contextmanager
 import pytest
 import zenoh
 
-from bridges.rmf import definitions as d
+from bridges.messages import definitions as d
+from bridges.messages.topics import FIRE_ALARM_TRIGGER, LIFT_REQUESTS, LIFT_STATES
 from bridges.rmf import zenoh_peers
-from bridges.rmf.topics import FIRE_ALARM_TRIGGER, LIFT_REQUESTS, LIFT_STATES
 from bridges.rmf.transport import TransportError
 from bridges.rmf.zenoh import ZenohTransport
 from bridges.rmf.zenoh_peers import Merged

@@ -6,8 +6,8 @@ from typing import Any
 import pytest
 from hypothesis import given
 
-from bridges.rmf import definitions as d
-from bridges.rmf.topics import LIFT_REQUESTS, LIFT_STATES, Topic
+from bridges.messages import definitions as d
+from bridges.messages.topics import LIFT_REQUESTS, LIFT_STATES, Topic
 from bridges.rmf.zenoh import ZenohTransport
 from tests.rmf import peer
 from tests.rmf.joining import RELEASE, ZENOH, joining

@@ -6,8 +6,8 @@ from typing import Any
 from hypothesis import settings
 from hypothesis import strategies as st
 
-from bridges.rmf import definitions as d
-from bridges.rmf.releases import NEWEST, Release
+from bridges.messages import definitions as d
+from bridges.messages.releases import NEWEST, Release
 from tests.depth import examples
 
 NUMBERS: dict[str, st.SearchStrategy[Any]] = {

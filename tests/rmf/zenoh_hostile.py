@@ -11,9 +11,9 @@ import time
 
 import zenoh
 
-from bridges.rmf import definitions as d
-from bridges.rmf.cdr import encode
-from bridges.rmf.rihs01 import type_hash
+from bridges.messages import definitions as d
+from bridges.messages.cdr import encode
+from bridges.messages.rihs01 import type_hash
 from tests.rmf.rmw_zenoh_reader import gid
 from tests.rmf.zenoh_programs import meeting
 

@@ -2,8 +2,8 @@
 
 from msgspec.structs import replace
 
-from bridges.rmf import definitions as d
-from bridges.rmf.stamps import stamp
+from bridges.messages import definitions as d
+from bridges.messages.stamps import stamp
 from bridges.rmf_rules.phases import DoorClose, DoorOpen, EndLiftSession, RequestLift
 from bridges.rmf_rules.robot import LiftDestination, Robot
 from bridges.rmf_rules.supervisors import DoorSupervisor, LiftSupervisor

@@ -5,9 +5,9 @@ from collections.abc import Iterable
 import pytest
 from msgspec.structs import replace
 
-from bridges.rmf import definitions as d
-from bridges.rmf import topics
-from bridges.rmf.stamps import stamp
+from bridges.messages import definitions as d
+from bridges.messages import topics
+from bridges.messages.stamps import stamp
 from bridges.rmf_rules import NEVER, Party, Said, door_request
 from bridges.rmf_rules.phases import DoorClose, DoorOpen, EndLiftSession, RequestLift
 from bridges.rmf_rules.robot import Robot

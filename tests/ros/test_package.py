@@ -6,7 +6,7 @@ from configparser import ConfigParser
 from pathlib import Path
 
 from bridges import __version__
-from bridges.rmf.definitions import PACKAGES
+from bridges.messages.definitions import PACKAGES
 from bridges.settings import names as named
 
 ROS = Path(__file__).parents[2] / "ros"

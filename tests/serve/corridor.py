@@ -6,9 +6,9 @@ from bridges.door import KIND
 from bridges.door.memory import DoorLimits
 from bridges.door.settings import DoorSettings
 from bridges.door.signals import DoorOutputs, DoorSample
-from bridges.rmf import topics
-from bridges.rmf.definitions import DoorMode, DoorModeValue, DoorRequest, DoorState, Message
-from bridges.rmf.topics import Topic
+from bridges.messages import topics
+from bridges.messages.definitions import DoorMode, DoorModeValue, DoorRequest, DoorState, Message
+from bridges.messages.topics import Topic
 from bridges.serve.clock import Clock
 from bridges.serve.device import Node
 from bridges.serve.loop import Loop

@@ -11,8 +11,8 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
 
-from bridges.rmf.definitions import DoorMode, DoorModeValue, DoorRequest, DoorState
-from bridges.rmf.topics import DOOR_REQUESTS, DOOR_STATES
+from bridges.messages.definitions import DoorMode, DoorModeValue, DoorRequest, DoorState
+from bridges.messages.topics import DOOR_REQUESTS, DOOR_STATES
 from hal_fakes.__main__ import served
 from hal_fakes.caller import Caller
 from hal_fakes.wire import join, wire

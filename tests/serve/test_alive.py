@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from bridges.commands import reset
-from bridges.rmf.definitions import DoorModeValue
+from bridges.messages.definitions import DoorModeValue
 from bridges.serve.loop import SUSPENDED_S
 from tests.serve.site import SERVICE, Graph, Module, command, daemon, environment, hold_open
 from tests.waiting import wait_until

@@ -8,9 +8,9 @@ from typing import Any
 import pytest
 from msgspec.structs import replace
 
-from bridges.rmf import stamps
-from bridges.rmf.definitions import LiftMode, LiftRequest, LiftState
-from bridges.rmf.topics import LIFT_REQUESTS, LIFT_STATES
+from bridges.messages import stamps
+from bridges.messages.definitions import LiftMode, LiftRequest, LiftState
+from bridges.messages.topics import LIFT_REQUESTS, LIFT_STATES
 from bridges.serve.clock import TELL_GAP_S
 from hal_fakes.wire import join, wire
 from tests.rmf import peer

@@ -2,8 +2,8 @@ import math
 
 import pytest
 
-from bridges.rmf.definitions import Time
-from bridges.rmf.stamps import ClockError
+from bridges.messages.definitions import Time
+from bridges.messages.stamps import ClockError
 from bridges.serve.clock import Clock, Pace
 
 

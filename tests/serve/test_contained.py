@@ -2,7 +2,7 @@
 
 import pytest
 
-from bridges.rmf.definitions import DoorModeValue
+from bridges.messages.definitions import DoorModeValue
 from bridges.serve.contained import LeftOn
 from drivers import DriverError
 from tests.serve.corridor import SCAN_S, Corridor

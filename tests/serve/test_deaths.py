@@ -17,7 +17,7 @@ import msgspec
 import pytest
 from msgspec.structs import replace
 
-from bridges.rmf.definitions import DoorModeValue
+from bridges.messages.definitions import DoorModeValue
 from bridges.serve.holder import HOLDER, ourselves
 from bridges.serve.signals import ENDING, WRITES
 from hal_fakes.wire import wire

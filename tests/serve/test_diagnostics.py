@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from bridges.rmf import definitions as d
-from bridges.rmf.topics import DIAGNOSTICS, DOOR_STATES
+from bridges.messages import definitions as d
+from bridges.messages.topics import DIAGNOSTICS, DOOR_STATES
 from bridges.serve.diagnostics import MOST, diagnosis, faults
 from hal_fakes.wire import join
 from tests.serve.site import PATIENT, SERVICE, Module, daemon

@@ -9,10 +9,10 @@ from msgspec.structs import replace
 
 from bridges.lift_supervisor import KIND
 from bridges.lift_supervisor.settings import Settings
-from bridges.rmf.definitions import LiftRequest, LiftState, Time
+from bridges.messages.definitions import LiftRequest, LiftState, Time
+from bridges.messages.stamps import stamp
+from bridges.messages.topics import ADAPTER_LIFT_REQUESTS, LIFT_REQUESTS, LIFT_STATES, Topic
 from bridges.rmf.memory import MemoryNetwork, MemoryTransport
-from bridges.rmf.stamps import stamp
-from bridges.rmf.topics import ADAPTER_LIFT_REQUESTS, LIFT_REQUESTS, LIFT_STATES, Topic
 from bridges.rmf.transport import Transport
 from bridges.serve import graph as graph_node
 from bridges.serve.clock import Clock

@@ -10,10 +10,10 @@ from msgspec.structs import replace
 
 from bridges.core.decision import RequestRefused
 from bridges.core.graph_kind import GraphKind
-from bridges.rmf import definitions as d
-from bridges.rmf import topics
-from bridges.rmf.definitions import Message
-from bridges.rmf.topics import Topic
+from bridges.messages import definitions as d
+from bridges.messages import topics
+from bridges.messages.definitions import Message
+from bridges.messages.topics import Topic
 from bridges.settings.load import load
 from bridges.settings.names import kind_called
 

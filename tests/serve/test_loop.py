@@ -2,7 +2,7 @@
 
 import pytest
 
-from bridges.rmf.definitions import DoorModeValue, DoorState
+from bridges.messages.definitions import DoorModeValue, DoorState
 from tests.serve.corridor import SCAN_S, Corridor
 
 

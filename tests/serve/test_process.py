@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from bridges.rmf.definitions import DoorModeValue
+from bridges.messages.definitions import DoorModeValue
 from bridges.serve.daemon import STARTING
 from hal_fakes.wire import runs_here
 from tests.rmf.conftest import ROS2

@@ -6,8 +6,8 @@ import msgspec
 import pytest
 
 from bridges.core.decision import Decision, Fault
-from bridges.rmf.definitions import Message
-from bridges.rmf.topics import Topic
+from bridges.messages.definitions import Message
+from bridges.messages.topics import Topic
 from bridges.serve.clock import Clock
 from bridges.serve.refusals import Refusals
 from bridges.serve.subject import Core, Subject

@@ -12,7 +12,7 @@ from msgspec.structs import replace
 
 from bridges.commands import dead
 from bridges.host.places import Places
-from bridges.rmf.definitions import DoorModeValue
+from bridges.messages.definitions import DoorModeValue
 from bridges.serve import record
 from bridges.serve.record import Records
 from bridges.settings.load import Config, load

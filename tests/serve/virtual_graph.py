@@ -12,9 +12,9 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 from bridges.core.graph_kind import GraphKind
-from bridges.rmf.definitions import Message
-from bridges.rmf.releases import NEWEST
-from bridges.rmf.topics import Topic
+from bridges.messages.definitions import Message
+from bridges.messages.releases import NEWEST
+from bridges.messages.topics import Topic
 from bridges.rmf.transport import Publisher, Subscription
 from bridges.rmf_rules import Party as RmfParty
 from bridges.rmf_rules import Said

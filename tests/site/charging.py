@@ -5,7 +5,7 @@ battery is full (rmf_ros2 9dedd0f, ChargeBattery.cpp). `charging_assignments` sa
 """
 
 from bridges.charger_coordinator.settings import Fleet, RobotSettings, Settings, Station, Waypoint
-from bridges.rmf import definitions as d
+from bridges.messages import definitions as d
 
 FLEET = "fleet"
 LOW, FULL = 30.0, 100.0

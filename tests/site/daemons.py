@@ -13,8 +13,8 @@ from typing import Any
 
 from bridges.core.decision import OperatorReset
 from bridges.core.graph_kind import AnyGraphKind
-from bridges.rmf.definitions import Message
-from bridges.rmf.topics import DOOR_REQUESTS, DOOR_SUPERVISOR_HEARTBEAT, LIFT_REQUESTS, Topic
+from bridges.messages.definitions import Message
+from bridges.messages.topics import DOOR_REQUESTS, DOOR_SUPERVISOR_HEARTBEAT, LIFT_REQUESTS, Topic
 from bridges.rmf.transport import Publisher
 from bridges.rmf_rules.supervisors import DoorSupervisor, LiftSupervisor
 from bridges.serve.clock import Clock

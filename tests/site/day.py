@@ -9,7 +9,7 @@ from random import Random
 from bridges.charger_coordinator import KIND as COORDINATOR
 from bridges.door_supervisor import KIND as DOOR_SUPERVISOR
 from bridges.lift_supervisor import KIND as LIFT_SUPERVISOR
-from bridges.rmf.releases import JAZZY, KILTED
+from bridges.messages.releases import JAZZY, KILTED
 from hal_fakes.plants.charger import ChargerPlant
 from hal_fakes.plants.door import DoorPlant
 from hal_fakes.plants.lift import FAILS, LiftPlant

@@ -16,9 +16,9 @@ from bridges.charger.signals import CURRENT_FLOWS
 from bridges.judge.judge import LAWS, Judge, Kind
 from bridges.judge.law import Verdict
 from bridges.lift.signals import Side
-from bridges.recording.heard import Heard
-from bridges.rmf import definitions as d
-from bridges.rmf import topics
+from bridges.messages import definitions as d
+from bridges.messages import topics
+from bridges.messages.heard import Heard
 from drivers.lift.table import group
 from hal_fakes.plants.charger import ChargerPlant
 from hal_fakes.plants.door import DoorPlant

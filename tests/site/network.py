@@ -13,10 +13,10 @@ from functools import partial
 from random import Random
 from typing import Any
 
-from bridges.rmf.definitions import Message
+from bridges.messages.definitions import Message
+from bridges.messages.releases import NEWEST
+from bridges.messages.topics import DOOR_STATES, LIFT_STATES, Topic
 from bridges.rmf.memory import MemoryNetwork, MemoryTransport
-from bridges.rmf.releases import NEWEST
-from bridges.rmf.topics import DOOR_STATES, LIFT_STATES, Topic
 from tests.site.timeline import NEVER, Timeline
 
 LEASE_S = 10.0

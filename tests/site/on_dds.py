@@ -13,9 +13,9 @@ from queue import Empty, SimpleQueue
 from random import Random
 from typing import Any
 
-from bridges.rmf import definitions as d
-from bridges.rmf import topics
-from bridges.rmf.topics import Topic
+from bridges.messages import definitions as d
+from bridges.messages import topics
+from bridges.messages.topics import Topic
 from bridges.rmf.transport import Publisher, Subscription
 from hal_fakes import wire
 from hal_fakes.demo.daemons import Daemon, stop_all

@@ -10,9 +10,9 @@ from dataclasses import dataclass, field
 from random import Random
 from typing import Any, Protocol
 
-from bridges.rmf import definitions as d
-from bridges.rmf import topics
-from bridges.rmf.stamps import duration
+from bridges.messages import definitions as d
+from bridges.messages import topics
+from bridges.messages.stamps import duration
 from bridges.rmf.transport import Transport
 from bridges.rmf_rules.phases import DoorClose, DoorOpen, EndLiftSession, RequestLift
 from bridges.rmf_rules.robot import Phase, Robot

@@ -11,8 +11,8 @@ from collections.abc import Callable
 import pytest
 
 from bridges.host import log
-from bridges.rmf import definitions as d
-from bridges.rmf import topics
+from bridges.messages import definitions as d
+from bridges.messages import topics
 from bridges.rmf.transport import TransportError
 from tests.explain.scene import Scene
 from tests.site.daemons import GraphDaemon

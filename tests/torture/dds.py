@@ -8,8 +8,8 @@ import sys
 import time
 from pathlib import Path
 
-from bridges.rmf.definitions import DoorState, Time
-from bridges.rmf.topics import DOOR_REQUESTS, DOOR_STATES
+from bridges.messages.definitions import DoorState, Time
+from bridges.messages.topics import DOOR_REQUESTS, DOOR_STATES
 from hal_fakes.domain import domain_for_a_while
 from tests.rmf.joining import joining
 from tests.serve.site import ROOT, Daemon

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from bridges.rmf.definitions import DoorModeValue
+from bridges.messages.definitions import DoorModeValue
 from bridges.serve.signals import ENDING
 from hal_fakes.domain import domain_for_a_while
 from tests.serve.site import SERVICE, Daemon, Graph, Module, command, environment

@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Final
 
-from bridges.rmf.definitions import DoorModeValue
+from bridges.messages.definitions import DoorModeValue
 from hal_fakes.domain import domain_for_a_while
 from tests.drivers.charger.test_can_wake import CHARGE, START, STOP, Sleeper
 from tests.rmf.test_zenoh_tokens import stranger

@@ -12,7 +12,7 @@ import msgspec
 from bridges import __version__
 from bridges.commands.doctoring.finding import Finding
 from bridges.commands.doctoring.machine import Machine
-from bridges.rmf.words import printable
+from bridges.messages.words import printable
 from bridges.settings.load import Config
 
 ALL: Final = frozenset({"gpio", "modbus", "http", "can"})

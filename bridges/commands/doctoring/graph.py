@@ -15,10 +15,10 @@ from typing import Any, Final
 from bridges.commands.doctoring.finding import Finding, note, ok, warning, wrong
 from bridges.commands.live import Ear
 from bridges.core.graph_kind import GraphKind
-from bridges.rmf import words
+from bridges.messages import words
+from bridges.messages.definitions import PACKAGES
 from bridges.rmf.addresses import addresses
 from bridges.rmf.choose import domain_id, open_transport, stays_on_loopback
-from bridges.rmf.definitions import PACKAGES
 from bridges.rmf.transport import Subscription, Transport, TransportError
 from bridges.serve.service import named_by
 from bridges.settings import names as named

@@ -16,10 +16,10 @@ from msgspec.structs import replace
 
 from bridges.charger.refusals import Refusal, read
 from bridges.commands.graph import CommandLine
-from bridges.recording.heard import Heard
-from bridges.rmf import words
-from bridges.rmf.definitions import DiagnosticStatus, SupervisorHeartbeat
-from bridges.rmf.topics import AnyTopic
+from bridges.messages import words
+from bridges.messages.definitions import DiagnosticStatus, SupervisorHeartbeat
+from bridges.messages.heard import Heard
+from bridges.messages.topics import AnyTopic
 
 State = TypeVar("State", bound=words.Stated)
 NEVER_AT: Final = float("-inf")

@@ -6,10 +6,10 @@ from typing import ClassVar, Final
 
 from bridges.charger.refusals import OCCUPIED
 from bridges.commands.requests import Done, Failed, Obstacle, Request, Seen
-from bridges.rmf import definitions as d
-from bridges.rmf import topics, words
-from bridges.rmf.stamps import duration
-from bridges.rmf.topics import AnyTopic
+from bridges.messages import definitions as d
+from bridges.messages import topics, words
+from bridges.messages.stamps import duration
+from bridges.messages.topics import AnyTopic
 
 ANY: Final = "any"
 SERVING: Final = (

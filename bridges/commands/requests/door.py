@@ -4,8 +4,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from bridges.commands.requests import Done, Obstacle, Request, Seen
-from bridges.rmf import definitions as d
-from bridges.rmf import topics
+from bridges.messages import definitions as d
+from bridges.messages import topics
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 from typing import Final
 
 from bridges.commands.requests import Done, Failed, Obstacle, Request, Seen, nearest
-from bridges.rmf import definitions as d
-from bridges.rmf import topics, words
-from bridges.rmf.topics import AnyTopic
+from bridges.messages import definitions as d
+from bridges.messages import topics, words
+from bridges.messages.topics import AnyTopic
 
 OBEYS_WITHIN_S: Final = 5.0
 """A supervisor that obeys ends a session within a few states."""

@@ -7,7 +7,7 @@ import msgspec
 
 from bridges.core.graph_kind import GraphKind
 from bridges.core.table import Table
-from bridges.rmf import instead
+from bridges.messages import instead
 from bridges.settings import names as named
 from bridges.settings.load import Config
 from bridges.settings.nodes import Problem

@@ -19,8 +19,8 @@ import pytest
 from bridges import cli
 from bridges.commands.doctoring.served import served
 from bridges.host.places import Places
-from bridges.rmf.definitions import DoorMode, DoorModeValue, DoorState, Time
-from bridges.rmf.topics import DOOR_REQUESTS, DOOR_STATES
+from bridges.messages.definitions import DoorMode, DoorModeValue, DoorState, Time
+from bridges.messages.topics import DOOR_REQUESTS, DOOR_STATES
 from bridges.serve import record
 from bridges.serve.holder import HOLDER
 from bridges.serve.record import Records

@@ -13,7 +13,7 @@ from bridges.charger import core
 from bridges.charger.memory import ChargerLimits, Memory
 from bridges.charger.signals import Activity, ChargerOutputs, ChargerSample
 from bridges.core.decision import Sampled
-from bridges.rmf.definitions import ChargerStateValue as State
+from bridges.messages.definitions import ChargerStateValue as State
 from bridges.settings.load import load
 from drivers import DriverError
 from drivers.charger.http import DRIVER, Settings, create, describe, warnings

@@ -8,7 +8,7 @@ from bridges.charger import core
 from bridges.charger.memory import ChargerLimits, Memory
 from bridges.charger.signals import Activity, ChargerOutputs, ChargerSample, Measured
 from bridges.core.decision import Sampled
-from bridges.rmf.definitions import ChargerStateValue as State
+from bridges.messages.definitions import ChargerStateValue as State
 from drivers.charger import xnergy
 from drivers.charger.xnergy import Orders, Written, settled, steer
 from tests.depth import examples

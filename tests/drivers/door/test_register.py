@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from bridges.core.decision import Sampled
 from bridges.door.signals import DoorSample
-from bridges.rmf.definitions import DoorModeValue
+from bridges.messages.definitions import DoorModeValue
 from bridges.settings.load import SettingsError, load
 from drivers.door.register import PROFILE, Settings, decode, door_map, points, tables
 from drivers.door.register_map import DoorMap

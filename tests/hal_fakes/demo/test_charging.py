@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from bridges.rmf import definitions as d
+from bridges.messages import definitions as d
 from hal_fakes.demo.charging import CHARGED, problems
 from hal_fakes.demo.journal import Journal
 from hal_fakes.wire import wire

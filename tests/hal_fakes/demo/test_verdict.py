@@ -7,8 +7,8 @@ import pytest
 import yaml
 from msgspec.structs import replace
 
-from bridges.rmf import definitions as d
-from bridges.rmf.words import Stated
+from bridges.messages import definitions as d
+from bridges.messages.words import Stated
 from hal_fakes.demo.journal import Journal
 from hal_fakes.demo.ride import DEMO, FROM, LIFT, RELAYS, TO, problems
 from hal_fakes.demo.stage import summary

@@ -1,6 +1,6 @@
 """END_SESSION of anybody releases the lift (low_level_lift)."""
 
-from bridges.rmf import definitions as d
+from bridges.messages import definitions as d
 from tests.judge.nodes.right_lift import RightLift
 
 

@@ -1,7 +1,7 @@
 """A state for each request, whether anything has changed or not."""
 
-from bridges.rmf import definitions as d
-from bridges.rmf import topics
+from bridges.messages import definitions as d
+from bridges.messages import topics
 from bridges.rmf_rules import Said
 from tests.judge.nodes.right_charger import RightCharger
 

@@ -1,6 +1,6 @@
 """The station is not reached any more, and IDLE is said for ever."""
 
-from bridges.rmf import definitions as d
+from bridges.messages import definitions as d
 from tests.judge.nodes.right_charger import RightCharger
 
 

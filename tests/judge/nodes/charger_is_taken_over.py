@@ -1,6 +1,6 @@
 """The next request takes the charge over."""
 
-from bridges.rmf import definitions as d
+from bridges.messages import definitions as d
 from tests.judge.nodes.right_charger import CHARGING, RightCharger
 
 

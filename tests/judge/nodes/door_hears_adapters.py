@@ -1,6 +1,6 @@
 """It hears adapter_door_requests: one robot's CLOSE closes on another."""
 
-from bridges.rmf import topics
+from bridges.messages import topics
 from tests.judge.nodes.right_door import RightDoor
 
 

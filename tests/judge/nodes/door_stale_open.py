@@ -1,6 +1,6 @@
 """The module is lost while the door is open; the last reading is said for ever."""
 
-from bridges.rmf import definitions as d
+from bridges.messages import definitions as d
 from tests.judge.nodes.right_door import RightDoor
 
 

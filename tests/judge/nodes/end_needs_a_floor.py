@@ -1,6 +1,6 @@
 """END_SESSION is refused when its floor is not served, as "" never is (lift_adapter_template)."""
 
-from bridges.rmf import definitions as d
+from bridges.messages import definitions as d
 from tests.judge.nodes.right_lift import RightLift
 
 

@@ -2,8 +2,8 @@
 
 from msgspec.structs import replace
 
-from bridges.rmf import definitions as d
-from bridges.rmf import topics
+from bridges.messages import definitions as d
+from bridges.messages import topics
 from bridges.rmf_rules import Said
 from tests.judge.nodes.right_lift import RightLift
 

@@ -1,7 +1,7 @@
 """The fire alarm is told each second, as `false` while there is none (low_level_lift)."""
 
-from bridges.rmf import definitions as d
-from bridges.rmf import topics
+from bridges.messages import definitions as d
+from bridges.messages import topics
 from bridges.rmf_rules import Said
 from tests.judge.nodes.right_lift import RightLift
 

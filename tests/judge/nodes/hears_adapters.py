@@ -1,6 +1,6 @@
 """It hears adapter_lift_requests, around the supervisor."""
 
-from bridges.rmf import topics
+from bridges.messages import topics
 from tests.judge.nodes.right_lift import RightLift
 
 

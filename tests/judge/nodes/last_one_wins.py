@@ -1,6 +1,6 @@
 """Who asks last gets the lift, whoever is in the car."""
 
-from bridges.rmf import definitions as d
+from bridges.messages import definitions as d
 from tests.judge.nodes.right_lift import RightLift
 
 

@@ -1,6 +1,6 @@
 """The request's numbers typed anew: END 1, AGV 2, HUMAN 3 (QuikSync). AGV ends, and END is nothing."""
 
-from bridges.rmf import definitions as d
+from bridges.messages import definitions as d
 from bridges.rmf_rules import Said
 from tests.judge.nodes.right_lift import RightLift
 

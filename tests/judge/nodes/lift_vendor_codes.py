@@ -2,7 +2,7 @@
 
 from msgspec.structs import replace
 
-from bridges.rmf import definitions as d
+from bridges.messages import definitions as d
 from tests.judge.nodes.right_lift import RightLift
 
 

@@ -1,6 +1,6 @@
 """OPEN because it was asked for; no sensor says so."""
 
-from bridges.rmf import definitions as d
+from bridges.messages import definitions as d
 from bridges.rmf_rules import Said
 from tests.judge.nodes.right_door import RightDoor
 

@@ -3,7 +3,7 @@
 import pytest
 from playwright.sync_api import BrowserContext, Page
 
-from bridges.rmf import definitions as d
+from bridges.messages import definitions as d
 from tests.page.browser.conftest import PASSWORD, Graph, Shot, Until, log_in, serious_faults
 
 pytestmark = pytest.mark.browser

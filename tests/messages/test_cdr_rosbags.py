@@ -8,10 +8,10 @@ from hypothesis import given
 from msgspec import Struct
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from bridges.rmf import definitions as d
-from bridges.rmf.cdr import encode
-from bridges.rmf.rihs01 import type_hash
-from tests.rmf.test_definitions import FIELDS
+from bridges.messages import definitions as d
+from bridges.messages.cdr import encode
+from bridges.messages.rihs01 import type_hash
+from tests.messages.test_definitions import FIELDS
 from tests.rmf.values import MESSAGE_TYPES, repeatable, values
 
 STORE = get_typestore(Stores.EMPTY)

@@ -7,8 +7,8 @@ network, so control characters are escaped.
 
 from enum import IntEnum
 
-from bridges.rmf import definitions as d
-from bridges.rmf.stamps import in_seconds
+from bridges.messages import definitions as d
+from bridges.messages.stamps import in_seconds
 
 Stated = d.LiftState | d.DoorState | d.ChargerState
 Requested = d.LiftRequest | d.DoorRequest | d.ChargerRequest | d.ChargerCancel

@@ -13,8 +13,8 @@ import typing
 from collections.abc import Hashable
 from functools import cache
 
-from bridges.rmf.definitions import PACKAGES
-from bridges.rmf.releases import NEWEST, RELEASES, Release
+from bridges.messages.definitions import PACKAGES
+from bridges.messages.releases import NEWEST, RELEASES, Release
 
 NESTED = 1
 TYPE_IDS = {

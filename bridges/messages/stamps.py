@@ -3,7 +3,7 @@
 import math
 from typing import Final
 
-from bridges.rmf.definitions import Duration, Time
+from bridges.messages.definitions import Duration, Time
 from bridges.rmf.transport import TransportError
 
 ENDS: Final = 2**31

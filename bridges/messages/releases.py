@@ -14,7 +14,7 @@ from typing import Final
 
 from msgspec import Struct
 
-from bridges.rmf.definitions import (
+from bridges.messages.definitions import (
     PACKAGES,
     Alert,
     AlertParameter,

@@ -9,9 +9,9 @@ import typing
 from functools import cache
 from typing import Final
 
-from bridges.rmf.definitions import PACKAGES, Message
-from bridges.rmf.releases import NEWEST, RELEASES, Release
-from bridges.rmf.rihs01 import type_name
+from bridges.messages.definitions import PACKAGES, Message
+from bridges.messages.releases import NEWEST, RELEASES, Release
+from bridges.messages.rihs01 import type_name
 
 RULE: Final = "=" * 80
 LONGEST: Final = 1 << 20

@@ -15,9 +15,9 @@ from typing import Any
 
 import pytest
 
-from bridges.rmf import constants, releases
-from bridges.rmf import definitions as d
-from bridges.rmf.releases import Release
+from bridges.messages import constants, releases
+from bridges.messages import definitions as d
+from bridges.messages.releases import Release
 
 CONSTANTS = {
     d.LiftRequestType: {

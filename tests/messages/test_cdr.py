@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridges.rmf import definitions as d
-from bridges.rmf.cdr import LONGEST, LONGEST_FLAT, CdrError, decode, encode
+from bridges.messages import definitions as d
+from bridges.messages.cdr import LONGEST, LONGEST_FLAT, CdrError, decode, encode
 from tests.rmf.values import MESSAGE_TYPES, repeatable, values
 
 REQUEST = d.LiftRequest("Lift1", d.Time(5, 6), "fleet/robot", 1, "L3", 2)

@@ -15,8 +15,8 @@ from collections.abc import Callable
 from functools import cache
 from typing import Any, Final, TypeVar
 
-from bridges.rmf.definitions import PACKAGES, field_types
-from bridges.rmf.releases import NEWEST, Release
+from bridges.messages.definitions import PACKAGES, field_types
+from bridges.messages.releases import NEWEST, Release
 
 T = TypeVar("T")
 Value = Any

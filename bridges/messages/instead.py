@@ -8,9 +8,9 @@ import logging
 from typing import Final
 
 from bridges.host.log import pairs
-from bridges.rmf.definitions import Alert, Bool, EmergencySignal, Message
-from bridges.rmf.releases import RELEASES
-from bridges.rmf.topics import EMERGENCY_SIGNAL, FIRE_ALARM_TRIGGER, AnyTopic
+from bridges.messages.definitions import Alert, Bool, EmergencySignal, Message
+from bridges.messages.releases import RELEASES
+from bridges.messages.topics import EMERGENCY_SIGNAL, FIRE_ALARM_TRIGGER, AnyTopic
 
 log = logging.getLogger(__name__)
 

@@ -11,7 +11,7 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from bridges.core.names import LONGEST_NAME
-from bridges.rmf.definitions import Message
+from bridges.messages.definitions import Message
 
 FREE_TEXTS: Final = frozenset(
     {"error_message", "message", "title", "subtitle", "value", "performing_action", "model"}

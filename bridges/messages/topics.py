@@ -10,7 +10,7 @@ from typing import Generic, Literal, TypeVar
 from msgspec import Struct
 from msgspec.structs import replace
 
-from bridges.rmf import definitions as d
+from bridges.messages import definitions as d
 
 M_co = TypeVar("M_co", bound=d.Message, covariant=True)
 

@@ -1,7 +1,7 @@
 """Messages in words, as `watch`, `send` and the demo print them."""
 
-from bridges.rmf import definitions as d
-from bridges.rmf import stamps, words
+from bridges.messages import definitions as d
+from bridges.messages import stamps, words
 
 
 def test_a_lift_state_says_where_the_car_is_and_where_it_goes_its_door_and_its_mode() -> None:

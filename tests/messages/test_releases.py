@@ -7,12 +7,12 @@ from contextlib import ExitStack, contextmanager
 import pytest
 from msgspec.structs import replace
 
-from bridges.rmf import cdr, topics
-from bridges.rmf import definitions as d
+from bridges.messages import cdr, topics
+from bridges.messages import definitions as d
+from bridges.messages.releases import JAZZY, KILTED, Release
+from bridges.messages.rihs01 import type_hash
 from bridges.rmf.memory import MemoryNetwork, MemoryTransport
 from bridges.rmf.peers import Announced, Peers
-from bridges.rmf.releases import JAZZY, KILTED, Release
-from bridges.rmf.rihs01 import type_hash
 from bridges.rmf.transport import Transport
 from bridges.serve.outlet import Outlet
 from tests.rmf.conftest import DDS

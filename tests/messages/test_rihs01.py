@@ -2,9 +2,9 @@ from typing import Any
 
 import pytest
 
-from bridges.rmf import definitions as d
-from bridges.rmf.releases import JAZZY, KILTED
-from bridges.rmf.rihs01 import releases_of, type_hash
+from bridges.messages import definitions as d
+from bridges.messages.releases import JAZZY, KILTED
+from bridges.messages.rihs01 import releases_of, type_hash
 
 SEEN_ON_JAZZY = {
     d.LiftRequest: "e8f1e0aa4d172703d0d7840c1876448c6c5d75ab58955faf7de7dddc17c096ac",

@@ -13,17 +13,17 @@ from typing import Annotated, Final
 
 from msgspec import Struct
 
-from bridges.rmf.constants import AlertTier as AlertTier
-from bridges.rmf.constants import ChargerStateValue as ChargerStateValue
-from bridges.rmf.constants import ChargingMode as ChargingMode
-from bridges.rmf.constants import DiagnosticLevel as DiagnosticLevel
-from bridges.rmf.constants import DoorModeValue as DoorModeValue
-from bridges.rmf.constants import LiftDoor as LiftDoor
-from bridges.rmf.constants import LiftMode as LiftMode
-from bridges.rmf.constants import LiftMotion as LiftMotion
-from bridges.rmf.constants import LiftRequestDoor as LiftRequestDoor
-from bridges.rmf.constants import LiftRequestType as LiftRequestType
-from bridges.rmf.constants import RobotModeValue as RobotModeValue
+from bridges.messages.constants import AlertTier as AlertTier
+from bridges.messages.constants import ChargerStateValue as ChargerStateValue
+from bridges.messages.constants import ChargingMode as ChargingMode
+from bridges.messages.constants import DiagnosticLevel as DiagnosticLevel
+from bridges.messages.constants import DoorModeValue as DoorModeValue
+from bridges.messages.constants import LiftDoor as LiftDoor
+from bridges.messages.constants import LiftMode as LiftMode
+from bridges.messages.constants import LiftMotion as LiftMotion
+from bridges.messages.constants import LiftRequestDoor as LiftRequestDoor
+from bridges.messages.constants import LiftRequestType as LiftRequestType
+from bridges.messages.constants import RobotModeValue as RobotModeValue
 
 uint8 = Annotated[int, "uint8"]
 byte = Annotated[int, "byte"]
