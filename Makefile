@@ -131,7 +131,7 @@ test-vm: .venv/ready
 	@$(BIN)/python -m tests.vm --arch $(ARCH) $(if $(ONLY),--only $(ONLY))
 
 # Mutants live in a copy. After an interruption only the missing results are computed. For a part:
-# make mutate ONLY='bridges.door.*' CHILDREN=1. To start again from nothing: rm -rf the directory first.
+# make mutate ONLY='bridges.kinds.door.*' CHILDREN=1. To start again from nothing: rm -rf the directory first.
 MUTANTS ?= $(or $(TMPDIR),/tmp)/rmf-bridges-mutants-$(shell id -u)
 MUTATED := bridges config drivers hal_fakes tests pyproject.toml
 mutate: .venv/ready

@@ -4,10 +4,10 @@ import signal
 import sys
 import threading
 
+from bridges.kinds.shared.rmf_section import Rmf
 from bridges.messages.definitions import LiftRequest, LiftState
 from bridges.messages.topics import LIFT_REQUESTS, LIFT_STATES
 from bridges.rmf.choose import open_transport
-from bridges.rmf.settings import Rmf
 from hal_fakes.wire import Wire
 
 

@@ -13,8 +13,8 @@ from typing import Any
 import yaml
 
 from bench.figures import Row
+from bridges.kinds.shared.rmf_section import Rmf
 from bridges.rmf.choose import open_transport
-from bridges.rmf.settings import Rmf
 from bridges.rmf.transport import Transport
 from hal_fakes.wire import Wire
 

@@ -11,10 +11,11 @@ from bench.daemons import Content, cost, daemon, memory_mb, shipped
 from bench.figures import Row, Rows, Tables, compared
 from bench.latency import daemon_paths
 from bridges import __version__
-from bridges.core.decision import Sampled
-from bridges.lift import KIND
-from bridges.lift.messages import state_message
-from bridges.lift.signals import Door, Ended, LiftSample, Requested
+from bridges.kinds.lift import KIND
+from bridges.kinds.lift.messages import state_message
+from bridges.kinds.lift.signals import Door, Ended, LiftSample, Requested
+from bridges.kinds.shared.decision import Sampled
+from bridges.kinds.shared.recording_section import Recording
 from bridges.messages.definitions import LiftRequest, Time
 from bridges.messages.releases import JAZZY
 from bridges.recording.bags import heard_in
@@ -23,7 +24,6 @@ from bridges.recording.files import opened
 from bridges.recording.recorder import Recorder
 from bridges.recording.replayed import Cores, Replay, of_head
 from bridges.recording.ring import Ring
-from bridges.recording.settings import Recording
 from bridges.recording.shelf import Shelf
 from bridges.recording.sources import Notes
 from bridges.serve.clock import Clock

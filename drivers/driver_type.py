@@ -9,7 +9,7 @@ from typing import Any, Generic, TypeAlias, TypeVar
 
 import msgspec
 
-from bridges.core.table import Table
+from bridges.kinds.shared.table import Table
 from drivers import Driver
 from drivers.hal import Remark
 from drivers.hal.points import Wire
@@ -22,15 +22,16 @@ Outputs = TypeVar("Outputs")
 class DriverType(msgspec.Struct, Generic[Settings, Sample, Outputs], frozen=True):
     """One driver.
 
-    `settings`: a struct that derives from the kind's (`bridges.lift.settings.LiftSettings`…) and adds
-    the wiring. `buses`: the bus types that it works on, as the names of files in `drivers/hal/`.
-    `create(name, settings, bus)`: makes the driver of one device; it sends nothing before `open`.
+    `settings`: a struct that derives from the kind's (`bridges.kinds.lift.settings.LiftSettings`…)
+    and adds the wiring. `buses`: the bus types that it works on, as the names of files in
+    `drivers/hal/`. `create(name, settings, bus)`: makes the driver of one device; it sends nothing
+    before `open`.
 
     The rest is optional:
     `wires(settings)`: the wiring table that an electrician checks (`drivers/hal/points.py`).
     `debounce(settings)`: signal or group -> how long a change must last (s).
     `describe(settings, bus's settings)`: rows for `check` (what, meaning) if there are no wires.
-    `tables(settings)`: codes, pulses and frames, for `check` (`bridges/core/table.py`).
+    `tables(settings)`: codes, pulses and frames, for `check` (`bridges/kinds/shared/table.py`).
     `claims(settings)`: (place, path) of each place, besides the wires', that no other device may use.
     `warnings(settings)`: (path, text) of valid settings that may be a mistake.
     `notes(settings)`: (path, text) of settings that a site may want, and should know about.

@@ -7,7 +7,7 @@ import itertools
 from collections.abc import Iterator, Mapping
 from typing import Final
 
-from bridges.charger.signals import Activity
+from bridges.kinds.charger.signals import Activity
 from drivers.charger.rules import MEANINGS, UNKNOWN, Errors, Meaning, Rule, Test, judge, places
 from drivers.charger.state_codes import ROBOT_ERROR
 from drivers.json_fields import Value

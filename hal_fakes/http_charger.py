@@ -8,7 +8,7 @@ import json
 import time
 from collections.abc import Iterator, Mapping
 
-from bridges.charger.signals import Activity
+from bridges.kinds.charger.signals import Activity
 from drivers.charger.http import Settings
 from drivers.charger.rules import places
 from drivers.charger.state_codes import ROBOT_ERROR

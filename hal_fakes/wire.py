@@ -3,8 +3,8 @@
 import os
 from typing import Literal
 
+from bridges.kinds.shared.rmf_section import Rmf
 from bridges.rmf.choose import missing_of_dds, open_transport
-from bridges.rmf.settings import Rmf
 from bridges.rmf.transport import Transport, TransportError
 
 Wire = Literal["dds", "zenoh"]

@@ -13,9 +13,9 @@ from types import FrameType
 
 import msgspec
 
+from bridges.kinds.shared.rmf_section import Rmf
 from bridges.messages import words
 from bridges.rmf.renamed import Renamed
-from bridges.rmf.settings import Rmf
 from bridges.rmf.transport import Transport, TransportError
 
 SILENT_AFTER_S = 3.0

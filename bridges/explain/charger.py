@@ -1,20 +1,20 @@
 """Who has a charger, and why a robot is not charged at it: sentences, from what was heard of it.
 
 RMF itself asks no charger for anything; requests come from the charger coordinator, another node or an
-operator, and a refusal is published on `charger_refusals` (`bridges/charger/refusals.py`).
+operator, and a refusal is published on `charger_refusals` (`bridges/kinds/charger/refusals.py`).
 """
 
 from collections.abc import Mapping
 from typing import Final
 
-from bridges.charger.pad import misplaced_in
-from bridges.charger.report import Diagnosis, diagnosis
 from bridges.explain import answer as common
 from bridges.explain.answer import Answer
 from bridges.explain.charger_facts import NOBODY, ChargerFacts
 from bridges.explain.explanation import Step
 from bridges.explain.phrases import Clock, lasted
 from bridges.explain.rows import label
+from bridges.kinds.charger.pad import misplaced_in
+from bridges.kinds.charger.report import Diagnosis, diagnosis
 
 REFUSED_LATELY_S: Final = 60.0
 

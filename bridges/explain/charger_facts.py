@@ -3,12 +3,12 @@
 from dataclasses import dataclass
 from typing import Final
 
-from bridges.charger import refusals
 from bridges.explain.claims import Claims
 from bridges.explain.device import Device, Fact
 from bridges.explain.phrases import Moment
 from bridges.explain.rows import label
 from bridges.explain.timeline import Kind
+from bridges.kinds.charger import refusals
 from bridges.messages import definitions as d
 from bridges.messages import words
 from bridges.messages.stamps import in_seconds

@@ -11,11 +11,11 @@ give a `Timeline` of plain values: `dataclasses.asdict` makes JSON of it.
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Final
 
-from bridges.charger import refusals
 from bridges.explain import tones
 from bridges.explain.noted import levels, noted
 from bridges.explain.rows import Row, label
 from bridges.explain.timeline import LANES, Kind, Lane, LaneName, Level, Timeline, Tone
+from bridges.kinds.charger import refusals
 from bridges.messages import definitions as d
 from bridges.messages import words
 from bridges.messages.heard import Heard, Own

@@ -10,7 +10,6 @@ from dataclasses import replace
 from datetime import tzinfo
 from typing import Final
 
-from bridges.charger import refusals
 from bridges.explain import answer as common
 from bridges.explain import charger, door, lift
 from bridges.explain.answer import Answer, Remedies
@@ -23,6 +22,7 @@ from bridges.explain.noted import noted
 from bridges.explain.phrases import Clock, Moment, lasted, on_graph
 from bridges.explain.rows import label
 from bridges.explain.timeline import Kind
+from bridges.kinds.charger import refusals
 from bridges.messages import definitions as d
 from bridges.messages import words
 from bridges.messages.heard import Heard, Own

@@ -10,7 +10,7 @@ from typing import Any, Final
 from msgspec import Struct
 from msgspec.structs import replace
 
-from bridges.core.names import LONGEST_NAME
+from bridges.kinds.shared.names import LONGEST_NAME
 from bridges.messages.definitions import Message
 
 FREE_TEXTS: Final = frozenset(

@@ -10,8 +10,8 @@ from typing import Any, Final
 from nicegui import core
 from nicegui.server import Server
 
-from bridges.core.durations import AGES_AGO
 from bridges.host.log import pairs
+from bridges.kinds.shared.durations import AGES_AGO
 from bridges.page.silent import Silent
 
 log = logging.getLogger(__name__)

@@ -6,7 +6,7 @@ from html import escape
 from pathlib import Path
 
 from bridges.commands.sheets.findings import WIRES, findings
-from bridges.core.table import Table
+from bridges.kinds.shared.table import Table
 from bridges.settings.load import SettingsError, load
 
 NO_RING = "Its daemon keeps no ring, or the page's user may not read it: no live levels."

@@ -20,7 +20,7 @@ import msgspec
 import yaml
 from msgspec.structs import replace
 
-from bridges.core.graph_kind import GraphKind
+from bridges.kinds.shared.graph_kind import GraphKind
 from bridges.messages import cdr
 from bridges.messages.definitions import Message
 from bridges.messages.heard import FREE_TEXTS

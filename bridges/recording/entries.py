@@ -11,9 +11,9 @@ from typing import Annotated, Final, TypeVar
 import msgspec
 from msgspec import Meta
 
+from bridges.kinds.shared.recording_section import Recording
 from bridges.messages.releases import RELEASES
 from bridges.messages.texts import MESSAGES
-from bridges.recording.settings import Recording
 from bridges.recording.trees import Tree
 
 LATEST_S: Final = 4e9

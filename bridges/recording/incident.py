@@ -6,7 +6,7 @@ from typing import Final
 
 import msgspec
 
-from bridges.core.decision import IoFailed, Sampled, Suspended, WriteFailed
+from bridges.kinds.shared.decision import IoFailed, Sampled, Suspended, WriteFailed
 from bridges.recording.entries import AnyEntry, Clocks, Head, Known, Step
 from bridges.recording.trees import Tree, name_of
 

@@ -11,8 +11,8 @@ from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Final
 
-from bridges.core.durations import AGES_AGO
 from bridges.host.log import pairs
+from bridges.kinds.shared.durations import AGES_AGO
 from bridges.recording.bags import CONTINUOUS
 from bridges.recording.entries import AnyEntry, Clocks, Died, Ended, Head, Known, Step
 from bridges.recording.incident import AFTER_S, BEFORE_S, Incident, Note, part

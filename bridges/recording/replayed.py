@@ -11,9 +11,9 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Final
 
-from bridges.core.decision import Decision, IoFailed, Sampled
-from bridges.core.graph_kind import GraphKind
 from bridges.host.log import plain
+from bridges.kinds.shared.decision import Decision, IoFailed, Sampled
+from bridges.kinds.shared.graph_kind import GraphKind
 from bridges.recording.entries import (
     LATEST_S,
     AnyEntry,

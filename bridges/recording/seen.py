@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from bridges.core.decision import Decision
+from bridges.kinds.shared.decision import Decision
 from bridges.recording.entries import Known, Step
 from bridges.recording.trees import Tree, tree
 

@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from typing import Final, NamedTuple
 
-from bridges.core.names import LONGEST_NAME
+from bridges.kinds.shared.names import LONGEST_NAME
 from bridges.messages import cdr, topics
 from bridges.messages.definitions import Message
 from bridges.messages.releases import NEWEST, RELEASES, Release

@@ -2,8 +2,9 @@
 
 A tree holds None, bool, int, float, str, lists and mappings with text as keys. A tuple is a
 list; anything else is a mapping whose key `""` names its type (`lift.memory.Session`), with its fields
-beside it, or what it holds under `=`. Only types with a name (in `bridges/core/recorded.py`, and in
-`RECORDED` of each kind) are written and created: no recording can call anything else.
+beside it, or what it holds under `=`. Only types with a name (in
+`bridges/kinds/shared/recorded.py`, and in `RECORDED` of each kind) are written and created: no
+recording can call anything else.
 """
 
 import math
@@ -15,7 +16,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import msgspec
 
-from bridges.core.recorded import SHARED
+from bridges.kinds.shared.recorded import SHARED
 
 if TYPE_CHECKING:
     Tree = None | bool | int | float | str | list["Tree"] | dict[str, "Tree"]

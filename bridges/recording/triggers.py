@@ -10,8 +10,8 @@ The same cause at the same subject counts once in AGAIN_S.
 from collections.abc import Iterator
 from typing import Final
 
-from bridges.core.decision import EXPECTED
-from bridges.core.durations import AGES_AGO
+from bridges.kinds.shared.decision import EXPECTED
+from bridges.kinds.shared.durations import AGES_AGO
 from bridges.messages import cdr
 from bridges.messages.definitions import (
     ChargerState,

@@ -12,10 +12,10 @@ import re
 from collections.abc import Mapping, Sequence
 
 from bridges.host.log import pairs
+from bridges.kinds.shared.rmf_section import Rmf
 from bridges.messages.definitions import PACKAGES
 from bridges.messages.releases import RELEASES, Release
 from bridges.rmf.cyclone import static_peers
-from bridges.rmf.settings import Rmf
 from bridges.rmf.transport import Transport, TransportError
 
 log = logging.getLogger(__name__)

@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from bridges.host.log import pairs
-from bridges.rmf.settings import Rmf
+from bridges.kinds.shared.rmf_section import Rmf
 from bridges.rmf.transport import TransportError
 
 log = logging.getLogger(__name__)

@@ -23,10 +23,10 @@ import zenoh
 from zenoh.handlers import Callback
 
 from bridges.host.log import pairs
+from bridges.kinds.shared.rmf_section import Zenoh
 from bridges.messages.releases import Release
 from bridges.messages.topics import AnyTopic, Topic
 from bridges.rmf import addresses, notices, zenoh_config
-from bridges.rmf.settings import Zenoh
 from bridges.rmf.threaded import LOOK_EVERY_S, Threaded
 from bridges.rmf.transport import M, TransportError, any_type
 from bridges.rmf.zenoh_alone import ROUTER_MET, WHY_AWAY, Alone

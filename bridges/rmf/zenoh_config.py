@@ -8,7 +8,7 @@ import re
 from typing import Final
 
 from bridges.host import user_files
-from bridges.rmf.settings import Zenoh, ZenohTls
+from bridges.kinds.shared.rmf_section import Zenoh, ZenohTls
 from bridges.rmf.transport import TransportError
 
 Configuration = dict[str, object]

@@ -5,8 +5,8 @@ from collections import deque
 from collections.abc import Callable, Mapping
 from typing import Final
 
-from bridges.core.durations import AGES_AGO, NEVER
-from bridges.core.kind import Answer
+from bridges.kinds.shared.durations import AGES_AGO, NEVER
+from bridges.kinds.shared.kind import Answer
 from bridges.serve.clock import TELL_GAP_S
 from bridges.serve.subject import Publish
 

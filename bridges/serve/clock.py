@@ -5,7 +5,7 @@ from collections.abc import Callable
 
 from msgspec import Struct
 
-from bridges.core.durations import AGES_AGO
+from bridges.kinds.shared.durations import AGES_AGO
 from bridges.messages import stamps
 from bridges.messages.definitions import Time
 

@@ -9,9 +9,9 @@ import logging
 from collections.abc import Callable, Mapping
 from typing import Final, Generic, TypeVar
 
-from bridges.core.decision import O, X
-from bridges.core.durations import AGES_AGO
 from bridges.host.log import pairs
+from bridges.kinds.shared.decision import O, X
+from bridges.kinds.shared.durations import AGES_AGO
 from bridges.serve.clock import Clock
 from drivers import Driver, DriverError, OnContacts
 

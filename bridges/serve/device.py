@@ -8,7 +8,8 @@ import logging
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any, Generic
 
-from bridges.core.decision import (
+from bridges.host.log import pairs, plain
+from bridges.kinds.shared.decision import (
     Fault,
     IoFailed,
     M,
@@ -22,9 +23,8 @@ from bridges.core.decision import (
     WriteFailed,
     X,
 )
-from bridges.core.durations import AGES_AGO
-from bridges.core.kind import Answer, DeviceEvent, E, Kind, L, S
-from bridges.host.log import pairs, plain
+from bridges.kinds.shared.durations import AGES_AGO
+from bridges.kinds.shared.kind import Answer, DeviceEvent, E, Kind, L, S
 from bridges.messages.definitions import Message
 from bridges.messages.stamps import ClockError
 from bridges.messages.topics import Topic

@@ -10,7 +10,7 @@ from collections.abc import Collection, Iterable, Iterator, Mapping
 from typing import Final
 
 from bridges.host.places import GROUPS
-from bridges.rmf.settings import Rmf, Zenoh
+from bridges.kinds.shared.rmf_section import Rmf, Zenoh
 from bridges.rmf.zenoh_config import mode
 from bridges.settings.config import Config
 from drivers.hal import Needs

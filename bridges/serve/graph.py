@@ -9,11 +9,11 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any, Generic
 
-from bridges.core.decision import Fault, M, OperatorReset, R, RequestRefused
-from bridges.core.durations import NEVER
-from bridges.core.graph_kind import GraphEvent, GraphKind, MaySpeak, Woken
-from bridges.core.kind import E, L, S
 from bridges.host.log import pairs
+from bridges.kinds.shared.decision import Fault, M, OperatorReset, R, RequestRefused
+from bridges.kinds.shared.durations import NEVER
+from bridges.kinds.shared.graph_kind import GraphEvent, GraphKind, MaySpeak, Woken
+from bridges.kinds.shared.kind import E, L, S
 from bridges.messages.definitions import Message
 from bridges.messages.stamps import ClockError, stamp
 from bridges.messages.topics import Topic

@@ -8,11 +8,11 @@ import logging
 from collections.abc import Mapping
 from typing import Final, Generic, Protocol
 
-from bridges.core.decision import Fault, M, R
-from bridges.core.durations import AGES_AGO, NEVER
-from bridges.core.graph_kind import GraphKind
-from bridges.core.kind import E, L, S
 from bridges.host.log import pairs
+from bridges.kinds.shared.decision import Fault, M, R
+from bridges.kinds.shared.durations import AGES_AGO, NEVER
+from bridges.kinds.shared.graph_kind import GraphKind
+from bridges.kinds.shared.kind import E, L, S
 from bridges.serve.clock import Pace
 from bridges.serve.subject import Publish
 

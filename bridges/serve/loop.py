@@ -12,8 +12,8 @@ answer first.
 import logging
 from collections.abc import Collection, Sequence
 
-from bridges.core.durations import AGES_AGO, NEVER
 from bridges.host.log import pairs
+from bridges.kinds.shared.durations import AGES_AGO, NEVER
 from bridges.serve.clock import Clock
 from bridges.serve.device import AnyNode
 from bridges.serve.inbox import Inbox

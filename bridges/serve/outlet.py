@@ -4,7 +4,7 @@ import logging
 import threading
 from collections.abc import Callable, Iterable
 
-from bridges.core.decision import Fault
+from bridges.kinds.shared.decision import Fault
 from bridges.messages.definitions import Message
 from bridges.messages.instead import INSTEAD, converted
 from bridges.messages.topics import Topic

@@ -9,11 +9,11 @@ import random
 from collections.abc import Iterable
 from typing import Final
 
-from bridges.core.decision import Fault
-from bridges.core.durations import AGES_AGO, NEVER
-from bridges.core.graph_kind import LISTENS
-from bridges.core.names import LONGEST_NAME
 from bridges.host.log import pairs
+from bridges.kinds.shared.decision import Fault
+from bridges.kinds.shared.durations import AGES_AGO, NEVER
+from bridges.kinds.shared.graph_kind import LISTENS
+from bridges.kinds.shared.names import LONGEST_NAME
 from bridges.messages.definitions import Message
 from bridges.messages.topics import Topic
 from bridges.messages.words import printable

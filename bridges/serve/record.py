@@ -21,7 +21,7 @@ from bridges import BUILD, VERSION
 from bridges.host import files
 from bridges.host.log import pairs
 from bridges.host.places import Places, named, opened
-from bridges.rmf.settings import Rmf
+from bridges.kinds.shared.rmf_section import Rmf
 from bridges.settings import names
 from bridges.settings.config import Config
 from drivers.profiles import texts

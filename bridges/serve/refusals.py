@@ -4,8 +4,8 @@ import logging
 import threading
 from collections import Counter
 
-from bridges.core.decision import EXPECTED
 from bridges.host.log import pairs
+from bridges.kinds.shared.decision import EXPECTED
 
 log = logging.getLogger(__name__)
 

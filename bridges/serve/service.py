@@ -9,11 +9,11 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from functools import partial
 from typing import Protocol
 
-from bridges.core.decision import Attended, OperatorReset
-from bridges.core.graph_kind import GraphKind
-from bridges.core.kind import AnyDeviceKind
-from bridges.core.names import LONGEST_NAME
 from bridges.host.log import pairs
+from bridges.kinds.shared.decision import Attended, OperatorReset
+from bridges.kinds.shared.graph_kind import GraphKind
+from bridges.kinds.shared.kind import AnyDeviceKind
+from bridges.kinds.shared.names import LONGEST_NAME
 from bridges.messages.definitions import Message
 from bridges.messages.topics import M_co, Topic
 from bridges.rmf.transport import Subscription, Transport

@@ -7,9 +7,9 @@ from typing import Any, Generic, TypeVar
 
 from msgspec import Struct
 
-from bridges.core.decision import Decision, Fault, M, O, R
-from bridges.core.durations import NEVER
 from bridges.host.log import pairs, plain
+from bridges.kinds.shared.decision import Decision, Fault, M, O, R
+from bridges.kinds.shared.durations import NEVER
 from bridges.messages.definitions import Message
 from bridges.messages.topics import Topic
 from bridges.serve.clock import Clock

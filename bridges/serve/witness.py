@@ -12,8 +12,8 @@ from collections.abc import Callable
 from contextlib import suppress
 from typing import Any, Final
 
-from bridges.core.decision import IoFailed, Sampled
-from bridges.core.durations import AGES_AGO, NEVER
+from bridges.kinds.shared.decision import IoFailed, Sampled
+from bridges.kinds.shared.durations import AGES_AGO, NEVER
 from bridges.messages import cdr
 from bridges.messages.definitions import Message
 from bridges.messages.releases import Release

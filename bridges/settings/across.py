@@ -8,12 +8,12 @@ from collections.abc import Iterable, Iterator, Sequence
 
 from msgspec import Struct
 
-from bridges.core.graph_kind import GraphKind
-from bridges.core.spelling import unknown
+from bridges.kinds.shared.graph_kind import GraphKind
 from bridges.settings import names as named
 from bridges.settings.load import Config
 from bridges.settings.nodes import Page, Problem, compose
 from bridges.settings.spots import Spot, locate
+from bridges.yaml.spelling import unknown
 from drivers.hal import Where
 
 Path = tuple[str, ...]

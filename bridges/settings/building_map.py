@@ -19,7 +19,7 @@ from contextlib import suppress
 from msgspec import Struct, field
 from yaml import MappingNode, Node, ScalarNode, SequenceNode
 
-from bridges.core.kind import CHARGER, DOOR, FLOOR, LIFT, WAYPOINT
+from bridges.kinds.shared.kind import CHARGER, DOOR, FLOOR, LIFT, WAYPOINT
 from bridges.settings.nodes import Page, Sort, compose, read
 
 MAP = Sort("building map or navigation graph", "levels: ...", 1024 * 1024, 100_000)

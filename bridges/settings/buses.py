@@ -5,12 +5,12 @@ from collections.abc import Iterable
 from msgspec import Struct
 from yaml import MappingNode, ScalarNode
 
-from bridges.core.spelling import either, nearest, unknown
 from bridges.settings import names as named
 from bridges.settings.nodes import Page
 from bridges.settings.spots import Entry, below
 from bridges.settings.top import word
 from bridges.settings.values import BROKEN, Values
+from bridges.yaml.spelling import either, nearest, unknown
 from drivers.hal import AnyBus, Remark
 
 

@@ -6,8 +6,8 @@ from typing import Any
 
 from msgspec import Struct, field
 
-from bridges.recording.settings import Recording
-from bridges.rmf.settings import Rmf
+from bridges.kinds.shared.recording_section import Recording
+from bridges.kinds.shared.rmf_section import Rmf
 from bridges.settings import names as named
 from bridges.settings.problems import Problem
 from drivers.driver_type import AnyDriver
@@ -21,8 +21,8 @@ class Config(Struct, frozen=True):
     `text`: its bytes as they were read. `buses` and `devices`: name -> the `settings` of the bus's
     or driver's record, whose type only that record knows. `bus_types`: name -> `type:`. `warnings`:
     legal settings that may be a mistake. `notes`: settings that a site may want, and should know about.
-    `section`: the settings of a kind without devices (`bridges/core/graph_kind.py`), which has no
-    driver and no buses.
+    `section`: the settings of a kind without devices (`bridges/kinds/shared/graph_kind.py`), which
+    has no driver and no buses.
     """
 
     path: Path

@@ -12,14 +12,14 @@ from typing import Literal
 from msgspec import Struct, field
 from yaml import MappingNode
 
-from bridges.charger_coordinator.settings import Fleet, Settings, Waypoint
-from bridges.core.spelling import unknown
+from bridges.kinds.charger_coordinator.settings import Fleet, Settings, Waypoint
 from bridges.settings.building_map import BuildingMap
 from bridges.settings.config import Config
 from bridges.settings.fleet_config import EVERY_LEVEL, FleetFile
 from bridges.settings.nodes import Page, Problem, compose
 from bridges.settings.similarity import Point, Similarity, estimate
 from bridges.settings.spots import Spot, locate
+from bridges.yaml.spelling import unknown
 
 Transforms = Mapping[str, Similarity]
 """Level -> RMF's map to the robot's; EVERY_LEVEL for all."""

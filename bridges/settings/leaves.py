@@ -26,10 +26,10 @@ from msgspec.inspect import (
 )
 from yaml import Node, ScalarNode, SequenceNode
 
-from bridges.core.spelling import either, nearest, short
 from bridges.settings.nodes import is_plain
 from bridges.settings.scalars import TRUTHS, number, reads_as, whole_number
 from bridges.settings.slips import has_unit, number_meant
+from bridges.yaml.spelling import either, nearest, short
 
 Extra = Mapping[str, str]
 """What a field's `Meta(extra=…)` says: its `unit`, its `pattern` in words, its `check`."""

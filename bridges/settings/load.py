@@ -1,10 +1,10 @@
 """A device YAML becomes a Config, or a SettingsError that names every problem with its place.
 
-    kind: lift              a folder of bridges/ that holds a KIND
+    kind: lift              a folder of bridges/kinds/ that holds a KIND
     driver: dry_contact     a file of drivers/<kind>/; a device may name another as its own `driver:`
-    rmf: {...}              bridges.rmf.settings.Rmf
+    rmf: {...}              bridges.kinds.shared.rmf_section.Rmf
     buses: {name: {type: a file of drivers/hal/, ...}}
-    recording: {...}        bridges.recording.settings.Recording
+    recording: {...}        bridges.kinds.shared.recording_section.Recording
     lifts: {name: {...}}    the kind's own key; what each holds is the driver's `settings`
 
 A kind without hardware has only `kind`, `rmf`, `recording` and one section of its own.
@@ -19,12 +19,11 @@ from typing import Final
 import msgspec
 from yaml import MappingNode, Node, ScalarNode
 
-from bridges.core.fields import DeviceSettings, Name
-from bridges.core.graph_kind import AnyGraphKind, AnyKind, GraphKind
-from bridges.core.spelling import either, unknown
+from bridges.kinds.shared.fields import DeviceSettings, Name
+from bridges.kinds.shared.graph_kind import AnyGraphKind, AnyKind, GraphKind
+from bridges.kinds.shared.recording_section import Recording
+from bridges.kinds.shared.rmf_section import Rmf
 from bridges.messages import topics
-from bridges.recording.settings import Recording
-from bridges.rmf.settings import Rmf
 from bridges.settings import names as named
 from bridges.settings.buses import BusRead, read_bus
 from bridges.settings.config import Config
@@ -34,6 +33,7 @@ from bridges.settings.spots import Entry, Spot, below, is_none, locate
 from bridges.settings.top import MAPPING, keys_below, top_keys, word
 from bridges.settings.values import BROKEN, Broken, Values
 from bridges.settings.wiring import Use, Wiring, note_conflicts, note_unknown_signals
+from bridges.yaml.spelling import either, unknown
 from drivers.driver_type import AnyDriver
 from drivers.hal.points import Wire
 

@@ -7,14 +7,14 @@ waits forever.
 from collections.abc import Iterator
 from pathlib import Path
 
-from bridges.core.graph_kind import GraphKind
-from bridges.core.kind import CHARGER, DOOR, FLOOR, LIFT, WAYPOINT, Place
-from bridges.core.spelling import nearest, short
+from bridges.kinds.shared.graph_kind import GraphKind
+from bridges.kinds.shared.kind import CHARGER, DOOR, FLOOR, LIFT, WAYPOINT, Place
 from bridges.settings import names as named
 from bridges.settings.building_map import BuildingMap
 from bridges.settings.load import Config
 from bridges.settings.nodes import Page, Problem, compose
 from bridges.settings.spots import Spot, locate
+from bridges.yaml.spelling import nearest, short
 
 
 def places(config: Config) -> list[Place]:

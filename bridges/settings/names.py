@@ -13,20 +13,20 @@ from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING
 
-import bridges
+import bridges.kinds
 import drivers
 import drivers.hal
 from drivers.driver_type import AnyDriver
 from drivers.hal import AnyBus
 
 if TYPE_CHECKING:
-    from bridges.core.graph_kind import AnyKind
-    from bridges.core.recorded import Recorded
+    from bridges.kinds.shared.graph_kind import AnyKind
+    from bridges.kinds.shared.recorded import Recorded
 
 
 def kind_names() -> list[str]:
-    """What `kind:` may be: the folders of `bridges/` that hold a `KIND`."""
-    return _found(bridges, "*/__init__.py", "KIND", lambda path: path.parent.name)
+    """What `kind:` may be: the folders of `bridges/kinds/` that hold a `KIND`."""
+    return _found(bridges.kinds, "*/__init__.py", "KIND", lambda path: path.parent.name)
 
 
 def driver_names(kind: str) -> list[str]:
@@ -77,7 +77,7 @@ def kind_files(name: str) -> Iterator[ModuleType]:
 
 
 def _package(kind: str) -> ModuleType:
-    return importlib.import_module(f"bridges.{kind}")
+    return importlib.import_module(f"bridges.kinds.{kind}")
 
 
 def driver_called(kind: str, name: str) -> AnyDriver:

@@ -5,7 +5,7 @@ from typing import Final
 
 from msgspec.inspect import StructType
 
-from bridges.core.fields import DeviceSettings
+from bridges.kinds.shared.fields import DeviceSettings
 from bridges.settings.values import described
 from drivers.hal import Remark
 

@@ -12,9 +12,9 @@ import msgspec
 from msgspec import inspect as mi
 
 from bridges import __version__
-from bridges.core.graph_kind import AnyGraphKind, GraphKind
-from bridges.recording.settings import Recording
-from bridges.rmf.settings import Rmf
+from bridges.kinds.shared.graph_kind import AnyGraphKind, GraphKind
+from bridges.kinds.shared.recording_section import Recording
+from bridges.kinds.shared.rmf_section import Rmf
 from bridges.settings import names as named
 from bridges.settings.examples import example, flow
 from bridges.settings.leaves import Extra, choices, wanted_text

@@ -5,9 +5,9 @@ from collections.abc import Iterable
 from msgspec import Struct
 from yaml import MappingNode, Node, ScalarNode, SequenceNode
 
-from bridges.core.spelling import short
 from bridges.settings.nodes import is_plain
 from bridges.settings.scalars import is_null_word
+from bridges.yaml.spelling import short
 
 
 class Spot(Struct, frozen=True):

@@ -5,13 +5,13 @@ from typing import Final
 from msgspec.inspect import LiteralType
 from msgspec.structs import fields
 
-from bridges.core.graph_kind import AnyKind, GraphKind
-from bridges.core.spelling import either
-from bridges.recording.settings import Recording
-from bridges.rmf.settings import Rmf
+from bridges.kinds.shared.graph_kind import AnyKind, GraphKind
+from bridges.kinds.shared.recording_section import Recording
+from bridges.kinds.shared.rmf_section import Rmf
 from bridges.settings import names as named
 from bridges.settings.spots import Entry
 from bridges.settings.values import BROKEN, Values
+from bridges.yaml.spelling import either
 from drivers.driver_type import AnyDriver
 
 MAPPING: Final = "a mapping (key: value)"

@@ -13,11 +13,17 @@ from typing import Annotated
 
 import msgspec
 
-from bridges.charger.settings import ChargerSettings
-from bridges.charger.signals import Activity, ChargerOutputs, ChargerSample, FaultSide, Measured
-from bridges.core.fields import Name
-from bridges.core.spelling import unknown
-from bridges.core.table import Table
+from bridges.kinds.charger.settings import ChargerSettings
+from bridges.kinds.charger.signals import (
+    Activity,
+    ChargerOutputs,
+    ChargerSample,
+    FaultSide,
+    Measured,
+)
+from bridges.kinds.shared.fields import Name
+from bridges.kinds.shared.table import Table
+from bridges.yaml.spelling import unknown
 from drivers import DriverError
 from drivers.charger import dbc
 from drivers.charger.can_map import NMT, PROFILE, FrameMap, Problems, Sent, rows, tables

@@ -8,9 +8,9 @@ from typing import Annotated, Final
 
 import msgspec
 
-from bridges.core.fields import Name, Period
-from bridges.core.spelling import unknown
-from bridges.core.table import Table
+from bridges.kinds.shared.fields import Name, Period
+from bridges.kinds.shared.table import Table
+from bridges.yaml.spelling import unknown
 from drivers.charger import dbc
 from drivers.charger import rules as by_rules
 from drivers.charger.rules import Errors, Rule

@@ -9,7 +9,7 @@ from typing import Annotated, Final, Literal
 
 import msgspec
 
-from bridges.charger.settings import ChargerSettings
+from bridges.kinds.charger.settings import ChargerSettings
 from drivers.charger import xnergy
 from drivers.driver_type import DriverType
 from drivers.hal import can

@@ -10,9 +10,15 @@ from typing import Final
 
 import msgspec
 
-from bridges.charger.settings import ChargerSettings
-from bridges.charger.signals import Activity, ChargerOutputs, ChargerSample, FaultSide, Measured
-from bridges.core.table import Table
+from bridges.kinds.charger.settings import ChargerSettings
+from bridges.kinds.charger.signals import (
+    Activity,
+    ChargerOutputs,
+    ChargerSample,
+    FaultSide,
+    Measured,
+)
+from bridges.kinds.shared.table import Table
 from drivers.driver_type import DriverType
 from drivers.hal.points import Input, Output, Points, PointsBus, Wire, input_wires
 from drivers.tables import lines_on, one_cut, told_of_cuts

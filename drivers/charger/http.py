@@ -15,14 +15,9 @@ from typing import Final
 
 import msgspec
 
-from bridges.charger.settings import ChargerSettings
-from bridges.charger.signals import (
-    AT_FAULT,
-    Activity,
-    ChargerOutputs,
-    ChargerSample,
-)
-from bridges.core.fields import Timeout
+from bridges.kinds.charger.settings import ChargerSettings
+from bridges.kinds.charger.signals import AT_FAULT, Activity, ChargerOutputs, ChargerSample
+from bridges.kinds.shared.fields import Timeout
 from drivers import json_fields
 from drivers.charger import rules
 from drivers.charger.http_fields import Fields, Word

@@ -6,8 +6,8 @@ from typing import Annotated, Final, Literal
 
 import msgspec
 
-from bridges.charger.signals import FaultSide, Measured
-from bridges.core.fields import Name
+from bridges.kinds.charger.signals import FaultSide, Measured
+from bridges.kinds.shared.fields import Name
 from drivers import json_fields
 from drivers.charger.state_codes import CODE_MAX
 from drivers.json_fields import Field, Flag

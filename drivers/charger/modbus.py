@@ -7,7 +7,7 @@ registers 0 to 100 in one request.
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Final
 
-from bridges.charger.settings import ChargerSettings
+from bridges.kinds.charger.settings import ChargerSettings
 from drivers.charger import xnergy
 from drivers.driver_type import DriverType
 from drivers.hal import modbus

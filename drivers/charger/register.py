@@ -7,10 +7,10 @@ the daemon starts, so that a restart does not end a charge.
 from collections.abc import Iterator, Mapping
 from typing import Final
 
-from bridges.charger.settings import ChargerSettings
-from bridges.charger.signals import ChargerOutputs, ChargerSample, Measured
-from bridges.core.fields import Name
-from bridges.core.table import Table
+from bridges.kinds.charger.settings import ChargerSettings
+from bridges.kinds.charger.signals import ChargerOutputs, ChargerSample, Measured
+from bridges.kinds.shared.fields import Name
+from bridges.kinds.shared.table import Table
 from drivers import DriverError
 from drivers.charger import rules
 from drivers.charger.register_map import PROFILE, ChargerMap, Number, Problems

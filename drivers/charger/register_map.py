@@ -5,8 +5,8 @@ from typing import Annotated, Final, Literal
 
 import msgspec
 
-from bridges.core.fields import Name
-from bridges.core.spelling import unknown
+from bridges.kinds.shared.fields import Name
+from bridges.yaml.spelling import unknown
 from drivers.charger import rules as by_rules
 from drivers.charger.rules import Errors, Rule
 from drivers.charger.state_codes import Codes

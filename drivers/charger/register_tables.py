@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping
 from typing import Final, NamedTuple
 
-from bridges.core.table import Table
+from bridges.kinds.shared.table import Table
 from drivers.charger.register_map import ChargerMap, Number
 from drivers.hal.modbus.points import Point
 

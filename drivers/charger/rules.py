@@ -9,8 +9,8 @@ from typing import Annotated, Final, NamedTuple, Protocol
 
 import msgspec
 
-from bridges.charger.signals import Activity, FaultSide
-from bridges.core.fields import Name
+from bridges.kinds.charger.signals import Activity, FaultSide
+from bridges.kinds.shared.fields import Name
 from drivers.charger.state_codes import ROBOT_ERROR, STATION_ERROR, Codes, first_side
 from drivers.json_fields import Value, same
 

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import msgspec
 
-from bridges.charger.signals import Activity, FaultSide
+from bridges.kinds.charger.signals import Activity, FaultSide
 
 CODE_MAX = 65535
 Code = Annotated[int, msgspec.Meta(ge=0, le=CODE_MAX)]

@@ -18,8 +18,14 @@ from typing import Final, Protocol
 from msgspec import Struct
 from msgspec.structs import replace
 
-from bridges.charger.settings import ChargerSettings
-from bridges.charger.signals import Activity, ChargerOutputs, ChargerSample, FaultSide, Measured
+from bridges.kinds.charger.settings import ChargerSettings
+from bridges.kinds.charger.signals import (
+    Activity,
+    ChargerOutputs,
+    ChargerSample,
+    FaultSide,
+    Measured,
+)
 from drivers import DriverError
 
 ALWAYS: Final = ("state", "error_low", "error_high", "volts", "amps", "range")

@@ -13,9 +13,9 @@ from typing import Final
 
 import msgspec
 
-from bridges.core.table import Table
-from bridges.door.settings import DoorSettings
-from bridges.door.signals import DoorOutputs, DoorSample
+from bridges.kinds.door.settings import DoorSettings
+from bridges.kinds.door.signals import DoorOutputs, DoorSample
+from bridges.kinds.shared.table import Table
 from drivers.door.closing import CLOSING
 from drivers.driver_type import DriverType
 from drivers.hal.points import Flash, Input, Output, Point, Points, PointsBus, Wire, input_wires

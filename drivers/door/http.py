@@ -10,9 +10,9 @@ from typing import Final
 
 import msgspec
 
-from bridges.core.fields import Timeout
-from bridges.door.settings import DoorSettings
-from bridges.door.signals import DoorOutputs, DoorSample
+from bridges.kinds.door.settings import DoorSettings
+from bridges.kinds.door.signals import DoorOutputs, DoorSample
+from bridges.kinds.shared.fields import Timeout
 from drivers import DriverError, json_fields
 from drivers.door.closing import CLOSING
 from drivers.driver_type import DriverType

@@ -8,10 +8,10 @@ agree with the status. The command holds the door open or releases it; nothing d
 from collections.abc import Iterator, Mapping
 from typing import Final
 
-from bridges.core.fields import Name
-from bridges.core.table import Table
-from bridges.door.settings import DoorSettings
-from bridges.door.signals import DoorOutputs, DoorSample
+from bridges.kinds.door.settings import DoorSettings
+from bridges.kinds.door.signals import DoorOutputs, DoorSample
+from bridges.kinds.shared.fields import Name
+from bridges.kinds.shared.table import Table
 from drivers.door.closing import CLOSING
 from drivers.door.register_map import DoorMap, Errors, Flag, Parts, Problems, Status
 from drivers.driver_type import DriverType

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import msgspec
 
-from bridges.core.fields import Name
+from bridges.kinds.shared.fields import Name
 from drivers.hal.modbus.registers import REGISTERS, WRITABLE, Place, Word, misplaced
 
 Bit = Annotated[int, msgspec.Meta(ge=0, le=15)]

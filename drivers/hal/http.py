@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import msgspec
 
-from bridges.core.fields import AbsolutePath, Name, Period
 from bridges.host import user_files
+from bridges.kinds.shared.fields import AbsolutePath, Name, Period
 from drivers.hal import Bus, BusType, HalError, Needs, Where
 from drivers.hal.backoff import Backoff
 from drivers.hal.deadline import Dialler, Resolve, tls_socket

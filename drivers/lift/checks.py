@@ -3,8 +3,8 @@
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from functools import partial
 
-from bridges.lift.settings import LiftSettings
-from bridges.lift.signals import Hazard, Side
+from bridges.kinds.lift.settings import LiftSettings
+from bridges.kinds.lift.signals import Hazard, Side
 from drivers.hal.points import Wire
 from drivers.lift import codes
 from drivers.lift.broken_lines import floor_warnings, unsafe_codes

@@ -6,7 +6,7 @@ The lines are GPIO pins, or coils and discrete inputs of a Modbus I/O module.
 from collections.abc import Iterable, Mapping
 from functools import partial
 
-from bridges.lift.signals import Door, Hazard, LiftOutputs, LiftSample, Motion, Side
+from bridges.kinds.lift.signals import Door, Hazard, LiftOutputs, LiftSample, Motion, Side
 from drivers.driver_type import DriverType
 from drivers.hal.points import Points, PointsBus, Wire
 from drivers.lift import checks as lift_checks

@@ -7,9 +7,9 @@ number that the map does not list is a fault; it never means a floor, an open do
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Final
 
-from bridges.core.table import Table
-from bridges.lift.settings import LiftSettings
-from bridges.lift.signals import Door, Hazard, LiftOutputs, LiftSample, Motion, Side
+from bridges.kinds.lift.settings import LiftSettings
+from bridges.kinds.lift.signals import Door, Hazard, LiftOutputs, LiftSample, Motion, Side
+from bridges.kinds.shared.table import Table
 from drivers.driver_type import DriverType
 from drivers.hal.modbus import ModbusBus
 from drivers.hal.modbus.lines import Lines

@@ -7,8 +7,8 @@ from typing import Annotated, Literal, TypeAlias
 
 import msgspec
 
-from bridges.core.fields import Name
-from bridges.lift.signals import Hazard
+from bridges.kinds.lift.signals import Hazard
+from bridges.kinds.shared.fields import Name
 from drivers.hal.modbus.points import BITS
 from drivers.hal.modbus.registers import REGISTERS, TABLES, WRITABLE, Place, Word, misplaced
 from drivers.lift.wiring import ServiceState

@@ -2,8 +2,8 @@
 
 from collections.abc import Iterator
 
-from bridges.core.table import Table
-from bridges.lift.settings import LiftSettings
+from bridges.kinds.lift.settings import LiftSettings
+from bridges.kinds.shared.table import Table
 from drivers.lift.register_map import DoorField, FloorField, LiftMap, MotionField, Number
 from drivers.lift.tables import BETWEEN, FAULT, floors, how_long
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 
-from bridges.lift.signals import Hazard
+from bridges.kinds.lift.signals import Hazard
 from drivers.hal.points import Output, Wire
 from drivers.lift.wiring import LiftInput, LiftWiring
 

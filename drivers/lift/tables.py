@@ -2,9 +2,9 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 
-from bridges.core.table import Table
-from bridges.lift.settings import LiftSettings
-from bridges.lift.signals import Side
+from bridges.kinds.lift.settings import LiftSettings
+from bridges.kinds.lift.signals import Side
+from bridges.kinds.shared.table import Table
 from drivers.hal.points import Wire
 from drivers.lift import codes
 from drivers.lift.table import wires

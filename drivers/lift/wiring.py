@@ -5,9 +5,9 @@ from typing import Annotated, Literal
 
 import msgspec
 
-from bridges.core.fields import Name
-from bridges.lift.settings import LiftSettings
-from bridges.lift.signals import Hazard
+from bridges.kinds.lift.settings import LiftSettings
+from bridges.kinds.lift.signals import Hazard
+from bridges.kinds.shared.fields import Name
 from drivers.hal.points import Input, Output
 from drivers.lift import codes
 from drivers.lift.codes import Encoding

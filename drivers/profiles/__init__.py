@@ -17,9 +17,9 @@ from typing import Generic, TypeVar
 import msgspec
 from msgspec.inspect import LiteralType
 
-from bridges.core.fields import Name
-from bridges.core.spelling import either, unknown
+from bridges.kinds.shared.fields import Name
 from bridges.settings.problems import SettingsError
+from bridges.yaml.spelling import either, unknown
 from drivers.profiles import texts
 from drivers.profiles.texts import FOLDER
 

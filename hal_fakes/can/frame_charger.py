@@ -16,7 +16,7 @@ from typing import Final
 
 import can
 
-from bridges.charger.signals import Activity, FaultSide
+from bridges.kinds.charger.signals import Activity, FaultSide
 from drivers.charger import dbc
 from drivers.charger.can_frames import Settings, frame_map
 from drivers.charger.can_map import FrameMap, Sent, State

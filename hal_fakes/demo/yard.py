@@ -9,8 +9,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
-from bridges.charger.settings import Robot
-from bridges.charger_coordinator.settings import Settings
+from bridges.kinds.charger.settings import Robot
+from bridges.kinds.charger_coordinator.settings import Settings
 from bridges.messages import definitions as d
 from bridges.messages.topics import CHARGING_ASSIGNMENTS, DIAGNOSTICS, AnyTopic
 from bridges.rmf_rules import Party, Said

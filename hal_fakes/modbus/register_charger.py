@@ -1,6 +1,6 @@
 """A charging station on registers: its plant in the numbers of its map."""
 
-from bridges.charger.signals import Activity
+from bridges.kinds.charger.signals import Activity
 from drivers.charger.register import POWER, Settings, cells, charger_map, orders
 from drivers.charger.rules import UNKNOWN
 from drivers.charger.state_codes import ROBOT_ERROR

@@ -9,8 +9,8 @@ from itertools import count
 
 import msgspec
 
-from bridges.lift.settings import LiftSettings
-from bridges.lift.signals import Hazard
+from bridges.kinds.lift.settings import LiftSettings
+from bridges.kinds.lift.signals import Hazard
 from drivers.hal.modbus.points import Point
 from drivers.hal.modbus.registers import at
 from drivers.lift import dry_contact

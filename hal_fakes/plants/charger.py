@@ -29,8 +29,8 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Final
 
-from bridges.charger.settings import ChargerSettings
-from bridges.charger.signals import CURRENT_FLOWS, Activity
+from bridges.kinds.charger.settings import ChargerSettings
+from bridges.kinds.charger.signals import CURRENT_FLOWS, Activity
 from drivers.hal.points import Wire
 from hal_fakes.fake import Fake
 from hal_fakes.plants.machine import Machine

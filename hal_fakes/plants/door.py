@@ -10,7 +10,7 @@ fail as well (`hal_fakes/modbus/`).
 from collections.abc import Iterable
 from typing import Final
 
-from bridges.door.settings import DoorSettings
+from bridges.kinds.door.settings import DoorSettings
 from drivers.hal.points import Wire
 from hal_fakes.fake import Fake
 from hal_fakes.plants.machine import Machine

@@ -20,7 +20,7 @@ Parts that fail: `car` (`off`, `stuck`: stands where it is; `slow`; `wrong`: goe
 
 from dataclasses import dataclass
 
-from bridges.lift.signals import Hazard, Side
+from bridges.kinds.lift.signals import Hazard, Side
 from drivers.lift import codes
 from drivers.lift.dry_contact import Settings, wires
 from drivers.lift.table import input_rows

@@ -2,7 +2,7 @@
 
 from typing import Final
 
-from bridges.charger.signals import Activity
+from bridges.kinds.charger.signals import Activity
 from drivers.charger.modbus import Settings, points
 from drivers.charger.xnergy import CHECK_RANGE, ENABLE, IN_RANGE, TICKS_PER_UNIT
 from drivers.hal.modbus.points import Point

@@ -7,13 +7,13 @@ import msgspec
 import pytest
 from msgspec.structs import replace
 
-from bridges.charger.refusals import Refusal
 from bridges.commands.exchange import step
 from bridges.commands.graph import CommandLine
 from bridges.commands.requests import Done, Failed, Request, Seen
 from bridges.commands.requests.charger import Charge, ChargeCancel, QueuedCancel, QueuedCharge
 from bridges.commands.requests.door import DoorMove
 from bridges.commands.requests.lift import LiftEnd, LiftRide
+from bridges.kinds.charger.refusals import Refusal
 from bridges.messages import definitions as d
 from bridges.messages import topics, words
 from bridges.messages.heard import Heard

@@ -15,7 +15,6 @@ from typing import Any, TypeVar
 import pytest
 from msgspec.structs import replace
 
-from bridges.charger.refusals import Refusal
 from bridges.cli import main
 from bridges.commands import send, watch
 from bridges.commands.graph import add_graph_arguments, overridden
@@ -23,13 +22,14 @@ from bridges.commands.requests import Request
 from bridges.commands.requests.charger import Charge, ChargeCancel
 from bridges.commands.requests.door import DoorMove
 from bridges.commands.requests.lift import LiftEnd, LiftRide
+from bridges.kinds.charger.refusals import Refusal
+from bridges.kinds.shared.rmf_section import Rmf
 from bridges.messages import definitions as d
 from bridges.messages import topics
 from bridges.messages.topics import Topic
 from bridges.rmf.choose import open_transport
 from bridges.rmf.memory import MemoryNetwork, MemoryTransport
 from bridges.rmf.renamed import Renamed
-from bridges.rmf.settings import Rmf
 from bridges.rmf.transport import Transport
 from bridges.settings.load import load
 from hal_fakes.wire import Wire, runs_here

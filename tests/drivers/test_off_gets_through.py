@@ -14,8 +14,8 @@ import msgspec
 import pytest
 from gpiozero.pins.mock import MockFactory
 
-from bridges.charger.signals import ChargerOutputs
-from bridges.door.signals import DoorOutputs
+from bridges.kinds.charger.signals import ChargerOutputs
+from bridges.kinds.door.signals import DoorOutputs
 from drivers import DriverError
 from drivers.charger import http as charger_http
 from drivers.charger import modbus

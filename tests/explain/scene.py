@@ -7,10 +7,10 @@ from collections.abc import Sequence
 from random import Random
 from typing import Any
 
-from bridges.charger_coordinator import KIND as COORDINATOR
-from bridges.core.graph_kind import AnyGraphKind
-from bridges.door_supervisor import KIND as DOOR_SUPERVISOR
-from bridges.lift_supervisor import KIND as LIFT_SUPERVISOR
+from bridges.kinds.charger_coordinator import KIND as COORDINATOR
+from bridges.kinds.door_supervisor import KIND as DOOR_SUPERVISOR
+from bridges.kinds.lift_supervisor import KIND as LIFT_SUPERVISOR
+from bridges.kinds.shared.graph_kind import AnyGraphKind
 from bridges.messages import definitions as d
 from bridges.messages import topics
 from bridges.messages.heard import Heard

@@ -8,9 +8,9 @@ from typing import Final
 
 from msgspec.structs import replace
 
-from bridges.charger.pad import Misplaced
-from bridges.charger.settings import Robot
 from bridges.explain.timeline import Kind
+from bridges.kinds.charger.pad import Misplaced
+from bridges.kinds.charger.settings import Robot
 from bridges.messages import definitions as d
 from bridges.messages import topics
 from bridges.messages.heard import Heard

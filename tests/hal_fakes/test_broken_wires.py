@@ -8,7 +8,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from bridges.lift.signals import Door, Hazard, LiftSample, Side
+from bridges.kinds.lift.signals import Door, Hazard, LiftSample, Side
 from drivers.lift.dry_contact import wires
 from hal_fakes.plants.plant import FailureMode
 from tests.hal_fakes.virtual_lift import WiredLift, shipped

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from bridges.door.signals import DoorOutputs, DoorSample
+from bridges.kinds.door.signals import DoorOutputs, DoorSample
 from bridges.settings.load import Config, load
 from drivers.door.dry_contact import create
 from drivers.hal import HalError

@@ -3,7 +3,7 @@
 import can
 import msgspec
 
-from bridges.charger.signals import ChargerOutputs
+from bridges.kinds.charger.signals import ChargerOutputs
 from drivers.charger.can_frames import Settings, create
 from hal_fakes.can.frame_charger import PERIODS, STATUS_S, FrameCharger
 from hal_fakes.plants.charger import ChargerPlant

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from bridges.door.signals import DoorOutputs
+from bridges.kinds.door.signals import DoorOutputs
 from bridges.settings.load import load
 from drivers.door.register import create
 from hal_fakes.simulate import Simulation

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from bridges.lift.signals import Door, Hazard, LiftOutputs, LiftSample, Side
+from bridges.kinds.lift.signals import Door, Hazard, LiftOutputs, LiftSample, Side
 from bridges.settings.load import Config, load
 from drivers.hal.gpio import GpioBus
 from drivers.lift.dry_contact import LiftDryContact, create

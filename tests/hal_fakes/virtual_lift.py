@@ -5,7 +5,7 @@ from typing import Any
 
 import msgspec
 
-from bridges.lift.signals import LiftOutputs, LiftSample
+from bridges.kinds.lift.signals import LiftOutputs, LiftSample
 from bridges.settings.load import load
 from drivers.hal.gpio import Settings as GpioSettings
 from drivers.hal.gpio import canonical, open_bus

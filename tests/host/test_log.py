@@ -7,10 +7,10 @@ from datetime import datetime
 import pytest
 from msgspec import Struct
 
-from bridges.core.decision import OperatorReset
-from bridges.door.signals import DoorOutputs
 from bridges.host.log import Seldom, _Formatter, _Json, pairs, plain
-from bridges.lift.signals import LiftOutputs, Side
+from bridges.kinds.door.signals import DoorOutputs
+from bridges.kinds.lift.signals import LiftOutputs, Side
+from bridges.kinds.shared.decision import OperatorReset
 from bridges.messages.definitions import LiftMode
 
 

@@ -13,11 +13,11 @@ from typing import Any
 
 import pytest
 
+from bridges.kinds.shared.rmf_section import Rmf
 from bridges.messages import definitions as d
 from bridges.messages import topics
 from bridges.messages.topics import AnyTopic
 from bridges.rmf.choose import open_transport
-from bridges.rmf.settings import Rmf
 from bridges.rmf.transport import Publisher
 from bridges.rmf_rules import Party
 from hal_fakes.wire import Wire, runs_here

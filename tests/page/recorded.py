@@ -5,6 +5,7 @@ from pathlib import Path
 from msgspec.structs import replace
 
 from bridges import __version__
+from bridges.kinds.shared.recording_section import Recording
 from bridges.messages import cdr
 from bridges.messages import definitions as d
 from bridges.messages.definitions import Message
@@ -14,7 +15,6 @@ from bridges.messages.stamps import stamp
 from bridges.recording import mcap_write
 from bridges.recording.entries import AnyEntry, Clocks, Head, Spoken
 from bridges.recording.incident import Incident, Note
-from bridges.recording.settings import Recording
 
 WALL = 1_795_000_000.0
 LIFT = d.LiftState(

@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
-from bridges.core.decision import IoFailed, Sampled
-from bridges.door.signals import DoorOutputs, DoorSample
+from bridges.kinds.door.signals import DoorOutputs, DoorSample
+from bridges.kinds.shared.decision import IoFailed, Sampled
 from bridges.page.levels import Levels
 from bridges.recording.entries import Step
 from bridges.recording.trees import tree

@@ -9,10 +9,10 @@ import msgspec
 import yaml
 
 from bridges import __version__
-from bridges.core.graph_kind import AnyGraphKind
+from bridges.kinds.shared.graph_kind import AnyGraphKind
+from bridges.kinds.shared.recording_section import Recording
 from bridges.recording.entries import Head
 from bridges.recording.ring import Ring
-from bridges.recording.settings import Recording
 from bridges.serve.clock import Clock
 from bridges.serve.witness import Witness
 from tests.site.building import Device

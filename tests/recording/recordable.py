@@ -9,7 +9,7 @@ from typing import Any
 
 import msgspec
 
-from bridges.core.decision import Decision
+from bridges.kinds.shared.decision import Decision
 from bridges.messages import constants
 from bridges.messages.definitions import Message
 from bridges.settings.names import kind_called, kind_names

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from bridges import lift
+from bridges.kinds import lift
+from bridges.kinds.shared.recording_section import Recording
 from bridges.messages import cdr
 from bridges.messages.definitions import LiftState
 from bridges.messages.releases import KILTED
@@ -17,7 +18,6 @@ from bridges.recording.files import opened
 from bridges.recording.incident import Incident
 from bridges.recording.incidents import notes_in
 from bridges.recording.replayed import Cores, Replay, of_head
-from bridges.recording.settings import Recording
 from bridges.recording.sources import Notes
 from tests.recording.test_replay import CORPUS
 

@@ -12,8 +12,8 @@ from typing import Any
 import msgspec
 import pytest
 
-from bridges.core.graph_kind import GraphKind
-from bridges.core.recorded import SHARED
+from bridges.kinds.shared.graph_kind import GraphKind
+from bridges.kinds.shared.recorded import SHARED
 from bridges.recording.entries import AnyEntry, Head, Known, Step
 from bridges.recording.files import opened
 from bridges.recording.replayed import Cores, Replay, of_head
@@ -41,7 +41,7 @@ def _own_texts() -> Iterator[None]:
 
 
 def test_every_type_that_a_daemon_can_record_has_a_name_and_comes_back() -> None:
-    """If one is missing: a row in `RECORDED` of its kind, or in `bridges/core/recorded.py`."""
+    """If one is missing: a row in `RECORDED` of its kind, or in `bridges/kinds/shared/recorded.py`."""
     nameless = []
     for one in recordable():
         kind = typing.get_origin(one) or one
@@ -159,7 +159,7 @@ def test_a_record_of_an_earlier_version_says_what_is_to_be_switched_off(file: Pa
 
 def test_names_load_no_other_kind_than_the_one_that_is_recorded() -> None:
     script = (
-        "import sys; from bridges.lift import memory; from bridges.recording.trees import tree, value;"
+        "import sys; from bridges.kinds.lift import memory; from bridges.recording.trees import tree, value;"
         "assert value(tree(memory.Memory())) == memory.Memory();"
         "print([name for name in ('door', 'charger', 'lift_supervisor', 'door_supervisor',"
         " 'charger_coordinator') if sys.modules.keys() & {memory.__name__.replace('lift', name)}])"

@@ -6,11 +6,11 @@ from typing import Any
 
 import pytest
 
-from bridges.core.debounce import Settled
-from bridges.core.decision import IoFailed
-from bridges.door.core import decide as decide_door
-from bridges.lift.core import decide as decide_lift
-from bridges.lift.signals import Door
+from bridges.kinds.door.core import decide as decide_door
+from bridges.kinds.lift.core import decide as decide_lift
+from bridges.kinds.lift.signals import Door
+from bridges.kinds.shared.debounce import Settled
+from bridges.kinds.shared.decision import IoFailed
 from bridges.messages import definitions as d
 from bridges.messages.heard import LONGEST_SENTENCE, MOST_PARTS, bounded
 from bridges.recording import entries

@@ -8,10 +8,11 @@ from pathlib import Path
 import pytest
 from msgspec.structs import replace
 
-from bridges.core.decision import Decision, Fault, IoFailed, Sampled
-from bridges.core.durations import NEVER
-from bridges.lift.report import LiftReport
-from bridges.lift.signals import Door, LiftOutputs, LiftSample, Requested
+from bridges.kinds.lift.report import LiftReport
+from bridges.kinds.lift.signals import Door, LiftOutputs, LiftSample, Requested
+from bridges.kinds.shared.decision import Decision, Fault, IoFailed, Sampled
+from bridges.kinds.shared.durations import NEVER
+from bridges.kinds.shared.recording_section import Recording
 from bridges.messages.definitions import (
     LiftDoor,
     LiftMode,
@@ -27,7 +28,6 @@ from bridges.recording.entries import Head, Step
 from bridges.recording.incidents import entries_in, head_of, notes_in
 from bridges.recording.recorder import Recorder
 from bridges.recording.ring import DIED, Read, Ring
-from bridges.recording.settings import Recording
 from bridges.recording.shelf import Shelf
 from bridges.serve.clock import Clock
 from bridges.serve.witness import Witness

@@ -6,8 +6,8 @@ import pytest
 import yaml
 from msgspec.structs import replace
 
-from bridges.core.decision import Fault
-from bridges.lift import core as lift_core
+from bridges.kinds.lift import core as lift_core
+from bridges.kinds.shared.decision import Fault
 from bridges.recording.entries import Known, Step
 from bridges.recording.files import opened
 from bridges.recording.replayed import CONTEXT, Cores, Difference, Replay, of_head

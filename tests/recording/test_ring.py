@@ -4,10 +4,10 @@ from pathlib import Path
 
 import pytest
 
+from bridges.kinds.shared.recording_section import Recording
 from bridges.recording import entries
 from bridges.recording.entries import AnyEntry, Forgotten, Head
 from bridges.recording.ring import DIED, MARK, SEGMENTS, Read, Ring, RingError, Tail
-from bridges.recording.settings import Recording
 
 HEAD = Head("run1", 7, "0.1.0", "lift", "/l.yaml", b"kind: lift", {}, False, {}, Recording())
 SIZE = 64 * 1024

@@ -6,12 +6,12 @@ import msgspec
 import pytest
 from msgspec.structs import replace
 
-from bridges.charger.settings import Robot
-from bridges.core.decision import Fault, IoFailed, OperatorReset, Sampled
-from bridges.core.durations import NEVER
-from bridges.core.graph_kind import MaySpeak, Woken
-from bridges.lift.memory import Channel, Memory, Relays, Senses, Session
-from bridges.lift.signals import Door, Hazard, LiftOutputs, LiftSample, Requested, Side
+from bridges.kinds.charger.settings import Robot
+from bridges.kinds.lift.memory import Channel, Memory, Relays, Senses, Session
+from bridges.kinds.lift.signals import Door, Hazard, LiftOutputs, LiftSample, Requested, Side
+from bridges.kinds.shared.decision import Fault, IoFailed, OperatorReset, Sampled
+from bridges.kinds.shared.durations import NEVER
+from bridges.kinds.shared.graph_kind import MaySpeak, Woken
 from bridges.messages.constants import LiftDoor
 from bridges.messages.definitions import LiftRequest, Time
 from bridges.recording.trees import UnknownValue, first_difference, tree, value

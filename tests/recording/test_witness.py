@@ -8,9 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from bridges.core.decision import Decision, Sampled
-from bridges.core.durations import NEVER
-from bridges.lift.signals import Door, LiftOutputs, LiftSample
+from bridges.kinds.lift.signals import Door, LiftOutputs, LiftSample
+from bridges.kinds.shared.decision import Decision, Sampled
+from bridges.kinds.shared.durations import NEVER
+from bridges.kinds.shared.recording_section import Recording
 from bridges.messages.definitions import LiftState, Message
 from bridges.messages.releases import KILTED
 from bridges.recording.bags import heard_in
@@ -19,7 +20,6 @@ from bridges.recording.incident import Incident, timed
 from bridges.recording.mcap_write import write
 from bridges.recording.replayed import times
 from bridges.recording.ring import Read, Ring
-from bridges.recording.settings import Recording
 from bridges.serve.clock import Clock
 from bridges.serve.witness import Witness
 from tests.recording.test_recorder import REPORT, WALL

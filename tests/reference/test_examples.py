@@ -8,7 +8,7 @@ import pytest
 import yaml
 from msgspec import inspect as mi
 
-from bridges.rmf.settings import Rmf
+from bridges.kinds.shared.rmf_section import Rmf
 from bridges.settings import names as named
 from bridges.settings import reference
 from bridges.settings.examples import example

@@ -3,10 +3,10 @@
 import importlib
 from collections.abc import Callable
 
+from bridges.kinds.shared.rmf_section import Zenoh
 from bridges.messages.releases import NEWEST, Release
 from bridges.rmf.choose import missing_of_ros
 from bridges.rmf.ros_types import installed
-from bridges.rmf.settings import Zenoh
 from bridges.rmf.transport import Transport
 from bridges.rmf.zenoh import ZenohTransport
 

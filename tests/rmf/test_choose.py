@@ -10,9 +10,9 @@ from typing import Literal
 import msgspec
 import pytest
 
+from bridges.kinds.shared.rmf_section import Rmf, Zenoh
 from bridges.messages.definitions import PACKAGES
 from bridges.rmf.choose import domain_id, open_transport, stays_on_loopback
-from bridges.rmf.settings import Rmf, Zenoh
 from bridges.rmf.transport import TransportError
 from bridges.settings.load import Problem, SettingsError, load
 from tests.rmf.conftest import DDS, ROS2

@@ -10,10 +10,10 @@ from typing import Any
 import pytest
 import trustme
 
+from bridges.kinds.shared.rmf_section import Zenoh, ZenohTls
 from bridges.messages import definitions as d
 from bridges.messages.topics import FIRE_ALARM_TRIGGER, LIFT_REQUESTS, LIFT_STATES
 from bridges.rmf import addresses, zenoh_alone, zenoh_config
-from bridges.rmf.settings import Zenoh, ZenohTls
 from bridges.rmf.transport import TransportError
 from bridges.rmf.zenoh import ZenohTransport
 from tests.rmf import peer

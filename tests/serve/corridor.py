@@ -2,10 +2,10 @@
 
 from collections.abc import Callable, Sequence
 
-from bridges.door import KIND
-from bridges.door.memory import DoorLimits
-from bridges.door.settings import DoorSettings
-from bridges.door.signals import DoorOutputs, DoorSample
+from bridges.kinds.door import KIND
+from bridges.kinds.door.memory import DoorLimits
+from bridges.kinds.door.settings import DoorSettings
+from bridges.kinds.door.signals import DoorOutputs, DoorSample
 from bridges.messages import topics
 from bridges.messages.definitions import DoorMode, DoorModeValue, DoorRequest, DoorState, Message
 from bridges.messages.topics import Topic

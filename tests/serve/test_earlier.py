@@ -11,10 +11,10 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from bridges.charger_coordinator import keep as coordinator
-from bridges.door_supervisor import keep as doors
-from bridges.door_supervisor.settings import Settings as DoorSupervisor
 from bridges.host.places import Places
+from bridges.kinds.charger_coordinator import keep as coordinator
+from bridges.kinds.door_supervisor import keep as doors
+from bridges.kinds.door_supervisor.settings import Settings as DoorSupervisor
 from bridges.serve.drop_in import FITS, misfit
 from bridges.serve.record import PATTERN, Records, read
 from bridges.settings.load import load

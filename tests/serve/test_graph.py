@@ -7,8 +7,8 @@ from typing import Any
 import pytest
 from msgspec.structs import replace
 
-from bridges.lift_supervisor import KIND
-from bridges.lift_supervisor.settings import Settings
+from bridges.kinds.lift_supervisor import KIND
+from bridges.kinds.lift_supervisor.settings import Settings
 from bridges.messages.definitions import LiftRequest, LiftState, Time
 from bridges.messages.stamps import stamp
 from bridges.messages.topics import ADAPTER_LIFT_REQUESTS, LIFT_REQUESTS, LIFT_STATES, Topic

@@ -8,8 +8,8 @@ import pytest
 from msgspec import Struct
 from msgspec.structs import replace
 
-from bridges.core.decision import RequestRefused
-from bridges.core.graph_kind import GraphKind
+from bridges.kinds.shared.decision import RequestRefused
+from bridges.kinds.shared.graph_kind import GraphKind
 from bridges.messages import definitions as d
 from bridges.messages import topics
 from bridges.messages.definitions import Message

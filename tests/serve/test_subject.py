@@ -5,7 +5,7 @@ import logging
 import msgspec
 import pytest
 
-from bridges.core.decision import Decision, Fault
+from bridges.kinds.shared.decision import Decision, Fault
 from bridges.messages.definitions import Message
 from bridges.messages.topics import Topic
 from bridges.serve.clock import Clock

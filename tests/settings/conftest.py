@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-import bridges
+import bridges.kinds
 import drivers
 import drivers.hal
 
@@ -16,7 +16,11 @@ SITE = Path(__file__).parent / "site"
 def site() -> Iterator[None]:
     """Their folders, where files are looked for by name."""
     with pytest.MonkeyPatch.context() as patch:
-        for package, folder in ((bridges, "kinds"), (drivers, "drivers"), (drivers.hal, "hal")):
+        for package, folder in (
+            (bridges.kinds, "kinds"),
+            (drivers, "drivers"),
+            (drivers.hal, "hal"),
+        ):
             patch.setattr(package, "__path__", [*package.__path__, str(SITE / folder)])
         yield
 

@@ -30,7 +30,7 @@ from yaml import CollectionNode, MappingNode, Node, ScalarNode, SequenceNode
 
 from bridges.commands.sheets.findings import findings
 from bridges.commands.sheets.text import lines
-from bridges.rmf.settings import Rmf
+from bridges.kinds.shared.rmf_section import Rmf
 from bridges.settings import names as named
 from bridges.settings.examples import device_yamls
 from bridges.settings.load import load

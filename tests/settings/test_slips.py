@@ -16,8 +16,8 @@ from msgspec.inspect import (
     type_info,
 )
 
-from bridges.core.graph_kind import GraphKind
-from bridges.rmf.settings import Rmf
+from bridges.kinds.shared.graph_kind import GraphKind
+from bridges.kinds.shared.rmf_section import Rmf
 from bridges.settings import names as named
 from bridges.settings.slips import number_meant
 from tests.settings.reading import changed, problems_of

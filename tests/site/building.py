@@ -13,10 +13,10 @@ from typing import Any
 
 import msgspec
 
-from bridges.charger import KIND as CHARGER
-from bridges.core.kind import AnyDeviceKind
-from bridges.door import KIND as DOOR
-from bridges.lift import KIND as LIFT
+from bridges.kinds.charger import KIND as CHARGER
+from bridges.kinds.door import KIND as DOOR
+from bridges.kinds.lift import KIND as LIFT
+from bridges.kinds.shared.kind import AnyDeviceKind
 from bridges.settings.load import load
 from drivers import Driver
 from drivers.charger import http as charger_http

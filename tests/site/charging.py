@@ -4,7 +4,13 @@ ChargeBattery drives to the robot's dedicated place and waits there in the mode 
 battery is full (rmf_ros2 9dedd0f, ChargeBattery.cpp). `charging_assignments` says which place that is.
 """
 
-from bridges.charger_coordinator.settings import Fleet, RobotSettings, Settings, Station, Waypoint
+from bridges.kinds.charger_coordinator.settings import (
+    Fleet,
+    RobotSettings,
+    Settings,
+    Station,
+    Waypoint,
+)
 from bridges.messages import definitions as d
 
 FLEET = "fleet"

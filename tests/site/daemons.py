@@ -11,8 +11,8 @@ from collections.abc import Callable, Iterable, Mapping
 from functools import partial
 from typing import Any
 
-from bridges.core.decision import OperatorReset
-from bridges.core.graph_kind import AnyGraphKind
+from bridges.kinds.shared.decision import OperatorReset
+from bridges.kinds.shared.graph_kind import AnyGraphKind
 from bridges.messages.definitions import Message
 from bridges.messages.topics import DOOR_REQUESTS, DOOR_SUPERVISOR_HEARTBEAT, LIFT_REQUESTS, Topic
 from bridges.rmf.transport import Publisher

@@ -6,9 +6,9 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from random import Random
 
-from bridges.charger_coordinator import KIND as COORDINATOR
-from bridges.door_supervisor import KIND as DOOR_SUPERVISOR
-from bridges.lift_supervisor import KIND as LIFT_SUPERVISOR
+from bridges.kinds.charger_coordinator import KIND as COORDINATOR
+from bridges.kinds.door_supervisor import KIND as DOOR_SUPERVISOR
+from bridges.kinds.lift_supervisor import KIND as LIFT_SUPERVISOR
 from bridges.messages.releases import JAZZY, KILTED
 from hal_fakes.plants.charger import ChargerPlant
 from hal_fakes.plants.door import DoorPlant

@@ -12,10 +12,10 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, cast
 
-from bridges.charger.signals import CURRENT_FLOWS
 from bridges.judge.judge import LAWS, Judge, Kind
 from bridges.judge.law import Verdict
-from bridges.lift.signals import Side
+from bridges.kinds.charger.signals import CURRENT_FLOWS
+from bridges.kinds.lift.signals import Side
 from bridges.messages import definitions as d
 from bridges.messages import topics
 from bridges.messages.heard import Heard

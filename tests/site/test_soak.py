@@ -2,7 +2,7 @@
 
 import pytest
 
-from bridges.lift import forgotten
+from bridges.kinds.lift import forgotten
 from tests.depth import depth
 from tests.site.day import Site
 from tests.site.growth import Look, growth
@@ -33,7 +33,7 @@ def test_a_site_lives_through_its_troubles(seed: int) -> None:
 def test_without_our_remedy_a_robot_that_rmfs_supervisor_forgets_stops_a_lift_for_good(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """The day finds the deadlock that `bridges/lift/forgotten.py` ends."""
+    """The day finds the deadlock that `bridges/kinds/lift/forgotten.py` ends."""
     monkeypatch.setattr(forgotten, "heard", lambda session, asked, now: (session, False))
     site = Site(23, "kilted")  # a day on which it comes early
     site.trouble._draw = site._restart_rmfs

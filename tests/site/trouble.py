@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from random import Random
 from typing import Protocol
 
-from bridges.lift.signals import Hazard
+from bridges.kinds.lift.signals import Hazard
 from hal_fakes.plants.charger import CAUSES, ChargerPlant
 from hal_fakes.plants.door import DoorPlant
 from hal_fakes.plants.lift import FAILS, LiftPlant

@@ -14,7 +14,7 @@ from typing import Any, Final
 
 from bridges.commands.doctoring.finding import Finding, note, ok, warning, wrong
 from bridges.commands.live import Ear
-from bridges.core.graph_kind import GraphKind
+from bridges.kinds.shared.graph_kind import GraphKind
 from bridges.messages import words
 from bridges.messages.definitions import PACKAGES
 from bridges.rmf.addresses import addresses

@@ -14,8 +14,8 @@ from typing import ClassVar, Final, NamedTuple, TypeVar
 from msgspec import Struct
 from msgspec.structs import replace
 
-from bridges.charger.refusals import Refusal, read
 from bridges.commands.graph import CommandLine
+from bridges.kinds.charger.refusals import Refusal, read
 from bridges.messages import words
 from bridges.messages.definitions import DiagnosticStatus, SupervisorHeartbeat
 from bridges.messages.heard import Heard

@@ -4,8 +4,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import ClassVar, Final
 
-from bridges.charger.refusals import OCCUPIED
 from bridges.commands.requests import Done, Failed, Obstacle, Request, Seen
+from bridges.kinds.charger.refusals import OCCUPIED
 from bridges.messages import definitions as d
 from bridges.messages import topics, words
 from bridges.messages.stamps import duration

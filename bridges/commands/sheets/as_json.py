@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import msgspec
 
 from bridges.commands.sheets.findings import Findings
-from bridges.core.table import Table
+from bridges.kinds.shared.table import Table
 
 
 def document(files: Sequence[Findings], errors: int, warnings: int) -> str:

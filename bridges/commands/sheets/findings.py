@@ -5,8 +5,8 @@ from collections.abc import Sequence
 
 import msgspec
 
-from bridges.core.graph_kind import GraphKind
-from bridges.core.table import Table
+from bridges.kinds.shared.graph_kind import GraphKind
+from bridges.kinds.shared.table import Table
 from bridges.messages import instead
 from bridges.settings import names as named
 from bridges.settings.load import Config

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from html import escape
 
 from bridges.commands.sheets.findings import MEANINGS, WIRES, BusShown, Findings, Part
-from bridges.core.table import Table
+from bridges.kinds.shared.table import Table
 
 STYLE = """
 body { font: 8pt/1.2 sans-serif; margin: 1.5em; color: #000; background: #fff; }

@@ -3,8 +3,8 @@
 from collections.abc import Iterator, Sequence
 
 from bridges.commands.sheets.findings import MEANINGS, WIRES, BusShown, Findings, Part
-from bridges.core.table import Table
 from bridges.host.columns import aligned
+from bridges.kinds.shared.table import Table
 
 
 def lines(findings: Findings) -> list[str]:

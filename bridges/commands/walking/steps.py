@@ -3,11 +3,11 @@
 from collections.abc import Callable, Collection, Iterator
 from typing import Any, Final
 
-from bridges.charger.signals import CURRENT_FLOWS, ChargerOutputs, ChargerSample
 from bridges.commands.walking.core import Step
-from bridges.door.signals import DoorOutputs, DoorSample
-from bridges.lift.settings import LiftSettings
-from bridges.lift.signals import Door, LiftOutputs, LiftSample, Motion, Side
+from bridges.kinds.charger.signals import CURRENT_FLOWS, ChargerOutputs, ChargerSample
+from bridges.kinds.door.signals import DoorOutputs, DoorSample
+from bridges.kinds.lift.settings import LiftSettings
+from bridges.kinds.lift.signals import Door, LiftOutputs, LiftSample, Motion, Side
 from bridges.settings.load import Config
 
 Wired = Collection[str] | None

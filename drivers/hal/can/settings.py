@@ -5,7 +5,7 @@ from typing import Annotated, Final
 
 import msgspec
 
-from bridges.core.fields import Name, Period
+from bridges.kinds.shared.fields import Name, Period
 from drivers.hal import Needs, Where, serial_port
 
 BITRATES: Final = (

@@ -18,7 +18,7 @@ from typing import Annotated
 
 import msgspec
 
-from bridges.core.fields import Period
+from bridges.kinds.shared.fields import Period
 from drivers.hal import BusType, HalError, Needs, Where
 from drivers.hal.gpio.bus import Factory, GpioBus
 from drivers.hal.gpio.header import (

@@ -6,7 +6,7 @@ from typing import Annotated, Final, Literal
 
 import msgspec
 
-from bridges.core.fields import Name
+from bridges.kinds.shared.fields import Name
 from drivers.hal.hosts import misspelt_address
 
 BAUDRATES: Final = (

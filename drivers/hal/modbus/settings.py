@@ -5,7 +5,7 @@ from typing import Annotated
 
 import msgspec
 
-from bridges.core.fields import Name, Period
+from bridges.kinds.shared.fields import Name, Period
 from drivers.hal import Needs, UnwatchedOutputs, Where, serial_port
 from drivers.hal.modbus.places import Serial, Tcp
 from drivers.hal.modbus.registers import Unit

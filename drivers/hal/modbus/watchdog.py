@@ -9,7 +9,7 @@ from typing import Annotated, Final
 
 import msgspec
 
-from bridges.core.fields import Name, Period
+from bridges.kinds.shared.fields import Name, Period
 from drivers.hal.modbus.registers import TABLES, WRITABLE, Place, Unit, Word, misplaced
 from drivers.profiles import Profile, profile_problems
 

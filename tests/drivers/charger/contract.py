@@ -11,7 +11,7 @@ from typing import Any, ClassVar, Literal
 import msgspec
 import pytest
 
-from bridges.charger.signals import CURRENT_FLOWS, Activity, ChargerOutputs, ChargerSample
+from bridges.kinds.charger.signals import CURRENT_FLOWS, Activity, ChargerOutputs, ChargerSample
 from drivers import Driver
 from drivers.hal import Bus
 from hal_fakes.fake import Fake

@@ -9,16 +9,16 @@ import can
 import msgspec
 import pytest
 
-from bridges.charger import core
-from bridges.charger.memory import ChargerLimits
-from bridges.charger.signals import (
+from bridges.kinds.charger import core
+from bridges.kinds.charger.memory import ChargerLimits
+from bridges.kinds.charger.signals import (
     Activity,
     ChargerOutputs,
     ChargerSample,
     Measured,
     Requested,
 )
-from bridges.core.decision import Sampled
+from bridges.kinds.shared.decision import Sampled
 from bridges.settings.load import SettingsError, load
 from drivers import DriverError
 from drivers.charger import dbc

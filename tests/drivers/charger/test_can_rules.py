@@ -8,7 +8,7 @@ import can
 import msgspec
 import pytest
 
-from bridges.charger.signals import Activity
+from bridges.kinds.charger.signals import Activity
 from drivers.charger.can_frames import FrameDriver, Settings, create, describe, frame_tables
 from drivers.charger.can_map import FrameMap
 from drivers.hal import can as hal

@@ -7,7 +7,7 @@ import can
 import msgspec
 import pytest
 
-from bridges.charger.signals import Activity, ChargerOutputs
+from bridges.kinds.charger.signals import Activity, ChargerOutputs
 from drivers.charger import can_frames
 from drivers.charger.can_frames import Settings, claims, create, frame_tables
 from drivers.charger.can_map import FrameMap

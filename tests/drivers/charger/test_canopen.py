@@ -6,7 +6,7 @@ from pathlib import Path
 import can
 import pytest
 
-from bridges.charger.signals import Activity, ChargerOutputs, ChargerSample, Measured
+from bridges.kinds.charger.signals import Activity, ChargerOutputs, ChargerSample, Measured
 from bridges.settings.load import SettingsError, load
 from drivers.charger import xnergy
 from drivers.charger.canopen import (

@@ -5,7 +5,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, ClassVar
 
-from bridges.charger.signals import Activity, ChargerOutputs
+from bridges.kinds.charger.signals import Activity, ChargerOutputs
 from bridges.settings.load import load
 from drivers.charger import dry_contact as charger_contacts
 from drivers.charger import http as charger_http

@@ -8,7 +8,7 @@ import can
 import msgspec
 import pytest
 
-from bridges.charger.signals import CURRENT_FLOWS, Activity, ChargerOutputs, ChargerSample
+from bridges.kinds.charger.signals import CURRENT_FLOWS, Activity, ChargerOutputs, ChargerSample
 from drivers import DriverError
 from drivers.charger import can_frames as charger_can_frames
 from drivers.charger import canopen as charger_canopen

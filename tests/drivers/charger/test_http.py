@@ -9,10 +9,10 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from bridges.charger import core
-from bridges.charger.memory import ChargerLimits, Memory
-from bridges.charger.signals import Activity, ChargerOutputs, ChargerSample
-from bridges.core.decision import Sampled
+from bridges.kinds.charger import core
+from bridges.kinds.charger.memory import ChargerLimits, Memory
+from bridges.kinds.charger.signals import Activity, ChargerOutputs, ChargerSample
+from bridges.kinds.shared.decision import Sampled
 from bridges.messages.definitions import ChargerStateValue as State
 from bridges.settings.load import load
 from drivers import DriverError
@@ -342,7 +342,7 @@ def test_check_prints_addresses_and_meanings() -> None:
 
 
 def test_check_says_how_often_errors_are_cleared_and_which_meaning_has_no_code() -> None:
-    from bridges.charger.settings import Durations
+    from bridges.kinds.charger.settings import Durations
 
     made = Settings(codes=Codes(idle=[0], charging=[5]), limits=Durations(clear_errors_per_h=2))
     rows = dict(describe(made, bus_file.Settings(api_base="tpu")))

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bridges.charger.settings import robot
-from bridges.charger.signals import Activity, ChargerOutputs, ChargerSample, Measured
+from bridges.kinds.charger.settings import robot
+from bridges.kinds.charger.signals import Activity, ChargerOutputs, ChargerSample, Measured
 from bridges.settings.load import load
 from drivers import DriverError, json_fields
 from drivers.charger.http import Settings, create, describe, warnings

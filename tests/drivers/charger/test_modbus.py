@@ -5,7 +5,7 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from bridges.charger.signals import ChargerOutputs
+from bridges.kinds.charger.signals import ChargerOutputs
 from bridges.settings.load import load
 from drivers.charger.modbus import Settings, claims, create, describe, warnings
 from drivers.hal import HalError

@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 import msgspec
 import pytest
 
-from bridges.charger.signals import Activity
+from bridges.kinds.charger.signals import Activity
 from bridges.settings.load import SettingsError, load
 from drivers.charger.dry_contact import decode
 from drivers.charger.http_fields import Number as HttpNumber

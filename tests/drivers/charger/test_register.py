@@ -6,7 +6,7 @@ from typing import Any
 import msgspec
 import pytest
 
-from bridges.charger.signals import Activity, ChargerSample, Measured
+from bridges.kinds.charger.signals import Activity, ChargerSample, Measured
 from bridges.settings.load import load
 from drivers.charger.register import Settings, decode, tables
 from drivers.charger.register_map import ChargerMap, Number

@@ -6,7 +6,7 @@ from typing import Any
 import msgspec
 import pytest
 
-from bridges.charger.signals import Activity, ChargerOutputs, ChargerSample
+from bridges.kinds.charger.signals import Activity, ChargerOutputs, ChargerSample
 from bridges.settings.load import load
 from drivers import DriverError
 from drivers.charger.http import Settings, create

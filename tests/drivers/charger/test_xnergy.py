@@ -4,10 +4,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bridges.charger import core
-from bridges.charger.memory import ChargerLimits, Memory
-from bridges.charger.signals import Activity, ChargerOutputs, ChargerSample, Measured
-from bridges.core.decision import Sampled
+from bridges.kinds.charger import core
+from bridges.kinds.charger.memory import ChargerLimits, Memory
+from bridges.kinds.charger.signals import Activity, ChargerOutputs, ChargerSample, Measured
+from bridges.kinds.shared.decision import Sampled
 from bridges.messages.definitions import ChargerStateValue as State
 from drivers.charger import xnergy
 from drivers.charger.xnergy import Orders, Written, settled, steer

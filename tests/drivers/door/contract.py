@@ -9,7 +9,7 @@ from typing import TypedDict
 
 import pytest
 
-from bridges.door.signals import DoorOutputs, DoorSample
+from bridges.kinds.door.signals import DoorOutputs, DoorSample
 from drivers import DriverError
 from drivers.hal.points import Wire
 from hal_fakes.plants.door import DoorPlant

@@ -6,16 +6,16 @@ from typing import Any
 
 import pytest
 
-from bridges.door.memory import DoorLimits
-from bridges.door.settings import Durations, Pulse
-from bridges.door.signals import DoorOutputs, DoorSample
+from bridges.kinds.door.memory import DoorLimits
+from bridges.kinds.door.settings import Durations, Pulse
+from bridges.kinds.door.signals import DoorOutputs, DoorSample
 from bridges.settings.load import load
 from drivers.door.dry_contact import create, debounce, warnings, wires
 from drivers.hal.points import Flash, HalError, Wire
 from hal_fakes.plants.door import build
-from tests.door.virtual import FIRE, OBSTRUCTION, Door, settings
 from tests.drivers.far import PointsFar
 from tests.drivers.hal.modbus.module import Time
+from tests.kinds.door.virtual import FIRE, OBSTRUCTION, Door, settings
 
 CONFIG = Path(__file__).parents[3] / "config"
 NONE: dict[str, Any] = {}

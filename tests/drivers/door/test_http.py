@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 import msgspec
 import pytest
 
-from bridges.door.signals import DoorOutputs, DoorSample
+from bridges.kinds.door.signals import DoorOutputs, DoorSample
 from bridges.settings.load import load
 from drivers import DriverError
 from drivers.door import http as door_http

@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import settings as tries
 from hypothesis import strategies as st
 
-from bridges.core.decision import Sampled
-from bridges.door.signals import DoorSample
+from bridges.kinds.door.signals import DoorSample
+from bridges.kinds.shared.decision import Sampled
 from bridges.messages.definitions import DoorModeValue
 from bridges.settings.load import SettingsError, load
 from drivers.door.register import PROFILE, Settings, decode, door_map, points, tables
@@ -18,7 +18,7 @@ from drivers.door.register_map import DoorMap
 from drivers.hal.modbus.points import Point
 from drivers.profiles.texts import FOLDER
 from tests.depth import examples
-from tests.door.virtual import CLOSED, CoreAlone
+from tests.kinds.door.virtual import CLOSED, CoreAlone
 from tests.settings.reading import changed, problems_of
 
 CONFIG = Path(__file__).parents[3] / "config"

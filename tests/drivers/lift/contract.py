@@ -10,7 +10,7 @@ from collections.abc import Callable
 
 import pytest
 
-from bridges.lift.signals import Door, Hazard, LiftOutputs, LiftSample, Motion, Side
+from bridges.kinds.lift.signals import Door, Hazard, LiftOutputs, LiftSample, Motion, Side
 from drivers import DriverError
 from hal_fakes.plants.lift import Pace
 from hal_fakes.plants.plant import FailureMode

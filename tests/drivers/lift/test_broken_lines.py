@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridges.lift.signals import Hazard
+from bridges.kinds.lift.signals import Hazard
 from drivers.lift.broken_lines import floor_warnings
 from drivers.lift.dry_contact import Settings, debounce, wires
 from tests.drivers.lift.test_checks import found, warned

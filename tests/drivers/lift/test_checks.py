@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from bridges.lift.signals import Hazard
+from bridges.kinds.lift.signals import Hazard
 from bridges.settings.load import load
 from drivers.lift.dry_contact import Settings, notes, warnings
 from tests.drivers.lift.wirings import alarm, bits, coil, inputs, line, settings, whole

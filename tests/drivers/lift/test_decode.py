@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from bridges.lift.signals import Door, Hazard, LiftOutputs, LiftSample, Motion, Side
+from bridges.kinds.lift.signals import Door, Hazard, LiftOutputs, LiftSample, Motion, Side
 from drivers.lift.dry_contact import Settings, debounce, decode, encode, wires
 from drivers.lift.table import conditional
 from tests.drivers.lift.wirings import bits, coil, inputs, line, settings, whole

@@ -6,7 +6,7 @@ from typing import Any
 import msgspec
 import pytest
 
-from bridges.lift.signals import Door, Hazard, LiftOutputs, LiftSample, Motion, Side
+from bridges.kinds.lift.signals import Door, Hazard, LiftOutputs, LiftSample, Motion, Side
 from bridges.settings.load import load
 from drivers.lift.register import Settings, decode, encode, tables, warnings
 from tests.settings.reading import problems_of

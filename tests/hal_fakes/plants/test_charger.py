@@ -2,7 +2,7 @@
 
 import pytest
 
-from bridges.charger.signals import Activity
+from bridges.kinds.charger.signals import Activity
 from hal_fakes.plants.charger import ChargerPlant, Reading
 from hal_fakes.plants.plant import Edge, FailureMode, Plant
 

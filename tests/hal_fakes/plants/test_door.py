@@ -5,7 +5,7 @@ import pytest
 from drivers.door.dry_contact import wires
 from drivers.hal.points import Wire
 from hal_fakes.plants.door import DoorPlant, build
-from tests.door.virtual import settings
+from tests.kinds.door.virtual import settings
 
 WIRES = [
     Wire("opened", "in", "unit 1 discrete input 0", "high"),

@@ -12,7 +12,7 @@ from playwright.sync_api import Page
 from websockets import Origin
 from websockets.sync.client import connect
 
-from bridges.rmf.settings import Zenoh
+from bridges.kinds.shared.rmf_section import Zenoh
 from bridges.rmf.zenoh import ZenohTransport
 from tests.page.browser.conftest import Graph, Until, page
 from tests.page.browser.test_page import card

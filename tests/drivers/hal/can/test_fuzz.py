@@ -7,7 +7,7 @@ import msgspec
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from bridges.charger.signals import Activity, ChargerOutputs, ChargerSample
+from bridges.kinds.charger.signals import Activity, ChargerOutputs, ChargerSample
 from drivers import DriverError
 from drivers.charger import can_frames as charger_can_frames
 from drivers.charger import canopen as charger_canopen

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from bridges.charger.signals import Activity, ChargerOutputs
+from bridges.kinds.charger.signals import Activity, ChargerOutputs
 from bridges.settings.load import load
 from drivers import DriverError
 from drivers.charger import can_frames as charger_can_frames

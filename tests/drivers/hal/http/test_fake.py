@@ -10,7 +10,7 @@ from typing import Any
 import msgspec
 import pytest
 
-from bridges.charger.signals import Activity, ChargerOutputs, ChargerSample
+from bridges.kinds.charger.signals import Activity, ChargerOutputs, ChargerSample
 from bridges.settings.load import Config, load
 from drivers import DriverError
 from drivers.charger.http import HttpCharger, create

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from bridges.charger.signals import Activity
+from bridges.kinds.charger.signals import Activity
 from bridges.settings.load import load
 from drivers.charger.http import create
 from drivers.hal.http import HttpBus

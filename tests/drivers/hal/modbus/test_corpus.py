@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import pytest
 
-from bridges.door.signals import DoorSample
+from bridges.kinds.door.signals import DoorSample
 from drivers import DriverError
 from drivers.door.dry_contact import create
 from tests.drivers.hal.modbus.line import SerialModule

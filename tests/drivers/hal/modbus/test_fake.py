@@ -6,7 +6,7 @@ from collections.abc import Iterator
 import msgspec
 import pytest
 
-from bridges.door.signals import DoorOutputs, DoorSample
+from bridges.kinds.door.signals import DoorOutputs, DoorSample
 from drivers import DriverError
 from drivers.door.dry_contact import DryContactDoor, Settings, create, wires
 from drivers.hal import modbus

@@ -10,10 +10,10 @@ import pytest
 
 from bridges.commands.sheets.findings import findings
 from bridges.commands.sheets.text import lines
-from bridges.core.decision import Sampled, WriteFailed
-from bridges.door.core import decide, initial
-from bridges.door.memory import DoorLimits
-from bridges.door.signals import CloseRequested, DoorOutputs, Event, OpenRequested
+from bridges.kinds.door.core import decide, initial
+from bridges.kinds.door.memory import DoorLimits
+from bridges.kinds.door.signals import CloseRequested, DoorOutputs, Event, OpenRequested
+from bridges.kinds.shared.decision import Sampled, WriteFailed
 from bridges.settings.load import load
 from drivers import DriverError
 from drivers.door.dry_contact import DryContactDoor, Settings, create, debounce, wires

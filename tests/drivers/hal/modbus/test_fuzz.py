@@ -9,7 +9,7 @@ import pytest
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
-from bridges.door.signals import DoorOutputs
+from bridges.kinds.door.signals import DoorOutputs
 from drivers import DriverError
 from drivers.door.dry_contact import DryContactDoor, Settings, create
 from drivers.hal.modbus import ModbusBus

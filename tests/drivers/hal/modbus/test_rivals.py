@@ -7,10 +7,10 @@ from collections.abc import Iterator
 import msgspec
 import pytest
 
-from bridges.core.decision import IoFailed, Sampled, WriteFailed
-from bridges.door import core
-from bridges.door.memory import DoorLimits, Memory
-from bridges.door.signals import DoorOutputs, OpenRequested
+from bridges.kinds.door import core
+from bridges.kinds.door.memory import DoorLimits, Memory
+from bridges.kinds.door.signals import DoorOutputs, OpenRequested
+from bridges.kinds.shared.decision import IoFailed, Sampled, WriteFailed
 from drivers import DriverError
 from drivers.door.dry_contact import Settings, create
 from tests.drivers.hal.modbus.module import Module, Time, bus_to

@@ -220,7 +220,7 @@ doors:
 """
 DAEMON = """
 import sys, threading
-from bridges.door.signals import DoorOutputs
+from bridges.kinds.door.signals import DoorOutputs
 from bridges.settings.load import load
 from drivers.door import dry_contact
 from drivers.hal import modbus

@@ -1,7 +1,7 @@
 """A door with a latch that is released, and one contact that sees it shut: one file is all of it."""
 
-from bridges.door.settings import DoorSettings
-from bridges.door.signals import DoorOutputs, DoorSample
+from bridges.kinds.door.settings import DoorSettings
+from bridges.kinds.door.signals import DoorOutputs, DoorSample
 from drivers.driver_type import DriverType
 from drivers.hal.points import Input, Output, Points, PointsBus, Wire
 

@@ -2,9 +2,9 @@
 
 from typing import Protocol
 
-from bridges.core.fields import Name
-from bridges.door.settings import DoorSettings
-from bridges.door.signals import DoorOutputs, DoorSample
+from bridges.kinds.door.settings import DoorSettings
+from bridges.kinds.door.signals import DoorOutputs, DoorSample
+from bridges.kinds.shared.fields import Name
 from drivers.driver_type import DriverType
 
 

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import msgspec
 
-from bridges.core.fields import Name, Period
+from bridges.kinds.shared.fields import Name, Period
 from drivers.hal import Bus, BusType, HalError
 
 

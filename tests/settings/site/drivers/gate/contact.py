@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 import msgspec
 from msgspec import Meta
 
-from bridges.core.fields import DeviceSettings, Name, Seconds
+from bridges.kinds.shared.fields import DeviceSettings, Name, Seconds
 from drivers import Driver
 from drivers.driver_type import DriverType
 from drivers.hal.points import Input, Output, Wire

@@ -1,6 +1,6 @@
 """A driver without wires."""
 
-from bridges.core.fields import DeviceSettings, Name
+from bridges.kinds.shared.fields import DeviceSettings, Name
 from drivers import Driver
 from drivers.driver_type import DriverType
 from tests.settings.site.hal import web

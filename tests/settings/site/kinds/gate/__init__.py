@@ -2,7 +2,7 @@
 
 from typing import Any, cast
 
-from bridges.core.kind import AnyDeviceKind, Kind
+from bridges.kinds.shared.kind import AnyDeviceKind, Kind
 
 
 def _unused(*_: Any) -> Any:

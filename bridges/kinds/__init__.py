@@ -1,0 +1,1 @@
+"""What a bridge can be, a folder for each kind: pure rules about lifts, doors and chargers."""

@@ -1,0 +1,279 @@
+"""The charger's decision core: who has the station, whether it may energise, and what RMF is told.
+
+1. The states are IDLE → ASSIGNED → CHARGING → RELEASED → IDLE, and ERROR from any of them. A request
+   leads to ASSIGNED only; every other state comes from the station's readings. CHARGING lasts as long
+   as current flows, also while it ramps down. In RELEASED the station is disconnected from its robot,
+   and the pad is not clear yet.
+2. A request is granted while the state is IDLE. Its repeats change nothing, and do not start it again
+   once it is over. Other requests are refused until the station is IDLE. There is one exception: the
+   robot on the pad, if the station can tell which robot that is (`pad.py`).
+3. `start_timeout` counts from the grant. A request that has not charged by then ends, through RELEASED
+   to IDLE. The reason is shown as a fault, as RMF's error message is blank unless the state is ERROR.
+4. A cancel ends the request that it names and no other. If current flows, the power is switched off,
+   and the state stays CHARGING until the station has stopped. A full battery ends a request likewise.
+5. The station is energised only for the robot that it is assigned to, once that robot is seen on the
+   pad and in range, and while a pad that moves is at its height. Another robot gets no power: the state
+   is ERROR with its name, and the request goes on waiting.
+6. At a fault the power is switched off before the fault is reported. It comes back only with a new
+   request. A station that is at fault, or that goes on charging when told to stop, is out of service
+   (PROTECTION): the state is ERROR until its errors have been cleared and a good reading follows. A
+   fault of the robot does not take the station out of service.
+7. Failed polls say nothing about the charge. After `misses` of them the state is ERROR, and robot and
+   request stay. Only a good reading ends a request or frees a station. An operator can do so too, once
+   the station must have switched off by itself (`peer_internal_timeout_s`).
+8. If a charge is under way when the daemon starts, or when it reaches the station again, it is shown
+   and not stopped. The next request gets that charge only if its robot is seen on the pad.
+9. Errors are cleared when an operator says so, or at most `clear_errors_per_h` times an hour.
+"""
+
+from msgspec.structs import replace
+
+from bridges.kinds.charger import pad, report, session
+from bridges.kinds.charger.memory import ChargerLimits, Memory, Session, rivalled, unreachable
+from bridges.kinds.charger.refusals import OCCUPIED
+from bridges.kinds.charger.report import ChargerReport
+from bridges.kinds.charger.signals import (
+    AT_FAULT,
+    CURRENT_FLOWS,
+    Activity,
+    Cancelled,
+    ChargerOutputs,
+    ChargerSample,
+    Event,
+    Requested,
+)
+from bridges.kinds.shared.decision import (
+    Decision,
+    IoFailed,
+    OperatorReset,
+    RivalSeen,
+    Sampled,
+    WriteFailed,
+)
+from bridges.kinds.shared.durations import AGES_AGO, NEVER, RIVAL_QUIET_S
+
+REMEMBERED = 8
+"""How many ended requests are remembered, so that their late repeats are refused."""
+CLEARED_WITHIN_S = 30.0
+"""How long after a clearing a good reading still proves that it has helped."""
+
+
+def initial(limits: ChargerLimits, now: float) -> Memory:
+    """Nothing has been read, and no request holds the station."""
+    return Memory()
+
+
+def decide(
+    memory: Memory, event: Event, now: float, limits: ChargerLimits
+) -> Decision[Memory, ChargerOutputs, ChargerReport]:
+    """One scan: take the event in, then derive outputs and report afresh."""
+    memory, refused = _take(memory, event, now, limits)
+    memory = replace(memory, power=_power(memory, now, limits))
+    outputs = ChargerOutputs(memory.power, memory.clear_errors, memory.range_checks)
+    wake_at = memory.rival_at + RIVAL_QUIET_S if rivalled(memory, now) else NEVER
+    return Decision(memory, outputs, report.report(memory, now, limits), wake_at, refused)
+
+
+def _take(memory: Memory, event: Event, now: float, limits: ChargerLimits) -> tuple[Memory, str]:
+    match event:
+        case Sampled(sample):
+            return _sampled(memory, sample, now, limits), ""
+        case WriteFailed(reason):
+            misses = memory.write_misses + 1
+            return replace(memory, write_misses=misses, write_failed=True, write_fault=reason), ""
+        case IoFailed(reason):
+            return replace(memory, misses=memory.misses + 1, io_fault=reason), ""
+        case RivalSeen():
+            return replace(memory, rival_at=now), ""
+        case OperatorReset():
+            return _reset(memory, now, limits)
+        case Requested():
+            return _request(memory, event, now, limits)
+        case _:
+            return _cancel(memory, event, now)
+
+
+# ---- a good reading
+
+
+def _sampled(memory: Memory, sample: ChargerSample, now: float, limits: ChargerLimits) -> Memory:
+    came = unreachable(memory, limits)
+    sample = pad.judged(sample)
+    memory = replace(
+        memory,
+        sample=sample,
+        read_at=now,
+        misses=0,
+        io_fault="",
+        write_misses=memory.write_misses if memory.write_failed else 0,
+        write_failed=False,
+    )
+    if memory.holder:
+        memory = _held(memory, session.follow(memory.holder, sample, now, limits))
+    flows = memory.holder is None and sample.activity in CURRENT_FLOWS
+    memory = replace(memory, adopted=flows and (came or memory.adopted))
+    memory = _protected(_watched(memory, now), now, limits)
+    memory = session.range_checked(_served(memory, now, limits), now, limits)
+    if sample.activity is Activity.ERROR and _may_clear(memory, now, limits):
+        memory = _clear(memory, now)
+    return memory
+
+
+def _held(memory: Memory, holder: Session | None) -> Memory:
+    """The memory with this session. If it is None, the ended request is remembered in `over`."""
+    if holder or not memory.holder:
+        return replace(memory, holder=holder)
+    ended = memory.holder.request.request_id
+    over = (*memory.over, ended)[-REMEMBERED:] if ended else memory.over
+    return replace(memory, holder=None, over=over)
+
+
+def _watched(memory: Memory, now: float) -> Memory:
+    """Note since when the station charges although it was told not to."""
+    sample = memory.sample
+    charges = sample and (sample.activity is Activity.CHARGING or sample.charges)
+    if memory.power is not False or not charges:
+        return replace(memory, disobeyed_since=None)
+    since = memory.disobeyed_since
+    return replace(memory, disobeyed_since=now if since is None else since)
+
+
+def _protected(memory: Memory, now: float, limits: ChargerLimits) -> Memory:
+    """The memory in or out of service: a station's fault starts it, a good reading after a clearing
+    ends it."""
+    sample, since = memory.sample, memory.disobeyed_since
+    assert sample
+    if not limits.can_stop:
+        return memory
+    if since is not None and now - since >= limits.t.stop_timeout_s:
+        what = "station: it goes on charging though it was told to stop; cut its supply"
+        return replace(memory, protection=what)
+    if sample.activity is Activity.ERROR and sample.side != "robot":
+        return replace(memory, protection=report.error_text(sample))
+    if now <= memory.clear_by and sample.activity not in AT_FAULT | CURRENT_FLOWS:
+        return replace(memory, protection="", clear_by=AGES_AGO)
+    return memory
+
+
+def _served(memory: Memory, now: float, limits: ChargerLimits) -> Memory:
+    """With `unrequested: serve_known`, serve a known robot on a free pad as if it had a request."""
+    who = pad.seen(memory.sample, limits).robot
+    if limits.unrequested != "serve_known" or who is None or memory.holder:
+        return memory
+    wrong = [f for f in report.errors(memory, now, limits) if f.code != pad.WRONG_DOCKING]
+    if wrong:
+        return memory
+    request = Requested("", who.fleet, who.name)
+    flows = memory.sample is not None and memory.sample.activity in CURRENT_FLOWS
+    holder = replace(session.granted(request, now, limits), started=flows)
+    return replace(memory, holder=holder, adopted=False)
+
+
+# ---- requests and the operator
+
+
+def _request(
+    memory: Memory, request: Requested, now: float, limits: ChargerLimits
+) -> tuple[Memory, str]:
+    holder = memory.holder
+    if holder and holder.request.request_id == request.request_id:
+        return memory, "" if holder.request.who == request.who else "request_id of another robot"
+    if request.request_id in memory.over:
+        return memory, "request is over"
+    if limits.receivers and request.who not in limits.receivers.values():
+        return memory, "robot has no receiver here"
+    on_pad = pad.seen(memory.sample, limits).robot == request.who
+    if _in_the_way(memory, on_pad, now, limits):
+        return memory, "charger in error"
+    if holder is None:
+        return _granted(memory, request, on_pad, now, limits)
+    if on_pad and not holder.request.request_id and not holder.over:
+        return replace(memory, holder=session.taken_over(holder, request, now, limits)), ""
+    if on_pad and session.shown_released(holder, now, limits):
+        again = session.granted(request, now, limits)
+        return replace(_held(memory, None), holder=again), ""
+    return memory, OCCUPIED
+
+
+def _granted(
+    memory: Memory, request: Requested, on_pad: bool, now: float, limits: ChargerLimits
+) -> tuple[Memory, str]:
+    holder = session.granted(request, now, limits)
+    if memory.adopted and on_pad:
+        return replace(memory, holder=replace(holder, started=True), adopted=False), ""
+    if report.state(memory) is not report.IDLE:
+        return memory, OCCUPIED
+    return replace(memory, holder=holder), ""
+
+
+def _in_the_way(memory: Memory, on_pad: bool, now: float, limits: ChargerLimits) -> bool:
+    """Is there an error that granting this request would not clear?"""
+    found = report.errors(memory, now, limits)
+    return any(not (on_pad and fault.code == pad.WRONG_DOCKING) for fault in found)
+
+
+def _cancel(memory: Memory, cancelled: Cancelled, now: float) -> tuple[Memory, str]:
+    holder = memory.holder
+    if holder is None or holder.request.request_id != cancelled.request_id:
+        known = cancelled.request_id in memory.over
+        return memory, "" if known else "request not assigned here"
+    at = holder.released_at
+    if at is None and not holder.started:
+        at = now
+    ended = holder.ended or "cancelled"
+    return replace(memory, holder=replace(holder, ended=ended, released_at=at)), ""
+
+
+def _reset(memory: Memory, now: float, limits: ChargerLimits) -> tuple[Memory, str]:
+    if rivalled(memory, now):
+        return memory, "two nodes for one device"
+    if memory.sample is None or unreachable(memory, limits):
+        return _freed(memory, now, limits)
+    if memory.sample.activity is not Activity.ERROR and not memory.protection:
+        return memory, "the charger reports no error to clear"
+    return _clear(memory, now), ""
+
+
+def _freed(memory: Memory, now: float, limits: ChargerLimits) -> tuple[Memory, str]:
+    """An operator frees a silent station, once it must have switched off by itself."""
+    after_s = limits.t.peer_internal_timeout_s
+    silent_s = NEVER if memory.read_at is None else now - memory.read_at
+    if memory.holder is None or after_s is None or silent_s < after_s:
+        return memory, "the charger does not answer"
+    return _held(memory, None), ""
+
+
+def _may_clear(memory: Memory, now: float, limits: ChargerLimits) -> bool:
+    per_hour = limits.t.clear_errors_per_h
+    if per_hour == 0 or rivalled(memory, now):
+        return False
+    return now - memory.cleared_at >= 3600 / per_hour
+
+
+def _clear(memory: Memory, now: float) -> Memory:
+    return replace(
+        memory,
+        clear_errors=memory.clear_errors + 1,
+        cleared_at=now,
+        clear_by=now + CLEARED_WITHIN_S,
+    )
+
+
+# ---- power
+
+
+def _power(memory: Memory, now: float, limits: ChargerLimits) -> bool | None:
+    """May the station energise? None: leave it as it is."""
+    holder = memory.holder
+    if rivalled(memory, now) or memory.protection or (holder and holder.over):
+        return False
+    if unreachable(memory, limits):
+        return None
+    assert memory.sample
+    if memory.sample.activity in AT_FAULT or pad.misplaced(memory, limits):
+        return False
+    if holder is None:
+        return None if pad.left_alone(memory, limits) else False
+    if pad.not_ready(memory.sample):
+        return False
+    return holder.started or session.cleared_to_start(memory, limits)

@@ -1,0 +1,124 @@
+"""ChargerRequest and ChargerCancel in, ChargerState out. Is a message well formed?"""
+
+from collections.abc import Mapping
+
+from bridges.kinds.charger.report import UNREQUESTED, ChargerReport
+from bridges.kinds.charger.settings import ChargerSettings
+from bridges.kinds.charger.signals import Cancelled, Requested
+from bridges.kinds.shared.decision import RequestRefused
+from bridges.kinds.shared.names import check_length
+from bridges.messages.definitions import (
+    ChargerCancel,
+    ChargerRequest,
+    ChargerState,
+    ChargerStateValue,
+    Duration,
+    Time,
+)
+from bridges.messages.stamps import duration, in_seconds
+
+LONGEST_TIMEOUT_S = 86400.0
+"""A day. A longer timeout must be a mistaken unit."""
+
+
+def accept_request(request: ChargerRequest, settings: ChargerSettings) -> Requested:
+    """The ChargerRequest as an event. Raises RequestRefused if it is malformed.
+
+    A start_timeout of zero means the configured default.
+    """
+    _check("request_id", request.request_id)
+    _check("fleet_name", request.fleet_name)
+    _check("robot_name", request.robot_name)
+    if request.request_id.startswith(UNREQUESTED):
+        raise RequestRefused("reserved request_id", f"{UNREQUESTED}… is what we publish ourselves")
+    return Requested(
+        request.request_id,
+        request.fleet_name,
+        request.robot_name,
+        _start_timeout_s(request.start_timeout),
+    )
+
+
+def accept_cancel(cancel: ChargerCancel, settings: ChargerSettings) -> Cancelled:
+    """The ChargerCancel as an event. Raises RequestRefused if it is malformed.
+
+    A charge without a request is cancelled by the request id under which its state is published.
+    """
+    _check("request_id", cancel.request_id)
+    if cancel.request_id == UNREQUESTED + cancel.charger_name:
+        return Cancelled("")
+    return Cancelled(cancel.request_id)
+
+
+def _check(field: str, text: str) -> None:
+    if not text:
+        raise RequestRefused(f"empty {field}", "ChargerState must show it")
+    check_length(**{field: text})
+    if not text.isprintable():
+        raise RequestRefused(f"impossible {field}", f"{text[:40]!r}, {len(text)} characters")
+
+
+def _start_timeout_s(timeout: Duration) -> float:
+    seconds = in_seconds(timeout)
+    if seconds < 0:
+        raise RequestRefused("negative start_timeout", f"{seconds:g} s")
+    if seconds > LONGEST_TIMEOUT_S:
+        raise RequestRefused("absurd start_timeout", f"{seconds:g} s is more than a day")
+    return seconds
+
+
+def device_name(message: ChargerRequest | ChargerCancel | ChargerState) -> str:
+    """Which charger a message is about."""
+    return message.charger_name
+
+
+def state_message(
+    name: str, settings: ChargerSettings, report: ChargerReport, stamp: Time
+) -> ChargerState:
+    """The report as RMF reads it; `stamp` is when the station was read."""
+    request_id = report.request_id
+    if not request_id and report.state is not ChargerStateValue.CHARGER_IDLE:
+        request_id = UNREQUESTED + name
+    return ChargerState(
+        charger_time=stamp,
+        state=int(report.state),
+        charger_name=name,
+        error_message=report.error_message,
+        request_id=request_id,
+        robot_fleet=report.fleet,
+        robot_name=report.robot,
+        time_to_fully_charged=duration(report.measured.time_to_full_s or 0.0),
+    )
+
+
+def summary(report: ChargerReport) -> Mapping[str, str]:
+    """The report in one line, for a person. A robot is marked unverified unless the station has seen
+    its receiver.
+    """
+    measured = report.measured
+    seen = "" if report.verified else " (unverified)"
+    texts = {
+        "state": report.state.name.removeprefix("CHARGER_"),
+        "request": report.request_id or "-",
+        "robot": f"{report.fleet}/{report.robot}{seen}" if report.robot else "-",
+        "error": report.error_message or "-",
+        **({"waits": report.waits} if report.waits else {}),
+    }
+    optional = {
+        "receiver": measured.receiver_id,
+        "in_range": measured.in_range,
+        "range_ok": measured.range_ok,
+        "at_height": measured.at_height,
+        "volts": measured.volts,
+        "amps": measured.amps,
+        "battery_percent": measured.battery_percent,
+        "time_to_full_s": measured.time_to_full_s,
+        **{f"{name}_celsius": celsius for name, celsius in measured.temperatures},
+    }
+    return texts | {key: _short(value) for key, value in optional.items() if value is not None}
+
+
+def _short(value: str | float) -> str:
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return value if isinstance(value, str) else str(round(value, 2))

@@ -1,0 +1,158 @@
+"""Who stands on the pad, and may the pad be energised?
+
+Does the receiver that the station sees belong to the request's robot? Without `receivers` in the YAML
+no robot is verified: any robot counts as the one of the request. With `receivers`, a station that does
+not say which receiver it sees charges nobody.
+
+A station that moves its pad, or that says whether a robot is in range, gives no power unless the pad is
+at its height and the robot in range. Nothing announces that a robot leaves, so both are only read: a
+pad that has left its height while current flows is a fault of the station.
+
+If something stands on the pad that should not, ChargerState's error_message says so.
+`Misplaced.text` writes that text and `misplaced_in` reads it. An id that would make the text
+ambiguous is quoted as in JSON, so every id can be read back.
+"""
+
+import json
+import re
+from typing import Literal
+
+import msgspec
+from msgspec.structs import replace
+
+from bridges.kinds.charger.memory import ChargerLimits, Memory
+from bridges.kinds.charger.settings import Robot
+from bridges.kinds.charger.signals import CURRENT_FLOWS, Activity, ChargerSample
+from bridges.kinds.shared.decision import Fault
+
+WRONG_DOCKING = "WRONG_DOCKING"
+WRONG_DOCKING_TEXT = "wrong docking: "
+UNKNOWN_RECEIVER_TEXT = "unknown receiver "
+HEIGHT_LOST_TEXT = "the pad left its height under power"
+RECEIVER_NOT_TOLD_TEXT = "the YAML has receivers, but the charger does not say which one it sees"
+
+_BARE = r"[^\s\",/\\]+"
+_ID = rf'("(?:[^"\\]|\\.)*"|{_BARE})'
+_ROBOT = f"{_ID}/{_ID}"
+_TEXT = re.compile(
+    rf"(?:{UNKNOWN_RECEIVER_TEXT}{_ID}"
+    rf"|{WRONG_DOCKING_TEXT}{_ROBOT} (?:stands here|is not assigned here))"
+    rf"(?:, {_ROBOT} is expected)?"
+)
+
+
+class Pad(msgspec.Struct, frozen=True):
+    """What stands on the pad. `unverified`: the YAML has no receivers. `mute`: the station does not say
+    which receiver it sees. `stranger`: a receiver that the YAML does not list.
+
+    `receiver`: the id that it sees. `robot`: whose receiver that is, None if it is not listed.
+    """
+
+    sort: Literal["unverified", "mute", "empty", "robot", "stranger"]
+    receiver: str = ""
+    robot: Robot | None = None
+
+    def may_be(self, who: Robot) -> bool:
+        """Can this robot be the one on the pad, as far as the station can tell?"""
+        return self.sort == "unverified" or self.robot == who
+
+    def is_another(self, who: Robot) -> bool:
+        """Is another robot on the pad?"""
+        return self.sort in ("robot", "stranger") and self.robot != who
+
+
+def seen(sample: ChargerSample | None, limits: ChargerLimits) -> Pad:
+    """The pad as one reading shows it."""
+    if not limits.receivers:
+        return Pad("unverified")
+    receiver = sample.measured.receiver_id if sample else None
+    if receiver is None:
+        return Pad("mute")
+    if not receiver:
+        return Pad("empty")
+    known = limits.receivers.get(receiver)
+    return Pad("robot" if known else "stranger", receiver, known)
+
+
+def not_ready(sample: ChargerSample) -> str:
+    """Why the pad must not be energised for anybody; "" if the station says nothing against it."""
+    if sample.measured.at_height is False:
+        return "the pad is not at its height"
+    return "the robot is not in range" if sample.measured.range_ok is False else ""
+
+
+def judged(sample: ChargerSample) -> ChargerSample:
+    """The reading, as a fault of the station if the pad has left its height under power."""
+    if sample.activity is not Activity.CHARGING or sample.measured.at_height is not False:
+        return sample
+    return replace(
+        sample,
+        activity=Activity.ERROR,
+        error_text=HEIGHT_LOST_TEXT,
+        side="station",
+        charges=True,
+    )
+
+
+class Misplaced(msgspec.Struct, frozen=True):
+    """What stands on the pad and should not: a known `robot`, else an unknown `receiver`.
+
+    `expected`: the robot that the station waits for, None if it waits for none.
+    """
+
+    robot: Robot | None
+    receiver: str = ""
+    expected: Robot | None = None
+
+    @property
+    def text(self) -> str:
+        """The text for ChargerState's error_message."""
+        expected = f", {_robot(self.expected)} is expected" if self.expected else ""
+        if self.robot is None:
+            return f"{UNKNOWN_RECEIVER_TEXT}{_id(self.receiver)}{expected}"
+        does = "stands here" if self.expected else "is not assigned here"
+        return f"{WRONG_DOCKING_TEXT}{_robot(self.robot)} {does}{expected}"
+
+
+def misplaced_in(text: str) -> Misplaced | None:
+    """The Misplaced that `Misplaced.text` wrote; None for any other text."""
+    found = _TEXT.fullmatch(text)
+    if found is None:
+        return None
+    receiver, *names = (part and _read(part) for part in found.groups())
+    robot, expected = (Robot(*names[i : i + 2]) if names[i] is not None else None for i in (0, 2))
+    return Misplaced(robot, receiver or "", expected)
+
+
+def _robot(who: Robot) -> str:
+    return f"{_id(who.fleet)}/{_id(who.name)}"
+
+
+def _id(text: str) -> str:
+    return text if re.fullmatch(_BARE, text) else json.dumps(text, ensure_ascii=False)
+
+
+def _read(part: str) -> str:
+    return str(json.loads(part)) if part.startswith('"') else part
+
+
+def misplaced(memory: Memory, limits: ChargerLimits) -> Fault | None:
+    """Why the station must not energise for what is on the pad; None if it may."""
+    pad, holder = seen(memory.sample, limits), memory.holder
+    expected = holder.request.who if holder and not holder.over else None
+    if pad.sort == "mute":
+        return Fault("RECEIVER_NOT_TOLD", RECEIVER_NOT_TOLD_TEXT)
+    if pad.sort == "stranger":
+        return Fault("UNKNOWN_RECEIVER", Misplaced(None, pad.receiver, expected).text)
+    if pad.robot is None or (holder and holder.request.who == pad.robot):
+        return None
+    if memory.adopted and not expected:
+        return None
+    return Fault(WRONG_DOCKING, Misplaced(pad.robot, expected=expected).text)
+
+
+def left_alone(memory: Memory, limits: ChargerLimits) -> bool:
+    """Does current flow without a request, in a case where we do not stop it?"""
+    if memory.sample is None or memory.sample.activity not in CURRENT_FLOWS:
+        return False
+    return memory.adopted or not limits.can_stop or limits.unrequested == "serve_known"

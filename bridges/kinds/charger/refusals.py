@@ -1,0 +1,103 @@
+"""The answer to a ChargerRequest that is refused: what is published, and how it is read.
+
+ChargerState shows the station's truth and nothing else, and RMF has no message for a refusal. So a
+refusal goes out as a diagnostic_msgs/DiagnosticStatus on a topic of ours, `charger_refusals`: a type
+that every ROS machine has, whose fields `ros2 topic echo` shows by their names.
+"""
+
+from collections.abc import Mapping
+
+import msgspec
+from msgspec.structs import replace
+
+from bridges.kinds.charger.report import ChargerReport
+from bridges.kinds.charger.settings import Robot
+from bridges.kinds.charger.signals import Requested
+from bridges.kinds.shared.kind import Answer
+from bridges.kinds.shared.names import LONGEST_NAME
+from bridges.messages.definitions import ChargerRequest, DiagnosticLevel, DiagnosticStatus, KeyValue
+from bridges.messages.topics import CHARGER_REFUSALS
+
+NAME = "ChargerRequest refused"
+OCCUPIED = "charger occupied"
+"""The one reason that ends when the charger is released."""
+LONGEST_REASON = 500
+
+
+class Refusal(msgspec.Struct, frozen=True, kw_only=True):
+    """Why a request was refused, and who has the charger.
+
+    `robot`: FLEET/ROBOT that the request was for. `state`: the charger's, in RMF's word. `held_by`,
+    `held_request`: the robot that has the charger and the id of its request, "" for nobody. `error`:
+    the charger's error text, "" if it has none.
+    """
+
+    request_id: str
+    charger: str
+    robot: str
+    reason: str
+    state: str = ""
+    held_by: str = ""
+    held_request: str = ""
+    error: str = ""
+
+    @property
+    def text(self) -> str:
+        """In one line: `charger occupied: tiny/AMR01 has it (request req-1)`."""
+        request = f" (request {self.held_request})" if self.held_request else ""
+        who = f"{self.held_by or 'a robot'} has it{request}" if self.held_by or request else ""
+        return ": ".join(filter(None, (self.reason, "; ".join(filter(None, (who, self.error))))))
+
+    def message(self) -> DiagnosticStatus:
+        """As it is published: the values are the fields, by their names."""
+        values = tuple(KeyValue(key, value) for key, value in self.fields().items())
+        return DiagnosticStatus(int(DiagnosticLevel.WARN), NAME, self.text, self.charger, values)
+
+    def fields(self) -> Mapping[str, str]:
+        """The fields, for the status file."""
+        return {key: getattr(self, key) for key in self.__struct_fields__}
+
+
+def read(status: DiagnosticStatus) -> Refusal | None:
+    """The Refusal that `message` wrote; None for any other status."""
+    values = {pair.key: pair.value for pair in status.values}
+    if status.name != NAME or not {"request_id", "charger", "robot", "reason"} <= values.keys():
+        return None
+    return Refusal(**{key: values.get(key, "") for key in Refusal.__struct_fields__})
+
+
+def refused(request_id: str, charger: str, who: Robot, reason: str) -> Refusal:
+    """The refusal of a request, which may be malformed: a name may be of any length."""
+    return Refusal(
+        request_id=_cut(request_id),
+        charger=_cut(charger),
+        robot=f"{_cut(who.fleet)}/{_cut(who.name)}",
+        reason=reason[:LONGEST_REASON],
+    )
+
+
+def answer(name: str, request: object, reason: str, report: ChargerReport) -> Answer | None:
+    """What is published when charger `name` refuses this; None for anything but a request.
+
+    `request`: the message, if it is malformed, else the core's event. `report`: the charger as it
+    is now.
+    """
+    match request:
+        case ChargerRequest():
+            request_id, fleet, robot = request.request_id, request.fleet_name, request.robot_name
+        case Requested():
+            request_id, fleet, robot = request.request_id, request.fleet, request.robot
+        case _:
+            return None
+    refusal = replace(
+        refused(request_id, name, Robot(fleet, robot), reason),
+        state=report.state.name.removeprefix("CHARGER_"),
+        held_by=f"{report.fleet}/{report.robot}" if report.robot else "",
+        held_request=report.request_id,
+        error=report.error_message[:LONGEST_REASON],
+    )
+    return Answer(CHARGER_REFUSALS, refusal.message(), refusal.fields())
+
+
+def _cut(text: str) -> str:
+    return text[:LONGEST_NAME]

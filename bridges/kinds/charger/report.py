@@ -1,0 +1,213 @@
+"""What RMF, the log and the status file are told of a charger, and how an error's text is read.
+
+RMF's ChargerState has one text for everything that is wrong. From that text the coordinator
+(`bridges/kinds/charger_coordinator/`) must find out which side is at fault: `error_message` writes
+it and `diagnosis` reads it.
+"""
+
+from enum import StrEnum
+
+import msgspec
+from msgspec.structs import replace
+
+from bridges.kinds.charger import pad
+from bridges.kinds.charger.memory import ChargerLimits, Memory, rivalled, unreachable
+from bridges.kinds.charger.session import cleared_to_start
+from bridges.kinds.charger.settings import Robot
+from bridges.kinds.charger.signals import CURRENT_FLOWS, Activity, ChargerSample, Measured
+from bridges.kinds.shared.decision import Fault
+from bridges.messages.definitions import ChargerStateValue
+
+IDLE = ChargerStateValue.CHARGER_IDLE
+ASSIGNED = ChargerStateValue.CHARGER_ASSIGNED
+CHARGING = ChargerStateValue.CHARGER_CHARGING
+RELEASED = ChargerStateValue.CHARGER_RELEASED
+ERROR = ChargerStateValue.CHARGER_ERROR
+
+UNREQUESTED = "unrequested/"
+"""ChargerState has a request id in every state but IDLE. Without a request (an error of a free
+station, a charge that nobody requested) the id is this, followed by the charger's name."""
+
+LOST = {
+    "TWO_NODES_FOR_ONE_DEVICE": "two nodes for one device",
+    "CHARGER_UNREACHABLE": "Charger unreachable",
+    "CHARGER_NOT_COMMANDED": "Charger takes no commands",
+}
+"""The error message of a station that is not reached. It is a fixed text; the fault has the reason."""
+OUT_OF_SERVICE = "out of service after: "
+
+
+class Diagnosis(StrEnum):
+    """Which side is at fault.
+
+    PAD: what stands on the pad should not be there. LOST: the station cannot be reached or commanded,
+    which says nothing about station or robot. UNCLEAR: the text does not tell. Then a second station
+    shows it: a robot that fails there too is the one at fault.
+    """
+
+    NONE = ""
+    ROBOT = "robot"
+    STATION = "station"
+    PAD = "pad"
+    LOST = "lost"
+    UNCLEAR = "unclear"
+
+
+_BEGINNINGS = {
+    "robot:": Diagnosis.ROBOT,
+    "station:": Diagnosis.STATION,
+    OUT_OF_SERVICE: Diagnosis.STATION,
+    pad.RECEIVER_NOT_TOLD_TEXT: Diagnosis.STATION,
+    pad.WRONG_DOCKING_TEXT: Diagnosis.PAD,
+    pad.UNKNOWN_RECEIVER_TEXT: Diagnosis.PAD,
+    **dict.fromkeys(LOST.values(), Diagnosis.LOST),
+}
+
+
+def error_message(fault: Fault) -> str:
+    """ChargerState's error_message for this fault."""
+    return LOST.get(fault.code, fault.detail)
+
+
+def diagnosis(message: str) -> Diagnosis:
+    """Which side is at fault, by a ChargerState's error_message; a text of another node is UNCLEAR."""
+    found = (whose for start, whose in _BEGINNINGS.items() if message.startswith(start))
+    return next(found, Diagnosis.UNCLEAR)
+
+
+class ChargerReport(msgspec.Struct, frozen=True):
+    """ChargerState without its name and stamp.
+
+    `read_at`: monotonic seconds of the last good reading, None before the first. `error_message`:
+    blank unless `state` is CHARGER_ERROR. `request_id`: blank while no request holds the station.
+    `fleet`, `robot`: the request's robot; without a request, the one on the pad of a station that is
+    not idle. `verified`: the station sees that robot's receiver. `waits`: what the request waits
+    for; "" without one, and while it is charged, over or in ERROR.
+    """
+
+    read_at: float | None
+    state: ChargerStateValue
+    error_message: str = ""
+    request_id: str = ""
+    fleet: str = ""
+    robot: str = ""
+    verified: bool = False
+    faults: tuple[Fault, ...] = ()
+    measured: Measured = Measured()
+    waits: str = ""
+
+    def news(self) -> object:
+        """All but the age, the measurements and what is waited for, which change while RMF is shown
+        the same."""
+        measured = Measured(receiver_id=self.measured.receiver_id)
+        return replace(self, read_at=None, measured=measured, waits="")
+
+
+def report(memory: Memory, now: float, limits: ChargerLimits) -> ChargerReport:
+    """The report as it is now."""
+    found = errors(memory, now, limits)
+    shown = ERROR if found else state(memory)
+    lost = unreachable(memory, limits)
+    who = _who(memory, shown, limits)
+    on_pad = pad.seen(None if lost else memory.sample, limits)
+    return ChargerReport(
+        read_at=memory.read_at,
+        state=shown,
+        error_message=error_message(found[0]) if found else "",
+        request_id=memory.holder.request.request_id if memory.holder else "",
+        fleet=who.fleet if who else "",
+        robot=who.name if who else "",
+        verified=who is not None and on_pad.robot == who,
+        faults=(*found, *_irregular(memory, shown, limits)),
+        measured=Measured() if lost or memory.sample is None else memory.sample.measured,
+        waits=_waits(memory, shown, limits),
+    )
+
+
+def _waits(memory: Memory, shown: ChargerStateValue, limits: ChargerLimits) -> str:
+    """What the request waits for that is not charged yet, or must not be charged now."""
+    holder, sample = memory.holder, memory.sample
+    if not holder or not sample or shown not in (ASSIGNED, CHARGING):
+        return ""
+    who, not_ready = holder.request.who, pad.not_ready(sample)
+    if shown is CHARGING:
+        return f"as {not_ready}" if not_ready and not holder.over else ""
+    if holder.over:
+        return "for the end of its handshake: it was at fault before"
+    if not pad.seen(sample, limits).may_be(who):
+        return f"for {who} on the pad"
+    if not_ready:
+        return f"as {not_ready}"
+    ready = holder.started or cleared_to_start(memory, limits)
+    return f"for the station to charge {who}" if ready else f"for {who} in range"
+
+
+def state(memory: Memory) -> ChargerStateValue:
+    """RMF's state of a station without an error."""
+    sample, holder = memory.sample, memory.holder
+    if sample is not None and sample.activity in CURRENT_FLOWS:
+        return CHARGING
+    if holder is None:
+        released = sample is not None and sample.activity is Activity.RELEASED
+        return RELEASED if released else IDLE
+    return ASSIGNED if holder.released_at is None else RELEASED
+
+
+def errors(memory: Memory, now: float, limits: ChargerLimits) -> list[Fault]:
+    """Why the state is ERROR, most serious first."""
+    found = []
+    if rivalled(memory, now):
+        what = "another node publishes this charger's states"
+        found.append(Fault("TWO_NODES_FOR_ONE_DEVICE", what))
+    sample = memory.sample
+    if sample is None or unreachable(memory, limits):
+        found.append(Fault("CHARGER_UNREACHABLE", memory.io_fault or "not read yet"))
+    elif sample.activity is Activity.ERROR:
+        found.append(Fault("CHARGER_ERROR", error_text(sample)))
+    elif sample.activity is Activity.UNKNOWN:
+        text = f": {sample.error_text}" if sample.error_text else ""
+        found.append(Fault("UNKNOWN_VENDOR_STATE", f"unknown vendor state {sample.code}{text}"))
+    if memory.protection:
+        found.append(Fault("PROTECTION", OUT_OF_SERVICE + memory.protection))
+    if memory.write_misses >= limits.t.misses:
+        found.append(Fault("CHARGER_NOT_COMMANDED", memory.write_fault))
+    if not unreachable(memory, limits) and (misplaced := pad.misplaced(memory, limits)):
+        found.append(misplaced)
+    return found
+
+
+def error_text(sample: ChargerSample) -> str:
+    """A station's error in its own words, after the side that is at fault."""
+    text = sample.error_text or f"the charger reports an error (vendor state {sample.code})"
+    if diagnosis(text) in (Diagnosis.PAD, Diagnosis.LOST):
+        text = f"the charger says: {text}"
+    side = f"{sample.side}: " if sample.side else ""
+    return text if text.startswith(side) else side + text
+
+
+def _irregular(memory: Memory, shown: ChargerStateValue, limits: ChargerLimits) -> list[Fault]:
+    """What is wrong although the state is not ERROR."""
+    holder = memory.holder
+    if holder is None:
+        who = pad.seen(memory.sample, limits).robot or "the robot is not known"
+        fault = Fault("UNREQUESTED_CHARGING", f"nobody requested it: {who}")
+        return [fault] if shown is CHARGING else []
+    stopping = memory.sample and memory.sample.activity is Activity.STOPPING
+    if shown is CHARGING and not stopping and holder.over and holder.ended != "full":
+        what = holder.ended or "the charger was at fault"
+        whose = holder.request.request_id or holder.request.who
+        return [Fault("STILL_CHARGING", f"{whose}: {what}")]
+    if shown is RELEASED and holder.ended == "start timeout":
+        late = f"{holder.request.who} did not start to charge in time"
+        why = pad.not_ready(memory.sample) if memory.sample else ""
+        return [Fault("START_TIMEOUT", f"{late}: {why}" if why else late)]
+    return []
+
+
+def _who(memory: Memory, shown: ChargerStateValue, limits: ChargerLimits) -> Robot | None:
+    """The request's robot. Without a request: the robot on the pad, or the last one seen charging."""
+    if memory.holder:
+        return memory.holder.request.who
+    if shown is IDLE or (unreachable(memory, limits) and not memory.adopted):
+        return None
+    return pad.seen(memory.sample, limits).robot

@@ -1,0 +1,128 @@
+"""A request from its grant to its end, reading by reading."""
+
+from msgspec.structs import replace
+
+from bridges.kinds.charger import pad
+from bridges.kinds.charger.memory import ChargerLimits, Memory, Session
+from bridges.kinds.charger.signals import (
+    AT_FAULT,
+    CURRENT_FLOWS,
+    Activity,
+    ChargerSample,
+    Requested,
+)
+
+RANGE_EVERY_S = 5.0
+"""The least time between two range checks (Xnergy RCU: wait 5 s between two checks)."""
+
+
+def granted(request: Requested, now: float, limits: ChargerLimits) -> Session:
+    """A request that has just got the station; its `start_timeout` counts from now."""
+    return Session(request, now + _patience_s(request, limits))
+
+
+def taken_over(holder: Session, request: Requested, now: float, limits: ChargerLimits) -> Session:
+    """The session of a robot that was served without a request, and now has one."""
+    return replace(holder, request=request, start_by=now + _patience_s(request, limits))
+
+
+def _patience_s(request: Requested, limits: ChargerLimits) -> float:
+    return request.start_timeout_s or limits.t.start_timeout_s
+
+
+def follow(
+    holder: Session, sample: ChargerSample, now: float, limits: ChargerLimits
+) -> Session | None:
+    """The session after one reading; None when it is over and the station is free."""
+    on_pad = pad.seen(sample, limits)
+    another = on_pad.is_another(holder.request.who)
+    if sample.activity in AT_FAULT and not (another and sample.side == "robot"):
+        return replace(holder, failed=True)
+    if another:
+        return _beside_another(holder, now, limits)
+    holder = _resumed(holder, now)
+    if sample.activity in CURRENT_FLOWS:
+        return _flowing(holder, sample, limits)
+    if sample.activity is Activity.HANDSHAKE and holder.started and not holder.ended:
+        holder = _sought_again(holder, now, limits)
+    if holder.released_at is not None:
+        there = limits.receivers and on_pad.robot == holder.request.who
+        gone = shown_released(holder, now, limits) and not there
+        return None if gone and sample.activity is not Activity.RELEASED else holder
+    return _pending(holder, sample.activity, on_pad, now)
+
+
+def shown_released(holder: Session, now: float, limits: ChargerLimits) -> bool:
+    """Has RELEASED been shown for `released_s`?"""
+    return holder.released_at is not None and now - holder.released_at >= limits.t.released_s
+
+
+def _beside_another(holder: Session, now: float, limits: ChargerLimits) -> Session | None:
+    """Another robot is on the pad. A robot that waits keeps waiting; one that was charged has left."""
+    if shown_released(holder, now, limits):
+        return None
+    if holder.released_at is not None:
+        return holder
+    if holder.started or holder.over:
+        return replace(holder, ended=holder.ended or "left", released_at=now)
+    return holder if holder.paused_at is not None else replace(holder, paused_at=now)
+
+
+def _resumed(holder: Session, now: float) -> Session:
+    if holder.paused_at is None:
+        return holder
+    return replace(holder, start_by=holder.start_by + now - holder.paused_at, paused_at=None)
+
+
+def _flowing(holder: Session, sample: ChargerSample, limits: ChargerLimits) -> Session:
+    percent = sample.measured.battery_percent
+    full = percent is not None and percent >= limits.t.full_percent and not holder.ended
+    return replace(holder, started=True, released_at=None, ended="full" if full else holder.ended)
+
+
+def _sought_again(holder: Session, now: float, limits: ChargerLimits) -> Session:
+    """The station has lost the receiver and looks for it: the request waits for its start again."""
+    by = now + _patience_s(holder.request, limits)
+    return replace(holder, started=False, start_by=by, checked_at=None)
+
+
+def _pending(holder: Session, activity: Activity, on_pad: pad.Pad, now: float) -> Session:
+    if not holder.request.request_id and on_pad.sort == "empty":
+        return replace(holder, ended=holder.ended or "left", released_at=now)
+    if holder.started or (holder.failed and activity is not Activity.HANDSHAKE):
+        return replace(holder, released_at=now)
+    if now >= holder.start_by:
+        return replace(holder, ended="start timeout", released_at=now)
+    return holder
+
+
+# ---- may it start?
+
+
+def cleared_to_start(memory: Memory, limits: ChargerLimits) -> bool:
+    """The right robot is on the pad and in range, as far as the station can tell."""
+    holder, sample = memory.holder, memory.sample
+    if holder is None or sample is None or memory.read_at is None:
+        return False
+    if not pad.seen(sample, limits).may_be(holder.request.who):
+        return False
+    if sample.measured.in_range is None:
+        return True
+    asked = holder.checked_at is not None and memory.read_at > holder.checked_at
+    return asked and sample.measured.in_range
+
+
+def range_checked(memory: Memory, now: float, limits: ChargerLimits) -> Memory:
+    """Ask for a range check if only that is missing. A result from before the check does not count."""
+    holder, sample = memory.holder, memory.sample
+    if holder is None or sample is None or holder.started or holder.over:
+        return memory
+    if sample.measured.in_range is None or sample.activity in AT_FAULT or pad.not_ready(sample):
+        return memory
+    if not pad.seen(sample, limits).may_be(holder.request.who):
+        return memory
+    asked = holder.checked_at
+    if asked is not None and (now - asked < RANGE_EVERY_S or cleared_to_start(memory, limits)):
+        return memory
+    holder = replace(holder, checked_at=now)
+    return replace(memory, holder=holder, range_checks=memory.range_checks + 1)

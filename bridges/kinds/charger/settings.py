@@ -1,0 +1,96 @@
+"""The part of a charger's YAML that does not depend on its driver."""
+
+from collections.abc import Iterator
+from typing import Annotated, Literal, NamedTuple
+
+import msgspec
+from msgspec import Meta
+
+from bridges.kinds.shared.fields import DeviceSettings, Name, Seconds
+
+Misses = Annotated[int, Meta(ge=1, le=100)]
+PerHour = Annotated[int, Meta(ge=0, le=60, extra={"unit": "per hour"})]
+StartTimeout = Annotated[float, Meta(ge=1, le=86400, extra={"unit": "s"})]
+StopTimeout = Annotated[float, Meta(ge=1, le=600, extra={"unit": "s"})]
+Released = Annotated[float, Meta(ge=1, le=60, extra={"unit": "s"})]
+Percent = Annotated[float, Meta(ge=50, le=100, extra={"unit": "%"})]
+ReceiverId = Annotated[
+    str,
+    Meta(
+        min_length=1, max_length=64, pattern=r"^[!-~]+$", extra={"pattern": "text without spaces"}
+    ),
+]
+Unrequested = Literal["serve_known", "refuse"]
+
+
+class Robot(NamedTuple):
+    """A robot as RMF names it."""
+
+    fleet: str
+    name: str
+
+    def __str__(self) -> str:
+        return f"{self.fleet}/{self.name}"
+
+
+def robot(text: str) -> Robot:
+    """FLEET/ROBOT in its parts. Raises ValueError."""
+    fleet, slash, name = text.partition("/")
+    if not (fleet and slash and name):
+        raise ValueError(f"{text!r} is not a robot: write FLEET/ROBOT, as RMF names them")
+    return Robot(fleet, name)
+
+
+class Durations(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Durations and counts of a charger.
+
+    `misses`: after so many failed polls in a row the charger is shown as unreachable; after so many
+    failed commands in a row, as one that takes no commands.
+    `start_timeout_s`: how long charging may take to start, if the request does not say.
+    `stop_timeout_s`: how long a station may go on charging after it was told to stop. Then it is taken
+    out of service.
+    `released_s`: the least time for which RELEASED is shown. States go out at 1 Hz, so at least 1 s.
+    `full_percent`: the charge at which a robot is released, if the station knows the battery's charge.
+    `clear_errors_per_h`: how often the daemon may clear the station's errors by itself; 0 is never.
+    `peer_internal_timeout_s`: after how long without the daemon the station has certainly switched
+    off by itself. Without it an operator cannot free a station that does not answer.
+    """
+
+    misses: Misses = 3
+    start_timeout_s: StartTimeout = 300.0
+    stop_timeout_s: StopTimeout = 30.0
+    released_s: Released = 2.0
+    full_percent: Percent = 100.0
+    clear_errors_per_h: PerHour = 0
+    peer_internal_timeout_s: Seconds | None = None
+
+
+class ChargerSettings(DeviceSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """What every charger has, whatever its driver.
+
+    `limits`: durations and counts that differ from the defaults.
+    `receivers`: receiver id -> FLEET/ROBOT, the robot that carries it. With this table only the robot
+    that the station is assigned to is charged.
+    `unrequested`: what happens to a robot of `receivers` on the pad without a request. `serve_known`
+    charges it; `refuse` does not, and says which robot it is.
+    `on_death`: `stop` or `keep` a charge under way when the daemon ends.
+    """
+
+    limits: Durations = Durations()
+    receivers: dict[ReceiverId, Name] = msgspec.field(default_factory=dict)
+    unrequested: Unrequested = "refuse"
+    on_death: Literal["stop", "keep"] = "stop"
+
+    def can_stop(self) -> bool:
+        """Can this station be told to stop? Drivers of stations that cannot override this."""
+        return True
+
+    def problems(self) -> Iterator[tuple[tuple[str, ...], str]]:
+        """Names that are not FLEET/ROBOT. A robot may have two receivers: one may be a spare."""
+        for receiver, text in self.receivers.items():
+            try:
+                robot(text)
+            except ValueError as error:
+                yield ("receivers", receiver), str(error)
+        if self.unrequested == "serve_known" and not self.receivers:
+            yield ("unrequested",), "serve_known needs receivers: whom does the station know?"

@@ -1,0 +1,176 @@
+"""Robots on a pad that is not theirs, and what makes them leave.
+
+RMF's fleet adapter starts a robot's ChargeBattery again when the waypoint or the mode of its charging
+assignment changes (rmf_ros2 9dedd0f, ChargeBattery.cpp, _consider_restart). That moves a robot, but
+only while its ChargeBattery runs: as a task, or as `finishing_request: charge`. Rules:
+1. A robot that is expected at one station and comes to another, or does not leave it for LEAVES_S, is
+   told to wait, and TOLD_S later to charge at its own. Not more than twice for one request.
+2. A robot that has no station, and stands on a pad that another waits for, is told to wait again,
+   by the other mode for TOLD_S. This happens `leaves_s` after it came or the station let it go.
+3. Where we may not assign, or the robot is in another task, nothing is told: RMF would not move it.
+4. If it still stands there OBEYS_S later, or cannot be told, a person is alerted.
+Who stands where is the fleet's word (FleetState's position), or the station's, if it reads receivers.
+"""
+
+from collections.abc import Iterator, Mapping
+from typing import Final, NamedTuple
+
+from msgspec.structs import replace
+
+from bridges.kinds.charger.pad import misplaced_in
+from bridges.kinds.charger.report import Diagnosis
+from bridges.kinds.charger.settings import Robot
+from bridges.kinds.charger_coordinator.memory import CHARGING, Memory, Nudge, Site
+from bridges.kinds.charger_coordinator.queue import Here, standing, suiting
+from bridges.kinds.charger_coordinator.wishes import SETTLES_S
+from bridges.kinds.shared.durations import AGES_AGO, NEVER
+
+TOLD_S: Final = 1.0
+OBEYS_S: Final = 15.0
+LEAVES_S: Final = 30.0
+TRIES: Final = 2
+
+
+class Astray(NamedTuple):
+    """`who` has stood at `station` since `since`. `expected`: the station that it has; None if it has
+    none, and `waiter` waits for this one. `tries`: how often it may be told to leave."""
+
+    who: Robot
+    station: str
+    since: float
+    why: str
+    tries: int
+    expected: str | None = None
+    waiter: Robot | None = None
+
+
+def found(memory: Memory, now: float, site: Site) -> dict[Robot, Astray]:
+    """Every robot that stands at the wrong station or in another robot's way. If `now` is NEVER, also
+    those that will count as such unless somebody moves."""
+    astray: dict[Robot, Astray] = {}
+    for one in (*_strayed(memory, now, site), *_blocking(memory, now, site)):
+        astray.setdefault(one.who, one)
+    return astray
+
+
+def nudged(memory: Memory, now: float, site: Site) -> Memory:
+    """Nudge the robots that are to leave, and forget those that have left."""
+    astray = found(memory, now, site)
+    nudges = {who: n for who, n in memory.nudges.items() if _matters(memory, who, n, astray)}
+    for who, one in astray.items():
+        if now >= _next_at(memory, one):
+            before = nudges.get(who)
+            count = before.count + 1 if before else 1
+            nudges[who] = Nudge(one.why, count, now)
+    return replace(memory, nudges=nudges)
+
+
+def is_nudged(memory: Memory, who: Robot, now: float) -> bool:
+    """Is it being told to leave now, by an assignment that is not its own?"""
+    return who in memory.nudges and now < memory.nudges[who].at + TOLD_S
+
+
+def alarming(memory: Memory, one: Astray, now: float) -> bool:
+    """Should a person be alerted?"""
+    return now >= max(one.since, _alarm_at(memory, one))
+
+
+def due(memory: Memory, now: float, site: Site) -> Iterator[float]:
+    """When any of this changes without an event."""
+    for nudge in memory.nudges.values():
+        yield nudge.at + TOLD_S
+    for one in found(memory, NEVER, site).values():
+        yield one.since
+        yield _next_at(memory, one)
+        yield _alarm_at(memory, one)
+
+
+# ---- inside
+
+
+def _strayed(memory: Memory, now: float, site: Site) -> Iterator[Astray]:
+    """Those that have a station, were not charged there yet, and stand at another."""
+    for name, grant in memory.grants.items():
+        if grant.over or grant.started:
+            continue
+        at, came_at, settled_at = _stands(memory, grant.robot, site)
+        since = settled_at if came_at > grant.made_at else grant.made_at + LEAVES_S
+        if at is not None and at != name and since <= now:
+            yield Astray(grant.robot, at, since, grant.request_id, TRIES, expected=name)
+
+
+def _stands(memory: Memory, who: Robot, site: Site) -> tuple[str | None, float, float]:
+    """The station where it stands, by its fleet or by that station; since when; from when it counts."""
+    for name, seen in memory.stations.items():
+        if seen.diagnosis is Diagnosis.PAD and on_pad(seen.error, site) == who:
+            return name, seen.since, seen.since
+    standing, at = memory.robots.get(who), memory.stands_at(who, site)
+    came_at = standing.here_since if standing else AGES_AGO
+    return at, came_at, came_at + SETTLES_S
+
+
+def _blocking(memory: Memory, now: float, site: Site) -> Iterator[Astray]:
+    """Those that have no station, and stand on a pad that another robot waits for."""
+    here = standing(memory, AGES_AGO if now == NEVER else now, site)
+    idle = {name: who for name in here if (who := _idle_at(memory, name, here)) is not None}
+    for wish in memory.wishes if idle else ():
+        if memory.station_of(wish.robot) is not None:
+            continue
+        for name in suiting(memory, wish, site):
+            who, seen = idle.get(name), memory.stations.get(name)
+            if who is None or who == wish.robot or seen is None:
+                continue
+            since = max(memory.robots[who].here_since, seen.since) + site.leaves_s
+            if since <= now:
+                yield Astray(who, name, since, name, 1, waiter=wish.robot)
+
+
+def _idle_at(memory: Memory, station: str, here: Here) -> Robot | None:
+    """A robot without a station that stands at this one, which nobody has."""
+    grant, seen = memory.grants.get(station), memory.stations.get(station)
+    if seen is None or seen.state is CHARGING or (grant is not None and not grant.over):
+        return None
+    return next((who for who in here[station] if memory.station_of(who) is None), None)
+
+
+def _matters(memory: Memory, who: Robot, nudge: Nudge, astray: Mapping[Robot, Astray]) -> bool:
+    """Does this nudge still count? While a robot has a station, its nudges count until it gets another
+    request: a robot that goes astray twice is not told more often."""
+    station = memory.station_of(who)
+    if station is not None:
+        return memory.grants[station].request_id == nudge.why
+    return who in astray and astray[who].why == nudge.why
+
+
+def _can_be_nudged(memory: Memory, who: Robot) -> bool:
+    standing = memory.robots.get(who)
+    return memory.assigns and standing is not None and not standing.works
+
+
+def _next_at(memory: Memory, one: Astray) -> float:
+    """When it is told to leave, or told again; NEVER if it was told often enough, or cannot be."""
+    nudge = memory.nudges.get(one.who)
+    if not _can_be_nudged(memory, one.who):
+        return NEVER
+    if nudge is None or nudge.why != one.why:
+        return one.since
+    return nudge.at + OBEYS_S if nudge.count < one.tries else NEVER
+
+
+def _alarm_at(memory: Memory, one: Astray) -> float:
+    nudge = memory.nudges.get(one.who)
+    if not _can_be_nudged(memory, one.who):
+        return one.since
+    if nudge is None or nudge.why != one.why or nudge.count < one.tries:
+        return NEVER
+    return nudge.at + OBEYS_S
+
+
+def on_pad(error: str, site: Site) -> Robot | None:
+    """Which of our robots stands on the pad, by the station's error; None if it is none of ours."""
+    seen = misplaced_in(error)
+    if seen is None:
+        return None
+    if seen.robot is None:
+        return site.receivers.get(seen.receiver)
+    return seen.robot if seen.robot in site.robots else None

@@ -1,0 +1,119 @@
+"""The coordinator's core: which robot charges where, for all stations of a site.
+
+Its inputs are FleetState, ChargerState and the requests of operators. It sends ChargerRequest and
+ChargerCancel, which no part of RMF does. A wish is a robot's need to be charged. Rules:
+1. Who has a wish is in `wishes.py`. An operator's wish lasts until its request is over or the robot is
+   full.
+2. Wishes are served first come, first served, among the suitable stations (`queue.py`). A station has
+   one robot at a time. It is given to another only after its state shows that it has let the first go.
+3. A request is repeated until the station shows it. A station that does not take it within TAKEN_S is
+   passed over for SHUNNED_S, and the wish goes to the end of the queue.
+4. How a request ends, and who is at fault, is read from the stations' states (`stations.py`).
+5. A robot on a pad that is not its own is told to leave it, or a person is (`astray.py`).
+6. A request for one of our robots counts as that robot's, even if another node has made it.
+7. During the quiet start it only listens. Beside another node that publishes charging assignments
+   (RMF's rmf_charging_schedule) it sends none, and asks for the stations that those dedicate.
+"""
+
+from msgspec.structs import replace
+
+from bridges.kinds.charger_coordinator import astray, report, stations, wishes
+from bridges.kinds.charger_coordinator.memory import Memory, Site
+from bridges.kinds.charger_coordinator.queue import allot, suiting
+from bridges.kinds.charger_coordinator.report import SiteReport
+from bridges.kinds.charger_coordinator.signals import (
+    Dedicated,
+    Event,
+    FleetSeen,
+    ReceiverHeard,
+    StateHeard,
+    Unwanted,
+    Wanted,
+)
+from bridges.kinds.shared.decision import Decision, OperatorReset
+from bridges.kinds.shared.durations import NEVER
+from bridges.kinds.shared.graph_kind import MaySpeak
+
+Decided = Decision[Memory, None, SiteReport]
+
+
+def initial(subject: str, started_at: float) -> Memory:
+    """Nothing has been heard."""
+    return Memory(began_at=started_at)
+
+
+def idle(memory: Memory, now: float) -> bool:
+    """Never: the one subject is the site."""
+    return False
+
+
+def decide(memory: Memory, event: Event, now: float, site: Site) -> Decided:
+    """Take the event in, allot free stations, and send what is due. Never raises."""
+    memory, refused = _take(memory, event, now, site)
+    memory = stations.in_time(stations.adopted(memory, now, site), now, site)
+    if memory.may_speak:
+        memory = allot(_as_dedicated(memory, site), now, site)
+    memory = astray.nudged(memory, now, site)
+    shown = report.report(memory, now, site)
+    memory, publish = report.messages(memory, shown.faults, now, site)
+    return Decision(memory, None, shown, _wake_at(memory, now, site), refused, publish)
+
+
+def _take(memory: Memory, event: Event, now: float, site: Site) -> tuple[Memory, str]:
+    match event:
+        case FleetSeen(robots, when):
+            memory = replace(memory, when=when)
+            for sighting in robots:
+                memory = wishes.sighted(memory, sighting, now, site)
+            return memory, ""
+        case StateHeard():
+            return stations.heard(memory, event, now, site), ""
+        case ReceiverHeard(robot, error):
+            return replace(memory, receivers={**memory.receivers, robot: error}), ""
+        case Wanted():
+            return wishes.wanted(memory, event, site)
+        case Unwanted(request_id):
+            return wishes.unwanted(memory, request_id)
+        case Dedicated(dedicated):
+            return replace(memory, preferred={**memory.preferred, **dict(dedicated)}), ""
+        case MaySpeak(yes=yes, alone=alone, waits=passive):
+            return _may_speak(replace(memory, passive=passive), yes, alone, now), ""
+        case OperatorReset():
+            return replace(memory, strikes={}, shunned={}, absent={}, nudges={}), ""
+        case _:  # only time has passed
+            return memory, ""
+
+
+def _may_speak(memory: Memory, yes: bool, alone: bool, now: float) -> Memory:
+    """A request that no station has shown yet counts from now; assignments are published again."""
+    grants = {
+        name: grant if grant.shown else replace(grant, made_at=now)
+        for name, grant in memory.grants.items()
+    }
+    return replace(memory, may_speak=yes, alone=alone, grants=grants, assigned=(), nudges={})
+
+
+def _as_dedicated(memory: Memory, site: Site) -> Memory:
+    """Beside a schedule: give up stations at which RMF will not bring their robots."""
+    if memory.alone:
+        return memory
+    for name, grant in memory.grants.items():
+        wish = memory.wish(grant.robot)
+        on_its_way = wish is not None and not grant.over and not grant.started
+        if wish is not None and on_its_way and name not in suiting(memory, wish, site):
+            memory = memory.takes_back(grant.robot)
+    return memory
+
+
+def _wake_at(memory: Memory, now: float, site: Site) -> float:
+    due = [*memory.shunned.values(), *(memory.silent_since(name) for name in site.places)]
+    for name, grant in memory.grants.items():
+        if grant.shown:
+            due.append(stations.hopeless_at(memory, name, grant))
+            due.append(stations.absent_at(memory, name, grant, site))
+        else:
+            due.append(stations.not_taken_at(grant))
+    due += [stations.proven_at(memory, who) for who in memory.strikes]
+    due += report.due(memory, site)
+    due += astray.due(memory, now, site)
+    return min((at for at in due if at > now), default=NEVER)

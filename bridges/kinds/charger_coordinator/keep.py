@@ -1,0 +1,118 @@
+"""What is saved across a restart: the queue, who has which station, and who has failed where.
+
+States of robots and stations come again within a second. A request that was sent but not saved is
+recognised by its id when its station shows it.
+"""
+
+from collections.abc import Mapping
+from typing import Annotated, Final
+
+import msgspec
+from msgspec import Meta
+
+from bridges.kinds.charger.settings import Robot, robot
+from bridges.kinds.charger_coordinator.memory import By, Grant, Memory, Wish
+from bridges.kinds.charger_coordinator.settings import Settings
+from bridges.kinds.shared import keep
+from bridges.kinds.shared.keep import Text
+
+VERSION: Final = 1
+SITE: Final = "site"
+
+
+class WishRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A Wish; `robot` is FLEET/ROBOT, as everywhere here."""
+
+    robot: Text
+    by: By
+    task_id: str
+    station: str
+    request_id: str
+    start_timeout_s: Annotated[float, Meta(ge=0, le=86400)]
+    called: bool = False
+
+
+class GrantRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A Grant, without what the station's states show again."""
+
+    robot: Text
+    request_id: str
+    start_timeout_s: Annotated[float, Meta(ge=0, le=86400)]
+    started: bool
+    over: bool
+
+
+class Record(keep.Record, frozen=True, forbid_unknown_fields=True):
+    """The parts of Memory that are kept."""
+
+    count: Annotated[int, Meta(ge=0)]
+    wishes: list[WishRecord]
+    grants: dict[Text, GrantRecord]
+    strikes: dict[Text, list[Text]]
+    served: dict[Text, str]
+    over: list[str]
+    preferred: dict[Text, Text]
+
+
+def persist(memories: Mapping[str, Memory]) -> bytes:
+    """What the next start needs. The bytes stay the same until some of it changes."""
+    memory = memories.get(SITE, Memory())
+    record = Record(
+        VERSION,
+        memory.count,
+        [_wish(wish) for wish in memory.wishes],
+        {name: _grant(grant) for name, grant in sorted(memory.grants.items())},
+        {str(who): list(where) for who, where in sorted(memory.strikes.items())},
+        {str(who): task for who, task in sorted(memory.served.items())},
+        list(memory.over),
+        {str(who): station for who, station in sorted(memory.preferred.items()) if station},
+    )
+    return msgspec.json.encode(record)
+
+
+def _wish(w: Wish) -> WishRecord:
+    return WishRecord(
+        str(w.robot), w.by, w.task_id, w.station, w.request_id, w.start_timeout_s, w.called
+    )
+
+
+def _grant(g: Grant) -> GrantRecord:
+    return GrantRecord(str(g.robot), g.request_id, g.start_timeout_s, g.started, g.over)
+
+
+def restore(kept: bytes, settings: Settings, now: float) -> dict[str, Memory]:
+    """The memory at start, for the robots and stations that are still in the YAML.
+
+    ValueError if the bytes are not those of `persist`. Durations count from now.
+    """
+    found = keep.read(kept, Record, VERSION, "a coordinator's memory")
+    return {SITE: _memory(found, settings, now)}
+
+
+def _memory(found: Record, settings: Settings, now: float) -> Memory:
+    known, stations = settings.robots(), settings.stations
+
+    def ours(text: str) -> Robot | None:
+        who = robot(text)
+        return who if who in known else None
+
+    wishes: dict[Robot, Wish] = {}
+    for w in found.wishes:
+        if who := ours(w.robot):
+            wish = Wish(who, w.by, w.task_id, w.called, w.station, w.request_id, w.start_timeout_s)
+            wishes.setdefault(who, wish)
+    grants = {
+        name: Grant(who, g.request_id, now, g.start_timeout_s, started=g.started, over=g.over)
+        for name, g in found.grants.items()
+        if name in stations and (who := ours(g.robot))
+    }
+    return Memory(
+        began_at=now,
+        wishes=tuple(wishes.values()),
+        grants=grants,
+        strikes={who: tuple(at) for text, at in found.strikes.items() if (who := ours(text))},
+        served={who: task for text, task in found.served.items() if (who := ours(text))},
+        over=tuple(found.over),
+        count=found.count,
+        preferred={who: s for text, s in found.preferred.items() if (who := ours(text))},
+    )

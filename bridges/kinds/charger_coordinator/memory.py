@@ -1,0 +1,290 @@
+"""What the coordinator remembers, and what it needs of its settings."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Final, Literal, TypeVar
+
+import msgspec
+from msgspec.structs import replace
+
+from bridges.kinds.charger.report import Diagnosis, diagnosis
+from bridges.kinds.charger.settings import Robot
+from bridges.kinds.charger_coordinator.schedule import Charging, LocalTime
+from bridges.kinds.charger_coordinator.settings import Settings
+from bridges.kinds.charger_coordinator.signals import Sighting, Wanted
+from bridges.kinds.shared.durations import AGES_AGO
+from bridges.kinds.shared.graph_kind import LISTENS
+from bridges.messages.definitions import ChargerStateValue, ChargingAssignments
+
+K = TypeVar("K")
+V = TypeVar("V")
+
+NODE: Final = "charger_coordinator"
+STATION_SILENT_S: Final = 5.0
+"""A station is silent after this long without a state. States come at 1 Hz."""
+STRIKES: Final = 2
+"""A robot is not tried again after this many failures; at two stations, if two suit it."""
+
+IDLE: Final = ChargerStateValue.CHARGER_IDLE
+ASSIGNED: Final = ChargerStateValue.CHARGER_ASSIGNED
+CHARGING: Final = ChargerStateValue.CHARGER_CHARGING
+RELEASED: Final = ChargerStateValue.CHARGER_RELEASED
+ERROR: Final = ChargerStateValue.CHARGER_ERROR
+
+
+@dataclass(frozen=True, slots=True)
+class Site:
+    """What the core needs of the settings.
+
+    `robots`: robot -> the stations that suit it, best first. `waits_at`: robot -> the waypoint where
+    it waits. `places`: station -> fleet -> waypoint. `receivers`: receiver id -> robot.
+    """
+
+    robots: Mapping[Robot, tuple[str, ...]]
+    waits_at: Mapping[Robot, str]
+    places: Mapping[str, Mapping[str, str]]
+    receivers: Mapping[str, Robot]
+    start_timeout_s: float
+    full_percent: float
+    again_percent: float
+    leaves_s: float
+    schedule: tuple[Charging, ...] = ()
+    _stations: Mapping[tuple[str, str], str] = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        found = {
+            (fleet, place): name
+            for name, places in self.places.items()
+            for fleet, place in places.items()
+        }
+        object.__setattr__(self, "_stations", found)
+
+    def station_at(self, fleet: str, place: str | None) -> str | None:
+        """Which station is at this waypoint of the fleet's graph; None for none."""
+        return self._stations.get((fleet, place or ""))
+
+    @classmethod
+    def of(cls, settings: Settings) -> "Site":
+        """From the YAML."""
+        robots = settings.robots()
+        return cls(
+            robots={who: tuple(robot.stations) for who, robot in robots.items()},
+            waits_at={who: robot.waits_at for who, robot in robots.items()},
+            places=settings.places(),
+            receivers={r: who for who, robot in robots.items() for r in robot.receivers},
+            start_timeout_s=settings.start_timeout_s,
+            full_percent=settings.full_percent,
+            again_percent=settings.again_percent,
+            leaves_s=settings.leaves_s,
+            schedule=tuple(settings.schedule),
+        )
+
+
+By = Literal["fleet", "schedule", "operator"]
+WHOSE: Final[Mapping[By, str]] = {
+    "fleet": "by the robot",
+    "schedule": "by the schedule",
+    "operator": "by an operator",
+}
+
+
+class Wish(msgspec.Struct, frozen=True):
+    """One robot's need to be charged. `by`: its fleet's state shows it, a schedule says so, or an
+    operator requested it.
+
+    `task_id`: the robot's task, if not by an operator. `called`: that task began after the robot was
+    given a station, so it is the drive there. `station`, `request_id`, `start_timeout_s`: those of the
+    operator's request.
+    """
+
+    robot: Robot
+    by: By
+    task_id: str = ""
+    called: bool = False
+    station: str = ""
+    request_id: str = ""
+    start_timeout_s: float = 0.0
+
+    @classmethod
+    def of(cls, wanted: Wanted) -> "Wish":
+        """The wish of an operator's request."""
+        return cls(
+            wanted.robot,
+            "operator",
+            station=wanted.station,
+            request_id=wanted.request_id,
+            start_timeout_s=wanted.start_timeout_s,
+        )
+
+
+class Grant(msgspec.Struct, frozen=True):
+    """A station given to a robot, since `made_at`, by the request `request_id`.
+
+    `shown`: the station's state has shown the request. `started`: current has flowed. `over`: the
+    robot no longer has the station, but no other robot gets it until the station has let go.
+    `sent_at`: when the last request or cancel was sent. `forgotten_at`: when the station's daemon last
+    forgot it, so that it is made again.
+    """
+
+    robot: Robot
+    request_id: str
+    made_at: float
+    start_timeout_s: float = 0.0
+    shown: bool = False
+    started: bool = False
+    over: bool = False
+    sent_at: float = AGES_AGO
+    forgotten_at: float = AGES_AGO
+
+
+class Standing(msgspec.Struct, frozen=True):
+    """A robot as its fleet showed it at `at`. `since`: since when place, mode and task are the same;
+    `here_since`: since when the place is (-inf: since its first state)."""
+
+    sighting: Sighting
+    at: float
+    since: float = AGES_AGO
+    here_since: float = AGES_AGO
+
+    @property
+    def works(self) -> bool:
+        """Is it in a task other than charging, as far as its fleet shows?"""
+        return bool(self.sighting.task_id) and not self.sighting.charges
+
+
+class Seen(msgspec.Struct, frozen=True):
+    """A station's last state, heard at `at`. `since`: since when state and error are the same.
+    `full_in_s`: as it said then."""
+
+    state: ChargerStateValue
+    request_id: str
+    robot: Robot | None
+    error: str
+    at: float
+    since: float
+    full_in_s: float = 0.0
+
+    @property
+    def diagnosis(self) -> Diagnosis:
+        """Which side is at fault; NONE without an error."""
+        return diagnosis(self.error) if self.state is ERROR else Diagnosis.NONE
+
+
+class Nudge(msgspec.Struct, frozen=True):
+    """That a robot was told to leave a pad. `why`: the request of its own station, or the station that
+    it blocks. `count`: how often. `at`: the last time."""
+
+    why: str
+    count: int
+    at: float
+
+
+class Memory(msgspec.Struct, frozen=True):
+    """Everything that outlives an event.
+
+    `may_speak`: it may publish. `passive`: what those wait for that wait for us, while it may not.
+    `alone`: no other node publishes charging assignments.
+
+    `wishes`: in the order in which they are served. `grants`: by station. `strikes`: robot -> the
+    stations where it has failed. `served`: robot -> the task in which it was charged. `rested`: robots
+    that the schedule need not charge again before it ends. `absent`: robot -> until when it is not
+    called again, because it did not leave its place. `over`: ids of the last operators' requests that
+    have ended, so that late repeats are refused. `count`: requests made so far. `robots`,
+    `stations`: as last heard, and when. `shunned`: station -> until when it is passed over, because
+    it took no request. `preferred`: robot -> the station that another node has dedicated to it.
+    `nudges`: robots told to leave a pad. `receivers`: robot -> the error of its own receiver.
+    `when`: the local time. `assigned`: the assignments last published, and when:
+    `assigned_at`. `alerts`: the faults that a person has been told of.
+    """
+
+    began_at: float = 0.0
+    may_speak: bool = False
+    passive: str = LISTENS
+    alone: bool = True
+    wishes: tuple[Wish, ...] = ()
+    grants: Mapping[str, Grant] = msgspec.field(default_factory=dict)
+    strikes: Mapping[Robot, tuple[str, ...]] = msgspec.field(default_factory=dict)
+    served: Mapping[Robot, str] = msgspec.field(default_factory=dict)
+    rested: frozenset[Robot] = frozenset()
+    absent: Mapping[Robot, float] = msgspec.field(default_factory=dict)
+    over: tuple[str, ...] = ()
+    count: int = 0
+    robots: Mapping[Robot, Standing] = msgspec.field(default_factory=dict)
+    stations: Mapping[str, Seen] = msgspec.field(default_factory=dict)
+    shunned: Mapping[str, float] = msgspec.field(default_factory=dict)
+    preferred: Mapping[Robot, str] = msgspec.field(default_factory=dict)
+    nudges: Mapping[Robot, Nudge] = msgspec.field(default_factory=dict)
+    receivers: Mapping[Robot, str] = msgspec.field(default_factory=dict)
+    when: LocalTime | None = None
+    assigned: tuple[ChargingAssignments, ...] = ()
+    assigned_at: float = AGES_AGO
+    alerts: frozenset[str] = frozenset()
+
+    def wish(self, robot: Robot) -> Wish | None:
+        """This robot's wish; None where it has none."""
+        return next((wish for wish in self.wishes if wish.robot == robot), None)
+
+    def station_of(self, robot: Robot) -> str | None:
+        """The station that it has; None where it has none."""
+        return next((s for s, g in self.grants.items() if g.robot == robot and not g.over), None)
+
+    def place_of(self, robot: Robot) -> str | None:
+        """The waypoint of ours at which its fleet saw it last."""
+        standing = self.robots.get(robot)
+        return standing.sighting.place if standing else None
+
+    def stands_at(self, robot: Robot, site: Site) -> str | None:
+        """The station at which its fleet saw it last; None for none."""
+        return site.station_at(robot.fleet, self.place_of(robot))
+
+    @property
+    def assigns(self) -> bool:
+        """May it tell the robots where to charge?"""
+        return self.may_speak and self.alone
+
+    def faulty(self, robot: Robot) -> bool:
+        """Has it failed too often? It is not tried again until an operator resets."""
+        return len(self.strikes.get(robot, ())) >= STRIKES
+
+    def speaks(self, station: str, now: float) -> bool:
+        """Has this station's state come lately?"""
+        return station in self.stations and now < self.stations[station].at + STATION_SILENT_S
+
+    def silent_since(self, station: str) -> float:
+        """When it fell silent, or will if no more states come."""
+        seen = self.stations.get(station)
+        return STATION_SILENT_S + (self.began_at if seen is None else seen.at)
+
+    # ---- changed copies
+
+    def with_grant(self, station: str, grant: Grant | None) -> "Memory":
+        """The memory with this grant of the station; None: it is granted to nobody."""
+        rest = without(self.grants, station)
+        return replace(self, grants=rest | ({} if grant is None else {station: grant}))
+
+    def without_wish(self, robot: Robot) -> "Memory":
+        """The memory without this robot's wish."""
+        wish = self.wish(robot)
+        if wish is None:
+            return self
+        over = (*self.over, wish.request_id)[-8:] if wish.request_id else self.over
+        return replace(self, wishes=tuple(w for w in self.wishes if w is not wish), over=over)
+
+    def last_in_queue(self, robot: Robot) -> "Memory":
+        """The memory with this robot's wish at the end of the queue."""
+        wish = self.wish(robot)
+        if wish is None:
+            return self
+        return replace(self, wishes=(*(w for w in self.wishes if w is not wish), wish))
+
+    def takes_back(self, robot: Robot) -> "Memory":
+        """The memory in which this robot's station is to release it."""
+        station = self.station_of(robot)
+        if station is None:
+            return self
+        return self.with_grant(station, replace(self.grants[station], over=True, sent_at=AGES_AGO))
+
+
+def without(table: Mapping[K, V], key: K) -> dict[K, V]:
+    """A copy of the table without this key."""
+    return {k: v for k, v in table.items() if k != key}

@@ -1,0 +1,102 @@
+"""Who gets which station: first come, first served, among the suitable stations.
+
+A station is free if its last state is IDLE and no older than STATION_SILENT_S, no robot has it, it has
+not just failed to take a request, and no other robot stands there. A robot that stands on a station's
+pad without a request, so that the station shows an error or a charge that nobody requested, may have
+that very station. So may one that a station has released, and that still stands there.
+
+A station where a robot has failed is tried again only if no other one suits the robot: a second
+station shows which side was at fault.
+
+Beside another node's charging schedule, a robot gets the station that the schedule has dedicated to it:
+RMF drives it to no other. A robot that the schedule does not name may have the one where it stands.
+"""
+
+from collections.abc import Mapping, Sequence
+from typing import Final
+
+from msgspec.structs import replace
+
+from bridges.kinds.charger.pad import misplaced_in
+from bridges.kinds.charger.report import UNREQUESTED
+from bridges.kinds.charger.settings import Robot
+from bridges.kinds.charger_coordinator.memory import (
+    CHARGING,
+    IDLE,
+    NODE,
+    RELEASED,
+    Grant,
+    Memory,
+    Site,
+    Wish,
+)
+
+REMEMBERED_S: Final = 30.0
+"""How long a robot's last place counts after its fleet has shown it."""
+Here = Mapping[str, Sequence[Robot]]
+"""Station -> the robots that stand there."""
+
+
+def allot(memory: Memory, now: float, site: Site) -> Memory:
+    """Give the free stations to the robots that wait, in the order of the queue."""
+    here = standing(memory, now, site)
+    for wish in memory.wishes:
+        if memory.station_of(wish.robot) is None:
+            stations = suiting(memory, wish, site)
+            station = next((s for s in stations if _free(memory, s, wish.robot, now, here)), None)
+            if station is not None:
+                memory = _granted(memory, wish, station, now, site)
+    return memory
+
+
+def _granted(memory: Memory, wish: Wish, station: str, now: float, site: Site) -> Memory:
+    count = memory.count + 1
+    request_id = f"{NODE}/{wish.robot}/{count}"
+    timeout_s = wish.start_timeout_s or site.start_timeout_s
+    grant = Grant(wish.robot, request_id, now, timeout_s)
+    return replace(memory, count=count).with_grant(station, grant)
+
+
+def suiting(memory: Memory, wish: Wish, site: Site) -> list[str]:
+    """The stations to try, best first: the operator's, the one where it stands, the dedicated one, then
+    the YAML's order."""
+    here = memory.stands_at(wish.robot, site)
+    dedicated = memory.preferred.get(wish.robot)
+    if not memory.alone:
+        scheduled = here or "" if dedicated is None else dedicated
+        return [s for s in dict.fromkeys((wish.station, scheduled)) if s in site.places]
+    suit, failed = site.robots[wish.robot], memory.strikes.get(wish.robot, ())
+    untried = [station for station in suit if station not in failed] or list(suit)
+    first = (wish.station, here, dedicated)
+    return sorted(untried, key=lambda s: first.index(s) if s in first else len(first))
+
+
+def _free(memory: Memory, station: str, robot: Robot, now: float, here: Here) -> bool:
+    if not memory.speaks(station, now) or now < memory.shunned.get(station, now):
+        return False
+    if in_the_way(here, station, robot):
+        return False
+    seen, grant = memory.stations[station], memory.grants.get(station)
+    if grant is not None:
+        released = grant.over and grant.robot == seen.robot == robot and seen.state is RELEASED
+        return released and robot in here.get(station, ())
+    if seen.robot != robot or not seen.request_id.startswith(UNREQUESTED):
+        return seen.state is IDLE
+    stands_there = misplaced_in(seen.error)
+    is_refused = stands_there is not None and stands_there.robot == robot
+    return is_refused or seen.state in (IDLE, CHARGING)
+
+
+def standing(memory: Memory, now: float, site: Site) -> Here:
+    """The robots that stand at each station, by their fleets' states of the last REMEMBERED_S."""
+    here: dict[str, list[Robot]] = {}
+    for who, seen in memory.robots.items():
+        station = memory.stands_at(who, site)
+        if station is not None and now < seen.at + REMEMBERED_S:
+            here.setdefault(station, []).append(who)
+    return here
+
+
+def in_the_way(here: Here, station: str, robot: Robot) -> Robot | None:
+    """Another robot that stands at the station; None if there is none."""
+    return next((who for who in here.get(station, ()) if who != robot), None)

@@ -1,0 +1,71 @@
+"""The queue as it is shown: who waits, who wanted that, what for, and until when.
+
+A charge's end is known only if the station reports it. Each robot is shown with the station that it
+will probably get: of those that suit it, the one that is free first and that no robot before it
+will get.
+"""
+
+from collections.abc import Iterator
+from typing import Final
+
+from bridges.kinds.charger.settings import Robot
+from bridges.kinds.charger_coordinator.memory import CHARGING, ERROR, WHOSE, Memory, Site, Wish
+from bridges.kinds.charger_coordinator.queue import Here, in_the_way, standing, suiting
+from bridges.kinds.shared.durations import NEVER
+
+MOST: Final = 4
+"""For at most this many stations the queue says why the robot does not have them."""
+
+
+def queued(memory: Memory) -> list[Wish]:
+    """The wishes without a station, in the order in which they are served."""
+    return [wish for wish in memory.wishes if memory.station_of(wish.robot) is None]
+
+
+def reasons(memory: Memory, now: float, site: Site) -> Iterator[str]:
+    """`tiny/AMR03 by the robot: charger_b charges tiny/AMR01, free in 12 min` for each that waits."""
+    taken: set[str] = set()
+    here = standing(memory, now, site)
+    for wish in queued(memory):
+        stations = suiting(memory, wish, site)
+        left = [name for name in stations if name not in taken]
+        first = min(left, key=lambda name: free_in_s(memory, name, now), default=None)
+        texts = [_obstacle(memory, name, wish.robot, now, here) for name in stations[:MOST]]
+        if len(stations) > MOST:
+            texts.append(f"and {len(stations) - MOST} more")
+        if first is not None and (wait_s := free_in_s(memory, first, now)) < NEVER:
+            taken.add(first)
+            texts.append(f"{first} is free in {_lasts(wait_s)}")
+        why = ", ".join(texts) or "the charging schedule has no station for it"
+        why = why if memory.may_speak else memory.passive
+        yield f"{wish.robot} {WHOSE[wish.by]}: {why}"
+
+
+def free_in_s(memory: Memory, station: str, now: float) -> float:
+    """How long its charge will still take, as it says; NEVER: that is not known."""
+    seen = memory.stations.get(station)
+    if seen is None or seen.state is not CHARGING or not seen.full_in_s:
+        return NEVER
+    return max(0.0, seen.at + seen.full_in_s - now)
+
+
+def _obstacle(memory: Memory, station: str, robot: Robot, now: float, here: Here) -> str:
+    """Why the robot does not have this station."""
+    seen, grant = memory.stations.get(station), memory.grants.get(station)
+    if seen is None or not memory.speaks(station, now):
+        return f"{station} is silent"
+    if now < memory.shunned.get(station, now):
+        return f"{station} takes no request"
+    if grant is not None and not grant.over:
+        does = "charges" if grant.started else "is assigned to"
+        return f"{station} {does} {grant.robot}"
+    other = in_the_way(here, station, robot)
+    if other is not None:
+        return f"{other} stands at {station}"
+    if seen.state is ERROR:
+        return f"{station} is out of service"
+    return f"{station} is not free yet"
+
+
+def _lasts(seconds: float) -> str:
+    return f"{seconds:.0f} s" if seconds < 100 else f"{seconds / 60:.0f} min"

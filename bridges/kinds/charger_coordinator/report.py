@@ -1,0 +1,252 @@
+"""What is sent to stations, fleet adapters and technicians, and what log and status file show.
+
+1. A request is repeated each second until its station shows it. A cancel is repeated each second while
+   the station still shows the request.
+2. Every robot is assigned one place, and no place has two robots: its station (MODE_CHARGE), else the
+   waypoint where it waits (MODE_WAIT). When a place changes, the assignments of all fleets are
+   published, so that a fleet adapter that starts later finds them retained. RMF drives the robot there
+   if it has a charging task (rmf_ros2 9dedd0f, ChargeBattery.cpp, _consider_restart).
+3. Each fault is sent as an Alert once; rmf-web shows it to a person.
+"""
+
+from collections.abc import Iterator
+from typing import Final
+
+import msgspec
+from msgspec.structs import replace
+
+from bridges.kinds.charger.pad import misplaced_in
+from bridges.kinds.charger.report import Diagnosis, diagnosis
+from bridges.kinds.charger.settings import Robot
+from bridges.kinds.charger_coordinator import astray
+from bridges.kinds.charger_coordinator.memory import (
+    ASSIGNED,
+    CHARGING,
+    ERROR,
+    NODE,
+    WHOSE,
+    Grant,
+    Memory,
+    Seen,
+    Site,
+)
+from bridges.kinds.charger_coordinator.reasons import queued, reasons
+from bridges.kinds.shared.decision import Fault
+from bridges.kinds.shared.durations import due_at
+from bridges.messages import definitions as d
+from bridges.messages.stamps import duration
+from bridges.messages.topics import (
+    ALERT,
+    CHARGER_CANCELS,
+    CHARGER_REQUESTS,
+    CHARGING_ASSIGNMENTS,
+    AnyTopic,
+)
+
+Messages = tuple[tuple[AnyTopic, d.Message], ...]
+TITLES: Final = {
+    "ROBOT_FAULTY": "A robot cannot be charged",
+    "STATION_OUT_OF_SERVICE": "A charger is out of service",
+    "STATION_SILENT": "A charger is silent",
+    "WRONG_STATION": "A robot is at the wrong charger",
+    "PAD_BLOCKED": "A robot blocks a charger",
+    "RECEIVER_ERROR": "A robot's receiver reports an error",
+    "REQUEST_NOT_TAKEN": "A charger takes no request",
+}
+ASKS_S: Final = 5.0
+AGAIN_S: Final = 15.0
+"""A robot that comes to a pad unannounced asks for it by its fleet's state, a few seconds later."""
+ERRORS: Final = ("ROBOT_FAULTY", "STATION_OUT_OF_SERVICE")
+
+
+class SiteReport(msgspec.Struct, frozen=True):
+    """The site as it is shown. `read_at`: when a station was last heard (monotonic s). `stations`:
+    (station, its state, its robot and who wanted that). `queue`: the robots that wait, in order, each
+    with what it waits for. `waiting`: the same robots alone. `assigns`: who tells the robots where to
+    charge. `schedule`: its times. `absent`: robots that were called and did not come."""
+
+    read_at: float | None
+    stations: tuple[tuple[str, str], ...] = ()
+    queue: tuple[str, ...] = ()
+    waiting: tuple[Robot, ...] = ()
+    assigns: str = ""
+    schedule: tuple[str, ...] = ()
+    absent: tuple[Robot, ...] = ()
+    faults: tuple[Fault, ...] = ()
+
+    def news(self) -> object:
+        """What is worth a line in the log: everything but running times."""
+        return self.stations, self.waiting, self.assigns, self.schedule, self.absent
+
+
+def report(memory: Memory, now: float, site: Site) -> SiteReport:
+    """The site as it is now."""
+    waiting = queued(memory)
+    return SiteReport(
+        read_at=max((seen.at for seen in memory.stations.values()), default=None),
+        stations=tuple((name, _of(memory, name, now)) for name in site.places),
+        queue=tuple(reasons(memory, now, site)),
+        waiting=tuple(wish.robot for wish in waiting),
+        assigns=_assigns(memory),
+        schedule=tuple(one.text(memory.when) for one in site.schedule),
+        absent=tuple(who for who, until in memory.absent.items() if now < until),
+        faults=tuple(_faults(memory, now, site)),
+    )
+
+
+def _assigns(memory: Memory) -> str:
+    if memory.alone:
+        return "yes" if memory.may_speak else "no"
+    return "no: another node publishes charging_assignments"
+
+
+def _of(memory: Memory, name: str, now: float) -> str:
+    """`CHARGING fleet/robot, by the schedule`, `IDLE`, or `?` before the first state."""
+    seen, grant = memory.stations.get(name), memory.grants.get(name)
+    state = "?" if seen is None else seen.state.name.removeprefix("CHARGER_")
+    if grant is None or grant.over:
+        return state
+    wish = memory.wish(grant.robot)
+    whose = f", {WHOSE[wish.by]}" if wish else ""
+    told = ", told to leave another pad" if grant.robot in memory.nudges else ""
+    return f"{state} {grant.robot}{whose}{told}"
+
+
+def _faults(memory: Memory, now: float, site: Site) -> Iterator[Fault]:
+    for who, stations in memory.strikes.items():
+        if memory.faulty(who):
+            what = f"{who} failed at {' and at '.join(stations)}: not tried again"
+            yield Fault("ROBOT_FAULTY", what)
+    for name in site.places:
+        if now >= memory.silent_since(name):
+            yield Fault("STATION_SILENT", f"{name}: no ChargerState comes")
+        elif name in memory.stations:
+            yield from _faults_of(memory, name, memory.stations[name], now, site)
+        if now < memory.shunned.get(name, now):
+            yield Fault("REQUEST_NOT_TAKEN", f"{name}: its daemon's log says why")
+    for one in astray.found(memory, now, site).values():
+        if astray.alarming(memory, one, now):
+            yield _misplaced(one)
+    for who, error in memory.receivers.items():
+        if error and diagnosis(error) is not Diagnosis.LOST:
+            yield Fault("RECEIVER_ERROR", f"the receiver on {who}: {error}")
+
+
+def _faults_of(memory: Memory, name: str, seen: Seen, now: float, site: Site) -> Iterator[Fault]:
+    """Faults that a station's state shows."""
+    if seen.diagnosis in (Diagnosis.STATION, Diagnosis.LOST, Diagnosis.UNCLEAR):
+        yield Fault("STATION_OUT_OF_SERVICE", f"{name}: {seen.error}")
+    if seen.diagnosis is not Diagnosis.PAD:
+        return
+    who = astray.on_pad(seen.error, site)
+    unasked = who is not None and memory.station_of(who) is None and now >= seen.since + ASKS_S
+    if who is None or unasked:
+        what = who or _stranger(seen.error)
+        yield Fault("WRONG_STATION", f"{what} stands at {name}, but nobody requested that")
+
+
+def _misplaced(one: astray.Astray) -> Fault:
+    if one.expected:
+        text = f"{one.who} stands at {one.station}, but is expected at {one.expected}"
+        return Fault("WRONG_STATION", text)
+    why = "RMF has no charging task that would send it away (finishing_request: charge has one)"
+    return Fault(
+        "PAD_BLOCKED", f"{one.who} stands at {one.station}, and {one.waiter} waits for it: {why}"
+    )
+
+
+def _stranger(error: str) -> str:
+    found = misplaced_in(error)
+    return f"unknown receiver {found.receiver}" if found and found.receiver else "an unknown robot"
+
+
+# ---- messages
+
+
+def messages(
+    memory: Memory, faults: tuple[Fault, ...], now: float, site: Site
+) -> tuple[Memory, Messages]:
+    """The messages that are due; none while it may not publish."""
+    if not memory.may_speak:
+        return memory, ()
+    found: list[tuple[AnyTopic, d.Message]] = []
+    for name, grant in memory.grants.items():
+        if now >= _due_at(memory, name, grant):
+            found.append(_to_station(name, grant))
+            memory = memory.with_grant(name, replace(grant, sent_at=now))
+    assignments = tuple(_assignments(memory, now, site)) if memory.alone else ()
+    forgotten = any(at <= now for at in _again_at(memory, site))
+    if assignments != memory.assigned or forgotten:
+        memory = replace(memory, assigned_at=now)
+        found += [(CHARGING_ASSIGNMENTS, message) for message in assignments]
+    new = {str(fault): fault for fault in faults}
+    found += [(ALERT, _alert(f)) for text, f in new.items() if text not in memory.alerts]
+    memory = replace(memory, assigned=assignments, alerts=frozenset(new))
+    return memory, tuple(found)
+
+
+def _again_at(memory: Memory, site: Site) -> Iterator[float]:
+    """When the assignment of a robot that stands elsewhere without a task is published again.
+
+    An EasyFullControl adapter that starts takes the retained assignment, and a moment later the charger
+    of its own file in its place (seen with Jazzy's). Nothing shows when it does, so the assignment is
+    published every AGAIN_S until the robot moves, or has lost the station.
+    """
+    for name, grant in memory.grants.items():
+        standing = memory.robots.get(grant.robot)
+        place = memory.place_of(grant.robot)
+        if grant.over or grant.started or standing is None or standing.sighting.task_id:
+            continue
+        if place is not None and memory.stands_at(grant.robot, site) != name:
+            yield max(memory.assigned_at, grant.made_at) + AGAIN_S
+
+
+def due(memory: Memory, site: Site) -> list[float]:
+    """When requests, cancels, assignments and faults are due."""
+    if not memory.may_speak:
+        return []
+    asks = [seen.since + ASKS_S for seen in memory.stations.values()]
+    asks += _again_at(memory, site)
+    return asks + [_due_at(memory, name, grant) for name, grant in memory.grants.items()]
+
+
+def _due_at(memory: Memory, name: str, grant: Grant) -> float:
+    seen = memory.stations.get(name)
+    if not grant.over:
+        return due_at(grant.sent_at, new=False, again=not grant.shown)
+    shows_it = seen is not None and seen.request_id == grant.request_id
+    lets_go = seen is None or seen.state not in (ASSIGNED, CHARGING, ERROR)
+    return due_at(grant.sent_at, new=False, again=shows_it and not lets_go)
+
+
+def _to_station(name: str, grant: Grant) -> tuple[AnyTopic, d.Message]:
+    if grant.over:
+        return CHARGER_CANCELS, d.ChargerCancel(name, grant.request_id)
+    who, timeout = grant.robot, duration(grant.start_timeout_s)
+    return CHARGER_REQUESTS, d.ChargerRequest(name, who.fleet, who.name, timeout, grant.request_id)
+
+
+def _assignments(memory: Memory, now: float, site: Site) -> Iterator[d.ChargingAssignments]:
+    """Every robot's place, fleet by fleet, in the order of names. One that is told to leave a pad has
+    for a moment another mode (`astray.py`)."""
+    fleets: dict[str, list[d.ChargingAssignment]] = {}
+    for who in sorted(site.robots):
+        station, told = memory.station_of(who), astray.is_nudged(memory, who, now)
+        charges = (station is None) == told
+        mode = d.ChargingMode.MODE_CHARGE if charges else d.ChargingMode.MODE_WAIT
+        place = site.places[station][who.fleet] if station and not told else site.waits_at[who]
+        assignment = d.ChargingAssignment(who.name, place, int(mode))
+        fleets.setdefault(who.fleet, []).append(assignment)
+    return (d.ChargingAssignments(name, tuple(them)) for name, them in fleets.items())
+
+
+def _alert(fault: Fault) -> d.Alert:
+    """The Alert of a fault. `stamped` appends the time to its id: rmf-web drops an id it knows."""
+    tier = d.AlertTier.TIER_ERROR if fault.code in ERRORS else d.AlertTier.TIER_WARNING
+    return d.Alert(
+        id=f"{NODE}/{fault.code}/{fault.detail}",
+        title=TITLES.get(fault.code, fault.code),
+        subtitle=fault.code,
+        message=fault.detail,
+        tier=int(tier),
+    )

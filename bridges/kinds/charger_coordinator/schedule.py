@@ -1,0 +1,106 @@
+"""The coordinator's own charging schedule: at which times of the week robots are charged, and how far.
+
+Pure: the local time of day and the day of the week are inputs. A time that ends at or before its
+beginning ends on the next day, and belongs to the day on which it begins.
+"""
+
+from collections.abc import Iterable, Iterator
+from typing import Annotated, Final, Literal, NamedTuple
+
+import msgspec
+from msgspec import Meta
+
+from bridges.kinds.charger.settings import Robot
+from bridges.kinds.shared.fields import Name
+
+Day = Literal["mon", "tue", "wed", "thu", "fri", "sat", "sun"]
+DAYS: Final[tuple[Day, ...]] = ("mon", "tue", "wed", "thu", "fri", "sat", "sun")
+DAY_MIN: Final = 24 * 60
+TimeOfDay = Annotated[
+    str,
+    Meta(
+        pattern=r"^([01][0-9]|2[0-3]):[0-5][0-9]$(?!\n)",
+        extra={"pattern": 'a time of day in quotes ("22:00")'},
+    ),
+]
+Target = Annotated[float, Meta(ge=1, le=100, extra={"unit": "%"})]
+
+
+class LocalTime(NamedTuple):
+    """`day`: 0 is Monday. `minute`: since local midnight."""
+
+    day: int
+    minute: int
+
+
+class Charging(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """One time of the week at which robots without a task are charged.
+
+    `at`: when it begins. `until`: when it ends. `days`: on which it begins; every day when absent.
+    `fleets`, `robots`: whom it is for, robots as FLEET/ROBOT; everybody when both are absent.
+    `percent`: how far they are charged.
+    """
+
+    at: TimeOfDay
+    until: TimeOfDay
+    days: list[Day] = msgspec.field(default_factory=lambda: list(DAYS))
+    fleets: list[Name] = []
+    robots: list[Name] = []
+    percent: Target = 100.0
+
+    def concerns(self, who: Robot) -> bool:
+        """Is it for this robot?"""
+        everybody = not self.fleets and not self.robots
+        return everybody or who.fleet in self.fleets or str(who) in self.robots
+
+    def under_way(self, when: LocalTime) -> bool:
+        """Is it in force at this time?"""
+        begins, lasts = _minute(self.at), self.lasts_min()
+        today, yesterday = DAYS[when.day], DAYS[when.day - 1]
+        began_today = today in self.days and 0 <= when.minute - begins < lasts
+        return began_today or (yesterday in self.days and when.minute + DAY_MIN - begins < lasts)
+
+    def lasts_min(self) -> int:
+        """How long it lasts, in minutes: at most a day."""
+        return (_minute(self.until) - _minute(self.at) - 1) % DAY_MIN + 1
+
+    def text(self, when: LocalTime | None) -> str:
+        """`22:00-05:00 mon tue tiny to 100 %: under way`."""
+        days = "" if set(self.days) == set(DAYS) else f" {' '.join(self.days)}"
+        whom = " ".join([*self.fleets, *self.robots]) or "everybody"
+        now = "" if when is None else f": {'under way' if self.under_way(when) else 'not now'}"
+        return f"{self.at}-{self.until}{days} {whom} to {self.percent:g} %{now}"
+
+
+def target(schedule: Iterable[Charging], who: Robot, when: LocalTime | None) -> float:
+    """How far the schedule charges this robot at this time (%); 0 where it does not."""
+    if when is None:
+        return 0.0
+    found = (c.percent for c in schedule if c.concerns(who) and c.under_way(when))
+    return max(found, default=0.0)
+
+
+def problems(
+    schedule: Iterable[Charging],
+    fleets: Iterable[str],
+    robots: Iterable[Robot],
+    least: float,
+    most: float,
+) -> Iterator[tuple[tuple[str, ...], str]]:
+    """Unknown names, and targets that mean nothing between `again_percent` and `full_percent`."""
+    known = {"fleets": set(fleets), "robots": set(map(str, robots))}
+    for i, one in enumerate(schedule):
+        for key, named in (("fleets", one.fleets), ("robots", one.robots)):
+            for n, name in enumerate(named):
+                if name not in known[key]:
+                    there = ", ".join(sorted(known[key]))
+                    yield (str(i), key, str(n)), f"no '{name}' among the {key} ({there})"
+        if one.percent > most:
+            yield (str(i), "percent"), f"is above full_percent ({most:g} %): it is never reached"
+        elif one.percent <= least:
+            text = f"is not above again_percent ({least:g} %): below that they are charged anyway"
+            yield (str(i), "percent"), text
+
+
+def _minute(text: str) -> int:
+    return int(text[:2]) * 60 + int(text[3:])

@@ -1,0 +1,281 @@
+"""The coordinator's section of its YAML: stations, and each fleet's waypoints and robots.
+
+`check` prints what `tables` and `warnings` give.
+"""
+
+import math
+from collections.abc import Iterator
+from typing import Annotated
+from zoneinfo import ZoneInfo
+
+import msgspec
+from msgspec import Meta
+
+from bridges.kinds.charger.settings import ReceiverId, Robot, StartTimeout
+from bridges.kinds.charger_coordinator import schedule as times
+from bridges.kinds.charger_coordinator.schedule import Charging
+from bridges.kinds.shared.fields import GraphSettings, Name, Timeout
+from bridges.kinds.shared.kind import CHARGER, WAYPOINT, Place
+from bridges.kinds.shared.table import Table
+
+Metres = Annotated[float, Meta(ge=-100_000, le=100_000, extra={"unit": "m"})]
+Near = Annotated[float, Meta(ge=0.1, le=5, extra={"unit": "m"})]
+Full = Annotated[float, Meta(ge=50, le=100, extra={"unit": "%"})]
+Low = Annotated[float, Meta(ge=1, le=100, extra={"unit": "%"})]
+Stations = Annotated[list[Name], Meta(min_length=1)]
+
+
+class Waypoint(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A named vertex of the fleet's navigation graph, where the graph has it.
+
+    `level`: its level's name.
+    `x`: its x coordinate in the graph.
+    `y`: its y coordinate in the graph.
+    """
+
+    level: Name
+    x: Metres
+    y: Metres
+
+
+class Station(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A charger, under the name that its own daemon publishes.
+
+    `waypoint`: what the navigation graphs call the place; the same name when absent.
+    `waypoints`: fleet -> what that fleet's graph calls it, where it differs.
+    """
+
+    waypoint: Name | None = None
+    waypoints: dict[Name, Name] = msgspec.field(default_factory=dict)
+
+
+class RobotSettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """One robot.
+
+    `stations`: those that suit it, best first. `waits_at`: its own waypoint, where it waits for a
+    station and stays when it needs none. `receivers`: the ids of its receivers. `rcu`: the name under
+    which the daemon of its own receiver publishes, if it has one: a robot's part, and no station.
+    """
+
+    stations: Stations
+    waits_at: Name
+    receivers: list[ReceiverId] = msgspec.field(default_factory=list)
+    rcu: Name | None = None
+
+
+class Fleet(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A fleet by the name of its adapter.
+
+    `waypoints`: the stations' and waiting places in its navigation graph. RMF's fleet adapter crashes
+    on a name that its graph does not have, so it is sent no other names.
+    `robots`: those that charge here, by the adapter's names.
+    """
+
+    waypoints: dict[Name, Waypoint]
+    robots: dict[Name, RobotSettings]
+
+
+class Settings(GraphSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Which robots charge where.
+
+    `stations`: the chargers, by the names under which their daemons publish.
+    `fleets`: the fleets whose robots charge at them.
+    `start_timeout_s`: how long a station stays assigned to a robot that is on its way.
+    `near_m`: a robot stands at the nearest waypoint, if that is no farther away than this.
+    `full_percent`: the charge at which a robot gives up its station.
+    `again_percent`: below this a robot without a task is charged. One that was charged comes back in
+    its task only below this.
+    `leaves_s`: how long a robot may stay on a pad that it no longer needs while another waits for it.
+    `schedule`: times of the week at which robots without a task are charged.
+    `timezone`: that of the schedule's times (Asia/Singapore); this machine's when absent.
+    """
+
+    stations: dict[Name, Station]
+    fleets: dict[Name, Fleet]
+    start_timeout_s: StartTimeout = 300.0
+    near_m: Near = 1.0
+    full_percent: Full = 100.0
+    again_percent: Low = 90.0
+    leaves_s: Timeout = 60.0
+    schedule: list[Charging] = msgspec.field(default_factory=list)
+    timezone: Name | None = None
+
+    def on_map(self) -> Iterator[Place]:
+        """The stations' places and each fleet's waypoints, which RMF's map must name too."""
+        for name, station in self.stations.items():
+            if set(self.fleets) - set(station.waypoints):
+                path = ("stations", name, *(["waypoint"] if station.waypoint else []))
+                yield path, CHARGER, station.waypoint or name
+            for fleet, waypoint in station.waypoints.items():
+                yield ("stations", name, "waypoints", fleet), CHARGER, waypoint
+        for fleet, settings in self.fleets.items():
+            for name in settings.waypoints:
+                yield ("fleets", fleet, "waypoints", name), WAYPOINT, name
+
+    def problems(self) -> Iterator[tuple[tuple[str, ...], str]]:
+        """Unknown names, places given twice, contradictory percentages."""
+        for key in ("stations", "fleets"):
+            if not getattr(self, key):
+                yield (key,), f"'{key}' is empty: there is nothing to coordinate"
+        if self.again_percent > self.full_percent:
+            yield ("again_percent",), "is above full_percent: a full robot would come back at once"
+        for name, station in self.stations.items():
+            for path, text in self._of_station(name, station):
+                yield ("stations", name, *path), text
+        for name, fleet in self.fleets.items():
+            for path, text in self._of_fleet(name, fleet):
+                yield ("fleets", name, *path), text
+        yield from self._doubles()
+        yield from self._of_schedule()
+
+    def _of_station(self, name: str, station: Station) -> Iterator[tuple[tuple[str, ...], str]]:
+        places = self.places()[name]
+        if not self._graphs_with(name):
+            text = (
+                f"'{name}' stands at '{station.waypoint or name}', which is in no fleet's waypoints"
+            )
+            yield ("waypoint",), text
+        for fleet in station.waypoints:
+            if fleet not in self.fleets:
+                yield ("waypoints", fleet), f"no fleet '{fleet}'; there are {', '.join(places)}"
+            elif places[fleet] not in self.fleets[fleet].waypoints:
+                yield ("waypoints", fleet), f"'{places[fleet]}' is not in that fleet's waypoints"
+
+    def _graphs_with(self, station: str) -> list[str]:
+        """The fleets that know the station's place."""
+        places = self.places()[station]
+        return [name for name, fleet in self.fleets.items() if places[name] in fleet.waypoints]
+
+    def _of_fleet(self, fleet_name: str, fleet: Fleet) -> Iterator[tuple[tuple[str, ...], str]]:
+        known = ", ".join(fleet.waypoints) or "none"
+        chargers = {places[fleet_name] for places in self.places().values()}
+        for name, robot in fleet.robots.items():
+            if robot.waits_at not in fleet.waypoints:
+                text = f"no waypoint '{robot.waits_at}' in this fleet's list ({known})"
+                yield ("robots", name, "waits_at"), text
+            elif robot.waits_at in chargers:
+                text = f"'{robot.waits_at}' is a charger's place: a robot waits somewhere else"
+                yield ("robots", name, "waits_at"), text
+            for i, station in enumerate(robot.stations):
+                path = ("robots", name, "stations", str(i))
+                if station not in self.stations:
+                    yield path, f"no station '{station}'; there are {', '.join(self.stations)}"
+                elif (place := self.places()[station][fleet_name]) not in fleet.waypoints:
+                    if not self._graphs_with(station):
+                        continue
+                    yield path, f"'{station}' is at '{place}', not in this fleet's list ({known})"
+
+    def _doubles(self) -> Iterator[tuple[tuple[str, ...], str]]:
+        """One place, one robot; one receiver, one robot; one name, one station or receiver."""
+        taken: dict[tuple[str, str], str] = {}
+        for station, places in self.places().items():
+            for fleet, place in places.items():
+                owner = taken.setdefault((fleet, place), station)
+                if owner != station:
+                    text = f"'{station}' stands at '{place}', as '{owner}' does"
+                    yield ("stations", station), text
+                    break
+        taken |= {("rcu", station): f"the station '{station}'" for station in self.stations}
+        for who, robot in self.robots().items():
+            path = ("fleets", who.fleet, "robots", who.name)
+            things = [("waits_at", robot.waits_at), *(("receivers", r) for r in robot.receivers)]
+            for key, thing in [*things, *([("rcu", robot.rcu)] if robot.rcu else [])]:
+                owner = taken.setdefault((key, thing), str(who))
+                if owner != str(who):
+                    yield (
+                        (*path, key),
+                        f"'{thing}' already belongs to {owner}: only one robot can have it",
+                    )
+
+    def _of_schedule(self) -> Iterator[tuple[tuple[str, ...], str]]:
+        least, most = self.again_percent, self.full_percent
+        for path, text in times.problems(self.schedule, self.fleets, self.robots(), least, most):
+            yield ("schedule", *path), text
+        try:
+            ZoneInfo(self.timezone or "UTC")
+        except (KeyError, OSError, ValueError):  # ZoneInfoNotFoundError is a KeyError
+            yield ("timezone",), f"no time zone '{self.timezone}' on this machine (Asia/Singapore)"
+
+    def robots(self) -> dict[Robot, RobotSettings]:
+        """Every robot, by fleet and name."""
+        return {
+            Robot(fleet_name, name): robot
+            for fleet_name, fleet in self.fleets.items()
+            for name, robot in fleet.robots.items()
+        }
+
+    def places(self) -> dict[str, dict[str, str]]:
+        """Station -> fleet -> the waypoint where it is."""
+        return {
+            name: {fleet: at.waypoints.get(fleet, at.waypoint or name) for fleet in self.fleets}
+            for name, at in self.stations.items()
+        }
+
+    def rcus(self) -> dict[str, Robot]:
+        """The name under which a robot's own receiver publishes -> the robot."""
+        return {robot.rcu: who for who, robot in self.robots().items() if robot.rcu}
+
+
+def tables(settings: Settings) -> Iterator[Table]:
+    """Each robot and its places, each station and its waypoint, and the schedule."""
+    yield Table(
+        "robots",
+        ("robot", "charges at", "waits at", "receivers"),
+        tuple(
+            (str(who), ", ".join(r.stations), r.waits_at, ", ".join(r.receivers) or "-")
+            for who, r in settings.robots().items()
+        ),
+    )
+    yield Table(
+        "stations",
+        ("charger", "at waypoint"),
+        tuple((name, _named(places)) for name, places in settings.places().items()),
+    )
+    if settings.schedule:
+        rows = tuple((one.text(None),) for one in settings.schedule)
+        yield Table("schedule", ("robots without a task are charged",), rows)
+
+
+def _named(places: dict[str, str]) -> str:
+    """`dock_b`, or `tiny: dock_b, big: station_2` where the fleets differ."""
+    names = set(places.values())
+    if len(names) == 1:
+        return names.pop()
+    return ", ".join(f"{fleet}: {place}" for fleet, place in places.items())
+
+
+def speaks_of(settings: Settings) -> Iterator[Place]:
+    """Its stations are chargers' daemons."""
+    for name in settings.stations:
+        yield ("stations", name), CHARGER, name
+
+
+def warnings(settings: Settings) -> Iterator[tuple[tuple[str, ...], str]]:
+    """What is legal but may be a mistake."""
+    used = {name for robot in settings.robots().values() for name in robot.stations}
+    for name in settings.stations:
+        if name not in used:
+            yield ("stations", name), f"no robot charges at '{name}'"
+    for who, robot in settings.robots().items():
+        path = ("fleets", who.fleet, "robots", who.name)
+        if len(set(robot.stations)) == 1:
+            only = f"{who} charges only at '{robot.stations[0]}'"
+            yield (
+                path,
+                f"{only}: if a charge fails there, nothing shows whether robot or charger is at fault",
+            )
+    yield from _near(settings)
+
+
+def _near(settings: Settings) -> Iterator[tuple[tuple[str, ...], str]]:
+    """Places so close together that a robot's position cannot tell them apart."""
+    for fleet_name, fleet in settings.fleets.items():
+        names = list(fleet.waypoints)
+        for i, name in enumerate(names):
+            a = fleet.waypoints[name]
+            for other in names[:i]:
+                b = fleet.waypoints[other]
+                apart = math.dist((a.x, a.y), (b.x, b.y))
+                if a.level == b.level and apart < settings.near_m:
+                    text = f"'{name}' is less than near_m ({settings.near_m:g} m) from '{other}'"
+                    yield ("fleets", fleet_name, "waypoints", name), text

@@ -1,0 +1,91 @@
+"""What the coordinator's core hears from the graph: fleets, stations, schedules and operators."""
+
+import re
+from typing import Final
+
+import msgspec
+
+from bridges.kinds.charger.settings import Robot
+from bridges.kinds.charger_coordinator.schedule import LocalTime
+from bridges.kinds.shared.decision import OperatorReset
+from bridges.kinds.shared.graph_kind import MaySpeak, Woken
+from bridges.messages.definitions import ChargerStateValue
+
+_DISPATCHED: Final = re.compile(r"(?!charge)[^.]+\.dispatch-")
+"""RMF's dispatcher names a task CATEGORY.dispatch-NUMBER, and its adapters call their own charging task
+Charge and a UUID (rmf_ros2 jazzy 7eef65a, Dispatcher.cpp; rmf_task jazzy, ChargeBatteryFactory.cpp)."""
+
+
+def is_dispatched(task_id: str) -> bool:
+    """Did RMF's dispatcher give this task? Then it is a patrol or a delivery, never a charge."""
+    return _DISPATCHED.match(task_id) is not None
+
+
+class Sighting(msgspec.Struct, frozen=True):
+    """One robot of a FleetState. `charges`: its mode is CHARGING or DOCKING, and its task is not one
+    that RMF's dispatcher gave it. `place`: which of our waypoints it stands at; None for none."""
+
+    who: Robot
+    charges: bool
+    place: str | None
+    battery_percent: float
+    task_id: str
+
+
+class FleetSeen(msgspec.Struct, frozen=True):
+    """A FleetState, with the robots that the YAML names. `when`: the local time; None if not known."""
+
+    robots: tuple[Sighting, ...]
+    when: LocalTime | None = None
+
+
+class StateHeard(msgspec.Struct, frozen=True):
+    """A ChargerState. `robot`: None where it names none. `full_in_s`: 0 where it is not known."""
+
+    station: str
+    state: ChargerStateValue
+    request_id: str = ""
+    robot: Robot | None = None
+    error: str = ""
+    full_in_s: float = 0.0
+
+
+class ReceiverHeard(msgspec.Struct, frozen=True):
+    """A ChargerState of a robot's own receiver, which is no station. `error`: "" without one."""
+
+    robot: Robot
+    error: str
+
+
+class Wanted(msgspec.Struct, frozen=True):
+    """An operator wants this robot charged; `station`: preferably there, "" for anywhere."""
+
+    robot: Robot
+    station: str
+    request_id: str
+    start_timeout_s: float
+
+
+class Unwanted(msgspec.Struct, frozen=True):
+    """An operator withdraws a request."""
+
+    request_id: str
+
+
+class Dedicated(msgspec.Struct, frozen=True):
+    """Another node's charging assignments: each robot and the station that it is to use, or ""."""
+
+    stations: tuple[tuple[Robot, str], ...]
+
+
+Event = (
+    FleetSeen
+    | StateHeard
+    | ReceiverHeard
+    | Wanted
+    | Unwanted
+    | Dedicated
+    | MaySpeak
+    | OperatorReset
+    | Woken
+)

@@ -1,0 +1,246 @@
+"""What the stations' states say of the requests that were made, and of who is at fault.
+
+1. A station shows how a request ends. Released after charging: the wish is fulfilled. Released without
+   charging: the robot did not come. Then a fleet's wish goes to the end of the queue if its robot
+   stands at one of our waypoints. Any other wish is over. If the robot stands at that very station, it
+   has failed there. A station that no longer shows a request, and has not released it, has forgotten
+   it: its daemon was restarted. The wish stays, and the station is asked again (`_forgot`). The power
+   may have been switched off meanwhile: a charge that ends within PROVEN_S of that was cut short.
+2. After an error of the station, the robot gets another station and keeps its place in the queue. If
+   the robot is at fault, or it is unclear which side is, that also counts as a failure of the
+   robot. After its second failure (at a second station if it has one) it is not tried again, and a
+   technician is told.
+3. A failure no longer counts once the robot has been charged for PROVEN_S, or fully. Nor does it once
+   the station where it failed is found faulty: the error names the station, or it ended only after
+   the robot had been gone for PROVEN_S.
+4. If another robot is on the pad, the assigned one keeps the station for its start_timeout. A station
+   that cannot be reached says nothing about the charge. A robot that was charging there keeps it; one
+   that was on its way gets another station after LOST_S.
+"""
+
+from typing import Final
+
+from msgspec.structs import replace
+
+from bridges.kinds.charger.report import OUT_OF_SERVICE, UNREQUESTED, Diagnosis, diagnosis
+from bridges.kinds.charger.settings import Robot
+from bridges.kinds.charger_coordinator.memory import (
+    ASSIGNED,
+    CHARGING,
+    ERROR,
+    IDLE,
+    NODE,
+    RELEASED,
+    Grant,
+    Memory,
+    Seen,
+    Site,
+    Wish,
+    without,
+)
+from bridges.kinds.charger_coordinator.signals import StateHeard
+from bridges.kinds.charger_coordinator.wishes import COMES_S, fulfilled, gives_up, stays_away
+from bridges.kinds.shared.durations import AGES_AGO, NEVER
+
+TAKEN_S: Final = 10.0
+SHUNNED_S: Final = 30.0
+LOST_S: Final = 30.0
+PROVEN_S: Final = 10.0
+
+
+def heard(memory: Memory, state: StateHeard, now: float, site: Site) -> Memory:
+    """A station has shown its state."""
+    name, before = state.station, memory.stations.get(state.station)
+    same = before is not None and (before.state, before.error) == (state.state, state.error)
+    since = before.since if before is not None and same else now
+    seen = Seen(
+        state.state, state.request_id, state.robot, state.error, now, since, state.full_in_s
+    )
+    memory = replace(memory, stations={**memory.stations, name: seen})
+    memory = _acquitted(memory, name, before, now, site)
+    grant = memory.grants.get(name)
+    if grant is None:
+        return memory
+    if state.state is not IDLE and state.request_id == grant.request_id:
+        return _followed(memory, name, grant, seen, now, site)
+    if grant.over:
+        return memory.with_grant(name, None)
+    if grant.shown and seen.diagnosis is Diagnosis.LOST:
+        return memory
+    if grant.shown and not _forgot(memory, name, grant, now, site):
+        return _ended(memory.with_grant(name, None), name, grant, now, site)
+    return memory.with_grant(name, _repeated(grant, seen, now))
+
+
+def _forgot(memory: Memory, name: str, grant: Grant, now: float, site: Site) -> bool:
+    """Has the station forgotten the request that it has shown? An IDLE one may also have released it
+    without our notice. Then the robot has left, or did not come in time."""
+    seen = memory.stations[name]
+    if seen.state is not IDLE:
+        return seen.request_id.startswith(UNREQUESTED)
+    if grant.started:
+        return memory.stands_at(grant.robot, site) == name
+    return now < grant.made_at + grant.start_timeout_s
+
+
+def _repeated(grant: Grant, seen: Seen, now: float) -> Grant | None:
+    """The grant while the station does not show its request yet; None if it will not take it."""
+    before = seen.state is RELEASED or seen.request_id.startswith(UNREQUESTED)
+    may_come = seen.state is IDLE or (before and seen.robot == grant.robot)
+    if not may_come or not grant.request_id.startswith(f"{NODE}/"):
+        return None
+    if not grant.shown and not grant.started:
+        return grant
+    return replace(grant, forgotten_at=now, shown=False, started=False, sent_at=AGES_AGO)
+
+
+def _followed(
+    memory: Memory, name: str, grant: Grant, seen: Seen, now: float, site: Site
+) -> Memory:
+    """The station shows our request."""
+    grant = replace(grant, shown=True, started=grant.started or seen.state is CHARGING)
+    memory = memory.with_grant(name, grant)
+    if grant.over:
+        return memory
+    if seen.state is RELEASED:
+        memory = _ended(memory, name, grant, now, site)
+        return memory.with_grant(name, replace(grant, over=True))
+    if seen.diagnosis in (Diagnosis.ROBOT, Diagnosis.STATION, Diagnosis.UNCLEAR):
+        memory = memory.with_grant(name, replace(grant, over=True, sent_at=AGES_AGO))
+        return memory if seen.diagnosis is Diagnosis.STATION else _struck(memory, name, grant.robot)
+    return memory
+
+
+def _ended(memory: Memory, name: str, grant: Grant, now: float, site: Site) -> Memory:
+    """A request has ended without our cancel."""
+    who, wish = grant.robot, memory.wish(grant.robot)
+    if grant.started and now < grant.forgotten_at + PROVEN_S:
+        return memory
+    if grant.started:
+        return fulfilled(memory, who, site)
+    if memory.stands_at(who, site) == name:
+        memory = _struck(memory, name, who)
+    stays = wish is not None and wish.by != "operator" and memory.place_of(who) is not None
+    return memory.last_in_queue(who) if stays else memory.without_wish(who)
+
+
+def _struck(memory: Memory, name: str, who: Robot) -> Memory:
+    """The robot has failed at this station. After its second failure it is not tried again."""
+    strikes = {**memory.strikes, who: (*memory.strikes.get(who, ()), name)}
+    memory = replace(memory, strikes=strikes)
+    return memory.without_wish(who) if memory.faulty(who) else memory
+
+
+def adopted(memory: Memory, now: float, site: Site) -> Memory:
+    """Adopt requests that another node has made for our robots, and charges that nobody requested."""
+    for name, seen in memory.stations.items():
+        if name not in memory.grants and seen.state in (ASSIGNED, CHARGING):
+            memory = _adopt(memory, name, seen, now, site)
+    return memory
+
+
+def _adopt(memory: Memory, name: str, seen: Seen, now: float, site: Site) -> Memory:
+    who = seen.robot or _waits_at(memory, name, site)
+    if who is None or who not in site.robots:
+        return memory
+    elsewhere = memory.station_of(who) is not None
+    if elsewhere and not seen.request_id.startswith(f"{NODE}/"):
+        return memory
+    to_request = seen.robot is not None and seen.request_id.startswith(UNREQUESTED)
+    if not to_request:
+        started = seen.state is CHARGING
+        grant = Grant(who, seen.request_id, now, shown=True, started=started, over=elsewhere)
+        memory = memory.with_grant(name, grant)
+    if elsewhere or memory.wish(who) is not None:
+        return memory
+    return replace(memory, wishes=(*memory.wishes, Wish(who, "operator")))
+
+
+def _waits_at(memory: Memory, station: str, site: Site) -> Robot | None:
+    """Which robot is charged here without a name: one with a wish that stands here."""
+    here = (w.robot for w in memory.wishes if memory.stands_at(w.robot, site) == station)
+    return next((who for who in here if memory.station_of(who) is None), None)
+
+
+# ---- time
+
+
+def in_time(memory: Memory, now: float, site: Site) -> Memory:
+    """What changes without an event."""
+    for name, grant in list(memory.grants.items()):
+        if grant.over or grant.started:
+            continue
+        if memory.may_speak and not grant.shown and now >= not_taken_at(grant):
+            shunned = {**memory.shunned, name: now + SHUNNED_S}
+            memory = replace(memory, shunned=shunned).with_grant(name, None)
+            memory = memory.last_in_queue(grant.robot)
+        elif grant.shown and now >= hopeless_at(memory, name, grant):
+            memory = memory.takes_back(grant.robot)
+        elif now >= absent_at(memory, name, grant, site):
+            memory = gives_up(memory, grant.robot, now)
+    return _proven(memory, now)
+
+
+def not_taken_at(grant: Grant) -> float:
+    """When a station that does not show this request is passed over."""
+    return max(grant.made_at, grant.forgotten_at) + TAKEN_S
+
+
+def hopeless_at(memory: Memory, name: str, grant: Grant) -> float:
+    """When a robot on its way should get another station. Reasons: we do not hear the station's
+    daemon, the daemon does not reach the station, or another robot does not leave the pad."""
+    seen, at = memory.stations.get(name), memory.silent_since(name) + LOST_S
+    if seen is not None and seen.diagnosis is Diagnosis.LOST:
+        at = min(at, seen.since + LOST_S)
+    if seen is not None and seen.diagnosis is Diagnosis.PAD:
+        at = min(at, seen.since + max(grant.start_timeout_s, LOST_S))
+    return at
+
+
+def absent_at(memory: Memory, name: str, grant: Grant, site: Site) -> float:
+    """When a robot that was called, and does not come, loses the station."""
+    stays = memory.may_speak and grant.shown and stays_away(memory, name, grant, site)
+    return grant.made_at + COMES_S if stays else NEVER
+
+
+# ---- whose fault
+
+
+def _acquitted(memory: Memory, name: str, before: Seen | None, now: float, site: Site) -> Memory:
+    """Forget robots' failures at this station that turn out to be the station's fault."""
+    for who, failed_at in memory.strikes.items():
+        if name in failed_at and _was_the_stations(memory, who, name, before, now, site):
+            left = tuple(station for station in failed_at if station != name)
+            rest = without(memory.strikes, who)
+            memory = replace(memory, strikes=rest | ({who: left} if left else {}))
+    return memory
+
+
+def _was_the_stations(
+    memory: Memory, who: Robot, name: str, before: Seen | None, now: float, site: Site
+) -> bool:
+    """Does the error name the station, or did it end only long after the robot had left?"""
+    seen, standing = memory.stations[name], memory.robots.get(who)
+    if seen.state is ERROR:
+        return diagnosis(seen.error.removeprefix(OUT_OF_SERVICE)) is Diagnosis.STATION
+    failed = before and before.diagnosis in (Diagnosis.STATION, Diagnosis.UNCLEAR)
+    if not failed or standing is None or memory.stands_at(who, site) == name:
+        return False
+    return now >= standing.here_since + PROVEN_S
+
+
+def _proven(memory: Memory, now: float) -> Memory:
+    """Forget the failures of robots that are being charged."""
+    for who in memory.strikes:
+        if now >= proven_at(memory, who):
+            memory = replace(memory, strikes=without(memory.strikes, who))
+    return memory
+
+
+def proven_at(memory: Memory, who: Robot) -> float:
+    """When a robot that is being charged has proven that it can be."""
+    station = memory.station_of(who)
+    seen = memory.stations.get(station or "")
+    if station is None or seen is None or not memory.grants[station].started:
+        return NEVER
+    return seen.since + PROVEN_S if seen.state is CHARGING else NEVER

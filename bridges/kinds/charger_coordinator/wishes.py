@@ -1,0 +1,228 @@
+"""Who wants to be charged. Place, battery and task decide; the mode is a hint.
+
+RMF's fleet adapter shows the mode CHARGING from the first charge on, in every later task too, and
+IDLE in none (rmf_ros2 9dedd0f: TaskManager::robot_mode; RobotContext::current_mode, which WaitForCharge
+and DockRobot alone set). The id of a task that RMF's dispatcher gave says that it is no charge. So, of
+a robot that has stood at one of our waypoints for SETTLES_S:
+1. Below `again_percent` it wants to be charged, if it has no task, or shows CHARGING or DOCKING.
+2. Above that, and below `full_percent`, only a task that shows CHARGING or DOCKING is believed. A robot
+   that was charged in that task is not served again. One that was charged, and has not left our
+   waypoints since, may be waiting for traffic on its pad: it is believed after LINGERS_S.
+3. Without a task, it wants to be charged where a schedule says so; after that, not again in the same
+   time before it has worked.
+4. A wish lasts while this is so, and while the robot drives to its station: in the same task, or
+   without one while a station is assigned to it. A task that begins within COMES_S of
+   the call is that drive: RMF's automatic retreat, or its ChargeBattery started again. A dispatched
+   task is not.
+5. RMF moves no robot without a task under `finishing_request: nothing`, until its battery is very low;
+   nor under `park`, except Jazzy's, which drives to the assigned place. Such a robot keeps its place
+   when it is called. After COMES_S it loses the station, and ABSENT_S later it is called again.
+"""
+
+from typing import Final
+
+from msgspec.structs import replace
+
+from bridges.kinds.charger.settings import Robot
+from bridges.kinds.charger_coordinator import schedule
+from bridges.kinds.charger_coordinator.memory import (
+    By,
+    Grant,
+    Memory,
+    Site,
+    Standing,
+    Wish,
+    without,
+)
+from bridges.kinds.charger_coordinator.signals import Sighting, Wanted, is_dispatched
+
+SETTLES_S: Final = 2.0
+"""A robot that passes by on another task may still show the mode CHARGING."""
+LINGERS_S: Final = 300.0
+"""No traffic jam lasts this long: a robot that stands there even longer waits for its battery."""
+COMES_S: Final = 60.0
+"""RMF acts on a charging assignment at once, or not at all."""
+ABSENT_S: Final = 600.0
+
+
+def sighted(memory: Memory, sighting: Sighting, now: float, site: Site) -> Memory:
+    """A fleet has shown one robot."""
+    who = sighting.who
+    standing = _standing(memory.robots.get(who), sighting, now)
+    memory = replace(memory, robots={**memory.robots, who: standing})
+    memory = _rested(_called(_served(memory, sighting), sighting, now), sighting, site)
+    wish = memory.wish(who)
+    if wish is None:
+        return _begun(memory, standing, now, site)
+    if wish.by == "operator":
+        return fulfilled(memory.takes_back(who), who, site) if _full(memory, wish, site) else memory
+    if _lasts(memory, wish, sighting, site):
+        return memory
+    full = _full(memory, wish, site)
+    memory = memory.takes_back(who)
+    return fulfilled(memory, who, site) if full else memory.without_wish(who)
+
+
+def wanted(memory: Memory, event: Wanted, site: Site) -> tuple[Memory, str]:
+    """An operator wants this robot charged."""
+    who = event.robot
+    if event.request_id in memory.over:
+        return memory, "request is over"
+    if event.station and event.station not in site.robots[who]:
+        return memory, "station does not suit the robot"
+    wish, before = Wish.of(event), memory.wish(who)
+    if wish == before:
+        return memory, ""
+    memory = replace(memory, strikes=without(memory.strikes, who))
+    if before is None:
+        return replace(memory, wishes=(*memory.wishes, wish)), ""
+    has = memory.station_of(who)
+    if wish.station not in ("", has):
+        memory = memory.takes_back(who)
+    return replace(memory, wishes=tuple(wish if w is before else w for w in memory.wishes)), ""
+
+
+def unwanted(memory: Memory, request_id: str) -> tuple[Memory, str]:
+    """An operator withdraws a request."""
+    wish = next((w for w in memory.wishes if request_id and w.request_id == request_id), None)
+    grants = memory.grants.values()
+    granted = next((g.robot for g in grants if g.request_id == request_id and not g.over), None)
+    who = wish.robot if wish else granted
+    if who is None:
+        return memory, "" if request_id in memory.over else "no such request"
+    return memory.takes_back(who).without_wish(who), ""
+
+
+def fulfilled(memory: Memory, who: Robot, site: Site) -> Memory:
+    """The robot was charged in its present task, so its failures are forgotten."""
+    standing = memory.robots.get(who)
+    served = {**memory.served, who: standing.sighting.task_id if standing else ""}
+    memory = replace(memory, served=served, strikes=without(memory.strikes, who))
+    if schedule.target(site.schedule, who, memory.when):
+        memory = replace(memory, rested=memory.rested | {who})
+    return memory.without_wish(who)
+
+
+def stays_away(memory: Memory, station: str, grant: Grant, site: Site) -> bool:
+    """Has a robot without a task not left its place since it was called?"""
+    standing, wish = memory.robots.get(grant.robot), memory.wish(grant.robot)
+    if standing is None or wish is None or wish.by == "operator" or standing.sighting.task_id:
+        return False
+    elsewhere = memory.stands_at(grant.robot, site) != station
+    return elsewhere and standing.here_since <= grant.made_at
+
+
+def gives_up(memory: Memory, who: Robot, now: float) -> Memory:
+    """It did not come when it was called: the station is for others."""
+    absent = {**memory.absent, who: now + ABSENT_S}
+    return replace(memory.takes_back(who).without_wish(who), absent=absent)
+
+
+# ---- inside
+
+
+def _standing(before: Standing | None, sighting: Sighting, now: float) -> Standing:
+    if before is None:
+        return Standing(sighting, now)
+    was = before.sighting
+    here = was.place == sighting.place
+    same = here and (was.charges, was.task_id) == (sighting.charges, sighting.task_id)
+    return Standing(
+        sighting, now, before.since if same else now, before.here_since if here else now
+    )
+
+
+def _served(memory: Memory, sighting: Sighting) -> Memory:
+    """Forget in which task a robot was charged, once it has left in another one."""
+    who, task = sighting.who, sighting.task_id
+    if sighting.place is None and task and memory.served.get(who, task) != task:
+        return replace(memory, served=without(memory.served, who))
+    return memory
+
+
+def _rested(memory: Memory, sighting: Sighting, site: Site) -> Memory:
+    """Note whether the robot is full enough for the schedule now. That holds until the schedule's
+    time is over, or the robot has worked."""
+    who = sighting.who
+    aim = schedule.target(site.schedule, who, memory.when)
+    worked = bool(sighting.task_id) and sighting.place is None
+    if not aim or worked:
+        return replace(memory, rested=memory.rested - {who})
+    if sighting.battery_percent >= aim:
+        return replace(memory, rested=memory.rested | {who})
+    return memory
+
+
+def _called(memory: Memory, sighting: Sighting, now: float) -> Memory:
+    """A task that begins when the robot is called is its drive to the station, unless the dispatcher
+    gave it."""
+    who, task = sighting.who, sighting.task_id
+    wish, station = memory.wish(who), memory.station_of(who)
+    if wish is None or wish.by == "operator" or wish.task_id or not task or station is None:
+        return memory
+    grant = memory.grants[station]
+    if grant.started or now >= grant.made_at + COMES_S or is_dispatched(task):
+        return memory
+    called = replace(wish, task_id=task, called=True)
+    return replace(memory, wishes=tuple(called if w is wish else w for w in memory.wishes))
+
+
+def _begun(memory: Memory, standing: Standing, now: float, site: Site) -> Memory:
+    sighting = standing.sighting
+    who = sighting.who
+    by = None if memory.faulty(who) else _asks(memory, standing, now, site)
+    if by is None:
+        return memory
+    memory = replace(memory, served=without(memory.served, who), absent=without(memory.absent, who))
+    return replace(memory, wishes=(*memory.wishes, Wish(who, by, sighting.task_id)))
+
+
+def _asks(memory: Memory, standing: Standing, now: float, site: Site) -> By | None:
+    """Who wants this robot charged, by its fleet's state and the schedule; None for nobody."""
+    s = standing.sighting
+    if s.place is None or s.battery_percent >= site.full_percent:
+        return None
+    if now < standing.since + SETTLES_S or standing.works:
+        return None
+    low = s.battery_percent < site.again_percent
+    if s.charges and (low or _believed(memory, standing, now)):
+        return "schedule" if s.who in memory.preferred and not memory.alone else "fleet"
+    if s.charges or now < memory.absent.get(s.who, now):
+        return None
+    aim = schedule.target(site.schedule, s.who, memory.when)
+    if s.battery_percent < aim and s.who not in memory.rested:
+        return "schedule"
+    return "fleet" if low else None
+
+
+def _believed(memory: Memory, standing: Standing, now: float) -> bool:
+    """Does the mode belong to its present task, and not to an earlier one?"""
+    served = memory.served.get(standing.sighting.who)
+    if served is None:
+        return True
+    return served != standing.sighting.task_id and now >= standing.since + LINGERS_S
+
+
+def _lasts(memory: Memory, wish: Wish, s: Sighting, site: Site) -> bool:
+    """Does it still want to be charged, and stand at one of our waypoints or drive there?"""
+    if s.battery_percent >= _goal(memory, wish, site):
+        return False
+    same = s.task_id == wish.task_id
+    if s.place is not None:
+        return s.charges or not s.task_id or (same and wish.called)
+    return same and (bool(s.task_id) or memory.station_of(s.who) is not None)
+
+
+def _goal(memory: Memory, wish: Wish, site: Site) -> float:
+    """The battery charge (%) at which the wish is fulfilled."""
+    if wish.by != "schedule" or not site.schedule:
+        return site.full_percent
+    aim = schedule.target(site.schedule, wish.robot, memory.when)
+    return max(aim, site.again_percent)
+
+
+def _full(memory: Memory, wish: Wish, site: Site) -> bool:
+    """Has its robot been charged, and does its fleet show that the goal is reached?"""
+    grant = memory.grants.get(memory.station_of(wish.robot) or "")
+    percent = memory.robots[wish.robot].sighting.battery_percent
+    return grant is not None and grant.started and percent >= _goal(memory, wish, site)

@@ -1,0 +1,178 @@
+"""The door's decision core: one pure decision for each event.
+
+Rules:
+- OPEN latches the hold, from any requester and any number of times. CLOSE releases it after
+  `close_grace_s`. An OPEN in that time cancels the CLOSE; a repeated CLOSE does not prolong it. (The
+  reason: RMF's supervisor, restarted while a robot stands in the doorway, first sends a CLOSE.)
+- Nothing ever drives the door shut. Silence never releases the hold: RMF is silent while a robot
+  passes. If the site has set `supervisor_lost_s`, the hold ends when for so long no node has been there
+  that publishes door requests.
+- After the hold has ended, and until the door is seen closed, an obstruction switches it on again.
+- In a fire alarm the site's `on_fire` decides. `open` holds the door open, and no CLOSE releases it.
+  `release` switches the hold off, clears the latch and refuses OPEN. The state is then UNKNOWN: no
+  robot enters a door that is about to close, and RMF's supervisor stops repeating its request.
+- Without a fresh reading the state is OFFLINE and the hold is off. The latch is kept, and the hold
+  comes on again with the first good reading.
+- The state is OPEN only if the contact of the fully open door says so. If both contacts are closed it
+  is UNKNOWN. If neither is, it is MOVING, and UNKNOWN after `travel_s`. If the controller does not say
+  where the door is, it is UNKNOWN.
+- While another node publishes states under this door's name, the state is OFFLINE and the hold is off.
+
+A fault only describes; it changes no output. It lasts as long as its cause, so an operator has nothing
+to reset.
+"""
+
+from collections.abc import Iterator
+
+from msgspec.structs import replace
+
+from bridges.kinds.door.memory import (
+    DoorLimits,
+    Memory,
+    Senses,
+    lost_at,
+    opening_ends_at,
+    rivalled,
+    too_long_at,
+    travel_ends_at,
+)
+from bridges.kinds.door.report import DoorReport, report
+from bridges.kinds.door.sensing import View, look, miss, released_by_fire, take
+from bridges.kinds.door.settings import Pulse
+from bridges.kinds.door.signals import CloseRequested, DoorOutputs, Event, OpenRequested
+from bridges.kinds.shared.decision import (
+    Attended,
+    Decision,
+    IoFailed,
+    RivalSeen,
+    Sampled,
+    Suspended,
+    WriteFailed,
+)
+from bridges.kinds.shared.durations import NEVER, RIVAL_QUIET_S
+
+
+def initial(limits: DoorLimits, now: float) -> Memory:
+    """At start nothing is known, and the hold is off."""
+    return Memory(held_since=now)
+
+
+def decide(
+    memory: Memory, event: Event, now: float, limits: DoorLimits
+) -> Decision[Memory, DoorOutputs, DoorReport]:
+    """One scan. `now`: monotonic s, never before that of the last scan. Never raises."""
+    memory, refused = _hear(memory, event, now, limits)
+    memory = _let_go(memory, now, limits)
+    memory = _hold(memory, _look(memory, now, limits), now, limits)
+    view = _look(memory, now, limits)
+    is_on = _pulse_is_on(memory, now, limits.pulse)
+    return Decision(
+        memory=memory,
+        outputs=DoorOutputs(memory.held and is_on, between_pulses=memory.held and not is_on),
+        report=report(memory, view, now, limits),
+        wake_at=min((at for at in _wakes(memory, view, now, limits) if at > now), default=NEVER),
+        refused=refused,
+    )
+
+
+def _hear(memory: Memory, event: Event, now: float, limits: DoorLimits) -> tuple[Memory, str]:
+    match event:
+        case Sampled(sample):
+            senses = take(memory.senses, sample, now, limits)
+            return replace(memory, senses=senses, io_failure=""), ""
+        case Suspended(reason):
+            return replace(memory, senses=Senses(), io_failure=reason), ""
+        case WriteFailed(reason):
+            senses = replace(memory.senses, linked_since=None)
+            return replace(memory, senses=senses, io_failure=reason), ""
+        case IoFailed(reason):
+            return replace(memory, senses=miss(memory.senses), io_failure=reason), ""
+        case RivalSeen():
+            return replace(memory, rival_at=now), ""
+        case Attended(yes):
+            return replace(memory, unattended_since=None if yes else now), ""
+        case OpenRequested():
+            return _open(memory, now, limits)
+        case CloseRequested():
+            return _close(memory, now, limits), ""
+    return memory, ""  # an operator's reset: nothing here latches
+
+
+def _open(memory: Memory, now: float, limits: DoorLimits) -> tuple[Memory, str]:
+    if released_by_fire(_look(memory, now, limits), limits):
+        return memory, "the fire alarm has released the door"
+    latched_at = now if memory.latched_at is None else memory.latched_at
+    unattended_since = None if memory.unattended_since is None else now
+    return (
+        replace(memory, latched_at=latched_at, close_at=None, unattended_since=unattended_since),
+        "",
+    )
+
+
+def _close(memory: Memory, now: float, limits: DoorLimits) -> Memory:
+    if memory.latched_at is None or memory.close_at is not None:
+        return memory
+    return replace(memory, close_at=now + limits.t.close_grace_s)
+
+
+def _let_go(memory: Memory, now: float, limits: DoorLimits) -> Memory:
+    close_at = NEVER if memory.close_at is None else memory.close_at
+    if now < min(close_at, lost_at(memory, limits)):
+        return memory
+    return replace(memory, latched_at=None, close_at=None)
+
+
+def _look(memory: Memory, now: float, limits: DoorLimits) -> View:
+    return look(memory.senses, memory.held, memory.held_since, now, limits)
+
+
+def _hold(memory: Memory, view: View, now: float, limits: DoorLimits) -> Memory:
+    """The memory with the hold on or off, and with what the next decision needs."""
+    if released_by_fire(view, limits):
+        memory = replace(memory, latched_at=None, close_at=None)
+    able = view.fresh and not rivalled(memory, now)
+    wanted = able and _wanted(memory, view, limits)
+    shut = view.seen and view.closed and not view.lost
+    closing = (memory.closing or (memory.held and not wanted)) and not shut
+    held = wanted or (able and closing and view.obstructed and not view.fire)
+    return replace(
+        memory,
+        held=held,
+        held_since=now if held != memory.held else memory.held_since,
+        closing=closing,
+        between_since=_since(
+            memory.between_since, view.seen and not (view.opened or view.closed or view.lost), now
+        ),
+        shut_since=_since(memory.shut_since, view.seen and not view.opened, now),
+    )
+
+
+def _wanted(memory: Memory, view: View, limits: DoorLimits) -> bool:
+    if view.fire:
+        return limits.on_fire == "open"
+    return memory.latched_at is not None
+
+
+def _since(before: float | None, is_so: bool, now: float) -> float | None:
+    if not is_so:
+        return None
+    return now if before is None else before
+
+
+def _pulse_is_on(memory: Memory, now: float, pulse: Pulse | None) -> bool:
+    return pulse is None or (now - memory.held_since) % pulse.every_s < pulse.on_s
+
+
+def _wakes(memory: Memory, view: View, now: float, limits: DoorLimits) -> Iterator[float]:
+    """Each time at which the decision may change without an event."""
+    yield view.changes_at
+    yield NEVER if memory.close_at is None else memory.close_at
+    yield NEVER if memory.rival_at is None else memory.rival_at + RIVAL_QUIET_S
+    yield travel_ends_at(memory, limits)
+    yield opening_ends_at(memory, limits)
+    yield too_long_at(memory, limits)
+    yield lost_at(memory, limits)
+    if memory.held and limits.pulse is not None:
+        phase_s = (now - memory.held_since) % limits.pulse.every_s
+        is_on = phase_s < limits.pulse.on_s
+        yield now - phase_s + (limits.pulse.on_s if is_on else limits.pulse.every_s)

@@ -1,0 +1,128 @@
+"""What RMF, the log and the status file are told of a door."""
+
+from collections.abc import Iterator
+
+import msgspec
+
+from bridges.kinds.door.memory import (
+    DoorLimits,
+    Memory,
+    lost_at,
+    opening_ends_at,
+    rivalled,
+    too_long_at,
+    travel_ends_at,
+)
+from bridges.kinds.door.sensing import View, released_by_fire
+from bridges.kinds.shared.decision import Fault
+from bridges.messages.definitions import DoorModeValue
+
+
+class DoorReport(msgspec.Struct, frozen=True):
+    """What RMF and the status file are told. `hold`: we hold the door open, also between pulses.
+
+    `estimated`: no contact proves `mode`. `waits`: what RMF's OPEN waits for; "" without one, or once
+    the door is OPEN.
+    """
+
+    mode: DoorModeValue
+    read_at: float | None = None
+    faults: tuple[Fault, ...] = ()
+    hold: bool = False
+    estimated: bool = False
+    waits: str = ""
+
+    def news(self) -> object:
+        """The report without its age, and without what is waited for, which RMF is not shown."""
+        return self.mode, self.faults, self.hold, self.estimated
+
+
+def report(memory: Memory, view: View, now: float, limits: DoorLimits) -> DoorReport:
+    """The door as it is now."""
+    mode = _mode(memory, view, now, limits)
+    return DoorReport(
+        mode=mode,
+        read_at=memory.senses.read_at,
+        faults=tuple(_faults(memory, view, now, limits)),
+        hold=memory.held,
+        estimated=bool(view.estimated & _PROOFS.get(mode, frozenset())),
+        waits=_waits(memory, view, mode, now),
+    )
+
+
+def _waits(memory: Memory, view: View, mode: DoorModeValue, now: float) -> str:
+    if memory.latched_at is None or mode is DoorModeValue.MODE_OPEN:
+        return ""
+    if rivalled(memory, now):
+        return "until no other node publishes its states"
+    if not view.fresh:
+        return "for a reading"
+    return "for the door to open" if view.seen else "for its contacts to be steady"
+
+
+_PROOFS = {
+    DoorModeValue.MODE_OPEN: frozenset({"opened"}),
+    DoorModeValue.MODE_CLOSED: frozenset({"closed"}),
+    DoorModeValue.MODE_MOVING: frozenset({"opened", "closed"}),
+}
+"""The contacts that prove each mode."""
+
+
+def _mode(memory: Memory, view: View, now: float, limits: DoorLimits) -> DoorModeValue:
+    if rivalled(memory, now) or not view.fresh:
+        return DoorModeValue.MODE_OFFLINE
+    if not view.seen or released_by_fire(view, limits):
+        return DoorModeValue.MODE_UNKNOWN
+    if view.lost or (view.opened and view.closed):
+        return DoorModeValue.MODE_UNKNOWN
+    if view.opened:
+        return DoorModeValue.MODE_OPEN
+    if view.closed:
+        return DoorModeValue.MODE_CLOSED
+    if now >= travel_ends_at(memory, limits):
+        return DoorModeValue.MODE_UNKNOWN
+    return DoorModeValue.MODE_MOVING
+
+
+def _faults(memory: Memory, view: View, now: float, limits: DoorLimits) -> Iterator[Fault]:
+    """Everything that is wrong now, most serious first. No text counts up: a changed text is news."""
+    if rivalled(memory, now):
+        yield Fault("TWO_NODES_FOR_ONE_DEVICE", "another node publishes states of this door")
+    if not view.fresh:
+        yield from _silence(memory, limits)
+    else:
+        yield from _hazards(memory, view, limits)
+        yield from _contradictions(memory, view, now, limits)
+    if now >= too_long_at(memory, limits):
+        yield Fault("DOOR_OPEN_TOO_LONG", f"held for RMF longer than {limits.t.max_hold_s} s")
+    if now >= lost_at(memory, limits):
+        lost_s = limits.t.supervisor_lost_s
+        yield Fault("SUPERVISOR_LOST", f"no node publishes door_requests for {lost_s} s: released")
+
+
+def _silence(memory: Memory, limits: DoorLimits) -> Iterator[Fault]:
+    if memory.io_failure:
+        yield Fault("COMMUNICATION_LOST", memory.io_failure)
+    elif memory.senses.read_at is not None:
+        yield Fault("COMMUNICATION_LOST", f"no reading for {limits.t.stale_after_s} s")
+
+
+def _hazards(memory: Memory, view: View, limits: DoorLimits) -> Iterator[Fault]:
+    if view.fire:
+        done = "held open" if limits.on_fire == "open" else "released"
+        yield Fault("FIRE_ALARM", f"the door is {done}")
+    if memory.closing and memory.held and memory.latched_at is None and view.obstructed:
+        yield Fault("DOOR_OBSTRUCTED", "held open after CLOSE while the doorway is not clear")
+    if view.errors:
+        yield Fault("DOOR_CONTROLLER_FAULT", "; ".join(view.errors))
+
+
+def _contradictions(memory: Memory, view: View, now: float, limits: DoorLimits) -> Iterator[Fault]:
+    if view.seen and view.opened and view.closed:
+        yield Fault("DOOR_CONTACTS_CONTRADICT", "the door reads open and closed")
+    if view.lost:
+        yield Fault("DOOR_POSITION_UNKNOWN", view.lost)
+    if now >= travel_ends_at(memory, limits):
+        yield Fault("DOOR_TRAVEL_TIMEOUT", f"at neither end position for {limits.t.travel_s} s")
+    if now >= opening_ends_at(memory, limits):
+        yield Fault("DOOR_OPENING_FAULT", f"held, but not open after {limits.t.open_timeout_s} s")

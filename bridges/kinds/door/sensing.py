@@ -1,0 +1,153 @@
+"""What to believe of a door's inputs: debounce, age, and estimates where no contact is wired.
+
+Rules:
+- A change counts once it has lasted for its signal's debounce. The end of a fire alarm or an
+  obstruction counts once it has lasted for `hazard_clear_s`. Until such an input has settled for the
+  first time, a single reading of the hazard counts.
+- After `stale_after_s` without a reading, what was believed is forgotten: the door may have moved.
+- A missing limit contact is estimated only if the YAML says so, from how long the relay has been on
+  or off. A failed read or write starts that time again.
+- If a controller does not say where the door is (`lost`), that counts at once, without debounce.
+"""
+
+from collections.abc import Iterator
+
+import msgspec
+from msgspec.structs import replace
+
+from bridges.kinds.door.memory import Contact, DoorLimits, Senses
+from bridges.kinds.door.signals import DoorSample
+from bridges.kinds.shared.debounce import forget, settle
+from bridges.kinds.shared.durations import NEVER
+
+SIGNALS = ("opened", "closed", "obstruction", "fire")
+HAZARDS = ("obstruction", "fire")
+
+
+class View(msgspec.Struct, frozen=True):
+    """The inputs as they are believed at one instant.
+
+    `fresh`: they were read within `stale_after_s`. `seen`: and each has settled, so the door's position
+    can be told. `estimated`: the end positions that no contact proves. `changes_at`: when the view
+    may change without a new reading (s). `lost`, `errors`: see DoorSample.
+    """
+
+    fresh: bool
+    seen: bool
+    opened: bool
+    closed: bool
+    obstructed: bool
+    fire: bool
+    estimated: frozenset[str]
+    changes_at: float
+    lost: str = ""
+    errors: tuple[str, ...] = ()
+
+
+def take(senses: Senses, sample: DoorSample, now: float, limits: DoorLimits) -> Senses:
+    """Add one reading."""
+    if not is_fresh(senses, now, limits):
+        senses = Senses()
+    contacts: dict[str, Contact] = {}
+    for signal in SIGNALS:
+        before: Contact | None = getattr(senses, signal)
+        seen: bool | None = getattr(sample, signal)
+        contacts[signal] = settle(before, seen, now, _hold_s(before, seen, signal, limits))
+    linked_since = now if senses.linked_since is None else senses.linked_since
+    return Senses(
+        **contacts,
+        read_at=now,
+        linked_since=linked_since,
+        lost=sample.lost,
+        errors=sample.errors,
+    )
+
+
+def miss(senses: Senses) -> Senses:
+    """A read has failed: the debounce and the estimates' time start again."""
+    return replace(
+        senses,
+        opened=forget(senses.opened),
+        closed=forget(senses.closed),
+        obstruction=forget(senses.obstruction),
+        fire=forget(senses.fire),
+        linked_since=None,
+    )
+
+
+def is_fresh(senses: Senses, now: float, limits: DoorLimits) -> bool:
+    """Is the last reading younger than `stale_after_s`?"""
+    return senses.read_at is not None and now < senses.read_at + limits.t.stale_after_s
+
+
+def look(senses: Senses, held: bool, held_since: float, now: float, limits: DoorLimits) -> View:
+    """What is believed now. The relay has been on (`held`) or off since `held_since`."""
+    opened, closed = _believed(senses.opened), _believed(senses.closed)
+    opened_at, closed_at = _estimates(senses, held, held_since, limits)
+    guessed = frozenset(s for s in ("opened", "closed") if _unwired(getattr(senses, s)))
+    fresh = is_fresh(senses, now, limits)
+    return View(
+        fresh=fresh,
+        seen=fresh and all(_settled(getattr(senses, signal)) for signal in SIGNALS),
+        opened=opened or ("opened" in guessed and now >= opened_at and not closed),
+        closed=closed or ("closed" in guessed and now >= closed_at and not opened),
+        obstructed=_feared(senses.obstruction),
+        fire=_feared(senses.fire),
+        estimated=guessed,
+        changes_at=min(_changes(senses, limits, now, opened_at, closed_at), default=NEVER),
+        lost=senses.lost,
+        errors=senses.errors,
+    )
+
+
+def released_by_fire(view: View, limits: DoorLimits) -> bool:
+    """Has a fire alarm released the hold?"""
+    return view.fresh and view.fire and limits.on_fire == "release"
+
+
+def _hold_s(before: Contact | None, seen: bool | None, signal: str, limits: DoorLimits) -> float:
+    """How long `seen` must last: longer for the end of a hazard than for its start."""
+    hold_s = limits.debounce.get(signal, 0.0)
+    clearing = signal in HAZARDS and seen is False and before is not None and before.value
+    return max(hold_s, limits.t.hazard_clear_s) if clearing else hold_s
+
+
+def _unwired(contact: Contact | None) -> bool:
+    return contact is not None and contact.candidate is None
+
+
+def _settled(contact: Contact | None) -> bool:
+    return contact is not None and contact.steady_at is not None
+
+
+def _believed(contact: Contact | None) -> bool:
+    return contact is not None and contact.value is True
+
+
+def _feared(contact: Contact | None) -> bool:
+    """Is the hazard present? Before its input has settled, a single reading counts."""
+    if contact is None:
+        return False
+    return bool(contact.value if _settled(contact) else contact.candidate)
+
+
+def _estimates(
+    senses: Senses, held: bool, held_since: float, limits: DoorLimits
+) -> tuple[float, float]:
+    """When a door without contacts counts as open, and when as closed; NEVER for "not at all"."""
+    if not limits.estimated or senses.linked_since is None:
+        return NEVER, NEVER
+    since = max(held_since, senses.linked_since)
+    delay_s = NEVER if limits.t.open_delay_s is None else limits.t.open_delay_s
+    return (since + delay_s, NEVER) if held else (NEVER, since + limits.t.travel_s)
+
+
+def _changes(senses: Senses, limits: DoorLimits, now: float, *estimates: float) -> Iterator[float]:
+    """When a reading goes stale, an estimate becomes due or a contact settles (s)."""
+    stale_at = NEVER if senses.read_at is None else senses.read_at + limits.t.stale_after_s
+    due = [stale_at, *estimates]
+    for signal in SIGNALS:
+        contact: Contact | None = getattr(senses, signal)
+        if contact is not None:
+            due.append(contact.due_at(_hold_s(contact, contact.candidate, signal, limits)))
+    yield from (at for at in due if at > now)

@@ -1,0 +1,88 @@
+"""The part of a door's YAML that does not depend on its wiring."""
+
+from collections.abc import Iterator
+from typing import Annotated, Literal
+
+import msgspec
+from msgspec import Meta
+
+from bridges.kinds.shared.fields import DeviceSettings, Patience, Seconds, Timeout
+
+StaleAfter = Annotated[float, Meta(ge=0.1, le=60, extra={"unit": "s"})]
+PulseSeconds = Annotated[float, Meta(ge=0.05, le=600, extra={"unit": "s"})]
+
+
+class Durations(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Durations of a door.
+
+    `stale_after_s`: after so long without a good reading the door is OFFLINE and its hold is off.
+    `close_grace_s`: how long after a CLOSE the hold is released; an OPEN before then cancels the CLOSE.
+    `travel_s`: how long the door may be between its end positions; after that its state is UNKNOWN.
+    `open_timeout_s`: how long a held door may take to open; after that a fault is shown.
+    `hazard_clear_s`: how long a fire alarm or an obstruction must be clear before it counts as over.
+    `open_delay_s`: with estimated feedback, how long the door takes to open.
+    `max_hold_s`: how long RMF may hold the door; after that a fault is shown, and the hold stays.
+    `supervisor_lost_s`: how long no node may publish door requests; after that the hold is released.
+    When absent the door stays held, as a robot may stand in the doorway.
+    """
+
+    stale_after_s: StaleAfter = 1.0
+    close_grace_s: Seconds = 3.0
+    travel_s: Timeout = 10.0
+    open_timeout_s: Timeout = 15.0
+    hazard_clear_s: Seconds = 1.0
+    open_delay_s: Seconds | None = None
+    max_hold_s: Seconds | None = None
+    supervisor_lost_s: Patience | None = None
+
+
+class Pulse(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """For a door operator that closes by itself: pulses on the relay while RMF holds the door.
+
+    `on_s`: how long each pulse lasts.
+    `every_s`: the time from the start of one pulse to the start of the next.
+    """
+
+    on_s: PulseSeconds
+    every_s: PulseSeconds
+
+
+class DoorSettings(DeviceSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """One door, apart from its wiring.
+
+    `limits`: durations that differ from the defaults.
+    `feedback`: `estimated` if a limit contact is missing; the door's state is then estimated by time.
+    Logs and status mark an estimate; RMF cannot see the difference.
+    `on_fire`: a fire alarm holds the door open (`open`) or releases the hold (`release`).
+    `pulse`: pulses for a door operator that closes by itself. When absent, the relay stays on.
+    """
+
+    limits: Durations = Durations()
+    feedback: Literal["sensors", "estimated"] = "sensors"
+    on_fire: Literal["open", "release"] | None = None
+    pulse: Pulse | None = None
+
+    def stale_after(self) -> float:
+        """Its limits' `stale_after_s`."""
+        return self.limits.stale_after_s
+
+    def problems(self) -> Iterator[tuple[tuple[str, ...], str]]:
+        """Fields that contradict each other."""
+        if self.pulse and self.pulse.on_s >= self.pulse.every_s:
+            yield (
+                ("pulse", "on_s"),
+                "must be shorter than every_s; leave pulse out for a steady hold",
+            )
+        delay_s = self.limits.open_delay_s
+        if self.feedback == "estimated" and delay_s is None:
+            yield (
+                ("limits",),
+                "feedback: estimated needs open_delay_s, the time the door takes to open",
+            )
+        if self.feedback == "sensors" and delay_s is not None:
+            yield (
+                ("limits", "open_delay_s"),
+                "is for feedback: estimated; contacts say when it is open",
+            )
+        if delay_s is not None and delay_s > self.limits.travel_s:
+            yield ("limits", "open_delay_s"), "must not be longer than travel_s"

@@ -1,0 +1,56 @@
+"""What passes between a door's driver and its core in one scan, and the core's events."""
+
+import msgspec
+
+from bridges.kinds.shared.decision import Attended, IoFailed, OperatorReset, RivalSeen, Sampled
+
+
+class DoorSample(msgspec.Struct, frozen=True):
+    """Every input of one door, polarity resolved but not debounced; None where not wired.
+
+    `opened`, `closed`: the limit contacts of the fully open and the fully closed door.
+    `obstruction`: somebody or something is in the doorway. `fire`: the fire alarm's contact.
+    `lost`: why the controller did not say where the door is; "" if it did.
+    `errors`: the faults that the controller itself reports.
+    """
+
+    opened: bool | None = None
+    closed: bool | None = None
+    obstruction: bool | None = None
+    fire: bool | None = None
+    lost: str = ""
+    errors: tuple[str, ...] = ()
+
+
+class DoorOutputs(msgspec.Struct, frozen=True):
+    """Every output of one door. There is no command to close: the door operator closes by itself.
+
+    `hold_open`: the relay is on. `between_pulses`: the relay is off until the next pulse, and the door
+    is still held.
+    """
+
+    hold_open: bool = False
+    between_pulses: bool = False
+
+
+class OpenRequested(msgspec.Struct, frozen=True):
+    """A requester wants the door open. `requester_id` is for the log only."""
+
+    requester_id: str
+
+
+class CloseRequested(msgspec.Struct, frozen=True):
+    """A requester no longer wants the door open."""
+
+    requester_id: str
+
+
+Event = (
+    Sampled[DoorSample]
+    | IoFailed
+    | RivalSeen
+    | OperatorReset
+    | Attended
+    | OpenRequested
+    | CloseRequested
+)

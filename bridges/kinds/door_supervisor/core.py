@@ -1,0 +1,148 @@
+"""The door supervisor's core, for one door: who holds it open, and what the door's node is sent.
+
+It replaces RMF's own (rmf_ros2, door_supervisor/Node.cpp). Fleet adapters and web users send their
+requests on `adapter_door_requests`; the supervisor sends its own on `door_requests`, as
+"door_supervisor". Rules:
+1. OPEN adds its requester to the holders, or renews its stamp. CLOSE removes it. A stale request
+   (`bridges/kinds/shared/freshness.py`) does neither.
+2. The first holder causes an OPEN to the door's node, and the last one that goes causes a CLOSE.
+   - The request is repeated when a requester repeats OPEN, and when the door's state contradicts it:
+     held, but CLOSED or MOVING; not held, but OPEN or MOVING.
+   - For INSIST_S after a holder has come, OPEN is repeated at every state. The first OPEN may have been
+     lost, and an earlier CLOSE may be about to close the door.
+   - The states OFFLINE and UNKNOWN cause nothing.
+3. Silence ends no hold: a robot in the doorway is silent. After `open_alarm_s` a fault is shown, and
+   the door stays open.
+4. During the quiet start, and while another supervisor publishes, it only listens. After that it sends
+   OPEN for a door with holders at once. It sends CLOSE only when a new state of the door calls for it.
+   A door that was held before the restart, and that is not seen CLOSED, is held from the start unless
+   another supervisor is there: its own node may have died too, with a robot in the doorway.
+5. Two messages are at least GAP_S apart, and a message is repeated unchanged after REPEAT_S at the
+   earliest.
+The heartbeat (`report.py`) says who holds the doors, and `keep.py` saves that across a restart.
+"""
+
+from typing import Final
+
+from msgspec.structs import replace
+
+from bridges.kinds.door_supervisor.memory import Holder, Limits, Memory
+from bridges.kinds.door_supervisor.report import DoorHoldReport, report
+from bridges.kinds.door_supervisor.signals import CloseRequested, Event, OpenRequested, StateHeard
+from bridges.kinds.shared.decision import Decision, Said
+from bridges.kinds.shared.durations import FORGOTTEN_S, NEVER, due_at
+from bridges.kinds.shared.freshness import Rules, hear
+from bridges.kinds.shared.graph_kind import MaySpeak
+from bridges.messages.definitions import DoorMode, DoorRequest
+from bridges.messages.topics import DOOR_REQUESTS
+
+REQUESTER_ID: Final = "door_supervisor"
+"""The requester_id that RMF's own uses (door_supervisor/Node.hpp)."""
+INSIST_S: Final = 5.0
+RULES: Final = Rules(retained=False)
+
+Decided = Decision[Memory, None, DoorHoldReport]
+
+
+def initial(door: str, started_at: float) -> Memory:
+    """Nothing has been heard, and we may not publish yet."""
+    return Memory(door)
+
+
+def idle(memory: Memory, now: float) -> bool:
+    """May this door be forgotten? Nobody holds it, and nothing was heard of it for FORGOTTEN_S."""
+    heard = [memory.shown_at, *(who.heard_at for who in memory.requesters.values())]
+    return not memory.holders and now >= max(heard) + FORGOTTEN_S
+
+
+def urgent(memory: Memory) -> bool:
+    """Must a door be held before the quiet start is over?"""
+    return memory.holds_restored
+
+
+def decide(memory: Memory, event: Event, now: float, limits: Limits) -> Decided:
+    """Take the event in, and send what is due: at most one message. Never raises."""
+    memory, refused = _take(memory, event, now)
+    publish: tuple[Said, ...] = ()
+    if now >= _due_at(memory):
+        publish = ((DOOR_REQUESTS, _request(memory)),)
+        memory = replace(memory, sent=memory.wanted, sent_at=now, prompted=False)
+    return Decision(
+        memory,
+        None,
+        report(memory, now, limits),
+        _wake_at(memory, now, limits),
+        refused,
+        publish,
+    )
+
+
+# --- what is heard -----------------------------------------------------------------------------
+
+
+def _take(memory: Memory, event: Event, now: float) -> tuple[Memory, str]:
+    match event:
+        case OpenRequested() | CloseRequested():
+            return _hear(memory, event, now)
+        case StateHeard(mode):
+            return _see(replace(memory, mode=mode, shown_at=now), now), ""
+        case MaySpeak(yes, at_once, waits=passive):
+            memory = replace(memory, may_speak=yes, at_once=at_once, passive=passive)
+            return replace(memory, sent=None, prompted=False), ""
+        case _:  # only time has passed
+            return memory, ""
+
+
+def _hear(memory: Memory, event: OpenRequested | CloseRequested, now: float) -> tuple[Memory, str]:
+    who, holders = event.requester, {holder.requester for holder in memory.holders}
+    requesters, refused = hear(memory.requesters, who, event.stamp, now, RULES, holders=holders)
+    memory = replace(memory, requesters=requesters)
+    if refused:
+        return memory, refused
+    if isinstance(event, OpenRequested):
+        return _enter(memory, event, now), ""
+    rest = tuple(holder for holder in memory.holders if holder.requester != who)
+    return replace(memory, holders=rest), ""
+
+
+def _enter(memory: Memory, event: OpenRequested, now: float) -> Memory:
+    """Add a holder, or note that one has repeated its OPEN."""
+    before = memory.holder(event.requester)
+    if before:
+        after = before.repeats(event.stamp, now)
+        holders = tuple(after if holder is before else holder for holder in memory.holders)
+    else:
+        holders = (*memory.holders, Holder(event.requester, now, now, event.stamp, event.stamp))
+    return replace(memory, holders=holders, prompted=True)
+
+
+def _see(memory: Memory, now: float) -> Memory:
+    """A state has come: should the last request be repeated?"""
+    insists = any(now < holder.since + INSIST_S for holder in memory.holders)
+    return replace(memory, prompted=memory.disagrees or insists)
+
+
+# --- what is sent ------------------------------------------------------------------------------
+
+
+def _request(memory: Memory) -> DoorRequest:
+    """The request to the door's node, without its stamp."""
+    return DoorRequest(
+        requester_id=REQUESTER_ID,
+        door_name=memory.door,
+        requested_mode=DoorMode(int(memory.wanted)),
+    )
+
+
+def _due_at(memory: Memory) -> float:
+    """When the next request is due."""
+    if not memory.may_send:
+        return NEVER
+    return due_at(memory.sent_at, new=memory.owed, again=memory.prompted)
+
+
+def _wake_at(memory: Memory, now: float, limits: Limits) -> float:
+    """When the decision may change without an event."""
+    due = [_due_at(memory), memory.silent_at]
+    due += [holder.since + limits.open_alarm_s for holder in memory.holders]
+    return min((at for at in due if at > now), default=NEVER)

@@ -1,0 +1,61 @@
+"""Who holds which door, saved across a restart.
+
+It is saved before the heartbeat announces it: a robot drives on once the heartbeat lists it.
+"""
+
+from collections.abc import Mapping
+from typing import Annotated, Final
+
+import msgspec
+from msgspec import Meta
+
+from bridges.kinds.door_supervisor.memory import Holder, Memory
+from bridges.kinds.door_supervisor.report import by_name
+from bridges.kinds.door_supervisor.settings import Settings
+from bridges.kinds.shared import keep
+from bridges.kinds.shared.freshness import SECOND_NS, Requester
+from bridges.kinds.shared.keep import Text
+
+VERSION: Final = 1
+Stamp = Annotated[int, Meta(ge=0, lt=2**31 * SECOND_NS)]
+
+
+class Record(keep.Record, frozen=True, forbid_unknown_fields=True):
+    """`doors`: door -> requester -> the stamp (ns) of the first OPEN of its present visit."""
+
+    doors: dict[Text, dict[Text, Stamp]]
+
+
+def persist(memories: Mapping[str, Memory]) -> bytes:
+    """What the next start needs. The bytes stay the same until a holder comes or goes."""
+    doors = {
+        name: {holder.requester: holder.visit for holder in by_name(memory)}
+        for name, memory in sorted(memories.items())
+        if memory.holders
+    }
+    return msgspec.json.encode(Record(VERSION, doors))
+
+
+def restore(kept: bytes, settings: Settings, now: float) -> dict[str, Memory]:
+    """The memories at start, from the bytes of `persist`, for the doors still served.
+
+    ValueError for any other bytes. How long each has held its door counts from now: the monotonic
+    clock before the restart means nothing any more.
+    """
+    found = keep.read(kept, Record, VERSION, "a table of who holds which door")
+    served = found.doors if settings.doors is None else set(settings.doors)
+    return {
+        door: _restored(door, holders, now)
+        for door, holders in found.doors.items()
+        if door in served
+    }
+
+
+def _restored(door: str, holders: Mapping[str, int], now: float) -> Memory:
+    return Memory(
+        door,
+        holders=tuple(
+            Holder(who, now, now, stamp, stamp, restored=True) for who, stamp in holders.items()
+        ),
+        requesters={who: Requester(stamp, heard_at=now) for who, stamp in holders.items()},
+    )

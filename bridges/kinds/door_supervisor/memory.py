@@ -1,0 +1,111 @@
+"""What the door supervisor's core remembers of one door, and the limits that it is given."""
+
+from typing import Final
+
+import msgspec
+from msgspec.structs import replace
+
+from bridges.kinds.door_supervisor.settings import Settings
+from bridges.kinds.shared.durations import AGES_AGO, NEVER, SILENT_S
+from bridges.kinds.shared.freshness import Requesters
+from bridges.kinds.shared.graph_kind import LISTENS
+from bridges.messages.definitions import DoorModeValue
+
+VISIT_S: Final = 2.5
+"""A waiting robot repeats OPEN at 1 Hz. An OPEN after a longer silence than this is a new visit."""
+
+CLOSED: Final = DoorModeValue.MODE_CLOSED
+MOVING: Final = DoorModeValue.MODE_MOVING
+OPEN: Final = DoorModeValue.MODE_OPEN
+
+
+class Limits(msgspec.Struct, frozen=True):
+    """The duration (s) that the site has set for one door."""
+
+    open_alarm_s: float = 600.0
+
+    @classmethod
+    def of(cls, settings: Settings) -> "Limits":
+        """From the YAML."""
+        return cls(settings.open_alarm_s)
+
+
+class Holder(msgspec.Struct, frozen=True):
+    """A requester that holds the door open, `since` when (our clock). `stamp`: of its latest OPEN.
+
+    `asked_at`: when that OPEN came. `visit`: the stamp of the first OPEN of its present visit; repeats
+    do not change it. `restored`: it held the door before our restart.
+    """
+
+    requester: str
+    since: float
+    asked_at: float
+    stamp: int
+    visit: int
+    restored: bool = False
+
+    def repeats(self, stamp: int, now: float) -> "Holder":
+        """The holder after another OPEN."""
+        again = now > self.asked_at + VISIT_S
+        return replace(self, asked_at=now, stamp=stamp, visit=stamp if again else self.visit)
+
+
+class Memory(msgspec.Struct, frozen=True):
+    """Everything that outlives an event.
+
+    `passive`: what those wait for that wait for us, while we may not publish.
+    `holders`: in the order in which they came. `requesters`: what was lately heard of each. `mode`:
+    the door's last mode, heard at `shown_at`. `at_once`: what was restored need not wait until we may
+    publish. `sent`: the last request to the door's node since we may publish. `prompted`: something
+    calls for a repeat of it.
+    """
+
+    door: str
+    may_speak: bool = False
+    passive: str = LISTENS
+    at_once: bool = False
+    holders: tuple[Holder, ...] = ()
+    requesters: Requesters = {}
+    mode: DoorModeValue | None = None
+    shown_at: float = AGES_AGO
+    sent: DoorModeValue | None = None
+    sent_at: float = AGES_AGO
+    prompted: bool = False
+
+    @property
+    def wanted(self) -> DoorModeValue:
+        """The mode to request of the door's node."""
+        return OPEN if self.holders else CLOSED
+
+    @property
+    def may_send(self) -> bool:
+        """May we send to the door's node now? During the quiet start only for restored holders, and
+        only if the door is not closed: a robot may stand in its doorway."""
+        stands_open = self.mode not in (None, CLOSED)
+        return self.may_speak or (self.at_once and stands_open and self.holds_restored)
+
+    @property
+    def holds_restored(self) -> bool:
+        """Is there a holder from before our restart?"""
+        return any(holder.restored for holder in self.holders)
+
+    @property
+    def owed(self) -> bool:
+        """Is a new request due? A CLOSE is due only if the last request was OPEN."""
+        return self.wanted != self.sent and (self.wanted == OPEN or self.sent == OPEN)
+
+    @property
+    def disagrees(self) -> bool:
+        """Does the door's state contradict what is wanted? OFFLINE and UNKNOWN do not."""
+        return self.mode == MOVING or self.mode == (CLOSED if self.holders else OPEN)
+
+    @property
+    def silent_at(self) -> float:
+        """When a held door will have been silent for too long; NEVER if nobody holds it."""
+        if not self.holders:
+            return NEVER
+        return max(self.shown_at, self.holders[0].since) + SILENT_S
+
+    def holder(self, requester: str) -> Holder | None:
+        """This requester's entry among the holders; None if it does not hold the door."""
+        return next((h for h in self.holders if h.requester == requester), None)

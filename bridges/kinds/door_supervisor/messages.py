@@ -1,0 +1,83 @@
+"""DoorRequests and DoorStates in. Is a message well formed, and about a door that we serve?"""
+
+from collections.abc import Mapping
+
+from msgspec.structs import replace
+
+from bridges.kinds.door_supervisor.core import REQUESTER_ID
+from bridges.kinds.door_supervisor.report import DoorHoldReport
+from bridges.kinds.door_supervisor.settings import Settings
+from bridges.kinds.door_supervisor.signals import CloseRequested, OpenRequested, StateHeard
+from bridges.kinds.shared.decision import RequestRefused
+from bridges.kinds.shared.freshness import in_ns
+from bridges.kinds.shared.names import check_length, check_listed
+from bridges.messages.definitions import (
+    DoorModeValue,
+    DoorRequest,
+    DoorState,
+    SupervisorHeartbeat,
+    Time,
+)
+
+
+def accept_request(
+    request: DoorRequest, settings: Settings, wall: float
+) -> OpenRequested | CloseRequested:
+    """An adapter's request as an event. Raises RequestRefused. `wall` is not used: stamps are compared
+    with those of the same requester only.
+
+    A request without a requester_id is refused: its fields were not filled in, and its default mode,
+    0, would mean CLOSE. A request with our own requester_id is one of those that we send to the doors,
+    and came back through a renamed topic.
+    """
+    check_listed("door", request.door_name, settings.doors)
+    who = request.requester_id
+    if not who:
+        raise RequestRefused("no requester", "requester_id is empty")
+    check_length(requester_id=who)
+    if who == REQUESTER_ID:
+        raise RequestRefused("a supervisor's request", "adapter_door_requests is for adapters")
+    stamp = in_ns(request.request_time)
+    mode = request.requested_mode.value
+    if mode == DoorModeValue.MODE_OPEN:
+        return OpenRequested(who, stamp)
+    if mode == DoorModeValue.MODE_CLOSED:
+        return CloseRequested(who, stamp)
+    text = f"requested_mode {mode}; only OPEN (2) and CLOSED (0) can be"
+    raise RequestRefused("mode that cannot be asked", text)
+
+
+def accept_state(state: DoorState, settings: Settings, wall: float) -> StateHeard:
+    """A door's state as an event. Raises RequestRefused."""
+    check_listed("door", state.door_name, settings.doors)
+    mode = state.current_mode.value
+    if mode not in set(DoorModeValue):
+        raise RequestRefused("unknown current_mode", str(mode))
+    return StateHeard(DoorModeValue(mode))
+
+
+def device_name(message: DoorRequest | DoorState) -> str:
+    """Which door a message is about."""
+    return message.door_name
+
+
+def requester(event: OpenRequested | CloseRequested | StateHeard) -> str:
+    """Who sends this request; "" for a state."""
+    return "" if isinstance(event, StateHeard) else event.requester
+
+
+def stamped(
+    message: DoorRequest | SupervisorHeartbeat, time: Time
+) -> DoorRequest | SupervisorHeartbeat:
+    """The message with its time of sending. A heartbeat has only its requesters' stamps."""
+    if isinstance(message, SupervisorHeartbeat):
+        return message
+    return replace(message, request_time=time)
+
+
+def summary(report: DoorHoldReport, now: float) -> Mapping[str, str]:
+    """One door in one line, for a person."""
+    mode = "-" if report.mode is None else report.mode.name.removeprefix("MODE_")
+    held = ", ".join(f"{who} ({now - since:.0f} s)" for who, since in report.holders)
+    said = {"mode": mode, "held_by": held or "-"}
+    return {**said, "waits": report.waits} if report.waits else said

@@ -1,0 +1,80 @@
+"""What the heartbeat, the log and the status file say of doors and their holders.
+
+Fleet adapters rely on the heartbeat. Their phase DoorOpen ends only when it lists the robot, and
+DoorClose when it does not. A robot that is listed for a door it does not hold sends CLOSE (rmf_ros2,
+RobotContext.cpp _check_door_supervisor). RMF's own supervisor sends the heartbeat only after adapter
+requests, so the sessions of a restarted fleet adapter stay for ever. Ours is also sent each second.
+"""
+
+from collections.abc import Iterator, Mapping
+
+import msgspec
+
+from bridges.kinds.door_supervisor.memory import Holder, Limits, Memory
+from bridges.kinds.shared.decision import Fault
+from bridges.kinds.shared.freshness import SECOND_NS
+from bridges.messages.definitions import (
+    DoorModeValue,
+    DoorSessions,
+    Session,
+    SupervisorHeartbeat,
+    Time,
+)
+from bridges.messages.topics import DOOR_SUPERVISOR_HEARTBEAT, AnyTopic
+
+
+class DoorHoldReport(msgspec.Struct, frozen=True):
+    """One door, for the log and the status file. Times are monotonic seconds.
+
+    `holders`: each requester, and since when it holds the door. `mode`: the door's last, of `read_at`.
+    `waits`: what the holders wait for while nothing is sent to the door.
+    """
+
+    read_at: float | None
+    mode: DoorModeValue | None = None
+    holders: tuple[tuple[str, float], ...] = ()
+    faults: tuple[Fault, ...] = ()
+    waits: str = ""
+
+    def news(self) -> object:
+        """What is worth a line in the log."""
+        return self.mode, tuple(requester for requester, _ in self.holders)
+
+
+def report(memory: Memory, now: float, limits: Limits) -> DoorHoldReport:
+    """One door as it is now."""
+    return DoorHoldReport(
+        read_at=None if memory.mode is None else memory.shown_at,
+        mode=memory.mode,
+        holders=tuple((holder.requester, holder.since) for holder in memory.holders),
+        faults=tuple(_faults(memory, now, limits)),
+        waits=memory.passive if memory.holders and not memory.may_send else "",
+    )
+
+
+def _faults(memory: Memory, now: float, limits: Limits) -> Iterator[Fault]:
+    late = [h.requester for h in memory.holders if now >= h.since + limits.open_alarm_s]
+    if late:
+        yield Fault("DOOR_HELD_OPEN", f"longer than {limits.open_alarm_s:g} s by {', '.join(late)}")
+    if now >= memory.silent_at:
+        yield Fault("DOOR_SILENT", "no DoorState comes")
+
+
+def heartbeat(memories: Mapping[str, Memory]) -> tuple[AnyTopic, SupervisorHeartbeat]:
+    """All held doors with their holders, in the order of names."""
+    doors = tuple(
+        DoorSessions(name, tuple(map(_session, by_name(memory))))
+        for name, memory in sorted(memories.items())
+        if memory.holders
+    )
+    return DOOR_SUPERVISOR_HEARTBEAT, SupervisorHeartbeat(doors)
+
+
+def by_name(memory: Memory) -> list[Holder]:
+    """The door's holders in the order of names."""
+    return sorted(memory.holders, key=lambda holder: holder.requester)
+
+
+def _session(holder: Holder) -> Session:
+    sec, nanosec = divmod(holder.stamp, SECOND_NS)
+    return Session(Time(sec, nanosec), holder.requester)

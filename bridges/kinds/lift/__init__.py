@@ -1,0 +1,58 @@
+"""Lifts: RMF's LiftRequest becomes outputs, and the lift's inputs become LiftState."""
+
+from bridges.kinds.lift import core, memory, messages, report, signals
+from bridges.kinds.lift.memory import LiftLimits, Memory
+from bridges.kinds.lift.report import LiftReport
+from bridges.kinds.lift.settings import LiftSettings
+from bridges.kinds.lift.signals import Asked, LiftOutputs, LiftSample
+from bridges.kinds.shared.kind import Kind
+from bridges.kinds.shared.recorded import Recorded
+from bridges.messages.topics import LIFT_REQUESTS, LIFT_STATES
+
+KIND: Kind[
+    LiftSettings,
+    LiftLimits,
+    Memory,
+    LiftSample,
+    Asked,
+    LiftOutputs,
+    LiftReport,
+] = Kind(
+    name="lift",
+    devices_key="lifts",
+    states=LIFT_STATES,
+    requests={LIFT_REQUESTS: messages.accept, messages.OWN_REQUESTS: messages.accept_adapters},
+    device_name=messages.device_name,
+    sender=lambda request: str(request.session_id),
+    limits=LiftLimits.of,
+    initial=core.initial,
+    decide=core.decide,
+    published=core.published,
+    publishes=messages.alarm_topics,
+    on_map=lambda settings: settings.on_map(),
+    state_message=messages.state_message,
+    summary=messages.summary,
+)
+
+RECORDED: Recorded = {
+    "lift.memory.Channel": memory.Channel,
+    "lift.memory.Doubted": memory.Doubted,
+    "lift.memory.Forgotten": memory.Forgotten,
+    "lift.memory.Grace": memory.Grace,
+    "lift.memory.Memory": memory.Memory,
+    "lift.memory.OwnWords": memory.OwnWords,
+    "lift.memory.Position": memory.Position,
+    "lift.memory.Relays": memory.Relays,
+    "lift.memory.Senses": memory.Senses,
+    "lift.memory.Session": memory.Session,
+    "lift.report.LiftReport": report.LiftReport,
+    "lift.signals.Door": signals.Door,
+    "lift.signals.Ended": signals.Ended,
+    "lift.signals.FromAdapter": signals.FromAdapter,
+    "lift.signals.Hazard": signals.Hazard,
+    "lift.signals.LiftOutputs": signals.LiftOutputs,
+    "lift.signals.LiftSample": signals.LiftSample,
+    "lift.signals.Motion": signals.Motion,
+    "lift.signals.Requested": signals.Requested,
+    "lift.signals.Side": signals.Side,
+}

@@ -1,0 +1,281 @@
+"""The lift's decision core: who holds the lift, what its relays do, and what RMF is told.
+
+Rules, in the order in which they are applied:
+1. While the lift is free, the first request gets a session, unless an obstacle (rule 4) is present.
+   Requests of the same session refresh it; those of other sessions are refused. Only its own END ends
+   a session: no hazard, fault or timeout does. A session in HUMAN mode has no outputs.
+2. END ends the session at once, unless it is older than the session. AGV mode and the door's hold may
+   stay on for `release_grace_s`. During that time only the same session is granted, even in a fire.
+   The reason: a supervisor that restarts sends END for a robot that is still inside, and that robot
+   must get out. For the same reason (`bridges/kinds/lift/forgotten.py`):
+   - An END on `lift_requests` does not end the session of a robot that may be inside while that robot
+     itself goes on asking. The session ends by the robot's own END, a person's, or its silence.
+   - If RMF's supervisor asks for a session other than the one that has the lift, or has ended it, the
+     requests and END of the holder's own robot count as well.
+   - After an END in mid-ride, as a new fleet adapter sends it, the lift waits longer for that robot:
+     until IN_CAR_S after its last word. Nothing is energised after `release_grace_s`.
+3. A request sets the destination and the mode. While the door is held, another destination may have
+   to wait (`bridges/kinds/lift/replayed.py`). `bridges/kinds/lift/drive.py` says what may be energised.
+4. An obstacle switches every output off and never changes the session. Obstacles are: fire (and its
+   latch, if an operator must reset it), code blue, earthquake, emergency, out of service, manual mode,
+   a second node for this lift, inputs that cannot be believed, outputs that cannot be written. A gap
+   in reading or writing shorter than `stale_after_s` is no obstacle. Overload only delays.
+5. RMF is told OPEN when fresh inputs show that the car stands at a known floor with its door open.
+   - Until OPEN has been published at a session's destination, its robot is outside. Then OPEN also
+     needs AGV mode and no fault: a robot looks only at session, floor and door, and must not board a
+     lift in a fire.
+   - After that a robot may be inside. The true door is shown in any mode, so that it can get out.
+   - A door is not shown OPEN while its hold is wanted but the relay must rest first: such a door may
+     close by itself while a robot drives through.
+   - A door that nobody holds is not shown OPEN either, if it is at the floor that the robot itself asks
+     for and the car is about to leave for the session: RMF's supervisor may be passing on an earlier
+     ride, and the robot would drive in.
+"""
+
+from msgspec.structs import replace
+
+from bridges.kinds.lift import drive, forgotten, sessions
+from bridges.kinds.lift.memory import LiftLimits, Memory, Session
+from bridges.kinds.lift.report import NOT_FRESH, LiftReport, report
+from bridges.kinds.lift.sensing import HAZARDS, View, gap, look, take, trust, unsure
+from bridges.kinds.lift.signals import (
+    Event,
+    FromAdapter,
+    Hazard,
+    LiftOutputs,
+    LiftSample,
+    Requested,
+)
+from bridges.kinds.shared.decision import (
+    STARTING,
+    Decision,
+    Fault,
+    IoFailed,
+    OperatorReset,
+    RivalSeen,
+    Said,
+    Sampled,
+    Suspended,
+    WriteFailed,
+)
+from bridges.kinds.shared.durations import NEVER, RIVAL_QUIET_S
+from bridges.messages.definitions import Bool, EmergencySignal
+from bridges.messages.topics import EMERGENCY_SIGNAL, FIRE_ALARM_TRIGGER
+
+NOT_RMFS = frozenset(
+    {
+        Hazard.FIRE,
+        Hazard.CODE_BLUE,
+        Hazard.EARTHQUAKE,
+        Hazard.EMERGENCY,
+        Hazard.OUT_OF_SERVICE,
+        Hazard.MANUAL,
+    }
+)
+"""Hazards that take the lift away; overload only delays it."""
+
+
+def initial(limits: LiftLimits, now: float) -> Memory:
+    """Nothing has been read, there is no session, every output is off."""
+    return Memory()
+
+
+def decide(
+    memory: Memory, event: Event, now: float, limits: LiftLimits
+) -> Decision[Memory, LiftOutputs, LiftReport]:
+    """One scan: take in the event, look at the inputs, derive outputs and report afresh."""
+    alarmed_before = memory.alarmed
+    memory, refused = _take(sessions.lapse(memory, now, limits), event, now, limits)
+    view = look(memory.senses, now, limits)
+    memory = _latch(memory, view, now, limits)
+    allowed = not obstacles(memory, view, now, limits)
+    memory, outputs = _drive(memory, view, allowed, now, limits)
+    return Decision(
+        memory,
+        memory.relays.outputs(),
+        report(memory, view, outputs, _faults(memory, view, now, limits), now, limits),
+        _wake_at(memory, view, outputs, now, limits),
+        refused,
+        _alarms(alarmed_before, memory, limits),
+    )
+
+
+def published(memory: Memory, shown: LiftReport) -> Memory:
+    """The memory once this report was sent. After OPEN at the destination a robot may be inside."""
+    session = memory.session
+    if session is None or not shown.open_at:
+        return memory
+    boarded = session.boarded or shown.open_at == session.destination
+    robot = session.robot
+    robot = replace(robot, opened=robot.opened or shown.open_at == robot.floor)
+    return replace(memory, session=replace(session, boarded=boarded, robot=robot))
+
+
+def obstacles(memory: Memory, view: View, now: float, limits: LiftLimits) -> tuple[Fault, ...]:
+    """What forbids every output now, most serious first."""
+    found = []
+    if memory.fire_latched and Hazard.FIRE not in view.hazards:
+        found.append(Fault("FIRE_LATCHED", "rmf-bridge reset when it is safe"))
+    found += [Fault(h.name) for h in HAZARDS if h in NOT_RMFS and h in view.hazards]
+    if memory.rival_at is not None:
+        found.append(Fault("TWO_NODES_FOR_ONE_DEVICE", "another node publishes this lift's states"))
+    if not view.fresh:
+        found.append(Fault(NOT_FRESH, memory.io_fault or view.blind))
+    if now >= _unwritten_at(memory, limits):
+        found.append(Fault("OUTPUTS_NOT_WRITTEN", memory.io_fault))
+    return tuple(found)
+
+
+def _unwritten_at(memory: Memory, limits: LiftLimits) -> float:
+    """When failed writes become an obstacle; NEVER if the last write succeeded."""
+    since = memory.unwritten_since
+    return NEVER if since is None else since + limits.t.stale_after_s
+
+
+def _drive(
+    memory: Memory, view: View, allowed: bool, now: float, limits: LiftLimits
+) -> tuple[Memory, LiftOutputs]:
+    """The memory with the next state of the relays, and the outputs that are wanted."""
+    session, grace, relays = memory.session, memory.grace, memory.relays
+    outputs = LiftOutputs()
+    if session and drive.serves(session, allowed, now, limits):
+        session = drive.advance(session, view, relays, now, limits)
+        outputs = drive.wanted(session, view, now, limits)
+    elif session:
+        session = drive.paused(session)
+    elif grace and now >= grace.until:
+        grace = None
+    elif grace and allowed:
+        outputs = drive.stays_on(grace, relays, view, now, limits)
+    relays = relays.step(outputs, now, limits)
+    if session and relays.call.on and session.call_at is None:
+        session = replace(session, call_at=now)
+    return replace(memory, session=session, grace=grace, relays=relays), outputs
+
+
+def _take(memory: Memory, event: Event, now: float, limits: LiftLimits) -> tuple[Memory, str]:
+    match event:
+        case Sampled(sample):
+            return _read(memory, sample, now, limits), ""
+        case Suspended(reason):
+            return replace(memory, senses=unsure(memory.senses, now), io_fault=reason), ""
+        case WriteFailed(reason):
+            since = now if memory.unwritten_since is None else memory.unwritten_since
+            return replace(memory, io_fault=reason, unwritten_since=since, write_failed=True), ""
+        case IoFailed(reason):
+            return replace(memory, senses=gap(memory.senses, now), io_fault=reason), ""
+        case RivalSeen():
+            return replace(memory, rival_at=now), ""
+        case OperatorReset():
+            return _reset(memory, now, limits), ""
+        case Requested():
+            return sessions.ask(memory, event, now, lambda: _why_not(memory, now, limits))
+        case FromAdapter():
+            return sessions.hear_adapter(memory, event.asked, now, limits), ""
+    return sessions.end(memory, event, now, limits)
+
+
+def _read(memory: Memory, sample: LiftSample, now: float, limits: LiftLimits) -> Memory:
+    """Take in a reading. If no write has failed since the last one, the outputs are written."""
+    return replace(
+        memory,
+        senses=take(memory.senses, sample, now, limits),
+        io_fault="",
+        unwritten_since=memory.unwritten_since if memory.write_failed else None,
+        write_failed=False,
+    )
+
+
+def _why_not(memory: Memory, now: float, limits: LiftLimits) -> str:
+    """Why nobody gets a lift that is free; "" if somebody may."""
+    view = look(memory.senses, now, limits)
+    why_not = obstacles(memory, view, now, limits)
+    if not why_not:
+        return ""
+    starting = view.settling and not memory.io_fault and why_not[0].code == NOT_FRESH
+    return STARTING if starting else why_not[0].code
+
+
+def _reset(memory: Memory, now: float, limits: LiftLimits) -> Memory:
+    """An operator says that it is safe: clear the latches, unless their cause may still be present."""
+    session = memory.session
+    if session and session.fault:
+        session = replace(drive.paused(session), tries=0, retry_at=None, fault=None)
+    # A fire that the inputs show latches again in this decision. Stale inputs may hide a fire.
+    unseen = not look(memory.senses, now, limits).fresh
+    return replace(
+        memory,
+        session=session,
+        fire_latched=unseen and memory.fire_latched,
+        alarmed=unseen and memory.alarmed,
+        senses=trust(memory.senses),
+    )
+
+
+def _latch(memory: Memory, view: View, now: float, limits: LiftLimits) -> Memory:
+    """Latch a fire as `fire_reset` says, and an alarm until an operator resets. Forget a rival once it
+    has been silent for RIVAL_QUIET_S."""
+    burning = Hazard.FIRE in view.hazards
+    manual = limits.fire_reset == "manual"
+    rival_at = memory.rival_at
+    return replace(
+        memory,
+        fire_latched=manual and (burning or memory.fire_latched),
+        alarmed=memory.alarmed or bool(limits.alarm_on & view.hazards),
+        rival_at=None if rival_at is None or now >= rival_at + RIVAL_QUIET_S else rival_at,
+    )
+
+
+def _alarms(before: bool, memory: Memory, limits: LiftLimits) -> tuple[Said, ...]:
+    """`true` once when a hazard of `alarm_on` comes; `false` once when an operator resets."""
+    if memory.alarmed == before or limits.alarm == "none":
+        return ()
+    if limits.alarm == FIRE_ALARM_TRIGGER.name:
+        return ((FIRE_ALARM_TRIGGER, Bool(memory.alarmed)),)
+    return ((EMERGENCY_SIGNAL, EmergencySignal((), memory.alarmed)),)
+
+
+def _faults(memory: Memory, view: View, now: float, limits: LiftLimits) -> tuple[Fault, ...]:
+    session = memory.session
+    found = [*obstacles(memory, view, now, limits)]
+    if view.settling and not memory.io_fault:
+        found = [fault for fault in found if fault.code != NOT_FRESH]
+    if session and session.fault:
+        found.append(session.fault)
+    if Hazard.OVERLOAD in view.hazards:
+        found.append(Fault("OVERLOAD", "waits until the car is lighter"))
+    if session:
+        found += _faults_of_rmf(session, now, limits)
+    elif memory.grace and memory.grace.in_car:
+        found.append(Fault("ROBOT_LEFT_IN_CAR", f"{memory.grace.session.id} was ended in mid-ride"))
+    return (*found, *view.faults)
+
+
+def _faults_of_rmf(session: Session, now: float, limits: LiftLimits) -> list[Fault]:
+    """A supervisor that asks for another session explains why no request comes for this one."""
+    if session.forgotten:
+        fault = forgotten.fault(session, now)
+        return [fault] if fault else []
+    if drive.silent(session, now, limits):
+        return [Fault("RMF_SILENT", f"no request from {session.id}")]
+    return []
+
+
+def _wake_at(
+    memory: Memory, view: View, outputs: LiftOutputs, now: float, limits: LiftLimits
+) -> float:
+    due = [
+        view.changes_at,
+        memory.relays.changes_at(outputs, now, limits),
+        _unwritten_at(memory, limits),
+    ]
+    if memory.session:
+        session = memory.session
+        due += [*drive.next_at(session, limits), forgotten.named_at(session)]
+        due.append(forgotten.lapses_at(session))
+    if memory.grace:
+        grace = memory.grace
+        due += [drive.let_go_at(grace, limits), grace.off_at, grace.until]
+    if memory.rival_at is not None:
+        due.append(memory.rival_at + RIVAL_QUIET_S)
+    return min((at for at in due if at > now), default=NEVER)

@@ -1,0 +1,189 @@
+"""Which outputs a session needs, from its request and from what the inputs show.
+
+Rules:
+- Without a session no output is switched on. All outputs are off under an obstacle (`core.py`), for a
+  session in HUMAN mode, while RMF is silent and the robot is outside, and while a fault waits for its
+  next try. For `release_grace_s` after END, AGV mode and the door's hold stay on if they were on; the
+  hold ends `dead_time_s` before AGV mode.
+- The order is: AGV mode, then the call to the destination, then, once the car stands there, the door's
+  hold. With `by_call` a call brings AGV mode, so the call comes first, even if the car stands there.
+- A call is given only in AGV mode (except with `by_call`), away from the destination, and without
+  overload. A door command is given only in AGV mode, while the car stands at the destination's
+  landing. The two are never on together, and neither comes on before both have been off for
+  `dead_time_s`.
+- A call is held until the car stands at its destination, or pulsed. It is given again after every
+  interruption, and when the car had arrived but is then seen at another floor. While the floor code
+  is changing no new call is given: the car may just be arriving.
+- AGV mode, the floor and the open door each have a timeout. When it ends, the outputs go off and a
+  fault is shown. Three more tries follow, 10, 30 and 60 s later; then the fault latches. Losing AGV
+  mode during the ride is such a fault too. With `by_call` AGV mode may end between two destinations,
+  while neither a call nor the hold is on. During an overload no timeout runs.
+- Switching off is immediate. Switching on waits until the relay has been off for `min_off_s`, and is
+  limited to `max_cycles_per_min` (`Channel` in `memory.py`).
+"""
+
+from msgspec.structs import replace
+
+from bridges.kinds.lift.memory import Grace, LiftLimits, Relays, Session, Waiting
+from bridges.kinds.lift.sensing import View
+from bridges.kinds.lift.signals import Hazard, LiftOutputs
+from bridges.kinds.shared.decision import Fault
+from bridges.kinds.shared.durations import NEVER
+
+RETRY_AFTER_S = (10.0, 30.0, 60.0)
+
+
+def at_destination(session: Session, view: View, limits: LiftLimits) -> bool:
+    """Does the car stand at the landing that the session asked for?"""
+    return view.stopped and view.level == limits.stops[session.destination].level
+
+
+def agv_ok(view: View) -> bool:
+    """Is AGV mode on, as far as the wiring can tell? True if no status line is wired."""
+    return view.agv is not False
+
+
+def silent(session: Session, now: float, limits: LiftLimits) -> bool:
+    """RMF has not repeated its request for too long."""
+    return now >= session.asked_at + limits.t.request_timeout_s
+
+
+def serves(session: Session, allowed: bool, now: float, limits: LiftLimits) -> bool:
+    """May anything be energised for this session? `allowed`: there is no obstacle."""
+    outside_and_gone = silent(session, now, limits) and not session.boarded
+    return allowed and session.agv and not outside_and_gone
+
+
+def paused(session: Session) -> Session:
+    """The session with its ride interrupted: it starts anew when outputs are allowed again."""
+    return replace(session, agv_seen=False, arrived=False, call_at=None, waiting=None)
+
+
+def advance(
+    session: Session, view: View, relays: Relays, now: float, limits: LiftLimits
+) -> Session:
+    """The session after this scan's inputs: arrivals, timeouts and retries.
+
+    `relays`: their state before this scan.
+    """
+    if session.retry_at is not None:
+        if now < session.retry_at:
+            return session
+        session = replace(session, retry_at=None)
+    requested = _requested(session, relays, limits)
+    if requested and session.agv_seen and not agv_ok(view):
+        return _trip(session, Fault("AGV_MODE_LOST", "AGV mode ended during the ride"), now)
+    session = replace(session, agv_seen=requested and view.agv is True)
+    session = _arrive(session, view, limits)
+    if Hazard.OVERLOAD in view.hazards:
+        return replace(session, call_at=None, waiting=None)
+    waiting = _waits_for(session, view, limits)
+    if waiting != session.waiting:
+        session = replace(session, waiting=waiting, since=now)
+    if waiting is None:
+        return replace(session, tries=0, fault=None)
+    if now >= session.since + _time_for(waiting, limits):
+        return _trip(session, _timeout_fault(session, waiting, limits), now)
+    return session
+
+
+def wanted(session: Session, view: View, now: float, limits: LiftLimits) -> LiftOutputs:
+    """The outputs for a session that is served."""
+    if session.retry_at is not None:
+        return LiftOutputs()
+    if not (agv_ok(view) or limits.by_call):
+        return LiftOutputs(agv_request=True)
+    stop = limits.stops[session.destination]
+    if agv_ok(view) and at_destination(session, view, limits):
+        return LiftOutputs(agv_request=True, hold_door=stop.side)
+    may_call = not session.arrived and now < _pulse_ends_at(session, limits)
+    is_new_call = session.call_at is None
+    if not may_call or Hazard.OVERLOAD in view.hazards or (is_new_call and view.level_settles):
+        return LiftOutputs(agv_request=True)
+    return LiftOutputs(agv_request=True, call=stop.level)
+
+
+def stays_on(
+    grace: Grace, relays: Relays, view: View, now: float, limits: LiftLimits
+) -> LiftOutputs:
+    """The outputs in the grace after END."""
+    if now >= grace.off_at:
+        return LiftOutputs()
+    standing = agv_ok(view) and at_destination(grace.session, view, limits)
+    hold = relays.hold.on if standing and now < let_go_at(grace, limits) else None
+    return LiftOutputs(agv_request=bool(relays.agv.on), hold_door=hold)
+
+
+def let_go_at(grace: Grace, limits: LiftLimits) -> float:
+    """When the door's hold ends."""
+    return min(grace.off_at, grace.until) - limits.t.dead_time_s
+
+
+def next_at(session: Session, limits: LiftLimits) -> tuple[float, ...]:
+    """When time alone may change this session's outputs or report."""
+    waits = NEVER if session.waiting is None else session.since + _time_for(session.waiting, limits)
+    return (
+        session.asked_at + limits.t.request_timeout_s,
+        NEVER if session.retry_at is None else session.retry_at,
+        waits,
+        _pulse_ends_at(session, limits),
+    )
+
+
+def _requested(session: Session, relays: Relays, limits: LiftLimits) -> bool:
+    """Has one of our outputs requested AGV mode until now?"""
+    if limits.by_call:
+        return session.call_at is not None or relays.hold.on is not None
+    return bool(relays.agv.on)
+
+
+def _arrive(session: Session, view: View, limits: LiftLimits) -> Session:
+    """A car that stands at the destination ends the call. If it is then seen elsewhere, it is called
+    again.
+
+    With `by_call`, a car that stands there already does not end the call before AGV mode is on.
+    """
+    if limits.by_call and not agv_ok(view):
+        return replace(session, arrived=False)
+    if at_destination(session, view, limits):
+        return replace(session, arrived=True)
+    elsewhere = view.level not in (None, limits.stops[session.destination].level)
+    if session.arrived and elsewhere:
+        return replace(session, arrived=False, call_at=None)
+    return session
+
+
+def _waits_for(session: Session, view: View, limits: LiftLimits) -> Waiting | None:
+    if not agv_ok(view):
+        return "agv"
+    if not at_destination(session, view, limits):
+        return "floor"
+    return None if view.door(limits.side(session.destination)).open else "door"
+
+
+def _time_for(waiting: Waiting, limits: LiftLimits) -> float:
+    t = limits.t
+    return {"agv": t.agv_timeout_s, "floor": t.floor_timeout_s, "door": t.door_timeout_s}[waiting]
+
+
+def _timeout_fault(session: Session, waiting: Waiting, limits: LiftLimits) -> Fault:
+    after = f"after {_time_for(waiting, limits):g} s"
+    if waiting == "agv":
+        return Fault("AGV_MODE_NOT_GRANTED", f"no AGV mode status {after}")
+    if waiting == "floor":
+        return Fault("RUNTIME_LIMIT_EXCEEDED", f"not at {session.destination} {after}")
+    return Fault("DOOR_OPENING_FAULT", f"not open at {session.destination} {after}")
+
+
+def _trip(session: Session, fault: Fault, now: float) -> Session:
+    """Switch the outputs off until the next try. After the third retry the fault latches."""
+    latched = session.tries >= len(RETRY_AFTER_S)
+    retry_at = NEVER if latched else now + RETRY_AFTER_S[session.tries]
+    return replace(paused(session), tries=session.tries + 1, retry_at=retry_at, fault=fault)
+
+
+def _pulse_ends_at(session: Session, limits: LiftLimits) -> float:
+    """When a pulsed call ends; NEVER for one that is held."""
+    if session.call_at is None or limits.t.call_pulse_s is None:
+        return NEVER
+    return session.call_at + limits.t.call_pulse_s

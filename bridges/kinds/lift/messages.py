@@ -1,0 +1,111 @@
+"""LiftRequest in, LiftState out. Is a request well formed, and does this lift serve its floor?"""
+
+from collections.abc import Mapping
+
+from bridges.kinds.lift.report import LiftReport
+from bridges.kinds.lift.settings import LiftSettings
+from bridges.kinds.lift.signals import Ended, FromAdapter, Requested
+from bridges.kinds.shared.decision import RequestRefused
+from bridges.kinds.shared.freshness import in_ns
+from bridges.kinds.shared.names import check_length
+from bridges.messages.definitions import (
+    LiftMode,
+    LiftRequest,
+    LiftRequestDoor,
+    LiftRequestType,
+    LiftState,
+    Message,
+    Time,
+)
+from bridges.messages.topics import (
+    ADAPTER_LIFT_REQUESTS,
+    EMERGENCY_SIGNAL,
+    FIRE_ALARM_TRIGGER,
+    Topic,
+)
+
+OWN_REQUESTS = ADAPTER_LIFT_REQUESTS.live()
+"""What fleet adapters send to RMF's supervisor. We listen to it for the robot that has the lift."""
+AVAILABLE_MODES = (int(LiftMode.MODE_HUMAN), int(LiftMode.MODE_AGV))
+
+
+def accept(request: LiftRequest, settings: LiftSettings) -> Requested | Ended:
+    """The request as an event. Raises RequestRefused if it is malformed or asks for the impossible.
+
+    An END_SESSION counts whatever its floor and door are: fleet adapters send "" and 0
+    (rmf_fleet_adapter RobotContext.cpp). Jazzy's supervisor sends one without a session at each state
+    of a lift that nobody has (lift_supervisor/Node.cpp); it ends nothing. One with DOOR_OPEN, which no
+    node of RMF's sends, is a person's (`rmf-bridge send`, rmf-web).
+    """
+    check_length(session_id=request.session_id)
+    stamp = _stamp(request)
+    if request.request_type == LiftRequestType.REQUEST_END_SESSION:
+        by_person = request.door_state == LiftRequestDoor.DOOR_OPEN
+        return Ended(request.session_id, stamp, by_person)
+    if not request.session_id:
+        raise RequestRefused("empty session_id", "a session needs a name")
+    agv = request.request_type == LiftRequestType.REQUEST_AGV_MODE
+    if not agv and request.request_type != LiftRequestType.REQUEST_HUMAN_MODE:
+        raise RequestRefused("unknown request_type", str(request.request_type))
+    if request.door_state not in set(LiftRequestDoor):
+        raise RequestRefused("unknown door_state", str(request.door_state))
+    floors = settings.stops()
+    if request.destination_floor not in floors:
+        raise RequestRefused(
+            "floor not served", f"{request.destination_floor!r} is not one of {', '.join(floors)}"
+        )
+    return Requested(request.session_id, agv, request.destination_floor, stamp)
+
+
+def accept_adapters(request: LiftRequest, settings: LiftSettings) -> FromAdapter:
+    """A fleet adapter's request, before RMF's supervisor has decided on it. Raises RequestRefused."""
+    return FromAdapter(accept(request, settings))
+
+
+def _stamp(request: LiftRequest) -> int:
+    """Its request_time (ns); 0 for one that no clock shows: an END counts all the same."""
+    try:
+        return in_ns(request.request_time)
+    except RequestRefused:
+        return 0
+
+
+def alarm_topics(settings: LiftSettings) -> tuple[Topic[Message], ...]:
+    """The topic on which this lift tells the fleets of a fire; empty if it does not."""
+    return tuple(t for t in (FIRE_ALARM_TRIGGER, EMERGENCY_SIGNAL) if t.name == settings.alarm)
+
+
+def device_name(message: LiftRequest | LiftState) -> str:
+    """Which lift a message is about."""
+    return message.lift_name
+
+
+def state_message(name: str, settings: LiftSettings, report: LiftReport, stamp: Time) -> LiftState:
+    """The report as RMF reads it; `stamp` is when the inputs were read."""
+    return LiftState(
+        lift_time=stamp,
+        lift_name=name,
+        available_floors=tuple(settings.stops()),
+        current_floor=report.floor,
+        destination_floor=report.destination,
+        door_state=int(report.door),
+        motion_state=int(report.motion),
+        available_modes=AVAILABLE_MODES,
+        current_mode=int(report.mode),
+        session_id=report.session,
+    )
+
+
+def summary(report: LiftReport) -> Mapping[str, str]:
+    """The report in one line, for a person."""
+    door = report.door.name.removeprefix("DOOR_").lower()
+    return {
+        "mode": report.mode.name.removeprefix("MODE_"),
+        "floor": report.floor or "?",
+        "door": f"{door} (estimated)" if report.estimated else door,
+        "motion": report.motion.name.removeprefix("MOTION_").lower(),
+        "session": report.session or "-",
+        "boarded": "yes" if report.boarded else "no",
+        "destination": report.destination or "-",
+        **({"waits": report.waits} if report.waits else {}),
+    }

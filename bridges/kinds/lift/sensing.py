@@ -1,0 +1,304 @@
+"""What to believe of a lift's inputs: debounce, age, and whether they can be true together.
+
+Rules:
+- A change counts once it has lasted for its signal's debounce. The end of a hazard counts once it has
+  lasted for `hazard_clear_s`. No input is believed before every input has settled once, or while any
+  input has kept changing for longer than `RESTLESS_S`. The time that inputs take to settle after the
+  start is no fault.
+- After `stale_after_s` without a reading, what was believed is forgotten: the car may be anywhere.
+  After a shorter gap the values stay, and a debounce that had begun starts again.
+- A floor code is believed only if the car can have reached that floor. It cannot if the code skips
+  floors faster than a car travels, or (with motion lines) changes while the car stands. Then the
+  position is unknown until the code shows the last trusted floor, or one that the car can have
+  reached, or until an operator resets.
+- While the floor code is not valid (`valid_when`) for longer than its debounce, the car may go
+  anywhere unseen. The next floor that the code shows is believed.
+- A door is open when the contact that proves it says so. With only one contact the other end position
+  is estimated from the door's travel time, and marked as an estimate.
+- A car stands when the motion lines say so. Without motion lines it is taken to stand.
+"""
+
+from collections.abc import Iterator, Sequence
+
+import msgspec
+from msgspec.structs import replace
+
+from bridges.kinds.lift.memory import LiftLimits, Position, Senses
+from bridges.kinds.lift.signals import Door, Hazard, LiftSample, Motion, Side
+from bridges.kinds.shared.debounce import Settled, forget, settle
+from bridges.kinds.shared.decision import Fault
+from bridges.kinds.shared.durations import AGES_AGO, NEVER
+
+HAZARDS = tuple(Hazard)
+
+MOTION_MEMORY_S = 2.0
+"""How long after the car was last seen moving a new floor code is still possible."""
+
+RESTLESS_S = 2.0
+"""An input that does not settle within this time keeps changing: a loose wire, or interference."""
+
+
+class DoorSeen(msgspec.Struct, frozen=True):
+    """One door: open, closed or moving (neither). `settles_at`: when an estimate will be ready (s)."""
+
+    open: bool
+    closed: bool
+    estimated: bool = False
+    settles_at: float = NEVER
+
+
+class View(msgspec.Struct, frozen=True):
+    """The inputs as they are believed at one instant.
+
+    `blind`: why no input can be believed, "" when all can. `settling`: the only reason is that they
+    have not settled since the start. `level`: the landing, None when unknown. `level_settles`: the
+    floor code is changing. `agv`: None where not wired. `changes_at`: when the view may change
+    without a new reading (s).
+    """
+
+    blind: str
+    settling: bool
+    level: str | None
+    level_settles: bool
+    stopped: bool
+    motion: Motion | None
+    agv: bool | None
+    front: DoorSeen
+    rear: DoorSeen | None
+    hazards: frozenset[Hazard]
+    faults: tuple[Fault, ...]
+    changes_at: float
+
+    @property
+    def fresh(self) -> bool:
+        """Can the inputs be believed?"""
+        return not self.blind
+
+    def door(self, side: Side) -> DoorSeen:
+        """The door on that side; a side that is not wired is never open."""
+        if side is Side.FRONT:
+            return self.front
+        return self.rear or DoorSeen(open=False, closed=False)
+
+
+def take(senses: Senses, sample: LiftSample, now: float, limits: LiftLimits) -> Senses:
+    """Add one reading."""
+    if now >= stale_at(senses, limits):
+        senses = unsure(senses, now)
+    hold = limits.debounce_s
+    code = settle(senses.code, (sample.level, sample.code_fault), now, hold("floor"))
+    return Senses(
+        read_at=now,
+        code=code,
+        doors=(
+            settle(senses.doors[0], sample.door, now, hold("door")),
+            settle(senses.doors[1], sample.rear_door, now, hold("rear_door")),
+        ),
+        motion=settle(senses.motion, sample.motion, now, hold("motion")),
+        agv=settle(senses.agv, sample.agv, now, hold("agv_mode")),
+        hazards={
+            h: _settle_hazard(senses.hazards.get(h), h, h in sample.hazards, now, limits)
+            for h in HAZARDS
+        },
+        position=_locate(senses.position, code, sample, now, limits),
+    )
+
+
+def gap(senses: Senses, now: float) -> Senses:
+    """A read has failed: the debounce starts again, and the car may have moved."""
+    return Senses(
+        senses.read_at,
+        forget(senses.code),
+        (forget(senses.doors[0]), forget(senses.doors[1])),
+        forget(senses.motion),
+        forget(senses.agv),
+        {h: s for h, before in senses.hazards.items() if (s := forget(before))},
+        replace(senses.position, moved_at=now),
+    )
+
+
+def unsure(senses: Senses, now: float) -> Senses:
+    """After a long time without a reading: forget everything but the last landing."""
+    return Senses(position=replace(senses.position, moved_at=now))
+
+
+def trust(senses: Senses) -> Senses:
+    """An operator says that the floor code is right."""
+    position = senses.position
+    if position.suspect is None:
+        return senses
+    position = replace(position, trusted=position.suspect, suspect=None)
+    return replace(senses, position=position)
+
+
+def look(senses: Senses, now: float, limits: LiftLimits) -> View:
+    """What is believed now."""
+    stale = now >= stale_at(senses, limits)
+    motion = senses.motion.value if senses.motion else None
+    front = _door(senses.doors[0], now, limits)
+    rear = _door(senses.doors[1], now, limits) if _wired(senses.doors[1]) else None
+    code = senses.code.value if senses.code else None
+    hazards = frozenset(h for h, s in senses.hazards.items() if s.value)
+    unsettled = tuple(_unsettled(senses, limits))
+    due = [stale_at(senses, limits), front.settles_at, rear.settles_at if rear else NEVER]
+    for wait in unsettled:
+        due += [wait.due_at, wait.torn_at]
+    return View(
+        blind=_blind(senses, unsettled, now, limits),
+        settling=_settling(unsettled, now),
+        level=code[0] if code and code[0] == senses.position.trusted else None,
+        level_settles=senses.code is not None and senses.code.candidate != senses.code.value,
+        stopped=_stands(senses.motion),
+        motion=motion,
+        agv=senses.agv.value if senses.agv else None,
+        front=front,
+        rear=rear,
+        hazards=frozenset() if stale else hazards,
+        faults=() if stale else _faults(senses),
+        changes_at=min((at for at in due if at > now), default=NEVER),
+    )
+
+
+def stale_at(senses: Senses, limits: LiftLimits) -> float:
+    """When the last reading becomes stale (s); -inf before the first."""
+    return AGES_AGO if senses.read_at is None else senses.read_at + limits.t.stale_after_s
+
+
+def _settle_hazard(
+    before: Settled[bool] | None, hazard: Hazard, seen: bool, now: float, limits: LiftLimits
+) -> Settled[bool]:
+    return settle(before, seen, now, _hazard_hold_s(before, hazard, seen, limits))
+
+
+def _hazard_hold_s(
+    before: Settled[bool] | None, hazard: Hazard, seen: bool, limits: LiftLimits
+) -> float:
+    """How long the reading must last: longer for the end of a hazard than for its start."""
+    hold_s = limits.debounce_s(hazard)
+    clearing = before is not None and bool(before.value) and not seen
+    return max(hold_s, limits.t.hazard_clear_s) if clearing else hold_s
+
+
+def _locate(
+    before: Position,
+    code: Settled[tuple[str | None, str]],
+    sample: LiftSample,
+    now: float,
+    limits: LiftLimits,
+) -> Position:
+    """Follow the car from floor to floor. A floor that it cannot have reached is only suspected."""
+    if sample.motion is not Motion.STOPPED:
+        before = replace(before, moved_at=now)
+    level = code.value[0] if code.value else None
+    if level is None and not sample.floor_valid:
+        return Position(moved_at=before.moved_at)
+    if level is None or level == before.suspect:
+        return before
+    if level == before.trusted or _can_have_come(before, level, now, limits):
+        return replace(before, trusted=level, seen_at=now, suspect=None)
+    return replace(before, suspect=level)
+
+
+def _can_have_come(before: Position, level: str, now: float, limits: LiftLimits) -> bool:
+    if before.trusted is None:
+        return True
+    memory_s = MOTION_MEMORY_S + limits.debounce_s("floor")
+    if before.moved_at is None or now - before.moved_at > memory_s:
+        return False
+    skipped = limits.floors_between(level, before.trusted)
+    return now - before.seen_at >= skipped * limits.t.floor_travel_min_s
+
+
+def _stands(motion: Settled[Motion | None] | None) -> bool:
+    """Does the car stand? Until the motion lines have settled, the first reading decides."""
+    if motion is None:
+        return False
+    return (motion.candidate if motion.value is None else motion.value) in (None, Motion.STOPPED)
+
+
+def _wired(seen: Settled[Door | None] | None) -> bool:
+    return seen is not None and seen.candidate is not None
+
+
+def _door(seen: Settled[Door | None] | None, now: float, limits: LiftLimits) -> DoorSeen:
+    value = seen.value if seen else None
+    if value in (Door.OPEN, Door.CLOSED):
+        return DoorSeen(open=value is Door.OPEN, closed=value is Door.CLOSED)
+    if seen is None or value not in (Door.NOT_OPEN, Door.NOT_CLOSED):
+        return DoorSeen(open=False, closed=False)
+    there_at = seen.since + limits.t.door_travel_s
+    if now < there_at:
+        return DoorSeen(open=False, closed=False, settles_at=there_at)
+    return DoorSeen(open=value is Door.NOT_CLOSED, closed=value is Door.NOT_OPEN, estimated=True)
+
+
+class Unsettled(msgspec.Struct, frozen=True):
+    """An input that is changing, or has never settled (`new`).
+
+    `due_at`: when it settles if it does not change again. `torn_at`: when it counts as restless. In s.
+    """
+
+    name: str
+    due_at: float
+    torn_at: float
+    new: bool = False
+
+
+def _unsettled(senses: Senses, limits: LiftLimits) -> Iterator[Unsettled]:
+    hold = limits.debounce_s
+    plain: list[tuple[str, Settled[object] | None]] = [
+        ("floor", senses.code),
+        ("door", senses.doors[0]),
+        ("rear_door", senses.doors[1]),
+        ("motion", senses.motion),
+        ("agv_mode", senses.agv),
+    ]
+    for name, seen in plain:
+        if seen is None or seen.torn_since is not None:
+            yield _wait(name, seen, hold(name), hold(name))
+    for h in HAZARDS:
+        fear = senses.hazards.get(h)
+        if fear is None or fear.torn_since is not None:
+            hold_s = _hazard_hold_s(fear, h, bool(fear and fear.candidate), limits)
+            yield _wait(h, fear, hold_s, max(hold_s, limits.t.hazard_clear_s))
+
+
+def _wait(name: str, seen: Settled[object] | None, hold_s: float, most_s: float) -> Unsettled:
+    if seen is None or seen.torn_since is None:
+        return Unsettled(name, AGES_AGO, AGES_AGO)
+    torn_at = seen.torn_since + most_s + RESTLESS_S
+    return Unsettled(name, seen.due_at(hold_s), torn_at, new=seen.steady_at is None)
+
+
+def _blind(senses: Senses, unsettled: Sequence[Unsettled], now: float, limits: LiftLimits) -> str:
+    if senses.read_at is None:
+        return "not read yet"
+    if now >= stale_at(senses, limits):
+        return f"no reading for {limits.t.stale_after_s:g} s"
+    torn = [wait.name for wait in unsettled if wait.new or now >= wait.torn_at]
+    return f"not steady: {', '.join(torn)}" if torn else ""
+
+
+def _settling(unsettled: Sequence[Unsettled], now: float) -> bool:
+    """Has an input not settled since the start, and is none restless?"""
+    first = any(wait.new for wait in unsettled)
+    return first and not any(now >= wait.torn_at for wait in unsettled)
+
+
+def _faults(senses: Senses) -> tuple[Fault, ...]:
+    found = []
+    code = senses.code.value if senses.code else None
+    if code and code[1]:
+        found.append(Fault("FLOOR_CODE_ILLEGAL", code[1]))
+    if code and code[0] is not None and code[0] == senses.position.suspect:
+        found.append(
+            Fault("POSITION_LOST", f"{code[0]} cannot follow {senses.position.trusted} like this")
+        )
+    for name, seen in zip(("door", "rear door"), senses.doors, strict=True):
+        if seen and seen.value is Door.BOTH:
+            found.append(Fault("DOOR_CONTACTS_CONTRADICT", f"{name} reads open and closed"))
+        if seen and seen.value is Door.UNKNOWN:
+            found.append(Fault("DOOR_CODE_ILLEGAL", f"the {name}'s number means nothing"))
+    if senses.motion and senses.motion.value is Motion.CONTRADICTORY:
+        found.append(Fault("MOTION_CONTRADICTORY", "the motion lines cannot all be true"))
+    return tuple(found)

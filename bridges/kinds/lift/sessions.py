@@ -1,0 +1,142 @@
+"""Who has the lift: grants, refusals, END, and the grace after it.
+
+The rules are 1 and 2 of `core.py`; `forgotten.py` has those of a robot that RMF's supervisor forgets,
+`replayed.py` those of requests that it hears again.
+"""
+
+from collections.abc import Callable
+from typing import Final
+
+from msgspec.structs import replace
+
+from bridges.kinds.lift import forgotten, replayed
+from bridges.kinds.lift.memory import Grace, LiftLimits, Memory, Session
+from bridges.kinds.lift.signals import Ended, Requested
+from bridges.kinds.shared.decision import RELEASED_LATELY
+from bridges.kinds.shared.durations import AGES_AGO
+
+LEFT_IN_CAR: Final = "released in mid-ride"
+
+
+def ask(
+    memory: Memory, request: Requested, now: float, why_not: Callable[[], str]
+) -> tuple[Memory, str]:
+    """Take a request of `lift_requests`; also why it is refused, "" if it is not. `why_not`: why nobody
+    gets the lift now."""
+    held, grace = memory.session, memory.grace
+    if held and held.id != request.session_id:
+        session = forgotten.overruled(held, request.session_id, now)
+        return replace(memory, session=session), f"held by another session: {held.id}"
+    if held:
+        return replace(memory, session=_heed(memory, held, request, now)), ""
+    if grace and now < grace.until:
+        if grace.session.id != request.session_id:
+            waits = LEFT_IN_CAR if grace.in_car else RELEASED_LATELY
+            return memory, f"{waits}: by {grace.session.id}"
+        session = forgotten.granted(_anew(grace.session, now), request.stamp)
+        return replace(memory, session=_heed(memory, session, request, now), grace=None), ""
+    if refused := why_not():
+        return memory, refused
+    session = Session(request.session_id, request.agv, request.destination, now)
+    return replace(memory, session=forgotten.granted(session, request.stamp), grace=None), ""
+
+
+def _heed(memory: Memory, session: Session, request: Requested, now: float) -> Session:
+    """The session once `lift_requests` asks for it."""
+    own = memory.own.get(session.id, "")
+    held_open = memory.relays.hold.on is not None
+    doubted = replayed.doubt(session, request, own, held_open, now)
+    heeded = replace(session, asked_at=now) if doubted else _refresh(session, request, now)
+    return replace(heeded, forgotten=None, doubted=doubted)
+
+
+def hear_adapter(
+    memory: Memory, asked: Requested | Ended, now: float, limits: LiftLimits
+) -> Memory:
+    """A robot's own request: it counts for the session that has the lift, if that is forgotten or
+    disowned, or if it settles a doubt; and for a robot that was left in the car."""
+    held = memory.session
+    memory = replace(memory, own=replayed.noted(memory.own, asked))
+    if held is None:
+        return _come_back(memory, asked, now)
+    if held.id != asked.session_id:
+        return memory
+    session, obeyed = forgotten.heard(held, asked, now)
+    if not (obeyed or replayed.confirmed(session, asked)):
+        return replace(memory, session=session)
+    if isinstance(asked, Requested):
+        return replace(memory, session=_refresh(session, asked, now))
+    return _let_go(memory, session, asked.by_person, now, limits)
+
+
+def _come_back(memory: Memory, asked: Requested | Ended, now: float) -> Memory:
+    """A robot that may have been left in the car asks again by itself, within the grace."""
+    grace = memory.grace
+    if grace is None or not grace.in_car or now >= grace.until:
+        return memory
+    if grace.session.id != asked.session_id:
+        return memory
+    session = forgotten.heard(grace.session, asked, now)[0]
+    if isinstance(asked, Ended) or session.robot == grace.session.robot:
+        return replace(memory, grace=replace(grace, session=session))
+    session = _refresh(forgotten.disowned(_anew(session, now), now), asked, now)
+    return replace(memory, session=session, grace=None)
+
+
+def _refresh(session: Session, request: Requested, now: float) -> Session:
+    """A repeat only shows that RMF is alive. A different destination or mode is a new request."""
+    if (request.agv, request.destination) == (session.agv, session.destination):
+        return replace(session, asked_at=now)
+    fresh = replace(_anew(session, now), agv=request.agv, destination=request.destination)
+    return replace(fresh, forgotten=session.forgotten)
+
+
+def _anew(session: Session, now: float) -> Session:
+    """The session as if it were granted now, but for what is known of its robot."""
+    return Session(
+        session.id,
+        session.agv,
+        session.destination,
+        now,
+        boarded=session.boarded,
+        robot=session.robot,
+        ends=session.ends,
+    )
+
+
+def end(memory: Memory, ended: Ended, now: float, limits: LiftLimits) -> tuple[Memory, str]:
+    """Take an END of `lift_requests`; also why it is refused, "" if it is not."""
+    held, grace = memory.session, memory.grace
+    if held is None and grace and ended.by_person and ended.session_id == grace.session.id:
+        return replace(memory, grace=replace(grace, until=grace.off_at, in_car=False)), ""
+    if held is None or not ended.session_id:
+        return memory, ""
+    if held.id != ended.session_id:
+        session = forgotten.remembered(held, ended.session_id)
+        return replace(memory, session=session), f"held by another session: {held.id}"
+    session, counts = forgotten.counts(held, ended, now)
+    if not counts:
+        return replace(memory, session=session), f"END older than the session: {held.id}"
+    if forgotten.goes_on(session, now) and not ended.by_person:
+        return replace(memory, session=forgotten.disowned(session, now)), ""
+    return _let_go(memory, session, ended.by_person, now, limits), ""
+
+
+def lapse(memory: Memory, now: float, limits: LiftLimits) -> Memory:
+    """A disowned session ends when its robot has been silent for too long."""
+    held = memory.session
+    if held is None or now < forgotten.lapses_at(held):
+        return memory
+    return _let_go(memory, held, False, now, limits)
+
+
+def _let_go(
+    memory: Memory, held: Session, by_person: bool, now: float, limits: LiftLimits
+) -> Memory:
+    """The session is over, and its grace begins."""
+    grace = None
+    if memory.relays.agv.on or held.boarded:
+        off_at = now + limits.t.release_grace_s
+        in_car_until = AGES_AGO if by_person else forgotten.in_car_until(held, now)
+        grace = Grace(held, max(off_at, in_car_until), off_at, in_car_until > now)
+    return replace(memory, session=None, grace=grace)

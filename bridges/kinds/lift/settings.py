@@ -1,0 +1,105 @@
+"""The part of a lift's YAML that does not depend on its wiring."""
+
+from collections.abc import Mapping
+from typing import Annotated, Literal
+
+import msgspec
+from msgspec import Meta
+
+from bridges.kinds.lift.signals import Side, Stop
+from bridges.kinds.shared.fields import DeviceSettings, Name, Period, Seconds, Timeout
+from bridges.kinds.shared.kind import FLOOR, Place
+
+AlarmOn = Annotated[
+    list[Literal["fire_alarm", "code_blue", "earthquake", "emergency"]], Meta(min_length=1)
+]
+
+
+class Floor(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A floor whose landing has another name, or that the car's rear door serves.
+
+    `level`: the landing's name in the floor code table; the floor's own name when absent.
+    `side`: which of the car's doors opens there.
+    """
+
+    level: Name | None = None
+    side: Side = Side.FRONT
+
+
+class Durations(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Durations and counts of a lift.
+
+    `stale_after_s`: after so long without a good reading, or without a good write, the lift is OFFLINE
+    and its outputs are off.
+    `release_grace_s`: how long AGV mode and the door's hold stay on after END, for the same session.
+    `agv_timeout_s`, `floor_timeout_s`, `door_timeout_s`: how long AGV mode, the floor and the open
+    door may take. Then the outputs go off and a fault is shown. Retries follow after 10, 30 and 60 s;
+    then the fault latches.
+    `request_timeout_s`: how long RMF may be silent (it repeats requests at 1 Hz). Then a fault is
+    shown, and the outputs go off unless a robot may be inside.
+    `hazard_clear_s`: how long a hazard input must be clear before RMF may use the lift again.
+    `door_travel_s`: with one door contact, how long the door takes to its other end position.
+    `floor_travel_min_s`: the least time from one floor to the next. A faster change of the floor code
+    is not believed.
+    `call_pulse_s`: how long a call is pulsed; held until arrival when absent.
+    `dead_time_s`: the pause between two calls, between the commands of two doors, and between a call
+    and a door command.
+    `min_off_s`, `max_cycles_per_min`: spare the relays. They delay switching on, never off.
+    """
+
+    stale_after_s: Period = 1.0
+    release_grace_s: Seconds = 3.0
+    agv_timeout_s: Timeout = 600.0
+    floor_timeout_s: Timeout = 120.0
+    door_timeout_s: Timeout = 10.0
+    request_timeout_s: Timeout = 30.0
+    hazard_clear_s: Seconds = 1.0
+    door_travel_s: Seconds = 5.0
+    floor_travel_min_s: Seconds = 0.5
+    call_pulse_s: Seconds | None = None
+    dead_time_s: Seconds = 0.3
+    min_off_s: Seconds = 0.5
+    max_cycles_per_min: Annotated[int, Meta(ge=1, le=600)] = 20
+
+
+class LiftSettings(DeviceSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """One lift, apart from its wiring.
+
+    `floors`: their names on RMF's map, from the lowest up. Write a mapping if a floor's landing has
+    another name, or if the rear door serves it.
+    `agv_mode`: how AGV mode is switched on. `requested`: by an output that is held. `by_call`: by a
+    call; it stays on while the call is served and the door is held.
+    `limits`: durations and counts that differ from the defaults.
+    `fire_reset`: RMF may use the lift again when the alarm clears (`auto`), or only after
+    `rmf-bridge reset` (`manual`).
+    `alarm`: the topic that tells the fleets of an alarm; `none` if the site does not want that.
+    `alarm_on`: the hazards that are such an alarm. All robots then leave the lifts and stop elsewhere,
+    until `rmf-bridge reset`.
+    """
+
+    floors: list[Name] | dict[Name, Floor]
+    agv_mode: Literal["requested", "by_call"] = "requested"
+    limits: Durations = Durations()
+    fire_reset: Literal["auto", "manual"] = "auto"
+    alarm: Literal["none", "fire_alarm_trigger", "emergency_signal"] = "none"
+    alarm_on: AlarmOn = msgspec.field(default_factory=lambda: ["fire_alarm"])
+
+    def stale_after(self) -> float:
+        """Its limits' `stale_after_s`."""
+        return self.limits.stale_after_s
+
+    def on_map(self) -> list[Place]:
+        """The floors, which RMF's map must name too."""
+        if isinstance(self.floors, list):
+            return [(("floors", str(i)), FLOOR, name) for i, name in enumerate(self.floors)]
+        return [(("floors", name), FLOOR, name) for name in self.floors]
+
+    def stops(self) -> Mapping[str, Stop]:
+        """RMF's floor name -> landing and door, from the lowest up."""
+        if isinstance(self.floors, list):
+            return {name: Stop(name) for name in self.floors}
+        return {name: Stop(f.level or name, f.side) for name, f in self.floors.items()}
+
+    def levels(self) -> list[str]:
+        """The landings, from the lowest up."""
+        return list(dict.fromkeys(stop.level for stop in self.stops().values()))

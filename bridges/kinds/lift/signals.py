@@ -1,0 +1,123 @@
+"""What passes between a lift's driver and its core in one scan, and the core's events."""
+
+from enum import Enum, StrEnum
+
+import msgspec
+
+from bridges.kinds.shared.decision import IoFailed, OperatorReset, RivalSeen, Sampled
+
+
+class Door(Enum):
+    """What the door contacts say at one instant.
+
+    With two contacts: OPEN, CLOSED, BETWEEN (neither) or BOTH (a fault). With one that proves open:
+    OPEN or NOT_OPEN. With one that proves closed: CLOSED or NOT_CLOSED. If the door is read as a
+    number, a number that the YAML does not list is UNKNOWN (a fault).
+    """
+
+    OPEN = "open"
+    CLOSED = "closed"
+    BETWEEN = "between"
+    BOTH = "both"
+    NOT_OPEN = "not open"
+    NOT_CLOSED = "not closed"
+    UNKNOWN = "unknown"
+
+
+class Motion(Enum):
+    """What the motion lines say. CONTRADICTORY: they cannot all be true (up and down at once)."""
+
+    STOPPED = "stopped"
+    UP = "up"
+    DOWN = "down"
+    MOVING = "moving"
+    CONTRADICTORY = "contradictory"
+
+
+class Hazard(StrEnum):
+    """Inputs that take the lift away from RMF. The names are the YAML's signal names."""
+
+    FIRE = "fire_alarm"
+    CODE_BLUE = "code_blue"
+    EARTHQUAKE = "earthquake"
+    EMERGENCY = "emergency"
+    OUT_OF_SERVICE = "out_of_service"
+    MANUAL = "manual_mode"
+    OVERLOAD = "overload"
+
+
+class LiftSample(msgspec.Struct, frozen=True):
+    """Every input of one lift, decoded but not debounced.
+
+    `level`: the landing that the floor code names, None for no code (between floors).
+    `code_fault`: why the code is illegal (not listed, two of one-hot, parity), "" if it is not.
+    `floor_valid`: the code is valid now; while it is not, the car may go anywhere unseen.
+    `motion`, `agv`, `rear_door`: None where not wired. `agv` is also None while its line is not valid.
+    """
+
+    level: str | None
+    door: Door
+    code_fault: str = ""
+    rear_door: Door | None = None
+    motion: Motion | None = None
+    agv: bool | None = None
+    hazards: frozenset[Hazard] = frozenset()
+    floor_valid: bool = True
+
+
+class Side(Enum):
+    """Which of the car's doors."""
+
+    FRONT = "front"
+    REAR = "rear"
+
+
+class Stop(msgspec.Struct, frozen=True):
+    """One of this lift's floors: the landing that the floor code names, and the door that serves it."""
+
+    level: str
+    side: Side = Side.FRONT
+
+
+class LiftOutputs(msgspec.Struct, frozen=True):
+    """Every output of one lift. The default is all off.
+
+    `call`: the landing whose call is energised. `hold_door`: the door whose open command is.
+    """
+
+    agv_request: bool = False
+    call: str | None = None
+    hold_door: Side | None = None
+
+
+class Requested(msgspec.Struct, frozen=True):
+    """A well-formed LiftRequest for AGV or HUMAN mode, for this lift and a floor that it serves.
+
+    `stamp`: its request_time (ns), by its sender's clock; 0 without one.
+    """
+
+    session_id: str
+    agv: bool
+    destination: str
+    stamp: int = 0
+
+
+class Ended(msgspec.Struct, frozen=True):
+    """A LiftRequest for END_SESSION, whatever its floor says. `by_person`: a person has sent it, with
+    `rmf-bridge send` or `release`."""
+
+    session_id: str
+    stamp: int = 0
+    by_person: bool = False
+
+
+class FromAdapter(msgspec.Struct, frozen=True):
+    """A robot's own request, as its fleet adapter sends it to RMF's supervisor."""
+
+    asked: Requested | Ended
+
+
+Asked = Requested | Ended | FromAdapter
+"""What requests become."""
+
+Event = Sampled[LiftSample] | IoFailed | RivalSeen | OperatorReset | Asked

@@ -1,0 +1,53 @@
+"""The lift supervisor: replaces RMF's own, between the fleet adapters and any number of lifts."""
+
+from bridges.kinds.lift_supervisor import core, memory, messages, report, signals
+from bridges.kinds.lift_supervisor.memory import Limits, Memory
+from bridges.kinds.lift_supervisor.report import SupervisorReport
+from bridges.kinds.lift_supervisor.settings import Settings, speaks_of
+from bridges.kinds.lift_supervisor.signals import Ended, Requested, StateHeard
+from bridges.kinds.shared.fields import quiet_s
+from bridges.kinds.shared.graph_kind import GraphKind
+from bridges.kinds.shared.recorded import Recorded
+from bridges.messages.topics import ADAPTER_LIFT_REQUESTS, LIFT_REQUESTS, LIFT_STATES
+
+KIND: GraphKind[
+    Settings,
+    Limits,
+    Memory,
+    Requested | Ended | StateHeard,
+    SupervisorReport,
+] = GraphKind(
+    name="lift_supervisor",
+    devices_key="supervisor",
+    settings=Settings,
+    requests={
+        ADAPTER_LIFT_REQUESTS: messages.accept_request,
+        LIFT_STATES: messages.accept_state,
+    },
+    publishes=(LIFT_REQUESTS,),
+    sole=(LIFT_REQUESTS,),
+    device_name=messages.device_name,
+    quiet_s=quiet_s,
+    limits=Limits.of,
+    initial=core.initial,
+    decide=core.decide,
+    stamped=messages.stamped,
+    summary=messages.summary,
+    idle=core.idle,
+    speaks_of=speaks_of,
+    shown_by=LIFT_STATES,
+    reserved=lambda settings: settings.lifts or (),
+    requester=messages.requester,
+    requesters=lambda memory: memory.requesters,
+)
+
+RECORDED: Recorded = {
+    "lift_supervisor.memory.Claim": memory.Claim,
+    "lift_supervisor.memory.Memory": memory.Memory,
+    "lift_supervisor.memory.Turn": memory.Turn,
+    "lift_supervisor.report.SupervisorReport": report.SupervisorReport,
+    "lift_supervisor.signals.Ended": signals.Ended,
+    "lift_supervisor.signals.Requested": signals.Requested,
+    "lift_supervisor.signals.StateHeard": signals.StateHeard,
+    "lift_supervisor.signals.Target": signals.Target,
+}

@@ -1,0 +1,289 @@
+"""The lift supervisor's core, for one lift: which session gets it, and what the lift's node is sent.
+
+It replaces RMF's own (rmf_ros2, lift_supervisor/Node.cpp). Fleet adapters send their requests on
+`adapter_lift_requests`. The supervisor passes on those of one session at a time to the lift's node,
+on `lift_requests`, until the lift's states show that they were obeyed.
+`bridges/kinds/shared/freshness.py` says which requests count. Rules:
+1. Sessions are served in the order of their first requests. A session leaves the queue by END, or
+   after `silent_after_s` without a request. While the lift is silent this time does not run, as
+   adapters repeat their requests only when the lift's states come.
+2. The lift's states say which session has the lift. That session goes before the queue if its robot
+   still requests it. If nobody has requested it for `orphan_after_s`, the supervisor ends it.
+3. One session at a time has its turn. Its request is sent when it is new or has changed. It is
+   repeated when the lift's state does not show what was requested, and when the adapter has repeated
+   it (else the lift's node would take RMF to be silent). It is never sent while the lift shows another
+   session.
+4. A turn ends by END. Usually the holder sends it, wherever the lift is and in any mode. The
+   supervisor sends it for a silent holder that the lift has never accepted, and after `holder_ttl_s`
+   if the site has set that. END is repeated until a later state shows another session, or none. Only
+   then is the next session served.
+5. While the lift is in fire, emergency or offline mode, no robot is sent to it and the queue waits.
+   END is passed on. So is HUMAN mode, which calls no robot to the lift.
+6. During the quiet start, and while another supervisor publishes, it only listens. Then it starts from
+   the lift's states and from the requests it has heard, so a restart ends no ride.
+7. Two messages are at least GAP_S apart, and a message is repeated unchanged after REPEAT_S at the
+   earliest.
+"""
+
+import math
+from typing import Final
+
+from msgspec.structs import replace
+
+from bridges.kinds.lift_supervisor.memory import Claim, Limits, Memory, Turn
+from bridges.kinds.lift_supervisor.report import SupervisorReport, alarms, report
+from bridges.kinds.lift_supervisor.signals import Ended, Event, Requested, StateHeard
+from bridges.kinds.shared.decision import Decision
+from bridges.kinds.shared.durations import FORGOTTEN_S, NEVER, SILENT_S, due_at
+from bridges.kinds.shared.freshness import hear
+from bridges.kinds.shared.graph_kind import MaySpeak
+from bridges.messages.definitions import LiftRequest, LiftRequestDoor, LiftRequestType
+from bridges.messages.topics import LIFT_REQUESTS
+
+MAX_CLAIMS: Final = 100
+
+END: Final = LiftRequestType.REQUEST_END_SESSION
+AGV: Final = LiftRequestType.REQUEST_AGV_MODE
+
+Decided = Decision[Memory, None, SupervisorReport]
+
+
+def initial(lift: str, started_at: float) -> Memory:
+    """Nothing has been heard, and we may not publish yet."""
+    return Memory(lift, started_at)
+
+
+def idle(memory: Memory, now: float) -> bool:
+    """May this lift be forgotten? No session requests it, and it has been silent for a while.
+
+    If the lift comes back, its states show again a session that is still to be ended. A robot that
+    only waits for a lift is forgotten after a longer time; it requests again when the lift is back.
+    """
+    heard_at = max(memory.heard_at, memory.shown_at)
+    has_it = memory.session_shown or (memory.turn and memory.turn.seen)
+    long_s = NEVER if has_it else 10 * FORGOTTEN_S
+    return now >= heard_at + (long_s if memory.claims else FORGOTTEN_S)
+
+
+def decide(memory: Memory, event: Event, now: float, limits: Limits) -> Decided:
+    """Take the event in, decide whose turn it is, and send what is due: at most one message."""
+    memory, refused = _take(memory, event, now, limits)
+    memory = _forget_silent(memory, now, limits)
+    memory = _take_turns(memory, now, limits)
+    message = wanted(memory)
+    due = now >= _due_at(memory, message)
+    if due:
+        memory = replace(memory, sent=message, last_sent=message, sent_at=now, prompted=False)
+    may_come = tuple(alarms(memory, now, limits))
+    return Decision(
+        memory,
+        None,
+        report(memory, [fault for at, fault in may_come if now >= at]),
+        _wake_at(memory, [_due_at(memory, message), *(at for at, _ in may_come)], now, limits),
+        refused,
+        ((LIFT_REQUESTS, message),) if due and message else (),
+    )
+
+
+# --- what is heard -----------------------------------------------------------------------------
+
+
+def _take(memory: Memory, event: Event, now: float, limits: Limits) -> tuple[Memory, str]:
+    match event:
+        case Requested() | Ended():
+            memory, refused = _listen(memory, event, now, limits)
+            if refused:
+                return memory, refused
+            if isinstance(event, Ended):
+                return _end(memory, event, now), ""
+            return _ask(memory, event, now)
+        case StateHeard():
+            return _see(memory, event, now), ""
+        case MaySpeak(yes, waits=passive):
+            return _speak(memory, yes, passive), ""
+        case _:  # only time has passed
+            return memory, ""
+
+
+def _listen(
+    memory: Memory, event: Requested | Ended, now: float, limits: Limits
+) -> tuple[Memory, str]:
+    """Does this request count?"""
+    requesters, refused = hear(
+        memory.requesters,
+        event.session,
+        event.stamp,
+        now,
+        memory.rules(now, limits),
+        age_s=event.age_s,
+        ends=isinstance(event, Ended),
+        holders={claim.session for claim in memory.claims},
+    )
+    return replace(memory, heard_at=now, requesters=requesters), refused
+
+
+def _ask(memory: Memory, request: Requested, now: float) -> tuple[Memory, str]:
+    """Enter the queue, or repeat or change the request without losing the place in it."""
+    before = memory.claim(request.session)
+    served = memory.shown.floors if memory.shown else ()
+    if served and request.target.request_type == AGV and request.target.floor not in served:
+        return _still_there(memory, before, now), "floor not served"
+    if before is None and len(memory.claims) == MAX_CLAIMS:
+        return memory, "queue full"
+    since = before.since if before else now
+    claim = Claim(request.session, request.target, since, now)
+    turn = memory.turn
+    holds = turn is not None and turn.session == request.session and not turn.ends
+    return replace(_with(memory, before, claim), prompted=memory.prompted or holds), ""
+
+
+def _still_there(memory: Memory, before: Claim | None, now: float) -> Memory:
+    """A request that cannot be obeyed still shows that its requester is alive."""
+    return memory if before is None else _with(memory, before, replace(before, heard_at=now))
+
+
+def _with(memory: Memory, before: Claim | None, claim: Claim) -> Memory:
+    if before is None:
+        return replace(memory, claims=(*memory.claims, claim))
+    return replace(memory, claims=tuple(claim if c is before else c for c in memory.claims))
+
+
+def _end(memory: Memory, ended: Ended, now: float) -> Memory:
+    """The session leaves the queue. If it has the lift or its turn, the node is sent END."""
+    session = ended.session
+    memory, turn = _without(memory, session), memory.turn
+    has_it = session in (memory.session_shown, turn.session if turn else "")
+    if not has_it or not memory.may_speak or (turn and turn.ends):
+        return memory
+    return _begin(memory, Turn(session, now, ends=True, by_person=ended.by_person))
+
+
+def _without(memory: Memory, session: str) -> Memory:
+    return replace(memory, claims=tuple(c for c in memory.claims if c.session != session))
+
+
+def _see(memory: Memory, shown: StateHeard, now: float) -> Memory:
+    """A state: it may confirm an END, call for a repeat, or show another session."""
+    flowed = now <= memory.shown_at + SILENT_S
+    same = flowed and shown.session == memory.session_shown
+    turn, prompted = memory.turn, memory.prompted
+    if turn and turn.ends:
+        gone = memory.sent is not None and shown.session != turn.session
+        turn, prompted = (None, False) if gone else (turn, True)
+    elif turn:
+        claim = memory.claim(turn.session)
+        assert claim is not None
+        turn = replace(turn, seen=turn.seen or shown.session == turn.session)
+        prompted = prompted or not shown.satisfies(turn.session, claim.target)
+    return replace(
+        memory,
+        turn=turn,
+        prompted=prompted,
+        shown=shown,
+        shown_at=now,
+        session_since=memory.session_since if same else now,
+        flowing_since=memory.flowing_since if flowed else now,
+    )
+
+
+def _speak(memory: Memory, yes: bool, passive: str) -> Memory:
+    """While we may not publish nobody has a turn. Later the lift's states show who has the lift."""
+    turn = memory.turn if yes else None
+    return replace(memory, may_speak=yes, passive=passive, turn=turn)
+
+
+# --- whose turn it is --------------------------------------------------------------------------
+
+
+def _forget_silent(memory: Memory, now: float, limits: Limits) -> Memory:
+    """Drop the claims of silent sessions that wait. A holder leaves by END only."""
+    holder = memory.turn.session if memory.turn and not memory.turn.ends else ""
+    staying = tuple(
+        claim
+        for claim in memory.claims
+        if claim.session == holder or now < memory.gone_at(claim, now, limits.silent_after_s)
+    )
+    return replace(memory, claims=staying)
+
+
+def _begin(memory: Memory, turn: Turn) -> Memory:
+    return replace(memory, turn=turn, sent=None, prompted=False)
+
+
+def _take_turns(memory: Memory, now: float, limits: Limits) -> Memory:
+    turn, shown = memory.turn, memory.session_shown
+    if not memory.may_speak or (turn and turn.ends):
+        return memory
+    if shown and (turn is None or shown != turn.session):
+        return _obey_the_lift(memory, shown, now, limits)
+    if turn:
+        return _let_go(memory, turn, now, limits)
+    if memory.claims and not memory.nobody_is_sent:
+        return _begin(memory, Turn(memory.claims[0].session, now))
+    return memory
+
+
+def _obey_the_lift(memory: Memory, shown: str, now: float, limits: Limits) -> Memory:
+    """The lift shows a session without a turn: after our restart, or after another node's request."""
+    if memory.claim(shown):
+        return _begin(memory, Turn(shown, now, seen=True))
+    if memory.shown_at >= memory.session_since + limits.orphan_after_s:
+        return _begin(memory, Turn(shown, now, ends=True))
+    return memory
+
+
+def _let_go(memory: Memory, turn: Turn, now: float, limits: Limits) -> Memory:
+    """End a silent holder's turn: after `silent_after_s` if the lift never took it, else after
+    `holder_ttl_s`."""
+    claim = memory.claim(turn.session)
+    assert claim is not None
+    after_s = limits.holder_ttl_s if turn.seen else limits.silent_after_s
+    if now < memory.gone_at(claim, now, after_s):
+        return memory
+    return _begin(_without(memory, turn.session), Turn(turn.session, now, ends=True))
+
+
+# --- what is sent ------------------------------------------------------------------------------
+
+
+def wanted(memory: Memory) -> LiftRequest | None:
+    """The request that the lift's node should have now, without its stamp."""
+    turn = memory.turn
+    if turn is None:
+        return None
+    if turn.ends:
+        floor = memory.shown.floor if memory.shown else ""
+        end = LiftRequest(memory.lift, session_id=turn.session, destination_floor=floor)
+        return replace(end, door_state=LiftRequestDoor.DOOR_OPEN) if turn.by_person else end
+    claim = memory.claim(turn.session)
+    assert claim is not None
+    target = claim.target
+    somebody_elses = memory.session_shown not in ("", turn.session)
+    if somebody_elses or (target.request_type == AGV and memory.nobody_is_sent):
+        return None
+    return LiftRequest(
+        lift_name=memory.lift,
+        session_id=turn.session,
+        request_type=target.request_type,
+        destination_floor=target.floor,
+        door_state=target.door,
+    )
+
+
+def _due_at(memory: Memory, message: LiftRequest | None) -> float:
+    """When to send this request. An END that names another floor is a repeat, not a new one."""
+    if message is None:
+        return NEVER
+    new = memory.sent is None or (message != memory.sent and message.request_type != END)
+    said = memory.sent is None and message == memory.last_sent  # the same, in an earlier turn
+    return due_at(memory.sent_at, new=new and not said, again=memory.prompted or said)
+
+
+def _wake_at(memory: Memory, due: list[float], now: float, limits: Limits) -> float:
+    """When the decision may change without an event."""
+    if memory.shown is not None and memory.flows(now):
+        due.append(math.nextafter(memory.shown_at + SILENT_S, NEVER))
+    for claim in memory.claims:
+        due.append(memory.gone_at(claim, now, limits.silent_after_s))
+        due.append(memory.gone_at(claim, now, limits.holder_ttl_s))
+    return min([at for at in due if at > now], default=NEVER)

@@ -1,0 +1,56 @@
+"""What the lift supervisor's core hears from the graph: adapters' requests and lifts' states."""
+
+import msgspec
+
+from bridges.kinds.shared.decision import OperatorReset
+from bridges.kinds.shared.graph_kind import MaySpeak, Woken
+
+
+class Target(msgspec.Struct, frozen=True):
+    """What a session requests of the lift, in the terms of LiftRequest."""
+
+    request_type: int
+    floor: str
+    door: int
+
+
+class Requested(msgspec.Struct, frozen=True):
+    """An adapter's request for AGV or HUMAN mode; `stamp` is by its clock (s), `age_s` by ours."""
+
+    session: str
+    target: Target
+    stamp: float
+    age_s: float
+
+
+class Ended(msgspec.Struct, frozen=True):
+    """An END_SESSION of an adapter or an operator, whatever its floor says. `by_person`: it has
+    DOOR_OPEN, which the lift's node takes for a person's."""
+
+    session: str
+    stamp: float
+    age_s: float
+    by_person: bool = False
+
+
+class StateHeard(msgspec.Struct, frozen=True):
+    """A LiftState."""
+
+    session: str
+    floor: str
+    destination: str
+    door: int
+    mode: int
+    floors: tuple[str, ...] = ()
+
+    def satisfies(self, session: str, target: Target) -> bool:
+        """Does the state show what was requested? The rule is rmf_lift_supervisor's."""
+        there = target.floor == self.floor and not self.destination
+        return (
+            (target.floor == self.destination or there)
+            and target.door == self.door
+            and session == self.session
+        )
+
+
+Event = Requested | Ended | StateHeard | MaySpeak | Woken | OperatorReset

@@ -1,0 +1,52 @@
+"""Debounce: a reading is believed when it has been seen unchanged for long enough.
+
+Pure: it works on samples, so one rule serves GPIO pins and polled Modbus inputs. gpiozero's own
+debounce drops edges, and its mock pins have none.
+"""
+
+from typing import Generic, TypeVar, cast
+
+import msgspec
+from msgspec.structs import replace
+
+from bridges.kinds.shared.durations import NEVER
+
+T = TypeVar("T")
+T_co = TypeVar("T_co", covariant=True)
+
+
+class Settled(msgspec.Struct, Generic[T_co], frozen=True):
+    """`value` is believed, and `candidate` has been seen since `since` (s).
+
+    `steady_at`: when `value` was last confirmed; None before the first time. `torn_since`: since when
+    the readings have not been steady; None while they are.
+    """
+
+    value: T_co | None
+    candidate: T_co
+    since: float
+    steady_at: float | None = None
+    torn_since: float | None = None
+
+    def due_at(self, hold_s: float) -> float:
+        """When the candidate will count if it lasts; inf when it counts already."""
+        return NEVER if self.torn_since is None else self.since + hold_s
+
+
+def settle(before: "Settled[T] | None", seen: T, now: float, hold_s: float) -> "Settled[T]":
+    """Take one sample. A value must be seen for `hold_s` seconds before it counts; 0: at once."""
+    if before is None:
+        before = Settled(None, seen, now, torn_since=now)
+    elif seen != before.candidate:
+        torn_since = now if before.torn_since is None else before.torn_since
+        before = replace(before, candidate=seen, since=now, torn_since=torn_since)
+    if before.torn_since is None or now < before.since + hold_s:
+        return before
+    return Settled(seen, seen, before.since, steady_at=now)
+
+
+def forget(before: "Settled[T] | None") -> "Settled[T] | None":
+    """After a gap in the readings the value stays, and a candidate's debounce starts again."""
+    if before is None or before.steady_at is None:
+        return None
+    return replace(before, candidate=cast(T, before.value), torn_since=None)

@@ -1,0 +1,74 @@
+"""The building blocks of every device YAML: numbers with units, names, common structs.
+
+`bridges/settings/load.py` reads a file into these; the kinds and drivers derive their own from them.
+A struct may have `problems() -> Iterable[tuple[tuple[str, ...], str]]`. It checks what no field can
+check alone, and gives (path below the struct, text with the fix). It is called once every field is
+present and of the right type, even if a struct below has problems of its own.
+"""
+
+from typing import Annotated
+
+import msgspec
+from msgspec import Meta
+
+from bridges.kinds.shared.rmf_section import AbsolutePath, Name
+
+__all__ = [
+    "AbsolutePath",
+    "DeviceSettings",
+    "GraphSettings",
+    "Name",
+    "Patience",
+    "Period",
+    "QuietStart",
+    "Seconds",
+    "Timeout",
+    "quiet_s",
+]
+
+Seconds = Annotated[float, Meta(ge=0, le=86400, extra={"unit": "s"})]
+"""A duration that may be zero."""
+Timeout = Annotated[float, Meta(ge=1, le=86400, extra={"unit": "s"})]
+"""After how long something is given up. Zero is not allowed: nothing would ever be tried."""
+Period = Annotated[float, Meta(ge=0.01, le=60, extra={"unit": "s"})]
+"""A repetition period."""
+QuietStart = Annotated[float, Meta(ge=3, le=60, extra={"unit": "s"})]
+"""How long a node without hardware only listens at first."""
+Patience = Annotated[float, Meta(ge=3, le=86400, extra={"unit": "s"})]
+"""How long a silence or a state may last before the daemon acts on it."""
+
+
+class DeviceSettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """What every lift, door and charger has, whatever its driver.
+
+    `bus`: the name of its bus; not needed if the file has only one.
+    `driver`: this device's own driver; the file's `driver` when absent.
+    `accept_unsafe`: signal -> why its unsafe wiring is accepted; `check` prints the reason.
+    """
+
+    bus: Name | None = None
+    driver: Name | None = None
+    accept_unsafe: dict[Name, Name] = msgspec.field(default_factory=dict)
+
+    def off_after(self) -> tuple[float, tuple[str, ...]] | None:
+        """How long (s) without a command until its outputs go off by themselves, and the path of the
+        setting that says so; None where they do not."""
+        return None
+
+    def stale_after(self) -> float | None:
+        """After how long (s) without a reading it is out of service; None if no time decides that."""
+        return None
+
+
+class GraphSettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """What every kind without hardware has.
+
+    `quiet_start_s`: how long it only listens after its start.
+    """
+
+    quiet_start_s: QuietStart = 3.0
+
+
+def quiet_s(settings: GraphSettings) -> float:
+    """How long the node only listens before it sends its first message (s)."""
+    return settings.quiet_start_s

@@ -1,0 +1,145 @@
+"""Does an adapter's request count, or is it a replay of an old one?
+
+A stamp is by the requester's clock, which need not agree with ours. So a stamp is first compared with
+the earlier stamps of the same requester. Rules:
+1. A request counts if it is newer than every earlier request of its requester that counted. An END is
+   compared with earlier ENDs only: an operator may end a robot's session, by another clock.
+2. A retained topic (`adapter_lift_requests`) replays up to 100 old requests of every adapter to each
+   new subscriber, and again when an adapter's network comes back. There an equal stamp is a replay,
+   and a requester's first request counts only if it was sent after our own start. Once a requester
+   has counted, only its own stamps are compared. With `clock_synchronised` every request's age is
+   judged too.
+3. On a topic that is not retained (`adapter_door_requests`) an old request was late or came twice.
+   There an equal stamp counts, as a requester without a clock always sends 0. A requester's first
+   request counts. A requester that has been silent for FORGOTTEN_S and holds nothing is new again.
+4. During the quiet start on a retained topic a stamp from the future does not count: our clock may
+   not be set yet, and then every replayed request looks new.
+5. A request that does not count may come from a live requester whose clock is wrong or was set back.
+   It counts once it has been repeated for long enough, with stamps that rise or are all 0. Long
+   enough is longer than a replay lasts (REPLAY_S, retained), or than a message can be late (LATE_S).
+   After a pause of BROKEN_OFF_S, or when a stamp does not rise, that time starts again.
+"""
+
+from collections.abc import Collection, Mapping
+from typing import Final
+
+import msgspec
+from msgspec.structs import replace
+
+from bridges.kinds.shared.decision import RequestRefused
+from bridges.kinds.shared.durations import AGES_AGO, FORGOTTEN_S, NEVER
+from bridges.messages.definitions import Time
+
+REPLAY_S: Final = 1.0
+"""A replay comes in a burst; a live requester repeats itself at 1 Hz."""
+LATE_S: Final = 10.0
+"""No message arrives later than this."""
+BROKEN_OFF_S: Final = 3.0
+FUTURE_S: Final = 2.0
+MAX_REQUESTERS: Final = 200
+SECOND_NS: Final = 10**9
+
+
+class Rules(msgspec.Struct, frozen=True):
+    """How a topic's requests are judged.
+
+    `most_s`: how old a request may be by its stamp. `known_clocks`: a requester that has counted
+    before is judged by its own stamps only. `future_s`: how far ahead of our clock a stamp may be.
+    `retained`: old requests are replayed on this topic.
+    """
+
+    most_s: float = NEVER
+    known_clocks: bool = True
+    future_s: float = NEVER
+    retained: bool = True
+
+    @property
+    def doubt_s(self) -> float:
+        """How long a requester must repeat itself before it is believed."""
+        return REPLAY_S if self.retained else LATE_S
+
+
+class Requester(msgspec.Struct, frozen=True):
+    """What has been heard of one requester. Its stamps are all in one unit, by its clock.
+
+    `newest`, `newest_end`: the newest stamp that counted, of all requests and of ENDs. `heard_at`:
+    when a request last counted. `doubted`: the stamp of the last request that did not count;
+    `doubted_since`, `doubted_at`: when its row of repeats began, and when the last of them came.
+    Times ending in `_at` or `_since` are in s by our clock.
+    """
+
+    newest: float = AGES_AGO
+    newest_end: float = AGES_AGO
+    doubted: float = AGES_AGO
+    doubted_since: float = AGES_AGO
+    doubted_at: float = AGES_AGO
+    heard_at: float = AGES_AGO
+
+    def hears(
+        self, stamp: float, age_s: float, now: float, rules: Rules, *, ends: bool = False
+    ) -> tuple["Requester", bool]:
+        """Take one request, `age_s` old by our clock. True if it counts."""
+        if self._is_live(stamp, age_s, rules, ends=ends):
+            newest = max(self.newest, stamp)
+            newest_end = max(self.newest_end, stamp) if ends else self.newest_end
+            return Requester(newest, newest_end, heard_at=now), True
+        doubted = self._doubt(stamp, now)
+        if now < doubted.doubted_since + rules.doubt_s:
+            return doubted, False
+        newest_end = stamp if ends else min(self.newest_end, stamp)
+        return replace(doubted, newest=stamp, newest_end=newest_end, heard_at=now), True
+
+    def _is_live(self, stamp: float, age_s: float, rules: Rules, *, ends: bool) -> bool:
+        newest = self.newest_end if ends else self.newest
+        if stamp < newest or (stamp == newest and rules.retained):
+            return False
+        known = rules.known_clocks and self.newest > AGES_AGO
+        return known or -rules.future_s <= age_s <= rules.most_s
+
+    def _doubt(self, stamp: float, now: float) -> "Requester":
+        goes_on = now <= self.doubted_at + BROKEN_OFF_S and (stamp > self.doubted or stamp == 0)
+        since = self.doubted_since if goes_on else now
+        return replace(self, doubted=stamp, doubted_since=since, doubted_at=now)
+
+
+Requesters = Mapping[str, Requester]
+"""By name, in the order in which they were last heard."""
+
+
+def hear(
+    requesters: Requesters,
+    who: str,
+    stamp: float,
+    now: float,
+    rules: Rules,
+    *,
+    age_s: float = 0.0,
+    ends: bool = False,
+    holders: Collection[str] = (),
+) -> tuple[Requesters, str]:
+    """Take one request into the table. Returns the table, and why the request does not count ("" if
+    it does).
+
+    Anybody can make names up, so the table has a bound: the requester heard longest ago makes room,
+    but never a holder.
+    """
+    known = {
+        name: requester
+        for name, requester in requesters.items()
+        if rules.retained or name in holders or now < requester.heard_at + FORGOTTEN_S
+    }
+    if who not in known and len(known) >= MAX_REQUESTERS:
+        oldest = next((name for name in known if name not in holders), None)
+        if oldest is None:
+            return known, "too many requesters"
+        del known[oldest]
+    requester, counts = known.pop(who, Requester()).hears(stamp, age_s, now, rules, ends=ends)
+    known[who] = requester
+    return known, "" if counts else "stale request"
+
+
+def in_ns(stamp: Time) -> int:
+    """A request_time in ns. Raises RequestRefused for one that no clock shows."""
+    if stamp.sec < 0 or stamp.nanosec >= SECOND_NS:
+        raise RequestRefused("impossible request_time", f"{stamp.sec} s {stamp.nanosec} ns")
+    return stamp.sec * SECOND_NS + stamp.nanosec

@@ -1,0 +1,110 @@
+"""The record of a kind without hardware: topics in, topics out, and the core between them.
+
+A supervisor or coordinator has no driver and no bus. It learns from messages which subjects (lifts,
+doors) there are, and keeps one core memory for each. `bridges/kinds/<kind>/__init__.py` holds the
+`KIND`; `bridges/serve/graph.py` serves it.
+"""
+
+from collections.abc import Callable, Collection, Iterable, Mapping
+from typing import Any, Final, Generic, Union
+
+from msgspec import Struct
+
+from bridges.kinds.shared.decision import Decision, M, OperatorReset, R
+from bridges.kinds.shared.kind import Answer, AnyDeviceKind, E, L, Place, S
+from bridges.kinds.shared.table import Table
+from bridges.messages.definitions import Message, Time
+from bridges.messages.topics import Topic
+
+LISTENS: Final = "for the end of the quiet start"
+
+
+class MaySpeak(Struct, frozen=True):
+    """Whether the core may publish. It may not during the quiet start or while a rival publishes.
+
+    `waits`: what those wait for that wait for us, while it may not.
+    `at_once`: during the quiet start what a restart must not interrupt may be sent: no rival is there.
+    `alone`: no other node publishes on a topic of `yields`.
+    """
+
+    yes: bool
+    at_once: bool = False
+    alone: bool = True
+    waits: str = LISTENS
+
+
+class Woken(Struct, frozen=True):
+    """The core's `wake_at` has come, and nothing was heard."""
+
+
+GraphEvent = Union[MaySpeak, Woken, OperatorReset, E]  # noqa: UP007
+"""Every event that such a core takes."""
+
+
+class GraphKind(Struct, Generic[S, L, M, E, R], frozen=True):
+    """One kind that lives on RMF's graph alone: its settings, limits, memory, events and report.
+
+    `devices_key`: the YAML's section of its settings. `settings`: the struct that reads it.
+    `requests`: each topic heard, with `accept(message, settings, wall) -> event`, which raises
+    RequestRefused; `wall` is our clock (s since the epoch).
+    `publishes`: the topics that it sends on. `sole`: those on which only one node may have a publisher;
+    while another node has one, ours only listens. `yields`: those on which it alone falls silent then.
+    `device_name`: which subject a message is about. `shown_by`: the topic on which a subject publishes
+    its own states, which proves that it exists (a request may name anything); None if there is only
+    one subject. `reserved(settings)`: the subjects that the YAML names.
+    `requester(event)`: who sends this request; "" for a state. `requesters(memory)`: whom the subject
+    remembers. Anybody can make them up, so all subjects together have a bound.
+    `quiet_s(settings)`: how long it only listens after its start.
+    `limits(settings)`: what the core needs of the settings.
+    `initial(subject, started_at)`: a subject's memory; `started_at` is the daemon's start.
+    `decide`: the core. Its messages have no stamps: `stamped(message, time)` adds them when they are
+    sent. `summary(report, now)`: key -> value for the status file and `watch`. `idle(memory, now)`:
+    may this subject be forgotten?
+    `answer(request, reason)`: what is published when a request is refused; None for nothing.
+    `request`: the message if it was refused at once, else the event.
+    `on_map(settings)`: which settings name a place on RMF's map (`bridges/kinds/shared/kind.py`).
+
+    For a kind with one message about all its subjects: `together(memories)`, sent each second and
+    whenever it has changed. For a kind whose memory must survive a restart: `persist(memories)`, which
+    gives the same bytes until something worth keeping changes, and `restore(kept, settings, now)`,
+    which raises ValueError for any other bytes. The memory is saved before `together` is sent.
+    `urgent(memory)`: does it hold something that a restart must not interrupt (`MaySpeak.at_once`)?
+
+    For a kind with more settings than a few numbers: `tables(settings)`, for `check`, and
+    `warnings(settings)`, (path, text) of what is legal but may be a mistake. `speaks_of(settings)`: the
+    devices that it names, as (path, their kind, name); some file of the site must have each of them.
+    """
+
+    name: str
+    devices_key: str
+    settings: type[S]
+    requests: Mapping[Topic[Message], Callable[[Any, S, float], E]]
+    publishes: tuple[Topic[Message], ...]
+    sole: tuple[Topic[Message], ...]
+    device_name: Callable[[Any], str]
+    quiet_s: Callable[[S], float]
+    limits: Callable[[S], L]
+    initial: Callable[[str, float], M]
+    decide: Callable[[M, GraphEvent[E], float, L], Decision[M, None, R]]
+    stamped: Callable[[Any, Time], Message]
+    summary: Callable[[R, float], Mapping[str, str]]
+    idle: Callable[[M, float], bool]
+    together: Callable[[Mapping[str, M]], tuple[Topic[Message], Message]] | None = None
+    persist: Callable[[Mapping[str, M]], bytes] | None = None
+    restore: Callable[[bytes, S, float], Mapping[str, M]] | None = None
+    urgent: Callable[[M], bool] = lambda memory: False
+    tables: Callable[[S], Iterable[Table]] = lambda settings: ()
+    warnings: Callable[[S], Iterable[tuple[tuple[str, ...], str]]] | None = None
+    on_map: Callable[[S], Iterable[Place]] = lambda settings: ()
+    speaks_of: Callable[[S], Iterable[Place]] = lambda settings: ()
+    yields: tuple[Topic[Message], ...] = ()
+    shown_by: Topic[Message] | None = None
+    reserved: Callable[[S], Collection[str]] = lambda settings: ()
+    answer: Callable[[object, str], Answer | None] = lambda request, reason: None
+    requester: Callable[[E], str] = lambda event: ""
+    requesters: Callable[[M], Collection[str]] = lambda memory: ()
+
+
+AnyGraphKind = GraphKind[Any, Any, Any, Any, Any]
+AnyKind = AnyDeviceKind | AnyGraphKind
+"""A kind that is looked up by its name."""

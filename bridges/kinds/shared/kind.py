@@ -1,0 +1,93 @@
+"""The record of a kind of device: its topics, and the pure functions of its folder.
+
+`bridges/kinds/<kind>/__init__.py` holds one `KIND`; the loop knows nothing else about lifts or
+doors. Each `KIND` states its types, so mypy proves that its functions fit together.
+"""
+
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any, Generic, NamedTuple, TypeVar, Union
+
+from msgspec import Struct
+
+from bridges.kinds.shared.decision import (
+    Decision,
+    IoFailed,
+    M,
+    O,
+    OperatorReset,
+    R,
+    RivalSeen,
+    Sampled,
+    X,
+)
+from bridges.messages.definitions import Message, Time
+from bridges.messages.topics import Topic
+
+S = TypeVar("S")
+"""The settings of one device, or of a kind without hardware."""
+L = TypeVar("L")
+"""The limits: what the core needs of the settings."""
+E = TypeVar("E")
+"""The events that `accept` makes of requests."""
+
+DeviceEvent = Union[Sampled[X], IoFailed, RivalSeen, OperatorReset, E]  # noqa: UP007
+"""Every event that the core of a device takes."""
+
+FLOOR, LIFT, DOOR, CHARGER, WAYPOINT = "floor", "lift", "door", "charger", "waypoint"
+"""What a name on RMF's map can name."""
+
+Place = tuple[tuple[str, ...], str, str]
+"""A setting that names something on RMF's map: its path, what it is (`FLOOR`, …), the name."""
+
+
+class Answer(NamedTuple):
+    """The answer to a refused request: its topic, the message, and the same for the status file."""
+
+    topic: Topic[Message]
+    message: Message
+    status: Mapping[str, str]
+
+
+class Kind(Struct, Generic[S, L, M, X, E, O, R], frozen=True):
+    """One kind of device: its settings, limits, memory, sample, requests, outputs and report.
+
+    `devices_key`: the YAML's section of the devices. `states`: the topic of their state messages.
+    `requests`: each topic that it obeys, with `accept(message, settings) -> event`, which raises
+    RequestRefused for a message that is malformed or cannot be asked of this device.
+    `device_name`: which device a message (request or state) is about. `sender`: for whom a request
+    was sent. If several requests wait for the next scan, only the last of each sender counts.
+    `limits(settings, debounce_s)`: the core's durations, from the device's settings and the wiring
+    table's per-signal debounce. `initial(limits, now)`: the core's memory at start.
+    `decide`: the core. `state_message(name, settings, report, stamp)`: the report as RMF's message.
+    `summary(report)`: key -> value for the log line, the status file and `watch`.
+    `published(memory, report)`: the memory after this report has gone out to RMF.
+    `publishes(settings)`: what a device publishes beside its states.
+    `answer(name, request, reason, report)`: what is published when a request is refused; None for
+    nothing. `request`: the message if it is malformed, else the event.
+    `on_map(settings)`: which of its settings name a place on RMF's map, as (path, what it is, name).
+    The device's own name is checked for every kind.
+    `attended_by`: the topic of requests whose publishers the core is told of (`Attended`), if any.
+    """
+
+    name: str
+    devices_key: str
+    states: Topic[Message]
+    requests: Mapping[Topic[Message], Callable[[Any, S], E]]
+    device_name: Callable[[Any], str]
+    sender: Callable[[Any], str]
+    limits: Callable[[S, Mapping[str, float]], L]
+    initial: Callable[[L, float], M]
+    decide: Callable[[M, DeviceEvent[X, E], float, L], Decision[M, O, R]]
+    state_message: Callable[[str, S, R, Time], Message]
+    summary: Callable[[R], Mapping[str, str]]
+    published: Callable[[M, R], M] = lambda memory, report: memory
+    publishes: Callable[[S], tuple[Topic[Message], ...]] = lambda settings: ()
+    answer: Callable[[str, object, str, R], Answer | None] = lambda name, request, reason, report: (
+        None
+    )
+    on_map: Callable[[S], Iterable[Place]] = lambda settings: ()
+    attended_by: Topic[Message] | None = None
+
+
+AnyDeviceKind = Kind[Any, Any, Any, Any, Any, Any, Any]
+"""A kind that is looked up by its name."""

@@ -1,0 +1,42 @@
+"""The names of values in rings and recordings. A name that was once written stays for ever; what it
+names may be moved and renamed. So every version reads the files of all earlier ones.
+
+The values of a kind are in `RECORDED` of its folder. Here are those that all kinds use.
+"""
+
+from collections.abc import Mapping
+from typing import Any, Final
+
+from bridges.kinds.shared import debounce, decision, freshness, graph_kind
+from bridges.messages import constants
+from bridges.messages.definitions import PACKAGES
+
+Recorded = Mapping[str, type[Any]]
+"""Name -> type. A type has one name, under which it is written; it begins with that of its kind."""
+
+SHARED: Final[Recorded] = {
+    "core.debounce.Settled": debounce.Settled,
+    "core.decision.Attended": decision.Attended,
+    "core.decision.Fault": decision.Fault,
+    "core.decision.IoFailed": decision.IoFailed,
+    "core.decision.OperatorReset": decision.OperatorReset,
+    "core.decision.RivalSeen": decision.RivalSeen,
+    "core.decision.Sampled": decision.Sampled,
+    "core.decision.Suspended": decision.Suspended,
+    "core.decision.WriteFailed": decision.WriteFailed,
+    "core.freshness.Requester": freshness.Requester,
+    "core.graph_kind.MaySpeak": graph_kind.MaySpeak,
+    "core.graph_kind.Woken": graph_kind.Woken,
+    "rmf.constants.AlertTier": constants.AlertTier,
+    "rmf.constants.ChargerStateValue": constants.ChargerStateValue,
+    "rmf.constants.ChargingMode": constants.ChargingMode,
+    "rmf.constants.DiagnosticLevel": constants.DiagnosticLevel,
+    "rmf.constants.DoorModeValue": constants.DoorModeValue,
+    "rmf.constants.LiftDoor": constants.LiftDoor,
+    "rmf.constants.LiftMode": constants.LiftMode,
+    "rmf.constants.LiftMotion": constants.LiftMotion,
+    "rmf.constants.LiftRequestDoor": constants.LiftRequestDoor,
+    "rmf.constants.LiftRequestType": constants.LiftRequestType,
+    "rmf.constants.RobotModeValue": constants.RobotModeValue,
+    **{f"rmf.definitions.{message.__name__}": message for message in PACKAGES},  # ROS's own names
+}

@@ -1,0 +1,127 @@
+"""Stories for the charger's core: a station that is polled once a second, in virtual time."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from typing import Any
+
+from msgspec.structs import replace
+
+from bridges.kinds.charger import core
+from bridges.kinds.charger.memory import ChargerLimits, Memory
+from bridges.kinds.charger.report import ChargerReport
+from bridges.kinds.charger.settings import Durations, robot
+from bridges.kinds.charger.signals import (
+    Activity,
+    Cancelled,
+    ChargerOutputs,
+    ChargerSample,
+    Event,
+    Measured,
+    Requested,
+)
+from bridges.kinds.shared.decision import IoFailed, OperatorReset, RivalSeen, Sampled
+
+DURATIONS = Durations(misses=3, start_timeout_s=60.0, released_s=2.0)
+LIMITS = ChargerLimits(DURATIONS, can_stop=False)
+"""A station that can only be observed."""
+RECEIVERS = {"rx-1": robot("tiny/AMR01"), "rx-2": robot("tiny/AMR02")}
+
+
+FULL = ChargerLimits(DURATIONS, RECEIVERS)
+"""A station that sees who stands on its pad, and can be stopped."""
+
+
+def observed(**durations: Any) -> ChargerLimits:
+    """Such a station with these durations, and the defaults."""
+    return ChargerLimits(Durations(**durations), can_stop=False)
+
+
+A = Activity
+IDLE = Sampled(ChargerSample(A.IDLE, 0))
+HANDSHAKE = Sampled(ChargerSample(A.HANDSHAKE, 1))
+CHARGING = Sampled(ChargerSample(A.CHARGING, 5))
+STOPPING = Sampled(ChargerSample(A.STOPPING, 11))
+RELEASED = Sampled(ChargerSample(A.RELEASED, 7))
+HOT = Sampled(ChargerSample(A.ERROR, 238, "over temperature"))
+ODD = Sampled(ChargerSample(A.UNKNOWN, 99))
+SILENT = IoFailed("192.168.1.60:80 refuses the connection")
+RIVAL = RivalSeen()
+RESET = OperatorReset()
+SCANS: dict[str, Event] = {
+    "idle": IDLE,
+    "handshake": HANDSHAKE,
+    "charging": CHARGING,
+    "stopping": STOPPING,
+    "released": RELEASED,
+    "hot": HOT,
+    "odd": ODD,
+    "silent": SILENT,
+}
+
+AMR1 = Requested("req-1", "tiny", "AMR01")
+AMR2 = Requested("req-2", "tiny", "AMR02")
+CANCEL_1 = Cancelled("req-1")
+
+
+@dataclass
+class Story:
+    """A core with its memory. `told`: (time, state, request id or error) whenever the news differ.
+
+    `powered`: what each poll by `sees` decided about the power.
+    """
+
+    limits: ChargerLimits = LIMITS
+    now: float = 0.0
+    memory: Memory = field(default_factory=lambda: core.initial(LIMITS, 0.0))
+    told: list[tuple[float, str, str]] = field(default_factory=list)
+    refused: list[tuple[float, str]] = field(default_factory=list)
+    faults: list[str] = field(default_factory=list)
+    report: ChargerReport | None = None
+    outputs: ChargerOutputs = field(default_factory=ChargerOutputs)
+    powered: list[bool | None] = field(default_factory=list)
+
+    def event(self, event: Event) -> "Story":
+        """Something happens now."""
+        decision = core.decide(self.memory, event, self.now, self.limits)
+        self.memory, self.outputs, self.report = decision.memory, decision.outputs, decision.report
+        shown = decision.report
+        state = shown.state.name.removeprefix("CHARGER_")
+        line = (state, shown.error_message or shown.request_id)
+        if not self.told or self.told[-1][1:] != line:
+            self.told.append((self.now, *line))
+        if decision.refused:
+            self.refused.append((self.now, decision.refused))
+        for fault in shown.faults:
+            if str(fault) not in self.faults:
+                self.faults.append(str(fault))
+        return self
+
+    def polls(self, script: str) -> "Story":
+        """`idle 3, charging 2`: so many polls that read this, a second after one another."""
+        for part in script.split(","):
+            word, count = part.split()
+            for _ in range(int(count)):
+                self.event(SCANS[word])
+                self.now += 1.0
+        return self
+
+    def sees(self, *readings: tuple[Activity, str, int], **known: Any) -> "Story":
+        """`(activity, receiver, polls)` of a station that knows who is on its pad."""
+        for activity, receiver, count in readings:
+            sample = ChargerSample(activity, 0, measured=Measured(receiver_id=receiver, **known))
+            for _ in range(count):
+                self.event(Sampled(sample))
+                self.powered.append(self.outputs.power)
+                self.now += 1.0
+        return self
+
+    def all(self, events: Iterable[Event]) -> "Story":
+        """Several events at once."""
+        for event in events:
+            self.event(event)
+        return self
+
+
+def measured(sample: ChargerSample, **known: float) -> Sampled[ChargerSample]:
+    """A reading of a station that measures."""
+    return Sampled(replace(sample, measured=Measured(**known)))  # type: ignore[arg-type]

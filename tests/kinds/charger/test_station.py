@@ -1,0 +1,605 @@
+"""A station that sees who stands on its pad and obeys: the five situations of a shared charger, its own
+side of each, in virtual time, one poll a second."""
+
+import pytest
+from msgspec.structs import replace
+
+from bridges.kinds.charger.memory import ChargerLimits
+from bridges.kinds.charger.report import ChargerReport
+from bridges.kinds.charger.settings import Durations
+from bridges.kinds.charger.signals import Activity as A
+from bridges.kinds.charger.signals import (
+    Cancelled,
+    ChargerOutputs,
+    ChargerSample,
+    Measured,
+    Requested,
+)
+from bridges.kinds.shared.decision import Fault, Sampled, WriteFailed
+from bridges.messages.definitions import ChargerStateValue as State
+from tests.kinds.charger.story import (
+    AMR1,
+    AMR2,
+    CANCEL_1,
+    DURATIONS,
+    FULL,
+    RECEIVERS,
+    RESET,
+    SILENT,
+    Story,
+)
+
+ONE, TWO, NOBODY = "rx-1", "rx-2", ""
+
+
+def story(limits: ChargerLimits = FULL) -> Story:
+    return Story(limits).sees((A.IDLE, NOBODY, 1))
+
+
+def docked() -> Story:
+    """AMR01 asked at 1 s, came, and charges since 4 s; it is 5 s now."""
+    return (
+        story().event(AMR1).sees((A.IDLE, NOBODY, 2), (A.HANDSHAKE, ONE, 1), (A.CHARGING, ONE, 1))
+    )
+
+
+# ---- scheduled
+
+
+def test_a_scheduled_charge_goes_through_every_state_with_its_robot_and_request_filled_in() -> None:
+    it = story().event(AMR1)
+    it.sees((A.IDLE, NOBODY, 5), (A.IDLE, ONE, 1), (A.HANDSHAKE, ONE, 2), in_range=None)
+    it.sees((A.CHARGING, ONE, 1), battery_percent=40.0, time_to_full_s=3600.0)
+    assert it.report == ChargerReport(
+        read_at=9.0,
+        state=State.CHARGER_CHARGING,
+        request_id="req-1",
+        fleet="tiny",
+        robot="AMR01",
+        verified=True,
+        measured=Measured(receiver_id=ONE, battery_percent=40.0, time_to_full_s=3600.0),
+    )
+    it.sees((A.CHARGING, ONE, 1), battery_percent=100.0, time_to_full_s=0.0)
+    it.sees((A.STOPPING, ONE, 1), (A.RELEASED, ONE, 2), (A.IDLE, ONE, 5), (A.IDLE, NOBODY, 2))
+    assert it.told == [
+        (0.0, "IDLE", ""),
+        (1.0, "ASSIGNED", "req-1"),
+        (9.0, "CHARGING", "req-1"),
+        (12.0, "RELEASED", "req-1"),
+        (19.0, "IDLE", ""),
+    ]
+    assert it.faults == []
+
+
+def test_power_is_given_when_the_right_receiver_is_seen_and_taken_when_the_battery_is_full() -> (
+    None
+):
+    it = story().event(AMR1)
+    it.sees((A.IDLE, NOBODY, 2), (A.IDLE, ONE, 1), (A.HANDSHAKE, ONE, 1), (A.CHARGING, ONE, 1))
+    it.sees((A.CHARGING, ONE, 1), battery_percent=100.0)
+    it.sees((A.IDLE, ONE, 1))
+    assert it.powered == [False, False, False, True, True, True, False, False]
+
+
+def test_a_battery_is_full_at_the_configured_level() -> None:
+    limits = replace(FULL, t=Durations(full_percent=80.0))
+    it = story(limits).event(AMR1).sees((A.CHARGING, ONE, 1), battery_percent=79.9)
+    assert it.outputs.power is True
+    it.sees((A.CHARGING, ONE, 1), battery_percent=80.0)
+    assert it.outputs.power is False
+    assert it.faults == []
+
+
+def test_a_released_station_is_not_free_before_the_pad_is_clear() -> None:
+    it = docked().sees((A.IDLE, ONE, 100)).event(AMR2)
+    assert it.told[-1] == (5.0, "RELEASED", "req-1")
+    assert it.refused == [(105.0, "charger occupied")]
+    it.sees((A.IDLE, NOBODY, 1)).event(AMR2)
+    assert it.told[-2:] == [(105.0, "IDLE", ""), (106.0, "ASSIGNED", "req-2")]
+
+
+def test_a_robot_still_on_the_pad_may_ask_again_once_released_was_shown() -> None:
+    it = docked().sees((A.IDLE, ONE, 1))
+    it.event(Requested("req-9", "tiny", "AMR01")).sees((A.IDLE, ONE, 2))
+    it.event(Requested("req-9", "tiny", "AMR01")).sees((A.CHARGING, ONE, 1)).event(AMR1)
+    assert it.told[-2:] == [(8.0, "ASSIGNED", "req-9"), (8.0, "CHARGING", "req-9")]
+    assert it.refused == [(6.0, "charger occupied"), (9.0, "request is over")]
+
+
+def test_a_receiver_that_is_lost_from_sight_while_current_flows_keeps_its_power() -> None:
+    it = docked().sees((A.CHARGING, NOBODY, 2))
+    assert it.outputs.power is True
+
+
+# ---- the range
+
+
+def test_nothing_is_energised_before_a_check_of_the_range_that_was_asked_for_says_yes() -> None:
+    it = story().event(AMR1).sees((A.IDLE, NOBODY, 1), in_range=True)
+    assert it.outputs == ChargerOutputs(power=False)
+    it.sees((A.IDLE, ONE, 1), in_range=True)  # an old answer: not asked for by us
+    assert it.outputs == ChargerOutputs(power=False, range_checks=1)
+    it.sees((A.IDLE, ONE, 1), in_range=False)
+    assert it.outputs == ChargerOutputs(power=False, range_checks=1)
+    it.sees((A.IDLE, ONE, 1), in_range=True)
+    assert it.outputs == ChargerOutputs(power=True, range_checks=1)
+
+
+def test_a_robot_out_of_range_is_looked_for_every_five_seconds_until_its_time_is_up() -> None:
+    it = story().event(AMR1)
+    asked = []
+    for _ in range(70):
+        before = it.outputs.range_checks
+        it.sees((A.IDLE, ONE, 1), in_range=False)
+        if it.outputs.range_checks > before:
+            asked.append(it.now - 1.0)
+    assert asked == [1.0 + 5.0 * n for n in range(12)]
+    assert it.told[-1] == (61.0, "RELEASED", "req-1")
+    assert True not in it.powered
+
+
+def test_a_range_that_is_lost_while_current_flows_is_the_stations_own_affair() -> None:
+    it = docked().sees((A.CHARGING, ONE, 1), in_range=False)
+    assert it.outputs == ChargerOutputs(power=True)
+
+
+def test_a_coupling_that_is_sought_again_is_checked_again() -> None:
+    it = story().event(AMR1).sees((A.IDLE, ONE, 2), in_range=True)
+    it.sees((A.CHARGING, ONE, 1), in_range=True).sees((A.HANDSHAKE, ONE, 1), in_range=True)
+    assert it.outputs == ChargerOutputs(power=False, range_checks=2)
+    it.sees((A.HANDSHAKE, ONE, 1), in_range=True)
+    assert it.outputs == ChargerOutputs(power=True, range_checks=2)
+
+
+# ---- ad hoc
+
+
+def test_a_robot_already_on_the_pad_is_charged_when_it_asks() -> None:
+    it = story().sees((A.IDLE, ONE, 2)).event(AMR1).sees((A.IDLE, ONE, 1), (A.CHARGING, ONE, 1))
+    assert it.told == [
+        (0.0, "IDLE", ""),
+        (1.0, "ERROR", "wrong docking: tiny/AMR01 is not assigned here"),
+        (3.0, "ASSIGNED", "req-1"),
+        (4.0, "CHARGING", "req-1"),
+    ]
+    assert it.powered == [False, False, False, True, True]
+
+
+def test_the_start_timeout_of_an_ad_hoc_request_counts_from_its_acceptance() -> None:
+    asked = Requested("req-1", "tiny", "AMR01", start_timeout_s=5.0)
+    it = story().sees((A.IDLE, ONE, 10)).event(asked).sees((A.IDLE, ONE, 6))
+    assert it.told[-1] == (16.0, "RELEASED", "req-1")
+    assert it.faults[-1] == "START_TIMEOUT: tiny/AMR01 did not start to charge in time"
+
+
+def test_where_the_site_says_so_a_known_robot_is_charged_without_a_request() -> None:
+    serves = replace(FULL, unrequested="serve_known")
+    it = story(serves).sees((A.IDLE, ONE, 1), (A.HANDSHAKE, ONE, 1), (A.CHARGING, ONE, 2))
+    it.sees((A.IDLE, ONE, 5), (A.IDLE, NOBODY, 2))
+    assert [(at, state) for at, state, _ in it.told] == [
+        (0.0, "IDLE"),
+        (1.0, "ASSIGNED"),
+        (3.0, "CHARGING"),
+        (5.0, "RELEASED"),
+        (10.0, "IDLE"),
+    ]
+    assert it.powered == [False, True, True, True, True] + [False] * 7
+
+
+def test_a_robot_that_is_served_without_a_request_may_ask_be_cancelled_and_leave() -> None:
+    serves = replace(FULL, unrequested="serve_known")
+    asks = story(serves).sees((A.IDLE, ONE, 1)).event(AMR2).event(AMR1)
+    assert (asks.told[-1], asks.refused) == (
+        (2.0, "ASSIGNED", "req-1"),
+        [(2.0, "charger occupied")],
+    )
+    late = asks.sees((A.IDLE, ONE, 61))
+    assert late.told[-1] == (62.0, "RELEASED", "req-1")
+    cancelled = story(serves).sees((A.CHARGING, ONE, 1)).event(Cancelled(""))
+    assert (cancelled.outputs.power, cancelled.refused) == (False, [])
+    left = story(serves).sees((A.IDLE, ONE, 1), (A.IDLE, NOBODY, 3))
+    assert left.told[-1] == (4.0, "IDLE", "")
+
+
+def test_a_station_at_fault_or_a_stranger_is_not_served_without_a_request() -> None:
+    serves = replace(FULL, unrequested="serve_known")
+    it = story(serves).sees((A.ERROR, ONE, 1), (A.IDLE, ONE, 1), (A.IDLE, "rx-9", 1))
+    assert it.powered == [False] * 4
+    assert it.memory.holder is None
+
+
+# ---- stacked
+
+
+def test_a_second_robot_is_not_granted_while_the_first_is_on_the_pad_finished_or_not() -> None:
+    it = docked().event(AMR2).sees((A.CHARGING, ONE, 1), (A.IDLE, ONE, 5)).event(AMR2)
+    assert it.refused == [(5.0, "charger occupied"), (11.0, "charger occupied")]
+    assert it.report is not None
+    assert (it.report.request_id, it.report.robot) == ("req-1", "AMR01")
+
+
+def test_the_second_robot_is_not_charged_when_it_arrives_first() -> None:
+    it = story().event(AMR1).sees((A.IDLE, TWO, 3), (A.HANDSHAKE, TWO, 1))
+    assert it.told[1:] == [
+        (1.0, "ASSIGNED", "req-1"),
+        (1.0, "ERROR", "wrong docking: tiny/AMR02 stands here, tiny/AMR01 is expected"),
+    ]
+    assert it.powered == [False] * 5
+    assert it.report is not None
+    assert (it.report.request_id, it.report.robot, it.report.verified) == ("req-1", "AMR01", False)
+
+
+# ---- wrong station
+
+
+def test_a_robot_at_the_wrong_station_is_refused_and_named_until_it_leaves() -> None:
+    it = story().sees((A.IDLE, ONE, 2), (A.HANDSHAKE, ONE, 2))
+    assert it.report == ChargerReport(
+        read_at=4.0,
+        state=State.CHARGER_ERROR,
+        error_message="wrong docking: tiny/AMR01 is not assigned here",
+        fleet="tiny",
+        robot="AMR01",
+        verified=True,
+        faults=(Fault("WRONG_DOCKING", "wrong docking: tiny/AMR01 is not assigned here"),),
+        measured=Measured(receiver_id=ONE),
+    )
+    it.event(AMR2)
+    assert it.refused == [(5.0, "charger in error")]
+    it.sees((A.IDLE, NOBODY, 1))
+    assert it.told[-1] == (5.0, "IDLE", "")
+    assert it.powered == [False] * 6
+
+
+def test_the_right_station_stays_assigned_until_its_start_timeout() -> None:
+    it = story().event(AMR1).sees((A.IDLE, NOBODY, 65))
+    assert it.told[1:] == [
+        (1.0, "ASSIGNED", "req-1"),
+        (61.0, "RELEASED", "req-1"),
+        (63.0, "IDLE", ""),
+    ]
+
+
+def test_an_intruder_pauses_the_start_timeout_of_the_request_that_waits() -> None:
+    it = story().event(AMR1)
+    it.sees((A.IDLE, NOBODY, 10), (A.IDLE, TWO, 100), (A.IDLE, NOBODY, 55))
+    assert it.told[2:] == [
+        (11.0, "ERROR", "wrong docking: tiny/AMR02 stands here, tiny/AMR01 is expected"),
+        (111.0, "ASSIGNED", "req-1"),
+        (161.0, "RELEASED", "req-1"),
+        (163.0, "IDLE", ""),
+    ]
+    assert it.report is not None
+    right = story().event(AMR1).sees((A.IDLE, TWO, 100), (A.IDLE, ONE, 1), (A.CHARGING, ONE, 1))
+    assert right.told[-1] == (102.0, "CHARGING", "req-1")
+
+
+def test_an_unknown_receiver_is_refused_with_its_number() -> None:
+    it = story().sees((A.IDLE, "4711", 1)).sees((A.IDLE, NOBODY, 1)).event(AMR1)
+    it.sees((A.HANDSHAKE, "4711", 1))
+    assert it.told[1:] == [
+        (1.0, "ERROR", "unknown receiver 4711"),
+        (2.0, "IDLE", ""),
+        (3.0, "ASSIGNED", "req-1"),
+        (3.0, "ERROR", "unknown receiver 4711, tiny/AMR01 is expected"),
+    ]
+
+
+def test_a_robot_that_drives_onto_the_pad_as_the_first_one_leaves_is_refused() -> None:
+    it = docked().sees((A.CHARGING, TWO, 3), (A.IDLE, TWO, 3), (A.IDLE, NOBODY, 1))
+    assert it.powered[5:] == [False] * 7
+    assert it.told[3:] == [
+        (5.0, "ERROR", "wrong docking: tiny/AMR02 is not assigned here"),
+        (11.0, "IDLE", ""),
+    ]
+
+
+def test_a_robot_without_a_receiver_here_is_not_granted() -> None:
+    it = story().event(Requested("req-7", "tiny", "AMR07"))
+    assert it.refused == [(1.0, "robot has no receiver here")]
+
+
+def test_a_station_that_does_not_say_whom_it_sees_charges_nobody_where_receivers_are_given() -> (
+    None
+):
+    it = Story(FULL).polls("idle 1").event(AMR1).polls("charging 1")
+    assert it.told == [
+        (0.0, "ERROR", "the YAML has receivers, but the charger does not say which one it sees")
+    ]
+    assert it.outputs.power is False
+
+
+def test_a_stranger_pauses_the_start_timeout_too_and_ends_a_charge_that_it_replaces() -> None:
+    waits = story().event(AMR1).sees((A.IDLE, "4711", 100), (A.IDLE, NOBODY, 1))
+    assert waits.told[-1] == (101.0, "ASSIGNED", "req-1")
+    charged = docked().sees((A.CHARGING, "4711", 4), (A.IDLE, NOBODY, 1))
+    assert charged.told[-1] == (9.0, "IDLE", "")
+
+
+def test_each_refusal_has_its_own_fault() -> None:
+    stranger = story().sees((A.IDLE, "4711", 1))
+    other = story().event(AMR1).sees((A.IDLE, TWO, 1))
+    mute = Story(FULL).polls("idle 1")
+    assert [it.faults[-1].partition(":")[0] for it in (stranger, other, mute)] == [
+        "UNKNOWN_RECEIVER",
+        "WRONG_DOCKING",
+        "RECEIVER_NOT_TOLD",
+    ]
+
+
+# ---- failure: the station's side, the robot's side
+
+
+def at_fault(text: str, side: str = "", receiver: str = ONE) -> Sampled[ChargerSample]:
+    measured = Measured(receiver_id=receiver)
+    return Sampled(ChargerSample(A.ERROR, 238, text, measured, side))  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("side", ["station", ""])
+def test_a_station_at_fault_loses_its_power_first_and_is_out_of_service_until_cleared_and_seen_well(
+    side: str,
+) -> None:
+    it = docked().event(at_fault("over temperature", side))
+    text = f"{side}: over temperature" if side else "over temperature"
+    assert it.outputs == ChargerOutputs(power=False)
+    assert it.told[-1] == (5.0, "ERROR", text)
+    it.sees((A.IDLE, ONE, 3600), (A.IDLE, NOBODY, 3600)).event(AMR2)
+    assert it.told[4:] == [(5.0, "ERROR", f"out of service after: {text}")]
+    assert it.refused == [(7205.0, "charger in error")]
+    it.event(RESET)
+    assert it.outputs == ChargerOutputs(power=False, clear_errors=1)
+    assert it.told[-1][1] == "ERROR"
+    it.sees((A.IDLE, NOBODY, 1)).event(AMR2)
+    assert it.told[-2:] == [(7205.0, "IDLE", ""), (7206.0, "ASSIGNED", "req-2")]
+
+
+def test_a_fault_of_the_robots_side_leaves_the_station_in_service() -> None:
+    it = (
+        story()
+        .event(AMR1)
+        .sees((A.HANDSHAKE, ONE, 2))
+        .event(at_fault("handshake timeout", "robot"))
+    )
+    assert it.told[-1] == (3.0, "ERROR", "robot: handshake timeout")
+    it.sees((A.IDLE, ONE, 3), (A.IDLE, NOBODY, 1))
+    assert it.told[3:] == [(3.0, "RELEASED", "req-1"), (6.0, "IDLE", "")]
+    assert it.event(AMR2).told[-1] == (7.0, "ASSIGNED", "req-2")
+
+
+def test_a_waiting_request_survives_an_intruders_fault_but_not_the_stations() -> None:
+    theirs = story().event(AMR1).event(at_fault("handshake timeout", "robot", TWO))
+    theirs.sees((A.IDLE, NOBODY, 1))
+    assert theirs.told[-1] == (1.0, "ASSIGNED", "req-1")
+    ours = story().event(AMR1).event(at_fault("fan stuck", "station", TWO)).event(RESET)
+    ours.sees((A.IDLE, NOBODY, 3))
+    assert ours.told[-2:] == [(1.0, "RELEASED", "req-1"), (3.0, "IDLE", "")]
+
+
+def test_the_side_at_fault_is_not_named_twice() -> None:
+    it = story().event(at_fault("station: fan stuck", "station"))
+    assert it.told[-1] == (1.0, "ERROR", "station: fan stuck")
+    assert it.faults == [
+        "CHARGER_ERROR: station: fan stuck",
+        "PROTECTION: out of service after: station: fan stuck",
+        "WRONG_DOCKING: wrong docking: tiny/AMR01 is not assigned here",
+    ]
+
+
+def test_one_clearing_puts_a_station_back_into_service_once() -> None:
+    it = story().event(at_fault("fan stuck")).event(RESET).sees((A.IDLE, NOBODY, 5))
+    assert (it.told[-1], it.refused) == ((1.0, "IDLE", ""), [])
+    it.event(at_fault("fan stuck")).sees((A.IDLE, NOBODY, 5))
+    assert it.told[-1] == (6.0, "ERROR", "out of service after: fan stuck")
+
+
+def test_a_clearing_that_failed_does_not_count_later() -> None:
+    it = docked().event(at_fault("fan stuck", "station")).event(RESET)
+    for _ in range(40):
+        it.event(at_fault("fan stuck", "station"))
+        it.now += 1.0
+    it.sees((A.IDLE, NOBODY, 100))
+    assert it.told[-1] == (45.0, "ERROR", "out of service after: station: fan stuck")
+
+
+def test_a_clearing_is_not_verified_by_a_station_that_still_charges_or_is_not_known() -> None:
+    it = docked().event(at_fault("fan stuck")).sees((A.CHARGING, ONE, 1)).event(RESET)
+    it.sees((A.CHARGING, ONE, 1), (A.STOPPING, ONE, 1), (A.UNKNOWN, ONE, 1))
+    assert it.memory.protection == "fan stuck"
+    it.sees((A.RELEASED, ONE, 1))
+    assert it.memory.protection == ""
+
+
+def test_the_request_under_way_when_a_station_fails_is_over_and_can_be_cancelled() -> None:
+    it = docked().event(at_fault("fan stuck")).event(CANCEL_1)
+    it.sees((A.IDLE, NOBODY, 4))
+    assert it.report is not None
+    assert (it.report.state, it.report.request_id) == (State.CHARGER_ERROR, "")
+    assert it.refused == []
+
+
+def test_a_station_that_goes_on_charging_when_told_to_stop_is_out_of_service() -> None:
+    it = docked().event(CANCEL_1).sees((A.CHARGING, ONE, 40))
+    assert it.told[3:] == [
+        (
+            35.0,
+            "ERROR",
+            "out of service after: station: it goes on charging though it was told to stop; cut its"
+            " supply",
+        )
+    ]
+    assert it.outputs.power is False
+    slow = (
+        docked()
+        .event(CANCEL_1)
+        .sees((A.CHARGING, ONE, 29), (A.STOPPING, ONE, 60), (A.IDLE, ONE, 1))
+    )
+    assert slow.memory.protection == ""
+
+
+def test_commands_that_fail_again_and_again_are_an_error() -> None:
+    it = docked().event(CANCEL_1)
+    for _ in range(3):
+        it.sees((A.CHARGING, ONE, 1)).event(WriteFailed("status 500"))
+    assert it.told[-1] == (8.0, "ERROR", "Charger takes no commands")
+    assert it.faults[-1] == "CHARGER_NOT_COMMANDED: status 500"
+    assert it.refused == []
+    it.sees((A.CHARGING, ONE, 1))
+    assert it.told[-1] == (8.0, "ERROR", "Charger takes no commands")
+    it.sees((A.STOPPING, ONE, 1))
+    assert it.told[-1] == (9.0, "CHARGING", "req-1")
+
+
+# ---- cancel and unreachable
+
+
+def test_a_cancel_while_the_station_is_lost_takes_the_power_as_soon_as_it_is_heard() -> None:
+    it = docked().all([SILENT] * 3).event(CANCEL_1)
+    assert it.outputs == ChargerOutputs(power=False)
+
+
+def test_an_operator_frees_a_lost_station_only_when_it_must_have_switched_off_by_itself() -> None:
+    limits = replace(FULL, t=Durations(peer_internal_timeout_s=15.0))
+    it = story(limits).event(AMR1).sees((A.CHARGING, ONE, 1)).all([SILENT] * 3)
+    it.now = 15.9
+    it.event(RESET)
+    it.now = 16.0
+    it.event(RESET)
+    assert it.refused == [(15.9, "the charger does not answer")]
+    assert it.report is not None
+    assert (it.report.state, it.report.request_id) == (State.CHARGER_ERROR, "")
+    never = story().event(AMR1).sees((A.CHARGING, ONE, 1)).all([SILENT] * 3)
+    never.now = 1e6
+    assert never.event(RESET).refused == [(1e6, "the charger does not answer")]
+
+
+# ---- restart
+
+
+def test_a_restart_while_charging_adopts_the_charge_and_its_robot_and_leaves_the_power_alone() -> (
+    None
+):
+    it = Story(FULL).sees((A.CHARGING, ONE, 2))
+    assert it.powered == [None, None]
+    assert it.report == ChargerReport(
+        read_at=1.0,
+        state=State.CHARGER_CHARGING,
+        fleet="tiny",
+        robot="AMR01",
+        verified=True,
+        faults=(Fault("UNREQUESTED_CHARGING", "nobody requested it: tiny/AMR01"),),
+        measured=Measured(receiver_id=ONE),
+    )
+    it.event(AMR2).event(AMR1).sees((A.CHARGING, ONE, 1))
+    assert it.refused == [(2.0, "charger occupied")]
+    assert it.powered == [None, None, True]
+    assert it.told[-1] == (2.0, "CHARGING", "req-1")
+
+
+def test_a_restart_while_a_stranger_charges_does_not_leave_it_alone() -> None:
+    it = Story(FULL).sees((A.CHARGING, "4711", 1))
+    assert (it.powered, it.told) == ([False], [(0.0, "ERROR", "unknown receiver 4711")])
+
+
+def test_charging_that_begins_while_we_watch_and_that_nobody_asked_for_is_stopped() -> None:
+    it = story().sees((A.CHARGING, ONE, 1))
+    assert it.powered == [False, False]
+    unseen = Story(ChargerLimits(DURATIONS)).polls("idle 1, charging 1")
+    assert unseen.outputs.power is False
+    serves = Story(ChargerLimits(DURATIONS, unrequested="serve_known")).polls("idle 1, charging 1")
+    assert serves.outputs.power is None
+
+
+def test_a_charge_that_ran_while_the_station_was_lost_is_adopted_too() -> None:
+    it = story().all([SILENT] * 3).sees((A.CHARGING, ONE, 1))
+    assert it.powered[-1] is None
+
+
+def test_an_adopted_charge_that_is_asked_for_or_served_goes_on_whatever_its_range_says() -> None:
+    asked = Story(FULL).sees((A.CHARGING, ONE, 1), in_range=False).event(AMR1)
+    assert (asked.outputs.power, asked.memory.adopted) == (True, False)
+    serves = replace(FULL, unrequested="serve_known")
+    served = Story(serves).sees((A.CHARGING, ONE, 1), in_range=False)
+    assert (served.outputs.power, served.memory.adopted) == (True, False)
+
+
+def test_a_station_that_is_lost_shows_the_robot_it_charged_last_and_no_other() -> None:
+    adopted = Story(FULL).sees((A.CHARGING, ONE, 1))
+    refused = story().sees((A.IDLE, ONE, 1))
+    for it, robot in ((docked(), "AMR01"), (adopted, "AMR01"), (refused, "")):
+        it.all([SILENT] * 3)
+        assert it.report is not None
+        assert (it.report.robot, it.report.verified) == (robot, False)
+
+
+def test_each_receiver_belongs_to_the_robot_that_the_yaml_names() -> None:
+    assert {receiver: str(robot) for receiver, robot in RECEIVERS.items()} == {
+        "rx-1": "tiny/AMR01",
+        "rx-2": "tiny/AMR02",
+    }
+
+
+# ---- a pad that the station moves
+
+
+def test_nothing_is_energised_before_the_pad_is_at_its_height_and_the_robot_in_range() -> None:
+    it = story().event(AMR1)
+    for height, ok in ((False, False), (True, False), (False, True), (True, True)):
+        it.sees((A.IDLE, ONE, 1), at_height=height, range_ok=ok)
+    assert it.powered[1:] == [False, False, False, True]
+
+
+def test_without_these_signals_nothing_is_asked_of_the_pad() -> None:
+    assert story().event(AMR1).sees((A.IDLE, ONE, 1)).powered[1:] == [True]
+
+
+def test_a_pad_that_leaves_its_height_under_power_is_a_fault_of_the_station() -> None:
+    it = story().event(AMR1).sees((A.IDLE, ONE, 1), (A.CHARGING, ONE, 2), at_height=True)
+    it.sees((A.CHARGING, ONE, 1), at_height=False)
+    assert it.powered[1:] == [True, True, True, False]
+    error = "station: the pad left its height under power"
+    assert it.told[-1] == (4.0, "ERROR", error)
+    it.sees((A.IDLE, ONE, 2), at_height=True)
+    assert it.told[-1] == (5.0, "ERROR", f"out of service after: {error}")
+    it.event(RESET).sees((A.IDLE, NOBODY, 3), at_height=False)
+    assert it.told[-1][1:] == ("IDLE", "")
+    assert True not in it.powered[4:]
+
+
+def test_a_pad_that_sinks_when_no_current_flows_is_not_a_fault() -> None:
+    it = story().event(AMR1).sees((A.IDLE, ONE, 1), (A.CHARGING, ONE, 1), at_height=True)
+    it.sees((A.STOPPING, ONE, 1), (A.IDLE, NOBODY, 4), at_height=False)
+    assert it.powered[1:] == [True, True, False, False, False, False, False]
+    assert [line[1] for line in it.told[1:]] == ["ASSIGNED", "CHARGING", "RELEASED", "IDLE"]
+
+
+def test_a_pad_that_is_down_asks_for_no_check_of_the_range() -> None:
+    it = story().event(AMR1).sees((A.IDLE, ONE, 3), at_height=False, in_range=False)
+    assert it.outputs.range_checks == 0
+    assert it.sees((A.IDLE, ONE, 1), at_height=True, in_range=False).outputs.range_checks == 1
+
+
+def test_a_range_that_is_lost_under_power_takes_the_power_away_without_a_fault() -> None:
+    it = story().event(AMR1).sees((A.IDLE, ONE, 1), (A.CHARGING, ONE, 1), range_ok=True)
+    it.sees((A.CHARGING, ONE, 1), (A.IDLE, ONE, 1), range_ok=False)
+    assert it.powered[1:] == [True, True, False, False]
+    assert it.told[-1][1:] == ("RELEASED", "req-1")
+    assert it.faults == []
+
+
+def test_a_start_timeout_says_that_the_pad_never_rose() -> None:
+    it = story().event(AMR1).sees((A.IDLE, ONE, 62), at_height=False)
+    late = "START_TIMEOUT: tiny/AMR01 did not start to charge in time"
+    assert it.faults == [f"{late}: the pad is not at its height"]
+
+
+def test_a_station_that_can_only_be_observed_shows_a_lost_height_while_it_lasts() -> None:
+    it = Story()
+    for height in (True, False, True):
+        known = Measured(at_height=height)
+        it.event(Sampled(ChargerSample(A.CHARGING, 5, measured=known)))
+    error = "station: the pad left its height under power"
+    assert [line[1:] for line in it.told] == [
+        ("CHARGING", ""),
+        ("ERROR", error),
+        ("CHARGING", ""),
+    ]

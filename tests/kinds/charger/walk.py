@@ -1,0 +1,308 @@
+"""Every state that the charger's core can reach within some steps, and what must be true in each.
+
+A state is the core's memory with every time relative to now, the station with its pad, and a ledger
+that tells what has happened in other words. Ages beyond every limit are made equal, and counts are left
+out, so that states that cannot behave differently are one.
+"""
+
+from collections.abc import Callable
+from typing import Any
+
+import msgspec
+from msgspec.structs import replace
+
+from bridges.kinds.charger.core import decide
+from bridges.kinds.charger.memory import ChargerLimits, Memory
+from bridges.kinds.charger.report import ChargerReport
+from bridges.kinds.charger.settings import Durations, Robot, robot
+from bridges.kinds.charger.signals import (
+    Activity,
+    Cancelled,
+    ChargerOutputs,
+    ChargerSample,
+    Event,
+    Measured,
+    Requested,
+)
+from bridges.kinds.shared.decision import (
+    Decision,
+    IoFailed,
+    OperatorReset,
+    RivalSeen,
+    Sampled,
+    WriteFailed,
+)
+from tests.walk import Walker
+
+LIMITS = Durations(
+    misses=2, start_timeout_s=8.0, stop_timeout_s=4.0, released_s=2.0, peer_internal_timeout_s=16.0
+)
+RECEIVERS = {"1": robot("tiny/A"), "2": robot("tiny/B")}
+OLDEST_S = 4096.0
+RIVAL_S, CLEAR_S = 5.0, 30.0
+
+SITES = {
+    "observed": ChargerLimits(LIMITS, can_stop=False),
+    "unverified": ChargerLimits(LIMITS),
+    "refuses": ChargerLimits(LIMITS, RECEIVERS),
+    "serves": ChargerLimits(LIMITS, RECEIVERS, "serve_known"),
+    "clears by itself": ChargerLimits(
+        Durations(misses=2, start_timeout_s=8.0, clear_errors_per_h=60), RECEIVERS
+    ),
+}
+
+
+class Ledger(msgspec.Struct, frozen=True):
+    """What has happened, without the core's conclusions. Times are relative to the state's.
+
+    `granted`: the request that was accepted last and has not been seen to end; `robot`: whose.
+    `spoiled`: since then it was cancelled, or an error was read. `read_at`: of the last good reading,
+    `misses` since. `out`: the station's own fault was read, and no clearing was seen to help since;
+    `cleared_at`: the last clearing.
+    """
+
+    granted: str | None = None
+    robot: Robot | None = None
+    spoiled: bool = False
+    read_at: float | None = None
+    misses: int = 0
+    rival_at: float | None = None
+    out: bool = False
+    cleared_at: float | None = None
+    adopted: bool = False
+
+
+class World(msgspec.Struct, frozen=True):
+    """Memory and ledger at time 0, the station, and whether it can be read and commanded."""
+
+    memory: Memory = Memory()
+    ledger: Ledger = Ledger()
+    sample: ChargerSample = ChargerSample(Activity.IDLE, 0, measured=Measured(receiver_id=""))
+    seen: ChargerSample | None = None
+    readable: bool = True
+    writable: bool = True
+
+
+class Step(msgspec.Struct, frozen=True):
+    """One decision and all around it. `ledger`: after it."""
+
+    before: World
+    event: Event
+    now: float
+    limits: ChargerLimits
+    decision: Decision[Memory, ChargerOutputs, ChargerReport]
+    ledger: Ledger
+    seen: ChargerSample | None
+
+
+Seen = Callable[[Step], None]
+Move = Callable[[World], tuple[World, list[Event]]]
+
+
+# ---- what can happen
+
+
+def reading(world: World) -> list[Event]:
+    """The event that a scan brings."""
+    if not world.readable:
+        return [IoFailed("timeout")]
+    return [Sampled(world.sample), *([] if world.writable else [WriteFailed("status 500")])]
+
+
+def _station(**changes: Any) -> Move:
+    def move(world: World) -> tuple[World, list[Event]]:
+        world = replace(world, sample=replace(world.sample, **{"side": "", **changes}))
+        return world, reading(world)
+
+    return move
+
+
+def _pad(**changes: Any) -> Move:
+    def move(world: World) -> tuple[World, list[Event]]:
+        measured = replace(world.sample.measured, **changes)
+        world = replace(world, sample=replace(world.sample, measured=measured))
+        return world, reading(world)
+
+    return move
+
+
+def _toggled(part: str) -> Move:
+    def move(world: World) -> tuple[World, list[Event]]:
+        toggled: Any = {part: not getattr(world, part)}
+        world = replace(world, **toggled)
+        return world, reading(world)
+
+    return move
+
+
+def _event(event: Event) -> Move:
+    return lambda world: (world, [event])
+
+
+MOVES: dict[str, Move] = {
+    **{f"{who} asks": _event(Requested(f"req-{who}", "tiny", who)) for who in "AB"},
+    **{f"{who} cancels": _event(Cancelled(f"req-{who}")) for who in "AB"},
+    **{str(a): _station(activity=a) for a in Activity},
+    "robot's error": _station(activity=Activity.ERROR, side="robot"),
+    "A docks": _pad(receiver_id="1"),
+    "B docks": _pad(receiver_id="2"),
+    "a stranger docks": _pad(receiver_id="9"),
+    "the pad is clear": _pad(receiver_id=""),
+    "nobody says who": _pad(receiver_id=None),
+    "in range": _pad(in_range=True),
+    "out of range": _pad(in_range=False),
+    "pad down": _pad(at_height=False),
+    "pad at height": _pad(at_height=True),
+    "gap wrong": _pad(range_ok=False),
+    "gap right": _pad(range_ok=True),
+    "link lost or back": _toggled("readable"),
+    "commands lost or back": _toggled("writable"),
+    "rival": _event(RivalSeen()),
+    "reset": _event(OperatorReset()),
+}
+WAITS = (1.0, 5.0, 32.0)
+
+
+def moved(world: World, move: Move, limits: ChargerLimits, seen: Seen) -> World:
+    """The world after this move."""
+    world, events = move(world)
+    for event in events:
+        world = decided(world, event, 0.0, limits, seen)
+    return world
+
+
+def waited(world: World, seconds: float, limits: ChargerLimits, seen: Seen) -> World:
+    """After so long, with a scan at least each four seconds."""
+    while seconds > 0:
+        after_s = min(seconds, 4.0)
+        for n, event in enumerate(reading(world)):
+            world = decided(world, event, 0.0 if n else after_s, limits, seen)
+        seconds -= after_s
+    return world
+
+
+def decided(world: World, event: Event, now: float, limits: ChargerLimits, seen: Seen) -> World:
+    """The core decides at `now`; the result is at time 0 again."""
+    decision = decide(world.memory, event, now, limits)
+    ledger = noted(world, event, now, limits, decision)
+    sample = event.sample if isinstance(event, Sampled) else world.seen
+    seen(Step(world, event, now, limits, decision, ledger, sample))
+    return replace(
+        world,
+        memory=alike(decision.memory, now, limits),
+        ledger=_shifted(ledger, now),
+        seen=sample,
+    )
+
+
+# ---- the ledger
+
+
+def noted(world: World, event: Event, now: float, limits: ChargerLimits, decision: Any) -> Ledger:
+    """The ledger after an event."""
+    ledger = world.ledger
+    cleared = decision.outputs.clear_errors > world.memory.clear_errors
+    if isinstance(event, Sampled):
+        ledger = _read(ledger, event.sample, now, limits)
+    elif isinstance(event, IoFailed) and not isinstance(event, WriteFailed):
+        ledger = replace(ledger, misses=min(ledger.misses + 1, limits.t.misses))
+    elif isinstance(event, RivalSeen):
+        ledger = replace(ledger, rival_at=now)
+    elif (
+        isinstance(event, Requested) and not decision.refused and event.request_id != ledger.granted
+    ):
+        ledger = replace(
+            ledger, granted=event.request_id, robot=event.who, spoiled=False, adopted=False
+        )
+    elif isinstance(event, Cancelled) and event.request_id == ledger.granted:
+        ledger = replace(ledger, spoiled=True)
+    if cleared:
+        ledger = replace(ledger, cleared_at=now)
+    return _held(ledger, decision)
+
+
+def _read(ledger: Ledger, sample: ChargerSample, now: float, limits: ChargerLimits) -> Ledger:
+    came = ledger.read_at is None or ledger.misses >= limits.t.misses
+    if sample.activity is Activity.CHARGING and sample.measured.at_height is False:
+        sample = replace(sample, activity=Activity.ERROR, side="station")
+    bad = sample.activity in (Activity.ERROR, Activity.UNKNOWN)
+    flows = sample.activity in (Activity.CHARGING, Activity.STOPPING)
+    well = not bad and not flows
+    helped = ledger.cleared_at is not None and now - ledger.cleared_at <= CLEAR_S and well
+    who = limits.receivers.get(sample.measured.receiver_id or "")
+    another = sample.measured.receiver_id and limits.receivers and who != ledger.robot
+    intruders = another and sample.side == "robot"
+    own = sample.activity is Activity.ERROR and sample.side != "robot" and limits.can_stop
+    return replace(
+        ledger,
+        read_at=now,
+        misses=0,
+        spoiled=ledger.spoiled or (bad and not intruders),
+        out=own or (ledger.out and not helped),
+        adopted=flows and ledger.granted is None and (came or ledger.adopted),
+    )
+
+
+def _held(ledger: Ledger, decision: Any) -> Ledger:
+    """Requests end in ways that the rules judge elsewhere; here only that none is shown any more."""
+    shown = decision.report
+    if decision.memory.holder is None:
+        return replace(ledger, granted=None, robot=None, spoiled=False)
+    who = Robot(shown.fleet, shown.robot)
+    if not shown.request_id and (ledger.granted != "" or who != ledger.robot):
+        # served without a request
+        return replace(ledger, granted="", robot=who, spoiled=False, adopted=False)
+    return ledger
+
+
+# ---- states with their times relative to now
+
+
+def alike(memory: Memory, now: float, limits: ChargerLimits) -> Memory:
+    """The same memory at time 0, equal for those that cannot behave differently."""
+    holder = memory.holder
+    if holder:
+        holder = replace(
+            holder,
+            start_by=max(holder.start_by - now, -1.0),
+            paused_at=_at(holder.paused_at, now),
+            checked_at=_at(holder.checked_at, now, 8.0),
+            released_at=_at(holder.released_at, now, limits.t.released_s),
+        )
+    return replace(
+        memory,
+        holder=holder,
+        read_at=_at(memory.read_at, now, 64.0),
+        misses=min(memory.misses, limits.t.misses),
+        write_misses=min(memory.write_misses, limits.t.misses),
+        disobeyed_since=_at(memory.disobeyed_since, now, limits.t.stop_timeout_s),
+        clear_by=max(memory.clear_by - now, -1.0),
+        cleared_at=_at(memory.cleared_at, now),
+        rival_at=_at(memory.rival_at, now, RIVAL_S),
+        clear_errors=0,
+        range_checks=0,
+    )
+
+
+def _shifted(ledger: Ledger, now: float) -> Ledger:
+    return replace(
+        ledger,
+        read_at=_at(ledger.read_at, now, 64.0),
+        rival_at=_at(ledger.rival_at, now, RIVAL_S),
+        cleared_at=_at(ledger.cleared_at, now, 64.0),
+    )
+
+
+def _at(at: Any, now: float, oldest_s: float = OLDEST_S) -> Any:
+    """A time, relative to now, and no further back than makes a difference; None stays."""
+    return None if at is None else max(at - now, -oldest_s)
+
+
+def walker(limits: ChargerLimits) -> Walker[World, Move]:
+    """The charger's, with these limits."""
+    return Walker(
+        MOVES,
+        WAITS,
+        lambda world, move, seen: moved(world, move, limits, seen),
+        lambda world, seconds, seen: waited(world, seconds, limits, seen),
+    )

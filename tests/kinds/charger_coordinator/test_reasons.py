@@ -1,0 +1,142 @@
+"""What the queue says of each robot that waits: whole texts, on memories made by hand."""
+
+from msgspec.structs import replace
+
+from bridges.kinds.charger.settings import Robot
+from bridges.kinds.charger_coordinator.memory import (
+    ASSIGNED,
+    CHARGING,
+    ERROR,
+    IDLE,
+    Grant,
+    Memory,
+    Seen,
+    Site,
+    Standing,
+    Wish,
+)
+from bridges.kinds.charger_coordinator.reasons import queued, reasons
+from bridges.kinds.charger_coordinator.schedule import Charging
+from bridges.kinds.charger_coordinator.signals import Sighting
+from bridges.messages.definitions import ChargerStateValue
+from tests.kinds.charger_coordinator.yard import settings
+
+ONE, TWO, THREE = (Robot("tiny", f"AMR0{i}") for i in (1, 2, 3))
+X, Y = Robot("big", "X"), Robot("big", "Y")
+
+
+def site(stations: int) -> Site:
+    """So many stations, and each suits everybody."""
+    names = tuple(f"s{i + 1}" for i in range(stations))
+    robots = dict.fromkeys((ONE, TWO, THREE), names)
+    places: dict[str, dict[str, str]] = {name: {} for name in names}
+    return Site(robots, {}, places, {}, 60.0, 100.0, 90.0, 60.0)
+
+
+def shows(state: ChargerStateValue, full_in_s: float = 0.0) -> Seen:
+    return Seen(state, "", None, "", 10.0, 0.0, full_in_s)
+
+
+BUSY = Memory(
+    may_speak=True,
+    wishes=tuple(Wish(who, "fleet") for who in (ONE, THREE, TWO)),
+    grants={
+        "s1": Grant(X, "r1", 0.0, started=True),
+        "s2": Grant(Y, "r2", 0.0, started=True),
+        "s4": Grant(THREE, "r3", 0.0),
+    },
+    stations={
+        "s1": shows(CHARGING, 609.0),
+        "s2": shows(CHARGING, 90.0),
+        "s4": shows(ASSIGNED, 9.0),
+        "s5": shows(ERROR),
+        "s6": shows(IDLE),
+    },
+    shunned={"s6": 13.0},
+)
+
+
+def test_each_waiting_robot_is_told_what_is_in_its_way_and_which_station_it_will_get() -> None:
+    assert [wish.robot for wish in queued(BUSY)] == [ONE, TWO]
+    why = "s1 charges big/X, s2 charges big/Y, s3 is silent, s4 is assigned to tiny/AMR03"
+    assert list(reasons(BUSY, 12.0, site(6))) == [
+        f"tiny/AMR01 by the robot: {why}, and 2 more, s2 is free in 88 s",
+        f"tiny/AMR02 by the robot: {why}, and 2 more, s1 is free in 10 min",
+    ]
+    four = list(reasons(BUSY, 12.0, site(4)))
+    assert four[0] == f"tiny/AMR01 by the robot: {why}, s2 is free in 88 s"
+
+
+def test_the_station_where_it_stands_comes_first_and_its_own_robot_is_not_in_its_way() -> None:
+    last_two = {name: BUSY.stations[name] for name in ("s5", "s6")}
+    stands_there = Standing(Sighting(ONE, False, "p6", 50.0, ""), 10.0)
+    memory = Memory(
+        may_speak=True,
+        wishes=BUSY.wishes[:1],
+        stations=last_two,
+        shunned=BUSY.shunned,
+        robots={ONE: stands_there},
+    )
+    places = {"s5": {"tiny": "p5"}, "s6": {"tiny": "p6"}}
+    two = Site({ONE: ("s5", "s6")}, {}, places, {}, 60.0, 100.0, 90.0, 60.0)
+    assert [list(reasons(memory, now, two)) for now in (12.0, 13.0)] == [
+        ["tiny/AMR01 by the robot: s6 takes no request, s5 is out of service"],
+        ["tiny/AMR01 by the robot: s6 is not free yet, s5 is out of service"],
+    ]
+
+
+def test_while_it_may_not_publish_no_station_is_what_they_wait_for() -> None:
+    memory = replace(BUSY, may_speak=False, passive="until rival leaves")
+    assert list(reasons(memory, 12.0, site(6))) == [
+        "tiny/AMR01 by the robot: until rival leaves",
+        "tiny/AMR02 by the robot: until rival leaves",
+    ]
+
+
+def said(now: float, seen: Seen, *robots: Robot) -> str:
+    """What AMR01 hears of its only station, at which these robots stand."""
+    one = Site({ONE: ("s1",)}, {}, {"s1": {"tiny": "p1"}}, {}, 60.0, 100.0, 90.0, 60.0)
+    there = {who: Standing(Sighting(who, False, "p1", 50.0, ""), 10.0) for who in robots}
+    memory = replace(BUSY, wishes=BUSY.wishes[:1], grants={}, stations={"s1": seen}, robots=there)
+    (text,) = reasons(memory, now, one)
+    return text.removeprefix("tiny/AMR01 by the robot: ")
+
+
+def test_a_silent_station_and_one_where_another_robot_stands_say_so() -> None:
+    assert [said(15.0, shows(IDLE)), said(12.0, shows(IDLE), TWO)] == [
+        "s1 is silent",
+        "tiny/AMR02 stands at s1",
+    ]
+
+
+def test_the_remaining_time_of_a_charge_is_shown_in_seconds_or_minutes() -> None:
+    found = [said(12.0, shows(CHARGING, full_s)) for full_s in (1.0, 101.0, 102.0, 3602.0)]
+    assert found == [
+        f"s1 is not free yet, s1 is free in {lasts}" for lasts in ("0 s", "99 s", "2 min", "60 min")
+    ]
+
+
+def test_a_robot_without_any_station_waits_for_the_schedule() -> None:
+    memory = Memory(may_speak=True, wishes=BUSY.wishes[:1], alone=False)
+    assert list(reasons(memory, 12.0, site(2))) == [
+        "tiny/AMR01 by the robot: the charging schedule has no station for it"
+    ]
+
+
+# ---- what is remembered
+
+
+def test_a_station_is_silent_five_seconds_after_its_last_state() -> None:
+    memory = Memory(stations={"s1": shows(IDLE)})
+    assert [memory.speaks("s1", now) for now in (14.9, 15.0)] == [True, False]
+    assert memory.speaks("s2", 0.0) is False
+
+
+def test_the_last_eight_requests_that_are_over_are_remembered() -> None:
+    memory = Memory(over=tuple("abcdefgh"), wishes=(Wish(ONE, "operator", request_id="i"),))
+    assert memory.without_wish(ONE) == Memory(over=tuple("bcdefghi"))
+
+
+def test_the_site_follows_the_yamls_schedule() -> None:
+    night = Charging(at="22:00", until="05:00")
+    assert Site.of(settings(schedule=[night])).schedule == (night,)

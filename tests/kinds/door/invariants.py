@@ -1,0 +1,137 @@
+"""What must be true of every decision of the door's core, whatever happened before it.
+
+Judged from the event, the inputs, the outputs and the walk's ledger; the core's memory is not asked.
+"""
+
+from typing import Any
+
+from bridges.kinds.door.core import decide
+from bridges.kinds.door.memory import DoorLimits, Memory
+from bridges.kinds.door.signals import OpenRequested
+from bridges.kinds.shared.decision import Sampled, WriteFailed
+from bridges.messages.definitions import DoorModeValue
+from tests.kinds.door.walk import UNLIKE, Step, World, burns, fresh, reading, sighted
+
+
+def check(step: Step) -> None:
+    """Check every rule; AssertionError says which is broken."""
+    the_hold_has_a_reason(step)
+    the_relay_follows_the_hold(step)
+    open_is_the_truth(step)
+    hazards_are_as_read(step)
+    a_request_that_waits_has_a_reason(step)
+    assert step.decision.report.read_at == step.ledger.read_at
+    assert step.decision.wake_at > step.now
+
+
+def the_hold_has_a_reason(step: Step) -> None:
+    """RMF wants it, or fire does, or somebody stands there after we let go; else it is off."""
+    held, ledger = step.decision.report.hold, step.ledger
+    if not _sighted(step):
+        assert not held
+        return
+    if burns(step.decision):
+        assert held == (step.limits.on_fire == "open")
+        return
+    assert held or not ledger.wanted
+    if held and not ledger.wanted:
+        assert ledger.let_go or step.limits.debounce
+        assert "DOOR_OBSTRUCTED" in _codes(step)
+    if (
+        _exact(step)
+        and _signal(step, "obstruction")
+        and ledger.let_go
+        and not step.limits.estimated
+    ):
+        assert held
+
+
+def the_relay_follows_the_hold(step: Step) -> None:
+    """Steadily, or in pulses from when the hold began."""
+    on, pulse = step.decision.outputs.hold_open, step.limits.pulse
+    in_pulse = pulse is None or (step.now - step.ledger.held_since) % pulse.every_s < pulse.on_s
+    assert on == (step.ledger.held and in_pulse)
+
+
+def open_is_the_truth(step: Step) -> None:
+    """OPEN only by a fresh reading of the contact at the open end, or by time where permitted."""
+    shown, sample = step.decision.report, step.world.sample
+    if not _sighted(step):
+        assert shown.mode is DoorModeValue.MODE_OFFLINE
+    if shown.mode is not DoorModeValue.MODE_OPEN:
+        return
+    assert _sighted(step)
+    assert not (burns(step.decision) and step.limits.on_fire == "release")
+    assert shown.estimated == (sample.opened is None)
+    if sample.opened is None:
+        assert step.limits.estimated
+        assert step.ledger.held
+        delay_s = step.limits.t.open_delay_s
+        assert step.ledger.sure_since is not None
+        assert delay_s is not None
+        assert step.now >= step.ledger.sure_since + delay_s
+        return
+    assert not _told_otherwise(step, "opened", step.limits.debounce.get("opened", 0.0))
+    if _exact(step):
+        assert (sample.opened, sample.closed, sample.lost) == (True, False, "")
+
+
+def a_request_that_waits_has_a_reason(step: Step) -> None:
+    """An OPEN waits while RMF wants the door open, and is not shown that it is. Without the hold there
+    is a fault too, except before the first reading."""
+    shown = step.decision.report
+    assert bool(shown.waits) == (step.ledger.wanted and shown.mode is not DoorModeValue.MODE_OPEN)
+    stands = shown.waits and not shown.hold and step.ledger.read_at is not None
+    assert not stands or _codes(step) & {"COMMUNICATION_LOST", "TWO_NODES_FOR_ONE_DEVICE"}
+
+
+def hazards_are_as_read(step: Step) -> None:
+    """A fire counts as soon as it lasts and ends when it has been away; only it refuses OPEN."""
+    clear_s = step.limits.t.hazard_clear_s
+    if fresh(step.ledger, step.now, step.limits):
+        assert not (burns(step.decision) and _told_otherwise(step, "fire", clear_s))
+        assert burns(step.decision) or not (_exact(step) and _signal(step, "fire"))
+    if "DOOR_OBSTRUCTED" in _codes(step):
+        assert not _told_otherwise(step, "obstruction", clear_s)
+        assert not step.ledger.wanted
+    refused = isinstance(step.event, OpenRequested) and burns(step.decision)
+    assert bool(step.decision.refused) == (refused and step.limits.on_fire == "release")
+
+
+def nothing_changes_before_wake_at(world: World, limits: DoorLimits) -> None:
+    """Scans of the same inputs between now and `wake_at` decide nothing else."""
+    now = _scan(world, world.memory, 0.0, limits)
+    until = min(now.wake_at, 1e4)
+    later = _scan(world, now.memory, until * (1.0 - 1e-6), limits)
+    assert later.outputs == now.outputs
+    assert later.report.news() == now.report.news()
+
+
+def _scan(world: World, memory: Memory, now: float, limits: DoorLimits) -> Any:
+    decision = decide(memory, reading(world), now, limits)
+    if world.writable:
+        return decision
+    return decide(decision.memory, WriteFailed("timeout"), now, limits)
+
+
+def _sighted(step: Step) -> bool:
+    return sighted(step.ledger, step.now, step.limits)
+
+
+def _codes(step: Step) -> set[str]:
+    return {fault.code for fault in step.decision.report.faults}
+
+
+def _exact(step: Step) -> bool:
+    """Has the core just seen the world's inputs, and do they count at once?"""
+    return isinstance(step.event, Sampled) and not step.limits.debounce
+
+
+def _signal(step: Step, name: str) -> bool:
+    return bool(getattr(step.world.sample, name))
+
+
+def _told_otherwise(step: Step, name: str, for_s: float) -> bool:
+    """Have the readings shown for so long, without a gap, that it is not asserted?"""
+    since = step.ledger.unlike[UNLIKE.index(name)]
+    return since is not None and step.now >= since + for_s

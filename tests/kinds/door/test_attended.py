@@ -1,0 +1,59 @@
+"""A door whose supervisor has gone: it stays held, unless the site limits that time."""
+
+from bridges.kinds.shared.decision import Attended
+from tests.kinds.door.virtual import OBSTRUCTION, Door
+
+
+def held(**limits: float) -> Door:
+    """A door that is held open from 1 s on, and whose supervisor leaves at 20 s."""
+    door = Door(limits=limits, inputs={"obstruction": OBSTRUCTION})
+    door.scan(Attended(True))
+    door.run(1.0)
+    door.opens()
+    door.run(20.0)
+    door.scan(Attended(False))
+    return door
+
+
+def test_by_default_a_door_stays_held_whoever_is_gone() -> None:
+    door = held()
+    door.run(4000.0)
+    assert [on for _, on in door.relay] == [True]
+    assert door.faults == [(0.0, ())]
+
+
+def test_with_supervisor_lost_s_the_hold_ends_after_that_time_and_a_fault_says_why() -> None:
+    door = held(supervisor_lost_s=60.0)
+    door.run(200.0)
+    assert [(round(at), on) for at, on in door.relay] == [(1, True), (80, False)]
+    assert [(round(at), codes) for at, codes in door.faults] == [
+        (0, ()),
+        (80, ("SUPERVISOR_LOST",)),
+    ]
+    door.scan(Attended(True))
+    assert door.faults[-1][1] == ()
+
+
+def test_a_supervisor_that_is_back_in_time_changes_nothing() -> None:
+    door = held(supervisor_lost_s=60.0)
+    door.run(75.0)
+    door.scan(Attended(True))
+    door.run(300.0)
+    assert [on for _, on in door.relay] == [True]
+
+
+def test_a_request_counts_as_a_sign_of_life_before_its_sender_is_seen_on_the_graph() -> None:
+    door = held(supervisor_lost_s=60.0)
+    door.run(200.0)
+    door.opens()
+    door.run(250.0)
+    assert [(round(at), on) for at, on in door.relay][2:] == [(200, True)]
+    door.run(300.0)
+    assert [(round(at), on) for at, on in door.relay][3:] == [(260, False)]
+
+
+def test_the_hold_does_not_end_while_somebody_is_in_the_doorway() -> None:
+    door = held(supervisor_lost_s=60.0)
+    door.plant.press("obstruction", True, door.now)
+    door.run(100.0)
+    assert [on for _, on in door.relay] == [True]

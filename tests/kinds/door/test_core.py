@@ -1,0 +1,458 @@
+"""The door's core, decision by decision, in virtual time."""
+
+import math
+
+import pytest
+from msgspec.structs import replace
+
+from bridges.kinds.door.memory import DoorLimits
+from bridges.kinds.door.report import DoorReport
+from bridges.kinds.door.settings import Durations, Pulse
+from bridges.kinds.door.signals import CloseRequested, DoorOutputs, DoorSample, OpenRequested
+from bridges.kinds.shared.decision import Fault, IoFailed, OperatorReset, RivalSeen
+from bridges.messages.definitions import DoorModeValue
+from tests.kinds.door.virtual import BETWEEN, BOTH, CLOSED, DEBOUNCED, OPEN, CoreAlone
+
+OPENS, CLOSES = OpenRequested("door_supervisor"), CloseRequested("door_supervisor")
+
+
+def limits(**durations: float) -> DoorLimits:
+    return DoorLimits(t=Durations(**durations), debounce=DEBOUNCED)
+
+
+def test_before_the_first_reading_a_door_is_offline_and_nothing_is_held() -> None:
+    core = CoreAlone()
+    decided = core.hears(IoFailed("connection refused"))
+    assert decided.report == DoorReport(
+        mode=DoorModeValue.MODE_OFFLINE,
+        read_at=None,
+        faults=(Fault("COMMUNICATION_LOST", "connection refused"),),
+    )
+    assert core.hears(OPENS).outputs == DoorOutputs(hold_open=False)
+    assert decided.wake_at == math.inf
+
+
+def test_an_open_before_the_first_reading_is_kept_and_held_with_it() -> None:
+    core = CoreAlone()
+    core.hears(OPENS)
+    core.now = 1.0
+    core.sees(CLOSED, until=1.1)
+    assert core.told == [(0.0, "OFFLINE", False), (1.0, "UNKNOWN", True), (1.0625, "CLOSED", True)]
+
+
+def test_a_doors_position_is_unknown_before_its_contacts_have_settled() -> None:
+    core = CoreAlone()
+    core.sees(OPEN, until=0.3)
+    assert core.told == [(0.0, "UNKNOWN", False), (0.0625, "OPEN", False)]
+
+
+def test_an_open_request_holds_the_door_and_its_contacts_show_how_far_it_is() -> None:
+    core = CoreAlone()
+    core.sees(CLOSED, until=1.0)
+    core.hears(OPENS)
+    core.sees(BETWEEN, until=3.0)
+    core.sees(OPEN, until=4.0)
+    assert core.told == [
+        (0.0, "UNKNOWN", False),
+        (0.0625, "CLOSED", False),
+        (1.0, "CLOSED", True),
+        (1.0625, "MOVING", True),
+        (3.0625, "OPEN", True),
+    ]
+
+
+def test_a_thousand_open_requests_switch_the_relay_once() -> None:
+    once, often = CoreAlone(), CoreAlone()
+    for core, times in ((once, 1), (often, 1000)):
+        core.sees(CLOSED, until=1.0)
+        for _ in range(times):
+            core.hears(OPENS)
+        core.sees(OPEN, until=2.0)
+    assert often.told == once.told
+    assert often.memory == once.memory
+
+
+def test_a_close_request_releases_the_hold_after_its_grace_and_repeats_do_not_prolong_it() -> None:
+    core = CoreAlone()
+    core.hears(OPENS)
+    for second in range(6):
+        core.sees(OPEN, until=second + 1.0)
+        core.hears(CLOSES)
+    assert core.told[-2:] == [(0.0625, "OPEN", True), (4.0, "OPEN", False)]
+
+
+def test_an_open_within_the_grace_cancels_the_close() -> None:
+    core = CoreAlone()
+    core.hears(OPENS)
+    core.sees(OPEN, until=1.0)
+    core.hears(CLOSES)
+    core.sees(OPEN, until=3.875)
+    core.hears(OPENS)
+    core.sees(OPEN, until=600.0)
+    assert core.told[-1] == (0.0625, "OPEN", True)
+
+
+def test_the_grace_begins_again_with_the_close_after_that() -> None:
+    core = CoreAlone(limits(close_grace_s=2.0))
+    core.hears(OPENS)
+    core.sees(OPEN, until=1.0)
+    core.hears(CLOSES)
+    core.sees(OPEN, until=2.5)
+    core.hears(OPENS)
+    core.hears(CLOSES)
+    core.sees(OPEN, until=10.0)
+    assert core.told[-1] == (4.5, "OPEN", False)
+
+
+def test_without_grace_a_close_request_releases_the_hold_at_once() -> None:
+    core = CoreAlone(limits(close_grace_s=0.0))
+    core.hears(OPENS)
+    core.sees(OPEN, until=1.0)
+    assert core.hears(CLOSES).outputs == DoorOutputs(hold_open=False)
+
+
+def test_an_obstruction_holds_the_door_again_until_it_has_been_away_for_a_second() -> None:
+    core = CoreAlone(limits(close_grace_s=1.0))
+    clear = replace(OPEN, obstruction=False)
+    core.hears(OPENS)
+    core.sees(clear, until=1.0)
+    core.hears(CLOSES)
+    core.sees(clear, until=2.5)
+    core.sees(replace(BETWEEN, obstruction=True), until=4.0)
+    assert core.faults() == (
+        "DOOR_OBSTRUCTED: held open after CLOSE while the doorway is not clear",
+    )
+    core.sees(clear, until=6.0)
+    core.sees(replace(BETWEEN, obstruction=False), until=7.0)
+    core.sees(replace(CLOSED, obstruction=False), until=8.0)
+    core.sees(replace(CLOSED, obstruction=True), until=9.0)
+    assert core.told[1:] == [
+        (0.0, "UNKNOWN", True),
+        (0.0625, "OPEN", True),
+        (2.0, "OPEN", False),
+        (2.5625, "MOVING", True),
+        (4.0625, "OPEN", True),
+        (5.0, "OPEN", False),
+        (6.0625, "MOVING", False),
+        (7.0625, "CLOSED", False),
+    ]
+
+
+def test_an_obstruction_at_an_idle_door_does_not_open_it() -> None:
+    core = CoreAlone()
+    core.sees(replace(CLOSED, obstruction=True), until=10.0)
+    core.sees(replace(OPEN, obstruction=True), until=20.0)
+    assert [hold for _, _, hold in core.told] == [False, False, False]
+
+
+def test_open_and_closed_at_once_is_unknown_and_a_fault_while_it_lasts() -> None:
+    core = CoreAlone()
+    core.sees(BOTH, until=1.0)
+    assert core.faults() == ("DOOR_CONTACTS_CONTRADICT: the door reads open and closed",)
+    core.sees(CLOSED, until=2.0)
+    assert core.told == [(0.0, "UNKNOWN", False), (1.0625, "CLOSED", False)]
+    assert core.faults() == ()
+
+
+def test_a_door_between_its_limits_for_too_long_is_unknown() -> None:
+    core = CoreAlone(limits(travel_s=5.0))
+    core.sees(CLOSED, until=1.0)
+    core.sees(BETWEEN, until=10.0)
+    assert core.told[1:] == [
+        (0.0625, "CLOSED", False),
+        (1.0625, "MOVING", False),
+        (6.0625, "UNKNOWN", False),
+    ]
+    assert core.faults() == ("DOOR_TRAVEL_TIMEOUT: at neither end position for 5.0 s",)
+    core.sees(OPEN, until=11.0)
+    assert (core.told[-1], core.faults()) == ((10.0625, "OPEN", False), ())
+
+
+def test_a_door_that_reverses_gets_its_whole_travel_time_again() -> None:
+    core = CoreAlone(limits(travel_s=5.0))
+    core.sees(CLOSED, until=1.0)
+    core.sees(BETWEEN, until=4.0)
+    core.hears(OPENS)
+    core.sees(BETWEEN, until=10.0)
+    assert core.told[2:] == [
+        (1.0625, "MOVING", False),
+        (4.0, "MOVING", True),
+        (9.0, "UNKNOWN", True),
+    ]
+
+
+def test_a_door_that_does_not_open_is_a_fault_and_stays_held() -> None:
+    core = CoreAlone(limits(open_timeout_s=4.0))
+    core.sees(CLOSED, until=1.0)
+    core.hears(OPENS)
+    core.sees(CLOSED, until=4.875)
+    core.hears(OPENS)
+    assert core.faults() == ()
+    core.sees(CLOSED, until=6.0)
+    assert core.faults() == ("DOOR_OPENING_FAULT: held, but not open after 4.0 s",)
+    assert core.told[-1] == (1.0, "CLOSED", True)
+    core.hears(OperatorReset())
+    assert core.faults() == ("DOOR_OPENING_FAULT: held, but not open after 4.0 s",)
+    core.sees(OPEN, until=7.0)
+    assert core.faults() == ()
+
+
+def test_a_door_whose_reading_is_too_old_is_offline_with_the_hold_off_and_remembers_the_request() -> (
+    None
+):
+    core = CoreAlone()
+    core.hears(OPENS)
+    core.sees(OPEN, until=1.0)
+    decided = core.sees(IoFailed("no reply"), until=5.0)
+    assert decided.report == DoorReport(
+        mode=DoorModeValue.MODE_OFFLINE,
+        read_at=1.0,
+        faults=(Fault("COMMUNICATION_LOST", "no reply"),),
+        waits="for a reading",
+    )
+    core.sees(CLOSED, until=6.0)
+    assert core.told[2:] == [
+        (0.0625, "OPEN", True),
+        (2.0, "OFFLINE", False),
+        (5.0, "UNKNOWN", True),
+        (5.0625, "CLOSED", True),
+    ]
+
+
+def test_a_short_gap_in_the_readings_changes_nothing() -> None:
+    core = CoreAlone()
+    core.hears(OPENS)
+    core.sees(OPEN, until=1.0)
+    core.sees(IoFailed("no reply"), until=1.875)
+    core.sees(OPEN, until=2.5)
+    assert core.told[2:] == [(0.0625, "OPEN", True)]
+    assert core.faults() == ()
+
+
+def test_a_contact_half_seen_before_a_gap_must_be_seen_again() -> None:
+    core = CoreAlone(DoorLimits(debounce={"opened": 0.5}))
+    core.sees(BETWEEN, until=2.0)
+    core.sees(OPEN, until=2.375)
+    core.hears(IoFailed("no reply"))
+    core.sees(OPEN, until=3.5)
+    assert core.told == [
+        (0.0, "UNKNOWN", False),
+        (0.5, "MOVING", False),
+        (2.875, "OPEN", False),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("contact", "before", "after"),
+    [
+        ("closed", BETWEEN, CLOSED),
+        ("obstruction", replace(OPEN, obstruction=False), replace(OPEN, obstruction=True)),
+        ("fire", replace(OPEN, fire=False), replace(OPEN, fire=True)),
+    ],
+)
+def test_every_contact_half_seen_before_a_gap_must_be_seen_again(
+    contact: str, before: DoorSample, after: DoorSample
+) -> None:
+    core = CoreAlone(DoorLimits(debounce={contact: 0.5}))
+    core.sees(before, until=2.0)
+    core.sees(after, until=2.375)
+    core.hears(IoFailed("no reply"))
+    seen = []
+    for at in (2.5, 2.75, 2.875):
+        core.sees(after, until=at)
+        value = getattr(core.memory.senses, contact).value
+        seen.append(value == getattr(after, contact))
+    assert seen == [False, False, True]
+
+
+def test_the_position_of_a_door_that_was_read_once_before_a_gap_is_still_unknown() -> None:
+    core = CoreAlone()
+    core.hears(IoFailed("no reply"))
+    core.sees(OPEN, until=0.0)
+    core.hears(IoFailed("no reply"))
+    core.now = 0.9
+    core.hears(IoFailed("no reply"))
+    assert core.told == [(0.0, "OFFLINE", False), (0.0, "UNKNOWN", False)]
+
+
+def test_a_missing_scan_is_a_lost_connection() -> None:
+    core = CoreAlone()
+    core.sees(OPEN, until=1.0)
+    core.now = 3.0
+    core.hears(OPENS)
+    assert core.told[-1] == (3.0, "OFFLINE", False)
+    assert core.faults() == ("COMMUNICATION_LOST: no reading for 1.0 s",)
+
+
+def test_a_rival_takes_the_door_offline_and_the_hold_off_until_five_quiet_seconds() -> None:
+    core = CoreAlone()
+    core.hears(OPENS)
+    core.sees(OPEN, until=1.0)
+    core.hears(RivalSeen())
+    core.sees(OPEN, until=3.0)
+    core.hears(RivalSeen())
+    assert core.faults() == (
+        "TWO_NODES_FOR_ONE_DEVICE: another node publishes states of this door",
+    )
+    core.sees(OPEN, until=20.0)
+    assert core.told[2:] == [
+        (0.0625, "OPEN", True),
+        (1.0, "OFFLINE", False),
+        (8.0, "OPEN", True),
+    ]
+
+
+def test_a_fire_releases_the_door_forgets_the_request_and_refuses_to_open() -> None:
+    core = CoreAlone()
+    quiet, fire = replace(OPEN, fire=False), replace(OPEN, fire=True)
+    core.hears(OPENS)
+    core.sees(quiet, until=1.0)
+    core.sees(fire, until=2.0)
+    assert core.faults() == ("FIRE_ALARM: the door is released",)
+    assert core.hears(OPENS).refused == "the fire alarm has released the door"
+    core.sees(quiet, until=4.0)
+    assert core.hears(OPENS).refused == ""
+    assert core.told[2:] == [
+        (0.0625, "OPEN", True),
+        (1.0625, "UNKNOWN", False),
+        (3.0, "OPEN", False),
+        (4.0, "OPEN", True),
+    ]
+
+
+def test_a_fire_holds_open_against_close_where_the_site_says_so() -> None:
+    core = CoreAlone(DoorLimits(debounce=DEBOUNCED, on_fire="open"))
+    core.sees(replace(CLOSED, fire=False), until=1.0)
+    core.sees(replace(CLOSED, fire=True), until=2.0)
+    core.sees(replace(OPEN, fire=True), until=3.0)
+    core.hears(CLOSES)
+    core.sees(replace(OPEN, fire=True), until=10.0)
+    assert core.faults() == ("FIRE_ALARM: the door is held open",)
+    core.sees(replace(OPEN, fire=False), until=12.0)
+    assert core.told[1:] == [
+        (0.0625, "CLOSED", False),
+        (1.0625, "CLOSED", True),
+        (2.0625, "OPEN", True),
+        (11.0, "OPEN", False),
+    ]
+
+
+def test_the_first_reading_of_a_fire_already_forbids_the_hold() -> None:
+    core = CoreAlone()
+    core.hears(OPENS)
+    core.sees(replace(OPEN, fire=True), until=1.0)
+    assert core.told == [(0.0, "OFFLINE", False), (0.0, "UNKNOWN", False)]
+
+
+def test_only_a_fire_lets_a_fire_door_close_on_an_obstruction() -> None:
+    core = CoreAlone()
+    core.hears(OPENS)
+    core.sees(replace(OPEN, fire=False, obstruction=False), until=1.0)
+    core.sees(replace(OPEN, fire=True, obstruction=True), until=3.0)
+    assert core.told[-1] == (1.0625, "UNKNOWN", False)
+
+
+def test_an_operator_that_closes_by_itself_is_triggered_at_a_steady_pace() -> None:
+    core = CoreAlone(DoorLimits(debounce=DEBOUNCED, pulse=Pulse(on_s=0.5, every_s=3.0)))
+    core.sees(CLOSED, until=1.0)
+    for second in range(6):
+        core.hears(OPENS)
+        core.sees(OPEN, until=second + 2.0)
+    core.hears(CLOSES)
+    core.sees(OPEN, until=14.0)
+    assert [(at, hold) for at, _, hold in core.told if at > 1.0625] == [
+        (1.5, False),
+        (4.0, True),
+        (4.5, False),
+        (7.0, True),
+        (7.5, False),
+    ]
+    assert core.last is not None
+    assert core.last.report.hold is False
+
+
+def test_between_two_pulses_the_door_is_still_held() -> None:
+    core = CoreAlone(DoorLimits(debounce=DEBOUNCED, pulse=Pulse(on_s=0.5, every_s=3.0)))
+    core.hears(OPENS)
+    decided = core.sees(OPEN, until=2.0)
+    assert (decided.outputs, decided.report.hold) == (DoorOutputs(between_pulses=True), True)
+
+
+def test_without_contacts_a_door_is_estimated_by_its_travel_time_and_marked_so() -> None:
+    core = CoreAlone(DoorLimits(t=Durations(open_delay_s=4.0, travel_s=6.0), estimated=True))
+    core.sees(DoorSample(), until=10.0)
+    core.hears(OPENS)
+    opened = core.sees(DoorSample(), until=15.0)
+    core.hears(CLOSES)
+    core.sees(DoorSample(), until=30.0)
+    assert core.told == [
+        (0.0, "MOVING", False),
+        (6.0, "CLOSED", False),
+        (10.0, "MOVING", True),
+        (14.0, "OPEN", True),
+        (18.0, "MOVING", False),
+        (24.0, "CLOSED", False),
+    ]
+    assert (opened.report.estimated, opened.report.faults) == (True, ())
+
+
+def test_an_estimate_begins_again_after_a_failed_reading() -> None:
+    core = CoreAlone(DoorLimits(t=Durations(open_delay_s=4.0), estimated=True))
+    core.hears(OPENS)
+    core.sees(DoorSample(), until=5.0)
+    core.sees(IoFailed("no reply"), until=5.5)
+    core.sees(DoorSample(), until=20.0)
+    core.sees(IoFailed("no reply"), until=25.0)
+    assert core.told[1:] == [
+        (0.0, "MOVING", True),
+        (4.0, "OPEN", True),
+        (5.0, "MOVING", True),
+        (9.5, "OPEN", True),
+        (20.0, "MOVING", True),
+        (21.0, "OFFLINE", False),
+    ]
+
+
+def test_without_open_delay_s_a_door_is_never_estimated_open() -> None:
+    core = CoreAlone(DoorLimits(estimated=True))
+    core.hears(OPENS)
+    core.sees(DoorSample(), until=100.0)
+    assert "OPEN" not in [mode for _, mode, _ in core.told]
+
+
+def test_with_one_contact_only_the_other_end_is_estimated() -> None:
+    core = CoreAlone(DoorLimits(t=Durations(open_delay_s=2.0), debounce=DEBOUNCED, estimated=True))
+    closed = core.sees(DoorSample(closed=True), until=1.0)
+    core.hears(OPENS)
+    core.sees(DoorSample(closed=True), until=5.0)
+    opened = core.sees(DoorSample(closed=False), until=6.0)
+    assert core.told[1:] == [
+        (0.0625, "CLOSED", False),
+        (1.0, "CLOSED", True),
+        (5.0625, "OPEN", True),
+    ]
+    assert (closed.report.estimated, opened.report.estimated) == (False, True)
+
+
+def test_a_missing_contact_proves_nothing_unless_estimates_are_allowed() -> None:
+    core = CoreAlone(DoorLimits())
+    core.hears(OPENS)
+    core.sees(DoorSample(), until=100.0)
+    assert core.told[1:] == [(0.0, "MOVING", True), (10.0, "UNKNOWN", True)]
+
+
+def test_a_door_held_for_very_long_is_reported_and_stays_held() -> None:
+    core = CoreAlone(limits(max_hold_s=60.0))
+    core.hears(OPENS)
+    core.sees(OPEN, until=59.0)
+    assert core.faults() == ()
+    core.sees(OPEN, until=61.0)
+    assert core.faults() == ("DOOR_OPEN_TOO_LONG: held for RMF longer than 60.0 s",)
+    assert core.told[-1] == (0.0625, "OPEN", True)
+
+
+def test_a_new_reading_that_says_the_same_is_not_news() -> None:
+    core = CoreAlone()
+    before, after = core.sees(OPEN, until=1.0).report, core.sees(OPEN, until=2.0).report
+    assert (before.read_at, after.read_at) == (1.0, 2.0)
+    assert before.news() == after.news()

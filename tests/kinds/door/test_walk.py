@@ -1,0 +1,147 @@
+"""Every state within some steps of the start, and of each stage of a passage: what is true in all."""
+
+import pytest
+from msgspec.structs import replace
+
+from bridges.kinds.door.memory import DoorLimits
+from bridges.kinds.door.settings import Pulse
+from tests.depth import depth
+from tests.kinds.door.invariants import check, nothing_changes_before_wake_at
+from tests.kinds.door.virtual import DEBOUNCED
+from tests.kinds.door.walk import MOVES, Step, World, limits_of, moved, start, walker
+
+SITES = {
+    "fire releases": limits_of(),
+    "fire holds open": limits_of(on_fire="open"),
+    "no contacts": limits_of({"open_delay_s": 4.0}, estimated=True),
+    "pulses": limits_of(pulse=Pulse(on_s=0.5, every_s=3.0)),
+    "debounced": limits_of(debounce=DEBOUNCED),
+}
+PLAIN = SITES["fire releases"]
+
+OPENING = ("between", 1.0, "A opens", 1.0)
+OPEN = (*OPENING, "at open", 1.0)
+LEFT = (*OPEN, "A closes", 4.0)
+STAGES: dict[str, tuple[str | float, ...]] = {
+    "shut": (1.0,),
+    "opening": OPENING,
+    "open": OPEN,
+    "in the grace": (*OPEN, "A closes", 1.0),
+    "let go": LEFT,
+    "somebody in the way": (*LEFT, "between", "obstruction", 1.0),
+    "fire": (*OPEN, "fire", 1.0),
+    "blind": (*OPEN, "bus lost or back", 64.0),
+    "rivalled": (*OPEN, "rival"),
+    "at neither end for long": (*OPENING, 16.0),
+}
+
+
+def path(*steps: str | float, limits: DoorLimits = PLAIN) -> World:
+    """The state that these moves and waits lead to."""
+    return walker(limits).path(start(limits), *steps)
+
+
+class Scan:
+    """One more scan of a state, checked; what it decided."""
+
+    def __init__(self, world: World, limits: DoorLimits) -> None:
+        self._steps: list[Step] = []
+        moved(world, MOVES["reset"], limits, self._note)
+        report = self._steps[0].decision.report
+        self.mode = report.mode.name.removeprefix("MODE_")
+        self.hold = report.hold
+        self.codes = tuple(fault.code for fault in report.faults)
+
+    def _note(self, step: Step) -> None:
+        check(step)
+        self._steps.append(step)
+
+
+def test_each_stage_of_a_passage_is_what_its_name_says() -> None:
+    scans = {name: Scan(path(*steps), PLAIN) for name, steps in STAGES.items()}
+    assert {name: (scan.mode, scan.hold, *scan.codes) for name, scan in scans.items()} == {
+        "shut": ("CLOSED", False),
+        "opening": ("MOVING", True),
+        "open": ("OPEN", True),
+        "in the grace": ("OPEN", True),
+        "let go": ("OPEN", False),
+        "somebody in the way": ("MOVING", True, "DOOR_OBSTRUCTED"),
+        "fire": ("UNKNOWN", False, "FIRE_ALARM"),
+        "blind": ("OFFLINE", False, "COMMUNICATION_LOST", "DOOR_OPEN_TOO_LONG"),
+        "rivalled": ("OFFLINE", False, "TWO_NODES_FOR_ONE_DEVICE"),
+        "at neither end for long": (
+            "UNKNOWN",
+            True,
+            "DOOR_TRAVEL_TIMEOUT",
+            "DOOR_OPENING_FAULT",
+        ),
+    }
+
+
+def check_rules_within(steps: int, roots: list[World], limits: DoorLimits) -> int:
+    """Check every step and state; return the number of states."""
+    found = walker(limits).walk(roots, steps, check)
+    for world in found:
+        nothing_changes_before_wake_at(world, limits)
+    return len(found)
+
+
+@pytest.mark.parametrize("site", SITES)
+def test_the_rules_hold_within_some_steps_of_the_start(site: str) -> None:
+    limits = SITES[site]
+    assert check_rules_within(depth(2, 3), [start(limits)], limits) > depth(80, 500)
+
+
+@pytest.mark.parametrize("stage", STAGES)
+def test_the_rules_hold_within_some_steps_of_each_stage_of_a_passage(stage: str) -> None:
+    assert check_rules_within(depth(2, 3), [path(*STAGES[stage])], PLAIN) > depth(100, 500)
+
+
+@pytest.mark.parametrize("site", SITES)
+def test_the_rules_hold_within_some_steps_of_all_stages_at_each_kind_of_site(site: str) -> None:
+    limits = SITES[site]
+    roots = [path(*steps, limits=limits) for steps in STAGES.values()]
+    assert check_rules_within(depth(1, 2), roots, limits) > depth(80, 800)
+
+
+def mended(world: World, limits: DoorLimits) -> World:
+    """The building mends itself: the door is shut, nobody is in it, nothing burns, all answer."""
+    world = replace(world, sample=start(limits).sample, readable=True, writable=True)
+    return path_checked(world, limits, 6.0)
+
+
+def path_checked(world: World, limits: DoorLimits, *steps: str | float) -> World:
+    """After these moves and waits, each step of them checked."""
+    return walker(limits).path(world, *steps, seen=check)
+
+
+def states_around_all_stages(limits: DoorLimits) -> list[World]:
+    """Every state within a step of them."""
+    roots = [path(*steps, limits=limits) for steps in STAGES.values()]
+    return walker(limits).walk(roots, 1, check)
+
+
+@pytest.mark.parametrize("site", SITES)
+def test_from_every_state_a_sound_door_opens_when_asked_and_is_let_go_when_asked(
+    site: str,
+) -> None:
+    limits = SITES[site]
+    for world in states_around_all_stages(limits):
+        sound = mended(world, limits)
+        wanted = path_checked(sound, limits, "A opens", "at open", 5.0)
+        assert (Scan(wanted, limits).mode, Scan(wanted, limits).hold) == ("OPEN", True)
+        asked = path_checked(wanted, limits, "A closes", 2.0)
+        assert Scan(asked, limits).hold
+        assert not Scan(path_checked(asked, limits, 1.0), limits).hold
+        shut = path_checked(asked, limits, 1.0, "at closed", 16.0)
+        assert (Scan(shut, limits).mode, Scan(shut, limits).hold) == ("CLOSED", False)
+
+
+@pytest.mark.parametrize("site", SITES)
+def test_from_every_state_silence_never_lets_go_of_a_door_that_is_wanted_open(site: str) -> None:
+    limits = SITES[site]
+    for world in states_around_all_stages(limits):
+        wanted = path_checked(mended(world, limits), limits, "A opens", "at open", 200.0)
+        scan = Scan(wanted, limits)
+        assert (scan.mode, scan.hold) == ("OPEN", True)
+        assert scan.codes == ("DOOR_OPEN_TOO_LONG",)

@@ -1,0 +1,363 @@
+"""Every state that the door's core can reach within some steps, and what must be true in each.
+
+A state is the core's memory with every time relative to now, the building around it, and a ledger
+that tells the rules in other words. Ages that are beyond every limit are made equal, so that states
+that cannot behave differently are one. All durations are sums of powers of two: no time is rounded.
+"""
+
+from collections.abc import Callable
+from typing import Any
+
+import msgspec
+from msgspec.structs import replace
+
+from bridges.kinds.door.core import decide, initial
+from bridges.kinds.door.memory import DoorLimits, Memory
+from bridges.kinds.door.settings import Durations
+from bridges.kinds.door.signals import CloseRequested, DoorSample, Event, OpenRequested
+from bridges.kinds.shared.debounce import Settled
+from bridges.kinds.shared.decision import IoFailed, OperatorReset, RivalSeen, Sampled, WriteFailed
+from bridges.kinds.shared.durations import RIVAL_QUIET_S
+from tests.kinds.door.virtual import Decided
+from tests.walk import Walker
+
+LONG_S = 32.0
+"""Without a wake_at, a scan each so many seconds is enough here; below `stale_after_s`."""
+
+DURATIONS: dict[str, float] = {"stale_after_s": 60.0, "max_hold_s": 30.0}
+"""Not the defaults: the age of readings, which costs scans; and the alarm for a door left open."""
+
+
+def limits_of(durations: dict[str, float] | None = None, **facts: Any) -> DoorLimits:
+    """The default durations, except these."""
+    return DoorLimits(t=Durations(**{**DURATIONS, **(durations or {})}), **facts)
+
+
+class Ledger(msgspec.Struct, frozen=True):
+    """What has happened, without the core's conclusions. Times are relative to the state's.
+
+    `wanted`: RMF has asked for it open; `ends_at`: when its CLOSE comes true. `let_go`: what held it
+    has ended, and no reading since then has said closed. `shut`: the last reading says so.
+    `sure_since`: since when the hold is as it is and nothing has failed. `unlike`: by contact, since
+    when readings have said otherwise than asserted.
+    """
+
+    held: bool = False
+    held_since: float = 0.0
+    wanted: bool = False
+    ends_at: float | None = None
+    let_go: bool = False
+    shut: bool = False
+    read_at: float | None = None
+    rival_at: float | None = None
+    sure_since: float | None = None
+    unlike: tuple[float | None, ...] = (None, None, None)
+
+
+UNLIKE = ("opened", "obstruction", "fire")
+
+
+class World(msgspec.Struct, frozen=True):
+    """Memory and ledger at time 0, and the building: whether it can be read, and written to."""
+
+    memory: Memory
+    sample: DoorSample
+    ledger: Ledger = Ledger()
+    readable: bool = True
+    writable: bool = True
+
+
+def start(limits: DoorLimits) -> World:
+    """A daemon that has just started on a closed door; without contacts where they are estimated."""
+    opened, closed = (None, None) if limits.estimated else (False, True)
+    return World(initial(limits, 0.0), DoorSample(opened, closed, obstruction=False, fire=False))
+
+
+# ---- what can happen
+
+Move = Callable[[World], tuple[World, Event]]
+
+
+def _ends(opened: bool, closed: bool) -> Move:
+    def move(world: World) -> tuple[World, Event]:
+        if world.sample.opened is not None:
+            sample = replace(world.sample, opened=opened, closed=closed)
+            world = replace(world, sample=sample)
+        return world, reading(world)
+
+    return move
+
+
+def _toggled(signal: str) -> Move:
+    def move(world: World) -> tuple[World, Event]:
+        toggled: Any = {signal: not getattr(world.sample, signal)}
+        sample = replace(world.sample, **toggled)
+        world = replace(world, sample=sample)
+        return world, reading(world)
+
+    return move
+
+
+def _lost(world: World) -> tuple[World, Event]:
+    sample = replace(world.sample, lost="" if world.sample.lost else "status 9")
+    world = replace(world, sample=sample)
+    return world, reading(world)
+
+
+def _event(event: Event) -> Move:
+    return lambda world: (world, event)
+
+
+def _bus(world: World) -> tuple[World, Event]:
+    world = replace(world, readable=not world.readable)
+    return world, reading(world)
+
+
+def _relay(world: World) -> tuple[World, Event]:
+    world = replace(world, writable=not world.writable)
+    return world, reading(world)
+
+
+def reading(world: World) -> Event:
+    """What a scan reads."""
+    return Sampled(world.sample) if world.readable else IoFailed("timeout")
+
+
+MOVES: dict[str, Move] = {
+    "A opens": _event(OpenRequested("A")),
+    "B opens": _event(OpenRequested("B")),
+    "A closes": _event(CloseRequested("A")),
+    "B closes": _event(CloseRequested("B")),
+    "at open": _ends(True, False),
+    "at closed": _ends(False, True),
+    "between": _ends(False, False),
+    "at both": _ends(True, True),
+    "obstruction": _toggled("obstruction"),
+    "fire": _toggled("fire"),
+    "position lost or back": _lost,
+    "bus lost or back": _bus,
+    "relay lost or back": _relay,
+    "rival": _event(RivalSeen()),
+    "reset": _event(OperatorReset()),
+}
+TIMES = (0.0625, 1.0, 4.0, 16.0, 64.0)
+"""Below and beyond the debounce, the hazards' end, the grace, the travel and opening, the age."""
+
+
+# ---- one step
+
+Seen = Callable[["Step"], None]
+
+
+class Step(msgspec.Struct, frozen=True):
+    """One decision, at time `now` after the state began. `ledger`: with this step in it."""
+
+    before: Memory
+    event: Event
+    decision: Decided
+    world: World
+    ledger: Ledger
+    now: float
+    limits: DoorLimits
+
+
+def moved(world: World, move: Move, limits: DoorLimits, seen: Seen) -> World:
+    """The state after a move, at the same instant."""
+    around, event = move(world)
+    return _scanned(around, event, 0.0, limits, seen)[0]
+
+
+def waited(world: World, seconds: float, limits: DoorLimits, seen: Seen) -> World:
+    """The state after some time, with a scan whenever the core wants one."""
+    now = 0.0
+    world, wake_at = _scanned(world, reading(world), now, limits, seen)
+    while now < seconds:
+        now = min(seconds, now + LONG_S, wake_at)
+        world, wake_at = _scanned(world, reading(world), now, limits, seen)
+    return replace(
+        world,
+        memory=shifted(world.memory, -now, limits),
+        ledger=_shifted(world.ledger, -now, limits),
+    )
+
+
+def _scanned(
+    world: World, event: Event, now: float, limits: DoorLimits, seen: Seen
+) -> tuple[World, float]:
+    """One scan: decide and write. Also when to scan again."""
+    step = _step(world, event, now, limits, seen)
+    world = replace(world, memory=step.decision.memory, ledger=step.ledger)
+    if not world.writable:
+        step = _step(world, WriteFailed("timeout"), now, limits, seen)
+        world = replace(world, memory=step.decision.memory, ledger=step.ledger)
+    return world, step.decision.wake_at
+
+
+def _step(world: World, event: Event, now: float, limits: DoorLimits, seen: Seen) -> Step:
+    decision = decide(world.memory, event, now, limits)
+    ledger = noted(world.ledger, event, now, decision, limits)
+    step = Step(world.memory, event, decision, world, ledger, now, limits)
+    seen(step)
+    return step
+
+
+def noted(
+    ledger: Ledger, event: Event, now: float, decision: Decided, limits: DoorLimits
+) -> Ledger:
+    """The ledger after one decision. It takes over only the hold, and whether a fire ended it."""
+    wanted, ends_at = _asked(ledger, event, now, bool(decision.refused), limits)
+    if limits.on_fire == "release" and burns(decision):
+        wanted, ends_at = False, None
+    held = decision.report.hold
+    sample = event.sample if isinstance(event, Sampled) else None
+    reason = limits.on_fire == "open" if burns(decision) else wanted
+    shut = ledger.shut and fresh(ledger, now, limits)
+    if sample:
+        shut = bool(sample.closed) and not sample.lost
+    rival_at = now if isinstance(event, RivalSeen) else ledger.rival_at
+    after = replace(ledger, rival_at=rival_at, read_at=now if sample else ledger.read_at)
+    let_go = ledger.let_go or (ledger.held and not (reason and sighted(after, now, limits)))
+    sure_since = ledger.sure_since if held == ledger.held or ledger.sure_since is None else now
+    if isinstance(event, IoFailed):
+        sure_since = None
+    return replace(
+        after,
+        held=held,
+        held_since=ledger.held_since if held == ledger.held else now,
+        wanted=wanted,
+        ends_at=ends_at,
+        let_go=let_go and not shut,
+        shut=shut,
+        sure_since=now if sample and sure_since is None else sure_since,
+        unlike=_unlike(ledger, event, now, limits),
+    )
+
+
+def fresh(ledger: Ledger, now: float, limits: DoorLimits) -> bool:
+    """Is the last reading young enough?"""
+    return ledger.read_at is not None and now < ledger.read_at + limits.t.stale_after_s
+
+
+def sighted(ledger: Ledger, now: float, limits: DoorLimits) -> bool:
+    """A fresh reading, and nobody else under this name."""
+    rival_at = ledger.rival_at
+    alone = rival_at is None or now >= rival_at + RIVAL_QUIET_S
+    return alone and fresh(ledger, now, limits)
+
+
+def burns(decision: Decided) -> bool:
+    """Does the core say that there is a fire?"""
+    return any(fault.code == "FIRE_ALARM" for fault in decision.report.faults)
+
+
+def _asked(
+    ledger: Ledger, event: Event, now: float, refused: bool, limits: DoorLimits
+) -> tuple[bool, float | None]:
+    """Does RMF want the door open? A CLOSE counts after its grace."""
+    wanted, ends_at = ledger.wanted, ledger.ends_at
+    if ends_at is not None and now >= ends_at and not isinstance(event, OpenRequested):
+        wanted, ends_at = False, None
+    if isinstance(event, OpenRequested) and not refused:
+        return True, None
+    if isinstance(event, CloseRequested) and wanted and ends_at is None:
+        return True, now + limits.t.close_grace_s
+    return wanted, ends_at
+
+
+def _unlike(
+    ledger: Ledger, event: Event, now: float, limits: DoorLimits
+) -> tuple[float | None, ...]:
+    """A failed reading ends what was seen; a failed write is no reading."""
+    if isinstance(event, Sampled):
+        gap = not fresh(ledger, now, limits)
+        said = [getattr(event.sample, signal) for signal in UNLIKE]
+        return tuple(
+            None if is_so else now if gap or since is None else since
+            for is_so, since in zip(said, ledger.unlike, strict=True)
+        )
+    if isinstance(event, IoFailed) and not isinstance(event, WriteFailed):
+        return (None,) * len(UNLIKE)
+    return ledger.unlike
+
+
+# ---- states with their times relative to now
+
+
+def shifted(memory: Memory, by: float, limits: DoorLimits) -> Memory:
+    """The same memory with every time moved by so much, and old ones cut off."""
+    t, senses = limits.t, memory.senses
+    return replace(
+        memory,
+        latched_at=_at(memory.latched_at, by, t.max_hold_s or 0.0),
+        close_at=_at(memory.close_at, by),
+        held_since=_held_since(memory.held_since, by, limits),
+        between_since=_at(memory.between_since, by, t.travel_s),
+        shut_since=_at(memory.shut_since, by, t.open_timeout_s),
+        rival_at=_at(memory.rival_at, by, RIVAL_QUIET_S),
+        senses=replace(
+            senses,
+            opened=_settled(senses.opened, by),
+            closed=_settled(senses.closed, by),
+            obstruction=_settled(senses.obstruction, by),
+            fire=_settled(senses.fire, by),
+            read_at=_at(senses.read_at, by, t.stale_after_s),
+            linked_since=_at(senses.linked_since, by, t.travel_s),
+        ),
+    )
+
+
+def _shifted(ledger: Ledger, by: float, limits: DoorLimits) -> Ledger:
+    return replace(
+        ledger,
+        held_since=_held_since(ledger.held_since, by, limits),
+        ends_at=_at(ledger.ends_at, by),
+        read_at=_at(ledger.read_at, by, limits.t.stale_after_s),
+        rival_at=_at(ledger.rival_at, by, RIVAL_QUIET_S),
+        sure_since=_at(ledger.sure_since, by, limits.t.travel_s),
+        unlike=tuple(_at(since, by, limits.t.hazard_clear_s) for since in ledger.unlike),
+    )
+
+
+def _at(at: Any, by: float, oldest_s: float = float("inf")) -> Any:
+    """A time, moved, and no further back than makes a difference; None stays."""
+    return None if at is None else max(at + by, -oldest_s)
+
+
+def _held_since(at: float, by: float, limits: DoorLimits) -> float:
+    """The age of the hold, cut off beyond every limit; its place among the pulses stays."""
+    age_s, oldest_s = -(at + by), max(limits.t.travel_s, limits.t.open_timeout_s)
+    if age_s <= oldest_s:
+        return -age_s
+    return -(oldest_s + ((age_s - oldest_s) % limits.pulse.every_s if limits.pulse else 0.0))
+
+
+def _settled(seen: Settled[Any] | None, by: float) -> Any:
+    """A settled contact without its time; a half-seen one with it."""
+    if seen is None:
+        return None
+    return Settled(
+        seen.value,
+        seen.candidate,
+        0.0 if seen.torn_since is None else max(seen.since + by, -1.0),
+        steady_at=None if seen.steady_at is None else 0.0,
+        torn_since=None if seen.torn_since is None else 0.0,
+    )
+
+
+def alike(world: World, limits: DoorLimits) -> World:
+    """Equal for states that cannot behave differently."""
+    return replace(
+        world,
+        memory=shifted(world.memory, 0.0, limits),
+        ledger=_shifted(world.ledger, 0.0, limits),
+    )
+
+
+def walker(limits: DoorLimits) -> Walker[World, Move]:
+    """The door's, with these limits."""
+    return Walker(
+        MOVES,
+        TIMES,
+        lambda world, move, seen: alike(moved(world, move, limits, seen), limits),
+        lambda world, seconds, seen: alike(waited(world, seconds, limits, seen), limits),
+    )

@@ -1,0 +1,53 @@
+"""The supervisor's core alone, for one door, in virtual time: told by hand, its words written down."""
+
+from bridges.kinds.door_supervisor import core
+from bridges.kinds.door_supervisor.memory import Limits, Memory
+from bridges.kinds.door_supervisor.report import DoorHoldReport
+from bridges.kinds.door_supervisor.signals import CloseRequested, Event, OpenRequested, StateHeard
+from bridges.messages.definitions import DoorModeValue, DoorRequest, Message
+from tests.kinds.shared import alone
+
+SECOND_NS = 10**9
+
+
+class Alone(alone.Alone[Memory, Event, Limits, DoorHoldReport]):
+    """With one door. `faults`: (s, texts), each time that they differ."""
+
+    def __init__(self, limits: Limits | None = None, *, speaks: bool = True) -> None:
+        self.faults: list[tuple[float, tuple[str, ...]]] = []
+        super().__init__(core.initial("ward", 0.0), core.decide, limits or Limits(), speaks)
+
+    def words(self, message: Message) -> str:
+        assert isinstance(message, DoorRequest)
+        assert (message.requester_id, message.door_name) == ("door_supervisor", "ward")
+        return DoorModeValue(message.requested_mode.value).name.removeprefix("MODE_")
+
+    def hears(self, event: Event) -> None:
+        super().hears(event)
+        faults = tuple(str(fault) for fault in self.report.faults)
+        if faults != (self.faults[-1][1] if self.faults else ()):
+            self.faults.append((round(self.now, 3), faults))
+
+    def opens(self, who: str = "a", *, aged: float = 0.0) -> None:
+        """A requester's OPEN, sent `aged` s ago by its own clock."""
+        self.hears(OpenRequested(who, self.stamp(aged)))
+
+    def closes(self, who: str = "a", *, aged: float = 0.0) -> None:
+        """A requester's CLOSE."""
+        self.hears(CloseRequested(who, self.stamp(aged)))
+
+    def stamp(self, aged: float) -> int:
+        return round(self.stamped(aged) * SECOND_NS)
+
+    def shows(self, mode: str, until: float | None = None) -> None:
+        """A DoorState; with `until`, one each second from now until then."""
+        self.hears(StateHeard(DoorModeValue[f"MODE_{mode}"]))
+        while until is not None and self.now + 1.0 <= until:
+            self.until(self.now + 1.0)
+            self.hears(StateHeard(DoorModeValue[f"MODE_{mode}"]))
+        if until is not None:
+            self.until(until)
+
+    @property
+    def holders(self) -> list[str]:
+        return [holder.requester for holder in self.memory.holders]

@@ -1,0 +1,403 @@
+"""The door supervisor's rules, one sentence each; what it sends to the door's node, whole."""
+
+from itertools import pairwise
+
+import pytest
+
+from bridges.kinds.door_supervisor import core
+from bridges.kinds.door_supervisor.memory import Limits
+from bridges.kinds.door_supervisor.report import DoorHoldReport
+from bridges.kinds.door_supervisor.signals import CloseRequested, OpenRequested
+from bridges.kinds.shared.graph_kind import MaySpeak
+from bridges.messages.definitions import DoorModeValue
+from tests.kinds.door_supervisor.alone import Alone
+
+
+def test_open_goes_out_for_the_first_holder_and_close_when_the_last_one_goes() -> None:
+    desk = Alone()
+    desk.opens("a")
+    desk.until(2.0)
+    desk.opens("b")
+    desk.until(4.0)
+    desk.closes("a")
+    desk.until(6.0)
+    desk.closes("b")
+    desk.until(60.0)
+    assert desk.sent == [(0.0, "OPEN"), (2.0, "OPEN"), (6.0, "CLOSED")]
+
+
+def test_silence_and_time_close_nothing() -> None:
+    desk = Alone(Limits(open_alarm_s=86400.0))
+    desk.opens()
+    desk.shows("OPEN", until=4000.0)
+    assert desk.sent == [(float(s), "OPEN") for s in range(6)]
+    assert desk.holders == ["a"]
+
+
+def test_a_requesters_repeats_are_passed_on_at_1_hz_at_the_most() -> None:
+    desk = Alone()
+    for tenth in range(35):
+        desk.until(tenth / 10)
+        desk.opens("ab"[tenth % 2])
+    assert desk.sent == [(0.0, "OPEN"), (1.0, "OPEN"), (2.0, "OPEN"), (3.0, "OPEN")]
+
+
+@pytest.mark.parametrize("mode", ["CLOSED", "MOVING"])
+def test_open_is_repeated_at_each_state_of_a_held_door_that_is_not_open(mode: str) -> None:
+    desk = Alone()
+    desk.opens()
+    desk.shows(mode, until=8.0)
+    assert desk.sent == [(float(s), "OPEN") for s in range(9)]
+
+
+@pytest.mark.parametrize("mode", ["OPEN", "MOVING"])
+def test_close_is_repeated_until_a_door_without_holders_is_closed(mode: str) -> None:
+    desk = Alone()
+    desk.shows(mode, until=2.0)
+    desk.shows("CLOSED", until=5.0)
+    assert desk.sent == [(0.0, "CLOSED"), (1.0, "CLOSED"), (2.0, "CLOSED")]
+
+
+def test_states_at_10_hz_cause_reminders_at_1_hz() -> None:
+    desk = Alone()
+    for tenth in range(31):
+        desk.until(tenth / 10)
+        desk.shows("OPEN")
+    assert desk.sent == [(0.0, "CLOSED"), (1.0, "CLOSED"), (2.0, "CLOSED"), (3.0, "CLOSED")]
+
+
+@pytest.mark.parametrize("mode", ["OFFLINE", "UNKNOWN"])
+def test_no_request_is_repeated_to_a_door_that_is_not_seen(mode: str) -> None:
+    desk = Alone()
+    desk.shows(mode, until=3.0)
+    desk.opens()
+    desk.until(8.5)
+    desk.shows(mode, until=20.0)
+    desk.until(20.5)
+    desk.closes()
+    desk.shows(mode, until=30.0)
+    assert desk.sent == [(3.0, "OPEN"), (20.5, "CLOSED")]
+
+
+def test_a_door_back_from_offline_is_opened_again_for_its_holder() -> None:
+    desk = Alone()
+    desk.opens()
+    desk.until(6.0)
+    desk.shows("OFFLINE", until=20.0)
+    desk.until(20.25)
+    desk.shows("CLOSED")
+    assert desk.sent == [(0.0, "OPEN"), (20.25, "OPEN")]
+
+
+def test_open_is_repeated_for_5_s_as_the_first_may_be_lost_or_a_close_be_under_way() -> None:
+    desk = Alone()
+    desk.opens("b")
+    desk.until(10.0)
+    desk.closes("b")
+    desk.until(10.5)
+    desk.opens("a")
+    desk.shows("OPEN", until=30.0)
+    assert desk.sent[1:] == [
+        (10.0, "CLOSED"),
+        *[(at + 0.5, "OPEN") for at in (10, 11, 12, 13, 14, 15)],
+    ]
+
+
+def test_a_new_holders_open_is_sent_although_the_door_still_shows_open() -> None:
+    desk = Alone()
+    desk.opens("a")
+    desk.until(10.0)
+    desk.closes("a")
+    desk.until(10.05)
+    desk.opens("b")
+    desk.shows("OPEN")
+    desk.until(10.5)
+    assert desk.sent == [(0.0, "OPEN"), (10.0, "CLOSED"), (10.1, "OPEN")]
+
+
+def test_quickly_changing_requests_are_sent_at_10_hz_at_most_and_the_last_one_always() -> None:
+    desk = Alone()
+    for hundredth in range(100):
+        desk.until(hundredth / 100)
+        desk.opens() if hundredth % 2 else desk.closes()
+    desk.until(3.0)
+    assert [at for at, _ in desk.sent] == sorted({at for at, _ in desk.sent})
+    gaps = [b - a for (a, _), (b, _) in pairwise(desk.sent)]
+    assert min(gaps) >= 0.1 - 1e-9
+    assert desk.sent[-1][1] == "OPEN"
+
+
+def test_a_pending_repeat_is_dropped_with_the_last_holder() -> None:
+    desk = Alone()
+    desk.opens()
+    desk.until(0.5)
+    desk.opens()
+    desk.until(0.55)
+    desk.closes()
+    desk.until(5.0)
+    assert desk.sent == [(0.0, "OPEN"), (0.55, "CLOSED")]
+
+
+def test_a_close_while_another_holds_closes_nothing_and_drops_no_repeat() -> None:
+    desk = Alone()
+    desk.opens("a")
+    desk.opens("b")
+    desk.until(0.5)
+    desk.closes("a")
+    desk.until(5.0)
+    assert desk.sent == [(0.0, "OPEN"), (1.0, "OPEN")]
+
+
+def test_a_close_from_a_requester_that_does_not_hold_the_door_is_ignored() -> None:
+    desk = Alone()
+    desk.opens("a")
+    desk.closes("b")
+    desk.until(0.5)
+    assert (desk.sent, desk.holders) == ([(0.0, "OPEN")], ["a"])
+
+
+# --- late, repeated and reordered requests -----------------------------------------------------
+
+
+def test_a_late_close_does_not_end_the_next_visit() -> None:
+    desk = Alone()
+    desk.opens()
+    desk.until(3.0)
+    desk.closes(aged=4.0)
+    assert desk.holders == ["a"]
+    assert desk.refused == [(3.0, "stale request")]
+
+
+def test_a_late_or_doubled_open_leaves_no_holder_behind() -> None:
+    desk = Alone()
+    desk.opens()
+    desk.until(3.0)
+    desk.closes()
+    desk.until(4.0)
+    desk.opens(aged=4.0)
+    desk.until(5.0)
+    assert (desk.sent, desk.holders) == ([(0.0, "OPEN"), (3.0, "CLOSED")], [])
+
+
+def test_an_open_that_its_own_close_has_overtaken_opens_nothing() -> None:
+    desk = Alone()
+    desk.until(1.0)
+    desk.closes()
+    desk.opens(aged=0.5)
+    assert (desk.sent, desk.holders) == ([], [])
+
+
+def test_each_requester_has_a_clock_of_its_own() -> None:
+    desk = Alone()
+    desk.opens("a")
+    desk.opens("b", aged=50.0)
+    desk.until(1.0)
+    desk.closes("b", aged=50.0)
+    assert desk.holders == ["a"]
+
+
+def test_a_requester_without_stamps_is_believed_in_the_order_of_arrival() -> None:
+    desk = Alone()
+    words: list[type[OpenRequested | CloseRequested]] = [OpenRequested, OpenRequested]
+    words += [CloseRequested, OpenRequested, CloseRequested]
+    for at, word in enumerate(words):
+        desk.until(float(at))
+        desk.hears(word("terminal", 0))
+    assert desk.sent == [
+        (0.0, "OPEN"),
+        (1.0, "OPEN"),
+        (2.0, "CLOSED"),
+        (3.0, "OPEN"),
+        (4.0, "CLOSED"),
+    ]
+
+
+def test_a_requester_whose_clock_was_set_back_is_believed_again_after_10_s() -> None:
+    desk = Alone()
+    desk.opens()
+    for second in range(20, 31):
+        desk.until(float(second))
+        assert desk.holders == ["a"]
+        desk.closes(aged=90.0)
+    assert desk.sent == [(0.0, "OPEN"), (30.0, "CLOSED")]
+    desk.until(31.0)
+    desk.opens(aged=90.0)
+    assert desk.holders == ["a"]
+
+
+def test_a_holder_whose_clock_was_set_back_can_leave_again_at_once_when_it_is_believed() -> None:
+    desk = Alone()
+    desk.opens()
+    for second in range(20, 31):
+        desk.until(float(second))
+        desk.opens(aged=90.0)
+    desk.closes(aged=90.0)
+    assert desk.holders == []
+
+
+def test_late_messages_with_a_break_or_the_same_stamp_are_never_taken_for_a_clock_set_back() -> (
+    None
+):
+    desk = Alone()
+    desk.opens()
+    for second in (1, 2, 3, 4, 8, 9, 10, 11):
+        desk.until(float(second))
+        desk.closes(aged=50.0)
+    for second in range(12, 40):
+        desk.until(float(second))
+        desk.hears(CloseRequested("a", 1))
+    assert desk.holders == ["a"]
+
+
+def test_one_timely_request_ends_the_doubts() -> None:
+    desk = Alone()
+    desk.opens()
+    for second in range(1, 20):
+        desk.until(float(second))
+        desk.closes(aged=50.0)
+        if second == 9:
+            desk.opens()
+    assert desk.holders == ["a"]
+
+
+def test_a_requester_is_forgotten_a_minute_after_it_has_gone_and_holders_never_are() -> None:
+    desk = Alone()
+    desk.opens("a")
+    desk.opens("b")
+    desk.closes("b")
+    desk.until(60.0)
+    desk.opens("c")
+    assert set(desk.memory.requesters) == {"a", "c"}
+
+
+def test_many_invented_names_are_refused_and_the_holder_is_still_heard() -> None:
+    desk = Alone()
+    desk.opens("a")
+    for n in range(300):
+        desk.opens(f"n{n}")
+    assert len(desk.memory.requesters) == 200
+    assert desk.refused == [(0.0, "too many requesters")] * 101
+    desk.until(1.0)
+    desk.closes("a")
+    assert "a" not in desk.holders
+
+
+# --- when it may speak -------------------------------------------------------------------------
+
+
+def test_after_its_quiet_start_it_first_sends_open_for_each_holder() -> None:
+    desk = Alone(speaks=False)
+    desk.shows("MOVING")
+    desk.opens()
+    desk.shows("OPEN", until=3.0)
+    assert desk.sent == []
+    desk.hears(MaySpeak(True))
+    desk.until(10.0)
+    assert desk.sent == [(3.0, "OPEN")]
+
+
+def test_a_close_heard_before_it_may_speak_waits_for_a_state_that_asks_for_it() -> None:
+    desk = Alone(speaks=False)
+    desk.opens()
+    desk.shows("OPEN", until=2.0)
+    desk.closes()
+    desk.until(3.0)
+    desk.hears(MaySpeak(True))
+    desk.until(3.5)
+    assert desk.sent == []
+    desk.shows("OPEN")
+    assert desk.sent == [(3.5, "CLOSED")]
+
+
+def test_beside_another_supervisor_it_sends_nothing_and_keeps_its_table() -> None:
+    desk = Alone()
+    desk.opens("a")
+    desk.until(1.0)
+    desk.hears(MaySpeak(False))
+    desk.opens("b")
+    desk.closes("a")
+    desk.shows("MOVING", until=20.0)
+    assert desk.sent == [(0.0, "OPEN")]
+    desk.hears(MaySpeak(True))
+    assert (desk.sent, desk.holders) == ([(0.0, "OPEN"), (20.0, "OPEN")], ["b"])
+
+
+# --- what is told ------------------------------------------------------------------------------
+
+
+def test_a_door_that_one_requester_has_held_for_too_long_is_a_fault_and_nothing_else() -> None:
+    desk = Alone(Limits(open_alarm_s=20.0))
+    desk.opens("web")
+    desk.shows("OPEN", until=15.0)
+    desk.opens("a")
+    desk.shows("OPEN", until=40.0)
+    desk.closes("web")
+    desk.until(41.0)
+    desk.closes("a")
+    assert desk.faults == [
+        (20.0, ("DOOR_HELD_OPEN: longer than 20 s by web",)),
+        (35.0, ("DOOR_HELD_OPEN: longer than 20 s by web, a",)),
+        (40.0, ("DOOR_HELD_OPEN: longer than 20 s by a",)),
+        (41.0, ()),
+    ]
+    assert [word for at, word in desk.sent if at < 41.0].count("CLOSED") == 0
+
+
+def test_repeats_do_not_put_off_the_alarm_but_another_visit_restarts_its_time() -> None:
+    desk = Alone(Limits(open_alarm_s=20.0))
+    for second in range(45):
+        desk.until(float(second))
+        desk.closes() if second == 15 else desk.opens()
+        desk.shows("OPEN")
+    assert desk.faults == [(36.0, ("DOOR_HELD_OPEN: longer than 20 s by a",))]
+
+
+def test_the_alarm_needs_no_message_to_go_off() -> None:
+    desk = Alone(Limits(open_alarm_s=20.0))
+    desk.opens()
+    desk.until(100.0)
+    silent, held = "DOOR_SILENT: no DoorState comes", "DOOR_HELD_OPEN: longer than 20 s by a"
+    assert desk.faults == [(3.0, (silent,)), (20.0, (held, silent))]
+
+
+def test_a_held_door_whose_states_stop_is_a_fault_until_they_come_again() -> None:
+    desk = Alone()
+    desk.shows("OPEN", until=5.0)
+    desk.opens()
+    desk.until(20.0)
+    desk.shows("OPEN")
+    assert desk.faults == [(8.0, ("DOOR_SILENT: no DoorState comes",)), (20.0, ())]
+
+
+def test_a_door_that_nobody_holds_may_be_silent_and_is_forgotten_after_a_minute() -> None:
+    desk = Alone()
+    desk.shows("CLOSED")
+    desk.until(30.0)
+    desk.opens()
+    desk.closes()
+    assert desk.faults == []
+    assert not core.idle(desk.memory, 89.0)
+    assert core.idle(desk.memory, 90.0)
+    desk.opens()
+    assert not core.idle(desk.memory, 1000.0)
+
+
+def test_the_report_names_the_holders_and_the_door_as_it_was_last_seen() -> None:
+    desk = Alone()
+    assert desk.report == DoorHoldReport(None)
+    desk.until(1.0)
+    desk.opens("b")
+    desk.until(2.0)
+    desk.shows("MOVING")
+    desk.opens("a")
+    report = desk.report
+    assert report == DoorHoldReport(2.0, DoorModeValue.MODE_MOVING, (("b", 1.0), ("a", 2.0)))
+    assert report.news() == (DoorModeValue.MODE_MOVING, ("b", "a"))
+
+
+def test_a_holder_that_repeats_itself_does_not_displace_another() -> None:
+    desk = Alone()
+    desk.opens("a")
+    desk.opens("b")
+    desk.opens("a")
+    assert desk.holders == ["a", "b"]

@@ -1,0 +1,148 @@
+"""RMF around one lift: stand-ins for its supervisor and its fleet adapters talk to the real node."""
+
+from collections.abc import Callable, Sequence
+
+from bridges.kinds.lift.messages import OWN_REQUESTS
+from bridges.messages.definitions import LiftRequest, LiftState, Message
+from bridges.messages.topics import ADAPTER_LIFT_REQUESTS, LIFT_REQUESTS, LIFT_STATES, AnyTopic
+from bridges.rmf_rules import Party, Said
+from bridges.rmf_rules.phases import EndLiftSession, RequestLift
+from bridges.rmf_rules.robot import Robot
+from bridges.rmf_rules.supervisors import LiftSupervisor
+from tests.kinds.lift.story import WALL, Story
+
+STEP_S = 0.25
+
+REPLAYED = 100
+"""How many old requests a transient-local topic gives to a new subscriber, of each publisher."""
+
+
+class World:
+    """`fate` gives the delays (s) after which a LiftRequest reaches the node: none loses it, two double
+    it. `hears` says whether RMF gets a LiftState. By default all arrives at once and in order.
+
+    The robots hear each state before the supervisor when `adapters_first`.
+    """
+
+    def __init__(self, story: Story, *robots: Robot, adapters_first: bool = False) -> None:
+        self.story = story
+        self.robots = list(robots)
+        self.supervisor = LiftSupervisor()
+        self.adapters_first = adapters_first
+        self.fate: Callable[[LiftRequest], Sequence[float]] = lambda request: (0.0,)
+        self.hears: Callable[[LiftState], bool] = lambda state: True
+        self.requested: list[LiftRequest] = []
+        self._history: dict[str, list[LiftRequest]] = {}
+        self._flying: list[tuple[float, LiftRequest]] = []
+        story.hear = self._hear
+
+    def run(self, until: float) -> None:
+        """Time passes, and late requests arrive."""
+        while self.story.now < until:
+            self.story.run(min(until, self.story.now + STEP_S))
+            arrived = [r for at, r in self._flying if at <= self.story.now]
+            self._flying = [(at, r) for at, r in self._flying if at > self.story.now]
+            if arrived:
+                self.story.request(*arrived)
+
+    def asks(self, robot: Robot, floor: str, *, inside: bool = False) -> None:
+        """A robot's task comes to RequestLift."""
+        self._say(robot.begin(RequestLift("Lift1", floor, inside=inside), self._now))
+
+    def releases(self, robot: Robot) -> None:
+        """A robot has left the car: EndLiftSession."""
+        self._say(robot.begin(EndLiftSession("Lift1"), self._now))
+
+    def rides(self, robot: Robot, start: str, end: str) -> None:
+        """A whole ride of one robot, from request to release."""
+        self.asks(robot, start)
+        self.until_done(robot)
+        robot.in_car = True
+        self.run(self.story.now + 5.0)
+        self.asks(robot, end, inside=True)
+        self.until_done(robot)
+        self.run(self.story.now + 5.0)
+        robot.in_car = False
+        self.releases(robot)
+        self.until_done(robot)
+
+    def until_done(self, robot: Robot, within: float = 60.0) -> None:
+        """Until the robot's phase is complete."""
+        end = self.story.now + within
+        while not robot.done:
+            assert self.story.now < end, f"not within {within} s: {self.story.state}"
+            self.run(self.story.now + STEP_S)
+
+    def restart_supervisor(self, first: Robot | None = None) -> None:
+        """A new one, which the fleet adapters' retained requests reach first, those of `first` before
+        the others'."""
+        self.supervisor = LiftSupervisor()
+        who = first.requester_id if first else ""
+        for _, history in sorted(self._history.items(), key=lambda item: item[0] != who):
+            for request in history[-REPLAYED:]:
+                self._deliver(self.supervisor.hear(request, self._now))
+        self._arrive()
+
+    def finds_again(self, robot: Robot, apart_s: float = 0.02) -> None:
+        """The supervisor finds an adapter again that was cut off, and hears what it has retained."""
+        for request in self.asked_by(robot):
+            self._deliver(self.supervisor.hear(request, self._now))
+            self._arrive()
+            self.run(self.story.now + apart_s)
+
+    def asked_by(self, robot: Robot) -> list[LiftRequest]:
+        """What its adapter has retained."""
+        return self._history[robot.requester_id][-REPLAYED:]
+
+    def restart_adapter(self, robot: Robot) -> Robot:
+        """A new fleet adapter for the same robot, which has no task and holds no lift."""
+        fresh = Robot(robot.requester_id)
+        fresh.on_task = False
+        self.robots[self.robots.index(robot)] = fresh
+        self._history.pop(robot.requester_id, None)
+        return fresh
+
+    @property
+    def _now(self) -> float:
+        return WALL + self.story.now
+
+    @property
+    def _parties(self) -> list[Party]:
+        supervisor: list[Party] = [self.supervisor]
+        robots: list[Party] = [*self.robots]
+        return robots + supervisor if self.adapters_first else supervisor + robots
+
+    def _hear(self, state: LiftState) -> None:
+        if self.hears(state):
+            self._deliver([(LIFT_STATES, state)])
+
+    def _say(self, said: list[Said]) -> None:
+        self._deliver(said)
+        self._arrive()
+
+    def _arrive(self) -> None:
+        arrived, self.story.incoming = self.story.incoming, []
+        self.story.receive(*arrived)
+
+    def _deliver(self, said: list[Said]) -> None:
+        left = list(said)
+        while left:
+            topic, message = left.pop(0)
+            self._to_node(topic, message)
+            for party in self._parties:
+                if topic in party.subscribes:
+                    left += party.hear(message, self._now)
+
+    def _to_node(self, topic: AnyTopic, message: Message) -> None:
+        if not isinstance(message, LiftRequest):
+            return
+        if topic == ADAPTER_LIFT_REQUESTS:
+            self._history.setdefault(message.session_id, []).append(message)
+            self.story.incoming.append((OWN_REQUESTS, message))
+        elif topic == LIFT_REQUESTS:
+            self.requested.append(message)
+            for delay_s in self.fate(message):
+                if delay_s:
+                    self._flying.append((self.story.now + delay_s, message))
+                else:
+                    self.story.incoming.append((LIFT_REQUESTS, message))

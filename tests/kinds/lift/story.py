@@ -1,0 +1,332 @@
+"""A lift in virtual time: the real node and core, with a building behind the driver that tests drive.
+
+Scans come each `scan_s`, at every `wake_at` and with every request, as the loop makes them. Histories
+are lists of (s, what), so that a test can assert all that happened with ==.
+"""
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+from msgspec.structs import replace
+
+from bridges.kinds.lift import KIND
+from bridges.kinds.lift.memory import LiftLimits
+from bridges.kinds.lift.settings import Durations, Floor, LiftSettings
+from bridges.kinds.lift.signals import Door, Hazard, LiftOutputs, LiftSample, Motion
+from bridges.kinds.shared.decision import OperatorReset
+from bridges.kinds.shared.kind import AnyDeviceKind
+from bridges.messages.definitions import (
+    LiftDoor,
+    LiftMode,
+    LiftMotion,
+    LiftRequest,
+    LiftRequestType,
+    LiftState,
+    Message,
+)
+from bridges.messages.topics import LIFT_REQUESTS, LIFT_STATES, Topic
+from bridges.serve.clock import Clock
+from bridges.serve.device import Node
+from drivers import DriverError
+
+SCAN_S = 0.05
+LEAST_GAP_S = 0.001
+WALL = 1_000_000.0
+"""The wall clock when the story begins (s since the epoch)."""
+
+DEBOUNCE: dict[str, float] = {"floor": 0.08, "door": 0.03, "rear_door": 0.03}
+DEBOUNCE |= dict.fromkeys(("motion", "agv_mode", *Hazard), 0.05)
+FLOORS = ["L1", "L2", "L3", "L4"]
+AGV, HUMAN, END = (
+    LiftRequestType.REQUEST_AGV_MODE,
+    LiftRequestType.REQUEST_HUMAN_MODE,
+    LiftRequestType.REQUEST_END_SESSION,
+)
+
+OUTPUTS = ("agv_request", "call", "hold_door")
+
+STANDING = LiftSample("L1", Door.CLOSED, motion=Motion.STOPPED, agv=False)
+"""At L1, closed, in nobody's service."""
+
+
+class Building:
+    """The lift as a test sets it (`drivers.Driver[LiftSample, LiftOutputs]`); it does nothing itself.
+
+    `edges`: (s, output, value). `unreadable`, `unwritable`: why reading or writing fails.
+    """
+
+    def __init__(self, sample: LiftSample = STANDING) -> None:
+        self.now = 0.0
+        self.sample = sample
+        self.driven = LiftOutputs()
+        self.edges: list[tuple[float, str, Any]] = []
+        self.unreadable = ""
+        self.unwritable = ""
+        self.writes = 0
+        self.opened = 0
+
+    def set(self, **inputs: Any) -> None:
+        """Some inputs change."""
+        self.sample = replace(self.sample, **inputs)
+
+    def hazard(self, *hazards: Hazard) -> None:
+        """These hazards are there, and no others."""
+        self.set(hazards=frozenset(hazards))
+
+    def advance(self, now: float) -> None:
+        """Time passes."""
+        self.now = now
+
+    def open(self) -> None:
+        self.opened += 1
+        self.write(LiftOutputs())
+
+    def read(self) -> LiftSample:
+        if self.unreadable:
+            raise DriverError(self.unreadable)
+        return self.sample
+
+    def write(self, outputs: LiftOutputs) -> None:
+        self.writes += 1
+        if self.unwritable:
+            raise DriverError(self.unwritable)
+        at, changed = (
+            round(self.now, 2),
+            [n for n in OUTPUTS if _of(outputs, n) != _of(self.driven, n)],
+        )
+        self.edges += [(at, n, _of(outputs, n)) for n in reversed(changed) if not _of(outputs, n)]
+        self.edges += [(at, n, _of(outputs, n)) for n in changed if _of(outputs, n)]
+        self.driven = outputs
+
+    def make_safe(self) -> None:
+        self.write(LiftOutputs())
+
+    def close(self) -> None:
+        self.make_safe()
+
+
+def _of(outputs: LiftOutputs, name: str) -> Any:
+    value = getattr(outputs, name)
+    return getattr(value, "value", value)
+
+
+class Controller(Building):
+    """A lift that works: grants AGV mode, goes where it is called, opens while the door is held.
+
+    A floor takes `FLOOR_S`, in the middle of which no floor is shown; the door takes `DOOR_S`.
+    """
+
+    AGV_S, FLOOR_S, DOOR_S = 0.5, 2.0, 1.0
+
+    def __init__(self, floors: list[str] | None = None) -> None:
+        self.floors = floors or FLOORS
+        self.height = 0.0
+        self.openness = 0.0
+        self.goal: int | None = None
+        self.asked_at = math.inf
+        super().__init__(replace(STANDING, level=self.floors[0]))
+
+    def advance(self, now: float) -> None:
+        passed_s, self.now = now - self.now, now
+        agv = self.driven.agv_request and not self.sample.hazards and now >= self.asked_at
+        if agv and self.driven.call:
+            self.goal = self.floors.index(self.driven.call)
+        self._move_door(passed_s, agv)
+        self._move_car(passed_s)
+        self.set(agv=agv, level=self._level(), door=self._door(), motion=self._motion())
+
+    def write(self, outputs: LiftOutputs) -> None:
+        if outputs.agv_request and not self.driven.agv_request and not self.unwritable:
+            self.asked_at = self.now + self.AGV_S
+        super().write(outputs)
+
+    @property
+    def standing(self) -> bool:
+        return self.goal is None
+
+    def _move_door(self, passed_s: float, agv: bool) -> None:
+        opens = agv and self.driven.hold_door is not None and self.standing
+        step = passed_s / self.DOOR_S
+        self.openness = min(1.0, self.openness + step) if opens else max(0.0, self.openness - step)
+
+    def _move_car(self, passed_s: float) -> None:
+        if self.goal is None or self.openness:
+            return
+        left, step = self.goal - self.height, passed_s / self.FLOOR_S
+        if abs(left) <= step:
+            self.height, self.goal = float(self.goal), None
+        else:
+            self.height += math.copysign(step, left)
+
+    def _level(self) -> str | None:
+        nearest = round(self.height)
+        return self.floors[nearest] if abs(self.height - nearest) < 0.25 else None
+
+    def _door(self) -> Door:
+        return {0.0: Door.CLOSED, 1.0: Door.OPEN}.get(self.openness, Door.BETWEEN)
+
+    def _motion(self) -> Motion:
+        if self.goal is None or self.openness:
+            return Motion.STOPPED
+        return Motion.UP if self.goal > self.height else Motion.DOWN
+
+
+def words(state: LiftState) -> str:
+    """A state as a person says it."""
+    door = LiftDoor(state.door_state).name.removeprefix("DOOR_").lower()
+    mode = LiftMode(state.current_mode).name.removeprefix("MODE_")
+    session = f", {state.session_id} to {state.destination_floor}" if state.session_id else ""
+    return f"{mode}, {door} at {state.current_floor or '?'}{session}"
+
+
+class Story:
+    """One lift in service. `told`: what RMF heard, (s, LiftState), whether it changed or not.
+
+    `hear` is called with each state; what is then put into `incoming` arrives at once.
+    """
+
+    def __init__(
+        self,
+        building: Building | None = None,
+        *,
+        floors: list[str] | dict[str, Floor] | None = None,
+        scan_s: float = SCAN_S,
+        debounce: dict[str, float] | None = None,
+        fire_reset: Any = "auto",
+        alarm: Any = "none",
+        alarm_on: Any = ("fire_alarm",),
+        agv_mode: Any = "requested",
+        kind: AnyDeviceKind = KIND,
+        **limits: Any,
+    ) -> None:
+        self.building = building or Building()
+        self.settings = LiftSettings(
+            floors=floors or FLOORS,
+            limits=Durations(**limits),
+            fire_reset=fire_reset,
+            alarm=alarm,
+            alarm_on=list(alarm_on),
+            agv_mode=agv_mode,
+        )
+        self.limits = LiftLimits.of(self.settings, DEBOUNCE if debounce is None else debounce)
+        self.now = 0.0
+        self.wall_step_s = 0.0
+        self.deaf = False  # nothing can be sent
+        self.told: list[tuple[float, LiftState]] = []
+        self.alarms: list[tuple[float, Message]] = []
+        self.hear: Callable[[LiftState], None] = lambda state: None
+        self.incoming: list[tuple[Topic[Any], LiftRequest]] = []
+        self._kind = kind
+        self._scan_s = scan_s
+        self._scans = 0
+        self.restart()
+
+    # ---- what happens
+
+    def restart(self) -> None:
+        """A new daemon, which remembers nothing, starts on the same lift."""
+        clock = Clock(lambda: self.now, lambda: WALL + self.now + self.wall_step_s)
+        self.node = Node(
+            "Lift1", self._kind, self.settings, self.limits, self.building, self._publish, clock
+        )
+        self._scan()
+
+    def run(self, until: float) -> None:
+        """Scans from now until then."""
+        while self.now < until:
+            due = min(self._scans * self._scan_s, max(self.node.wake_at, self.now + LEAST_GAP_S))
+            while due == self._scans * self._scan_s:
+                self._scans += 1
+            if due > self.now:
+                self.now = min(due, until)
+                self._scan()
+
+    def until(self, what: Callable[[], object], within: float = 60.0) -> float:
+        """Scans until this is so; when that was (s)."""
+        end = self.now + within
+        while not what():
+            assert self.now < end, f"not within {within} s: {self.state}"
+            self.run(self.now + self._scan_s)
+        return round(self.now, 2)
+
+    def asks(self, session: str, floor: str, mode: LiftRequestType = AGV) -> None:
+        """A request of the kind that fleet adapters and rmf-web send."""
+        self.request(LiftRequest("Lift1", session_id=session, request_type=int(mode),
+                                 destination_floor=floor, door_state=2))  # fmt: skip
+
+    def ends(self, session: str) -> None:
+        """END_SESSION as fleet adapters send it: no floor, door 0."""
+        self.request(LiftRequest("Lift1", session_id=session, request_type=int(END)))
+
+    def request(self, *requests: LiftRequest) -> None:
+        """These requests arrive from the supervisor in one scan."""
+        self.receive(*((LIFT_REQUESTS, request) for request in requests))
+
+    def receive(self, *said: tuple[Topic[Any], LiftRequest]) -> None:
+        """These arrive in one scan, each on its topic."""
+        self._scan(*(self.node.event(topic, request) for topic, request in said))
+
+    def rival(self) -> None:
+        """Somebody else publishes a state of this lift."""
+        self._scan(self.node.event(LIFT_STATES, LiftState(lift_name="Lift1")))
+
+    def resets(self) -> None:
+        """An operator's `rmf-bridge reset`."""
+        self._scan(OperatorReset())
+
+    # ---- what is known of it
+
+    @property
+    def edges(self) -> list[tuple[float, str, Any]]:
+        """Each change of an output."""
+        return self.building.edges
+
+    @property
+    def outputs(self) -> LiftOutputs:
+        """What is driven."""
+        return self.building.driven
+
+    @property
+    def state(self) -> str:
+        """What RMF was told last."""
+        return words(self.told[-1][1])
+
+    @property
+    def states(self) -> list[tuple[float, str]]:
+        """What RMF was told, without the repeats."""
+        changes: list[tuple[float, str]] = []
+        for at, state in self.told:
+            if not changes or words(state) != changes[-1][1]:
+                changes.append((round(at, 2), words(state)))
+        return changes
+
+    @property
+    def motions(self) -> list[LiftMotion]:
+        """The motion that RMF was told, without the repeats."""
+        told = [LiftMotion(state.motion_state) for _, state in self.told]
+        return [m for m, before in zip(told, [None, *told], strict=False) if m != before]
+
+    @property
+    def faults(self) -> list[str]:
+        """What the status file shows as wrong."""
+        return [fault["code"] for fault in self.node.status()["faults"]]
+
+    # ---- inside
+
+    def _scan(self, *events: Any) -> None:
+        self.building.advance(self.now)
+        self.node.scan([event for event in events if event is not None])
+        if self.incoming:
+            arrived, self.incoming = self.incoming, []
+            self.receive(*arrived)
+
+    def _publish(self, topic: Topic[Any], message: Any) -> bool:
+        if self.deaf:
+            return False
+        if topic == LIFT_STATES:
+            self.told.append((self.now, message))
+            self.hear(message)
+        else:
+            self.alarms.append((round(self.now, 2), message))
+        return True

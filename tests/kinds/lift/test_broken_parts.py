@@ -1,0 +1,122 @@
+"""Each wire, and each part of the lift, broken in turn, under RMF: node, driver, wires and plant.
+
+While it is broken a robot may wait for ever, but an open door is offered only where there is one.
+When it is mended and the robot gives up, the next ride completes.
+"""
+
+from dataclasses import dataclass
+
+import pytest
+
+from bridges.kinds.lift.signals import LiftOutputs
+from bridges.messages.definitions import LiftState
+from bridges.rmf_rules.robot import Robot
+from drivers.lift.dry_contact import wires
+from hal_fakes.plants.lift import FAILS
+from hal_fakes.plants.plant import FailureMode
+from tests.depth import part
+from tests.kinds.lift.rmf_world import World
+from tests.kinds.lift.wired import WiredStory, shipped
+
+LATE_S = 0.3
+"""Debounce, a scan, and states that may not follow each other faster: how old a truth may be."""
+
+WIRES = [w.signal for w in wires(shipped())]
+WIRE_FAILURES: list[FailureMode] = ["off", "stuck", "wrong"]
+LIES = {("door", "wrong")}
+"""A contact that says open when the door is closed, and has no second one beside it."""
+
+BREAKS = [(w, mode) for w in WIRES for mode in WIRE_FAILURES if (w, mode) not in LIES]
+BREAKS += [(p, m) for p, modes in FAILS.items() for m in modes if p != "rear_door_operator"]
+
+
+@dataclass
+class Witness:
+    """Looks at the real car at each state, and remembers where it stood open."""
+
+    story: WiredStory
+    open_at: str | None = None
+    until: float = -1.0
+
+    def looks(self) -> None:
+        standing = self.story.building.standing_open_at
+        if standing:
+            self.open_at, self.until = standing, self.story.now + LATE_S
+
+    def hears(self, state: LiftState) -> None:
+        self.looks()
+        if state.door_state == 2:
+            assert self.story.now <= self.until, "open is shown, and it is not"
+            assert state.current_floor == self.open_at
+
+
+def ride(broken: str, mode: FailureMode, broken_at: float) -> WiredStory:
+    """A robot's ride to L3 on a lift that breaks; it is mended, the robot gives up, another rides."""
+    story = WiredStory(scan_s=0.1, agv_timeout_s=5, floor_timeout_s=10, door_timeout_s=5)
+    robot, other = Robot("fleet/a"), Robot("fleet/b")
+    rmf = World(story, robot, other)
+    witness = Witness(story)
+    to_rmf = story.hear
+
+    def hear(state: LiftState) -> None:
+        witness.hears(state)
+        to_rmf(state)
+
+    story.hear = hear
+    advance = story.building.advance
+
+    def advanced(now: float) -> None:
+        advance(now)
+        witness.looks()
+
+    story.building.advance = advanced  # type: ignore[method-assign]
+    rmf.run(1.0)
+    rmf.asks(robot, "L3")
+    rmf.run(broken_at)
+    story.fail(broken, mode)
+    rmf.run(30.0)
+    story.fail(broken, None)
+    rmf.run(31.0)
+    rmf.releases(robot)
+    rmf.until_done(robot)
+    story.resets()
+    rmf.run(story.now + 10.0)
+    assert story.outputs == LiftOutputs()
+    rmf.rides(other, "L1", "L2")
+    return story
+
+
+@pytest.mark.parametrize(("broken", "mode"), part(BREAKS, 3))
+def test_no_part_broken_before_the_ride_shows_a_closed_door_as_open(
+    broken: str, mode: FailureMode
+) -> None:
+    ride(broken, mode, broken_at=1.0)
+
+
+@pytest.mark.parametrize(("broken", "mode"), part(BREAKS, 3, 1))
+def test_no_part_that_breaks_on_the_way_shows_a_closed_door_as_open(
+    broken: str, mode: FailureMode
+) -> None:
+    ride(broken, mode, broken_at=3.0)
+
+
+@pytest.mark.parametrize("signal", [w for w in WIRES if w.startswith("floor")])
+def test_a_broken_floor_line_is_an_illegal_floor_code(signal: str) -> None:
+    story = WiredStory()
+    story.run(1.0)
+    story.fail(signal, "wrong")
+    story.run(2.0)
+    assert story.faults == ["FLOOR_CODE_ILLEGAL"]
+    assert story.state == "HUMAN, moving at ?"
+
+
+@pytest.mark.parametrize(
+    ("signal", "state"),
+    [("fire_alarm", "FIRE, moving at L1"), ("code_blue", "EMERGENCY, moving at L1")],
+)
+def test_a_cut_alarm_loop_is_an_alarm(signal: str, state: str) -> None:
+    story = WiredStory()
+    story.run(1.0)
+    story.fail(signal, "off")
+    story.run(2.0)
+    assert story.state == state

@@ -1,0 +1,136 @@
+"""A lift whose AGV mode is the result of a call: nothing else asks for it."""
+
+from pathlib import Path
+
+import pytest
+from msgspec.structs import replace
+
+from bridges.kinds.lift.signals import Door, LiftOutputs, Motion
+from bridges.settings.load import load
+from drivers.lift.dry_contact import Settings
+from tests.depth import depth
+from tests.kinds.lift.invariants import check, nothing_changes_before_wake_at
+from tests.kinds.lift.story import STANDING, Building, Story
+from tests.kinds.lift.walk import limits_of, start, walker
+from tests.kinds.lift.wired import WiredStory
+
+A = "fleet/a"
+CONFIG = Path(__file__).parents[3] / "config" / "lift_by_call.yaml"
+
+
+def simulator() -> WiredStory:
+    """The open simulator's lift, as `config/lift_by_call.yaml` is wired to it."""
+    settings = load(CONFIG).devices["Lift1"]
+    assert isinstance(settings, Settings)
+    story = WiredStory(settings)
+    story.run(1.0)
+    return story
+
+
+def relays(story: WiredStory) -> list[tuple[str, object]]:
+    edges = story.building.plant.edges
+    return [(edge.signal, edge.value) for edge in edges if edge.what == "relay"]
+
+
+def open_at(story: Story, floor: str) -> None:
+    def there() -> bool:
+        story.asks(A, floor)
+        return story.state == f"AGV, open at {floor}, {A} to {floor}"
+
+    story.until(there)
+
+
+def test_a_call_brings_agv_mode_where_the_car_stands_and_the_hold_keeps_it() -> None:
+    story = simulator()
+    open_at(story, "L1")
+    story.run(story.now + 60.0)
+    assert relays(story) == [("call_L1", True), ("call_L1", False), ("door_open", True)]
+    assert (story.state, story.building.plant.agv) == (f"AGV, open at L1, {A} to L1", True)
+
+
+def test_agv_mode_ends_with_the_hold_after_a_whole_ride() -> None:
+    story = simulator()
+    open_at(story, "L1")
+    story.run(story.now + 5.0)
+    open_at(story, "L3")
+    story.ends(A)
+    story.run(story.now + 10.0)
+    assert relays(story) == [
+        ("call_L1", True),
+        ("call_L1", False),
+        ("door_open", True),
+        ("door_open", False),
+        ("call_L3", True),
+        ("call_L3", False),
+        ("door_open", True),
+        ("door_open", False),
+    ]
+    assert (story.state, story.faults) == ("HUMAN, closed at L3", [])
+
+
+def called(agv: bool = True) -> tuple[Building, Story]:
+    """A car at L1 that has been called to L3, and AGV mode that has come."""
+    building = Building(replace(STANDING, agv=False))
+    story = Story(building, agv_mode="by_call", agv_timeout_s=5)
+    story.run(1.0)
+    story.asks(A, "L3")
+    story.run(1.2)
+    building.set(agv=agv)
+    story.run(2.0)
+    return building, story
+
+
+def test_a_call_that_brings_no_agv_mode_is_given_up_after_its_time() -> None:
+    _, story = called(agv=False)
+    assert story.outputs.call == "L3"
+    story.run(7.0)
+    assert (story.outputs, story.faults) == (LiftOutputs(), ["AGV_MODE_NOT_GRANTED"])
+
+
+def test_agv_mode_that_ends_on_the_way_is_a_fault_and_is_called_for_again() -> None:
+    building, story = called()
+    building.set(agv=False, motion=Motion.UP, level=None)
+    story.run(3.0)
+    assert (story.outputs.call, story.faults) == (None, ["AGV_MODE_LOST"])
+    story.asks(A, "L3")
+    story.run(14.0)
+    assert story.outputs.call == "L3"
+
+
+def test_agv_mode_may_end_between_two_destinations() -> None:
+    building, story = called()
+    building.set(level=None, motion=Motion.UP)
+    story.run(5.0)
+    building.set(level="L3", motion=Motion.STOPPED)
+    story.run(6.0)
+    building.set(door=Door.OPEN)
+    story.run(7.0)
+    story.asks(A, "L1")
+    building.set(agv=False)
+    story.run(8.0)
+    assert (story.outputs.hold_door, story.outputs.call, story.faults) == (None, "L1", [])
+
+
+LIMITS = limits_of(agv_mode="by_call")
+WALKER = walker(LIMITS)
+CALLED = (1.0, "A asks L3", 1.0, "agv on", 0.05)
+ARRIVED = (*CALLED, "moving", "at None", 1.0, "at L2", 1.0, "at L3", "standing", 1.0)
+BOARDED = (*ARRIVED, "door open", 1.0)
+ROOTS = {
+    "idle": (1.0,),
+    "called where it stands": (1.0, "A asks L1", 1.0),
+    "called": CALLED,
+    "arrived": ARRIVED,
+    "boarded": BOARDED,
+    "called on": (*BOARDED, "A asks L1", 1.0),
+    "in the grace": (*BOARDED, "A ends", 0.05),
+}
+
+
+@pytest.mark.parametrize("root", ROOTS)
+def test_the_rules_hold_within_some_steps_of_each_stage_of_a_ride(root: str) -> None:
+    stage = WALKER.path(start(LIMITS), *ROOTS[root])
+    found = WALKER.walk([stage], depth(2, 3), check)
+    for world in found:
+        nothing_changes_before_wake_at(world, LIMITS)
+    assert len(found) > depth(150, 1000)

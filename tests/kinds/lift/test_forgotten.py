@@ -1,0 +1,206 @@
+"""A supervisor that has forgotten the robot in the car: by RMF's own rules, and rule by rule.
+
+rmf_ros2, lift_supervisor/Node.cpp: one slot for each lift, adopted from whoever is heard first; what
+any other session asks, its END among it, is dropped.
+"""
+
+from collections.abc import Sequence
+
+import pytest
+
+from bridges.kinds.lift.messages import OWN_REQUESTS
+from bridges.kinds.lift.signals import LiftOutputs
+from bridges.messages.definitions import LiftRequest
+from bridges.messages.stamps import stamp
+from bridges.rmf_rules.robot import Robot
+from tests.kinds.lift.rmf_world import World
+from tests.kinds.lift.story import AGV, END, WALL, Building, Controller, Story
+from tests.kinds.lift.test_with_rmf import A, B, ons, sessions, world
+
+
+def one_inside_one_waiting(adapters_first: bool = False) -> tuple[World, Robot, Robot]:
+    a, b = Robot(A), Robot(B)
+    rmf = world(a, b, adapters_first=adapters_first)
+    rmf.asks(a, "L2")
+    rmf.until_done(a)
+    a.in_car = True
+    rmf.asks(b, "L1")
+    rmf.run(rmf.story.now + 3.0)
+    return rmf, a, b
+
+
+@pytest.mark.parametrize("adapters_first", [False, True])
+def test_a_supervisor_that_restarts_and_takes_up_the_waiting_robot_locks_nobody_in(
+    adapters_first: bool,
+) -> None:
+    rmf, a, b = one_inside_one_waiting(adapters_first)
+    rmf.restart_supervisor(first=b)
+    rmf.run(rmf.story.now + 5.0)
+    assert rmf.supervisor.slots["Lift1"].session_id == B
+    assert rmf.story.faults == ["FORGOTTEN_BY_SUPERVISOR"]
+    rmf.asks(a, "L4", inside=True)
+    rmf.until_done(a)
+    assert rmf.story.state == "AGV, open at L4, fleet/a to L4"
+    a.in_car = False
+    rmf.releases(a)
+    rmf.until_done(a)
+    rmf.until_done(b)
+    assert sessions(rmf.story) == ["", A, "", B]
+    assert rmf.story.faults == []
+
+
+def test_a_robot_that_still_waits_outside_is_served_too_and_then_the_other_one() -> None:
+    a, b = Robot(A), Robot(B)
+    rmf = world(a, b)
+    rmf.asks(a, "L4")
+    rmf.run(3.0)
+    rmf.asks(b, "L1")
+    rmf.restart_supervisor(first=b)
+    rmf.until_done(a)
+    rmf.rides(a, "L4", "L2")
+    rmf.until_done(b)
+    assert sessions(rmf.story) == ["", A, "", B]
+
+
+def test_an_end_that_was_lost_while_another_robot_waits_is_heard_from_its_adapter() -> None:
+    rmf, a, b = one_inside_one_waiting()
+    lost: list[LiftRequest] = []
+
+    def fate(request: LiftRequest) -> Sequence[float]:
+        if request.request_type == END and not lost:
+            lost.append(request)
+            return ()
+        return (0.0,)
+
+    rmf.fate = fate
+    a.in_car = False
+    rmf.releases(a)
+    rmf.until_done(a)
+    rmf.until_done(b)
+    assert (len(lost), sessions(rmf.story)) == (1, ["", A, "", B])
+
+
+class Overheard:
+    """A lift that `A` holds, open at L2. `adapter`: what is said in its name, without a supervisor."""
+
+    def __init__(self, building: Building | None = None) -> None:
+        self.story = Story(building or Controller())
+        self.story.run(1.0)
+        self.story.asks(A, "L2")
+        self.story.run(12.0)
+        self.sent = 0
+
+    def adapter(self, kind: int, floor: str = "", *, at: float | None = None, who: str = A) -> None:
+        now = WALL + self.story.now + self.sent * 1e-3
+        self.sent += 1
+        request = LiftRequest("Lift1", stamp(now if at is None else at), who, int(kind), floor, 2)
+        self.story.receive((OWN_REQUESTS, request))
+        self.story.run(self.story.now + 0.2)
+
+
+def test_what_an_adapter_says_counts_only_while_the_supervisor_asks_for_somebody_else() -> None:
+    lift = Overheard()
+    lift.adapter(AGV, "L4")
+    lift.adapter(END)
+    lift.adapter(END)
+    assert lift.story.state == "AGV, open at L2, fleet/a to L2"
+    lift.story.asks(B, "L1")
+    lift.adapter(AGV, "L3")
+    assert lift.story.state.endswith("fleet/a to L3")
+    lift.story.asks(A, "L4")
+    lift.adapter(AGV, "L1")
+    assert lift.story.state.endswith("fleet/a to L4")
+    assert sessions(lift.story) == ["", A]
+
+
+def test_an_adapters_request_is_never_a_grant() -> None:
+    lift = Overheard()
+    lift.adapter(AGV, "L1", who=B)
+    lift.story.asks(B, "L1")
+    lift.adapter(AGV, "L1", who=B)
+    lift.adapter(END, who=B)
+    lift.adapter(END, who=B)
+    assert sessions(lift.story) == ["", A]
+    lift.story.ends(A)
+    lift.adapter(AGV, "L1", who=A)
+    lift.adapter(AGV, "L1", who=B)
+    lift.story.run(lift.story.now + 5.0)
+    assert sessions(lift.story) == ["", A, ""]
+    assert lift.story.outputs == LiftOutputs()
+
+
+def test_an_end_counts_when_it_is_heard_twice_with_no_newer_request_between() -> None:
+    lift = Overheard()
+    lift.story.asks(B, "L1")
+    lift.adapter(END)
+    lift.adapter(AGV, "L2")
+    lift.adapter(END)
+    assert sessions(lift.story) == ["", A]
+    lift.adapter(END)
+    assert sessions(lift.story) == ["", A, ""]
+
+
+def test_an_old_request_does_not_count_and_an_end_without_a_stamp_does() -> None:
+    """Jazzy's fleet adapter does not stamp its END (RobotContext.cpp, _check_lift_state)."""
+    lift = Overheard()
+    lift.story.asks(B, "L1")
+    lift.adapter(AGV, "L2")
+    lift.adapter(AGV, "L4", at=WALL)
+    lift.adapter(END, at=WALL)
+    lift.adapter(END, at=WALL + 0.1)
+    assert lift.story.state == "AGV, open at L2, fleet/a to L2"
+    lift.adapter(END, at=0.0)
+    lift.adapter(END, at=0.0)
+    assert sessions(lift.story) == ["", A, ""]
+
+
+def test_the_fault_names_the_robot_that_the_supervisor_asks_for_and_not_its_silence() -> None:
+    lift = Overheard()
+    lift.story.asks(B, "L1")
+    at = lift.story.now
+    shown = []
+    for _ in range(45):
+        shown += [(round(lift.story.now - at), lift.story.faults)]
+        lift.story.run(lift.story.now + 1.0)
+    changes = [
+        s for s, before in zip(shown, [(0, None), *shown], strict=False) if s[1] != before[1]
+    ]
+    assert changes == [(0, []), (3, ["FORGOTTEN_BY_SUPERVISOR"])]
+    assert lift.story.node.status()["faults"][0]["detail"] == (
+        "lift_requests asks for fleet/b while fleet/a has the lift"
+    )
+    assert lift.story.outputs.hold_door is not None
+
+
+def test_the_other_robots_end_ends_the_fault() -> None:
+    lift = Overheard()
+    lift.story.asks(B, "L1")
+    lift.story.run(lift.story.now + 4.0)
+    assert lift.story.faults == ["FORGOTTEN_BY_SUPERVISOR"]
+    lift.story.ends(B)
+    lift.adapter(AGV, "L4")
+    assert (lift.story.faults, lift.story.state) == ([], "AGV, open at L2, fleet/a to L2")
+    assert ons(lift.story, "call") == 1
+
+
+def test_neither_a_third_robots_end_nor_an_earlier_end_ends_the_fault() -> None:
+    lift = Overheard()
+    lift.story.ends(B)
+    assert (lift.story.faults, sessions(lift.story)) == ([], ["", A])
+    lift.story.asks(B, "L1")
+    lift.story.run(lift.story.now + 4.0)
+    lift.story.ends("fleet/c")
+    lift.adapter(AGV, "L4")
+    assert lift.story.faults == ["FORGOTTEN_BY_SUPERVISOR"]
+    assert lift.story.state.endswith("fleet/a to L4")
+
+
+def test_one_message_that_is_delivered_twice_is_heard_once() -> None:
+    lift = Overheard()
+    lift.story.asks(B, "L1")
+    at = WALL + lift.story.now
+    lift.adapter(END, at=at)
+    lift.adapter(END, at=at)
+    assert sessions(lift.story) == ["", A]
+    lift.adapter(END, at=at + 1.0)
+    assert sessions(lift.story) == ["", A, ""]

@@ -1,0 +1,451 @@
+"""What takes the lift away from RMF, and how it comes back."""
+
+import pytest
+from msgspec.structs import replace
+
+from bridges.kinds.lift.messages import alarm_topics
+from bridges.kinds.lift.settings import LiftSettings
+from bridges.kinds.lift.signals import Door, Hazard, LiftOutputs, LiftSample, Motion, Side
+from bridges.messages.definitions import Bool, EmergencySignal
+from bridges.messages.topics import EMERGENCY_SIGNAL, FIRE_ALARM_TRIGGER, RETAINED
+from tests.kinds.lift.story import Building, Controller, Story
+
+CLOSED_AT_L1 = LiftSample("L1", Door.CLOSED, motion=Motion.STOPPED, agv=True)
+OPEN_AT_L1 = replace(CLOSED_AT_L1, door=Door.OPEN)
+HELD = LiftOutputs(agv_request=True, hold_door=Side.FRONT)
+
+MODES = [
+    (Hazard.FIRE, "FIRE"),
+    (Hazard.CODE_BLUE, "EMERGENCY"),
+    (Hazard.EARTHQUAKE, "EMERGENCY"),
+    (Hazard.EMERGENCY, "EMERGENCY"),
+    (Hazard.OUT_OF_SERVICE, "OFFLINE"),
+    (Hazard.MANUAL, "OFFLINE"),
+]
+
+
+def waiting(**options: object) -> Story:
+    """A waits outside at L1, where the car stands closed with its door held."""
+    story = Story(Building(CLOSED_AT_L1), door_timeout_s=600, **options)  # type: ignore[arg-type]
+    story.run(1.0)
+    story.asks("A", "L1")
+    story.run(2.0)
+    assert story.outputs == HELD
+    return story
+
+
+def inside(**options: object) -> Story:
+    """A may be inside at L1: the open door has been published."""
+    story = Story(Building(OPEN_AT_L1), **options)  # type: ignore[arg-type]
+    story.run(1.0)
+    story.asks("A", "L1")
+    story.run(2.0)
+    return story
+
+
+@pytest.mark.parametrize(("hazard", "mode"), MODES)
+def test_a_hazard_before_boarding_switches_off_within_a_scan_and_offers_no_open_door(
+    hazard: Hazard, mode: str
+) -> None:
+    story = waiting()
+    story.building.hazard(hazard)
+    story.building.set(door=Door.OPEN, agv=False)
+    story.run(5.0)
+    assert story.edges[2:] == [(2.1, "hold_door", None), (2.1, "agv_request", False)]
+    assert story.state == f"{mode}, moving at L1, A to L1"
+    assert story.faults == [hazard.name]
+    story.asks("A", "L2")
+    assert story.outputs == LiftOutputs()
+    story.ends("A")
+    story.run(6.0)
+    assert story.state == f"{mode}, open at L1"
+
+
+@pytest.mark.parametrize(("hazard", "mode"), MODES)
+def test_after_boarding_the_true_door_is_shown_so_that_the_robot_gets_out(
+    hazard: Hazard, mode: str
+) -> None:
+    story = inside()
+    building = story.building
+    story.asks("A", "L3")
+    story.run(3.0)
+    building.hazard(hazard)
+    building.set(agv=False, door=Door.CLOSED)
+    story.run(4.0)
+    building.set(level=None, motion=Motion.DOWN)
+    story.run(5.0)
+    building.set(level="L2", motion=Motion.STOPPED)
+    story.run(6.0)
+    assert story.state == f"{mode}, closed at L2, A to L3"
+    story.asks("A", "L2")
+    building.set(door=Door.BETWEEN)
+    story.run(7.0)
+    building.set(door=Door.OPEN)
+    story.run(8.0)
+    assert story.outputs == LiftOutputs()
+    assert story.states[-2:] == [
+        (6.1, f"{mode}, moving at L2, A to L2"),
+        (7.08, f"{mode}, open at L2, A to L2"),
+    ]
+
+
+@pytest.mark.parametrize(("hazard", "mode"), MODES)
+def test_a_hazard_that_has_cleared_leaves_no_latch(hazard: Hazard, mode: str) -> None:
+    story = waiting()
+    story.building.hazard(hazard)
+    story.run(5.0)
+    story.building.hazard()
+    story.building.set(agv=False)
+    story.run(6.0)
+    assert story.outputs == LiftOutputs()
+    story.run(7.0)
+    assert story.edges[4:] == [(6.05, "agv_request", True)]
+    story.building.set(agv=True)
+    story.run(8.0)
+    assert story.outputs == HELD
+    assert (story.state, story.faults) == ("AGV, closed at L1, A to L1", [])
+
+
+def test_a_hazard_on_the_way_cancels_the_call_and_the_ride_resumes_afterwards() -> None:
+    story = Story(Controller())
+    story.run(1.0)
+    story.asks("A", "L3")
+    story.run(3.0)
+    story.building.hazard(Hazard.CODE_BLUE)
+    story.run(5.0)
+    story.building.hazard()
+    story.run(20.0)
+    assert story.edges == [
+        (1.0, "agv_request", True),
+        (1.55, "call", "L3"),
+        (3.1, "call", None),
+        (3.1, "agv_request", False),
+        (6.05, "agv_request", True),
+        (6.6, "hold_door", "front"),
+    ]
+    assert story.state == "AGV, open at L3, A to L3"
+
+
+def test_a_hazard_that_flickers_on_is_ignored_and_one_that_flickers_off_stays() -> None:
+    story = waiting()
+    story.building.hazard(Hazard.FIRE)
+    story._scan()
+    story.run(2.04)
+    story.building.hazard()
+    story.run(4.0)
+    assert story.outputs == HELD
+    story.building.hazard(Hazard.FIRE)
+    story.run(5.0)
+    for _ in range(6):
+        story.building.hazard()
+        story.run(story.now + 0.9)
+        story.building.hazard(Hazard.FIRE)
+        story.run(story.now + 0.1)
+    assert len(story.edges) == 4
+    assert (story.state, story.faults) == ("FIRE, closed at L1, A to L1", ["FIRE"])
+
+
+@pytest.mark.parametrize(("debounce_s", "clear_s"), [(0.05, 10.0), (10.0, 1.0)])
+def test_a_hazard_clears_after_the_longer_of_its_two_times(
+    debounce_s: float, clear_s: float
+) -> None:
+    building = Building(CLOSED_AT_L1)
+    building.hazard(Hazard.FIRE)
+    debounce: dict[str, float] = {Hazard.FIRE: debounce_s}
+    story = Story(building, debounce=debounce, hazard_clear_s=clear_s)
+    story.run(20.0)
+    building.hazard()
+    story.run(29.9)
+    assert story.faults == ["FIRE"]
+    story.run(30.1)
+    assert story.faults == []
+
+
+def test_a_reset_while_nothing_can_be_read_does_not_report_a_fire() -> None:
+    story = waiting(fire_reset="manual", alarm="fire_alarm_trigger")
+    story.building.unreadable = "no answer"
+    story.run(5.0)
+    story.resets()
+    assert story.faults == ["INPUTS_NOT_FRESH"]
+    story.building.unreadable = ""
+    story.run(7.0)
+    assert (story.faults, story.alarms) == ([], [])
+
+
+def test_fire_comes_before_every_other_mode() -> None:
+    story = waiting()
+    story.building.hazard(*Hazard)
+    story.run(3.0)
+    assert story.state.startswith("FIRE")
+    assert story.faults == [h.name for h in Hazard]
+
+
+def test_an_overload_keeps_the_door_held_and_only_delays_the_ride() -> None:
+    story = inside()
+    story.building.hazard(Hazard.OVERLOAD)
+    story.run(3.0)
+    story.asks("A", "L3")
+    story.run(20.0)
+    assert story.outputs == LiftOutputs(agv_request=True)
+    story.asks("A", "L1")
+    story.run(200.0)
+    assert story.outputs == HELD
+    assert (story.state, story.faults) == (
+        "AGV, open at L1, A to L1",
+        ["OVERLOAD", "RMF_SILENT"],
+    )
+    story.asks("A", "L3")
+    story.building.hazard()
+    story.run(203.0)
+    assert story.outputs == LiftOutputs(agv_request=True, call="L3")
+
+
+def test_the_time_of_an_overload_does_not_count_as_waiting() -> None:
+    story = Story(Building(CLOSED_AT_L1), floor_timeout_s=20, request_timeout_s=600)
+    story.run(1.0)
+    story.asks("A", "L3")
+    story.run(15.0)
+    story.building.hazard(Hazard.OVERLOAD)
+    story.run(300.0)
+    story.building.hazard()
+    story.run(318.0)
+    assert story.faults == []
+    story.run(322.0)
+    assert story.faults == ["RUNTIME_LIMIT_EXCEEDED"]
+
+
+def test_a_car_that_a_hazard_has_left_between_floors_is_called_again() -> None:
+    story = inside()
+    building = story.building
+    building.hazard(Hazard.CODE_BLUE)
+    building.set(level=None, motion=Motion.DOWN, door=Door.CLOSED)
+    story.run(4.0)
+    building.hazard()
+    building.set(motion=Motion.STOPPED)
+    story.run(7.0)
+    assert story.outputs == LiftOutputs(agv_request=True, call="L1")
+
+
+def test_an_overloaded_lift_is_not_offered_for_boarding() -> None:
+    story = waiting()
+    story.building.hazard(Hazard.OVERLOAD)
+    story.building.set(door=Door.OPEN)
+    story.run(4.0)
+    assert story.state == "AGV, moving at L1, A to L1"
+    story.building.hazard()
+    story.run(6.0)
+    assert story.state == "AGV, open at L1, A to L1"
+
+
+def test_a_pulsed_call_that_an_overload_cut_short_is_given_again() -> None:
+    story = Story(Building(CLOSED_AT_L1), call_pulse_s=1.0)
+    story.run(1.0)
+    story.asks("A", "L3")
+    story.run(1.5)
+    story.building.hazard(Hazard.OVERLOAD)
+    story.run(5.0)
+    story.building.hazard()
+    story.run(9.0)
+    assert story.edges == [
+        (1.0, "agv_request", True),
+        (1.0, "call", "L3"),
+        (1.6, "call", None),
+        (6.05, "call", "L3"),
+        (7.05, "call", None),
+    ]
+
+
+def test_agv_mode_that_is_never_confirmed_is_waited_for_through_an_overload() -> None:
+    story = Story(Building(replace(CLOSED_AT_L1, agv=False)), agv_timeout_s=5.0)
+    story.building.hazard(Hazard.OVERLOAD)
+    story.run(1.0)
+    story.asks("A", "L3")
+    story.run(10.0)
+    assert story.faults == ["OVERLOAD"]
+    assert story.outputs == LiftOutputs(agv_request=True)
+
+
+def test_with_automatic_reset_rmf_gets_the_lift_back_when_the_fire_is_over() -> None:
+    story = waiting(fire_reset="auto")
+    story.building.hazard(Hazard.FIRE)
+    story.run(5.0)
+    story.building.hazard()
+    story.run(7.0)
+    assert story.outputs == HELD
+
+
+def test_with_manual_reset_only_an_operator_gives_the_lift_back_and_only_after_the_fire_is_over() -> (
+    None
+):
+    story = waiting(fire_reset="manual")
+    story.building.hazard(Hazard.FIRE)
+    story.run(5.0)
+    story.resets()
+    story.run(6.0)
+    story.building.hazard()
+    story.run(60.0)
+    assert (story.state, story.faults) == (
+        "FIRE, closed at L1, A to L1",
+        ["FIRE_LATCHED", "RMF_SILENT"],
+    )
+    assert story.outputs == LiftOutputs()
+    story.ends("A")
+    story.asks("B", "L1")
+    assert story.node.refused == {"FIRE_LATCHED": 1}
+    story.resets()
+    story.asks("B", "L1")
+    story.run(61.0)
+    assert (story.outputs, story.faults) == (HELD, [])
+
+
+def test_an_end_or_a_new_request_does_not_clear_a_fire_latch() -> None:
+    story = waiting(fire_reset="manual")
+    story.building.hazard(Hazard.FIRE)
+    story.run(5.0)
+    story.building.hazard()
+    story.run(7.0)
+    story.asks("A", "L4")
+    story.run(8.0)
+    story.ends("A")
+    story.run(20.0)
+    assert story.faults == ["FIRE_LATCHED"]
+    assert story.state.startswith("FIRE")
+
+
+@pytest.mark.parametrize(
+    ("alarm", "on", "off"),
+    [
+        ("fire_alarm_trigger", Bool(True), Bool(False)),
+        ("emergency_signal", EmergencySignal((), True), EmergencySignal((), False)),
+    ],
+)
+def test_the_fire_alarm_topic_hears_true_once_and_false_only_after_an_operators_reset(
+    alarm: str, on: object, off: object
+) -> None:
+    story = waiting(alarm=alarm)
+    building = story.building
+    building.hazard(Hazard.FIRE)
+    story.run(5.0)
+    building.hazard()
+    story.run(8.0)
+    building.hazard(Hazard.FIRE)
+    story.run(10.0)
+    story.resets()  # it still burns
+    building.hazard()
+    story.run(100.0)
+    assert story.alarms == [(2.1, on)]
+    story.resets()
+    story.resets()
+    story.run(110.0)
+    assert story.alarms == [(2.1, on), (100.0, off)]
+    building.hazard(Hazard.FIRE)
+    story.run(111.0)
+    assert story.alarms[2:] == [(110.1, on)]
+
+
+def test_a_code_blue_is_told_to_the_fleets_where_the_settings_say_so_until_an_operator_resets() -> (
+    None
+):
+    story = waiting(alarm="emergency_signal", alarm_on=["fire_alarm", "code_blue"])
+    on, off = EmergencySignal((), True), EmergencySignal((), False)
+    story.building.hazard(Hazard.CODE_BLUE)
+    story.run(5.0)
+    story.building.hazard(Hazard.CODE_BLUE, Hazard.FIRE)  # one alarm, told once
+    story.run(8.0)
+    story.building.hazard()
+    story.run(20.0)
+    assert story.alarms == [(2.1, on)]
+    assert story.state.startswith("AGV")  # the lift itself is back; the fleets wait for a person
+    story.resets()
+    story.run(21.0)
+    assert story.alarms == [(2.1, on), (20.0, off)]
+
+
+def test_a_hazard_that_alarm_on_does_not_name_is_told_to_nobody() -> None:
+    story = waiting(alarm="emergency_signal", alarm_on=["code_blue"])
+    story.building.hazard(Hazard.FIRE, Hazard.EARTHQUAKE, Hazard.OVERLOAD)
+    story.run(5.0)
+    assert story.alarms == []
+
+
+def test_a_fire_at_the_very_first_reading_is_told_to_the_fleets() -> None:
+    building = Building(CLOSED_AT_L1)
+    building.hazard(Hazard.FIRE)
+    story = Story(building, alarm="fire_alarm_trigger")
+    story.run(3.0)
+    assert story.alarms == [(0.05, Bool(True))]
+
+
+def test_a_node_that_saw_no_fire_never_says_that_it_is_over() -> None:
+    story = waiting(alarm="fire_alarm_trigger")
+    story.resets()
+    story.building.hazard(Hazard.CODE_BLUE, Hazard.EMERGENCY)
+    story.run(5.0)
+    story.resets()
+    story.run(20.0)
+    assert story.alarms == []
+
+
+def test_a_fire_is_not_told_to_the_fleets_unless_the_settings_say_so() -> None:
+    story = waiting()
+    story.building.hazard(Hazard.FIRE)
+    story.run(5.0)
+    assert story.alarms == []
+    assert alarm_topics(story.settings) == ()
+
+
+def test_the_alarm_goes_out_on_the_one_topic_that_was_chosen_and_is_kept_for_late_joiners() -> None:
+    chosen = LiftSettings(floors=["L1"], alarm="emergency_signal")
+    assert alarm_topics(chosen) == (EMERGENCY_SIGNAL,)
+    chosen = LiftSettings(floors=["L1"], alarm="fire_alarm_trigger")
+    assert alarm_topics(chosen) == (FIRE_ALARM_TRIGGER,)
+    assert {topic.publish for topic in (EMERGENCY_SIGNAL, FIRE_ALARM_TRIGGER)} == {RETAINED}
+
+
+def test_a_fire_that_can_no_longer_be_seen_is_not_shown_as_a_fact() -> None:
+    story = waiting()
+    story.building.hazard(Hazard.FIRE)
+    story.run(5.0)
+    story.building.unreadable = "no answer"
+    story.run(10.0)
+    assert (story.state, story.faults) == (
+        "OFFLINE, moving at ?, A to L1",
+        ["INPUTS_NOT_FRESH"],
+    )
+
+
+@pytest.mark.parametrize("over", [False, True])
+def test_a_latched_fire_stays_latched_while_nobody_can_see_whether_it_is_over(over: bool) -> None:
+    story = waiting(fire_reset="manual", alarm="fire_alarm_trigger")
+    story.building.hazard(Hazard.FIRE)
+    story.run(5.0)
+    if over:
+        story.building.hazard()
+    story.run(8.0)
+    story.building.unreadable = "no answer"
+    story.run(10.0)
+    story.resets()
+    story.run(11.0)
+    assert story.state == "FIRE, moving at ?, A to L1"
+    assert story.faults == ["FIRE_LATCHED", "INPUTS_NOT_FRESH"]
+    story.building.unreadable = ""
+    story.run(11.05)
+    story.resets()  # read, but not settled yet
+    story.run(20.0)
+    assert story.faults == ["FIRE_LATCHED" if over else "FIRE"]
+    assert story.alarms == [(2.1, Bool(True))]
+
+
+def test_a_second_node_for_this_lift_switches_it_off_until_it_is_gone() -> None:
+    story = waiting()
+    for second in range(3, 8):
+        story.rival()
+        story.run(float(second))
+    assert story.edges[2:] == [(2.0, "hold_door", None), (2.0, "agv_request", False)]
+    assert story.state == "OFFLINE, closed at L1, A to L1"
+    assert story.faults == ["TWO_NODES_FOR_ONE_DEVICE"]
+    story.asks("A", "L1")
+    story.run(10.9)
+    assert story.outputs == LiftOutputs()
+    story.run(11.0)
+    assert (story.outputs.agv_request, story.faults) == (True, [])

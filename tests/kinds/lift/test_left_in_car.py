@@ -1,0 +1,294 @@
+"""A session that RMF's supervisor ends while its robot is in the car, and a robot that was left there.
+
+By RMF's own rules first: a supervisor that starts sends END for whatever session the lift shows, and
+takes up whoever is heard first (rmf_ros2, lift_supervisor/Node.cpp). A fleet adapter that starts sends
+END for its robot's session (RobotContext.cpp, _check_lift_state).
+"""
+
+import pytest
+
+from bridges.kinds.lift.signals import Hazard, LiftOutputs
+from bridges.messages.definitions import LiftRequest
+from bridges.messages.stamps import stamp
+from bridges.rmf_rules.robot import Robot
+from bridges.rmf_rules.supervisors import LiftSupervisor
+from tests.kinds.lift.rmf_world import World
+from tests.kinds.lift.story import AGV, END, WALL
+from tests.kinds.lift.test_forgotten import Overheard
+from tests.kinds.lift.test_with_rmf import A, B, ons, sessions, world
+
+SILENT_S = 5.0
+LEFT_S = 60.0
+
+
+def riding(jazzy: bool = False, adapters_first: bool = False) -> tuple[World, Robot, Robot]:
+    """A is between L2 and L4, B waits at L1."""
+    a, b = Robot(A, jazzy), Robot(B, jazzy)
+    rmf = world(a, b, adapters_first=adapters_first)
+    rmf.supervisor = LiftSupervisor(jazzy)
+    rmf.asks(a, "L2")
+    rmf.until_done(a)
+    a.in_car = True
+    rmf.asks(b, "L1")
+    rmf.run(rmf.story.now + 3.0)
+    rmf.asks(a, "L4", inside=True)
+    rmf.run(rmf.story.now + 2.0)
+    return rmf, a, b
+
+
+@pytest.mark.parametrize("jazzy", [False, True])
+@pytest.mark.parametrize("adapters_first", [False, True])
+@pytest.mark.parametrize("after_s", [0.0, 0.3, 0.6, 1.1, 2.0, 3.0])
+def test_a_supervisor_that_restarts_and_ends_the_session_takes_no_lift_from_a_robot_in_the_car(
+    jazzy: bool, adapters_first: bool, after_s: float
+) -> None:
+    """Whoever it takes up then, at whatever moment of the ride."""
+    rmf, a, b = riding(jazzy, adapters_first)
+    rmf.run(rmf.story.now + after_s)
+    edges = list(rmf.story.edges)
+    rmf.supervisor = LiftSupervisor(jazzy)
+    rmf._hear(rmf.story.told[-1][1])
+    rmf.robots.reverse()
+    rmf._arrive()
+    assert any(request.request_type == END for request in rmf.requested)
+    rmf.until_done(a)
+    assert [e for e in rmf.story.edges if e not in edges] == [
+        e for e in rmf.story.edges[len(edges) :] if e[1:] in CALLED_AND_HELD
+    ]
+    assert sessions(rmf.story) == ["", A]
+    a.in_car = False
+    released_at = rmf.story.now
+    rmf.releases(a)
+    rmf.until_done(a)
+    rmf.until_done(b)
+    assert sessions(rmf.story) == ["", A, "", B]
+    granted_at = next(at for at, state in rmf.story.told if state.session_id == B)
+    assert granted_at - released_at < 6.0  # the grace of 3 s, and RMF's next words
+
+
+CALLED_AND_HELD = [("call", None), ("hold_door", "front")]
+
+
+class InMidRide(Overheard):
+    """A has been let in at L2 and rides to L4; its adapter has just said so."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.adapter(AGV, "L2")
+        self.story.run(self.story.now + 1.0)
+        self.story.asks(A, "L4")
+        self.adapter(AGV, "L4")
+
+    def supervisor_ends(self, *, by_person: bool = False, at: float | None = None) -> None:
+        sent = stamp(WALL + self.story.now if at is None else at)
+        self.story.request(LiftRequest("Lift1", sent, A, int(END), "L2", 2 if by_person else 0))
+        self.story.run(self.story.now + 0.2)
+
+    def asks_for(self, seconds: float) -> None:
+        """Its adapter goes on asking, once a second."""
+        for _ in range(int(seconds)):
+            self.adapter(AGV, "L4")
+            self.story.run(self.story.now + 0.8)
+
+
+def test_a_session_that_the_supervisor_has_ended_lasts_while_its_robot_asks_and_five_seconds() -> (
+    None
+):
+    lift = InMidRide()
+    lift.supervisor_ends()
+    lift.asks_for(20.0)
+    assert lift.story.state == "AGV, open at L4, fleet/a to L4"
+    assert lift.story.faults == ["FORGOTTEN_BY_SUPERVISOR"]
+    detail = lift.story.node.status()["faults"][0]["detail"]
+    assert detail == "lift_requests has ended it while fleet/a has the lift"
+    silent_since = lift.story.now - 1.0
+    ended_at = lift.story.until(lambda: not lift.story.told[-1][1].session_id)
+    assert ended_at == pytest.approx(silent_since + SILENT_S, abs=0.3)
+
+
+def test_the_supervisors_request_makes_the_session_its_own_again() -> None:
+    lift = InMidRide()
+    lift.supervisor_ends()
+    lift.story.asks(A, "L4")
+    lift.story.run(lift.story.now + 20.0)
+    assert lift.story.state == "AGV, open at L4, fleet/a to L4"
+    assert lift.story.faults == []
+
+
+def test_the_end_of_another_session_does_not_make_a_robots_silence_last() -> None:
+    lift = InMidRide()
+    lift.supervisor_ends()
+    lift.story.asks(B, "L1")
+    lift.story.ends(B)
+    assert sessions(lift.story) == ["", A]
+    lift.story.run(lift.story.now + SILENT_S)
+    assert sessions(lift.story) == ["", A, ""]
+
+
+def test_the_robots_own_end_ends_its_session_whichever_of_the_two_is_heard_first() -> None:
+    for own_first in (True, False):
+        lift = InMidRide()
+        lift.asks_for(20.0)
+        if own_first:
+            lift.adapter(END)
+        lift.supervisor_ends()
+        assert sessions(lift.story)[-1] == ("" if own_first else A)
+        if not own_first:
+            lift.adapter(END)
+        assert sessions(lift.story) == ["", A, ""]
+        lift.story.run(lift.story.now + 3.0)
+        lift.story.asks(B, "L1")
+        assert sessions(lift.story)[-1] == B
+
+
+def test_an_end_that_is_passed_on_late_counts_although_the_robot_asks_again() -> None:
+    lift = InMidRide()
+    lift.adapter(END)
+    lift.adapter(AGV, "L4")
+    lift.supervisor_ends()
+    assert sessions(lift.story) == ["", A, ""]
+
+
+def test_a_person_ends_the_session_of_a_robot_that_goes_on_asking_and_another_one_gets_the_lift() -> (
+    None
+):
+    lift = InMidRide()
+    lift.supervisor_ends()
+    lift.supervisor_ends(by_person=True)
+    assert sessions(lift.story) == ["", A, ""]
+    for _ in range(5):
+        lift.adapter(AGV, "L4")
+        lift.story.asks(B, "L1")
+        lift.story.run(lift.story.now + 0.8)
+    assert sessions(lift.story) == ["", A, "", B]
+
+
+def test_a_fire_takes_the_outputs_of_a_session_that_the_supervisor_has_ended() -> None:
+    lift = InMidRide()
+    lift.supervisor_ends()
+    lift.story.building.hazard(Hazard.FIRE)
+    lift.asks_for(1.0)
+    assert lift.story.outputs == LiftOutputs()
+    assert lift.story.state.startswith("FIRE")
+
+
+@pytest.mark.parametrize("heard_s", [4.5, 5.5])
+def test_a_robot_is_believed_to_ask_for_five_seconds(heard_s: float) -> None:
+    lift = InMidRide()
+    lift.story.run(lift.story.now + heard_s - 0.2)
+    lift.supervisor_ends()
+    assert sessions(lift.story)[-1] == (A if heard_s < SILENT_S else "")
+
+
+def test_a_robot_that_waits_outside_or_was_never_heard_is_ended_as_ever() -> None:
+    unheard = Overheard()
+    unheard.story.ends(A)
+    assert sessions(unheard.story) == ["", A, ""]
+    outside = world(Robot(A))
+    outside.asks(outside.robots[0], "L4")
+    outside.run(outside.story.now + 2.0)
+    outside.robots.clear()
+    outside.story.ends(A)
+    assert sessions(outside.story) == ["", A, ""]
+
+
+# ---- a fleet adapter that was killed
+
+
+@pytest.mark.parametrize("back_after_s", [1.0, 8.0, 30.0])
+def test_a_robot_whose_new_adapter_sends_end_in_mid_ride_gets_its_lift_back(
+    back_after_s: float,
+) -> None:
+    rmf, a, b = riding()
+    fresh = rmf.restart_adapter(a)
+    fresh.in_car = True
+    rmf.run(rmf.story.now + back_after_s)
+    assert rmf.supervisor.slots["Lift1"].session_id == B
+    assert (sessions(rmf.story)[-1], rmf.story.outputs.call) == ("", None)
+    assert rmf.story.faults == ["ROBOT_LEFT_IN_CAR"]
+    rmf.asks(fresh, "L4", inside=True)
+    rmf.until_done(fresh)
+    assert rmf.story.state == "AGV, open at L4, fleet/a to L4"
+    fresh.in_car = False
+    rmf.releases(fresh)
+    rmf.until_done(b)
+    assert sessions(rmf.story) == ["", A, "", A, "", B]
+    assert ons(rmf.story, "call") >= 3
+
+
+def test_a_lift_waits_a_minute_for_a_robot_that_was_left_in_the_car_and_its_outputs_do_not() -> (
+    None
+):
+    lift = InMidRide()
+    lift.adapter(END)
+    ended_at = lift.story.now
+    lift.supervisor_ends()
+    lift.story.run(ended_at + 2.5)
+    assert lift.story.outputs == LiftOutputs(agv_request=True)
+    lift.story.run(ended_at + 3.1)
+    assert lift.story.outputs == LiftOutputs()
+    lift.story.run(ended_at + LEFT_S - 0.5)
+    lift.story.asks(B, "L1")
+    assert lift.story.node.refused == {"released in mid-ride": 1}
+    lift.story.run(ended_at + LEFT_S)
+    lift.story.asks(B, "L1")
+    assert (sessions(lift.story)[-1], lift.story.faults) == (B, [])
+
+
+def test_an_adapter_that_was_silent_before_its_end_may_have_left_its_robot_in_the_open_car() -> (
+    None
+):
+    lift = InMidRide()
+    lift.asks_for(20.0)
+    assert lift.story.state == "AGV, open at L4, fleet/a to L4"
+    lift.story.run(lift.story.now + 20.0)
+    lift.adapter(END)
+    lift.supervisor_ends()
+    assert lift.story.faults == ["ROBOT_LEFT_IN_CAR"]
+    lift.adapter(END)
+    lift.story.run(lift.story.now + 30.0)
+    lift.adapter(AGV, "L4", who=B)
+    lift.adapter(AGV, "L4", at=WALL)
+    assert sessions(lift.story)[-1] == ""
+    lift.adapter(AGV, "L4")
+    lift.story.run(lift.story.now + 1.0)
+    assert sessions(lift.story)[-1] == A
+
+
+def test_a_person_who_has_looked_into_the_car_gives_the_lift_to_the_next_robot() -> None:
+    lift = InMidRide()
+    lift.adapter(END)
+    lift.supervisor_ends()
+    lift.story.run(lift.story.now + 5.0)
+    lift.supervisor_ends(by_person=True)
+    lift.story.run(lift.story.now + 0.1)
+    lift.story.asks(B, "L1")
+    assert sessions(lift.story)[-1] == B
+
+
+# ---- an END that is older than its session
+
+
+def test_an_end_from_before_the_session_counts_once_it_has_been_repeated_for_a_second() -> None:
+    lift = Overheard()
+    sent = stamp(WALL + lift.story.now)
+    lift.story.ends(A)
+    lift.story.run(lift.story.now + 5.0)
+    lift.story.request(LiftRequest("Lift1", sent, A, int(AGV), "L2", 2))
+    began = lift.story.now
+    for old_s in (9.0, 8.0, 7.5):
+        old = stamp(WALL + began - old_s - 5.0)
+        lift.story.request(LiftRequest("Lift1", old, A, int(END), "", 0))
+        assert sessions(lift.story)[-1] == (A if old_s > 7.5 else "")
+        lift.story.run(lift.story.now + 0.6)
+    assert lift.story.node.refused == {"END older than the session": 2}
+
+
+@pytest.mark.parametrize("sec", [0, -1])
+def test_an_end_without_a_stamp_that_a_clock_shows_counts_at_once(sec: int) -> None:
+    lift = InMidRide()
+    lift.adapter(END)
+    impossible = stamp(0.0)
+    impossible = type(impossible)(sec, 0)
+    lift.story.request(LiftRequest("Lift1", impossible, A, int(END), "", 0))
+    assert sessions(lift.story)[-1] == ""

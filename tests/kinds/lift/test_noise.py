@@ -1,0 +1,66 @@
+"""What belongs to every start, every handover and every idle second of Jazzy's RMF is no warning."""
+
+import logging
+
+import pytest
+
+from bridges.messages.definitions import LiftRequest
+from bridges.rmf_rules.robot import Robot
+from bridges.rmf_rules.supervisors import LiftSupervisor
+from tests.kinds.lift.rmf_world import World
+from tests.kinds.lift.story import END, Controller, Story
+from tests.kinds.lift.test_with_rmf import A, B, world
+
+
+def warnings(caplog: pytest.LogCaptureFixture) -> list[str]:
+    return [record.message for record in caplog.records if record.levelno >= logging.WARNING]
+
+
+def test_a_start_with_a_robot_that_already_asks_warns_of_nothing(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    story = Story(Controller())
+    story.asks(A, "L3")
+    story.run(5.0)
+    story.asks(A, "L3")
+    story.run(6.0)
+    assert warnings(caplog) == []
+    assert story.node.refused == {"inputs settle after the start": 1}
+    assert story.state.endswith("fleet/a to L3")
+
+
+def test_a_handover_warns_only_that_the_other_one_asked_too_early(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    a, b = Robot(A), Robot(B)
+    rmf = world(a, b)
+    rmf.asks(a, "L2")
+    rmf.until_done(a)
+    rmf.asks(b, "L1")
+    rmf.run(rmf.story.now + 5.0)
+    rmf.releases(a)
+    rmf.until_done(b)
+    assert warnings(caplog) == []
+    assert set(rmf.story.node.refused) == {"released a moment ago"}
+
+
+def test_an_end_without_a_session_is_ignored_and_not_logged(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    a = Robot(A, jazzy=True)
+    rmf = World(Story(Controller()), a)
+    rmf.supervisor = LiftSupervisor(jazzy=True)
+    rmf.run(10.0)
+    assert LiftRequest("Lift1", rmf.requested[-1].request_time, "", END, "L1", 0) in rmf.requested
+    rmf.rides(a, "L3", "L1")
+    rmf.run(rmf.story.now + 10.0)
+    assert (warnings(caplog), rmf.story.node.refused) == ([], {})
+
+
+def test_an_end_without_a_session_leaves_a_held_session_alone() -> None:
+    story = Story(Controller())
+    story.run(1.0)
+    story.asks(A, "L2")
+    story.ends("")
+    story.run(12.0)
+    assert story.state == "AGV, open at L2, fleet/a to L2"

@@ -1,0 +1,168 @@
+"""Requests of earlier rides that RMF's supervisor hears again: by RMF's own rules, and rule by rule."""
+
+from collections.abc import Mapping
+
+import pytest
+
+from bridges.kinds.lift.memory import Doubted, Session
+from bridges.kinds.lift.replayed import LASTS_S, MOST, doubt, noted
+from bridges.kinds.lift.signals import Door, Ended, LiftSample, Motion, Requested
+from bridges.rmf_rules.robot import Robot
+from tests.kinds.lift.rmf_world import World
+from tests.kinds.lift.story import AGV, END, Building
+from tests.kinds.lift.test_forgotten import Overheard
+from tests.kinds.lift.test_with_rmf import A, B, ons, sessions, world
+
+OPEN_FOR_A = "AGV, open at L2, fleet/a to L2"
+
+
+def on_its_threshold(rides_before: int) -> tuple[World, Robot]:
+    """A robot goes into the car at L3, and has had so many rides just before."""
+    robot = Robot(A)
+    rmf = world(robot)
+    for _ in range(rides_before):
+        rmf.rides(robot, "L2", "L1")
+    rmf.asks(robot, "L3")
+    rmf.until_done(robot)
+    rmf.run(rmf.story.now + 1.0)
+    return rmf, robot
+
+
+@pytest.mark.parametrize("rides_before", [1, 2])
+def test_an_earlier_ride_that_rmf_hears_again_lets_no_door_go_while_a_robot_goes_in(
+    rides_before: int,
+) -> None:
+    """As `make soak SEED=7 RMF=kilted` found it: an adapter that was cut off for more than a lease."""
+    rmf, robot = on_its_threshold(rides_before)
+    before = list(rmf.story.edges)
+    rmf.finds_again(robot)
+    rmf.run(rmf.story.now + 5.0)
+    assert rmf.story.edges == before
+    assert rmf.story.state == "AGV, open at L3, fleet/a to L3"
+    rmf.asks(robot, "L1", inside=True)
+    rmf.until_done(robot)
+    assert rmf.story.state == "AGV, open at L1, fleet/a to L1"
+
+
+def test_a_supervisor_that_restarts_and_hears_an_earlier_ride_lets_no_door_go_either() -> None:
+    rmf, robot = on_its_threshold(1)
+    before = list(rmf.story.edges)
+    rmf.supervisor = type(rmf.supervisor)()
+    rmf.finds_again(robot)
+    rmf.run(rmf.story.now + 5.0)
+    assert rmf.story.edges == before
+    assert sessions(rmf.story)[-3:] == [A, "", A]
+
+
+def test_a_robot_that_is_cut_off_before_it_gets_the_lift_is_as_safe_when_it_is_found_again() -> (
+    None
+):
+    """It was cut off at 12.6 h of that day, and had the lift only afterwards."""
+    first, robot = Robot(B), Robot(A)
+    rmf = world(first, robot)
+    rmf.rides(robot, "L2", "L1")
+    rmf.asks(first, "L1")
+    rmf.until_done(first)
+    rmf.asks(robot, "L3")
+    rmf.run(rmf.story.now + 3.0)
+    rmf.robots.remove(robot)
+    rmf.releases(first)
+    rmf.supervisor.slots["Lift1"] = rmf.asked_by(robot)[-1]
+    rmf.story.until(lambda: rmf.story.state == "AGV, open at L3, fleet/a to L3")
+    before = list(rmf.story.edges)
+    rmf.finds_again(robot)
+    rmf.run(rmf.story.now + 1.0)
+    assert rmf.story.edges == before
+
+
+@pytest.mark.parametrize("after_s", [2.8, 3.2], ids=["within the grace", "after it"])
+def test_an_earlier_ride_that_rmf_hears_again_shows_a_robot_no_door_that_was_let_go(
+    after_s: float,
+) -> None:
+    """As a robot's next ride began where the last one had ended, while RMF's real supervisor was dead:
+    it went in on the earlier ride's state, and the door closed."""
+    lift = Overheard(Building(LiftSample("L2", Door.OPEN, motion=Motion.STOPPED, agv=True)))
+    assert lift.story.state == OPEN_FOR_A
+    lift.story.ends(A)
+    ended_at = lift.story.now
+    lift.adapter(AGV, "L2")
+    lift.story.run(ended_at + after_s)
+    assert not lift.story.outputs.hold_door
+    lift.story.asks(A, "L4")
+    lift.story.asks(A, "L2")
+    lift.story.until(lambda: lift.story.outputs.hold_door)
+    assert [state for _, state in lift.story.states][-4:] == [
+        "AGV, open at L2",
+        "AGV, moving at L2, fleet/a to L4",
+        "AGV, moving at L2, fleet/a to L2",
+        OPEN_FOR_A,
+    ]
+
+
+def test_a_floor_that_only_the_supervisor_asks_for_counts_after_a_while() -> None:
+    lift = Overheard()
+    lift.adapter(AGV, "L2")
+    began = lift.story.now
+    while lift.story.outputs.hold_door and lift.story.now < began + 2 * LASTS_S:
+        lift.story.asks(A, "L4")
+        lift.story.run(lift.story.now + 0.25)
+    assert began + LASTS_S <= lift.story.now <= began + LASTS_S + 0.5
+    assert lift.story.state == "AGV, moving at L2, fleet/a to L4"
+
+
+def test_a_doubt_lasts_exactly_three_seconds() -> None:
+    doubted = Doubted("L4", 10.0)
+    session = Session(A, True, "L2", 0.0, doubted=doubted)
+    request = Requested(A, True, "L4")
+    lasts = [doubt(session, request, "L2", True, now) for now in (12.9, 13.0)]
+    assert lasts == [doubted, None]
+
+
+def test_a_request_for_the_present_floor_ends_the_doubt_and_a_new_one_begins_afterwards() -> None:
+    lift = Overheard()
+    lift.adapter(AGV, "L2")
+    lift.story.asks(A, "L4")
+    lift.story.run(lift.story.now + LASTS_S)
+    lift.story.asks(A, "L2")
+    lift.story.asks(A, "L4")
+    assert lift.story.state == OPEN_FOR_A
+    assert ons(lift.story, "hold_door") == 1
+
+
+def test_the_robots_own_request_ends_the_doubt_at_once_whichever_comes_first() -> None:
+    lift = Overheard()
+    lift.adapter(AGV, "L2")
+    lift.story.asks(A, "L4")
+    lift.story.run(lift.story.now + 0.2)
+    assert lift.story.state == OPEN_FOR_A
+    lift.adapter(AGV, "L4")
+    assert lift.story.state == "AGV, moving at L2, fleet/a to L4"
+
+
+def test_the_robots_own_request_counts_for_nothing_before_the_supervisor_has_passed_it_on() -> None:
+    lift = Overheard()
+    lift.adapter(AGV, "L2")
+    lift.adapter(AGV, "L4")
+    assert lift.story.state == OPEN_FOR_A
+    lift.story.asks(A, "L4")
+    lift.story.run(lift.story.now + 0.2)
+    assert lift.story.state == "AGV, moving at L2, fleet/a to L4"
+
+
+def test_a_robot_that_has_ended_or_was_never_heard_raises_no_doubt() -> None:
+    for last_said in ((), (AGV, END)):
+        lift = Overheard()
+        for kind in last_said:
+            lift.adapter(kind, "L2" if kind == AGV else "")
+        lift.story.asks(A, "L4")
+        lift.story.run(lift.story.now + 0.2)
+        assert lift.story.state == "AGV, moving at L2, fleet/a to L4"
+
+
+def test_of_more_robots_than_any_site_has_those_heard_first_are_forgotten() -> None:
+    own: Mapping[str, str] = {}
+    for number in range(MOST + 1):
+        own = noted(own, Requested(f"robot{number}", True, "L1"))
+    own = noted(noted(own, Requested("robot1", True, "L2")), Ended("robot2"))
+    assert list(own) == [*(f"robot{n}" for n in range(3, MOST + 1)), "robot1"]
+    assert own["robot1"] == "L2"

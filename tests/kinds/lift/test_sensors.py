@@ -1,0 +1,537 @@
+"""What is believed of the inputs: broken, contradictory, glitching, stale, restless, moving."""
+
+import pytest
+from msgspec.structs import replace
+
+from bridges.kinds.lift.core import decide
+from bridges.kinds.lift.memory import Memory
+from bridges.kinds.lift.signals import Door, Hazard, LiftOutputs, LiftSample, Motion, Requested
+from bridges.kinds.shared.decision import Fault, Sampled
+from bridges.messages.definitions import LiftMotion
+from bridges.messages.stamps import in_seconds
+from tests.kinds.lift.story import WALL, Building, Controller, Story
+
+OPEN_AT_L1 = LiftSample("L1", Door.OPEN, motion=Motion.STOPPED, agv=True)
+
+
+def boarding(**inputs: object) -> Story:
+    """A waits at L1, where the lift stands open. `inputs` replace parts of what it reads."""
+    story = Story(Building(replace(OPEN_AT_L1, **inputs)))
+    story.run(1.0)
+    story.asks("A", "L1")
+    story.run(2.0)
+    return story
+
+
+def test_an_open_door_is_offered_when_every_input_confirms_it() -> None:
+    assert boarding().state == "AGV, open at L1, A to L1"
+
+
+@pytest.mark.parametrize(
+    ("inputs", "state", "faults"),
+    [
+        ({"door": Door.BOTH}, "AGV, moving at L1", ["DOOR_CONTACTS_CONTRADICT"]),
+        ({"door": Door.UNKNOWN}, "AGV, moving at L1", ["DOOR_CODE_ILLEGAL"]),
+        ({"door": Door.BETWEEN}, "AGV, moving at L1", []),
+        ({"door": Door.NOT_OPEN}, "AGV, moving at L1", []),
+        ({"level": None}, "AGV, moving at ?", []),
+        (
+            {"level": None, "code_fault": "the lines of L1 and L3 are on at once"},
+            "AGV, moving at ?",
+            ["FLOOR_CODE_ILLEGAL"],
+        ),
+        (
+            {"level": None, "code_fault": "code 7 is not a floor's"},
+            "AGV, moving at ?",
+            ["FLOOR_CODE_ILLEGAL"],
+        ),
+        ({"motion": Motion.UP}, "AGV, moving at L1", []),
+        ({"motion": Motion.DOWN}, "AGV, moving at L1", []),
+        ({"motion": Motion.MOVING}, "AGV, moving at L1", []),
+        ({"motion": Motion.CONTRADICTORY}, "AGV, moving at L1", ["MOTION_CONTRADICTORY"]),
+        ({"agv": False}, "HUMAN, moving at L1", []),
+    ],
+)
+def test_an_open_door_is_not_offered_when_one_input_contradicts_it(
+    inputs: dict[str, object], state: str, faults: list[str]
+) -> None:
+    story = boarding(**inputs)
+    assert story.state == f"{state}, A to L1"
+    assert story.faults == faults
+
+
+@pytest.mark.parametrize(
+    ("motion", "told"),
+    [
+        (Motion.UP, LiftMotion.MOTION_UP),
+        (Motion.DOWN, LiftMotion.MOTION_DOWN),
+        (Motion.STOPPED, LiftMotion.MOTION_STOPPED),
+        (Motion.MOVING, LiftMotion.MOTION_UNKNOWN),
+        (Motion.CONTRADICTORY, LiftMotion.MOTION_UNKNOWN),
+    ],
+)
+def test_motion_is_read_from_the_motion_lines(motion: Motion, told: LiftMotion) -> None:
+    assert boarding(motion=motion).motions[-1] is told
+
+
+def test_a_door_contact_that_glitches_on_the_way_never_reads_as_open() -> None:
+    building = Building(replace(OPEN_AT_L1, door=Door.CLOSED))
+    story = Story(building)
+    story.run(1.0)
+    story.asks("A", "L3")
+    for level in (None, "L2", None):
+        building.set(level=level, motion=Motion.UP)
+        story.run(story.now + 0.5)
+        building.set(door=Door.OPEN)
+        story.run(story.now + 0.05)
+        building.set(door=Door.CLOSED)
+        story.run(story.now + 0.5)
+    assert [state for _, state in story.states if "open" in state] == []
+    assert [edge for edge in story.edges if edge[1] == "hold_door"] == []
+
+
+def test_a_short_door_contact_glitch_at_the_destination_does_not_read_as_an_open_door() -> None:
+    story = boarding(door=Door.CLOSED)
+    story.run(2.01)
+    story.building.set(door=Door.OPEN)
+    story._scan()
+    story.run(2.03)
+    story.building.set(door=Door.CLOSED)
+    story.run(4.0)
+    assert [state for _, state in story.states if "open" in state] == []
+
+
+def test_an_open_contact_while_the_car_moves_reads_as_a_moving_door() -> None:
+    story = boarding(motion=Motion.UP)
+    story.run(5.0)
+    assert story.state == "AGV, moving at L1, A to L1"
+    assert story.edges == [(1.0, "agv_request", True), (1.0, "call", "L1")]
+
+
+def test_passing_a_floor_is_not_an_arrival() -> None:
+    story = Story(Controller())
+    story.run(1.0)
+    story.asks("A", "L3")
+    story.until(lambda: story.state == "AGV, closed at L2, A to L3")
+    story.asks("A", "L2")
+    story.run(story.now + 1.0)
+    assert story.outputs.hold_door is None
+    assert [state for _, state in story.states if "open" in state] == []
+
+
+def test_a_floor_code_that_jumps_over_a_floor_is_not_believed_until_it_comes_back() -> None:
+    story = boarding()
+    story.building.set(level="L3")
+    story.run(5.0)
+    assert story.state == "AGV, moving at ?, A to L1"
+    assert story.node.status()["faults"] == [
+        {"code": "POSITION_LOST", "detail": "L3 cannot follow L1 like this"}
+    ]
+    assert story.outputs == LiftOutputs(agv_request=True)
+    story.building.set(level="L1")
+    story.run(6.0)
+    assert story.state == "AGV, open at L1, A to L1"
+    assert story.faults == []
+
+
+def test_a_floor_code_that_changes_while_the_car_stands_is_not_believed() -> None:
+    story = boarding()
+    story.run(5.0)
+    story.building.set(level="L2")
+    story.run(6.0)
+    assert story.state == "AGV, moving at ?, A to L1"
+    assert story.faults == ["POSITION_LOST"]
+
+
+def test_an_impossible_floor_code_stays_doubted_after_time_between_floors() -> None:
+    story = boarding()
+    story.building.set(level="L3")
+    story.run(3.0)
+    story.building.set(level=None, motion=Motion.UP)
+    story.run(6.0)
+    story.building.set(level="L3", motion=Motion.STOPPED)
+    story.run(7.0)
+    assert story.faults == ["POSITION_LOST"]
+
+
+def test_a_doubted_floor_is_believed_once_the_car_really_goes_there() -> None:
+    story = boarding()
+    story.building.set(level="L3")
+    story.run(3.0)
+    story.building.set(level="L1")
+    story.run(5.0)
+    story.building.set(level=None, motion=Motion.UP)
+    story.run(8.0)
+    story.building.set(level="L3", motion=Motion.STOPPED)
+    story.run(9.0)
+    assert (story.faults, story.state) == ([], "AGV, open at L3, A to L1")
+
+
+def test_a_floor_code_that_changes_long_after_the_car_stopped_is_not_believed() -> None:
+    story = boarding()
+    story.building.set(motion=Motion.UP)
+    story.run(3.0)
+    story.building.set(motion=Motion.STOPPED)
+    story.run(5.5)
+    story.building.set(level="L2")
+    story.run(6.0)
+    assert story.faults == ["POSITION_LOST"]
+
+
+def test_a_slowly_debounced_floor_code_still_belongs_to_the_last_movement() -> None:
+    building = Building(OPEN_AT_L1)
+    story = Story(building, debounce={"floor": 3.0})
+    story.run(5.0)
+    building.set(motion=Motion.UP)
+    story.run(6.0)
+    building.set(level="L2", motion=Motion.STOPPED)
+    story.run(12.0)
+    assert (story.faults, story.state) == ([], "AGV, open at L2")
+
+
+def test_an_operators_reset_confirms_the_floor_code() -> None:
+    story = boarding()
+    story.building.set(level="L3")
+    story.run(5.0)
+    story.resets()
+    story.run(6.0)
+    assert story.faults == []
+    assert story.state == "AGV, open at L3, A to L1"
+    assert story.outputs == LiftOutputs(agv_request=True, call="L1")
+
+
+def test_a_reset_moves_nothing_where_nothing_is_wrong() -> None:
+    story = boarding()
+    edges, states = list(story.edges), list(story.states)
+    story.resets()
+    story.run(3.0)
+    assert (story.edges, story.states) == (edges, states)
+
+
+def test_without_motion_lines_the_next_floor_is_believed_but_a_jump_is_not() -> None:
+    story = boarding(motion=None)
+    story.building.set(level="L2")
+    story.run(3.0)
+    assert story.faults == []
+    story.building.set(level="L4")
+    story.run(4.0)
+    assert story.faults == ["POSITION_LOST"]
+
+
+def test_a_fast_car_may_skip_the_code_of_a_floor_that_it_has_had_time_to_pass() -> None:
+    story = boarding(door=Door.CLOSED)
+    story.building.set(level=None, motion=Motion.UP)
+    story.run(3.0)
+    story.building.set(level="L3", motion=Motion.STOPPED)
+    story.run(4.0)
+    assert (story.faults, story.state) == ([], "AGV, closed at L3, A to L1")
+
+
+def test_lines_that_have_a_meaning_only_in_agv_mode_are_believed_there() -> None:
+    building = Building(LiftSample(None, Door.BETWEEN, motion=None, agv=False))
+    story = Story(building)
+    story.run(1.0)
+    for floor in ("L1", "L3"):
+        story.asks("A", floor)
+        story.run(story.now + 1.0)
+        building.set(agv=True, level=floor, door=Door.OPEN, motion=Motion.STOPPED)
+        story.run(story.now + 1.0)
+        assert story.state == f"AGV, open at {floor}, A to {floor}"
+        story.ends("A")
+        story.run(story.now + 3.0)
+        building.set(agv=False, level=None, door=Door.BETWEEN, motion=None)
+        story.run(story.now + 9.0)
+        assert story.state == "HUMAN, moving at ?"
+    assert story.edges == [
+        (1.0, "agv_request", True),
+        (2.13, "hold_door", "front"),
+        (5.7, "hold_door", None),
+        (6.0, "agv_request", False),
+        (15.0, "agv_request", True),
+        (16.13, "hold_door", "front"),
+        (19.7, "hold_door", None),
+        (20.0, "agv_request", False),
+    ]
+
+
+def test_a_movement_counts_at_once_when_the_motion_lines_had_no_meaning_before() -> None:
+    building = Building(LiftSample("L1", Door.OPEN, motion=None, agv=True))
+    story = Story(building, debounce={"motion": 5.0})
+    story.run(7.0)
+    building.set(motion=Motion.UP)
+    story.run(8.0)
+    assert story.state == "AGV, moving at L1"
+
+
+def test_one_missed_reading_changes_nothing() -> None:
+    for inputs in ({}, {"motion": None, "agv": None}):
+        story = boarding(**inputs)
+        edges, states = list(story.edges), list(story.states)
+        story.building.unreadable = "timeout"
+        story.run(2.5)
+        story.building.unreadable = ""
+        story.run(4.0)
+        assert (story.edges, story.states) == (edges, states)
+
+
+def test_without_readings_the_lift_is_offline_with_outputs_off_and_still_publishes_states() -> None:
+    story = boarding()
+    story.building.unreadable = "no answer from 10.0.0.7"
+    story.run(12.0)
+    assert story.edges[2:] == [(3.0, "hold_door", None), (3.0, "agv_request", False)]
+    assert story.states[-1] == (3.0, "OFFLINE, moving at ?, A to L1")
+    offline = [state for at, state in story.told if at >= 3.0]
+    assert len(offline) == 10
+    assert {in_seconds(state.lift_time) for state in offline} == {WALL + 2.0}
+    assert story.node.status()["faults"] == [
+        {"code": "INPUTS_NOT_FRESH", "detail": "no answer from 10.0.0.7"}
+    ]
+
+
+def test_the_lift_comes_back_by_itself_when_its_readings_come_back() -> None:
+    story = boarding()
+    story.building.unreadable = "no answer"
+    story.run(12.0)
+    story.building.unreadable = ""
+    story.run(14.0)
+    assert story.state == "AGV, open at L1, A to L1"
+    assert story.outputs == LiftOutputs(agv_request=True, hold_door=boarding().outputs.hold_door)
+    assert story.faults == []
+
+
+def test_what_was_believed_before_the_readings_stopped_is_not_believed_afterwards() -> None:
+    story = boarding()
+    story.building.unreadable = "no answer"
+    story.run(12.0)
+    told = len(story.told)
+    story.building.unreadable = ""
+    story.building.set(level="L3", door=Door.CLOSED)
+    story.run(14.0)
+    back = [state for at, state in story.states if at >= 12.0]
+    assert back == ["AGV, closed at L3, A to L1"]
+    assert all(state.door_state != 2 for _, state in story.told[told:])
+    assert story.faults == []
+
+
+def test_an_impossible_floor_code_is_still_doubted_after_a_loss_of_readings() -> None:
+    story = boarding()
+    story.building.set(level="L3")
+    story.run(3.0)
+    story.building.unreadable = "no answer"
+    story.run(6.0)
+    assert story.faults == ["INPUTS_NOT_FRESH"]
+    story.building.unreadable = ""
+    story.run(8.0)
+    assert story.faults == ["POSITION_LOST"]
+
+
+def test_a_car_that_was_not_read_for_a_while_may_have_moved() -> None:
+    story = boarding()
+    story.run(9.0)
+    story.building.set(level="L3")
+    story.now = 19.0  # the loop has stalled
+    story.run(20.0)
+    assert (story.faults, story.state) == ([], "AGV, open at L3, A to L1")
+
+
+def test_a_floor_that_was_reached_in_a_short_gap_is_believed() -> None:
+    story = boarding()
+    story.run(9.0)
+    story.building.unreadable = "timeout"
+    story.run(9.9)
+    story.building.unreadable = ""
+    story.building.set(level="L2")
+    story.run(11.0)
+    assert (story.faults, story.state) == ([], "AGV, open at L2, A to L1")
+
+
+def test_a_glitch_that_a_gap_cuts_in_half_changes_nothing() -> None:
+    story = boarding(door=Door.CLOSED)
+    story.building.set(door=Door.OPEN)
+    story._scan()
+    story.building.unreadable = "timeout"
+    story.run(2.5)
+    story.building.unreadable = ""
+    story.run(2.51)
+    story.building.set(door=Door.CLOSED)
+    story.run(4.0)
+    assert [state for _, state in story.states if "open" in state] == []
+
+
+def test_an_input_that_never_settles_is_not_believed() -> None:
+    story = boarding()
+    story.building.unreadable = "timeout"
+    story.run(2.05)
+    story.building.unreadable = ""
+    for i in range(100):
+        story.building.set(level=("L1", "L2")[i % 2])
+        story.run(2.05 + 0.05 * (i + 1))
+    assert story.states[-1] == (4.23, "OFFLINE, moving at ?, A to L1")
+    assert story.outputs == LiftOutputs()
+    assert story.node.status()["faults"] == [
+        {"code": "INPUTS_NOT_FRESH", "detail": "not steady: floor"}
+    ]
+    story.building.set(level="L1")
+    story.run(8.0)
+    assert (story.faults, story.state) == ([], "AGV, open at L1, A to L1")
+
+
+def test_a_fire_loop_that_chatters_takes_the_lift_away() -> None:
+    story = boarding()
+    for i in range(100):
+        story.building.hazard(*((Hazard.FIRE,) if i % 2 else ()))
+        story.run(2.0 + 0.05 * (i + 1))
+    assert story.outputs == LiftOutputs()
+    assert story.state == "OFFLINE, moving at ?, A to L1"
+
+
+def test_a_door_that_never_settles_at_the_start_is_never_believed() -> None:
+    story = Story(Building(OPEN_AT_L1))
+    for i in range(100):
+        story.building.set(door=(Door.OPEN, Door.CLOSED)[i % 2])
+        story.run(0.02 * (i + 1))
+        story._scan()
+    assert [state for _, state in story.states] == ["OFFLINE, moving at ?"]
+
+
+def test_without_any_debounce_the_first_reading_counts() -> None:
+    story = Story(Building(OPEN_AT_L1), debounce={})
+    assert story.states == [(0.0, "AGV, open at L1")]
+    story.asks("A", "L1")
+    assert story.edges == [(0.0, "agv_request", True), (0.0, "hold_door", "front")]
+
+
+def test_a_contact_for_open_proves_nothing_about_closed() -> None:
+    story = Story(Building(replace(OPEN_AT_L1, door=Door.NOT_OPEN)), door_travel_s=4.0)
+    story.run(3.0)
+    assert story.state == "AGV, moving at L1"
+    story.run(5.0)
+    assert story.state == "AGV, closed at L1"
+    assert story.node.status()["door"] == "closed (estimated)"
+    story.building.set(door=Door.OPEN)
+    story.run(6.0)
+    assert story.node.status()["door"] == "open"
+    story.building.set(door=Door.NOT_OPEN)
+    story.run(12.0)
+    assert [state for _, state in story.states[-3:]] == [
+        "AGV, open at L1",
+        "AGV, moving at L1",
+        "AGV, closed at L1",
+    ]
+    assert [round(at, 1) for at, _ in story.states[-3:]] == [5.1, 6.1, 10.1]
+
+
+def test_with_only_a_closed_contact_an_open_door_is_estimated_and_marked() -> None:
+    story = Story(Building(replace(OPEN_AT_L1, door=Door.CLOSED)), door_travel_s=4.0)
+    story.run(1.0)
+    story.asks("A", "L1")
+    story.building.set(door=Door.NOT_CLOSED)
+    story.run(7.0)
+    assert story.states[-1][1] == "AGV, open at L1, A to L1"
+    assert story.states[-1][0] == 5.05
+    assert story.node.status()["door"] == "open (estimated)"
+
+
+@pytest.mark.parametrize(
+    ("front", "rear", "shown"),
+    [
+        (Door.CLOSED, Door.CLOSED, "closed"),
+        (Door.CLOSED, Door.NOT_OPEN, "closed (estimated)"),
+        (Door.BETWEEN, Door.NOT_OPEN, "moving"),
+        (Door.OPEN, Door.NOT_OPEN, "open"),
+        (Door.OPEN, Door.NOT_CLOSED, "open"),
+        (Door.CLOSED, Door.NOT_CLOSED, "open (estimated)"),
+    ],
+)
+def test_of_two_doors_only_the_estimated_one_is_marked(front: Door, rear: Door, shown: str) -> None:
+    story = Story(Building(replace(OPEN_AT_L1, door=front, rear_door=rear)))
+    story.run(9.0)
+    assert story.node.status()["door"] == shown
+
+
+def test_an_estimated_door_that_is_not_offered_is_shown_as_moving() -> None:
+    story = Story(Building(replace(OPEN_AT_L1, door=Door.NOT_CLOSED, agv=False)))
+    story.run(9.0)
+    story.asks("A", "L1")
+    assert story.node.status()["door"] == "moving"
+
+
+def test_an_estimated_door_that_starts_to_move_is_no_longer_at_its_end() -> None:
+    story = Story(Building(replace(OPEN_AT_L1, door=Door.NOT_CLOSED)), door_travel_s=4.0)
+    story.run(6.0)
+    assert story.state == "AGV, open at L1"
+    story.building.set(door=Door.CLOSED)
+    story._scan()
+    assert story.node.status()["door"] == "moving"
+
+
+def test_the_core_wakes_when_an_input_seen_for_the_first_time_has_settled() -> None:
+    rules = Story(Building(OPEN_AT_L1)).limits
+    before = decide(Memory(), Requested("A", True, "L1"), 0.0, rules)
+    assert [fault.detail for fault in before.report.faults] == ["not read yet"]
+    first = decide(before.memory, Sampled(OPEN_AT_L1), 10.0, rules)
+    assert first.wake_at == 10.0 + rules.debounce_s("door")
+
+
+def test_the_core_wakes_when_either_door_is_estimated_to_have_arrived() -> None:
+    rules = Story(Building(OPEN_AT_L1), debounce={}, door_travel_s=0.7).limits
+    for front, rear in ((Door.NOT_OPEN, Door.OPEN), (Door.OPEN, Door.NOT_CLOSED)):
+        sample = LiftSample("L1", front, rear_door=rear)
+        assert decide(Memory(), Sampled(sample), 10.0, rules).wake_at == 10.7
+
+
+def test_a_new_fault_is_news_but_a_change_of_its_words_is_not() -> None:
+    rules = Story(Building(OPEN_AT_L1), debounce={}).limits
+    first = decide(Memory(), Sampled(OPEN_AT_L1), 0.0, rules).report
+    lost = [replace(first, faults=(Fault("INPUTS_NOT_FRESH", f"timeout {i}"),)) for i in (1, 2)]
+    assert lost[0].news() == lost[1].news() != first.news()
+    assert replace(first, read_at=9.0).news() == first.news()
+
+
+class FloorsInAgvMode(Controller):
+    """Its floor code means something only in AGV mode (`valid_when`); its motion lines always do."""
+
+    def read(self) -> LiftSample:
+        sample = super().read()
+        return sample if sample.agv else replace(sample, level=None, floor_valid=False)
+
+
+def test_a_floor_code_is_believed_after_people_used_the_lift_while_it_meant_nothing() -> None:
+    lift = FloorsInAgvMode()
+    story = Story(lift)
+    story.run(1.0)
+    story.asks("A", "L3")
+    story.until(lambda: story.state == "AGV, open at L3, A to L3")
+    story.ends("A")
+    story.run(story.now + 10.0)
+    lift.goal = 0
+    story.until(lambda: lift.standing)
+    story.run(story.now + 60.0)
+    assert (story.state, story.faults) == ("HUMAN, closed at ?", [])
+    story.asks("B", "L1")
+    story.until(lambda: story.state == "AGV, open at L1, B to L1")
+    assert story.faults == []
+
+
+def test_a_jump_between_valid_floor_codes_is_not_believed() -> None:
+    lift = FloorsInAgvMode()
+    story = Story(lift)
+    story.run(1.0)
+    story.asks("A", "L1")
+    story.until(lambda: story.state == "AGV, open at L1, A to L1")
+    lift.height = 2.0
+    story.run(story.now + 5.0)
+    assert (story.state, story.faults) == ("AGV, closed at ?, A to L1", ["POSITION_LOST"])
+
+
+def test_a_flicker_of_the_agv_line_does_not_make_a_jump_believable() -> None:
+    lift = FloorsInAgvMode()
+    story = Story(lift)
+    story.run(1.0)
+    story.asks("A", "L1")
+    story.until(lambda: story.state == "AGV, open at L1, A to L1")
+    lift.height = 2.0
+    story.run(story.now + 5.0)
+    lift.asked_at = story.now + 0.06
+    story.run(story.now + 5.0)
+    assert (story.state, story.faults) == ("AGV, closed at ?, A to L1", ["POSITION_LOST"])

@@ -1,0 +1,237 @@
+"""Who holds the lift: grant, refresh, refuse, END and the grace after it."""
+
+import pytest
+
+from bridges.kinds.lift import KIND
+from bridges.kinds.lift.core import decide
+from bridges.kinds.lift.signals import Door, Hazard, LiftOutputs, LiftSample, Motion, Requested
+from bridges.messages.definitions import LiftRequest, LiftState
+from tests.kinds.lift.story import HUMAN, Building, Controller, Story
+
+OPEN_AT_L1 = LiftSample("L1", Door.OPEN, motion=Motion.STOPPED, agv=True)
+
+
+def boarded() -> Story:
+    """A robot may be inside: the open door at its floor has been published, three seconds ago."""
+    story = Story(Building(OPEN_AT_L1))
+    story.run(1.0)
+    story.asks("A", "L1")
+    story.run(4.0)
+    assert story.state == "AGV, open at L1, A to L1"
+    return story
+
+
+def test_requests_of_others_change_nothing_while_a_session_is_held() -> None:
+    alone, beset = boarded(), boarded()
+    for story in (alone, beset):
+        for second in range(5, 15):
+            story.asks("A", "L1")
+            if story is beset:
+                story.asks("B", "L3")
+                story.asks("B", "L3", HUMAN)
+                story.ends("B")
+                story.ends("")
+            story.run(float(second))
+    assert beset.edges == alone.edges
+    assert beset.states == alone.states
+    assert beset.node.refused == {"held by another session": 30}
+
+
+def test_a_message_names_the_lift_that_it_is_for() -> None:
+    assert KIND.device_name(LiftRequest(lift_name="Lift2", session_id="A")) == "Lift2"
+    assert KIND.device_name(LiftState(lift_name="Lift3")) == "Lift3"
+
+
+def test_an_end_frees_the_lift_at_once_and_releases_outputs_in_order_after_the_grace() -> None:
+    story = boarded()
+    story.ends("A")
+    story.run(10.0)
+    assert story.edges == [
+        (1.0, "agv_request", True),
+        (1.0, "hold_door", "front"),
+        (6.7, "hold_door", None),
+        (7.0, "agv_request", False),
+    ]
+    assert story.states[-2:] == [(1.0, "AGV, open at L1, A to L1"), (4.1, "AGV, open at L1")]
+
+
+def test_the_same_session_back_within_the_grace_finds_everything_as_it_was() -> None:
+    story = boarded()
+    edges = list(story.edges)
+    for _ in range(5):
+        story.ends("A")
+        story.run(story.now + 2.6)
+        story.asks("A", "L1")
+        story.run(story.now + 2.0)
+    assert story.edges == edges
+    assert story.state == "AGV, open at L1, A to L1"
+
+
+def test_nobody_else_is_granted_a_session_within_the_grace_and_anybody_afterwards() -> None:
+    story = boarded()
+    story.ends("A")
+    story.run(6.9)
+    story.asks("B", "L2")
+    assert story.node.refused == {"released a moment ago": 1}
+    assert story.state == "AGV, open at L1"
+    story.run(7.0)
+    story.asks("B", "L2")
+    story.run(8.0)
+    assert story.state == "AGV, open at L1, B to L2"
+    assert story.edges[-3:] == [
+        (7.0, "agv_request", False),
+        (7.5, "agv_request", True),
+        (7.5, "call", "L2"),
+    ]
+
+
+def test_the_grace_ends_at_its_time_even_for_a_request_that_comes_before_the_scan() -> None:
+    story = boarded()
+    story.ends("A")
+    story.run(6.9)
+    memory, rules = story.node.subject.memory, story.limits
+    assert decide(memory, Requested("B", True, "L2"), 6.99, rules).refused
+    granted = decide(memory, Requested("B", True, "L2"), 7.0, rules)
+    assert (granted.report.session, granted.memory.grace) == ("B", None)
+
+
+def test_a_second_end_does_not_prolong_the_grace() -> None:
+    story = boarded()
+    story.ends("A")
+    story.run(6.0)
+    story.ends("A")
+    story.run(10.0)
+    assert story.edges[-1] == (7.0, "agv_request", False)
+
+
+def test_nothing_that_was_off_is_energised_during_the_grace() -> None:
+    story = Story(Controller())
+    story.run(1.0)
+    story.asks("A", "L1")
+    story.run(1.3)
+    story.ends("A")  # AGV mode is granted and the car stands open to be held, but nobody asks
+    story.run(10.0)
+    assert story.edges == [(1.0, "agv_request", True), (4.3, "agv_request", False)]
+
+
+def test_a_call_is_never_energised_without_a_session() -> None:
+    story = Story(Controller())
+    story.run(1.0)
+    story.asks("A", "L4")
+    story.run(3.0)
+    story.ends("A")
+    story.run(4.0)
+    assert story.outputs == LiftOutputs(agv_request=True)
+    story.asks("A", "L4")
+    story.run(5.0)
+    assert story.edges[2:] == [(3.0, "call", None), (4.0, "call", "L4")]
+
+
+def test_a_pulse_cut_short_by_an_end_is_given_again_to_the_session_that_comes_back() -> None:
+    story = Story(Controller(), call_pulse_s=1.0)
+    story.run(1.0)
+    story.asks("A", "L4")
+    story.run(2.0)
+    story.ends("A")
+    story.run(4.0)
+    story.asks("A", "L4")
+    story.run(6.0)
+    calls = [edge for edge in story.edges if edge[1] == "call"]
+    assert calls == [(1.55, "call", "L4"), (2.0, "call", None), (4.0, "call", "L4"),
+                     (5.0, "call", None)]  # fmt: skip
+
+
+def test_a_hazard_in_the_grace_switches_outputs_off_but_a_robot_inside_gets_its_session_back() -> (
+    None
+):
+    story = boarded()
+    story.ends("A")
+    story.run(4.5)
+    story.building.hazard(Hazard.FIRE)
+    story.run(5.0)
+    assert story.outputs == LiftOutputs()
+    story.asks("B", "L2")
+    assert story.state == "FIRE, open at L1"
+    story.asks("A", "L1")
+    story.run(6.0)
+    assert story.state == "FIRE, open at L1, A to L1"
+    assert story.outputs == LiftOutputs()
+
+
+def test_nothing_is_held_again_after_a_hazard_has_ended_the_grace() -> None:
+    story = boarded()
+    story.ends("A")
+    story.building.hazard(Hazard.CODE_BLUE)
+    story.run(4.5)
+    story.building.hazard()
+    story.run(6.5)
+    assert story.edges[-2:] == [(4.1, "hold_door", None), (4.1, "agv_request", False)]
+
+
+def test_agv_mode_lost_in_the_grace_lets_the_door_go() -> None:
+    story = boarded()
+    story.ends("A")
+    story.building.set(agv=False)
+    story.run(10.0)
+    assert story.edges[2:] == [(4.1, "hold_door", None), (7.0, "agv_request", False)]
+
+
+def test_the_door_of_a_car_that_moves_in_the_grace_is_not_held() -> None:
+    story = boarded()
+    story.ends("A")
+    story.building.set(motion=Motion.UP)
+    story.run(6.0)
+    assert story.edges[2:] == [(4.1, "hold_door", None)]
+
+
+def test_agv_mode_that_ends_before_the_relay_has_rested_belongs_to_the_last_session() -> None:
+    story = Story(Building(OPEN_AT_L1), release_grace_s=0)
+    story.run(1.0)
+    story.asks("A", "L1")
+    story.run(2.0)
+    story.ends("A")
+    story.asks("B", "L1")
+    story.run(2.1)
+    story.building.set(agv=False)
+    story.run(3.0)
+    assert (story.faults, story.outputs) == ([], LiftOutputs(agv_request=True))
+
+
+def test_a_session_that_never_had_agv_mode_leaves_no_grace() -> None:
+    story = Story()
+    story.run(1.0)
+    story.asks("A", "L2", HUMAN)
+    story.run(2.0)
+    story.ends("A")
+    story.asks("B", "L2")
+    story.run(3.0)
+    assert story.state == "HUMAN, closed at L1, B to L2"
+
+
+@pytest.mark.parametrize(
+    ("hazard", "why"),
+    [
+        (Hazard.FIRE, "FIRE"),
+        (Hazard.CODE_BLUE, "CODE_BLUE"),
+        (Hazard.EARTHQUAKE, "EARTHQUAKE"),
+        (Hazard.EMERGENCY, "EMERGENCY"),
+        (Hazard.OUT_OF_SERVICE, "OUT_OF_SERVICE"),
+        (Hazard.MANUAL, "MANUAL"),
+    ],
+)
+def test_a_lift_that_is_taken_away_grants_no_session(hazard: Hazard, why: str) -> None:
+    story = Story()
+    story.building.hazard(hazard)
+    story.run(1.0)
+    story.asks("A", "L2")
+    assert story.node.refused == {why: 1}
+    assert story.told[-1][1].session_id == ""
+
+
+def test_before_the_inputs_have_settled_no_session_is_granted() -> None:
+    story = Story()
+    story.asks("A", "L2")
+    assert story.node.refused == {"inputs settle after the start": 1}
+    story.run(0.2)
+    story.asks("A", "L2")
+    assert story.outputs == LiftOutputs(agv_request=True)

@@ -1,0 +1,275 @@
+"""What does not happen in time: AGV mode, the floor, the open door, RMF's next request, an I/O."""
+
+from itertools import pairwise
+
+import pytest
+
+from bridges.kinds.lift.signals import Door, LiftOutputs, LiftSample, Motion, Side
+from bridges.messages.stamps import in_seconds
+from tests.kinds.lift.story import WALL, Building, Controller, Story
+
+HELD = LiftOutputs(agv_request=True, hold_door=Side.FRONT)
+OFF = LiftOutputs()
+
+
+def lift(level: str, door: Door, *, agv: bool, **limits: object) -> Story:
+    """A standing car, scanned twice a second, and a request for L1 at 1 s."""
+    building = Building(LiftSample(level, door, motion=Motion.STOPPED, agv=agv))
+    story = Story(building, scan_s=0.5, **limits)  # type: ignore[arg-type]
+    story.run(1.0)
+    story.asks("A", "L1")
+    return story
+
+
+def keep_asking(story: Story, until: float) -> None:
+    """RMF repeats its request each second until then."""
+    while story.now < until:
+        story.asks("A", "L1")
+        story.run(min(until, story.now + 5.0))
+
+
+def tries(story: Story, output: str) -> list[float]:
+    """When an output was switched on."""
+    return [at for at, name, value in story.edges if name == output and value]
+
+
+CASES = [
+    ("AGV_MODE_NOT_GRANTED", ("L2", Door.CLOSED, False), "agv_timeout_s", 600.0, "agv_request"),
+    ("RUNTIME_LIMIT_EXCEEDED", ("L2", Door.CLOSED, True), "floor_timeout_s", 120.0, "call"),
+    ("DOOR_OPENING_FAULT", ("L1", Door.CLOSED, True), "door_timeout_s", 10.0, "hold_door"),
+]
+
+
+@pytest.mark.parametrize(("fault", "inputs", "limit", "default_s", "output"), CASES)
+def test_a_step_that_times_out_is_a_fault_with_outputs_off(
+    fault: str, inputs: tuple[str, Door, bool], limit: str, default_s: float, output: str
+) -> None:
+    story = lift(inputs[0], inputs[1], agv=inputs[2])
+    keep_asking(story, 1.0 + default_s - 0.5)
+    assert story.faults == []
+    assert tries(story, output) == [1.0]
+    keep_asking(story, 1.0 + default_s)
+    assert story.faults == [fault]
+    assert story.outputs == OFF
+    assert story.told[-1][1].session_id == "A"
+
+
+@pytest.mark.parametrize(("fault", "inputs", "limit", "default_s", "output"), CASES)
+def test_a_failed_step_is_tried_three_times_more_and_then_latched(
+    fault: str, inputs: tuple[str, Door, bool], limit: str, default_s: float, output: str
+) -> None:
+    story = lift(inputs[0], inputs[1], agv=inputs[2], **{limit: 4.0})
+    keep_asking(story, 500.0)
+    assert tries(story, output) == [1.0, 15.0, 49.0, 113.0]
+    offs = [at for at, name, value in story.edges if name == output and not value]
+    assert offs == [5.0, 19.0, 53.0, 117.0]
+    assert (story.faults, story.outputs) == ([fault], OFF)
+
+
+def latched() -> Story:
+    """The door at L1 has not opened in four tries."""
+    story = lift("L1", Door.CLOSED, agv=True, door_timeout_s=4.0)
+    keep_asking(story, 200.0)
+    assert (story.faults, story.outputs) == (["DOOR_OPENING_FAULT"], OFF)
+    return story
+
+
+def test_a_latched_fault_ends_with_the_session() -> None:
+    story = latched()
+    story.ends("A")
+    assert story.faults == []
+    story.asks("B", "L1")
+    assert story.outputs == HELD
+
+
+def test_a_latched_fault_ends_with_an_end_though_the_same_session_is_back_at_once() -> None:
+    """An operator ends the session, and the fleet adapter asks again within a second."""
+    story = lift("L1", Door.OPEN, agv=True, door_timeout_s=4.0)
+    story.run(3.0)
+    story.building.set(door=Door.CLOSED)
+    keep_asking(story, 200.0)
+    assert (story.faults, story.outputs) == (["DOOR_OPENING_FAULT"], OFF)
+    story.ends("A")
+    story.run(200.5)
+    story.asks("A", "L1")
+    assert (story.faults, story.outputs) == ([], HELD)
+    story.building.set(agv=False, door=Door.OPEN)  # and it is still known to be inside
+    story.run(202.0)
+    assert story.state == "HUMAN, open at L1, A to L1"
+
+
+def test_a_latched_fault_ends_with_another_destination() -> None:
+    story = latched()
+    story.asks("A", "L3")
+    assert (story.faults, story.outputs) == ([], LiftOutputs(agv_request=True, call="L3"))
+
+
+def test_a_latched_fault_ends_with_an_operators_reset() -> None:
+    story = latched()
+    story.resets()
+    assert (story.faults, story.outputs) == ([], HELD)
+    keep_asking(story, 215.0)
+    assert tries(story, "hold_door")[-2:] == [200.0, 214.0]
+
+
+def test_in_a_fault_an_open_door_is_not_offered() -> None:
+    story = latched()
+    story.building.set(door=Door.OPEN)
+    keep_asking(story, 210.0)
+    assert story.state == "AGV, moving at L1, A to L1"
+
+
+def test_a_later_try_that_succeeds_ends_the_fault_and_resets_the_count() -> None:
+    story = lift("L1", Door.CLOSED, agv=True, door_timeout_s=4.0)
+    keep_asking(story, 16.0)
+    assert story.faults == ["DOOR_OPENING_FAULT"]
+    story.building.set(door=Door.OPEN)
+    keep_asking(story, 17.0)
+    assert (story.faults, story.state) == ([], "AGV, open at L1, A to L1")
+    story.building.set(door=Door.CLOSED)
+    keep_asking(story, 200.0)
+    starts = tries(story, "hold_door")
+    assert [round(b - a, 1) for a, b in pairwise(starts[2:])] == [34.0, 64.0]
+
+
+def test_agv_mode_lost_on_the_way_switches_outputs_off_and_is_requested_again() -> None:
+    story = Story(Building(LiftSample("L2", Door.CLOSED, motion=Motion.STOPPED, agv=True)))
+    story.run(1.0)
+    story.asks("A", "L1")
+    story.run(2.0)
+    story.building.set(agv=False)
+    story.run(3.0)
+    assert story.edges == [
+        (1.0, "agv_request", True),
+        (1.0, "call", "L1"),
+        (2.1, "call", None),
+        (2.1, "agv_request", False),
+    ]
+    assert (story.state, story.faults) == ("HUMAN, closed at L2, A to L1", ["AGV_MODE_LOST"])
+    story.run(13.0)
+    assert story.edges[4:] == [(12.1, "agv_request", True)]
+    story.building.set(agv=True)
+    story.run(14.0)
+    assert story.outputs == LiftOutputs(agv_request=True, call="L1")
+
+
+def test_agv_mode_lost_with_the_robot_at_the_open_door_shows_the_true_door() -> None:
+    story = lift("L1", Door.OPEN, agv=True)
+    story.run(5.0)
+    story.building.set(agv=False)
+    story.run(6.0)
+    assert (story.faults, story.outputs) == (["AGV_MODE_LOST"], OFF)
+    assert story.state == "HUMAN, open at L1, A to L1"
+
+
+def test_the_call_stays_on_while_people_take_the_car_first() -> None:
+    """Without an AGV status line nothing keeps people from stealing the car."""
+    building = Building(LiftSample("L2", Door.CLOSED, motion=Motion.STOPPED, agv=None))
+    story = Story(building)
+    story.run(1.0)
+    story.asks("A", "L1")
+    building.set(level=None, motion=Motion.UP)
+    story.run(3.0)
+    building.set(level="L4", motion=Motion.STOPPED, door=Door.OPEN)
+    story.run(6.0)
+    assert story.state == "AGV, open at L4, A to L1"
+    assert story.outputs == LiftOutputs(agv_request=True, call="L1")
+    building.set(level=None, motion=Motion.DOWN, door=Door.CLOSED)
+    story.run(9.0)
+    building.set(level="L1", motion=Motion.STOPPED)
+    story.run(10.0)
+    assert story.outputs == HELD
+    building.set(level=None, motion=Motion.UP)  # stolen with the robot still outside
+    story.run(12.0)
+    assert story.outputs == LiftOutputs(agv_request=True)
+    building.set(level="L2", motion=Motion.STOPPED)
+    story.run(13.0)
+    assert story.outputs == LiftOutputs(agv_request=True, call="L1")
+    assert story.faults == []
+
+
+def test_rmf_silent_with_the_robot_outside_lets_the_lift_go_and_keeps_the_session() -> None:
+    story = lift("L1", Door.CLOSED, agv=True, door_timeout_s=600)
+    story.run(30.5)
+    assert story.outputs == HELD
+    story.run(31.0)
+    assert (story.outputs, story.faults) == (OFF, ["RMF_SILENT"])
+    story.building.set(agv=False)
+    story.run(100.0)
+    assert story.state == "HUMAN, closed at L1, A to L1"
+    assert story.faults == ["RMF_SILENT"]
+    story.asks("A", "L1")
+    assert (story.outputs, story.faults) == (LiftOutputs(agv_request=True), [])
+    story.building.set(agv=True)
+    story.run(101.0)
+    assert (story.outputs, story.faults) == (HELD, [])
+
+
+def test_rmf_silent_with_a_robot_inside_holds_and_warns() -> None:
+    story = lift("L1", Door.OPEN, agv=True)
+    story.run(300.0)
+    assert (story.outputs, story.faults) == (HELD, ["RMF_SILENT"])
+    assert story.state == "AGV, open at L1, A to L1"
+    story.asks("A", "L1")
+    assert story.faults == []
+
+
+def test_outputs_that_cannot_be_written_soon_become_a_fault_with_all_outputs_off() -> None:
+    story = lift("L1", Door.OPEN, agv=True)
+    story.run(5.0)
+    story.building.unwritable = "no answer from the relay module"
+    story.run(6.0)
+    assert story.faults == []
+    story.run(6.5)
+    assert story.node.status()["faults"] == [
+        {"code": "OUTPUTS_NOT_WRITTEN", "detail": "no answer from the relay module"}
+    ]
+    assert story.node.status()["outputs"] == "-"
+    assert story.state == "OFFLINE, open at L1, A to L1"
+    writes = story.building.writes
+    story.run(10.0)
+    assert story.building.writes >= writes + 6
+    story.building.unwritable = ""
+    story.run(11.0)
+    assert story.edges[2:4] == [(10.5, "hold_door", None), (10.5, "agv_request", False)]
+    story.run(13.0)
+    assert (story.outputs, story.faults) == (HELD, [])
+
+
+def test_a_failed_write_is_repaired_by_the_next_one() -> None:
+    story = lift("L1", Door.OPEN, agv=True)
+    story.run(5.0)
+    for _ in range(10):
+        story.building.unwritable = "timeout"
+        story.run(story.now + 0.5)
+        story.building.unwritable = ""
+        story.run(story.now + 0.5)
+    assert story.edges == [(1.0, "agv_request", True), (1.0, "hold_door", "front")]
+    assert story.faults == []
+
+
+def test_inputs_are_believed_though_outputs_cannot_be_written() -> None:
+    story = Story(Controller())
+    story.run(1.0)
+    story.asks("A", "L1")
+    story.until(lambda: story.state == "AGV, open at L1, A to L1")
+    story.building.unwritable = "timeout"
+    story.building.driven = OFF  # the module's own watchdog has let go
+    story.run(story.now + 5.0)
+    assert story.state == "OFFLINE, closed at L1, A to L1"
+
+
+@pytest.mark.parametrize("step_s", [3600.0, -3600.0])
+def test_a_jump_of_the_wall_clock_changes_neither_timeouts_nor_ages(step_s: float) -> None:
+    straight, jumped = (
+        lift("L1", Door.CLOSED, agv=True, door_timeout_s=4.0),
+        lift("L1", Door.CLOSED, agv=True, door_timeout_s=4.0),
+    )
+    for story in (straight, jumped):
+        story.run(3.0)
+        story.wall_step_s = step_s if story is jumped else 0.0
+        story.run(29.0)
+    assert jumped.edges == straight.edges
+    assert jumped.states == straight.states
+    stamps = [in_seconds(state.lift_time) - WALL for at, state in jumped.told if at > 3.0]
+    assert stamps == pytest.approx([at + step_s for at, _ in jumped.told if at > 3.0])

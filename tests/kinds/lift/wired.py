@@ -1,0 +1,95 @@
+"""The whole lift without its pins: node, driver, wires and plant, in virtual time."""
+
+from pathlib import Path
+from typing import Any, cast
+
+import msgspec
+
+from bridges.kinds.lift.signals import LiftOutputs, LiftSample
+from bridges.settings.load import load
+from drivers import Driver
+from drivers.hal.modbus import ModbusBus
+from drivers.lift import register
+from drivers.lift.dry_contact import Settings, create, debounce, wires
+from hal_fakes.modbus import register_lift
+from hal_fakes.plants.lift import LiftPlant
+from hal_fakes.plants.plant import FailureMode
+from tests.drivers.far import PointsFar, RegisterFar
+from tests.kinds.lift.story import Building, Story
+
+SHIPPED = Path(__file__).parents[3] / "config" / "lift_dry_contact.yaml"
+
+
+def shipped() -> Settings:
+    """The shipped example of `config/`."""
+    settings = load(SHIPPED).devices["Lift1"]
+    assert isinstance(settings, Settings)
+    return settings
+
+
+class Driven(Building):
+    """Behind a driver and its bus."""
+
+    plant: LiftPlant
+    _driver: Driver[LiftSample, LiftOutputs]
+
+    def open(self) -> None:
+        self._driver.open()
+
+    def read(self) -> LiftSample:
+        super().read()
+        return self._driver.read()
+
+    def write(self, outputs: LiftOutputs) -> None:
+        super().write(outputs)
+        self._driver.write(outputs)
+
+
+class WiredBuilding(Driven):
+    """The plant at the far ends of the wires."""
+
+    def __init__(self, settings: Settings) -> None:
+        super().__init__()
+        self.plant = LiftPlant("Lift1", settings)
+        self._driver = create("Lift1", settings, PointsFar(self, self.plant, wires(settings)))
+
+    @property
+    def standing_open_at(self) -> str | None:
+        """The landing where the car really stands with its door really open."""
+        car, (door,) = self.plant.car, self.plant.doors.values()
+        return f"L{car.floor + 1}" if car.standing and door.opened else None
+
+
+class GatewayBuilding(Driven):
+    """The plant behind a gateway's registers."""
+
+    def __init__(self, settings: register.Settings) -> None:
+        super().__init__()
+        self.plant = register_lift.build("Lift1", settings)
+        bus = RegisterFar(self, register_lift.RegisterLift(self.plant, settings))
+        self._driver = register.create("Lift1", settings, cast(ModbusBus, bus))
+
+
+class WiredStory(Story):
+    """A lift in service; the shipped one if it is not said which."""
+
+    building: WiredBuilding
+
+    def __init__(self, settings: Settings | None = None, **limits: Any) -> None:
+        settings = settings or shipped()
+        super().__init__(
+            WiredBuilding(settings),
+            floors=settings.floors,
+            debounce=dict(debounce(settings)),
+            agv_mode=settings.agv_mode,
+            **{**msgspec.structs.asdict(settings.limits), **limits},
+        )
+
+    def fail(self, part: str, mode: FailureMode | None) -> None:
+        """A wire or part breaks (None: is mended)."""
+        self.building.plant.advance(self.now)
+        self.building.plant.fail(part, mode)
+
+    def press(self, what: str, asserted: bool) -> None:
+        """Somebody in the building does something."""
+        self.building.plant.press(what, asserted, self.now)

@@ -1,0 +1,66 @@
+"""The supervisor's core alone, for one lift, in virtual time: told by hand, its words written down."""
+
+from bridges.kinds.lift_supervisor import core
+from bridges.kinds.lift_supervisor.memory import Limits, Memory
+from bridges.kinds.lift_supervisor.report import SupervisorReport
+from bridges.kinds.lift_supervisor.signals import Ended, Event, Requested, StateHeard, Target
+from bridges.messages.definitions import LiftMode, LiftRequest, Message
+from tests.kinds.shared import alone
+
+MODES = {"AGV": LiftMode.MODE_AGV, "FIRE": LiftMode.MODE_FIRE, "OFFLINE": LiftMode.MODE_OFFLINE}
+TYPES = {0: "END", 1: "AGV", 2: "HUMAN"}
+
+
+def words(message: LiftRequest) -> str:
+    """`AGV a L3`, `END a L1`."""
+    name = TYPES[message.request_type]
+    return f"{name} {message.session_id} {message.destination_floor}".rstrip()
+
+
+class Alone(alone.Alone[Memory, Event, Limits, SupervisorReport]):
+    """With one lift."""
+
+    def __init__(self, limits: Limits | None = None, *, speaks: bool = True) -> None:
+        super().__init__(core.initial("Lift1", 0.0), core.decide, limits or Limits(), speaks)
+        self.skew = 0.0
+
+    def words(self, message: Message) -> str:
+        assert isinstance(message, LiftRequest)
+        return words(message)
+
+    def asks(self, session: str, floor: str = "L3", *, kind: int = 1, aged: float = 0.0) -> None:
+        """An adapter's request, sent `aged` s ago by its own clock."""
+        stamp = self.stamped(aged)
+        door = 2 if kind == 1 else 0
+        self.hears(Requested(session, Target(kind, floor, door), stamp, self.now - stamp))
+
+    def ends(self, session: str, *, aged: float = 0.0) -> None:
+        """An adapter's END."""
+        stamp = self.stamped(aged)
+        self.hears(Ended(session, stamp, self.now - stamp))
+
+    def shows(
+        self,
+        session: str = "",
+        floor: str = "L1",
+        *,
+        to: str = "",
+        open: bool = False,
+        mode: str = "AGV",
+        floors: tuple[str, ...] = (),
+    ) -> None:
+        """A LiftState."""
+        door = 2 if open else 0
+        self.hears(StateHeard(session, floor, to, door, MODES[mode], floors))
+
+    def ride(self, session: str = "a") -> None:
+        """The lift is there, for this session: nothing is left to ask for."""
+        self.shows(session, "L3", to="L3", open=True)
+
+    @property
+    def faults(self) -> list[str]:
+        return [fault.code for fault in self.report.faults]
+
+    @property
+    def waiting(self) -> list[str]:
+        return [session for session, _ in self.report.waiting]

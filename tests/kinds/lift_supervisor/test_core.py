@@ -1,0 +1,476 @@
+"""The lift supervisor's rules, one sentence each; what it sends to the lift's node, whole."""
+
+import pytest
+
+from bridges.kinds.lift_supervisor import core
+from bridges.kinds.lift_supervisor.memory import Limits
+from bridges.kinds.lift_supervisor.signals import StateHeard, Target
+from bridges.kinds.shared.freshness import MAX_REQUESTERS
+from tests.kinds.lift_supervisor.alone import Alone
+
+TO_L3 = Target(1, "L3", 2)
+
+
+# --- one robot ---------------------------------------------------------------------------------
+
+
+def test_a_first_request_is_sent_at_once_and_without_a_state_only_once() -> None:
+    desk = Alone()
+    desk.asks("a")
+    desk.until(9.0)
+    assert desk.sent == [(0.0, "AGV a L3")]
+
+
+def test_each_state_that_does_not_show_the_request_causes_a_repeat_at_1_hz_at_most() -> None:
+    desk = Alone()
+    desk.asks("a")
+    for tenth in range(1, 31):
+        desk.until(tenth / 10)
+        desk.shows("a", "L1", to="L3")
+    assert desk.sent == [(t, "AGV a L3") for t in (0.0, 1.0, 2.0, 3.0)]
+
+
+@pytest.mark.parametrize(
+    "mismatch",
+    [
+        StateHeard("", "L3", "", 2, 2),
+        StateHeard("a", "L1", "", 2, 2),
+        StateHeard("a", "L3", "L1", 2, 2),
+        StateHeard("a", "L1", "L3", 0, 2),
+        StateHeard("a", "L1", "L3", 1, 2),
+    ],
+)
+def test_any_difference_between_request_and_state_causes_a_repeat(mismatch: StateHeard) -> None:
+    desk = Alone()
+    desk.asks("a")
+    desk.until(1.0)
+    desk.hears(mismatch)
+    assert desk.sent == [(0.0, "AGV a L3"), (1.0, "AGV a L3")]
+
+
+@pytest.mark.parametrize(
+    "match", [StateHeard("a", "L3", "", 2, 2), StateHeard("a", "L1", "L3", 2, 2)]
+)
+def test_a_state_that_shows_the_request_causes_no_repeat(match: StateHeard) -> None:
+    desk = Alone()
+    desk.asks("a")
+    desk.until(1.0)
+    desk.hears(match)
+    desk.until(5.0)
+    assert desk.sent == [(0.0, "AGV a L3")]
+
+
+def test_the_holders_repeats_are_passed_on_at_1_hz_so_that_the_node_hears_that_rmf_lives() -> None:
+    desk = Alone()
+    for tenth in range(25):
+        desk.until(tenth / 10)
+        desk.ride("a")
+        desk.asks("a")
+    assert desk.sent == [(0.0, "AGV a L3"), (1.0, "AGV a L3"), (2.0, "AGV a L3")]
+
+
+def test_another_destination_goes_out_at_once_but_never_faster_than_10_hz() -> None:
+    desk = Alone()
+    for number in range(9):
+        desk.until(number * 0.03)
+        desk.asks("a", f"L{number}")
+    desk.until(1.0)
+    assert desk.sent == [
+        (0.0, "AGV a L0"),
+        (0.1, "AGV a L3"),
+        (0.2, "AGV a L6"),
+        (0.3, "AGV a L8"),
+    ]
+
+
+def test_a_human_mode_request_is_passed_on_as_it_is() -> None:
+    desk = Alone()
+    desk.asks("web", "L1", kind=2)
+    assert desk.sent == [(0.0, "HUMAN web L1")]
+
+
+def test_a_floor_that_the_lift_does_not_serve_blocks_nobody_else() -> None:
+    desk = Alone()
+    desk.shows("", floors=("L1", "L3"))
+    desk.asks("a", "L2")
+    desk.asks("b", "L3")
+    assert desk.sent == [(0.0, "AGV b L3")]
+    assert desk.refused == [(0.0, "floor not served")]
+
+
+def test_human_mode_needs_no_served_floor() -> None:
+    desk = Alone()
+    desk.shows("", floors=("L1", "L3"))
+    desk.asks("web", "", kind=2)
+    assert desk.sent == [(0.0, "HUMAN web")]
+
+
+def test_a_holder_that_asks_for_an_unserved_floor_keeps_its_request_and_counts_as_alive() -> None:
+    desk = Alone(Limits(holder_alarm_s=20.0))
+    desk.asks("a")
+    for second in range(1, 30):
+        desk.until(float(second))
+        desk.shows("a", "L3", to="L3", open=True, floors=("L1", "L3"))
+        desk.asks("a", "L9")
+    assert desk.sent == [(0.0, "AGV a L3")]
+    assert desk.faults == []
+
+
+# --- END ---------------------------------------------------------------------------------------
+
+
+def test_the_holders_end_is_sent_at_once_with_the_cars_floor() -> None:
+    desk = Alone()
+    desk.asks("a")
+    desk.shows("a", "L2", to="L3")
+    desk.until(0.5)
+    desk.ends("a")
+    assert desk.sent == [(0.0, "AGV a L3"), (0.5, "END a L2")]
+
+
+def test_an_end_is_repeated_for_each_state_that_still_shows_the_session_at_1_hz_at_the_most() -> (
+    None
+):
+    desk = Alone()
+    desk.asks("a")
+    desk.ride("a")
+    desk.until(1.0)
+    desk.ends("a")
+    desk.until(10.0)
+    for half in range(20, 29):
+        desk.until(half / 2)
+        desk.ride("a")
+    desk.shows("", "L3")
+    desk.until(60.0)
+    ends = [(t, "END a L3") for t in (1.0, 10.0, 11.0, 12.0, 13.0, 14.0)]
+    assert desk.sent == [(0.0, "AGV a L3"), *ends]
+
+
+def test_nobody_else_is_served_before_a_state_after_the_end_shows_that_it_was_obeyed() -> None:
+    desk = Alone()
+    desk.asks("a")
+    desk.asks("b", "L1")
+    desk.shows("", "L2")  # from before the grant
+    desk.ends("a")
+    desk.until(0.1)
+    for second in range(1, 4):
+        desk.until(float(second))
+        desk.asks("b", "L1")
+        desk.ride("a")
+    desk.until(3.5)
+    desk.shows("", "L3")
+    assert desk.sent == [
+        (0.0, "AGV a L3"),
+        (0.1, "END a L2"),
+        (1.1, "END a L3"),
+        (2.1, "END a L3"),
+        (3.1, "END a L3"),
+        (3.5, "AGV b L1"),
+    ]
+
+
+def test_a_state_from_before_the_end_was_sent_confirms_nothing() -> None:
+    desk = Alone()
+    desk.asks("a")
+    desk.until(0.05)
+    desk.ends("a")  # waits for its turn on the wire
+    desk.shows("", "L1")
+    desk.asks("b")
+    assert desk.report.holder == "a"
+    desk.until(0.3)
+    desk.shows("", "L1")
+    assert desk.sent == [(0.0, "AGV a L3"), (0.1, "END a L1"), (0.3, "AGV b L3")]
+
+
+def test_a_session_that_another_lift_daemon_shows_after_the_end_confirms_it_too() -> None:
+    desk = Alone()
+    desk.asks("a")
+    desk.ends("a")
+    desk.until(0.2)
+    desk.shows("b", "L1")
+    assert desk.report.holder == ""
+
+
+def test_an_end_from_a_robot_that_neither_has_nor_wants_the_lift_is_ignored() -> None:
+    desk = Alone()
+    desk.asks("a")
+    desk.ends("b")
+    desk.until(5.0)
+    assert desk.sent == [(0.0, "AGV a L3")]
+
+
+def test_an_end_of_the_session_that_the_lift_shows_is_passed_on_whoever_waits() -> None:
+    """The lift was taken without us; its robot, or an operator, gives it back."""
+    desk = Alone()
+    desk.asks("b")
+    desk.shows("a", "L2")
+    desk.until(0.5)
+    desk.ends("a")
+    desk.until(0.7)
+    desk.shows("", "L2")
+    assert desk.sent == [(0.0, "AGV b L3"), (0.5, "END a L2"), (0.7, "AGV b L3")]
+
+
+def test_an_end_while_another_session_is_being_ended_waits_for_its_repeat() -> None:
+    desk = Alone()
+    desk.asks("a")
+    desk.ends("a")
+    desk.until(0.1)
+    desk.ends("b")
+    assert desk.report.holder == "a"
+
+
+def test_a_robot_that_asks_again_after_its_end_is_served_again_in_its_turn() -> None:
+    desk = Alone()
+    desk.asks("a")
+    desk.asks("b", "L1")
+    desk.until(0.5)
+    desk.ends("a")
+    desk.until(0.6)
+    desk.asks("a", "L2")
+    desk.shows("", "L3")
+    assert desk.waiting == ["a"]
+    desk.until(1.0)
+    desk.ends("b")
+    desk.until(1.1)
+    desk.shows("", "L3")
+    assert [text for _, text in desk.sent] == [
+        "AGV a L3",
+        "END a",
+        "AGV b L1",
+        "END b L3",
+        "AGV a L2",
+    ]
+
+
+# --- the queue ---------------------------------------------------------------------------------
+
+
+def test_robots_are_served_in_the_order_of_their_first_requests() -> None:
+    desk = Alone()
+    for who in "abc":
+        desk.asks(who, f"to-{who}")
+    desk.until(0.5)
+    for who in "cba":
+        desk.asks(who, f"to-{who}")
+    assert desk.waiting == ["b", "c"]
+    for who in "abc":
+        desk.shows(who)
+        desk.until(desk.now + 0.5)
+        desk.ends(who)
+        desk.until(desk.now + 0.5)
+        desk.shows("")
+    order = [text for _, text in desk.sent if text.startswith("AGV")]
+    assert list(dict.fromkeys(order)) == ["AGV a to-a", "AGV b to-b", "AGV c to-c"]
+
+
+def test_a_robot_that_waits_in_silence_for_10_s_leaves_the_queue_and_comes_back_at_its_end() -> (
+    None
+):
+    desk = Alone()
+    desk.shows("")
+    for who in "abc":
+        desk.asks(who)
+    for second in range(1, 11):
+        desk.until(float(second))
+        desk.shows("a", "L1", to="L3")
+        desk.asks("a")
+        desk.asks("c")
+        assert desk.waiting == (["b", "c"] if second < 10 else ["c"])
+    desk.asks("b")
+    assert desk.waiting == ["c", "b"]
+
+
+def test_requesters_may_be_silent_while_the_lift_is_silent() -> None:
+    """Fleet adapters repeat themselves at its states, and at nothing else."""
+    desk = Alone(Limits(holder_ttl_s=70.0))
+    desk.asks("a")
+    desk.asks("b")
+    desk.ride("a")
+    desk.until(1000.0)
+    assert (desk.report.holder, desk.waiting, desk.faults) == ("a", ["b"], ["LIFT_SILENT"])
+    desk.ride("a")
+    assert (desk.report.holder, desk.waiting, desk.faults) == ("a", ["b"], [])
+    for second in range(1, 10):
+        desk.until(1000.0 + second)
+        desk.ride("a")
+    assert desk.waiting == ["b"]
+    desk.until(1010.0)
+    assert desk.waiting == []
+
+
+def test_a_lift_that_falls_silent_is_a_fault_to_those_who_wait_and_to_nobody_else() -> None:
+    desk = Alone()
+    desk.shows("", mode="FIRE")
+    desk.until(10.0)
+    assert desk.faults == []
+    desk.asks("a")
+    assert (desk.waiting, desk.faults) == (["a"], ["LIFT_SILENT"])
+
+
+def test_a_lift_that_was_never_heard_is_not_waited_for() -> None:
+    desk = Alone()
+    desk.asks("a")
+    desk.until(100.0)
+    assert desk.sent == [(0.0, "AGV a L3"), (10.0, "END a")]
+    assert not core.idle(desk.memory, 59.0)
+    assert core.idle(desk.memory, 60.0)
+
+
+def test_a_lift_whose_states_have_stopped_is_forgotten_unless_somebody_wants_it() -> None:
+    desk = Alone()
+    desk.shows("")
+    assert not core.idle(desk.memory, 59.0)
+    assert core.idle(desk.memory, 60.0)
+    desk.asks("a")
+    desk.shows("a")
+    desk.until(1000.0)
+    assert not core.idle(desk.memory, 1000.0)
+
+
+def test_a_robot_that_ends_while_it_waits_leaves_the_queue() -> None:
+    desk = Alone()
+    desk.asks("a")
+    desk.asks("b")
+    desk.until(1.0)
+    desk.ends("b")
+    assert desk.waiting == []
+    assert desk.sent == [(0.0, "AGV a L3")]
+
+
+def test_a_queue_has_a_maximum_length() -> None:
+    desk = Alone()
+    for number in range(core.MAX_CLAIMS + 1):
+        desk.asks(f"robot {number}")
+    assert len(desk.waiting) == core.MAX_CLAIMS - 1
+    assert desk.refused == [(0.0, "queue full")]
+
+
+def test_requesters_beyond_the_bound_are_forgotten_oldest_first() -> None:
+    desk = Alone()
+    for number in range(MAX_REQUESTERS + 1):
+        desk.ends(f"robot {number}")
+    assert len(desk.memory.requesters) == MAX_REQUESTERS
+    assert "robot 0" not in desk.memory.requesters
+
+
+# --- who really has the lift -------------------------------------------------------------------
+
+
+def test_a_session_that_the_lift_shows_goes_before_the_queue_if_its_robot_asks() -> None:
+    desk = Alone()
+    desk.asks("b", "L1")
+    desk.shows("a", "L2")
+    desk.until(0.5)
+    desk.asks("a", "L3")
+    assert (desk.report.holder, desk.waiting) == ("a", ["b"])
+    assert desk.sent == [(0.0, "AGV b L1"), (0.5, "AGV a L3")]
+
+
+def test_a_holder_is_not_ended_for_a_short_silence_although_the_lift_daemon_has_lost_the_session() -> (
+    None
+):
+    desk = Alone()
+    desk.shows("a", "L2")
+    desk.asks("a")
+    for second in range(1, 20):
+        desk.until(float(second))
+        desk.shows("", "L2")
+    assert {text for _, text in desk.sent} == {"AGV a L3"}
+
+
+def test_while_the_lift_shows_a_stranger_nobody_else_is_sent_to_it() -> None:
+    desk = Alone()
+    desk.asks("b")
+    for second in range(1, 4):
+        desk.until(float(second))
+        desk.shows("a", "L2")
+        desk.asks("b")
+    assert desk.sent == [(0.0, "AGV b L3")]
+
+
+def test_a_session_that_no_robot_requests_for_3_s_is_ended() -> None:
+    desk = Alone()
+    for second in range(5):
+        desk.until(float(second))
+        desk.shows("a", "L2")
+    desk.until(5.0)
+    desk.shows("", "L2")
+    assert desk.sent == [(3.0, "END a L2"), (4.0, "END a L2")]
+
+
+def test_a_strangers_session_gets_its_3_s_again_after_the_lift_was_silent() -> None:
+    desk = Alone()
+    desk.shows("a")
+    desk.until(1.0)
+    desk.shows("a")
+    desk.until(60.0)
+    assert desk.sent == []
+    desk.shows("a")
+    desk.until(62.9)
+    desk.shows("a")
+    assert desk.sent == []
+    desk.until(63.0)
+    desk.shows("a")
+    assert desk.sent == [(63.0, "END a L1")]
+
+
+def test_a_holder_whose_session_the_node_has_lost_in_a_restart_is_asked_for_again() -> None:
+    desk = Alone()
+    desk.asks("a")
+    desk.ride("a")
+    desk.until(5.0)
+    desk.shows("", "L3")
+    assert desk.sent == [(0.0, "AGV a L3"), (5.0, "AGV a L3")]
+
+
+# --- who has gone ------------------------------------------------------------------------------
+
+
+def test_a_holder_that_the_lift_never_took_and_that_is_silent_for_10_s_is_ended() -> None:
+    desk = Alone()
+    desk.shows("")
+    desk.asks("a")
+    for second in range(1, 12):
+        desk.until(float(second))
+        desk.shows("", "L1")
+        desk.asks("b", "L1")
+    asked = [(float(second), "AGV a L3") for second in range(10)]
+    assert desk.sent == [*asked, (10.0, "END a L1"), (10.1, "AGV b L1")]
+
+
+def test_a_silent_holder_keeps_the_lift_and_raises_an_alarm_after_a_minute() -> None:
+    desk = Alone()
+    desk.asks("a")
+    desk.ride("a")
+    for second in range(1, 3600):
+        desk.until(float(second))
+        desk.ride("a")
+        assert desk.faults == (["HOLDER_SILENT"] if second >= 60 else [])
+    assert desk.sent == [(0.0, "AGV a L3")]
+    desk.asks("a")
+    assert desk.faults == []
+
+
+def test_where_the_site_wants_it_a_silent_holder_is_ended_after_its_time() -> None:
+    desk = Alone(Limits(holder_ttl_s=120.0))
+    desk.asks("a")
+    desk.ride("a")
+    for second in range(1, 122):
+        desk.until(float(second))
+        desk.ride("a")
+    assert desk.sent == [(0.0, "AGV a L3"), (120.0, "END a L3"), (121.0, "END a L3")]
+
+
+def test_a_lift_that_does_not_take_the_holder_or_does_not_release_it_raises_an_alarm() -> None:
+    desk = Alone()
+    for second in range(31):
+        desk.until(float(second))
+        desk.shows("")
+        desk.asks("a")
+    assert desk.faults == ["NOT_GRANTED"]
+    desk.ends("a", aged=-0.5)
+    for second in range(31, 62):
+        desk.until(float(second))
+        desk.shows("a")
+        assert desk.faults == (["END_NOT_OBEYED"] if second >= 60 else [])

@@ -1,0 +1,199 @@
+"""What holds the supervisor back: hazards, a quiet start, another supervisor, stale requests."""
+
+import pytest
+from msgspec.structs import replace
+
+from bridges.kinds.lift_supervisor import core
+from bridges.kinds.lift_supervisor.memory import Claim, Limits
+from bridges.kinds.lift_supervisor.report import SupervisorReport
+from bridges.kinds.lift_supervisor.signals import Requested, Target
+from bridges.kinds.shared.graph_kind import MaySpeak
+from tests.kinds.lift_supervisor.alone import Alone
+
+TO_L3 = Target(1, "L3", 2)
+
+
+# --- hazards -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("mode", ["FIRE", "OFFLINE"])
+def test_in_a_hazard_nobody_is_sent_and_no_queue_moves(mode: str) -> None:
+    desk = Alone()
+    desk.shows("", mode=mode)
+    desk.asks("a")
+    for second in range(1, 40):
+        desk.until(float(second))
+        desk.shows("", mode=mode)
+        desk.asks("a")
+    assert (desk.sent, desk.waiting, desk.faults) == ([], ["a"], [])
+    desk.until(40.0)
+    desk.shows("")
+    assert desk.sent == [(40.0, "AGV a L3")]
+
+
+def test_in_a_hazard_a_holders_request_is_held_back_and_its_end_is_not() -> None:
+    desk = Alone()
+    desk.asks("a")
+    for second in range(1, 40):
+        desk.until(float(second))
+        desk.shows("a", "L1", to="L3", mode="FIRE")
+        desk.asks("a", "L1")
+    assert (desk.sent, desk.faults) == ([(0.0, "AGV a L3")], [])
+    desk.ends("a", aged=-0.1)
+    desk.until(40.0)
+    desk.shows("a", "L1", to="L3", mode="FIRE")
+    assert desk.sent == [(0.0, "AGV a L3"), (39.0, "END a L1"), (40.0, "END a L1")]
+
+
+def test_a_holder_not_yet_taken_when_the_hazard_came_is_sent_when_it_is_over() -> None:
+    desk = Alone()
+    desk.asks("a")
+    for second in range(1, 40):
+        desk.until(float(second))
+        desk.shows("", mode="FIRE")
+        desk.asks("a")
+    assert (desk.sent, desk.faults) == ([(0.0, "AGV a L3")], [])
+    desk.until(40.0)
+    desk.shows("")
+    assert desk.sent == [(0.0, "AGV a L3"), (40.0, "AGV a L3")]
+
+
+def test_a_holders_human_mode_is_passed_on_in_a_hazard() -> None:
+    desk = Alone()
+    desk.asks("a")
+    desk.shows("a", "L1", to="L3", mode="FIRE")
+    desk.until(1.0)
+    desk.asks("a", "L1", kind=2)
+    assert desk.sent == [(0.0, "AGV a L3"), (1.0, "HUMAN a L1")]
+
+
+# --- while it may not speak --------------------------------------------------------------------
+
+
+def test_after_its_quiet_start_it_continues_the_ride_that_it_finds() -> None:
+    desk = Alone(speaks=False)
+    desk.asks("b", "L1")
+    for second in (0.5, 1.5, 2.5):
+        desk.until(second)
+        desk.shows("a", "L1", to="L3")
+        desk.asks("a")
+    assert desk.sent == []
+    desk.until(3.0)
+    desk.hears(MaySpeak(True))
+    assert (desk.report.holder, desk.waiting) == ("a", ["b"])
+    assert desk.sent == [(3.0, "AGV a L3")]
+
+
+def test_a_session_shown_throughout_the_quiet_time_and_asked_for_by_nobody_is_ended_after_it() -> (
+    None
+):
+    desk = Alone(speaks=False)
+    for second in (0.0, 1.0, 2.0, 3.0):
+        desk.until(second)
+        desk.shows("a", "L2")
+    desk.hears(MaySpeak(True))
+    assert desk.sent == [(3.0, "END a L2")]
+
+
+def test_an_end_in_the_quiet_time_removes_the_robots_claim() -> None:
+    desk = Alone(speaks=False)
+    desk.asks("a")
+    desk.until(1.0)
+    desk.ends("a")
+    desk.hears(MaySpeak(True))
+    desk.until(5.0)
+    assert desk.sent == []
+
+
+def test_beside_another_supervisor_it_falls_silent_and_goes_on_from_what_it_sees_afterwards() -> (
+    None
+):
+    desk = Alone()
+    desk.asks("a")
+    desk.ride("a")
+    desk.until(1.0)
+    desk.hears(MaySpeak(False))
+    assert desk.report.holder == ""
+    for second in range(2, 6):
+        desk.until(float(second))
+        desk.shows("b", "L1")
+        desk.asks("b", "L1")
+        desk.asks("a", "L2")
+    desk.hears(MaySpeak(True))
+    assert (desk.report.holder, desk.waiting) == ("b", ["a"])
+    assert desk.sent == [(0.0, "AGV a L3"), (5.0, "AGV b L1")]
+
+
+def test_nothing_is_sent_before_sending_is_allowed() -> None:
+    assert not core.initial("Lift1", 0.0).may_speak
+
+
+# --- stale requests ----------------------------------------------------------------------------
+
+
+def test_requests_from_before_our_start_count_once_they_are_repeated() -> None:
+    desk = Alone()
+    desk.skew = -3600.0
+    desk.asks("a", "L1", aged=60.0)
+    desk.asks("a", "L2", aged=30.0)
+    assert (desk.sent, desk.refused) == ([], [(0.0, "stale request")] * 2)
+    desk.until(1.0)
+    desk.asks("a", "L3")
+    assert desk.sent == [(1.0, "AGV a L3")]
+
+
+def test_a_request_older_than_its_requesters_newest_is_stale() -> None:
+    desk = Alone()
+    desk.until(10.0)
+    desk.asks("a", "L3")
+    desk.asks("a", "L1", aged=2.0)
+    desk.until(11.0)
+    assert desk.sent == [(10.0, "AGV a L3")]
+    assert desk.refused == [(10.0, "stale request")]
+
+
+def test_with_synchronised_clocks_a_young_request_from_before_our_start_counts_at_once() -> None:
+    desk = Alone(Limits(clock_synchronised=True))
+    desk.asks("a", "L3", aged=9.0)
+    desk.asks("b", "L3", aged=11.0)
+    desk.until(60.0)
+    desk.asks("a", "L1", aged=11.0)
+    assert [text for _, text in desk.sent] == ["AGV a L3", "END a"]
+    assert desk.refused == [(0.0, "stale request"), (60.0, "stale request")]
+
+
+def test_a_request_from_the_future_is_not_believed_in_the_quiet_time() -> None:
+    """Our clock is not set yet: all that is replayed looks new."""
+    desk = Alone(speaks=False)
+    desk.skew = 3600.0
+    desk.asks("a")
+    desk.hears(MaySpeak(True))
+    desk.asks("b")
+    assert desk.sent == [(0.0, "AGV b L3")]
+
+
+# --- the report --------------------------------------------------------------------------------
+
+
+def test_the_report_says_who_holds_who_waits_and_since_when() -> None:
+    desk = Alone()
+    assert desk.report == SupervisorReport(None)
+    desk.until(1.0)
+    desk.asks("a")
+    desk.until(2.0)
+    desk.asks("b")
+    desk.shows("a")
+    waiting = (("b", 2.0),)
+    held = SupervisorReport(2.0, "a", "a", 1.0, False, waiting, waits="for END of a")
+    assert desk.report == held
+    desk.until(3.0)
+    desk.ends("a")
+    ending = replace(held, since=3.0, ending=True, waits="for the lift to release a")
+    assert desk.report == ending
+    assert desk.report.news() == ("a", "a", True, ("b",))
+
+
+def test_a_request_is_remembered_as_it_was_last_asked() -> None:
+    desk = Alone()
+    desk.hears(Requested("a", TO_L3, 1.0, 0.0))
+    assert desk.memory.claims == (Claim("a", TO_L3, 0.0, 0.0),)

@@ -1,0 +1,68 @@
+"""Two supervisors that begin at the same moment, as after a power cut: one of them serves."""
+
+from collections import deque
+from collections.abc import Callable
+from typing import Any
+
+from bridges.kinds.lift_supervisor import KIND
+from bridges.kinds.lift_supervisor.settings import Settings
+from bridges.messages.topics import Topic
+from bridges.rmf.memory import MemoryNetwork, MemoryTransport
+from bridges.rmf.transport import Subscription
+from bridges.serve.clock import Clock
+from bridges.serve.graph import GraphNode
+
+DISCOVERY_S = 0.3
+STEP_S = 0.05
+
+
+class Late:
+    """A subscription that sees a publisher DISCOVERY_S after it has come or gone, as on a network."""
+
+    def __init__(self, end: Subscription) -> None:
+        self._end = end
+        self._seen: deque[int] = deque([0], maxlen=round(DISCOVERY_S / STEP_S))
+
+    def look(self) -> None:
+        self._seen.append(self._end.matched())
+
+    def matched(self) -> int:
+        return self._seen[0]
+
+    def senders(self) -> list[str]:
+        return self._end.senders()
+
+
+class LateTransport(MemoryTransport):
+    """A node whose view of the graph lags."""
+
+    def __init__(self, network: MemoryNetwork, name: str) -> None:
+        super().__init__(network, name)
+        self.ends: list[Late] = []
+
+    def subscribe(  # type: ignore[override]
+        self, topic: Topic[Any], received: Callable[[Any], None], *, others_only: bool = False
+    ) -> Late:
+        self.ends.append(Late(super().subscribe(topic, received, others_only=others_only)))
+        return self.ends[-1]
+
+
+def test_of_two_supervisors_that_start_at_once_exactly_one_serves_in_the_end() -> None:
+    now = 0.0
+    network = MemoryNetwork()
+    transports = [LateTransport(network, name) for name in ("one", "two")]
+    clock = Clock(lambda: now, lambda: now)
+    nodes = [GraphNode(KIND, Settings(), transport, clock) for transport in transports]
+    for node in nodes:
+        node.subscribe()
+    speaking: list[int] = []
+    while now < 60.0:
+        for transport in transports:
+            for end in transport.ends:
+                end.look()
+        for node in nodes:
+            node.round()
+        speaking.append(sum(node.presence.may_speak for node in nodes))
+        now += STEP_S
+    assert 2 in speaking, "they did begin at once"
+    assert set(speaking[round(30.0 / STEP_S) :]) == {1}

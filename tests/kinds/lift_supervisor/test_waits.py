@@ -1,0 +1,69 @@
+"""Every history to a depth: whoever asks for a lift is passed on to it, or the report says why not.
+
+Nine moves: two robots ask, one ends, states of the lift, leave to speak, silence. All 9^5 = 59,049
+histories of five; but for `make deep` all 9^4 = 6,561 of four. Judged from what was sent and what is
+reported.
+"""
+
+from collections.abc import Callable
+from copy import copy
+
+from bridges.kinds.shared.graph_kind import LISTENS, MaySpeak
+from tests.depth import depth
+from tests.kinds.lift_supervisor.alone import Alone
+from tests.walk import histories
+
+Move = Callable[[Alone], None]
+
+MOVES: list[Move] = [
+    lambda one: one.asks("a", "L3"),
+    lambda one: one.asks("b", "L1"),
+    lambda one: one.ends("a"),
+    lambda one: one.shows(),
+    lambda one: one.shows("a", to="L3"),
+    lambda one: one.shows("b", "L1", to="L1", open=True),
+    lambda one: one.shows(mode="FIRE"),
+    lambda one: one.hears(MaySpeak(not one.memory.may_speak, waits="for the rival")),
+    lambda one: one.until(one.now + 12.0),
+]
+PACE_S = 0.2
+"""Longer than the least time between two messages."""
+
+
+def after(one: Alone, move: Move) -> Alone:
+    one = copy(one)
+    one.sent, one.refused = [*one.sent], [*one.refused]
+    move(one)
+    one.until(one.now + PACE_S)
+    check(one)
+    return one
+
+
+def check(one: Alone) -> None:
+    """A request is served while it was the last that went out; it waits while it was not."""
+    last = one.sent[-1][1] if one.sent else ""
+    unserved = [c for c in one.memory.claims if last != f"AGV {c.session} {c.target.floor}"]
+    assert bool(one.report.waits) >= bool(unserved), one.report
+    assert bool(one.report.waits) >= bool(one.waiting), one.report
+    assert bool(one.memory.claims) >= bool(one.report.waits)
+
+
+def test_in_every_history_whoever_waits_is_told_for_what() -> None:
+    said = {
+        one.report.waits for one, _ in histories(Alone(speaks=False), MOVES, depth(4, 5), after)
+    }
+    assert said == {
+        "",
+        LISTENS,
+        "for the rival",
+        "for the lift to release a",
+        "for the lift to release b",
+        "for the lift to take a",
+        "for the lift to take b",
+        "for END of a",
+        "for END of b",
+        "for a request or the end of a, which the lift shows",
+        "for a request or the end of b, which the lift shows",
+        "for the end of the lift's FIRE mode",
+        "for the lift's states",
+    }

@@ -1,0 +1,179 @@
+"""A lift's part of the graph in virtual time: its node on a lift that works, riders, supervisors.
+
+The supervisor is ours as it is served, or the stand-in for RMF's. The lift node is ours as it is
+served (Node). The fleet adapters are RMF's rules.
+"""
+
+from typing import Any
+
+from bridges.kinds.lift import KIND as LIFT
+from bridges.kinds.lift.settings import LiftSettings
+from bridges.kinds.lift_supervisor import KIND as SUPERVISOR
+from bridges.kinds.lift_supervisor.settings import Settings
+from bridges.messages.definitions import Message
+from bridges.messages.topics import LIFT_REQUESTS, LIFT_STATES, Topic
+from bridges.rmf_rules.phases import EndLiftSession, RequestLift
+from bridges.rmf_rules.robot import Phase, Robot
+from bridges.rmf_rules.supervisors import LiftSupervisor
+from bridges.serve.clock import Clock
+from bridges.serve.device import Node
+from tests.kinds.lift.story import Controller
+from tests.kinds.lift_supervisor.alone import words
+from tests.serve.virtual_graph import EPOCH, NEVER, Served, StandIn, World, say
+
+FLOORS = ["L1", "L2", "L3"]
+
+
+def requests(world: World) -> list[tuple[float, str]]:
+    """What was sent to the lift's node: (s, words)."""
+    return [(at, words(message)) for at, _, message in world.said_on(LIFT_REQUESTS)]
+
+
+def sessions(world: World) -> list[tuple[float, str]]:
+    """Whom the lift has shown: (s, session), each time that it differs."""
+    shown = [(0.0, "")]
+    for at, _, state in world.said_on(LIFT_STATES):
+        if state.session_id != shown[-1][1]:
+            shown.append((at, state.session_id))
+    return shown[1:]
+
+
+class OurSupervisor(Served):
+    """The supervisor of this repository."""
+
+    def __init__(
+        self,
+        world: World,
+        settings: Settings | None = None,
+        name: str = "supervisor",
+        wall_skew: float = 0.0,
+    ) -> None:
+        super().__init__(world, SUPERVISOR, settings or Settings(), name, wall_skew)
+
+
+class RmfsSupervisor(StandIn):
+    """RMF's own supervisor, by its rules."""
+
+    def __init__(self, world: World) -> None:
+        super().__init__(world, LiftSupervisor, "rmf_supervisor", LIFT_REQUESTS)
+
+
+class LiftNode:
+    """Our lift node, scanning a lift that works."""
+
+    SCAN_S = 0.25
+
+    def __init__(self, world: World, name: str = "Lift1") -> None:
+        self.name = name
+        self.world = world
+        self.lift = Controller(FLOORS)
+        self.settings = LiftSettings(floors=FLOORS)
+        world.add(self, LIFT_REQUESTS)
+        self.restart()
+
+    def restart(self) -> None:
+        """A new daemon: outputs off, nothing remembered."""
+        clock = Clock(lambda: self.world.now, lambda: EPOCH + self.world.now)
+        limits = LIFT.limits(self.settings, {})
+        self.lift.advance(self.world.now)
+        self.lift.make_safe()
+        self.node = Node(self.name, LIFT, self.settings, limits, self.lift, self._say, clock)
+        self._scan_at = self.world.now
+        self.wake()
+
+    def _say(self, topic: Topic[Any], message: Message) -> None:
+        self.world.send(self.name, topic, message)
+
+    def hear(self, topic: Topic[Any], message: Any) -> None:
+        if message.lift_name == self.name:
+            event = self.node.event(topic, message)
+            self._scan(*([] if event is None else [event]))
+
+    def wake_at(self) -> float:
+        return self._scan_at
+
+    def wake(self) -> None:
+        self._scan()
+
+    def _scan(self, *events: Any) -> None:
+        self.lift.advance(self.world.now)
+        self.node.scan(events)
+        next_at = min(self.node.wake_at, self.world.now + self.SCAN_S)
+        self._scan_at = max(next_at, self.world.now + 0.001)
+
+
+class Rider:
+    """A robot with its fleet adapter: it rides each of its trips, then is done.
+
+    `skew`: its clock is ahead of ours (s). `rode`: (s, trip) of each ride that has ended.
+    """
+
+    ENTER_S = 3.0
+    REST_S = 3.0
+
+    def __init__(
+        self,
+        world: World,
+        name: str,
+        *trips: tuple[str, str],
+        starts_at: float = 5.0,
+        skew: float = 0.0,
+    ) -> None:
+        self.name = name
+        self.world = world
+        self.skew = skew
+        self.trips = list(trips)
+        self.rode: list[tuple[float, tuple[str, str]]] = []
+        self.robot = Robot(name)
+        self._step = 0
+        self._next_at = starts_at
+        world.add(self, LIFT_STATES)
+
+    @property
+    def done(self) -> bool:
+        return not self.trips
+
+    def restart(self) -> None:
+        """A new fleet adapter, which sends its robot on the same trip once more, from the start."""
+        self.world.retained.pop(self.name, None)
+        self.robot = Robot(self.name)
+        self._step = 0
+        self._next_at = NEVER if self.done else self.world.now + 2.0
+
+    def die(self) -> None:
+        """It sends nothing any more, and what it retained is gone."""
+        self.world.retained.pop(self.name, None)
+        self.world.hearers[LIFT_STATES.name].discard(self.name)
+        self._next_at = NEVER
+
+    def hear(self, topic: Topic[Any], message: Any) -> None:
+        running = not self.robot.done
+        say(self.world, self.name, self.robot.hear(message, self._clock))
+        if running and self.robot.done:
+            self._step += 1
+            self._next_at = self.world.now + self.ENTER_S
+
+    def wake_at(self) -> float:
+        return self._next_at
+
+    def wake(self) -> None:
+        self._next_at = NEVER
+        if self._step == 3:
+            self.rode.append((round(self.world.now, 3), self.trips.pop(0)))
+            self._step = 0
+            self._next_at = NEVER if self.done else self.world.now + self.REST_S
+            return
+        self.robot.in_car = self._step == 1
+        say(self.world, self.name, self.robot.begin(self._phase(), self._clock))
+
+    @property
+    def _clock(self) -> float:
+        return EPOCH + self.world.now + self.skew
+
+    def _phase(self) -> Phase:
+        pickup, target = self.trips[0]
+        return [
+            RequestLift("Lift1", pickup, inside=False),
+            RequestLift("Lift1", target, inside=True),
+            EndLiftSession("Lift1"),
+        ][self._step]

@@ -1,0 +1,62 @@
+"""The core of a kind without hardware, alone in virtual time: told by hand, its words written down."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from typing import Generic, TypeVar
+
+from bridges.kinds.shared.decision import Decision, Report
+from bridges.kinds.shared.graph_kind import MaySpeak, Woken
+from bridges.messages.definitions import Message
+
+M = TypeVar("M")
+L = TypeVar("L")
+R = TypeVar("R", bound=Report)
+E = TypeVar("E")
+
+
+class Alone(ABC, Generic[M, E, L, R]):
+    """`sent`: (s, words) of each message; `refused`: (s, why). Requesters' clocks: ours plus `skew`."""
+
+    def __init__(
+        self,
+        memory: M,
+        decide: Callable[[M, E | MaySpeak | Woken, float, L], Decision[M, None, R]],
+        limits: L,
+        speaks: bool,
+    ) -> None:
+        self.memory = memory
+        self.limits = limits
+        self.now = 0.0
+        self.skew = 100.0
+        self.wake_at = 0.0
+        self.report: R
+        self.sent: list[tuple[float, str]] = []
+        self.refused: list[tuple[float, str]] = []
+        self._decide = decide
+        self.hears(MaySpeak(speaks))
+
+    @abstractmethod
+    def words(self, message: Message) -> str:
+        """A message in short; "" for one that is not noted."""
+
+    def hears(self, event: E | MaySpeak | Woken) -> None:
+        """One decision, now."""
+        decided = self._decide(self.memory, event, self.now, self.limits)
+        self.memory, self.report, self.wake_at = decided.memory, decided.report, decided.wake_at
+        at = round(self.now, 3)
+        words = [self.words(message) for _, message in decided.publish]
+        self.sent += [(at, word) for word in words if word]
+        if decided.refused:
+            self.refused.append((at, decided.refused))
+
+    def until(self, at: float) -> None:
+        """Time passes; the core is woken when it wants to be."""
+        while self.wake_at <= at:
+            self.now = self.wake_at
+            self.hears(Woken())
+            assert self.wake_at > self.now, "it wants to be woken at once, for ever"
+        self.now = at
+
+    def stamped(self, aged: float) -> float:
+        """When a requester sent what is `aged` s old, by its own clock (s)."""
+        return self.now + self.skew - aged

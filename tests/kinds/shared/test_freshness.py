@@ -1,0 +1,158 @@
+"""Which of an adapter's requests count, by its own stamps and by our clock."""
+
+import math
+
+import pytest
+
+from bridges.kinds.shared.decision import RequestRefused
+from bridges.kinds.shared.freshness import Requester, Rules, in_ns
+from bridges.messages.definitions import Time
+
+STAMP = 1_800_000_000.0
+STARTED = Rules(most_s=5.0)
+"""We started 5 s ago."""
+
+
+class Clocked:
+    """One requester, whose clock is `skew` s ahead of ours."""
+
+    def __init__(self, rules: Rules = STARTED, skew: float = 0.0) -> None:
+        self.rules = rules
+        self.skew = skew
+        self.requester = Requester()
+
+    def at(self, now: float, *, sent: float | None = None, ends: bool = False) -> bool:
+        """A message arrives `now`; it was `sent` at that time of ours (s), or just now."""
+        sent = now if sent is None else sent
+        stamp = STAMP + sent + self.skew
+        age_s = now - sent - self.skew
+        self.requester, counts = self.requester.hears(stamp, age_s, now, self.rules, ends=ends)
+        return counts
+
+
+def test_a_request_sent_after_our_start_counts_at_once() -> None:
+    requester = Clocked()
+    assert [requester.at(0.0), requester.at(0.0, sent=0.1), requester.at(9.0, sent=1.0)] == [
+        True,
+        True,
+        True,
+    ]
+
+
+def test_a_request_that_is_not_newer_than_the_last_one_that_counted_does_not_count() -> None:
+    requester = Clocked()
+    assert requester.at(2.0)
+    assert not requester.at(2.0)
+    assert not requester.at(2.1, sent=1.0)
+    assert requester.at(2.2)
+
+
+def test_a_hundred_replayed_requests_do_not_count_but_a_live_repeat_does() -> None:
+    requester = Clocked(skew=-3600.0)
+    replay = [requester.at(0.1, sent=-100.0 + number) for number in range(100)]
+    assert replay == [False] * 100
+    assert [requester.at(1.0), requester.at(1.2), requester.at(1.3)] == [False, True, True]
+
+
+def test_a_requester_that_has_counted_once_is_known_and_may_be_silent_for_long() -> None:
+    requester = Clocked(skew=-3600.0)
+    assert [requester.at(0.0), requester.at(1.0), requester.at(900.0)] == [False, True, True]
+
+
+def test_with_synchronised_clocks_an_old_request_is_stale_even_from_a_known_requester() -> None:
+    requester = Clocked(Rules(most_s=10.0, known_clocks=False))
+    assert requester.at(0.0, sent=-9.0)
+    assert not requester.at(100.0, sent=89.0)
+    assert requester.at(100.5)
+
+
+def test_a_request_from_the_future_counts_unless_a_limit_is_set() -> None:
+    assert Clocked(skew=300.0).at(0.0)
+    assert Clocked(Rules(5.0, future_s=2.0), skew=1.9).at(0.0)
+    assert not Clocked(Rules(5.0, future_s=2.0), skew=2.1).at(0.0)
+
+
+def test_an_end_is_compared_with_earlier_ends_only() -> None:
+    """An operator ends a robot's session by another clock than the robot's."""
+    requester = Clocked()
+    assert requester.at(100.0)
+    assert requester.at(100.0, sent=95.0, ends=True)
+    assert not requester.at(100.5, sent=95.0, ends=True)
+    assert not requester.at(100.6, sent=94.0, ends=True)
+    assert requester.at(101.0)
+
+
+def test_an_end_makes_earlier_requests_stale() -> None:
+    requester = Clocked()
+    assert requester.at(10.0, ends=True)
+    assert not requester.at(10.1, sent=9.0)
+
+
+def test_a_requester_whose_clock_is_set_back_is_believed_after_a_second() -> None:
+    requester = Clocked()
+    assert requester.at(10.0, ends=True)
+    requester.skew = -3600.0
+    assert [requester.at(11.0), requester.at(11.9), requester.at(12.0)] == [False, False, True]
+    assert [requester.at(12.1), requester.at(13.0, ends=True)] == [True, True]
+
+
+def test_ends_by_a_clock_that_was_set_back_count_once_repeated() -> None:
+    requester = Clocked()
+    assert requester.at(10.0, ends=True)
+    requester.skew = -3600.0
+    assert [requester.at(t, ends=True) for t in (11.0, 11.5, 12.0, 12.5)] == [
+        False,
+        False,
+        True,
+        True,
+    ]
+
+
+def test_an_end_that_counted_by_its_repeats_does_not_count_again() -> None:
+    requester = Clocked(skew=-3600.0)
+    assert [requester.at(t, ends=True) for t in (0.0, 1.0)] == [False, True]
+    assert not requester.at(1.1, sent=1.0, ends=True)
+
+
+def test_an_end_by_a_slower_clock_counts_after_requests_that_counted_by_their_repeats() -> None:
+    requester = Clocked(skew=-3600.0)
+    assert [requester.at(0.0), requester.at(1.0)] == [False, True]
+    assert requester.at(1.5, sent=0.5, ends=True)
+
+
+def test_late_echoes_out_of_order_are_never_taken_for_a_live_requester() -> None:
+    requester = Clocked()
+    assert requester.at(60.0)
+    echoes = [requester.at(61.0 + number, sent=50.0 - number) for number in range(10)]
+    assert echoes == [False] * 10
+
+
+def test_echoes_far_apart_are_never_taken_for_a_live_requester() -> None:
+    requester = Clocked()
+    assert requester.at(60.0)
+    assert [requester.at(t, sent=t / 10) for t in (61.0, 64.1, 67.2)] == [False] * 3
+
+
+def test_a_requester_without_stamps_counts_when_it_repeats_itself() -> None:
+    requester, counted = Requester(), []
+    for now in (50.0, 50.5, 51.0, 52.0, 53.0):
+        requester, counts = requester.hears(0.0, STAMP + now, now, STARTED, ends=False)
+        counted.append(counts)
+    assert counted == [False, False, True, True, True]
+
+
+def test_a_requester_never_heard_has_no_stamps() -> None:
+    assert Requester() == Requester(*[-math.inf] * 6)
+
+
+def test_a_requester_that_counts_by_its_repeats_is_remembered_from_then_on() -> None:
+    requester = Clocked(skew=-3600.0)
+    assert [requester.at(100.0), requester.at(101.0)] == [False, True]
+    assert requester.requester.heard_at == 101.0
+
+
+def test_an_impossible_stamp_is_refused_and_a_missing_one_is_not() -> None:
+    assert [in_ns(Time(0, 0)), in_ns(Time(1, 999_999_999))] == [0, 1_999_999_999]
+    for stamp, text in ((Time(-1, 0), "-1 s 0 ns"), (Time(0, 10**9), "0 s 1000000000 ns")):
+        with pytest.raises(RequestRefused, match=f"^impossible request_time: {text}$"):
+            in_ns(stamp)
