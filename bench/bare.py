@@ -7,7 +7,7 @@ import threading
 from bridges.kinds.shared.rmf_section import Rmf
 from bridges.messages.definitions import LiftRequest, LiftState
 from bridges.messages.topics import LIFT_REQUESTS, LIFT_STATES
-from bridges.rmf.choose import open_transport
+from bridges.transports.choose import open_transport
 from hal_fakes.wire import Wire
 
 

@@ -14,8 +14,8 @@ import yaml
 
 from bench.figures import Row
 from bridges.kinds.shared.rmf_section import Rmf
-from bridges.rmf.choose import open_transport
-from bridges.rmf.transport import Transport
+from bridges.transports.choose import open_transport
+from bridges.transports.transport import Transport
 from hal_fakes.wire import Wire
 
 Content = dict[str, Any]

@@ -16,8 +16,8 @@ from msgspec.structs import replace
 from bench.daemons import DOMAIN, cpu_s, daemon, memory_mb, ready, shipped
 from bridges.messages.definitions import LiftRequest, LiftState
 from bridges.messages.topics import LIFT_REQUESTS, LIFT_STATES
-from bridges.rmf.dds import DdsTransport
-from bridges.rmf.transport import Publisher
+from bridges.transports.dds.transport import DdsTransport
+from bridges.transports.transport import Publisher
 
 SECONDS = 60.0
 A_SECOND = 10_000

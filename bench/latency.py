@@ -26,9 +26,9 @@ from bench.daemons import (
 from bench.figures import Rows, Tables, compared
 from bridges.messages.definitions import LiftMode, LiftRequest, LiftRequestType, LiftState
 from bridges.messages.topics import LIFT_REQUESTS, LIFT_STATES
-from bridges.rmf.choose import missing_of_ros
-from bridges.rmf.transport import Transport
 from bridges.settings.load import load
+from bridges.transports.choose import missing_of_ros
+from bridges.transports.transport import Transport
 from drivers.hal.gpio import canonical
 from drivers.lift.dry_contact import Settings, wires
 from hal_fakes.caller import Caller

@@ -17,7 +17,7 @@ from rclpy.executors import ExternalShutdownException
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from rmf_lift_msgs.msg import LiftRequest, LiftState
 
-from bridges.rmf.cyclone import LOOPBACK
+from bridges.transports.cyclone import LOOPBACK
 
 
 def main(domain: int) -> None:

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Final
 
-from bridges.rmf.zenoh_config import LOOPBACK_PORT
+from bridges.transports.zenoh.config import LOOPBACK_PORT
 
 DOMAINS: Final = range(10, 70)
 """`bench/` has those from 70 on; above 101 the ports reach into those that Linux hands to clients."""

@@ -4,8 +4,8 @@ import os
 from typing import Literal
 
 from bridges.kinds.shared.rmf_section import Rmf
-from bridges.rmf.choose import missing_of_dds, open_transport
-from bridges.rmf.transport import Transport, TransportError
+from bridges.transports.choose import missing_of_dds, open_transport
+from bridges.transports.transport import Transport, TransportError
 
 Wire = Literal["dds", "zenoh"]
 

@@ -30,7 +30,7 @@ from bridges.explain.site import Site
 from bridges.explain.text import SCREEN_LINES, lines
 from bridges.explain.timeline import KINDS, Kind
 from bridges.recording.sources import BagError
-from bridges.rmf.transport import TransportError
+from bridges.transports.transport import TransportError
 
 LISTENS_S: Final = 5.0
 AGAIN_S: Final = 1.0

@@ -16,7 +16,7 @@ import msgspec
 from bridges.kinds.shared.rmf_section import Rmf
 from bridges.messages import words
 from bridges.rmf.renamed import Renamed
-from bridges.rmf.transport import Transport, TransportError
+from bridges.transports.transport import Transport, TransportError
 
 SILENT_AFTER_S = 3.0
 """States come at 1 Hz: three missed ones, or a reading three seconds old, get a mark."""
@@ -66,7 +66,7 @@ def seconds(least: float, most: float) -> Callable[[str], float]:
 
 def open_graph(args: argparse.Namespace, node_name: str) -> Transport:
     """Join the graph that the options name. Raises TransportError."""
-    from bridges.rmf.choose import open_transport
+    from bridges.transports.choose import open_transport
 
     rmf = overridden(_configured(args.config), args)
     joined = open_transport(rmf, node_name, localhost=args.localhost, ros_args=args.ros_args)
@@ -75,7 +75,7 @@ def open_graph(args: argparse.Namespace, node_name: str) -> Transport:
 
 def graph_of(args: argparse.Namespace, speaks: str) -> str:
     """Where the joined graph is, for people: `dds in domain 7, on this machine alone`."""
-    from bridges.rmf.choose import domain_id, stays_on_loopback
+    from bridges.transports.choose import domain_id, stays_on_loopback
 
     rmf = overridden(_configured(args.config), args)
     alone = args.localhost or stays_on_loopback(rmf, os.environ)

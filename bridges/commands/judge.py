@@ -35,8 +35,8 @@ from bridges.messages import topics
 from bridges.messages.definitions import Message
 from bridges.messages.heard import Heard
 from bridges.recording.sources import BagError
-from bridges.rmf.transport import Publisher, Transport, TransportError
 from bridges.rmf_rules import NEVER, Said
+from bridges.transports.transport import Publisher, Transport, TransportError
 
 NODE_NAME = "rmf_bridge_judge"
 LOOK_EVERY_S = 0.1

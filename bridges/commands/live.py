@@ -10,7 +10,7 @@ from bridges.messages import topics
 from bridges.messages.definitions import Message
 from bridges.messages.heard import Heard, bounded
 from bridges.messages.topics import AnyTopic
-from bridges.rmf.transport import Subscription, Transport
+from bridges.transports.transport import Subscription, Transport
 
 OF_DEVICES: Final[tuple[AnyTopic, ...]] = (
     topics.LIFT_STATES,

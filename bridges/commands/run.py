@@ -10,12 +10,12 @@ from msgspec.structs import replace
 
 from bridges.commands.graph import TRANSPORTS, overridden
 from bridges.host import log, places
-from bridges.rmf import ros_setup
-from bridges.rmf.transport import TransportError
 from bridges.serve import directory as runtime
 from bridges.serve import drop_in, guard, signals
 from bridges.serve.notify import watchdog_s
 from bridges.settings.load import Config, SettingsError, load
+from bridges.transports.ros2 import setup as ros_setup
+from bridges.transports.transport import TransportError
 from drivers.hal import HalError
 
 

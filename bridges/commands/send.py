@@ -32,7 +32,7 @@ from bridges.messages import definitions as d
 from bridges.messages import topics, words
 from bridges.messages.heard import Heard
 from bridges.messages.stamps import stamp
-from bridges.rmf.transport import Publisher, Transport, TransportError
+from bridges.transports.transport import Publisher, Transport, TransportError
 
 NODE_NAME = "rmf_bridge_send"
 LOOK_EVERY_S = 0.1

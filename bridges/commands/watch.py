@@ -25,7 +25,7 @@ from bridges.commands.graph import (
 from bridges.commands.live import Ear
 from bridges.host.paint import coloured
 from bridges.messages import topics
-from bridges.rmf.transport import Transport, TransportError
+from bridges.transports.transport import Transport, TransportError
 
 REDRAW_S = 0.5
 REDRAW_AT_MOST_EVERY_S = 0.1

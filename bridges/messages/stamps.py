@@ -4,7 +4,7 @@ import math
 from typing import Final
 
 from bridges.messages.definitions import Duration, Time
-from bridges.rmf.transport import TransportError
+from bridges.transports.transport import TransportError
 
 ENDS: Final = 2**31
 """RMF's Time counts seconds in 31 bits: its last second is on 2038-01-19."""

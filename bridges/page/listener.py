@@ -13,7 +13,7 @@ from bridges.messages.definitions import Message
 from bridges.messages.heard import Heard, bounded
 from bridges.messages.topics import AnyTopic
 from bridges.page.site import HEARD, Site
-from bridges.rmf.transport import Transport, TransportError
+from bridges.transports.transport import Transport, TransportError
 
 log = logging.getLogger(__name__)
 

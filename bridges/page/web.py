@@ -31,7 +31,7 @@ from bridges.page.listener import Listener
 from bridges.page.login import STYLE, Login
 from bridges.page.site import Site
 from bridges.page.site_views import SiteViews
-from bridges.rmf.transport import Transport
+from bridges.transports.transport import Transport
 
 log = logging.getLogger(__name__)
 

@@ -6,7 +6,7 @@ from typing import TypeVar
 from bridges.messages.definitions import Message
 from bridges.messages.releases import Release
 from bridges.messages.topics import Topic
-from bridges.rmf.transport import Publisher, Subscription, Transport
+from bridges.transports.transport import Publisher, Subscription, Transport
 
 M = TypeVar("M", bound=Message)
 

@@ -21,8 +21,6 @@ from bridges.messages.stamps import stamp
 from bridges.messages.topics import DIAGNOSTICS
 from bridges.recording.entries import Head
 from bridges.recording.ring import Ring
-from bridges.rmf.choose import open_transport
-from bridges.rmf.transport import Publisher, TransportError
 from bridges.serve import guard, last_mark, record, signals
 from bridges.serve.diagnostics import diagnosis
 from bridges.serve.directory import KEPT, MemoryFile, Once, RuntimeDirectory, state_file
@@ -34,6 +32,8 @@ from bridges.serve.service import OpenBus, clock_of, named_by, service
 from bridges.serve.serving import stop
 from bridges.serve.witness import NOBODY, Nobody, Witness
 from bridges.settings.load import Config
+from bridges.transports.choose import open_transport
+from bridges.transports.transport import Publisher, TransportError
 
 log = logging.getLogger(__name__)
 

@@ -11,8 +11,8 @@ from typing import Final
 
 from bridges.host.places import GROUPS
 from bridges.kinds.shared.rmf_section import Rmf, Zenoh
-from bridges.rmf.zenoh_config import mode
 from bridges.settings.config import Config
+from bridges.transports.zenoh.config import mode
 from drivers.hal import Needs
 
 FITS: Final = "RMF_BRIDGE_FITS"

@@ -17,7 +17,6 @@ from bridges.kinds.shared.kind import E, L, S
 from bridges.messages.definitions import Message
 from bridges.messages.stamps import ClockError, stamp
 from bridges.messages.topics import Topic
-from bridges.rmf.transport import Subscription, Transport
 from bridges.serve.answers import Answers
 from bridges.serve.clock import Clock
 from bridges.serve.inbox import Inbox
@@ -27,6 +26,7 @@ from bridges.serve.presence import Presence
 from bridges.serve.refusals import Refusals
 from bridges.serve.subject import Core, Status, Subject
 from bridges.serve.witness import NOBODY, Nobody
+from bridges.transports.transport import Subscription, Transport
 
 log = logging.getLogger(__name__)
 

@@ -8,9 +8,9 @@ from bridges.kinds.shared.decision import Fault
 from bridges.messages.definitions import Message
 from bridges.messages.instead import INSTEAD, converted
 from bridges.messages.topics import Topic
-from bridges.rmf.transport import Publisher, Transport, TransportError
 from bridges.serve.directory import Once
 from bridges.serve.witness import NOBODY, Nobody
+from bridges.transports.transport import Publisher, Transport, TransportError
 
 Named = Callable[[Topic[Message]], Topic[Message]]
 """Renames a topic as the site's YAML says."""

@@ -17,7 +17,7 @@ from bridges.kinds.shared.names import LONGEST_NAME
 from bridges.messages.definitions import Message
 from bridges.messages.topics import Topic
 from bridges.messages.words import printable
-from bridges.rmf.transport import Subscription, Transport
+from bridges.transports.transport import Subscription, Transport
 
 log = logging.getLogger(__name__)
 

@@ -16,7 +16,6 @@ from bridges.kinds.shared.kind import AnyDeviceKind
 from bridges.kinds.shared.names import LONGEST_NAME
 from bridges.messages.definitions import Message
 from bridges.messages.topics import M_co, Topic
-from bridges.rmf.transport import Subscription, Transport
 from bridges.serve.clock import Clock, machine_s
 from bridges.serve.device import AnyNode, Node
 from bridges.serve.graph import AnyGraphNode, GraphNode
@@ -29,6 +28,7 @@ from bridges.serve.subject import Status
 from bridges.serve.witness import NOBODY, Nobody
 from bridges.settings.load import Config
 from bridges.settings.names import kind_called
+from bridges.transports.transport import Subscription, Transport
 from drivers.hal import Bus
 
 log = logging.getLogger(__name__)

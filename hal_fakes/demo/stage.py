@@ -17,8 +17,8 @@ from typing import Final
 
 from bridges.messages import words
 from bridges.messages.topics import AnyTopic
-from bridges.rmf.transport import Transport, TransportError
 from bridges.settings.load import load
+from bridges.transports.transport import Transport, TransportError
 from hal_fakes.demo.daemons import Daemon, Page, Wrong, stop_all
 from hal_fakes.demo.journal import Journal
 from hal_fakes.demo.world import PUBLISHED, World

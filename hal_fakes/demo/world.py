@@ -14,8 +14,8 @@ from bridges.messages import definitions as d
 from bridges.messages import topics, words
 from bridges.messages.topics import AnyTopic
 from bridges.messages.words import Requested, Stated
-from bridges.rmf.transport import Publisher, Transport
 from bridges.rmf_rules import Party, Said
+from bridges.transports.transport import Publisher, Transport
 from hal_fakes.demo.daemons import Daemon, Wrong
 from hal_fakes.demo.journal import SETTLES_S, Journal
 from hal_fakes.plants.plant import Edge

@@ -14,7 +14,7 @@ from bridges.messages import topics
 from bridges.messages.definitions import LiftState
 from bridges.messages.heard import Heard
 from bridges.messages.releases import NEWEST
-from bridges.rmf.memory import MemoryNetwork, MemoryTransport
+from bridges.transports.memory import MemoryNetwork, MemoryTransport
 from hal_fakes.wire import wire
 from tests.explain.scenes import fire, held_by_another
 from tests.recording.written import MCAP, SQLITE, write

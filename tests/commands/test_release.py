@@ -16,7 +16,7 @@ from bridges.commands.requests.lift import LiftEnd
 from bridges.messages import definitions as d
 from bridges.messages import topics
 from bridges.messages.heard import Heard
-from bridges.rmf.memory import MemoryNetwork, MemoryTransport
+from bridges.transports.memory import MemoryNetwork, MemoryTransport
 from tests.commands.test_exchange import GRANTED, LIFT, ME
 
 LINE = CommandLine(("release", "Lift1"))

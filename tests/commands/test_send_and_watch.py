@@ -27,13 +27,13 @@ from bridges.kinds.shared.rmf_section import Rmf
 from bridges.messages import definitions as d
 from bridges.messages import topics
 from bridges.messages.topics import Topic
-from bridges.rmf.choose import open_transport
-from bridges.rmf.memory import MemoryNetwork, MemoryTransport
 from bridges.rmf.renamed import Renamed
-from bridges.rmf.transport import Transport
 from bridges.settings.load import load
+from bridges.transports.choose import open_transport
+from bridges.transports.memory import MemoryNetwork, MemoryTransport
+from bridges.transports.transport import Transport
 from hal_fakes.wire import Wire, runs_here
-from tests.rmf.zenoh_programs import Router
+from tests.transports.zenoh_programs import Router
 from tests.waiting import LEASE_S, PATIENCE_S, wait_until
 
 M = TypeVar("M", bound=d.Message)

@@ -17,9 +17,9 @@ from bridges.kinds.shared.rmf_section import Rmf
 from bridges.messages import definitions as d
 from bridges.messages import topics
 from bridges.messages.topics import AnyTopic
-from bridges.rmf.choose import open_transport
-from bridges.rmf.transport import Publisher
 from bridges.rmf_rules import Party
+from bridges.transports.choose import open_transport
+from bridges.transports.transport import Publisher
 from hal_fakes.wire import Wire, runs_here
 from tests.judge.nodes.fire_is_volatile import FireIsVolatile
 from tests.judge.nodes.lift_answers import LiftAnswers

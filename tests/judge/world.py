@@ -11,8 +11,8 @@ from bridges.messages import topics
 from bridges.messages.definitions import Message
 from bridges.messages.heard import Heard
 from bridges.messages.topics import AnyTopic
-from bridges.rmf.transport import Publisher
 from bridges.rmf_rules import Party, Said
+from bridges.transports.transport import Publisher
 from tests.site.network import CLEAR, Air, Place
 from tests.site.timeline import EPOCH, NEVER, Alarm, Timeline
 

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from bridges.messages import definitions as d
 from bridges.messages.cdr import LONGEST, LONGEST_FLAT, CdrError, decode, encode
-from tests.rmf.values import MESSAGE_TYPES, repeatable, values
+from tests.transports.values import MESSAGE_TYPES, repeatable, values
 
 REQUEST = d.LiftRequest("Lift1", d.Time(5, 6), "fleet/robot", 1, "L3", 2)
 REQUEST_BYTES = bytes.fromhex(
@@ -63,7 +63,7 @@ def test_every_message_comes_back_as_it_was(message: Any) -> None:
 @pytest.mark.dds
 @pytest.mark.parametrize("message_type", MESSAGE_TYPES, ids=lambda kind: kind.__name__)
 def test_cyclonedds_itself_writes_the_same_bytes(message_type: Any) -> None:
-    from tests.rmf import idl_types
+    from tests.transports import idl_types
 
     @repeatable
     @given(values(message_type))

@@ -12,7 +12,7 @@ from bridges.messages import definitions as d
 from bridges.messages.cdr import encode
 from bridges.messages.rihs01 import type_hash
 from tests.messages.test_definitions import FIELDS
-from tests.rmf.values import MESSAGE_TYPES, repeatable, values
+from tests.transports.values import MESSAGE_TYPES, repeatable, values
 
 STORE = get_typestore(Stores.EMPTY)
 for _name, _text in FIELDS.items():  # as in a .msg file: one field to a line

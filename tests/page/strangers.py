@@ -15,7 +15,7 @@ from websockets.sync.client import connect
 from bridges.messages import definitions as d
 from bridges.messages import topics
 from bridges.messages.cdr import LONGEST_FLAT
-from bridges.rmf.transport import Transport
+from bridges.transports.transport import Transport
 from tests.page.browser.test_safety import ask
 
 SOCKET: Final = "_nicegui_ws/socket.io/?EIO=4&transport="

@@ -9,7 +9,7 @@ from bridges.messages.heard import Heard
 from bridges.page.gallery import Gallery, place_of, script
 from bridges.page.listener import Listener
 from bridges.page.site import Site
-from bridges.rmf.transport import Transport, TransportError
+from bridges.transports.transport import Transport, TransportError
 from tests.page.test_site import LIFT, lift
 
 HOSTILE = "</script>\u2028\"'`${1}"

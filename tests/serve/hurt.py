@@ -19,10 +19,10 @@ from hal_fakes.wire import wire
 
 def _reader() -> type:
     if wire() == "dds":
-        from bridges.rmf.dds import DdsTransport
+        from bridges.transports.dds.transport import DdsTransport
 
         return DdsTransport
-    from bridges.rmf.zenoh import ZenohTransport
+    from bridges.transports.zenoh.transport import ZenohTransport
 
     return ZenohTransport
 

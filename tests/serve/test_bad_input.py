@@ -13,9 +13,9 @@ from bridges.messages.definitions import LiftMode, LiftRequest, LiftState
 from bridges.messages.topics import LIFT_REQUESTS, LIFT_STATES
 from bridges.serve.clock import TELL_GAP_S
 from hal_fakes.wire import join, wire
-from tests.rmf import peer
-from tests.rmf.conftest import ROS2
 from tests.serve.site import Daemon, daemon, shipped
+from tests.transports import peer
+from tests.transports.conftest import ROS2
 from tests.waiting import wait_until
 
 RIGHT = LiftRequest(

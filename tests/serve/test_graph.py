@@ -12,15 +12,15 @@ from bridges.kinds.lift_supervisor.settings import Settings
 from bridges.messages.definitions import LiftRequest, LiftState, Time
 from bridges.messages.stamps import stamp
 from bridges.messages.topics import ADAPTER_LIFT_REQUESTS, LIFT_REQUESTS, LIFT_STATES, Topic
-from bridges.rmf.memory import MemoryNetwork, MemoryTransport
-from bridges.rmf.transport import Transport
 from bridges.serve import graph as graph_node
 from bridges.serve.clock import Clock
 from bridges.serve.graph import GraphNode
 from bridges.serve.presence import SPREAD_MOST_S
 from bridges.serve.serving import Serving, stop
+from bridges.transports.memory import MemoryNetwork, MemoryTransport
+from bridges.transports.transport import Transport
 from hal_fakes import wire
-from tests.rmf.domains import domain_of_this_run
+from tests.transports.domains import domain_of_this_run
 from tests.waiting import wait_until
 
 WALL = 1_800_000_000.0

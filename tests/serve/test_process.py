@@ -13,8 +13,8 @@ import pytest
 from bridges.messages.definitions import DoorModeValue
 from bridges.serve.daemon import STARTING
 from hal_fakes.wire import runs_here
-from tests.rmf.conftest import ROS2
 from tests.serve.site import YAML, Daemon, Graph, Module, command, daemon, environment, hold_open
+from tests.transports.conftest import ROS2
 from tests.waiting import LEASE_S, PATIENCE_S, wait_until
 
 ROOT = Path(__file__).parents[2]

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from bridges.kinds.shared.rmf_section import Rmf
-from bridges.rmf.ros_setup import SOURCED, sourced, sourcing
-from bridges.rmf.transport import TransportError
+from bridges.transports.ros2.setup import SOURCED, sourced, sourcing
+from bridges.transports.transport import TransportError
 from tests.serve.site import daemon
 from tests.waiting import PATIENCE_S
 

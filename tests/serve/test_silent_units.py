@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from bridges.rmf.memory import MemoryNetwork, MemoryTransport
 from bridges.serve.service import service
 from bridges.serve.serving import stop
 from bridges.settings.load import load
+from bridges.transports.memory import MemoryNetwork, MemoryTransport
 from tests.depth import depth
 from tests.drivers.hal.modbus.line import SerialModule
 from tests.drivers.hal.modbus.module import Module, door

@@ -15,11 +15,11 @@ from bridges.kinds.shared.graph_kind import GraphKind
 from bridges.messages.definitions import Message
 from bridges.messages.releases import NEWEST
 from bridges.messages.topics import Topic
-from bridges.rmf.transport import Publisher, Subscription
 from bridges.rmf_rules import Party as RmfParty
 from bridges.rmf_rules import Said
 from bridges.serve.clock import Clock
 from bridges.serve.graph import GraphNode
+from bridges.transports.transport import Publisher, Subscription
 
 EPOCH = 2.0**30
 """Wall time when the world's clock shows 0; a power of two, so that sums of times stay exact."""
@@ -143,7 +143,7 @@ class World:
 
 
 class WorldTransport:
-    """A node's place in the world (`bridges.rmf.transport.Transport`)."""
+    """A node's place in the world (`bridges.transports.transport.Transport`)."""
 
     speaks = "memory"
     domain_id = 0

@@ -15,13 +15,13 @@ from bridges.kinds.shared.decision import OperatorReset
 from bridges.kinds.shared.graph_kind import AnyGraphKind
 from bridges.messages.definitions import Message
 from bridges.messages.topics import DOOR_REQUESTS, DOOR_SUPERVISOR_HEARTBEAT, LIFT_REQUESTS, Topic
-from bridges.rmf.transport import Publisher
 from bridges.rmf_rules.supervisors import DoorSupervisor, LiftSupervisor
 from bridges.serve.clock import Clock
 from bridges.serve.device import AnyNode, Node
 from bridges.serve.graph import AnyGraphNode, GraphNode
 from bridges.serve.subject import Status
 from bridges.serve.witness import NOBODY, Nobody
+from bridges.transports.transport import Publisher
 from hal_fakes.plants.plant import Edge
 from tests.serve.virtual_graph import Disk
 from tests.site.building import Device

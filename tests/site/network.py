@@ -16,7 +16,7 @@ from typing import Any
 from bridges.messages.definitions import Message
 from bridges.messages.releases import NEWEST
 from bridges.messages.topics import DOOR_STATES, LIFT_STATES, Topic
-from bridges.rmf.memory import MemoryNetwork, MemoryTransport
+from bridges.transports.memory import MemoryNetwork, MemoryTransport
 from tests.site.timeline import NEVER, Timeline
 
 LEASE_S = 10.0

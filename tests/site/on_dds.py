@@ -16,7 +16,7 @@ from typing import Any
 from bridges.messages import definitions as d
 from bridges.messages import topics
 from bridges.messages.topics import Topic
-from bridges.rmf.transport import Publisher, Subscription
+from bridges.transports.transport import Publisher, Subscription
 from hal_fakes import wire
 from hal_fakes.demo.daemons import Daemon, stop_all
 from hal_fakes.plants.plant import Edge

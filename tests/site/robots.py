@@ -13,9 +13,9 @@ from typing import Any, Protocol
 from bridges.messages import definitions as d
 from bridges.messages import topics
 from bridges.messages.stamps import duration
-from bridges.rmf.transport import Transport
 from bridges.rmf_rules.phases import DoorClose, DoorOpen, EndLiftSession, RequestLift
 from bridges.rmf_rules.robot import Phase, Robot
+from bridges.transports.transport import Transport
 from tests.site.charging import Charge
 from tests.site.timeline import EPOCH, NEVER, Alarm, Timeline
 

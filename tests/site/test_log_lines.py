@@ -13,7 +13,7 @@ import pytest
 from bridges.host import log
 from bridges.messages import definitions as d
 from bridges.messages import topics
-from bridges.rmf.transport import TransportError
+from bridges.transports.transport import TransportError
 from tests.explain.scene import Scene
 from tests.site.daemons import GraphDaemon
 from tests.site.network import Place

@@ -11,9 +11,9 @@ from pathlib import Path
 from bridges.messages.definitions import DoorState, Time
 from bridges.messages.topics import DOOR_REQUESTS, DOOR_STATES
 from hal_fakes.domain import domain_for_a_while
-from tests.rmf.joining import joining
 from tests.serve.site import ROOT, Daemon
 from tests.torture.table import Table
+from tests.transports.joining import joining
 from tests.waiting import wait_until
 
 LIMIT_MIB = 128
@@ -65,7 +65,12 @@ def _on_loopback(name: str, directory: Path, domain: int) -> Path:
 
 
 def _forge(domain: int, length: int, each_s: float) -> int:
-    command = [sys.executable, "-m", "tests.rmf.long_samples", *map(str, (domain, length, each_s))]
+    command = [
+        sys.executable,
+        "-m",
+        "tests.transports.long_samples",
+        *map(str, (domain, length, each_s)),
+    ]
     forgers = [subprocess.Popen(command, stdout=subprocess.PIPE, cwd=ROOT) for _ in range(FORGERS)]
     return sum(int(forger.communicate()[0]) for forger in forgers)
 
@@ -91,7 +96,7 @@ def lost_network(table: Table) -> None:
 
 def _in_the_namespace() -> None:
     with subprocess.Popen(
-        [sys.executable, "-m", "tests.rmf.long_samples", str(DOMAIN)],
+        [sys.executable, "-m", "tests.transports.long_samples", str(DOMAIN)],
         stdin=subprocess.PIPE,
     ) as rmf:
         node = joining("dds", DOMAIN)("ours")

@@ -17,12 +17,12 @@ from bridges.commands.live import Ear
 from bridges.kinds.shared.graph_kind import GraphKind
 from bridges.messages import words
 from bridges.messages.definitions import PACKAGES
-from bridges.rmf.addresses import addresses
-from bridges.rmf.choose import domain_id, open_transport, stays_on_loopback
-from bridges.rmf.transport import Subscription, Transport, TransportError
 from bridges.serve.service import named_by
 from bridges.settings import names as named
 from bridges.settings.load import Config
+from bridges.transports.addresses import addresses
+from bridges.transports.choose import domain_id, open_transport, stays_on_loopback
+from bridges.transports.transport import Subscription, Transport, TransportError
 
 NETWORK: Final = "network"
 GRAPH: Final = "RMF"
@@ -169,7 +169,7 @@ def _messages(transport: Transport) -> Iterator[Finding]:
 
 
 def _installed() -> Iterator[Finding]:
-    from bridges.rmf.ros_types import ros_type
+    from bridges.transports.ros2.types import ros_type
 
     problems = []
     for message_type in PACKAGES:
@@ -190,7 +190,7 @@ def overheard() -> Iterator[list[str]]:
     said: list[str] = []
     ears = logging.Handler(logging.WARNING)
     ears.emit = lambda record: said.append(record.getMessage())  # type: ignore[method-assign]
-    logger = logging.getLogger("bridges.rmf")
+    logger = logging.getLogger("bridges.transports")
     before = logger.level, logger.propagate
     logger.setLevel(logging.WARNING)
     logger.propagate = False

@@ -9,10 +9,10 @@ import pytest
 
 from bridges.messages.definitions import ChargerState, ChargerStateValue
 from bridges.messages.topics import CHARGER_STATES
-from bridges.rmf.memory import MemoryNetwork, MemoryTransport
 from bridges.serve.service import service
 from bridges.serve.serving import stop
 from bridges.settings.load import load
+from bridges.transports.memory import MemoryNetwork, MemoryTransport
 from tests.drivers.hal.http.far_end import Caller, Conversation, FarEnd, always, answer
 from tests.waiting import wait_until
 

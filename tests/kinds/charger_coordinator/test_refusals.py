@@ -9,10 +9,10 @@ from bridges.kinds.charger.refusals import Refusal, read
 from bridges.kinds.charger_coordinator import KIND
 from bridges.messages import topics
 from bridges.messages.definitions import ChargerRequest, Duration
-from bridges.rmf.memory import MemoryNetwork, MemoryTransport
 from bridges.serve.clock import Clock
 from bridges.serve.graph import GraphNode
 from bridges.settings.load import load
+from bridges.transports.memory import MemoryNetwork, MemoryTransport
 
 SITE = load(Path("config/charger_coordinator.yaml")).section
 WISH = ChargerRequest("charger_a", "tiny", "AMR03", Duration(60), "wish-1")

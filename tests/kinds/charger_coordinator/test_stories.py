@@ -9,7 +9,7 @@ from bridges.kinds.charger.settings import Robot
 from bridges.kinds.shared.decision import OperatorReset
 from bridges.messages import definitions as d
 from bridges.messages import topics
-from bridges.rmf.transport import Publisher
+from bridges.transports.transport import Publisher
 from tests.kinds.charger_coordinator.yard import Yard
 
 

@@ -7,10 +7,10 @@ from typing import Any
 from bridges.kinds.lift_supervisor import KIND
 from bridges.kinds.lift_supervisor.settings import Settings
 from bridges.messages.topics import Topic
-from bridges.rmf.memory import MemoryNetwork, MemoryTransport
-from bridges.rmf.transport import Subscription
 from bridges.serve.clock import Clock
 from bridges.serve.graph import GraphNode
+from bridges.transports.memory import MemoryNetwork, MemoryTransport
+from bridges.transports.transport import Subscription
 
 DISCOVERY_S = 0.3
 STEP_S = 0.05

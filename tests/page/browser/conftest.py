@@ -19,7 +19,7 @@ from bridges.messages import definitions as d
 from bridges.messages import topics
 from bridges.messages.stamps import stamp
 from bridges.page import access
-from bridges.rmf.transport import Transport, TransportError
+from bridges.transports.transport import Transport, TransportError
 from hal_fakes.wire import join, wire
 from tests.page import recorded
 

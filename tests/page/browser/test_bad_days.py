@@ -13,11 +13,11 @@ from websockets import Origin
 from websockets.sync.client import connect
 
 from bridges.kinds.shared.rmf_section import Zenoh
-from bridges.rmf.zenoh import ZenohTransport
+from bridges.transports.zenoh.transport import ZenohTransport
 from tests.page.browser.conftest import Graph, Until, page
 from tests.page.browser.test_page import card
 from tests.page.browser.test_safety import ask
-from tests.rmf.zenoh_programs import Router
+from tests.transports.zenoh_programs import Router
 from tests.waiting import wait_until
 
 pytestmark = pytest.mark.browser

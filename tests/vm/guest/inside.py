@@ -19,7 +19,7 @@ def demo() -> str:
 def transport() -> str:
     """The tests of zenoh, the transport that works here without ROS."""
     suite = mounted("suite", "/media")
-    tests = sorted(str(path) for path in (suite / "tests/rmf").glob("test_zenoh_*.py"))
+    tests = sorted(str(path) for path in (suite / "tests/transports").glob("test_zenoh_*.py"))
     path = f"PYTHONPATH={suite}:{suite / 'site'}"
     told = sh("env", "-C", str(suite), path, "HOME=/root", PYTHON, "-m", "pytest", *tests)
     last = told.strip().splitlines()[-1]

@@ -1,0 +1,155 @@
+"""Which transport a daemon uses, in which ROS domain, on which network.
+
+The YAML decides. Where it says nothing, ROS's environment variables do, as for any ROS node. Each
+transport has a file beside this one: `ros2.py`, `dds.py`, `zenoh.py`.
+"""
+
+import importlib
+import importlib.util
+import logging
+import os
+import re
+from collections.abc import Mapping, Sequence
+
+from bridges.host.log import pairs
+from bridges.kinds.shared.rmf_section import Rmf
+from bridges.messages.definitions import PACKAGES
+from bridges.messages.releases import RELEASES, Release
+from bridges.transports.cyclone import static_peers
+from bridges.transports.transport import Transport, TransportError
+
+log = logging.getLogger(__name__)
+
+NO_CYCLONEDDS = (
+    "transport dds needs the Python package cyclonedds 11.0.1, and {}. On x86-64 `pip install"
+    " cyclonedds==11.0.1` installs it. For arm64 pip has no such package: put zenoh-bridge-ros2dds"
+    " beside RMF and write `transport: zenoh` with `keys: ros2dds`, or install ROS 2 and write"
+    " `transport: ros2`"
+)
+NO_ROS = (
+    "transport ros2 needs ROS 2 with RMF's messages, and {}. On Ubuntu 24.04 `sudo apt install"
+    " ros-jazzy-rclpy {}`; the virtual environment needs --system-site-packages and ROS's own"
+    " Python, and the shell ROS's setup file (`. /opt/ros/jazzy/setup.bash`; for a service"
+    " `ros_setup:` below `rmf:`). `transport: dds` needs none of this and reaches the same nodes"
+)
+
+
+def open_transport(
+    rmf: Rmf, node_name: str, *, localhost: bool = False, ros_args: Sequence[str] = ()
+) -> Transport:
+    """Join the RMF graph as `node_name`. Raises TransportError with what to do about it.
+
+    `localhost` keeps all traffic on this machine, whatever the YAML and the environment say.
+    `ros_args`: `--ros-args` and the arguments after it on the command line.
+    """
+    domain = domain_id(rmf, os.environ)
+    speaks, reason = _choice(rmf)
+    peers = [] if speaks == "zenoh" else static_peers(os.environ)
+    loopback = localhost or stays_on_loopback(rmf, os.environ, peers)
+    network = "localhost" if loopback else "subnet"
+    release = RELEASES.get(rmf.release)
+    log.info(pairs("transport", speaks=speaks, domain_id=domain, network=network, reason=reason))
+    node_name = re.sub(r"\W", "_", node_name, flags=re.ASCII)  # ROS allows no other characters
+    if speaks == "ros2":
+        return _open_ros2(node_name, domain, loopback=loopback, ros_args=ros_args)
+    if set(ros_args) - {"--ros-args", "--"}:
+        raise TransportError(
+            f"{' '.join(ros_args)}: only transport ros2 understands this. Write `transport: ros2`, or"
+            " rename topics with `topics:` in the YAML"
+        )
+    if speaks == "dds":
+        return _open_dds(node_name, domain, loopback=loopback, release=release)
+    from bridges.transports.zenoh.transport import ZenohTransport
+
+    return ZenohTransport(node_name, domain, loopback=loopback, settings=rmf.zenoh, release=release)
+
+
+def domain_id(rmf: Rmf, environ: Mapping[str, str]) -> int:
+    """The ROS domain: the YAML's, else ROS_DOMAIN_ID, else 0."""
+    if rmf.domain_id is not None:
+        return rmf.domain_id
+    text = environ.get("ROS_DOMAIN_ID", "") or "0"
+    if not text.isascii() or not text.isdigit() or int(text) > 232:
+        raise TransportError(f"ROS_DOMAIN_ID is {text!r}: give a whole number from 0 to 232")
+    return int(text)
+
+
+def stays_on_loopback(rmf: Rmf, environ: Mapping[str, str], peers: Sequence[str] = ()) -> bool:
+    """Whether the YAML, ROS_LOCALHOST_ONLY or ROS_AUTOMATIC_DISCOVERY_RANGE keeps us on loopback.
+
+    As in ROS 2 Jazzy, the older ROS_LOCALHOST_ONLY=1 wins over the newer variable, and LOCALHOST
+    reaches static `peers` all the same.
+    """
+    if rmf.network == "localhost" or environ.get("ROS_LOCALHOST_ONLY") == "1":
+        return True
+    text = environ.get("ROS_AUTOMATIC_DISCOVERY_RANGE", "") or "SUBNET"
+    if text not in ("SUBNET", "SYSTEM_DEFAULT", "LOCALHOST"):
+        raise TransportError(
+            f"ROS_AUTOMATIC_DISCOVERY_RANGE is {text!r}: use SUBNET or LOCALHOST. With OFF"
+            " this node would find no other; other values are unknown"
+        )
+    return text == "LOCALHOST" and not peers
+
+
+def _choice(rmf: Rmf) -> tuple[str, str]:
+    """The transport, and why it was chosen."""
+    if rmf.transport in ("dds", "zenoh"):
+        return rmf.transport, "configured"
+    missing = missing_of_ros()
+    if rmf.transport == "auto":
+        return (
+            _best_without(missing)
+            if missing
+            else ("ros2", "rclpy and RMF's messages are installed")
+        )
+    if missing:
+        packages = " ".join(_apt_name(package) for package in sorted(set(PACKAGES.values())))
+        raise TransportError(NO_ROS.format(missing, packages))
+    return "ros2", "configured"
+
+
+def _best_without(ros: str) -> tuple[str, str]:
+    """What `auto` chooses without ROS. `ros`: what is missing of ROS."""
+    missing = missing_of_dds()
+    return ("zenoh", f"{ros}; {missing}") if missing else ("dds", ros)
+
+
+def missing_of_dds() -> str:
+    """Why transport `dds` cannot be used here; "" if it can."""
+    try:
+        importlib.import_module("cyclonedds.core")
+    except ImportError as error:
+        return f"cyclonedds does not import: {error}"
+    return ""
+
+
+def missing_of_ros() -> str:
+    """Why transport `ros2` cannot be used here; "" if it can."""
+    try:
+        importlib.import_module("rclpy")
+    except ImportError as error:
+        return f"rclpy does not import: {error}"
+    for package in sorted(set(PACKAGES.values())):
+        if importlib.util.find_spec(package) is None:
+            return f"the ROS package {package} is not installed"
+    return ""
+
+
+def _apt_name(package: str) -> str:
+    return f"ros-jazzy-{package.replace('_', '-')}"
+
+
+def _open_ros2(
+    node_name: str, domain: int, *, loopback: bool, ros_args: Sequence[str]
+) -> Transport:
+    from bridges.transports.ros2.transport import Ros2Transport
+
+    return Ros2Transport(node_name, domain, loopback=loopback, ros_args=ros_args)
+
+
+def _open_dds(node_name: str, domain: int, *, loopback: bool, release: Release | None) -> Transport:
+    if missing := missing_of_dds():
+        raise TransportError(NO_CYCLONEDDS.format(missing))
+    from bridges.transports.dds.transport import DdsTransport
+
+    return DdsTransport(node_name, domain, loopback=loopback, release=release)

@@ -1,0 +1,222 @@
+"""The ends of the `dds` transport: its publishers and subscriptions.
+
+An end outlives its writer or reader: when the transport joins again, the end gets a new one.
+"""
+
+import threading
+from collections import deque
+from collections.abc import Callable
+from typing import Final, Protocol
+
+from cyclonedds.core import DDSException, DDSStatus
+from cyclonedds.domain import DomainParticipant
+from cyclonedds.pub import DataWriter
+from cyclonedds.qos import Policy, Qos
+from cyclonedds.sub import DataReader
+from cyclonedds.topic import Topic as DdsTopic
+
+from bridges.messages import topics
+from bridges.messages.cdr import CdrError
+from bridges.messages.definitions import Message
+from bridges.messages.releases import Release
+from bridges.messages.rihs01 import type_hash
+from bridges.messages.topics import AnyTopic
+from bridges.transports import notices
+from bridges.transports.dds.idl import Sample, sample_type
+from bridges.transports.peers import Peers
+from bridges.transports.transport import Receive, TransportError
+
+WRITE_BLOCKS_NS: Final = 20_000_000
+"""A writer that waits for a peer holds Python's lock: keep this shorter than a scan."""
+AT_ONCE: Final = 100
+"""The most samples taken from one subscription before the others have their turn."""
+POLICIES: Final = {2: "durability", 11: "reliability", 23: "data representation", 24: "type"}
+
+
+class DdsPublisher:
+    """The publisher of one topic. `withdraw(publisher, writer)`: takes it off the graph."""
+
+    def __init__(
+        self,
+        topic: AnyTopic,
+        reader_thread: threading.Thread,
+        withdraw: Callable[["DdsPublisher", DataWriter], None],
+    ) -> None:
+        self.topic = topic
+        self._withdraw = withdraw
+        self._writer: DataWriter = None
+        self._reader_thread = reader_thread
+        depth = topic.publish.depth if topic.publish.durability == "transient_local" else 0
+        self._retained: deque[Message] = deque(maxlen=depth)
+        self._sample: type[Sample] | None = None
+
+    watched = DDSStatus.OfferedIncompatibleQos
+
+    def create(
+        self, participant: DomainParticipant, topic: DdsTopic, release: Release
+    ) -> DataWriter:
+        """Make its writer; it replaces an earlier one."""
+        qos = _writer_qos(self.topic.publish, type_hash(self.topic.type, release))
+        self._sample = sample_type(self.topic.type, release)
+        self._writer = DataWriter(participant, topic, qos=qos)
+        return self._writer
+
+    def drop(self) -> None:
+        """The writer has gone with its participant."""
+        self._writer = None
+
+    def send_retained(self) -> None:
+        """Send again what the earlier writer retained for late joiners."""
+        for message in list(self._retained):
+            self._write(message)
+
+    def publish(self, message: Message) -> None:
+        """Send; blocks for 20 ms at most. Raises TransportError if it was not sent."""
+        if not self._reader_thread.is_alive():
+            raise TransportError(f"topic {self.topic.name}: closed, or the reader has died")
+        self._retained.append(message)  # goes out when the node joins again
+        if self._writer is None:
+            why = "there is no network, or RMF's release lacks the message"
+            raise TransportError(f"topic {self.topic.name}: not sent: {why}")
+        try:
+            self._write(message)
+        except DDSException as error:
+            raise TransportError(f"topic {self.topic.name}: not sent: {error}") from error
+
+    def matched(self) -> int:
+        """How many subscriptions are reached; 0 after close."""
+        try:
+            return len(self._writer.get_matched_subscriptions()) if self._writer else 0
+        except DDSException:
+            return 0
+
+    def close(self) -> None:
+        """Take this end off the graph."""
+        self._withdraw(self, self._writer)
+
+    def _write(self, message: Message) -> None:
+        assert self._sample is not None
+        self._writer.write(self._sample(message))
+
+    def log_misfits(self, peers: Peers) -> None:
+        """Log each new subscription of this topic whose QoS does not match."""
+        if self._writer is None:
+            return
+        status = self._writer.get_offered_incompatible_qos_status()
+        if status.total_count_change:
+            _log_misfit(self.topic, notices.NOT_SERVED, status, peers)
+
+
+class DdsSubscription:
+    """The subscription of one topic. `dropped`: counts invalid samples, by topic name.
+    `owners(guids)`: the nodes of these writers."""
+
+    def __init__(
+        self,
+        topic: AnyTopic,
+        received: Receive,
+        dropped: dict[str, int],
+        owners: Callable[[list[bytes]], list[str]],
+        *,
+        others_only: bool,
+    ) -> None:
+        self.topic = topic
+        self._owners = owners
+        self._others_only = others_only
+        self._reader: DataReader = None
+        self._received = received
+        self._dropped = dropped
+
+    watched = DDSStatus.RequestedIncompatibleQos
+
+    def create(
+        self, participant: DomainParticipant, topic: DdsTopic, release: Release
+    ) -> DataReader:
+        """Make its reader; it replaces an earlier one."""
+        hashed = type_hash(self.topic.type, release)
+        qos = _reader_qos(self.topic.subscribe, hashed, others_only=self._others_only)
+        self._reader = DataReader(participant, topic, qos=qos)
+        return self._reader
+
+    def drop(self) -> None:
+        """The reader has gone with its participant."""
+        self._reader = None
+
+    def matched(self) -> int:
+        """How many publishers are heard; 0 after close."""
+        try:
+            return len(self._reader.get_matched_publications()) if self._reader else 0
+        except DDSException:
+            return 0
+
+    def senders(self) -> list[str]:
+        """The nodes of these publishers; none at first, until other nodes' announcements have come."""
+        reader = self._reader
+        try:
+            handles = reader.get_matched_publications() if reader else []
+            found = [reader.get_matched_publication_data(handle) for handle in handles]
+        except DDSException:
+            return []
+        return self._owners([writer.key.bytes for writer in found if writer])
+
+    def take(self) -> bool:
+        """Deliver what has arrived; False if nothing had."""
+        if self._reader is None:
+            return False
+        for taken in range(AT_ONCE):
+            try:
+                samples = self._reader.take(1)
+            except CdrError as error:
+                notices.drop(self._dropped, self.topic, error)
+                continue
+            if not samples:
+                return taken > 0
+            if samples[0].sample_info.valid_data:
+                notices.hand_on(self._dropped, self.topic, self._received, samples[0].message)
+        return True
+
+    def log_misfits(self, peers: Peers) -> None:
+        """Log each new publisher of this topic whose QoS does not match."""
+        if self._reader is None:
+            return
+        status = self._reader.get_requested_incompatible_qos_status()
+        if status.total_count_change:
+            _log_misfit(self.topic, notices.NOT_HEARD, status, peers)
+
+
+class _Misfits(Protocol):
+    """Cyclone's status of an end that has met peers whose QoS does not fit."""
+
+    last_policy_id: int
+
+
+def _log_misfit(topic: AnyTopic, text: str, status: _Misfits, peers: Peers) -> None:
+    policy = POLICIES.get(status.last_policy_id, f"QoS policy {status.last_policy_id}")
+    if policy == "type":
+        peers.name(topic, published=text == notices.NOT_HEARD)
+    else:
+        notices.misfit(topic, text, policy)
+
+
+def _writer_qos(qos: topics.Qos, hashed: str) -> Qos:
+    if qos.durability == "volatile":
+        return Qos(Policy.Durability.Volatile, *_policies(qos, hashed))
+    # What a late joiner gets is the durability service's history, which is 1 deep by default.
+    retained = Policy.DurabilityService(0, Policy.History.KeepLast(qos.depth), -1, -1, -1)
+    return Qos(Policy.Durability.TransientLocal, retained, *_policies(qos, hashed))
+
+
+def _reader_qos(qos: topics.Qos, hashed: str, *, others_only: bool) -> Qos:
+    durability = Policy.Durability
+    wanted = durability.Volatile if qos.durability == "volatile" else durability.TransientLocal
+    ignored = Policy.IgnoreLocal.Participant if others_only else Policy.IgnoreLocal.Nothing
+    return Qos(wanted, ignored, *_policies(qos, hashed))
+
+
+def _policies(qos: topics.Qos, hashed: str) -> list[object]:
+    return [
+        Policy.Reliability.Reliable(WRITE_BLOCKS_NS),
+        Policy.History.KeepLast(qos.depth),
+        Policy.DataRepresentation(use_cdrv0_representation=True, use_xcdrv2_representation=False),
+        Policy.Userdata(f"typehash={hashed};".encode()),
+    ]

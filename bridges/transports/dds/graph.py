@@ -1,0 +1,108 @@
+"""Makes our endpoints a named node on the ROS graph, by the topic `ros_discovery_info`.
+
+DDS has participants, readers and writers, but no nodes. On this topic each ROS participant publishes
+which node owns which of its readers and writers, retained for late joiners. Without that
+`ros2 node list` shows our endpoints under `_CREATED_BY_BARE_DDS_APP_`.
+Source: ros2/rmw_dds_common, msg/*.msg, as rmw_cyclonedds and rmw_fastrtps publish them.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Final
+
+from cyclonedds.core import Entity
+from cyclonedds.domain import DomainParticipant
+from cyclonedds.idl import IdlStruct, annotations
+from cyclonedds.idl.types import array, bounded_str, sequence, uint8
+from cyclonedds.pub import DataWriter
+from cyclonedds.qos import Policy, Qos
+from cyclonedds.sub import DataReader
+from cyclonedds.topic import Topic
+
+from bridges.transports.peers import MOST
+
+MOST_PARTICIPANTS: Final = 200
+PACKAGE: Final = "rmw_dds_common.msg.dds_."
+TYPE_HASH: Final = "RIHS01_91a0593bacdcc50ea9bdcf849a938b128412cc1ea821245c663bcd26f83c295e"
+"""What Iron, Jazzy and later announce for ParticipantEntitiesInfo."""
+
+
+@annotations.final
+@dataclass
+class Gid(IdlStruct, typename=PACKAGE + "Gid_"):  # type: ignore[misc, call-arg]
+    data: array[uint8, 16]
+
+
+@annotations.final
+@dataclass
+class NodeEntitiesInfo(IdlStruct, typename=PACKAGE + "NodeEntitiesInfo_"):  # type: ignore[misc, call-arg]
+    node_namespace: bounded_str[256]
+    node_name: bounded_str[256]
+    reader_gid_seq: sequence[Gid]
+    writer_gid_seq: sequence[Gid]
+
+
+@annotations.final
+@dataclass
+class ParticipantEntitiesInfo(IdlStruct, typename=PACKAGE + "ParticipantEntitiesInfo_"):  # type: ignore[misc, call-arg]
+    gid: Gid
+    node_entities_info_seq: sequence[NodeEntitiesInfo]
+
+
+class NodeOnGraph:
+    """The one node of a participant; published again whenever its endpoints change."""
+
+    def __init__(self, participant: DomainParticipant, node_name: str) -> None:
+        self._node = NodeEntitiesInfo("/", node_name, [], [])
+        self._info = ParticipantEntitiesInfo(_gid(participant), [self._node])
+        self._participant = participant
+        self._owners: dict[bytes, str] = {}
+        self.reader: DataReader | None = None
+        self.topic = Topic(participant, "ros_discovery_info", ParticipantEntitiesInfo)
+        self.writer = DataWriter(participant, self.topic, qos=_qos())
+        self.writer.write(self._info)
+
+    def add_reader(self, reader: DataReader) -> None:
+        """Publish that this reader belongs to the node."""
+        self._node.reader_gid_seq.append(_gid(reader))
+        self.writer.write(self._info)
+
+    def add_writer(self, writer: DataWriter) -> None:
+        """Publish that this writer belongs to the node."""
+        self._node.writer_gid_seq.append(_gid(writer))
+        self.writer.write(self._info)
+
+    def drop_writer(self, writer: DataWriter) -> None:
+        """Publish that this writer has gone."""
+        self._node.writer_gid_seq.remove(_gid(writer))
+        self.writer.write(self._info)
+
+    def listen(self) -> DataReader:
+        """Begin to hear which node owns which writers: each participant retains its last word."""
+        self.reader = DataReader(self._participant, self.topic, qos=_qos(MOST_PARTICIPANTS))
+        return self.reader
+
+    def owners(self, writers: Iterable[bytes]) -> list[str]:
+        """The names of the nodes that own these writers (guids), as far as they were heard."""
+        assert self.reader is not None
+        for info in self.reader.take(MOST_PARTICIPANTS):
+            for node in info.node_entities_info_seq:
+                name = f"{node.node_namespace.rstrip('/')}/{node.node_name}"
+                self._owners |= {bytes(gid.data): name for gid in node.writer_gid_seq}
+        if len(self._owners) > MOST:
+            self._owners.clear()
+        return [self._owners[guid] for guid in writers if guid in self._owners]
+
+
+def _gid(entity: Entity) -> Gid:
+    return Gid(list(entity.guid.bytes))
+
+
+def _qos(depth: int = 1) -> Qos:
+    return Qos(
+        Policy.Reliability.Reliable(100_000_000),
+        Policy.Durability.TransientLocal,
+        Policy.History.KeepLast(depth),
+        Policy.DataRepresentation(use_cdrv0_representation=True, use_xcdrv2_representation=False),
+        Policy.Userdata(f"typehash={TYPE_HASH};".encode()),
+    )

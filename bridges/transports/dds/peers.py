@@ -1,0 +1,93 @@
+"""What the ends on a DDS graph announce: topic, type, and in their user data the type hash."""
+
+import re
+import threading
+from collections.abc import Hashable
+from typing import Any, Final, Protocol
+
+from cyclonedds import builtin
+from cyclonedds.core import InstanceState
+from cyclonedds.domain import DomainParticipant
+from cyclonedds.qos import Policy, Qos
+
+from bridges.transports.peers import Announced, Peers
+
+AT_ONCE: Final = 100
+HASH: Final = re.compile(r"typehash=(RIHS01_[0-9a-f]{64});")
+TYPE: Final = re.compile(r"(\w+)::msg::dds_::(\w+)_")
+"""A message's name, as ROS writes it in DDS."""
+
+_reading = threading.Lock()
+
+
+class _State(Protocol):
+    instance_state: int
+
+
+class _End(Protocol):
+    """What DDS announces of an end (cyclonedds.builtin.DcpsEndpoint)."""
+
+    key: Hashable
+    topic_name: str
+    type_name: str | None
+    qos: Qos
+    sample_info: _State
+
+
+class BuiltinReader(builtin.BuiltinDataReader):  # type: ignore[misc] # noqa: TID251
+    """Reads what participants and their ends announce, one thread of the process at a time.
+
+    cyclonedds reads each announced QoS into the same variables (11.0.1, qos._CQos._gc_*): where two
+    threads read at once, an end gets another's user data. A process may have several nodes.
+    """
+
+    def take(self, count: int) -> list[Any]:
+        """At most so many of what was announced since."""
+        with _reading:
+            taken: list[Any] = super().take(count)
+        return taken
+
+
+class DdsPeers:
+    """Reads DDS's own topics, on which each end is announced, and tells `peers`."""
+
+    def __init__(self, peers: Peers) -> None:
+        self._peers = peers
+        self._readers: list[tuple[bool, BuiltinReader]] = []
+
+    def join(self, participant: DomainParticipant) -> list[BuiltinReader]:
+        """Begin anew; the readers are the caller's to wait for and to delete."""
+        topics = (builtin.BuiltinTopicDcpsSubscription, builtin.BuiltinTopicDcpsPublication)
+        readers = [BuiltinReader(participant, topic) for topic in topics]
+        self._readers = list(enumerate(readers))  # type: ignore[arg-type]
+        self._peers.clear()
+        return readers
+
+    def look(self) -> bool:
+        """Take what was announced since; False if nothing was."""
+        news = False
+        for publishes, reader in self._readers:
+            while samples := reader.take(AT_ONCE):
+                news = True
+                for sample in samples:
+                    self._take(sample, bool(publishes))
+        return news
+
+    def _take(self, sample: _End, publishes: bool) -> None:
+        if sample.sample_info.instance_state != InstanceState.Alive:
+            self._peers.gone(sample.key)
+            return
+        kind = TYPE.fullmatch(sample.type_name or "")
+        if not kind or not sample.topic_name.startswith("rt/"):
+            return
+        topic = sample.topic_name.removeprefix("rt/")
+        end = Announced(topic, f"{kind[1]}/msg/{kind[2]}", _hash(sample.qos), publishes)
+        self._peers.seen(sample.key, end)
+
+
+def _hash(qos: Qos) -> str:
+    """The type hash in an end's user data; "" without one."""
+    if Policy.Userdata not in qos:
+        return ""
+    found = HASH.search(bytes(qos[Policy.Userdata].data).decode(errors="replace"))
+    return found[1] if found else ""

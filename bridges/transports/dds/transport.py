@@ -1,0 +1,274 @@
+"""The `dds` transport: ROS 2's wire without ROS, by cyclonedds 11.0.1.
+
+Names, types and QoS are those that rmw_cyclonedds and rmw_fastrtps use: topic `rt/<name>`, type
+`<package>::msg::dds_::<Type>_`, plain CDR, the type hash in the endpoint's user data.
+
+One thread reads for all subscriptions. It drops and counts an invalid sample, and logs the first one of
+each topic. (Cyclone's C library already refuses samples that do not fit their type, and says so on
+stderr.) If reading itself fails, the node joins again.
+
+Only this file, dds_ends.py, idl.py and graph.py import cyclonedds, and only choose.py imports them.
+"""
+
+import ctypes
+import logging
+import os
+import threading
+from collections.abc import Callable
+from typing import Final, TypeVar
+from weakref import WeakValueDictionary
+
+from cyclonedds import core
+from cyclonedds.core import DDSException
+from cyclonedds.domain import Domain, DomainParticipant
+from cyclonedds.internal import DDS, dds_infinity
+from cyclonedds.pub import DataWriter
+from cyclonedds.qos import Policy, Qos
+from cyclonedds.topic import Topic as DdsTopic
+
+from bridges.host.log import pairs
+from bridges.messages.releases import Release
+from bridges.messages.topics import AnyTopic, Topic
+from bridges.transports import addresses, cyclone, notices
+from bridges.transports.dds.ends import DdsPublisher, DdsSubscription
+from bridges.transports.dds.graph import NodeOnGraph
+from bridges.transports.dds.idl import sample_type
+from bridges.transports.dds.peers import DdsPeers
+from bridges.transports.threaded import LOOK_EVERY_S, Threaded
+from bridges.transports.transport import M, TransportError, any_type
+
+log = logging.getLogger(__name__)
+
+E = TypeVar("E", bound=core.Entity)
+
+CANNOT_JOIN: Final = (
+    "is a network interface up, and does CYCLONEDDS_URI, if set, name one that exists? "
+    "`network: localhost` needs none. Is the clock after 1970? Cannot join DDS domain"
+)
+LOOK_EVERY_NS: Final = int(LOOK_EVERY_S * 1e9)
+ANY_SAMPLE: Final = core.SampleState.Any | core.ViewState.Any | core.InstanceState.Any
+ERRORS: Final = 1 | 2
+"""What Cyclone may log: errors, also fatal ones. It would warn of each malformed datagram, and anybody
+can send those. Neither its Python binding nor its configuration can turn these warnings off."""
+
+_domains: WeakValueDictionary[tuple[int, str], Domain] = WeakValueDictionary()
+_domains_lock = threading.Lock()
+
+
+class DdsTransport(Threaded):
+    """One node: a participant, its reader thread, its publishers and subscriptions.
+
+    `loopback`: stay on this machine, whatever CYCLONEDDS_URI says. When the wall clock is set back or,
+    off loopback, the machine's addresses change, the node leaves the graph and joins again with the
+    same ends, and publishers send again what they retain. `release`: None to follow RMF's. Raises
+    TransportError when the domain cannot be joined.
+    """
+
+    speaks = "dds"
+
+    refusals = (DDSException,)
+
+    def __init__(
+        self, node_name: str, domain_id: int, *, loopback: bool, release: Release | None = None
+    ) -> None:
+        super().__init__(node_name, domain_id, release)
+        self._failed = False
+        self._entities: list[core.Entity] = []
+        self._topics: dict[str, DdsTopic] = {}
+        self._ends: tuple[DdsPublisher | DdsSubscription, ...] = ()
+        self._subscriptions: tuple[DdsSubscription, ...] = ()
+        self._loopback = loopback
+        self._joined = False
+        self._dds_peers = DdsPeers(self._peers)
+        try:
+            with self._reporting(f"{CANNOT_JOIN} {domain_id}"):
+                self._join()
+        except TransportError:
+            self._delete_entities()
+            raise
+        self._start(self._read, "dds")
+        self._watch_clock()
+
+    def publisher(self, topic: AnyTopic) -> DdsPublisher:
+        """Declare a publisher with `topic.publish` QoS."""
+        publisher = DdsPublisher(topic, self._thread, self._withdraw)
+        with self._lock, self._reporting(f"topic {topic.name} cannot be published"):
+            if self._joined:
+                self._attach(publisher)
+            self._ends += (publisher,)
+        return publisher
+
+    def subscribe(
+        self, topic: Topic[M], received: Callable[[M], None], *, others_only: bool = False
+    ) -> DdsSubscription:
+        """Declare a subscription with `topic.subscribe` QoS; `received` runs on our thread."""
+        subscription = DdsSubscription(
+            topic, any_type(received), self.dropped, self._owners, others_only=others_only
+        )
+        with self._lock, self._reporting(f"topic {topic.name} cannot be subscribed"):
+            if self._joined:
+                self._attach(subscription)
+            self._ends += (subscription,)
+            self._subscriptions += (subscription,)
+        return subscription
+
+    def close(self) -> None:
+        """Leave the graph at once. Deletes each entity, without waiting for the garbage collector."""
+        with self._lock:
+            if self._closed:
+                return
+            self._closed = True
+            self._stop.set()
+            self._wake()
+        self._join_thread()
+        self._delete_entities()
+
+    def _wake(self) -> None:
+        if self._joined:
+            self._leaving.set(True)
+
+    def _join(self) -> None:
+        self._addresses = addresses.addresses()
+        wanted = cyclone.LOOPBACK if self._loopback else cyclone.configuration(os.environ)
+        self._domain = _shared_domain(self.domain_id, wanted)
+        userdata = Qos(Policy.Userdata(b"enclave=/;"))
+        self._participant = self._keep(DomainParticipant(self.domain_id, qos=userdata))
+        self._waitset = self._keep(core.WaitSet(self._participant))
+        self._leaving = self._keep(core.GuardCondition(self._participant))
+        self._waitset.attach(self._leaving)
+        for reader in self._dds_peers.join(self._participant):
+            self._waitset.attach(self._keep(core.ReadCondition(self._keep(reader), ANY_SAMPLE)))
+        self._node = NodeOnGraph(self._participant, self.name)
+        self._entities += [self._node.topic, self._node.writer]
+        self._joined = True
+
+    def _follow_network(self) -> None:
+        """Join again if the machine's addresses have changed since the last time."""
+        if (self._loopback and self._joined) or not self._look_is_due():
+            return
+        if self._network_changed() or not self._joined:
+            self._join_anew()
+
+    def _join_anew(self) -> None:
+        with self._lock:
+            if self._closed:
+                return
+            was_joined, self._joined, self._set_back = self._joined, False, False
+            self._delete_entities()
+            self._topics.clear()
+            try:
+                self._join()
+                for end in self._ends:
+                    self._attach(end)
+            except DDSException as error:
+                self._joined = False
+                self._delete_entities()
+                if was_joined:
+                    log.warning(pairs("not_joined", node=self.name, reason=error))
+
+    def _topic(self, topic: AnyTopic) -> DdsTopic:
+        name = f"rt/{topic.name}"
+        if name not in self._topics:
+            kind = sample_type(topic.type, self.release)
+            self._topics[name] = self._keep(DdsTopic(self._participant, name, kind))
+        return self._topics[name]
+
+    def _attach(self, end: DdsPublisher | DdsSubscription) -> None:
+        """Make the DDS entities of an end, if the release has its message."""
+        self._peers.ours(end.topic, publishes=isinstance(end, DdsPublisher))
+        if not self.release.has(end.topic.type):
+            end.drop()
+            return
+        entity = self._keep(end.create(self._participant, self._topic(end.topic), self.release))
+        entity.set_status_mask(end.watched)
+        self._waitset.attach(entity)
+        if isinstance(end, DdsPublisher):
+            self._node.add_writer(entity)
+            end.send_retained()
+        else:
+            self._waitset.attach(self._keep(core.ReadCondition(entity, ANY_SAMPLE)))
+            self._node.add_reader(entity)
+
+    def _read(self) -> None:
+        failures = 0
+        while not self._closed and failures < notices.FAILURES:
+            try:
+                self._read_once()
+                failures = 0
+            except Exception as error:  # noqa: BLE001 - logged by _recover
+                failures += 1
+                self._recover(error)
+
+    def _read_once(self) -> None:
+        if self._set_back:
+            self._join_anew()
+        self._follow_network()
+        if not self._joined:
+            self._stop.wait(LOOK_EVERY_S)
+            return
+        self._waitset.wait(dds_infinity if self._loopback else LOOK_EVERY_NS)
+        if self._dds_peers.look():
+            self._follow_release()
+        taken = [subscription.take() for subscription in self._subscriptions]
+        if not any(taken):
+            for end in self._ends:
+                end.log_misfits(self._peers)
+
+    def _follow_release(self) -> None:
+        """Join again if RMF is of another release in which a message of ours differs."""
+        before = self.release
+        if self._peers.settle() and any(self._peers.differs(e.topic, before) for e in self._ends):
+            self._join_anew()
+        else:
+            self._peers.name_misfits()
+
+    def _recover(self, error: Exception) -> None:
+        """After an unexpected exception: log it once, and join again after a pause."""
+        if self._closed:
+            return
+        if not self._failed:
+            log.error(pairs("reader_failed", node=self.name, reason=error), exc_info=error)
+        self._failed = True
+        self._stop.wait(LOOK_EVERY_S)
+        self._join_anew()
+
+    def _owners(self, writers: list[bytes]) -> list[str]:
+        with self._lock:
+            if not self._joined:
+                return []
+            if self._node.reader is None:
+                self._keep(self._node.listen())
+            return self._node.owners(writers)
+
+    def _withdraw(self, publisher: DdsPublisher, writer: DataWriter) -> None:
+        """Take one writer off the graph; after close that has happened already."""
+        with self._lock:
+            if self._closed or publisher not in self._ends:
+                return
+            self._ends = tuple(end for end in self._ends if end is not publisher)
+            if not self._joined:
+                return
+            self._waitset.detach(writer)
+            self._node.drop_writer(writer)
+            self._entities = [entity for entity in self._entities if entity is not writer]
+            writer.__del__()
+
+    def _keep(self, entity: E) -> E:
+        self._entities.append(entity)
+        return entity
+
+    def _delete_entities(self) -> None:
+        while self._entities:
+            self._entities.pop().__del__()  # deletes the C entity; a second call does nothing
+        self._domain = None
+
+
+def _shared_domain(domain_id: int, configuration: str) -> Domain:
+    """This process's domain with this configuration. Cyclone allows only one: participants share it."""
+    key = domain_id, configuration
+    with _domains_lock:
+        domain = _domains.get(key)
+        if domain is None:
+            DDS._dll_handle.dds_set_log_mask(ctypes.c_uint32(ERRORS))
+            domain = _domains[key] = Domain(domain_id, configuration)
+        return domain

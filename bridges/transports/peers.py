@@ -1,0 +1,140 @@
+"""The other nodes on the graph by the ends that they announce: which release of RMF is there, and whose
+types do not fit ours.
+
+A fleet adapter shows the release: it publishes FleetState and, in newer releases, subscribes to
+EmergencySignal; our daemons do neither. With `auto` we speak the release of the fleet adapters: the
+default while there is none, and still the present one if there are two, which is a fault. The
+transports report the ends that they see.
+"""
+
+import logging
+from collections import Counter
+from collections.abc import Hashable, Iterator
+from typing import Final
+
+from msgspec import Struct
+
+from bridges.host.log import pairs
+from bridges.messages.definitions import Alert, EmergencySignal, FleetState
+from bridges.messages.releases import DEFAULT, Release
+from bridges.messages.rihs01 import releases_of, type_hash, type_name
+from bridges.messages.topics import AnyTopic
+from bridges.transports import notices
+
+log = logging.getLogger(__name__)
+
+MOST: Final = 5000
+"""More ends of other nodes than any site has."""
+WITNESSES: Final = {
+    (type_name(FleetState), True),
+    (type_name(EmergencySignal), False),
+    (type_name(Alert), False),
+}
+"""(message, published): ends that only RMF's own nodes have."""
+MISFIT: Final = "TYPE_MISFIT"
+MIXED: Final = "TWO_RELEASES"
+
+
+class Announced(Struct, frozen=True):
+    """An end of any node. `topic`: without slash. `type`: package/msg/Name. `hash`: "" for none."""
+
+    topic: str
+    type: str
+    hash: str
+    publishes: bool
+
+
+class Peers:
+    """What others announce, and the release that follows from it. `wanted`: None for `auto`."""
+
+    def __init__(self, wanted: Release | None) -> None:
+        self.release = wanted or DEFAULT
+        self._auto = wanted is None
+        self._ends: dict[Hashable, Announced] = {}
+        self._ours: dict[tuple[str, bool], AnyTopic] = {}
+        self._mixed = False
+        self._named: set[tuple[str, bool]] = set()
+
+    def ours(self, topic: AnyTopic, *, publishes: bool) -> None:
+        """Note an end of our own."""
+        self._ours[topic.name.strip("/"), publishes] = topic
+
+    def seen(self, key: Hashable, end: Announced) -> None:
+        """Note that an end is there."""
+        if len(self._ends) < MOST or key in self._ends:
+            self._ends[key] = end
+
+    def gone(self, key: Hashable) -> None:
+        """Note that an end has left."""
+        self._ends.pop(key, None)
+
+    def clear(self) -> None:
+        """Forget all ends, because we join again."""
+        self._ends.clear()
+
+    def settle(self) -> bool:
+        """Take over the release that RMF's nodes speak. True if ours has changed."""
+        heard = self._heard()
+        self._name_mixed(heard)
+        if not self._auto or len(heard) != 1 or self.release in heard:
+            return False
+        (self.release,) = heard
+        log.info(pairs("release", speaks=self.release.name, reason="RMF's fleet adapters do"))
+        return True
+
+    def name_misfits(self) -> None:
+        """Log each topic on which others have another type, once."""
+        for end in list(self._ends.values()):
+            if self._misfits(end):
+                self.name(self._ours[end.topic, not end.publishes], published=end.publishes)
+
+    def name(self, topic: AnyTopic, *, published: bool) -> None:
+        """Log, once, that other nodes publish or subscribe to a topic with another type."""
+        key = topic.name.strip("/"), published
+        if key not in self._named:
+            self._named.add(key)
+            notices.misfit(topic, notices.NOT_HEARD if published else notices.NOT_SERVED, "type")
+
+    def differs(self, topic: AnyTopic, before: Release) -> bool:
+        """Does this topic's message differ between the present release and that one?"""
+        return _hash_of(topic, self.release) != _hash_of(topic, before)
+
+    def faults(self) -> list[tuple[str, str]]:
+        """(code, detail) of what now keeps nodes from hearing each other."""
+        heard = sorted(release.name for release in self._heard())
+        found = [(MIXED, f"{' and '.join(heard)} are both on this graph")] if len(heard) > 1 else []
+        counts = Counter(end.topic for end in list(self._ends.values()) if self._misfits(end))
+        what = f"of another definition than ours ({self.release.name})"
+        return found + [(MISFIT, f"{topic}: {n} {what}") for topic, n in sorted(counts.items())]
+
+    def _heard(self) -> set[Release]:
+        return {
+            release
+            for end in list(self._ends.values())
+            if (end.type, end.publishes) in WITNESSES
+            for release in _only(end.hash)
+        }
+
+    def _misfits(self, end: Announced) -> bool:
+        ours = self._ours.get((end.topic, not end.publishes))
+        if ours is None or not self.release.has(ours.type):
+            return False
+        fits = end.hash in ("", type_hash(ours.type, self.release))
+        return end.type != type_name(ours.type) or not fits
+
+    def _name_mixed(self, heard: set[Release]) -> None:
+        """Log two releases once, when the second appears."""
+        if len(heard) > 1 and not self._mixed:
+            names = " ".join(sorted(release.name for release in heard))
+            log.warning(pairs("two_releases", on_this_graph=names, we_speak=self.release.name))
+        self._mixed = len(heard) > 1
+
+
+def _hash_of(topic: AnyTopic, release: Release) -> str:
+    return type_hash(topic.type, release) if release.has(topic.type) else ""
+
+
+def _only(hashed: str) -> Iterator[Release]:
+    """The release of this hash, if only one has it."""
+    found = releases_of(hashed)
+    return iter(found if len(found) == 1 else ())

@@ -1,0 +1,255 @@
+"""The ends of the `ros2` transport: its publishers and subscriptions.
+
+An end outlives rclpy's publisher or subscription: when the transport joins again, it gets a new one.
+rclpy's callbacks run in the transport's thread; they only deliver the message.
+"""
+
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Iterator
+from typing import Final, Protocol
+
+from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
+from rclpy.node import Node
+from rclpy.publisher import Publisher as RosPublisher
+from rclpy.qos import (
+    DurabilityPolicy,
+    HistoryPolicy,
+    QoSProfile,
+    ReliabilityPolicy,
+    qos_policy_name_from_kind,
+)
+from rclpy.subscription import Subscription as RosSubscription
+
+from bridges.messages import cdr, topics
+from bridges.messages.definitions import Message
+from bridges.messages.releases import Release
+from bridges.messages.topics import AnyTopic
+from bridges.transports import notices
+from bridges.transports.ros2.types import ros_type
+from bridges.transports.transport import Receive, TransportError
+
+UNHEARD: Final = 256
+"""The most own messages that may be on their way back to us: over twice any topic's depth."""
+YIELD_S: Final = 50e-6
+"""rclpy's executor holds Python's lock for a while after a callback. This pause (s) lets the thread
+that the message has woken run first."""
+
+
+class Ends:
+    """The ends of one node, and which of them must not hear which."""
+
+    def __init__(self, release: Release) -> None:
+        self.release = release
+        self.publishers: tuple[Ros2Publisher, ...] = ()
+        self.subscriptions: tuple[Ros2Subscription, ...] = ()
+
+    def __iter__(self) -> "Iterator[Ros2Publisher | Ros2Subscription]":
+        yield from self.publishers
+        yield from self.subscriptions
+
+    def heard_back(self, topic: AnyTopic) -> "list[Ros2Subscription]":
+        """The subscriptions that must not hear what this node publishes on the topic."""
+        return [end for end in self.subscriptions if end.others_only and end.would_hear(topic)]
+
+    def unheard_publishers(self, subscription: "Ros2Subscription") -> int:
+        """How many of this node's own publishers a subscription must not hear."""
+        if not subscription.others_only:
+            return 0
+        return sum(subscription.would_hear(end.topic) for end in self.publishers)
+
+
+class Ros2Publisher:
+    """The publisher of one topic. `lives`: does the transport? `withdraw(publisher)`: takes it off the
+    graph."""
+
+    def __init__(
+        self,
+        topic: AnyTopic,
+        ends: Ends,
+        lives: Callable[[], bool],
+        withdraw: "Callable[[Ros2Publisher], None]",
+    ) -> None:
+        self.topic = topic
+        self._ends = ends
+        self._lives = lives
+        self._withdraw = withdraw
+        self._using = threading.Lock()
+        self._end: RosPublisher | None = None
+        depth = topic.publish.depth if topic.publish.durability == "transient_local" else 0
+        self._retained: deque[Message] = deque(maxlen=depth)
+
+    def create(self, node: Node) -> None:
+        """Make rclpy's publisher, and send again what an earlier one retained for late joiners."""
+        made = node.create_publisher(
+            ros_type(self.topic.type, self._ends.release),
+            self.topic.name,
+            _profile(self.topic.publish),
+            event_callbacks=PublisherEventCallbacks(
+                incompatible_qos=_misfit(self.topic, notices.NOT_SERVED)
+            ),
+        )
+        with self._using:
+            self._end = made
+        for message in list(self._retained):
+            self._write(message)
+
+    def drop(self) -> None:
+        """Let go of rclpy's publisher: nobody uses it from then on."""
+        with self._using:
+            self._end = None
+
+    def destroy(self, node: Node) -> None:
+        """Take rclpy's publisher off the graph."""
+        with self._using:
+            if self._end is not None:
+                node.destroy_publisher(self._end)
+            self._end = None
+
+    def publish(self, message: Message) -> None:
+        """Send. Raises TransportError if it was not sent, CdrError if no sample can hold it."""
+        if not self._lives():
+            raise TransportError(f"topic {self.topic.name}: closed, or the reader has died")
+        self._retained.append(message)
+        self._write(message)
+
+    def matched(self) -> int:
+        """How many subscriptions are reached, without own ones that it must skip; 0 after close."""
+        with self._using:
+            try:
+                count = int(self._end.get_subscription_count()) if self._end else 0
+            except RuntimeError:
+                return 0
+        return max(0, count - len(self._ends.heard_back(self.topic)))
+
+    def close(self) -> None:
+        """Take this end off the graph."""
+        self._withdraw(self)
+
+    def _write(self, message: Message) -> None:
+        sample = cdr.encode(self.topic.type, message, self._ends.release)
+        with self._using:
+            if self._end is None:
+                raise TransportError(f"topic {self.topic.name}: not sent: there is no network")
+            for subscription in self._ends.heard_back(self.topic):
+                subscription.said.append(cdr.decode(self.topic.type, sample, self._ends.release))
+            try:
+                self._end.publish(sample)
+            except RuntimeError as error:
+                raise TransportError(f"topic {self.topic.name}: not sent: {error}") from error
+
+
+class Ros2Subscription:
+    """The subscription of one topic. `dropped`: counts invalid samples, by topic name.
+
+    `said`: with `others_only`, what this node has published here and not heard back yet. rclpy (Jazzy)
+    has no such option, and does not say who sent a sample.
+    """
+
+    def __init__(
+        self,
+        topic: AnyTopic,
+        received: Receive,
+        ends: Ends,
+        dropped: dict[str, int],
+        *,
+        others_only: bool,
+    ) -> None:
+        self.topic = topic
+        self.others_only = others_only
+        self.said: deque[Message] = deque(maxlen=UNHEARD)
+        self._received = received
+        self._ends = ends
+        self._dropped = dropped
+        self._using = threading.Lock()
+        self._end: RosSubscription | None = None
+        self._node: Node | None = None
+
+    def create(self, node: Node) -> None:
+        """Make rclpy's subscription."""
+        self.said.clear()
+        made = node.create_subscription(
+            ros_type(self.topic.type, self._ends.release),
+            self.topic.name,
+            self._take,
+            _profile(self.topic.subscribe),
+            raw=True,
+            event_callbacks=SubscriptionEventCallbacks(
+                incompatible_qos=_misfit(self.topic, notices.NOT_HEARD)
+            ),
+        )
+        with self._using:
+            self._end, self._node = made, node
+
+    def drop(self) -> None:
+        """Let go of rclpy's subscription: nobody uses it from then on."""
+        with self._using:
+            self._end = self._node = None
+
+    def would_hear(self, published: AnyTopic) -> bool:
+        """Whether DDS would match this end with a publisher of that topic."""
+        durabilities = (self.topic.subscribe.durability, published.publish.durability)
+        return (published.name, published.type) == (self.topic.name, self.topic.type) and (
+            durabilities != ("transient_local", "volatile")
+        )
+
+    def matched(self) -> int:
+        """How many publishers are heard; 0 after close."""
+        with self._using:
+            try:
+                count = int(self._end.get_publisher_count()) if self._end else 0
+            except RuntimeError:
+                return 0
+        return max(0, count - self._ends.unheard_publishers(self))
+
+    def senders(self) -> list[str]:
+        """The nodes of these publishers."""
+        with self._using:
+            node = self._node
+            try:
+                found = node.get_publishers_info_by_topic(self.topic.name) if node else []
+            except RuntimeError:
+                return []
+            ours = (node.get_namespace(), node.get_name()) if node and self.others_only else ()
+        names = [(end.node_namespace, end.node_name) for end in found]
+        return [f"{space.rstrip('/')}/{name}" for space, name in names if (space, name) != ours]
+
+    def _take(self, sample: bytes) -> None:
+        try:
+            message = cdr.decode(self.topic.type, sample, self._ends.release)
+        except cdr.CdrError as error:
+            notices.drop(self._dropped, self.topic, error)
+            return
+        if message in self.said:
+            self.said.remove(message)
+            return
+        notices.hand_on(self._dropped, self.topic, self._received, message)
+        time.sleep(YIELD_S)
+
+
+def _profile(qos: topics.Qos) -> QoSProfile:
+    durability = {
+        "volatile": DurabilityPolicy.VOLATILE,
+        "transient_local": DurabilityPolicy.TRANSIENT_LOCAL,
+    }
+    return QoSProfile(
+        reliability=ReliabilityPolicy.RELIABLE,
+        durability=durability[qos.durability],
+        history=HistoryPolicy.KEEP_LAST,
+        depth=qos.depth,
+    )
+
+
+class _Misfit(Protocol):
+    """rclpy's event for a peer whose QoS does not fit an end."""
+
+    last_policy_kind: object
+
+
+def _misfit(topic: AnyTopic, text: str) -> Callable[[_Misfit], None]:
+    def tell(event: _Misfit) -> None:
+        policy = qos_policy_name_from_kind(event.last_policy_kind).lower()
+        notices.misfit(topic, text, policy)
+
+    return tell

@@ -1,0 +1,44 @@
+"""Sources ROS's setup file before the daemon starts: `ros_setup:` in the YAML.
+
+Without the paths that it sets, rclpy cannot be imported, and `transport: auto` would choose another
+transport under systemd than in a shell. The daemon's process becomes a shell, which sources the file
+and becomes the daemon. So the process id, by which systemd knows the daemon, stays the same.
+"""
+
+import logging
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from bridges.host.log import pairs
+from bridges.kinds.shared.rmf_section import Rmf
+from bridges.transports.transport import TransportError
+
+log = logging.getLogger(__name__)
+
+SOURCED = "RMF_BRIDGE_ROS_SETUP"
+"""The variable that names the setup file which this process has sourced."""
+SHELL = 'setup=$1; shift; ours=("$@"); set --; . "$setup"; exec "${ours[@]}"'
+
+
+def sourcing(rmf: Rmf, environ: Mapping[str, str], argv: Sequence[str]) -> list[str]:
+    """The command that this process must become; empty if nothing is to be sourced.
+
+    `argv`: `sys.orig_argv`. Raises TransportError if `transport: ros2` needs a missing file.
+    """
+    if (
+        rmf.ros_setup is None
+        or rmf.transport in ("dds", "zenoh")
+        or environ.get(SOURCED) == rmf.ros_setup
+    ):
+        return []
+    if Path(rmf.ros_setup).is_file():
+        return ["bash", "-c", SHELL, "rmf-bridge", rmf.ros_setup, *argv]
+    if rmf.transport == "ros2":
+        raise TransportError(f"ros_setup: {rmf.ros_setup} does not exist: is ROS 2 installed?")
+    log.info(pairs("no_ros_setup", file=rmf.ros_setup, reason="it does not exist"))
+    return []
+
+
+def sourced(rmf: Rmf, environ: Mapping[str, str]) -> dict[str, str]:
+    """The environment of that command: it says that the file has been sourced."""
+    return {**environ, SOURCED: rmf.ros_setup or ""}

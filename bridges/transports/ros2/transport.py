@@ -1,0 +1,202 @@
+"""The `ros2` transport: an ordinary ROS 2 node, by rclpy, on whichever RMW is installed.
+
+Samples pass through rclpy as bytes, and `cdr.py` encodes and decodes them, as on `dds`. An invalid
+sample is dropped and counted, as there. rclpy's executor runs in a thread of this transport. When the
+machine's addresses change or its wall clock is set back, that thread leaves the graph and joins again,
+with the same ends. (Of the RMWs only Cyclone needs it for the clock; the others lose a moment.)
+
+Source: rclpy 7.1 (ROS 2 Jazzy), its public API. Only this file, ros_stay.py and ros_ends.py import
+rclpy, only ros_types.py the message packages, and only choose.py imports this one.
+"""
+
+import atexit
+import logging
+from collections.abc import Callable, Sequence
+from typing import Final
+
+from rclpy.node import Node
+
+from bridges.host.log import pairs
+from bridges.messages.topics import AnyTopic, Topic
+from bridges.transports import addresses, notices
+from bridges.transports.ros2 import peers as ros_peers
+from bridges.transports.ros2.ends import Ends, Ros2Publisher, Ros2Subscription
+from bridges.transports.ros2.stay import REFUSALS, Stay
+from bridges.transports.ros2.types import installed
+from bridges.transports.threaded import LOOK_EVERY_S, Threaded
+from bridges.transports.transport import M, TransportError, any_type
+
+log = logging.getLogger(__name__)
+
+AGAIN_S: Final = 1.0
+"""How long (s) to wait after an exception of rclpy before its executor runs again."""
+
+
+class Ros2Transport(Threaded):
+    """One rclpy node, its ends and its executor's thread.
+
+    `ros_args`: the arguments after `--ros-args` on the command line: name, namespace, remappings and
+    parameters (`use_sim_time`). `loopback`: stay on this machine, whatever the environment says.
+    When the wall clock is set back or, off loopback, the machine's addresses change, the node leaves
+    the graph and joins again, and publishers send again what they retain. Raises TransportError when
+    the graph cannot be joined.
+    """
+
+    speaks = "ros2"
+
+    refusals = REFUSALS
+
+    def __init__(
+        self,
+        node_name: str,
+        domain_id: int,
+        *,
+        loopback: bool,
+        ros_args: Sequence[str] = (),
+    ) -> None:
+        super().__init__(node_name, domain_id, installed())
+        self._asked_name = node_name
+        self._loopback = loopback
+        self._ros_args = ros_args
+        self._ends = Ends(self.release)
+        self._stay: Stay | None = None
+        with self._reporting(f"cannot join ROS domain {domain_id}"):
+            self._join()
+        self.name = self.node.get_name()
+        self._start(self._spin, "ros2")
+        self._watch_clock()
+        # An executor's thread that outlives the interpreter aborts it, as where a start is refused.
+        atexit.register(self.close)
+
+    @property
+    def node(self) -> Node:
+        """rclpy's node; another one after the node has joined again. Raises TransportError without a
+        network."""
+        if self._stay is None:
+            raise TransportError(f"{self.name} has no network")
+        return self._stay.node
+
+    def publisher(self, topic: AnyTopic) -> Ros2Publisher:
+        """Declare a publisher with `topic.publish` QoS. Raises TransportError, also for a missing ROS
+        package."""
+        publisher = Ros2Publisher(topic, self._ends, lambda: self.lives, self._withdraw)
+        with self._lock, self._reporting(f"topic {topic.name} cannot be published"):
+            if self._stay is not None:
+                publisher.create(self._stay.node)
+            self._ends.publishers += (publisher,)
+        return publisher
+
+    def subscribe(
+        self, topic: Topic[M], received: Callable[[M], None], *, others_only: bool = False
+    ) -> Ros2Subscription:
+        """Declare a subscription with `topic.subscribe` QoS; `received` runs on our thread."""
+        subscription = Ros2Subscription(
+            topic, any_type(received), self._ends, self.dropped, others_only=others_only
+        )
+        with self._lock, self._reporting(f"topic {topic.name} cannot be subscribed"):
+            if self._stay is not None:
+                subscription.create(self._stay.node)
+            self._ends.subscriptions += (subscription,)
+        return subscription
+
+    def faults(self) -> list[tuple[str, str]]:
+        """What keeps it and other nodes from hearing each other; from any thread."""
+        with self._lock:
+            if not self.lives or self._stay is None:
+                return []
+            published = [(end.topic, True) for end in self._ends.publishers]
+            subscribed = [(end.topic, False) for end in self._ends.subscriptions]
+            ros_peers.look(self._stay.node, self._peers, [*published, *subscribed])
+            return self._peers.faults()
+
+    def wall(self) -> float:
+        """ROS's time (s since the epoch): the wall clock, or `/clock` where use_sim_time is set."""
+        return float(self._clock.now().nanoseconds * 1e-9)
+
+    def close(self) -> None:
+        """Leave the graph at once, so that no ghost endpoint remains. May be called twice."""
+        with self._lock:
+            if self._closed:
+                return
+            self._closed = True
+            self._stop.set()
+            self._wake()
+        atexit.unregister(self.close)
+        self._join_thread()
+        self._leave()
+
+    def _wake(self) -> None:
+        if self._stay is not None:
+            self._stay.leave_soon()
+
+    def _join(self) -> None:
+        """Raises one of REFUSALS."""
+        self._addresses = addresses.addresses()
+        self._stay = Stay(
+            self._asked_name, self.domain_id, loopback=self._loopback, ros_args=self._ros_args
+        )
+        self._clock = self._stay.node.get_clock()
+
+    def _leave(self) -> None:
+        for end in self._ends:
+            end.drop()
+        stay, self._stay = self._stay, None
+        if stay is not None:
+            stay.leave()
+
+    def _join_anew(self) -> None:
+        with self._lock:
+            if self._closed:
+                return
+            was_joined, self._set_back = self._stay is not None, False
+            self._leave()
+            try:
+                self._join()
+                for end in self._ends:
+                    end.create(self.node)
+            except REFUSALS as error:
+                self._leave()
+                if was_joined:
+                    log.warning(pairs("not_joined", node=self.name, reason=error))
+
+    def _spin(self) -> None:
+        """Run the executor. An exception of rclpy ends the thread only if it keeps coming, or if the
+        context has been shut down."""
+        failures = 0
+        while not self._closed and self._lasts() and failures < notices.FAILURES:
+            try:
+                self._spin_once()
+                failures = 0
+            except Exception as error:
+                failures += 1
+                if failures == 1:
+                    log.exception(pairs("reader_failed", node=self.name, reason=error))
+                self._stop.wait(AGAIN_S)
+
+    def _lasts(self) -> bool:
+        return self._stay is None or self._stay.lasts
+
+    def _spin_once(self) -> None:
+        if self._set_back:
+            self._join_anew()
+        if not self._loopback and self._look_is_due():
+            self._follow_network()
+        if self._stay is None:
+            self._stop.wait(LOOK_EVERY_S)
+        else:
+            self._stay.spin(None if self._loopback else LOOK_EVERY_S)
+
+    def _follow_network(self) -> None:
+        if self._network_changed() or self._stay is None:
+            self._join_anew()
+
+    def _withdraw(self, publisher: Ros2Publisher) -> None:
+        """Take one publisher off the graph; after close that has happened already."""
+        with self._lock:
+            if self._closed or publisher not in self._ends.publishers:
+                return
+            self._ends.publishers = tuple(
+                end for end in self._ends.publishers if end is not publisher
+            )
+            if self._stay is not None:
+                publisher.destroy(self._stay.node)

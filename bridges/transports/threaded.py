@@ -1,0 +1,121 @@
+"""What the transports with a thread of their own share: `dds`, `zenoh` and `ros2`."""
+
+import logging
+import math
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import ClassVar, Final
+
+from bridges.host.log import pairs
+from bridges.messages.releases import Release
+from bridges.transports import addresses, wall_clock
+from bridges.transports.peers import Peers
+from bridges.transports.transport import TransportError
+
+log = logging.getLogger(__name__)
+
+LOOK_EVERY_S: Final = 1.0
+"""How often (s) to look whether the machine's addresses have changed. No library does that: one that
+starts with only `lo` up stays there forever, and none notices a changed address."""
+
+
+class Threaded:
+    """A node on the graph, with one thread; on DDS another one looks at the clock. `refusals`: the
+    exceptions by which its library refuses.
+
+    `release`: None to follow RMF's.
+    """
+
+    refusals: ClassVar[tuple[type[Exception], ...]]
+
+    def __init__(self, node_name: str, domain_id: int, release: Release | None = None) -> None:
+        self.name = node_name
+        self.domain_id = domain_id
+        self._peers = Peers(release)
+        self.dropped: dict[str, int] = {}
+        self._lock = threading.Lock()
+        self._closed = False
+        self._stop = threading.Event()
+        self._clock_thread: threading.Thread | None = None
+        self._wall_clock = wall_clock.WallClock(wall_clock.ahead_s())
+        self._set_back = False
+        self._look_at = -math.inf
+        self._addresses: addresses.Addresses = frozenset()
+
+    @property
+    def release(self) -> Release:
+        """The release of RMF's messages that it speaks now."""
+        return self._peers.release
+
+    def faults(self) -> list[tuple[str, str]]:
+        """(code, detail) of what now keeps it and others from hearing each other; from any thread."""
+        return self._peers.faults()
+
+    @property
+    def lives(self) -> bool:
+        """Whether its thread runs; also true without a network, a router or a peer."""
+        return not self._closed and self._thread.is_alive()
+
+    def wall(self) -> float:
+        """The wall clock (s since the epoch)."""
+        return time.time()
+
+    def _start(self, run: Callable[[], None], wire: str) -> None:
+        self._thread = threading.Thread(target=run, name=f"{self.name}-{wire}", daemon=True)
+        self._thread.start()
+
+    def _watch_clock(self) -> None:
+        """From now on set `_set_back` and wake our thread when the wall clock is set back.
+
+        It takes another thread, because ours may itself wait by the wall clock.
+        """
+        run, name = self._look_at_clock, f"{self.name}-clock"
+        self._clock_thread = threading.Thread(target=run, name=name, daemon=True)
+        self._clock_thread.start()
+
+    def _look_at_clock(self) -> None:
+        while not self._stop.wait(LOOK_EVERY_S):
+            if back_s := self._wall_clock.set_back_s(wall_clock.ahead_s()):
+                log.info(pairs("clock_set_back", node=self.name, by_s=round(back_s, 1)))
+                with self._lock:
+                    self._set_back = True
+                    self._wake()
+
+    def _wake(self) -> None:
+        """End the wait of our thread, if it has joined; called with the lock."""
+
+    def _look_is_due(self) -> bool:
+        """Whether it is time to look at the network again."""
+        now = time.monotonic()
+        if now < self._look_at:
+            return False
+        self._look_at = now + LOOK_EVERY_S
+        return True
+
+    def _network_changed(self) -> bool:
+        """Whether the machine's addresses have changed since the node joined; logs them."""
+        found = addresses.addresses()
+        if found == self._addresses:
+            return False
+        self._addresses = found
+        log.info(pairs("network", addresses=" ".join(sorted(a for _, a in found)) or "none"))
+        return True
+
+    def _join_thread(self) -> None:
+        """Wait until the threads have ended, unless ours is the one that asks."""
+        if self._clock_thread is not None:
+            self._clock_thread.join()
+        if threading.current_thread() is not self._thread:
+            self._thread.join()
+
+    @contextmanager
+    def _reporting(self, text: str) -> Iterator[None]:
+        """Raise the library's exceptions as TransportError. `text`: what cannot be done."""
+        if self._closed:
+            raise TransportError(f"{text}: {self.name} has left the graph")
+        try:
+            yield
+        except self.refusals as error:
+            raise TransportError(f"{text}: {error}") from error

@@ -1,0 +1,97 @@
+"""The interface of every transport: `ros2`, `dds`, `zenoh`, `memory`.
+
+Each has a file beside this one; `bridges/transports/choose.py` opens the one that the YAML names.
+"""
+
+from collections.abc import Callable
+from typing import Protocol, TypeVar, cast
+
+from bridges.messages.definitions import Message
+from bridges.messages.releases import Release
+from bridges.messages.topics import Topic
+
+M = TypeVar("M", bound=Message)
+M_contra = TypeVar("M_contra", bound=Message, contravariant=True)
+
+
+Receive = Callable[[Message], None]
+"""Takes a message of any type."""
+
+
+def any_type(received: Callable[[M], None]) -> Receive:
+    """The callback of one subscription, as a transport stores it beside those of other types.
+
+    A transport only gives it messages that were decoded as its own topic's type.
+    """
+    return cast(Receive, received)
+
+
+class TransportError(Exception):
+    """The transport cannot be opened, or has been lost: no network, no library, no such domain."""
+
+
+class Publisher(Protocol[M_contra]):
+    """The sending end of one topic."""
+
+    def publish(self, message: M_contra) -> None:
+        """Send; never blocks longer than 20 ms. Raises TransportError when the wire is gone."""
+
+    def matched(self) -> int:
+        """How many subscriptions receive what is sent here, in any process; 0 after close."""
+
+    def close(self) -> None:
+        """Take this publisher off the graph at once; the node stays. May be called twice."""
+
+
+class Subscription(Protocol):
+    """The receiving end of one topic."""
+
+    def matched(self) -> int:
+        """How many publishers are heard here, in any process; 0 after close."""
+
+    def senders(self) -> list[str]:
+        """The nodes of these publishers, as `/namespace/name`, as far as the wire tells; from any
+        thread. Anybody can make a name up."""
+
+
+class Transport(Protocol):
+    """One node on the RMF graph. `speaks`: the transport's name in a YAML. `domain_id`: its ROS domain.
+
+    `received` is called on the transport's own thread. A callback must only append to an inbox and
+    must not raise. Samples that do not decode, or whose callback raises, are dropped, counted in
+    `dropped` by topic name, and logged once for each topic.
+    """
+
+    name: str
+    speaks: str
+    domain_id: int
+    dropped: dict[str, int]
+
+    @property
+    def release(self) -> Release:
+        """The release of RMF's messages that it speaks now."""
+
+    def faults(self) -> list[tuple[str, str]]:
+        """(code, detail) of what now keeps this node and others from hearing each other; from any
+        thread."""
+
+    def publisher(self, topic: Topic[M]) -> Publisher[M]:
+        """Declare a publisher with `topic.publish` QoS."""
+
+    def subscribe(
+        self, topic: Topic[M], received: Callable[[M], None], *, others_only: bool = False
+    ) -> Subscription:
+        """Declare a subscription with `topic.subscribe` QoS.
+
+        `others_only`: what this same transport publishes on the topic is not delivered to it.
+        """
+
+    @property
+    def lives(self) -> bool:
+        """Whether its thread runs. It also does without a network, a router or a peer."""
+
+    def wall(self) -> float:
+        """RMF's time, for stamps (s since the epoch): the wall clock, unless ROS simulates time."""
+
+    def close(self) -> None:
+        """Leave the graph at once, so that no ghost endpoint remains. May be called twice."""

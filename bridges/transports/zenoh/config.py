@@ -1,0 +1,122 @@
+"""The configuration of a zenoh session: as in rmw_zenoh, with the YAML's settings, or for a node that
+stays on this machine.
+
+Source: ros2/rmw_zenoh, jazzy, DEFAULT_RMW_ZENOH_SESSION_CONFIG.json5; zenoh's DEFAULT_CONFIG.json5.
+"""
+
+import re
+from typing import Final
+
+from bridges.host import user_files
+from bridges.kinds.shared.rmf_section import Zenoh, ZenohTls
+from bridges.transports.transport import TransportError
+
+Configuration = dict[str, object]
+"""A key of zenoh's configuration -> its value, as JSON holds it."""
+
+LOOPBACK_PORT: Final = 17400
+"""The port on which nodes of domain 0 on this machine meet; domain N uses the Nth port after it. It is
+not a router's (7447), and not one that Linux assigns by itself (from 32768)."""
+RETRY: Final = {"period_init_ms": 100, "period_max_ms": 1000, "period_increase_factor": 2}
+
+COMMON: Final[Configuration] = {
+    "scouting/multicast/enabled": False,
+    "scouting/delay": 1,  # ms: scouting is off, so there is nothing to wait for
+    # zenoh's own clock panics before 1970, and then sends and hears nothing more. What is retained is
+    # ordered by its number, so nothing needs the time.
+    "timestamping/enabled": False,
+    # A new message waits while retained ones are queried. A node that hangs must not delay a fire alarm
+    # for longer than this (ms); rmw_zenoh would wait forever.
+    "queries_default_timeout": 3000,
+    "transport/shared_memory/enabled": False,
+    "connect/timeout_ms": -1,
+    "connect/exit_on_failure": False,
+    "connect/retry": RETRY,
+}
+_LOCAL = re.compile(r"[a-z]+/(localhost|127\.[0-9.]+|\[::1\]):[0-9]+")
+
+
+def is_local(endpoint: str) -> bool:
+    """Whether an endpoint is on this machine's loopback."""
+    return _LOCAL.fullmatch(endpoint) is not None
+
+
+def on_loopback(domain_id: int) -> list[Configuration]:
+    """Configurations for a node that only meets nodes of its domain on this machine, and no router.
+
+    To be tried in this order. The first node listens on the domain's port, and introduces later nodes
+    to each other. Later nodes keep trying to connect to that port, so they also find a node that
+    takes it over.
+    """
+    meeting = f"tcp/127.0.0.1:{LOOPBACK_PORT + domain_id}"
+    common = COMMON | {
+        "mode": "peer",
+        "listen/exit_on_failure": True,
+        "scouting/gossip/autoconnect": {"router": [], "peer": ["peer"]},
+    }
+    return [
+        common | {"listen/endpoints": [meeting]},
+        common | {"listen/endpoints": ["tcp/127.0.0.1:0"], "connect/endpoints": [meeting]},
+    ]
+
+
+def on_the_site(zenoh: Zenoh) -> Configuration:
+    """The configuration that the YAML asks for. Raises TransportError for a file that is missing, or a
+    secret that others can read."""
+    wanted = COMMON | {"mode": mode(zenoh), "connect/endpoints": list(zenoh.connect)}
+    if wanted["mode"] == "peer":
+        wanted["listen/endpoints"] = list(zenoh.listen)
+        wanted["listen/exit_on_failure"] = True
+    else:
+        wanted["connect/timeout_ms"] = 0  # do not wait for a router when a client's session opens
+    try:
+        return wanted | _tls(zenoh.tls) | _user(zenoh)
+    except user_files.SecretError as error:
+        raise TransportError(str(error)) from None
+
+
+def mode(zenoh: Zenoh) -> str:
+    """`peer` or `client`.
+
+    A router forwards no messages between peers, because peers connect directly. So a node that peers
+    cannot reach must be a client. With several routers it must be one too: a peer connects to all of
+    them, and would receive each message once from each.
+    """
+    if zenoh.mode != "auto":
+        return zenoh.mode
+    near = is_local(zenoh.connect[0]) or not all(map(is_local, zenoh.listen))
+    return "peer" if near and len(zenoh.connect) == 1 else "client"
+
+
+def _tls(tls: ZenohTls | None) -> Configuration:
+    if tls is None:
+        return {}
+    wanted: Configuration = {}
+    if tls.ca:
+        wanted["root_ca_certificate"] = _readable("ca", tls.ca)
+    if tls.certificate and tls.private_key:
+        user_files.secret("private_key", tls.private_key)
+        certificate = _readable("certificate", tls.certificate)
+        for side in ("connect", "listen"):
+            wanted[f"{side}_certificate"] = certificate
+            wanted[f"{side}_private_key"] = tls.private_key
+        wanted["enable_mtls"] = True
+    return {f"transport/link/tls/{key}": value for key, value in wanted.items()}
+
+
+def _readable(name: str, file: str) -> str:
+    try:
+        user_files.read(file, 0)
+        return file
+    except OSError as error:
+        raise TransportError(f"{name} {file} cannot be read: {error.strerror}") from None
+
+
+def _user(zenoh: Zenoh) -> Configuration:
+    if zenoh.user is None or zenoh.password_file is None:
+        return {}
+    password = user_files.secret_line("password_file", zenoh.password_file, "password")
+    return {
+        "transport/auth/usrpwd/user": zenoh.user,
+        "transport/auth/usrpwd/password": password,
+    }

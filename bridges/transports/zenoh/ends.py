@@ -1,0 +1,279 @@
+"""The ends of the `zenoh` transport: its publishers and subscriptions.
+
+They are made as in rmw_zenoh (jazzy: rmw_publisher_data.cpp, rmw_subscription_data.cpp). A publisher
+that retains messages is an advanced publisher, with a cache as deep as its history. A subscription
+that wants retained messages is an advanced subscriber. It queries each cache when either of the two is
+new, and again for samples that it has missed.
+
+An end outlives its session: when the transport joins again, the end gets a place in the new session.
+Callbacks on zenoh's threads only leave work for the transport's thread.
+"""
+
+import time
+from abc import ABC, abstractmethod
+from collections import deque
+from collections.abc import Callable
+from functools import partial
+from typing import Final, Protocol
+
+import zenoh
+from zenoh import CongestionControl, Locality, Reliability, Sample, SampleKind, ext
+from zenoh.handlers import Callback
+
+from bridges.messages import cdr
+from bridges.messages.cdr import CdrError
+from bridges.messages.definitions import Message
+from bridges.messages.releases import NEWEST
+from bridges.messages.topics import AnyTopic
+from bridges.transports import notices
+from bridges.transports.transport import Receive, TransportError
+from bridges.transports.zenoh import keys as zenoh_keys
+from bridges.transports.zenoh.keys import Keys, Kind
+from bridges.transports.zenoh.peers import Merged, Order
+from bridges.transports.zenoh.place import Place, Tell
+from bridges.transports.zenoh.session import contained
+
+HEARTBEAT_S: Final = 0.5
+"""As in rmw_zenoh: this long after a retained message its number is sent again, so that subscribers
+notice a loss."""
+AT_ONCE: Final = 100
+"""The most samples taken from one subscription before the others have their turn."""
+
+
+class Declared(Protocol):
+    """A publisher or subscriber in a zenoh session."""
+
+    def undeclare(self) -> object:
+        """Take it off the graph."""
+
+
+class ZenohEnd(ABC):
+    """What publishers and subscriptions share. `do(order)`: runs it on the transport's thread. `tell`:
+    as `Place`."""
+
+    def __init__(
+        self, topic: AnyTopic, notice: str, do: Callable[[Order], None], tell: Tell
+    ) -> None:
+        self.topic = topic
+        self.place: Place | None = None
+        self._end: Declared | None = None
+        self._notice = notice
+        self._noticed: set[str] = set()
+        self._do = do
+        self._tell = tell
+        self._release = NEWEST
+
+    @abstractmethod
+    def create(self, session: zenoh.Session, keys: Keys, number: int) -> None:
+        """Take a place in a session. `number`: unique within it."""
+
+    def _placed(self, session: zenoh.Session, keys: Keys, kind: Kind, number: int) -> Place:
+        misfit, tell, do = self.log_misfit, self._tell, self._do
+        return Place(session, keys, kind, self.topic, number, misfit, tell, do)
+
+    def leave(self) -> None:
+        """Leave a session that stays open."""
+        place, self.place = self.place, None
+        end, self._end = self._end, None
+        if place and end:
+            place.leave()
+            end.undeclare()
+
+    def give_up(self) -> object:
+        """Leave a session that is about to be closed. Returns what was declared in it."""
+        held = self.place, self._end
+        self.place = self._end = None
+        return held
+
+    def log_misfit(self, policy: str) -> None:
+        """Log, once for each policy, that a peer does not fit."""
+        if policy not in self._noticed:
+            self._noticed.add(policy)
+            self._do(partial(notices.misfit, self.topic, self._notice, policy))
+
+
+class ZenohPublisher(ZenohEnd):
+    """The publisher of one topic.
+
+    `withdraw(publisher)`: takes it off the graph. `lives()`: the transport is open and its thread
+    runs. `deaf`: tokens of this node's own subscriptions that must not hear it.
+    """
+
+    _end: zenoh.Publisher | ext.AdvancedPublisher | None
+
+    def __init__(
+        self,
+        topic: AnyTopic,
+        do: Callable[[Order], None],
+        withdraw: Callable[["ZenohPublisher"], None],
+        lives: Callable[[], bool],
+        deaf: set[str],
+        tell: Tell,
+    ) -> None:
+        super().__init__(topic, notices.NOT_SERVED, do, tell)
+        self._withdraw = withdraw
+        self._lives = lives
+        self._deaf = deaf
+        self._sent = 0
+        depth = topic.publish.depth if topic.publish.durability == "transient_local" else 0
+        self._retained: deque[bytes] = deque(maxlen=depth)
+
+    def create(self, session: zenoh.Session, keys: Keys, number: int) -> None:
+        """Take a place in a session, and send what was retained again for late joiners."""
+        place = self._placed(session, keys, "MP", number)
+        self._release = keys.release
+        self._end = end = self._declared(session, place.key)
+        place.appear()
+        self.place, self._sent = place, 0
+        for sample in list(self._retained):
+            self._put(end, place, sample)
+
+    def publish(self, message: Message) -> None:
+        """Send. Raises TransportError if it was not sent, CdrError if no sample can hold it."""
+        if not self._lives():
+            raise TransportError(f"topic {self.topic.name}: closed, or the reader has died")
+        sample = cdr.encode(self.topic.type, message, self._release)
+        self._retained.append(sample)
+        place, end = self.place, self._end  # another thread may clear them at any time
+        if place is None or end is None:
+            raise TransportError(f"topic {self.topic.name}: not sent: the node is not on the graph")
+        try:
+            with contained():
+                self._put(end, place, sample)
+        except zenoh.ZError as error:
+            raise TransportError(f"topic {self.topic.name}: not sent: {error}") from error
+
+    def matched(self) -> int:
+        """How many subscriptions are reached; 0 after close."""
+        place = self.place
+        return len(place.peers.keys() - self._deaf) if place else 0
+
+    def close(self) -> None:
+        """Take this end off the graph."""
+        self._withdraw(self)
+
+    def _declared(
+        self, session: zenoh.Session, key: str
+    ) -> zenoh.Publisher | ext.AdvancedPublisher:
+        # With DROP, zenoh waits for 1 ms at most for room in the queue to a peer.
+        congestion, reliable = CongestionControl.DROP, Reliability.RELIABLE
+        if not self._retained.maxlen:
+            return session.declare_publisher(
+                key, congestion_control=congestion, reliability=reliable
+            )
+        return ext.declare_advanced_publisher(
+            session,
+            key,
+            congestion_control=congestion,
+            reliability=reliable,
+            cache=ext.CacheConfig(max_samples=self._retained.maxlen),
+            sample_miss_detection=ext.MissDetectionConfig(
+                heartbeat=None, sporadic_heartbeat=HEARTBEAT_S
+            ),
+            publisher_detection=True,
+        )
+
+    def _put(
+        self, end: zenoh.Publisher | ext.AdvancedPublisher, place: Place, sample: bytes
+    ) -> None:
+        self._sent += 1
+        attached = zenoh_keys.attachment(self._sent, time.time_ns(), place.gid)
+        end.put(sample, attachment=attached)
+
+
+class ZenohSubscription(ZenohEnd):
+    """The subscription of one topic.
+
+    `dropped`: counts invalid samples, by topic name. `others_only`: does not hear this node's own
+    publishers. `attached`: only samples with the attachment of a ROS node are valid.
+    """
+
+    def __init__(
+        self,
+        topic: AnyTopic,
+        received: Receive,
+        do: Callable[[Order], None],
+        dropped: dict[str, int],
+        *,
+        others_only: bool,
+        attached: bool,
+        tell: Tell,
+    ) -> None:
+        super().__init__(topic, notices.NOT_HEARD, do, tell)
+        self.others_only = others_only
+        self._ring = Merged(do, self.take)
+        self._own_session = ""
+        self._received = received
+        self._dropped = dropped
+        self._attached = attached
+        self._waiting: deque[Sample | CdrError] = deque(maxlen=topic.subscribe.depth)
+
+    def create(self, session: zenoh.Session, keys: Keys, number: int) -> None:
+        """Take a place in a session."""
+        place = self._placed(session, keys, "MS", number)
+        self._release = keys.release
+        self.place, self._own_session = place, keys.session
+        origin = Locality.REMOTE if self.others_only else Locality.ANY
+        on_sample = Callback(self._arrived, indirect=False)
+        if self.topic.subscribe.durability == "volatile":
+            self._end = session.declare_subscriber(place.key, on_sample, allowed_origin=origin)
+        else:
+            depth = self.topic.subscribe.depth
+            self._end = ext.declare_advanced_subscriber(
+                session,
+                place.key,
+                on_sample,
+                allowed_origin=origin,
+                history=ext.HistoryConfig(detect_late_publishers=True, max_samples=depth),
+                recovery=ext.RecoveryConfig(periodic_queries=None, heartbeat=True),
+                subscriber_detection=True,
+            )
+        place.appear()
+
+    def matched(self) -> int:
+        """How many publishers are heard; 0 after close."""
+        return len(self.senders())
+
+    def senders(self) -> list[str]:
+        """The nodes of these publishers."""
+        place = self.place
+        peers = list(place.peers.values()) if place else []
+        ours = self._own_session if self.others_only else ""
+        return [peer.node for peer in peers if peer.session != ours]
+
+    def take(self) -> None:
+        """Deliver what has arrived, at most AT_ONCE samples; the rest waits for the next turn."""
+        for _ in range(min(AT_ONCE, len(self._waiting))):
+            try:
+                message = self._message(self._waiting.popleft())
+            except CdrError as error:
+                notices.drop(self._dropped, self.topic, error)
+                continue
+            if message is not None:
+                notices.hand_on(self._dropped, self.topic, self._received, message)
+        if self._waiting:
+            self._ring()
+
+    def _arrived(self, sample: Sample) -> None:
+        """Called on zenoh's thread. A full queue drops its oldest sample, as KEEP_LAST does."""
+        size = len(sample.payload)
+        long = size > cdr.longest(self.topic.type)
+        self._waiting.append(CdrError(f"{size} bytes long") if long else sample)
+        self._ring()
+
+    def _message(self, sample: Sample | CdrError) -> Message | None:
+        """The message in a sample; None if its publisher must not be heard. Raises CdrError."""
+        if isinstance(sample, CdrError):
+            raise sample
+        place = self.place
+        if place is None:
+            return None
+        if sample.kind != SampleKind.PUT or str(sample.key_expr) != place.key:
+            raise CdrError(f"sent to {sample.key_expr}, or a deletion")
+        attached = sample.attachment
+        sender = None if attached is None else zenoh_keys.sender(bytes(attached))
+        if sender is None and self._attached:
+            raise CdrError("without the attachment of a ROS node")
+        if sender in place.unheard:
+            return None
+        return cdr.decode(self.topic.type, bytes(sample.payload), self._release)

@@ -1,0 +1,217 @@
+"""How ROS's topics and nodes are named on zenoh: data keys, liveliness tokens, attachments. Pure.
+
+There are two ways to name them, and nodes of one do not hear those of the other:
+- rmw_zenoh's, where each ROS context is a zenoh session. Source: ros2/rmw_zenoh, jazzy,
+  docs/design.md; rmw_zenoh_cpp/src/detail/liveliness_utils.cpp and attachment_helpers.cpp.
+- zenoh-bridge-ros2dds's, which routes a DDS domain. Source: eclipse-zenoh/zenoh-plugin-ros2dds,
+  liveliness_mgt.rs and ros2_utils.rs.
+
+A liveliness token is a key that exists as long as its session. Tokens tell other nodes that a node, a
+publisher or a subscription is there. An end is a publisher or a subscription.
+"""
+
+import re
+import struct
+from typing import Final, Literal, Protocol
+
+import xxhash
+from msgspec import Struct
+
+from bridges.messages.definitions import PACKAGES
+from bridges.messages.releases import NEWEST, Release
+from bridges.messages.rihs01 import type_hash
+from bridges.messages.topics import AnyTopic, Qos
+from bridges.transports.peers import WITNESSES, Announced
+
+Kind = Literal["MP", "MS"]
+"""A publisher or a subscription: rmw_zenoh's Message Publisher and Message Subscription."""
+NODE_ID: Final = 0
+_HEAD: Final = struct.Struct("<qqB")
+GID_LENGTH: Final = 16
+LONGEST: Final = 2000
+"""No token of a ROS node is longer (characters): ROS bounds each name in it to 255."""
+HASH: Final = re.compile(r"typehash=(RIHS01_[0-9a-f]{64});")
+
+
+class Peer(Struct, frozen=True):
+    """What a token says of an end.
+
+    `type`: the message type, with the hash where the token has one. `transient_local`: a publisher
+    retains its messages; a subscription wants retained ones. `announced`: its topic, type and hash.
+    `node`: its node, as `/namespace/name`.
+    """
+
+    session: str
+    type: str
+    transient_local: bool
+    announced: Announced
+    node: str
+
+
+class Keys(Protocol):
+    """The names of one node's ends, in one of the two ways. `session`: the zenoh session's id."""
+
+    session: str
+    release: Release
+
+    def presence(self) -> str:
+        """The token of the node itself."""
+
+    def data(self, topic: AnyTopic) -> str:
+        """The key under which a topic's samples travel."""
+
+    def type(self, topic: AnyTopic) -> str:
+        """The topic's type as `Peer.type` names it."""
+
+    def token(self, kind: Kind, topic: AnyTopic, number: int) -> str:
+        """The token of an end. `number`: unique within the session."""
+
+    def others(self, kind: Kind, topic: AnyTopic) -> str:
+        """A key expression that matches the tokens of all ends of this kind on a topic."""
+
+    def witnesses(self) -> list[str]:
+        """Key expressions that match the tokens which tell RMF's release (`peers.py`)."""
+
+    def peer(self, token: str) -> Peer | None:
+        """What a token says of its end; None for the token of anything else."""
+
+
+class RmwZenoh:
+    """rmw_zenoh's keys for a node in a ROS domain. In a token, `%` replaces a name's slashes."""
+
+    def __init__(
+        self, domain_id: int, session: str, node_name: str, release: Release = NEWEST
+    ) -> None:
+        self.session, self.release = session, release
+        self._domain = domain_id
+        self._node = f"%/%/{node_name}"  # enclave "/", namespace "/"
+
+    def presence(self) -> str:
+        return f"@ros2_lv/{self._domain}/{self.session}/{NODE_ID}/{NODE_ID}/NN/{self._node}"
+
+    def data(self, topic: AnyTopic) -> str:
+        return f"{self._domain}/{topic.name.strip('/')}/{self.type(topic)}"
+
+    def type(self, topic: AnyTopic) -> str:
+        name = f"{PACKAGES[topic.type]}::msg::dds_::{topic.type.__name__}_"
+        return f"{name}/{type_hash(topic.type, self.release)}"
+
+    def token(self, kind: Kind, topic: AnyTopic, number: int) -> str:
+        qos = _qos(topic, kind)
+        ids = f"{self._domain}/{self.session}/{NODE_ID}/{number}/{kind}"
+        retained = "1" if qos.durability == "transient_local" else ""
+        # Only what differs from rmw_zenoh's defaults is written: reliable, volatile, keep last 42.
+        depth = "" if qos.depth == 42 else qos.depth
+        return (
+            f"@ros2_lv/{ids}/{self._node}/{_name(topic, '%')}/{self.type(topic)}"
+            f"/:{retained}:,{depth}:,:,:,,"
+        )
+
+    def others(self, kind: Kind, topic: AnyTopic) -> str:
+        return f"@ros2_lv/{self._domain}/*/*/*/{kind}/*/*/*/{_name(topic, '%')}/**"
+
+    def witnesses(self) -> list[str]:
+        return [
+            f"@ros2_lv/{self._domain}/*/*/*/{_kind(publishes)}/*/*/*/*/{package}::msg::dds_::{name}_/**"
+            for package, name, publishes in _witnesses()
+        ]
+
+    def peer(self, token: str) -> Peer | None:
+        parts = token.split("/") if len(token) <= LONGEST else []
+        qos = parts[12].split(":") if len(parts) > 12 else []
+        if len(qos) < 6:
+            return None
+        kind = parts[10].replace("::msg::dds_::", "/msg/").removesuffix("_")
+        topic = parts[9].strip("%").replace("%", "/")
+        announced = Announced(topic, kind, parts[11], parts[5] == "MP")
+        node = f"{parts[7].replace('%', '/').rstrip('/')}/{parts[8]}"
+        return Peer(parts[2], "/".join(parts[10:12]), qos[1] == "1", announced, node)
+
+
+class Ros2Dds:
+    """zenoh-bridge-ros2dds's keys. In a token, `§` replaces a name's slashes.
+
+    Keys hold no domain, because a bridge serves only one, and no type, because the token states it.
+    """
+
+    def __init__(
+        self, domain_id: int, session: str, node_name: str, release: Release = NEWEST
+    ) -> None:
+        self.session, self.release = session, release
+
+    def presence(self) -> str:
+        return f"@/{self.session}/@ros2_lv"
+
+    def data(self, topic: AnyTopic) -> str:
+        return topic.name.strip("/")
+
+    def type(self, topic: AnyTopic) -> str:
+        return f"{PACKAGES[topic.type]}§msg§{topic.type.__name__}"
+
+    def token(self, kind: Kind, topic: AnyTopic, number: int) -> str:
+        qos = _qos(topic, kind)
+        retained = int(qos.durability == "transient_local")
+        # No key fields; reliable; durability; keep last; user data of the bridge's DDS end.
+        text = f":1:{retained}:0,{qos.depth}:typehash={type_hash(topic.type, self.release)};"
+        return f"@/{self.session}/@ros2_lv/{kind}/{_name(topic, '§')[1:]}/{self.type(topic)}/{text}"
+
+    def others(self, kind: Kind, topic: AnyTopic) -> str:
+        return f"@/*/@ros2_lv/{kind}/{_name(topic, '§')[1:]}/*/*"
+
+    def witnesses(self) -> list[str]:
+        return [
+            f"@/*/@ros2_lv/{_kind(publishes)}/*/{package}§msg§{name}/*"
+            for package, name, publishes in _witnesses()
+        ]
+
+    def peer(self, token: str) -> Peer | None:
+        parts = token.split("/") if len(token) <= LONGEST else []
+        qos = parts[6].split(":") if len(parts) > 6 else []
+        if len(qos) < 4:
+            return None
+        found = HASH.search(parts[6])
+        topic, kind = parts[4].replace("§", "/"), parts[5].replace("§", "/")
+        announced = Announced(topic, kind, found[1] if found else "", parts[3] == "MP")
+        node = f"a node behind the zenoh bridge {parts[1]}"
+        return Peer(parts[1], parts[5], qos[2] == "1", announced, node)
+
+
+WAYS: Final[dict[str, type[RmwZenoh] | type[Ros2Dds]]] = {
+    "rmw_zenoh": RmwZenoh,
+    "ros2dds": Ros2Dds,
+}
+
+
+def gid(token: str) -> bytes:
+    """The 16 bytes that identify an end in ROS: the XXH3-128 of its token, lower half first."""
+    return xxhash.xxh3_128_digest(token.encode())[::-1]
+
+
+def attachment(number: int, wall_ns: int, sender: bytes) -> bytes:
+    """The attachment of a sample. `number`: counts an end's samples from 1. `wall_ns`: when it was sent
+    (ns since the epoch). `sender`: the gid of the sending end."""
+    return _HEAD.pack(number, wall_ns, GID_LENGTH) + sender
+
+
+def sender(attached: bytes) -> bytes | None:
+    """The gid of the sending end; None if this is not the attachment of a ROS node."""
+    if len(attached) != _HEAD.size + GID_LENGTH or attached[_HEAD.size - 1] != GID_LENGTH:
+        return None
+    return attached[_HEAD.size :]
+
+
+def _kind(publishes: bool) -> Kind:
+    return "MP" if publishes else "MS"
+
+
+def _witnesses() -> list[tuple[str, str, bool]]:
+    split = ((*name.partition("/msg/"), publishes) for name, publishes in sorted(WITNESSES))
+    return [(package, name, publishes) for package, _, name, publishes in split]
+
+
+def _qos(topic: AnyTopic, kind: Kind) -> Qos:
+    return topic.publish if kind == "MP" else topic.subscribe
+
+
+def _name(topic: AnyTopic, slash: str) -> str:
+    return f"/{topic.name.strip('/')}".replace("/", slash)

@@ -1,0 +1,89 @@
+"""An end's place in one zenoh session: which of its peers it reaches, and which do not fit."""
+
+from collections.abc import Callable
+
+import zenoh
+
+from bridges.messages.rihs01 import type_hash
+from bridges.messages.topics import AnyTopic
+from bridges.transports.peers import Announced
+from bridges.transports.zenoh import keys as zenoh_keys
+from bridges.transports.zenoh.keys import Keys, Kind
+from bridges.transports.zenoh.peers import Order, Tokens
+
+Tell = Callable[[str, Announced | None], None]
+"""Takes a token and its end, or None when it has gone."""
+
+
+class Place:
+    """An end's place in one session: its token, and the tokens of its peers.
+
+    Peers are the ends of the other kind on the same topic, in any process. `peers`: those that this
+    end reaches, by their tokens. `unheard`: the gids of those that do not fit. `misfit(policy)`: called
+    on zenoh's thread for each peer whose QoS does not fit. `tell(token, end)`: likewise for each that
+    comes, and with None when it goes. `do`: as `Tokens`.
+    """
+
+    def __init__(
+        self,
+        session: zenoh.Session,
+        keys: Keys,
+        kind: Kind,
+        topic: AnyTopic,
+        number: int,
+        misfit: Callable[[str], None],
+        tell: Tell,
+        do: Callable[[Order], None],
+    ) -> None:
+        self.key = keys.data(topic)
+        self.token = keys.token(kind, topic, number)
+        self.gid = zenoh_keys.gid(self.token)
+        self.peers: dict[str, zenoh_keys.Peer] = {}
+        self.unheard: set[bytes] = set()
+        self._keys = keys
+        self._kind = kind
+        self._topic = topic
+        self._misfit = misfit
+        self._tell = tell
+        retained = topic.publish if kind == "MP" else topic.subscribe
+        self._transient_local = retained.durability == "transient_local"
+        self._live = session.liveliness()
+        others = keys.others("MS" if kind == "MP" else "MP", topic)
+        self._tokens = Tokens(session, keys, [others], self._meet, self._part, do)
+        self._alive: zenoh.LivelinessToken | None = None
+
+    def appear(self) -> None:
+        """Declare the token: the end sends or hears now."""
+        self._alive = self._live.declare_token(self.token)
+
+    def leave(self) -> None:
+        """Withdraw the token."""
+        if self._alive:
+            self._alive.undeclare()  # type: ignore[no-untyped-call]
+        self._tokens.leave()
+
+    def _part(self, token: str) -> None:
+        """A peer has gone. Called on zenoh's thread, as `_meet` is."""
+        self.peers.pop(token, None)
+        self.unheard.discard(zenoh_keys.gid(token))
+        self._tell(token, None)
+
+    def _meet(self, token: str, peer: zenoh_keys.Peer) -> None:
+        self._tell(token, peer.announced)
+        policy = self._incompatible(peer)
+        if not policy:
+            self.peers[token] = peer
+            return
+        self.unheard.add(zenoh_keys.gid(token))
+        if policy != "type":  # `peers.py` logs those of every end
+            self._misfit(policy)
+
+    def _incompatible(self, theirs: zenoh_keys.Peer) -> str:
+        """The QoS policy by which DDS would not match the two ends; "" if it would match them."""
+        hashed = type_hash(self._topic.type, self._keys.release)
+        if theirs.type != self._keys.type(self._topic) or theirs.announced.hash not in ("", hashed):
+            return "type"
+        wants, keeps = theirs.transient_local, self._transient_local
+        if self._kind == "MS":
+            wants, keeps = keeps, wants
+        return "durability" if wants and not keeps else ""

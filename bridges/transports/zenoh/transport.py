@@ -1,0 +1,351 @@
+"""The `zenoh` transport: a session that looks like a ROS node on rmw_zenoh, or like a
+zenoh-bridge-ros2dds with one node behind it.
+
+zenoh reconnects by itself: it keeps looking for its routers, and declares everything again when one
+answers. This transport opens a new session only when the machine's addresses have changed: the old
+session would notice that only when its links time out.
+
+Source: eclipse-zenoh 1.10 (Python API), and the sources in zenoh_keys.py and zenoh_ends.py. Only
+these files import zenoh, and only choose.py imports this one.
+"""
+
+import atexit
+import logging
+import threading
+import time
+from collections.abc import Callable
+from functools import partial
+from itertools import count
+from queue import Empty, SimpleQueue
+from typing import Final
+
+import zenoh
+from zenoh.handlers import Callback
+
+from bridges.host.log import pairs
+from bridges.kinds.shared.rmf_section import Zenoh
+from bridges.messages.releases import Release
+from bridges.messages.topics import AnyTopic, Topic
+from bridges.transports import addresses, notices
+from bridges.transports.threaded import LOOK_EVERY_S, Threaded
+from bridges.transports.transport import M, TransportError, any_type
+from bridges.transports.zenoh import config as zenoh_config
+from bridges.transports.zenoh.alone import ROUTER_MET, WHY_AWAY, Alone
+from bridges.transports.zenoh.ends import ZenohEnd, ZenohPublisher, ZenohSubscription
+from bridges.transports.zenoh.keys import WAYS, Keys
+from bridges.transports.zenoh.peers import Merged, Order, Tokens, ZenohPeers
+from bridges.transports.zenoh.session import closed, contained, opened, trim_memory
+
+log = logging.getLogger(__name__)
+
+UNLINKED: Final = "NO_ROUTER"
+NO_ROUTER: Final = (
+    "no router answers, or it refuses this node: RMF hears nothing until one accepts it"
+)
+
+
+class ZenohTransport(Threaded):
+    """One node: a session, its publishers and subscriptions, and the thread that hands on messages.
+
+    `loopback`: stay on this machine, without a router, whatever `settings` say. Raises TransportError
+    when no session can be opened. It is no error that no other node answers yet.
+    """
+
+    speaks = "zenoh"
+
+    refusals = (zenoh.ZError,)
+
+    def __init__(
+        self,
+        node_name: str,
+        domain_id: int,
+        *,
+        loopback: bool,
+        settings: Zenoh | None = None,
+        release: Release | None = None,
+    ) -> None:
+        super().__init__(node_name, domain_id, release)
+        self._settings = settings or Zenoh()
+        self._loopback = loopback
+        self._failed = False
+        self._ends: tuple[ZenohEnd, ...] = ()
+        self._deaf: set[str] = set()
+        self._orders: SimpleQueue[Order] = SimpleQueue()
+        do = self._orders.put
+        self._watcher = ZenohPeers(self._peers, Merged(do, self._follow_release), do)
+        self._looks = Merged(do, self._look)
+        self._alone = Alone()
+        self._away = False
+        self._presence: zenoh.LivelinessToken | None = None
+        self._witnesses: Tokens | None = None
+        self._session: zenoh.Session | None = None
+        self._linked: bool | None = None
+        self._met_router = False
+        self._look_at = time.monotonic() + LOOK_EVERY_S
+        self._wants_router = not loopback and zenoh_config.mode(self._settings) == "client"
+        self._why_unlinked = ""
+        self._closing: list[threading.Thread] = []
+        self._neighbours: dict[str, zenoh.WhatAmI] = {}
+        self._join()
+        if self._session is None and not self._wants_router:
+            raise TransportError(f"cannot open a zenoh session: {self._why_unlinked}")
+        # A session that is still open aborts the interpreter when it exits.
+        atexit.register(self.close)
+        self._start(self._listen, "zenoh")
+
+    def faults(self) -> list[tuple[str, str]]:
+        """Also: it is off the graph, or no router answers."""
+        found = super().faults()
+        if self._away:
+            found.insert(0, (ROUTER_MET, WHY_AWAY))
+        elif self._linked is False:
+            found.insert(0, (UNLINKED, self._why_unlinked or NO_ROUTER))
+        return found
+
+    def publisher(self, topic: AnyTopic) -> ZenohPublisher:
+        """Declare a publisher with `topic.publish` QoS."""
+        publisher = ZenohPublisher(
+            topic,
+            self._orders.put,
+            self._withdraw,
+            lambda: self.lives,
+            self._deaf,
+            self._watcher.tell,
+        )
+        with self._lock, self._reporting(f"topic {topic.name} cannot be published"), contained():
+            self._attach(publisher)
+            self._ends += (publisher,)
+        return publisher
+
+    def subscribe(
+        self, topic: Topic[M], received: Callable[[M], None], *, others_only: bool = False
+    ) -> ZenohSubscription:
+        """Declare a subscription with `topic.subscribe` QoS; `received` runs on our thread."""
+        subscription = ZenohSubscription(
+            topic,
+            any_type(received),
+            self._orders.put,
+            self.dropped,
+            others_only=others_only,
+            attached=self._settings.keys == "rmw_zenoh",
+            tell=self._watcher.tell,
+        )
+        with self._lock, self._reporting(f"topic {topic.name} cannot be subscribed"), contained():
+            self._attach(subscription)
+            self._ends += (subscription,)
+        return subscription
+
+    def close(self) -> None:
+        """Leave the graph at once, so that no ghost endpoint remains. May be called twice."""
+        with self._lock:
+            if self._closed:
+                return
+            self._closed = True
+        atexit.unregister(self.close)
+        self._orders.put(_nothing)
+        self._join_thread()
+        with self._lock:
+            self._leave()
+        for closing in self._closing:
+            closing.join()
+
+    # --- the session ---------------------------------------------------------------------------
+
+    def _join(self) -> None:
+        """Open a session if possible. A client has none before its router answers."""
+        self._addresses = addresses.addresses()
+        if self._loopback:
+            ways = zenoh_config.on_loopback(self.domain_id)
+        else:
+            ways = [zenoh_config.on_the_site(self._settings)]
+        try:
+            session = opened(ways)
+        except zenoh.ZError as error:
+            self._why_unlinked = str(error).partition(" at /")[
+                0
+            ]  # a place in zenoh's source follows
+            return
+        way, name = WAYS[self._settings.keys], str(session.zid())
+        self._keys: Keys = way(self.domain_id, name, self.name, self.release)
+        self._numbers = count(1)
+        self._neighbours = {}
+        self._events = session.info.declare_transport_events_listener(
+            Callback(partial(self._neighbour, self._neighbours), indirect=False), history=True
+        )
+        self._session = session
+        self._appear(session)
+        trim_memory()
+
+    def _appear(self, session: zenoh.Session) -> None:
+        """Be on the graph, with every end."""
+        self._presence = session.liveliness().declare_token(self._keys.presence())
+        self._witnesses = self._watcher.watch(session, self._keys)
+        for end in self._ends:
+            self._attach(end)
+
+    def _vanish(self) -> None:
+        """Take everything off the graph, and stay in the session to see when the router has gone."""
+        for end in self._ends:
+            end.leave()
+        self._deaf.clear()
+        if self._witnesses:
+            self._witnesses.leave()
+        presence, self._presence = self._presence, None
+        if presence:
+            presence.undeclare()  # type: ignore[no-untyped-call]
+
+    def _attach(self, end: ZenohEnd) -> None:
+        """Give an end its place, if we are on the graph and the release has its message."""
+        self._peers.ours(end.topic, publishes=isinstance(end, ZenohPublisher))
+        off = self._away or end.place or not self.release.has(end.topic.type)
+        if self._session is None or off:
+            return
+        number = next(self._numbers)
+        if isinstance(end, ZenohSubscription) and end.others_only:
+            self._deaf.add(self._keys.token("MS", end.topic, number))
+        end.create(self._session, self._keys, number)
+
+    def _neighbour(self, neighbours: dict[str, zenoh.WhatAmI], event: zenoh.TransportEvent) -> None:
+        """A router or peer has connected or gone. Called on zenoh's thread.
+
+        To ask the session for its neighbours here would wait for a lock that this thread holds. So they
+        are counted.
+        """
+        if event.kind == zenoh.SampleKind.PUT:
+            neighbours[str(event.transport.zid)] = event.transport.whatami
+        else:
+            neighbours.pop(str(event.transport.zid), None)
+        self._looks()
+
+    def _withdraw(self, publisher: ZenohPublisher) -> None:
+        with self._lock, contained():
+            if publisher in self._ends:
+                self._ends = tuple(end for end in self._ends if end is not publisher)
+                publisher.leave()
+
+    def _leave(self) -> None:
+        """Leave the session. Another thread closes it: on a dead link that takes 10 s.
+
+        What was declared in it is kept until then, because to drop it sooner may block this thread.
+        """
+        session, self._session = self._session, None
+        held: list[object] = [end.give_up() for end in self._ends]
+        self._deaf.clear()
+        self._neighbours = {}
+        if session:
+            held += [self._presence, self._events, self._witnesses]
+            closing = threading.Thread(target=closed, args=(session, held), daemon=True)
+            closing.start()
+            self._closing.append(closing)
+
+    def _join_anew(self) -> None:
+        with self._lock:
+            if self._closed:
+                return
+            self._leave()
+            self._closing = [closing for closing in self._closing if closing.is_alive()]
+            try:
+                self._join()
+            except (TransportError, zenoh.ZError) as error:  # for example, a secret is missing now
+                self._why_unlinked = str(error)
+                self._leave()
+
+    def _follow_release(self) -> None:
+        """Give the ends whose message differs in RMF's release a new place."""
+        before = self.release
+        if not self._peers.settle():
+            self._peers.name_misfits()
+            return
+        with self._lock:
+            if self._closed or self._session is None:
+                return
+            self._keys.release = self.release
+            for end in self._ends:
+                if self._peers.differs(end.topic, before):
+                    end.leave()
+                    self._attach(end)
+
+    # --- our thread ----------------------------------------------------------------------------
+
+    def _listen(self) -> None:
+        failures = 0
+        while not self._closed and failures < notices.FAILURES:
+            try:
+                forever = self._loopback and not self._away
+                order = self._orders.get(timeout=None if forever else LOOK_EVERY_S)
+            except Empty:
+                order = _nothing
+            try:
+                with contained():
+                    order()
+                    self._follow_network()
+                failures = 0
+            except Exception as error:  # noqa: BLE001 - logged by _recover
+                failures += 1
+                self._recover(error)
+
+    def _recover(self, error: Exception) -> None:
+        """After an unexpected exception: log it once, and open a new session."""
+        if not self._failed:
+            log.exception(pairs("reader_failed", node=self.name, reason=error))
+        self._failed = True
+        if not self._loopback:
+            self._look_at = time.monotonic() + LOOK_EVERY_S
+            self._join_anew()
+
+    def _follow_network(self) -> None:
+        """Join again if the machine's addresses have changed since the last time."""
+        if self._loopback:
+            if self._away:
+                self._look()
+            return
+        if not self._look_is_due():
+            return
+        self._look()
+        if (self._leaves_machine() and self._network_changed()) or self._session is None:
+            self._join_anew()
+
+    def _leaves_machine(self) -> bool:
+        """Whether any endpoint is on another machine."""
+        endpoints = (*self._settings.connect, *self._settings.listen)
+        return not all(map(zenoh_config.is_local, endpoints))
+
+    def _look(self) -> None:
+        """Log once when no router or peer answers, and once when one answers again."""
+        neighbours = list(self._neighbours.values())
+        routers = zenoh.WhatAmI.ROUTER in neighbours
+        if self._loopback:
+            self._keep_apart(self._alone.away(routers, time.monotonic()))
+            return
+        self._met_router |= routers
+        linked = routers or (not self._met_router and bool(neighbours))
+        if linked == self._linked:
+            return
+        self._linked = linked
+        where = " ".join(self._settings.connect)
+        if linked:
+            log.info(pairs("linked", node=self.name, connect=where))
+        else:
+            reason = self._why_unlinked or NO_ROUTER
+            log.warning(pairs("not_linked", node=self.name, connect=where, reason=reason))
+
+    def _keep_apart(self, away: bool) -> None:
+        """Leave the graph where a router is, and return to it when that has gone."""
+        with self._lock:
+            before, session = self._away, self._session
+            if self._closed or session is None or not (before or away):
+                return
+            self._away = away
+            if away and not before:
+                log.error(pairs("left_graph", node=self.name, reason=WHY_AWAY))
+            try:
+                self._vanish() if away else self._appear(session)
+            except zenoh.ZError:
+                self._away = True  # the next look tries again
+                raise
+        if not away:
+            log.info(pairs("back_on_graph", node=self.name))
+
+
+def _nothing() -> None:
+    """An order that only wakes our thread."""

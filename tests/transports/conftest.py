@@ -1,0 +1,90 @@
+import gc
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+
+from bridges.transports.choose import missing_of_dds
+from bridges.transports.memory import MemoryNetwork, MemoryTransport
+from bridges.transports.transport import Transport
+from tests.transports.domains import domain_of_this_run
+from tests.transports.joining import Join, joining
+
+if missing_of_dds():
+    collect_ignore = [
+        "test_dds.py",
+        "test_flood.py",
+        "test_namesake.py",
+        "test_network.py",
+        "test_wires.py",
+    ]
+
+DDS = pytest.param("dds", marks=pytest.mark.dds)
+ROS2 = pytest.param("ros2", marks=pytest.mark.ros)
+
+
+@pytest.fixture(params=["memory", DDS, "zenoh", ROS2])
+def join(request: pytest.FixtureRequest) -> Iterator[Join]:
+    """One graph for the test, on each transport in turn; its nodes leave at the end."""
+    network = MemoryNetwork()
+    on: dict[str, Join] = {
+        "memory": lambda name: MemoryTransport(network, name),
+        "dds": joining("dds", domain_of_this_run()),
+        "zenoh": joining("zenoh", domain_of_this_run()),
+        "ros2": joining("ros2", domain_of_this_run()),
+    }
+    yield from _graph(on[request.param])
+
+
+@pytest.fixture(params=[DDS, "zenoh", ROS2])
+def join_any_wire(request: pytest.FixtureRequest) -> Iterator[Join]:
+    """One graph for the test, on each transport that has a wire."""
+    yield from _graph(joining(request.param, domain_of_this_run()))
+
+
+@pytest.fixture(params=["dds", ROS2])
+def join_wire(request: pytest.FixtureRequest) -> Iterator[Join]:
+    """One graph for the test, on each transport whose wire is DDS."""
+    yield from _graph(joining(request.param, domain_of_this_run()))
+
+
+@pytest.fixture
+def join_dds() -> Iterator[Join]:
+    """One graph for the test, on DDS."""
+    yield from _graph(joining("dds", domain_of_this_run()))
+
+
+@pytest.fixture
+def join_zenoh() -> Iterator[Join]:
+    """One graph for the test, on zenoh."""
+    yield from _graph(joining("zenoh", domain_of_this_run()))
+
+
+@pytest.fixture
+def join_ros() -> Iterator[Join]:
+    """One graph for the test, on ROS; for tests that are marked so."""
+    yield from _graph(joining("ros2", domain_of_this_run()))
+
+
+@pytest.fixture
+def observer(join_dds: Join) -> Iterator[Any]:
+    """A DDS participant from outside this project, in the same process and domain."""
+    join_dds("keeps_the_domain")
+    from cyclonedds.domain import DomainParticipant
+
+    participant = DomainParticipant(domain_of_this_run())
+    yield participant
+    del participant
+    gc.collect()
+
+
+def _graph(opening: Join) -> Iterator[Join]:
+    nodes: list[Transport] = []
+
+    def join(name: str) -> Transport:
+        nodes.append(opening(name))
+        return nodes[-1]
+
+    yield join
+    for node in nodes:
+        node.close()

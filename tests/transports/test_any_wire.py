@@ -1,0 +1,58 @@
+"""What every transport with a wire does, within one process: threads, misfits, what stays behind."""
+
+import os
+import threading
+
+import pytest
+from msgspec.structs import replace
+
+from bridges.messages import definitions as d
+from bridges.messages.topics import FIRE_ALARM_TRIGGER, LIFT_REQUESTS, LIFT_STATES, VOLATILE
+from tests.transports import peer
+from tests.transports.joining import Join
+from tests.waiting import wait_until
+
+
+def test_messages_arrive_on_the_thread_of_the_transport(join_any_wire: Join) -> None:
+    threads: list[str] = []
+    listener = join_any_wire("listener")
+    listener.subscribe(LIFT_STATES, lambda _: threads.append(threading.current_thread().name))
+    publisher = join_any_wire("speaker").publisher(LIFT_STATES)
+    wait_until(lambda: threads or peer.sent(publisher, d.LiftState()), "a message arrives")
+    assert {name.rpartition("-")[0] for name in threads} == {"listener"}
+
+
+def test_nodes_that_come_and_go_leave_no_thread_no_file_and_no_complaint_behind(
+    join_any_wire: Join, caplog: pytest.LogCaptureFixture
+) -> None:
+    def come_and_go() -> None:
+        node = join_any_wire("guest")
+        node.subscribe(LIFT_REQUESTS, print)
+        node.publisher(LIFT_STATES).publish(d.LiftState())
+        node.close()
+
+    for _ in range(5):  # what a library starts once and keeps
+        come_and_go()
+    before = _threads_and_files()
+    for _ in range(10):
+        come_and_go()
+    wait_until(lambda: _threads_and_files() <= before, "threads and files are as before")
+    assert caplog.messages == []
+
+
+def test_a_peer_whose_durability_does_not_fit_is_named_once(
+    join_any_wire: Join, caplog: pytest.LogCaptureFixture
+) -> None:
+    join_any_wire("listener").subscribe(FIRE_ALARM_TRIGGER, print)
+    join_any_wire("stranger").publisher(replace(FIRE_ALARM_TRIGGER, publish=VOLATILE))
+    wait_until(lambda: len(caplog.messages) == 2, "both ends say so")
+    assert sorted(caplog.messages) == [
+        'misfit topic=fire_alarm_trigger reason="a publisher is not heard:'
+        ' its durability does not fit ours"',
+        'misfit topic=fire_alarm_trigger reason="a subscription is not served:'
+        ' its durability does not fit ours"',
+    ]
+
+
+def _threads_and_files() -> tuple[int, int]:
+    return len(os.listdir("/proc/self/task")), len(os.listdir("/proc/self/fd"))

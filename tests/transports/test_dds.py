@@ -1,0 +1,186 @@
+"""What is special to `dds`: noise on its ports, its place on the ROS graph, its configuration."""
+
+import random
+import socket
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+from cyclonedds import builtin
+from cyclonedds.qos import Policy, Qos
+from cyclonedds.sub import DataReader
+from cyclonedds.topic import Topic as DdsTopic
+
+from bridges.messages import definitions as d
+from bridges.messages.topics import LIFT_REQUESTS, LIFT_STATES, Topic
+from bridges.transports.cyclone import LOOPBACK
+from bridges.transports.dds import graph
+from bridges.transports.dds.peers import BuiltinReader
+from bridges.transports.dds.transport import DdsTransport
+from bridges.transports.transport import TransportError
+from tests.transports import peer
+from tests.transports.domains import domain_of_this_run
+from tests.transports.joining import Join
+from tests.transports.observing import PUBLICATION, SUBSCRIPTION, seen
+from tests.waiting import wait_until
+
+
+@pytest.fixture(scope="module")
+def echo() -> Iterator[None]:
+    """A second process that sends everything back."""
+    with peer.running("echo", domain_of_this_run()):
+        yield
+
+
+# --- bad input -------------------------------------------------------------------------------
+
+
+def test_noise_on_our_ports_disturbs_nobody(domain: int, join_dds: Join, echo: None) -> None:
+    received: list[d.LiftState] = []
+    node = join_dds("here")
+    node.subscribe(LIFT_STATES.named("pong_lift_states"), received.append)
+    publisher = node.publisher(LIFT_STATES.named("ping_lift_states"))
+    wait_until(lambda: received or peer.sent(publisher, d.LiftState()), "a first echo comes back")
+    noise = random.Random(1)
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
+        for _ in range(300):
+            packet = b"RTPS" * noise.randint(0, 1) + noise.randbytes(noise.randint(0, 200))
+            for port in (10, 11, 12, 13):  # discovery and data of the two processes in the domain
+                sender.sendto(packet, ("127.0.0.1", 7400 + 250 * domain_of_this_run() + port))
+    after = d.LiftState(lift_name="after")
+    publisher.publish(after)
+    wait_until(lambda: received[-1] == after, "a message after the noise comes back")
+    assert (publisher.matched(), node.dropped) == (1, {})
+
+
+def test_a_peer_with_another_type_is_named_once(
+    join_dds: Join, caplog: pytest.LogCaptureFixture
+) -> None:
+    join_dds("listener").publisher(Topic("door_states", d.DoorState))
+    join_dds("stranger").subscribe(Topic("door_states", d.LiftState), print)
+    wait_until(lambda: len(caplog.messages) == 2, "both ends say so")
+    assert sorted(caplog.messages) == [
+        'misfit topic=door_states reason="a publisher is not heard: its type does not fit ours"',
+        'misfit topic=door_states reason="a subscription is not served:'
+        ' its type does not fit ours"',
+    ]
+
+
+# --- as the others see us --------------------------------------------------------------------
+
+
+def test_the_node_and_its_ends_stand_on_the_ros_graph(join_dds: Join, observer: Any) -> None:
+    node = join_dds("lift_node")
+    node.publisher(LIFT_STATES)
+    node.subscribe(LIFT_REQUESTS, print)
+    states = seen(observer, PUBLICATION, LIFT_STATES)
+    requests = seen(observer, SUBSCRIPTION, LIFT_REQUESTS)
+    as_ros_reads = Qos(
+        Policy.Reliability.Reliable(0), Policy.Durability.TransientLocal, Policy.History.KeepAll
+    )
+    topic = DdsTopic(observer, "ros_discovery_info", graph.ParticipantEntitiesInfo)
+    reader = DataReader(observer, topic, qos=as_ros_reads)
+    announced: dict[str, tuple[bytes, Any]] = {}
+
+    def look() -> bool:
+        for info in reader.take(50):
+            for entry in getattr(info, "node_entities_info_seq", []):
+                announced[entry.node_name] = (bytes(info.gid.data), entry)
+        return "lift_node" in announced and bool(announced["lift_node"][1].reader_gid_seq)
+
+    wait_until(look, "the node is announced")
+    participant, entry = announced["lift_node"]
+    assert (entry.node_namespace, participant) == ("/", states.participant_key.bytes)
+    assert [bytes(gid.data) for gid in entry.writer_gid_seq] == [states.key.bytes]
+    assert [bytes(gid.data) for gid in entry.reader_gid_seq] == [requests.key.bytes]
+    participants = BuiltinReader(observer, builtin.BuiltinTopicDcpsParticipant)
+    enclaves = {one.key.bytes: one.qos[Policy.Userdata] for one in participants.take(50)}
+    assert enclaves[participant].data == b"enclave=/;"
+
+
+# --- opening and leaving ---------------------------------------------------------------------
+
+
+def test_without_a_usable_network_the_error_says_what_to_look_at(
+    domain: int,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    nowhere = LOOPBACK.replace('"lo"', '"no-such-interface"')
+    monkeypatch.setenv("CYCLONEDDS_URI", nowhere)
+    with pytest.raises(TransportError, match="is a network interface up, and does CYCLONEDDS_URI"):
+        DdsTransport("nobody", domain, loopback=False)
+
+
+def test_on_the_subnet_cyclones_own_configuration_stands(
+    domain: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("CYCLONEDDS_URI", LOOPBACK)
+    node = DdsTransport("configured", domain, loopback=False)
+    try:
+        publisher = node.publisher(Topic("ping_lift_states", d.LiftState))
+        with peer.running("echo", domain):
+            wait_until(lambda: publisher.matched() == 1, "a process on loopback is found")
+    finally:
+        node.close()
+
+
+def test_a_domain_that_is_open_on_the_network_is_not_taken_for_loopback(
+    domain: int,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setenv("CYCLONEDDS_URI", LOOPBACK)
+    exposed = DdsTransport("exposed", domain, loopback=False)
+    try:
+        with pytest.raises(TransportError):
+            DdsTransport("simulated", domain, loopback=True)
+    finally:
+        exposed.close()
+
+
+def test_a_reader_that_fails_joins_again_and_hears_again(
+    join_dds: Join, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    received: list[d.LiftState] = []
+    node = join_dds("here")
+    assert isinstance(node, DdsTransport)
+    node.subscribe(LIFT_STATES, received.append)
+    publisher = join_dds("there").publisher(LIFT_STATES)
+    wait_until(lambda: received or peer.sent(publisher, d.LiftState()), "it hears")
+    whole = node._read_once
+    failures = iter([MemoryError("none left")])
+
+    def fails() -> None:
+        for failure in failures:
+            raise failure
+        whole()
+
+    monkeypatch.setattr(node, "_read_once", fails)
+    wakes = d.LiftState(lift_name="wakes it")
+    wait_until(
+        lambda: any(r.exc_info for r in caplog.records) or peer.sent(publisher, wakes), "it fails"
+    )
+    received.clear()
+    after = d.LiftState(lift_name="after")
+    wait_until(
+        lambda: after in received or peer.sent(publisher, after), "it hears when it has joined anew"
+    )
+    assert node.lives
+    assert [r.getMessage() for r in caplog.records if r.exc_info] == [
+        'reader_failed node=here reason="none left"'
+    ]
+
+
+def test_a_reader_that_keeps_failing_is_reported_as_dead(
+    join_dds: Join, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    node = join_dds("here")
+    assert isinstance(node, DdsTransport)
+    node.subscribe(LIFT_STATES, lambda state: None)
+    publisher = join_dds("there").publisher(LIFT_STATES)
+
+    def fails() -> None:
+        raise MemoryError("none left")
+
+    monkeypatch.setattr("bridges.transports.dds.transport.LOOK_EVERY_S", 0.01)
+    monkeypatch.setattr(node, "_read_once", fails)
+    wait_until(lambda: peer.sent(publisher, d.LiftState()) or not node.lives, "it is dead")

@@ -1,0 +1,83 @@
+"""A wall clock that steps: when `dds` and `ros2` join again, and that they do."""
+
+import logging
+from contextlib import suppress
+
+import pytest
+
+from bridges.messages import definitions as d
+from bridges.messages.topics import DOOR_STATES, FIRE_ALARM_TRIGGER
+from bridges.transports import wall_clock
+from bridges.transports.transport import TransportError
+from bridges.transports.wall_clock import WallClock
+from tests.transports import peer
+from tests.transports.conftest import ROS2
+from tests.transports.joining import joining
+from tests.waiting import wait_until
+
+YEAR_S = 365.25 * 24 * 3600.0
+
+
+@pytest.mark.parametrize(
+    ("ahead", "found"),
+    [
+        pytest.param([0.0, 0.0, 0.0], [0.0, 0.0, 0.0], id="a clock that does not step"),
+        pytest.param([3600.0, 3600.0], [0.0, 0.0], id="set forward"),
+        pytest.param([-3600.0, -3600.0], [3600.0, 0.0], id="set back, found once"),
+        pytest.param(
+            [10 * YEAR_S, 0.0, -10 * YEAR_S, 0.0, -2.0],
+            [0.0, 10 * YEAR_S, 10 * YEAR_S, 0.0, 2.0],
+            id="forth, back, back and forth by years, then back by seconds",
+        ),
+        pytest.param([-1.0, -1.0], [0.0, 0.0], id="a leap second"),
+        pytest.param([-0.75, -1.5, -2.25], [0.0, 1.5, 0.0], id="small steps add up"),
+        pytest.param([-0.75, 0.0, -0.75], [0.0, 0.0, 0.0], id="what comes back is forgotten"),
+    ],
+)
+def test_a_clock_that_is_set_back_by_more_than_a_second_is_found_once(
+    ahead: list[float], found: list[float]
+) -> None:
+    clock = WallClock(0.0)
+    assert [clock.set_back_s(each) for each in ahead] == found
+
+
+def test_the_clock_is_ahead_of_the_machines_start_by_years_and_runs_with_it() -> None:
+    clock = WallClock(wall_clock.ahead_s())
+    assert (wall_clock.ahead_s() > YEAR_S, clock.set_back_s(wall_clock.ahead_s())) == (True, 0.0)
+
+
+@pytest.mark.parametrize("transport", [pytest.param("dds", marks=pytest.mark.dds), ROS2])
+def test_a_node_whose_clock_is_set_back_joins_again_with_all_its_ends(
+    transport: str,
+    domain: int,
+    monkeypatch: pytest.MonkeyPatch,
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    """On loopback its thread waits for messages alone, without end: it has to be woken."""
+    caplog.set_level(logging.INFO)
+    ahead = [0.0]
+    monkeypatch.setattr(wall_clock, "ahead_s", lambda: ahead[-1])
+    node, heard = joining(transport, domain)("node"), list[d.Message]()
+    node.subscribe(DOOR_STATES.named("pong_door_states"), heard.append)
+    node.subscribe(FIRE_ALARM_TRIGGER.named("pong_fire_alarm_trigger"), heard.append)
+    states = node.publisher(DOOR_STATES.named("ping_door_states"))
+    alarm = node.publisher(FIRE_ALARM_TRIGGER.named("ping_fire_alarm_trigger"))
+
+    def comes_back(number: int) -> bool:
+        state = d.DoorState(d.Time(number), "ward")
+        with suppress(TransportError):  # while it joins
+            states.publish(state)
+        return state in heard
+
+    with peer.running("echo", domain):
+        wait_until(lambda: comes_back(1), "the process is found")
+        alarm.publish(d.Bool(True))
+        wait_until(lambda: d.Bool(True) in heard, "the alarm is heard")
+        heard.clear()
+        ahead.append(-10 * YEAR_S)
+        wait_until(lambda: d.Bool(True) in heard, "what is retained comes from a new participant")
+        wait_until(lambda: comes_back(2), "states go there and back")
+        node.close()
+    assert [text for text in caplog.messages if "clock" in text] == [
+        "clock_set_back node=node by_s=315576000.0"
+    ]

@@ -1,0 +1,70 @@
+"""Samples on zenoh that no ROS node would send."""
+
+import subprocess
+import sys
+
+import pytest
+
+from bridges.messages import definitions as d
+from bridges.messages.cdr import encode
+from bridges.messages.topics import LIFT_REQUESTS
+from bridges.transports.zenoh.transport import ZenohTransport
+from tests.transports.zenoh_hostile import FLOOD, GOOD, arguments
+from tests.waiting import wait_until
+
+BY_HAND = 8
+"""Without an attachment, with two malformed ones, cut short, empty, two of 10 MB, a deletion. Then
+comes a wrong hash, which is another key, and a wildcard, which is counted too."""
+
+
+def test_forged_samples_are_dropped_and_counted_and_the_good_ones_after_them_arrive(
+    domain: int, caplog: pytest.LogCaptureFixture
+) -> None:
+    received: list[d.LiftRequest] = []
+    node = ZenohTransport("listener", domain, loopback=True)
+    command = [sys.executable, "-m", "tests.transports.zenoh_hostile", *arguments(domain)]
+    try:
+        node.subscribe(LIFT_REQUESTS, received.append)
+        with subprocess.Popen(
+            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+        ) as child:
+            assert child.stdin is not None
+            assert child.stdout is not None
+            assert child.stdout.readline() == "flooded\n"
+            received.clear()
+            wait_until(lambda: len(received) >= 3, "good ones arrive after the flood")
+            child.stdin.close()
+            child.wait()
+    finally:
+        node.close()
+    assert set(map(repr, received)) == {repr(GOOD)}
+    # Of a flood the newest hundred wait for our thread: the rest need not be looked at.
+    assert BY_HAND + 1 < node.dropped["lift_requests"] <= BY_HAND + 1 + FLOOD
+    # It is said once. On a busy machine the first of them may have been pushed out of the queue.
+    (said,) = caplog.messages
+    assert said.startswith("sample_dropped topic=lift_requests reason=")
+
+
+def test_nothing_forged_is_taken_for_a_message(domain: int) -> None:
+    """The hash in a key is part of it: another one is another key; a wildcard is no key of ours."""
+    received: list[d.LiftRequest] = []
+    node = ZenohTransport("listener", domain, loopback=True)
+    liar = ZenohTransport("liar", domain, loopback=True)
+    try:
+        node.subscribe(LIFT_REQUESTS, received.append)
+        voice = liar.publisher(LIFT_REQUESTS)
+        wait_until(voice.matched, "they meet")
+        session = liar._session
+        assert session is not None
+        key = voice.place.key if voice.place else ""
+        sample = encode(d.LiftRequest, d.LiftRequest("forged"))
+        session.put(key[:-64] + "0" * 64, sample)
+        session.put(key.rsplit("/", 1)[0] + "/*", sample)
+        session.put(f"{domain}/**", sample)
+        voice.publish(d.LiftRequest("true"))
+        wait_until(lambda: received, "the true one arrives")
+        wait_until(lambda: node.dropped == {"lift_requests": 2}, "the wildcards are counted")
+    finally:
+        liar.close()
+        node.close()
+    assert received == [d.LiftRequest("true")]
