@@ -133,7 +133,7 @@ test-vm: .venv/ready
 # Mutants live in a copy. After an interruption only the missing results are computed. For a part:
 # make mutate ONLY='bridges.kinds.door.*' CHILDREN=1. To start again from nothing: rm -rf the directory first.
 MUTANTS ?= $(or $(TMPDIR),/tmp)/rmf-bridges-mutants-$(shell id -u)
-MUTATED := bridges config drivers hal_fakes tests pyproject.toml
+MUTATED := bridges config drivers hal_fakes tests workbench pyproject.toml
 mutate: .venv/ready
 	$(BIN)/pip install --quiet --disable-pip-version-check -e '.[mutate]'
 	@mkdir -p $(MUTANTS) && cd $(MUTANTS) && rm -rf $(MUTATED)

@@ -24,7 +24,9 @@ setup(
     version=VERSION[1],
     description="Daemons that connect Open-RMF to the lifts, doors and chargers of a building",
     license="Apache-2.0",
-    packages=find_packages(str(ABOVE), include=["bridges*", "drivers*", "hal_fakes*"]),
+    packages=find_packages(
+        str(ABOVE), include=["bridges*", "drivers*", "hal_fakes*", "workbench*"]
+    ),
     package_dir={"": str(ABOVE)},
     package_data={"drivers": ["profiles/*.yaml"]},
     data_files=[

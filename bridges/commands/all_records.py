@@ -21,7 +21,7 @@ from bridges.host import log
 from bridges.host.log import pairs
 from bridges.host.places import SERVICE_STATE
 from bridges.serve.record import PATTERN, read
-from bridges.settings.problems import SettingsError
+from bridges.yaml.problems import SettingsError
 from drivers.profiles import texts
 
 OWN_S, OTHERS_S = 4.0, 2.0

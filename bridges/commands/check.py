@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING
 
 import msgspec
 
-from bridges.commands.sheets import text
-from bridges.commands.sheets.findings import Findings, findings, wrong
 from bridges.host.written import not_written
 from bridges.settings.across import Found, across
 from bridges.settings.load import Config, Problem, SettingsError, load
+from bridges.settings.sheets import text
+from bridges.settings.sheets.findings import Findings, findings, wrong
 
 if TYPE_CHECKING:
     from bridges.settings.building_map import BuildingMap
@@ -172,7 +172,7 @@ def _tell(files: Sequence[Findings], args: argparse.Namespace) -> int:
     errors = sum(len(file.errors) for file in files)
     code = os.EX_CONFIG if errors else 0
     if args.json:
-        from bridges.commands.sheets.as_json import document
+        from bridges.settings.sheets.as_json import document
 
         sys.stdout.write(document(files, *_counts(files)))
     else:
@@ -216,7 +216,7 @@ def _complain(lines: Iterable[str]) -> None:
 
 def _write_sheet(files: Sequence[Findings], path: str) -> int:
     """Write the commissioning sheet. Returns 0, or another exit code if that fails."""
-    from bridges.commands.sheets.html import page
+    from bridges.settings.sheets.html import page
 
     try:
         with open(path, "w", encoding="utf-8") as sheet:

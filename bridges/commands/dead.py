@@ -19,7 +19,7 @@ from bridges.serve.last_shown import ages
 from bridges.serve.record import Record, Records
 from bridges.serve.switch_off import outputs_off
 from bridges.settings.config import Config
-from bridges.settings.problems import SettingsError
+from bridges.yaml.problems import SettingsError
 
 TIMEOUT_S = 5.0
 

@@ -27,7 +27,7 @@ from bridges.commands.drafts.answers import (
 from bridges.host.written import no_folder, not_written
 from bridges.settings.building_map import BuildingMap, load_map
 from bridges.settings.load import understood
-from bridges.settings.nodes import SettingsError
+from bridges.yaml.nodes import SettingsError
 
 EX_USAGE, EX_NOINPUT, EX_CANTCREAT, EX_INTERRUPTED = 64, 66, 73, 130
 Given = dict[str, Any]
@@ -283,7 +283,7 @@ def _schema_line() -> str:
 
     The schema of this version is kept among the user's data.
     """
-    from bridges.settings.reference import schema
+    from workbench.commissioning.reference import schema
 
     base = os.environ.get("XDG_DATA_HOME") or os.path.expanduser("~/.local/share")
     path = Path(base) / "rmf-bridges" / f"schema-{__version__}.json"

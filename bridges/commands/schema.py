@@ -3,7 +3,7 @@
 import argparse
 import json
 
-from bridges.settings import reference
+from workbench.commissioning import reference
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

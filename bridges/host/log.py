@@ -118,7 +118,7 @@ class _OthersOnce(logging.Filter):
     """Lets each log call in a library through once: with bad frames or datagrams anybody could
     trigger it endlessly. Our own code already logs each event once."""
 
-    OURS = ("root", "bridges", "drivers", "hal_fakes")
+    OURS = ("root", "bridges", "drivers", "hal_fakes", "workbench")
 
     def __init__(self) -> None:
         super().__init__()

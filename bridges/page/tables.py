@@ -5,9 +5,9 @@ from functools import lru_cache
 from html import escape
 from pathlib import Path
 
-from bridges.commands.sheets.findings import WIRES, findings
 from bridges.kinds.shared.table import Table
 from bridges.settings.load import SettingsError, load
+from bridges.settings.sheets.findings import WIRES, findings
 
 NO_RING = "Its daemon keeps no ring, or the page's user may not read it: no live levels."
 

@@ -33,7 +33,7 @@ from bridges.recording.sources import TOPICS
 from bridges.recording.trees import HOLDS, TYPE, Tree
 from bridges.settings import names as known
 from bridges.settings.config import Config
-from bridges.settings.reference import schema
+from workbench.commissioning.reference import schema
 
 SAID: Final = FREE_TEXTS | {"code", "detail", "reason", "code_fault", "errors", "lost", "io_fault"}
 """Fields of a core's values that hold its own words."""

@@ -11,9 +11,9 @@ from msgspec import Struct
 from bridges.kinds.shared.graph_kind import GraphKind
 from bridges.settings import names as named
 from bridges.settings.load import Config
-from bridges.settings.nodes import Page, Problem, compose
-from bridges.settings.spots import Spot, locate
+from bridges.yaml.nodes import Page, Problem, compose
 from bridges.yaml.spelling import unknown
+from bridges.yaml.spots import Spot, locate
 from drivers.hal import Where
 
 Path = tuple[str, ...]

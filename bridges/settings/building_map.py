@@ -20,7 +20,7 @@ from msgspec import Struct, field
 from yaml import MappingNode, Node, ScalarNode, SequenceNode
 
 from bridges.kinds.shared.kind import CHARGER, DOOR, FLOOR, LIFT, WAYPOINT
-from bridges.settings.nodes import Page, Sort, compose, read
+from bridges.yaml.nodes import Page, Sort, compose, read
 
 MAP = Sort("building map or navigation graph", "levels: ...", 1024 * 1024, 100_000)
 """A file of this size takes some seconds to read; longer ones are refused at once."""

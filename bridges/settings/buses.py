@@ -6,11 +6,11 @@ from msgspec import Struct
 from yaml import MappingNode, ScalarNode
 
 from bridges.settings import names as named
-from bridges.settings.nodes import Page
-from bridges.settings.spots import Entry, below
 from bridges.settings.top import word
-from bridges.settings.values import BROKEN, Values
+from bridges.yaml.nodes import Page
 from bridges.yaml.spelling import either, nearest, unknown
+from bridges.yaml.spots import Entry, below
+from bridges.yaml.values import BROKEN, Values
 from drivers.hal import AnyBus, Remark
 
 

@@ -9,7 +9,7 @@ from msgspec import Struct, field
 from bridges.kinds.shared.recording_section import Recording
 from bridges.kinds.shared.rmf_section import Rmf
 from bridges.settings import names as named
-from bridges.settings.problems import Problem
+from bridges.yaml.problems import Problem
 from drivers.driver_type import AnyDriver
 from drivers.hal import AnyBus, Bus
 from drivers.hal.points import Wire

@@ -21,9 +21,9 @@ import msgspec
 from yaml import MappingNode, YAMLError
 from yaml.constructor import SafeConstructor
 
-from bridges.settings.nodes import Page, Problem, SettingsError, Sort, compose, read
 from bridges.settings.similarity import Point
-from bridges.settings.spots import Spot, locate
+from bridges.yaml.nodes import Page, Problem, SettingsError, Sort, compose, read
+from bridges.yaml.spots import Spot, locate
 
 FLEET = Sort("fleet configuration", "rmf_fleet: ...", 256 * 1024, 20_000)
 EVERY_LEVEL = ""

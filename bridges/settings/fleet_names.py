@@ -16,10 +16,10 @@ from bridges.kinds.charger_coordinator.settings import Fleet, Settings, Waypoint
 from bridges.settings.building_map import BuildingMap
 from bridges.settings.config import Config
 from bridges.settings.fleet_config import EVERY_LEVEL, FleetFile
-from bridges.settings.nodes import Page, Problem, compose
 from bridges.settings.similarity import Point, Similarity, estimate
-from bridges.settings.spots import Spot, locate
+from bridges.yaml.nodes import Page, Problem, compose
 from bridges.yaml.spelling import unknown
+from bridges.yaml.spots import Spot, locate
 
 Transforms = Mapping[str, Similarity]
 """Level -> RMF's map to the robot's; EVERY_LEVEL for all."""

@@ -27,13 +27,13 @@ from bridges.messages import topics
 from bridges.settings import names as named
 from bridges.settings.buses import BusRead, read_bus
 from bridges.settings.config import Config
-from bridges.settings.nodes import Page, Problem, SettingsError, compose, read
 from bridges.settings.plausible import milliseconds, out_of_step
-from bridges.settings.spots import Entry, Spot, below, is_none, locate
 from bridges.settings.top import MAPPING, keys_below, top_keys, word
-from bridges.settings.values import BROKEN, Broken, Values
 from bridges.settings.wiring import Use, Wiring, note_conflicts, note_unknown_signals
+from bridges.yaml.nodes import Page, Problem, SettingsError, compose, read
 from bridges.yaml.spelling import either, unknown
+from bridges.yaml.spots import Entry, Spot, below, is_none, locate
+from bridges.yaml.values import BROKEN, Broken, Values
 from drivers.driver_type import AnyDriver
 from drivers.hal.points import Wire
 

@@ -12,9 +12,9 @@ from bridges.kinds.shared.kind import CHARGER, DOOR, FLOOR, LIFT, WAYPOINT, Plac
 from bridges.settings import names as named
 from bridges.settings.building_map import BuildingMap
 from bridges.settings.load import Config
-from bridges.settings.nodes import Page, Problem, compose
-from bridges.settings.spots import Spot, locate
+from bridges.yaml.nodes import Page, Problem, compose
 from bridges.yaml.spelling import nearest, short
+from bridges.yaml.spots import Spot, locate
 
 
 def places(config: Config) -> list[Place]:

@@ -6,7 +6,7 @@ from typing import Final
 from msgspec.inspect import StructType
 
 from bridges.kinds.shared.fields import DeviceSettings
-from bridges.settings.values import described
+from bridges.yaml.values import described
 from drivers.hal import Remark
 
 RENEWED: Final = 3

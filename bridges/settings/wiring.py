@@ -9,10 +9,10 @@ from collections.abc import Iterable
 from msgspec import Struct
 from yaml import Node
 
-from bridges.settings.nodes import Page
-from bridges.settings.spots import Spot, below, locate
-from bridges.settings.values import BROKEN, Check
+from bridges.yaml.nodes import Page
 from bridges.yaml.spelling import unknown
+from bridges.yaml.spots import Spot, below, locate
+from bridges.yaml.values import BROKEN, Check
 from drivers.hal import AnyBus
 from drivers.hal.points import Input, Output, Wire
 

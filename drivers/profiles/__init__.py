@@ -18,7 +18,7 @@ import msgspec
 from msgspec.inspect import LiteralType
 
 from bridges.kinds.shared.fields import Name
-from bridges.settings.problems import SettingsError
+from bridges.yaml.problems import SettingsError
 from bridges.yaml.spelling import either, unknown
 from drivers.profiles import texts
 from drivers.profiles.texts import FOLDER
@@ -51,7 +51,7 @@ class Profile(Generic[Content]):
         return self._read(FOLDER / f"{name}.yaml")["hardware"] == "untried"
 
     def _read(self, file: Path) -> dict[str, object]:
-        from bridges.settings.nodes import read
+        from bridges.yaml.nodes import read
 
         text = texts.text(file, lambda: read(str(file)))
         return _understood(str(file), text, self.reader, self.key, self._content)
@@ -65,9 +65,9 @@ def _lines(file: Path) -> list[str]:
 def _understood(
     file: str, text: bytes, reader: str, key: str, content: type[msgspec.Struct]
 ) -> dict[str, object]:
-    from bridges.settings.nodes import Page, compose
-    from bridges.settings.spots import Spot
-    from bridges.settings.values import BROKEN, Values
+    from bridges.yaml.nodes import Page, compose
+    from bridges.yaml.spots import Spot
+    from bridges.yaml.values import BROKEN, Values
 
     page = Page(file)
     root = compose(page, text)

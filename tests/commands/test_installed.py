@@ -19,7 +19,7 @@ def test_every_file_that_is_not_a_module_is_installed() -> None:
     }
     there = {
         file
-        for name in ("bridges", "drivers", "hal_fakes")
+        for name in ("bridges", "drivers", "hal_fakes", "workbench")
         for file in (ROOT / name).rglob("*")
         if file.is_file() and file.suffix not in (".py", ".pyc")
     }

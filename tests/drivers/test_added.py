@@ -16,7 +16,7 @@ from tests.serve.site import ROOT, command, daemon, environment
 from tests.waiting import wait_until
 
 ADDED = Path(__file__).parent / "added"
-ROOMS = ("bridges", "drivers", "hal_fakes")
+ROOMS = ("bridges", "drivers", "hal_fakes", "workbench")
 
 LATCH = """
 kind: door

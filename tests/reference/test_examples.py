@@ -10,11 +10,11 @@ from msgspec import inspect as mi
 
 from bridges.kinds.shared.rmf_section import Rmf
 from bridges.settings import names as named
-from bridges.settings import reference
-from bridges.settings.examples import example
-from bridges.settings.nodes import Page
-from bridges.settings.spots import Spot
-from bridges.settings.values import Values
+from bridges.yaml.nodes import Page
+from bridges.yaml.spots import Spot
+from bridges.yaml.values import Values
+from workbench.commissioning import reference
+from workbench.commissioning.examples import example
 
 
 def structs() -> list[type]:

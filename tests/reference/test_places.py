@@ -6,7 +6,18 @@ from pathlib import Path, PurePath
 import pytest
 
 ROOT = Path(__file__).parents[2]
-ROOMS = ("bridges", "drivers", "hal_fakes", "tests", "bench", "config", "docs", "systemd", "ros")
+ROOMS = (
+    "bridges",
+    "drivers",
+    "hal_fakes",
+    "workbench",
+    "tests",
+    "bench",
+    "config",
+    "docs",
+    "systemd",
+    "ros",
+)
 THERE = [
     PurePath(path.relative_to(ROOT))
     for room in ROOMS

@@ -6,8 +6,8 @@ import yaml
 from jsonschema import Draft202012Validator
 
 from bridges.settings import names as named
-from bridges.settings import reference
-from bridges.settings.examples import device_yamls
+from workbench.commissioning import reference
+from workbench.commissioning.examples import device_yamls
 
 ROOT = Path(__file__).parents[2]
 SHIPPED = device_yamls()

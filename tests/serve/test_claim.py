@@ -11,9 +11,9 @@ import pytest
 from bridges.serve import record
 from bridges.serve.record import Claim, Record
 from bridges.settings.config import Config
-from bridges.settings.examples import device_yamls
 from bridges.settings.load import SettingsError, load
 from drivers.profiles import texts
+from workbench.commissioning.examples import device_yamls
 
 DEVICES = [file for file in device_yamls() if "\nbuses:" in file.read_text()]
 

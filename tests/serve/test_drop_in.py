@@ -7,8 +7,8 @@ import pytest
 from bridges.commands.run import too_slow
 from bridges.host.places import GROUPS
 from bridges.serve.drop_in import FITS, fits, misfit, text, watchdog_s
-from bridges.settings.examples import device_yamls
 from bridges.settings.load import Config, load, understood
+from workbench.commissioning.examples import device_yamls
 
 CONFIG = Path(__file__).parents[2] / "config"
 USB = ["modprobe@usbserial.service modprobe@cdc_acm.service"]

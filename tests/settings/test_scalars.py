@@ -7,7 +7,7 @@ import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bridges.settings.scalars import reads_as
+from bridges.yaml.scalars import reads_as
 from tests.depth import examples
 from tests.settings.reading import RIGHT, changed, config_of, problems_of
 

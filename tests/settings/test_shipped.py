@@ -28,14 +28,14 @@ from msgspec.inspect import (
 )
 from yaml import CollectionNode, MappingNode, Node, ScalarNode, SequenceNode
 
-from bridges.commands.sheets.findings import findings
-from bridges.commands.sheets.text import lines
 from bridges.kinds.shared.rmf_section import Rmf
 from bridges.settings import names as named
-from bridges.settings.examples import device_yamls
 from bridges.settings.load import load
+from bridges.settings.sheets.findings import findings
+from bridges.settings.sheets.text import lines
 from tests.depth import depth, part
 from tests.settings.reading import problems_of
+from workbench.commissioning.examples import device_yamls
 
 T = TypeVar("T")
 

@@ -19,7 +19,7 @@ from msgspec.inspect import (
 from bridges.kinds.shared.graph_kind import GraphKind
 from bridges.kinds.shared.rmf_section import Rmf
 from bridges.settings import names as named
-from bridges.settings.slips import number_meant
+from bridges.yaml.slips import number_meant
 from tests.settings.reading import changed, problems_of
 
 NBSP = "\u00a0"

@@ -10,8 +10,8 @@ import pytest
 
 from bridges.host.places import GROUPS
 from bridges.serve.drop_in import text
-from bridges.settings.examples import device_yamls
 from bridges.settings.load import load
+from workbench.commissioning.examples import device_yamls
 
 ROOT = Path(__file__).parents[2]
 FILES = ROOT / "systemd"

@@ -8,10 +8,10 @@ import msgspec
 import pytest
 
 from bridges.commands.doctoring.answers import numbers, ranges, readings, unarmed
-from bridges.settings.examples import device_yamls
 from bridges.settings.load import load
 from hal_fakes.__main__ import served
 from tests.waiting import wait_until
+from workbench.commissioning.examples import device_yamls
 
 CONFIG = Path(__file__).parents[3] / "config"
 ASKED = sorted(

@@ -2,9 +2,9 @@
 
 from pathlib import Path
 
-from bridges.commands.sheets.findings import findings
-from bridges.commands.sheets.text import lines
 from bridges.settings.load import load
+from bridges.settings.sheets.findings import findings
+from bridges.settings.sheets.text import lines
 
 SHIPPED = Path(__file__).parents[3] / "config" / "lift_dry_contact.yaml"
 PARITY = '      parity: {point: "J8:33", active: high, pull: down, total: even}\n'

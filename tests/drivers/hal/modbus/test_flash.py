@@ -8,13 +8,13 @@ from typing import Any
 import msgspec
 import pytest
 
-from bridges.commands.sheets.findings import findings
-from bridges.commands.sheets.text import lines
 from bridges.kinds.door.core import decide, initial
 from bridges.kinds.door.memory import DoorLimits
 from bridges.kinds.door.signals import CloseRequested, DoorOutputs, Event, OpenRequested
 from bridges.kinds.shared.decision import Sampled, WriteFailed
 from bridges.settings.load import load
+from bridges.settings.sheets.findings import findings
+from bridges.settings.sheets.text import lines
 from drivers import DriverError
 from drivers.door.dry_contact import DryContactDoor, Settings, create, debounce, wires
 from drivers.hal import gpio, modbus

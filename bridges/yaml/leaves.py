@@ -26,9 +26,9 @@ from msgspec.inspect import (
 )
 from yaml import Node, ScalarNode, SequenceNode
 
-from bridges.settings.nodes import is_plain
-from bridges.settings.scalars import TRUTHS, number, reads_as, whole_number
-from bridges.settings.slips import has_unit, number_meant
+from bridges.yaml.nodes import is_plain
+from bridges.yaml.scalars import TRUTHS, number, reads_as, whole_number
+from bridges.yaml.slips import has_unit, number_meant
 from bridges.yaml.spelling import either, nearest, short
 
 Extra = Mapping[str, str]

@@ -13,9 +13,9 @@ from msgspec import inspect as mi
 
 import drivers
 from bridges.settings import names as named
-from bridges.settings.leaves import choices
 from bridges.settings.load import load
 from bridges.settings.shown import is_section
+from bridges.yaml.leaves import choices
 from drivers.profiles import Profile
 
 CONFIG = Path(drivers.__file__).parents[1] / "config"

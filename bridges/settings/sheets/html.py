@@ -6,8 +6,8 @@ It needs no other file. Texts from a YAML are escaped, never markup.
 from collections.abc import Iterator, Sequence
 from html import escape
 
-from bridges.commands.sheets.findings import MEANINGS, WIRES, BusShown, Findings, Part
 from bridges.kinds.shared.table import Table
+from bridges.settings.sheets.findings import MEANINGS, WIRES, BusShown, Findings, Part
 
 STYLE = """
 body { font: 8pt/1.2 sans-serif; margin: 1.5em; color: #000; background: #fff; }

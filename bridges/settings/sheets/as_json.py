@@ -4,8 +4,8 @@ from collections.abc import Sequence
 
 import msgspec
 
-from bridges.commands.sheets.findings import Findings
 from bridges.kinds.shared.table import Table
+from bridges.settings.sheets.findings import Findings
 
 
 def document(files: Sequence[Findings], errors: int, warnings: int) -> str:

@@ -10,8 +10,8 @@ from bridges.kinds.shared.table import Table
 from bridges.messages import instead
 from bridges.settings import names as named
 from bridges.settings.load import Config
-from bridges.settings.nodes import Problem
 from bridges.settings.shown import choices_of, plain
+from bridges.yaml.nodes import Problem
 from drivers.hal.points import Wire
 
 HEADINGS = ("signal", "point", "direction", "active", "pull", "debounce", "at rest", "wire broken")

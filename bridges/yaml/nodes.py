@@ -16,9 +16,9 @@ from yaml.reader import ReaderError
 
 from bridges.host import user_files
 from bridges.messages.words import printable
-from bridges.settings import slips
-from bridges.settings.problems import Problem as Problem
-from bridges.settings.problems import SettingsError as SettingsError
+from bridges.yaml import slips
+from bridges.yaml.problems import Problem as Problem
+from bridges.yaml.problems import SettingsError as SettingsError
 
 MAX_DEPTH = 32
 HALVES = re.compile("[\ud800-\udfff]")

@@ -5,8 +5,8 @@ from collections.abc import Iterable
 from msgspec import Struct
 from yaml import MappingNode, Node, ScalarNode, SequenceNode
 
-from bridges.settings.nodes import is_plain
-from bridges.settings.scalars import is_null_word
+from bridges.yaml.nodes import is_plain
+from bridges.yaml.scalars import is_null_word
 from bridges.yaml.spelling import short
 
 

@@ -22,11 +22,11 @@ from msgspec.inspect import (
 )
 from yaml import MappingNode, Node, ScalarNode, SequenceNode
 
-from bridges.settings.leaves import Extra, Wrong, leaf, looks, wanted_text
-from bridges.settings.nodes import Page, is_plain
-from bridges.settings.scalars import is_null
-from bridges.settings.spots import Entry, Spot, is_none, locate
+from bridges.yaml.leaves import Extra, Wrong, leaf, looks, wanted_text
+from bridges.yaml.nodes import Page, is_plain
+from bridges.yaml.scalars import is_null
 from bridges.yaml.spelling import either, nearest, short, unknown
+from bridges.yaml.spots import Entry, Spot, is_none, locate
 
 VERBS = ("is", "has", "needs", "must", "says")
 """A problem that begins with one of these words gets its key as the subject."""
