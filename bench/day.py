@@ -7,7 +7,7 @@ from bench.figures import Tables
 from bridges.rmf_rules.phases import EndLiftSession, RequestLift
 from bridges.rmf_rules.robot import Phase
 from tests.kinds.lift_supervisor.world import LiftNode, OurSupervisor, Rider
-from tests.serve.virtual_graph import World
+from tests.runtime.virtual_graph import World
 
 DAY_S = 86400.0
 

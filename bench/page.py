@@ -27,7 +27,7 @@ from bench.figures import Row, Rows, Tables, percentiles
 from bridges.messages import definitions as d
 from bridges.messages import topics
 from bridges.messages.stamps import stamp
-from bridges.serve.diagnostics import diagnosis
+from bridges.runtime.diagnostics import diagnosis
 from hal_fakes.domain import free_domain
 from hal_fakes.wire import join, wire
 

@@ -26,10 +26,10 @@ from bridges.recording.replayed import Cores, Replay, of_head
 from bridges.recording.ring import Ring
 from bridges.recording.shelf import Shelf
 from bridges.recording.sources import Notes
-from bridges.serve.clock import Clock
-from bridges.serve.refusals import Refusals
-from bridges.serve.subject import Core, Subject
-from bridges.serve.witness import Witness
+from bridges.runtime.clock import Clock
+from bridges.runtime.refusals import Refusals
+from bridges.runtime.subject import Core, Subject
+from bridges.runtime.witness import Witness
 from bridges.settings.load import load
 
 ROUNDS, WATCHED_S = 2, 30.0

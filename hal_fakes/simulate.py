@@ -28,7 +28,7 @@ READY_S = 15.0
 PATIENCE_S = 1.5
 """A simulated bus waits at least this long (s) for an answer: its far side shares this machine,
 which may be busy. Not longer, as a call may take half of the shortest WatchdogSec
-(bridges/serve/drop_in.py)."""
+(bridges/runtime/drop_in.py)."""
 
 
 class Simulation:

@@ -18,7 +18,7 @@ from bridges.host.columns import aligned
 from bridges.messages import definitions as d
 from bridges.messages import words
 from bridges.messages.heard import Heard
-from bridges.serve import diagnostics
+from bridges.runtime import diagnostics
 
 KINDS: Final = {d.LiftState: "lift", d.DoorState: "door", d.ChargerState: "charger"}
 SETTLES_S: Final = 1.5

@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from bridges.host import places
-from bridges.serve import directory, guard, record
+from bridges.runtime import directory, guard, record
 from bridges.settings.load import Config
 from drivers import Driver, DriverError
 from drivers.hal import Bus

@@ -39,7 +39,7 @@ def service_names(prefix: str, parsed_args: argparse.Namespace, **_: object) -> 
     """The services that have a YAML in /etc/rmf-bridges, and files that begin so."""
     from argcomplete.completers import FilesCompleter
 
-    from bridges.commands.services import CONFIG
+    from bridges.runtime.services import CONFIG
 
     files: list[str] = list(FilesCompleter(allowednames=("yaml", "yml"))(prefix))
     return sorted({file.stem for file in (Path("/") / CONFIG).glob("*.yaml")}) + files

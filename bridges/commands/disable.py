@@ -6,7 +6,7 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
-from bridges.commands.services import (
+from bridges.runtime.services import (
     INSTANCE,
     NO_INSTANCE,
     Remove,

@@ -2,7 +2,7 @@
 
 It validates the file, beside the files of this machine's other services; stops an instance that runs,
 so that its outputs are switched off while it may still reach the old relay; copies the file to
-/etc/rmf-bridges; writes the instance's drop-in (`bridges/serve/drop_in.py`); and starts it. If a step
+/etc/rmf-bridges; writes the instance's drop-in (`bridges/runtime/drop_in.py`); and starts it. If a step
 fails, what ran is started again as it is then.
 """
 
@@ -13,7 +13,9 @@ from collections.abc import Collection, Iterable, Iterator
 from contextlib import suppress
 from pathlib import Path
 
-from bridges.commands.services import (
+from bridges.host.places import GROUPS
+from bridges.runtime import drop_in
+from bridges.runtime.services import (
     CONFIG,
     INSTANCE,
     NO_INSTANCE,
@@ -26,8 +28,6 @@ from bridges.commands.services import (
     switch_off,
     unit,
 )
-from bridges.host.places import GROUPS
-from bridges.serve import drop_in
 from bridges.settings.across import taken
 from bridges.settings.load import Config, Problem, SettingsError, load
 

@@ -13,7 +13,6 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Final
 
-from bridges.commands import faults
 from bridges.commands.board import SECONDS
 from bridges.commands.graph import (
     add_graph_arguments,
@@ -30,6 +29,7 @@ from bridges.explain.site import Site
 from bridges.explain.text import SCREEN_LINES, lines
 from bridges.explain.timeline import KINDS, Kind
 from bridges.recording.sources import BagError
+from bridges.runtime import faults
 from bridges.transports.transport import TransportError
 
 LISTENS_S: Final = 5.0

@@ -11,9 +11,9 @@ from bridges.host.written import no_folder, not_written
 from bridges.recording.bags import INSTALL
 from bridges.recording.incident import AFTER_S, BEFORE_S, Incident, Note, part
 from bridges.recording.ring import DIED, NAME, Read, RingError
-from bridges.serve import holder
-from bridges.serve.clock import machine_s
-from bridges.serve.directory import find
+from bridges.runtime import holder
+from bridges.runtime.clock import machine_s
+from bridges.runtime.directory import find
 from bridges.settings.load import SettingsError
 
 EX_UNAVAILABLE = 69

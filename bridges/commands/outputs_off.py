@@ -9,7 +9,7 @@ import os
 import sys
 from pathlib import Path
 
-from bridges.serve import last_mark
+from bridges.runtime import last_mark
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -30,11 +30,11 @@ def run(args: argparse.Namespace) -> int:
         print('nothing_to_switch_off reason="the daemon verified it"', file=sys.stderr)
         return 0
     if args.all_records:
-        from bridges.commands.all_records import switch_off_all
+        from bridges.runtime.all_records import switch_off_all
 
         return switch_off_all()
     if args.file is None:
         args.usage("name a device YAML, or --all-records")
-    from bridges.commands.dead import switch_off
+    from bridges.runtime.dead import switch_off
 
     return switch_off(args)

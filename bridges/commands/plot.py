@@ -11,7 +11,6 @@ from html import escape
 from pathlib import Path
 from typing import Final
 
-from bridges.commands import faults
 from bridges.commands.graph import complain
 from bridges.commands.recordings import Span, add_span_arguments, told_between, unreadable
 from bridges.explain.lanes import Drawing
@@ -21,6 +20,7 @@ from bridges.explain.site import Site
 from bridges.explain.text import lines
 from bridges.explain.timeline import KINDS, Timeline
 from bridges.recording.sources import BagError
+from bridges.runtime import faults
 
 SUFFIXES: Final = (".html", ".svg", ".png")
 INSTALL: Final = "pip install 'rmf-bridges[plot]'"

@@ -10,9 +10,9 @@ from bridges.host import log, places
 from bridges.recording.bags import INSTALL
 from bridges.recording.recorder import Recorder
 from bridges.recording.shelf import Shelf
-from bridges.serve import signals
-from bridges.serve.clock import machine_s
-from bridges.serve.notify import notify
+from bridges.runtime import signals
+from bridges.runtime.clock import machine_s
+from bridges.runtime.notify import notify
 
 EX_UNAVAILABLE = 69
 EVERY_S = 1.0

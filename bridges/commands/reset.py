@@ -6,9 +6,9 @@ import sys
 from pathlib import Path
 
 from bridges.host.places import Places, act_as_owner
-from bridges.serve import holder
-from bridges.serve.directory import find
-from bridges.serve.signals import RESET
+from bridges.runtime import holder
+from bridges.runtime.directory import find
+from bridges.runtime.signals import RESET
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -10,9 +10,9 @@ from msgspec.structs import replace
 
 from bridges.commands.graph import TRANSPORTS, overridden
 from bridges.host import log, places
-from bridges.serve import directory as runtime
-from bridges.serve import drop_in, guard, signals
-from bridges.serve.notify import watchdog_s
+from bridges.runtime import directory as runtime
+from bridges.runtime import drop_in, guard, signals
+from bridges.runtime.notify import watchdog_s
 from bridges.settings.load import Config, SettingsError, load
 from bridges.transports.ros2 import setup as ros_setup
 from bridges.transports.transport import TransportError
@@ -99,7 +99,7 @@ def _serve(
     if command := ros_setup.sourcing(config.rmf, os.environ, sys.orig_argv):
         os.execvpe(command[0], command, ros_setup.sourced(config.rmf, os.environ))
     if not args.simulate:
-        from bridges.serve.daemon import Daemon
+        from bridges.runtime.daemon import Daemon
 
         outputs_off = guard.command(args.file, args.runtime_dir)
         places.work_somewhere(held.places)  # lgpio leaves a FIFO in the working directory
@@ -108,7 +108,7 @@ def _serve(
 
     logging.warning("SIMULATED: no hardware moves, and RMF is told simulated states")
     simulation = Simulation(config, held.path, log_format=args.log_format)
-    from bridges.serve.daemon import Daemon  # imported while the fakes start
+    from bridges.runtime.daemon import Daemon  # imported while the fakes start
 
     try:
         return Daemon(

@@ -17,14 +17,14 @@ from typing import Any, Final, TextIO, cast
 
 import msgspec
 
-from bridges.commands.faults import Remedy, here, remedies, values
 from bridges.host import files
 from bridges.host.paint import bold, red
 from bridges.host.places import SERVICE_RUN, SERVICE_STATE, Places, owner_of, runtimes, state_base
 from bridges.messages.words import printable
-from bridges.serve import holder
-from bridges.serve.record import paths, read
-from bridges.serve.subject import Status
+from bridges.runtime import holder
+from bridges.runtime.faults import Remedy, here, remedies, values
+from bridges.runtime.record import paths, read
+from bridges.runtime.subject import Status
 
 UNIT: Final = "rmf-bridge@"
 RUNS: Final = ("active (running)", "activating (start)", "deactivating (stop-sigterm)")

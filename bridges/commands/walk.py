@@ -19,8 +19,8 @@ from pathlib import Path
 from bridges.commands.by_hand import NoDevice, device_of, guarded
 from bridges.commands.completion import completed_by, device_names
 from bridges.host import log
-from bridges.serve import directory as runtime
-from bridges.serve import guard, signals
+from bridges.runtime import directory as runtime
+from bridges.runtime import guard, signals
 from bridges.settings.load import Config, SettingsError, load
 from drivers.hal import Bus, HalError
 

@@ -12,7 +12,7 @@ from bridges.explain.phrases import Moment, lasted
 from bridges.explain.rows import label
 from bridges.explain.timeline import Kind
 from bridges.messages import definitions as d
-from bridges.serve import diagnostics
+from bridges.runtime import diagnostics
 
 MOST_LINES: Final = 600
 MOST_NODES: Final = 8

@@ -19,7 +19,7 @@ from bridges.kinds.charger import refusals
 from bridges.messages import definitions as d
 from bridges.messages import words
 from bridges.messages.heard import Heard, Own
-from bridges.serve import diagnostics
+from bridges.runtime import diagnostics
 
 MOST_ROWS: Final = 12
 """The most rows of a lane: a flood of made-up requesters or faults must not fill a page."""

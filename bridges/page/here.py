@@ -16,7 +16,7 @@ from bridges.commands.status import Daemon, daemons
 from bridges.host.places import runtimes
 from bridges.page.actions import Local
 from bridges.page.levels import Levels, Rows
-from bridges.serve.diagnostics import CONTACTS
+from bridges.runtime.diagnostics import CONTACTS
 
 
 @dataclass(frozen=True, slots=True)

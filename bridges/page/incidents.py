@@ -15,7 +15,6 @@ from typing import Final
 
 import msgspec
 
-from bridges.commands import faults
 from bridges.explain import site
 from bridges.explain.answer import Remedies
 from bridges.explain.explanation import Explanation
@@ -24,6 +23,7 @@ from bridges.explain.timeline import Timeline
 from bridges.messages.heard import Heard
 from bridges.recording.bags import heard_in
 from bridges.recording.sources import BagError, Notes
+from bridges.runtime import faults
 
 SUFFIX: Final = ".mcap"
 MOST_LISTED: Final = 500

@@ -22,7 +22,7 @@ from bridges.messages import topics, words
 from bridges.messages.heard import Heard
 from bridges.messages.topics import AnyTopic
 from bridges.messages.words import Requested, Stated
-from bridges.serve import diagnostics
+from bridges.runtime import diagnostics
 
 KEPT_S: Final = 600.0
 """The past that a device's page shows."""

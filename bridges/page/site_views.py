@@ -9,7 +9,6 @@ from typing import Final
 from fastapi import Request
 from nicegui import Client, ui
 
-from bridges.commands import faults
 from bridges.explain.explanation import Explanation
 from bridges.explain.picture import svg
 from bridges.explain.timeline import KINDS
@@ -23,6 +22,7 @@ from bridges.page.here import Here
 from bridges.page.login import Login
 from bridges.page.site import Site
 from bridges.page.why import explanation, story
+from bridges.runtime import faults
 
 SECTIONS: Final = (
     ("lift", "Lifts"),

@@ -34,7 +34,7 @@ class Where(NamedTuple):
 
 
 class Needs(NamedTuple):
-    """What systemd must permit a daemon for a bus (`bridges/serve/drop_in.py`).
+    """What systemd must permit a daemon for a bus (`bridges/runtime/drop_in.py`).
 
     `devices`: as its DeviceAllow has them: a path, or a class whose devices may come and go
     (`char-ttyUSB`). `modules`: the kernel modules that bring those classes. `group`: who may open

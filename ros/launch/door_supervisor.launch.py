@@ -1,6 +1,6 @@
 """`ros2 launch rmf_bridges door_supervisor.launch.py config:=FILE`"""
 
-from bridges.commands.ros_launch import LaunchDescription, daemon
+from bridges.runtime.ros_launch import LaunchDescription, daemon
 
 
 def generate_launch_description() -> LaunchDescription:

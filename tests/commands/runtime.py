@@ -7,7 +7,7 @@ from pathlib import Path
 
 import msgspec
 
-from bridges.serve.holder import HOLDER, ourselves
+from bridges.runtime.holder import HOLDER, ourselves
 
 
 @contextmanager

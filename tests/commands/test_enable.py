@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 
 from bridges.cli import main
-from bridges.commands import disable, enable, services
-from bridges.commands.services import Remove, Run, Write, carry_out, switch_off
-from bridges.serve import drop_in
+from bridges.commands import disable, enable
+from bridges.runtime import drop_in, services
+from bridges.runtime.services import Remove, Run, Write, carry_out, switch_off
 from bridges.settings.load import load
 
 CONFIG = Path(__file__).parents[2] / "config"

@@ -14,7 +14,7 @@ from bridges import cli
 from bridges.commands import log
 from bridges.host.log import pairs
 from bridges.host.places import by_hand
-from bridges.serve.directory import RuntimeDirectory
+from bridges.runtime.directory import RuntimeDirectory
 
 LINES = [
     pairs("state", device="Lift1", mode="AGV"),

@@ -9,11 +9,12 @@ from typing import Any
 import pytest
 
 from bridges import cli
-from bridges.commands import faults, status
+from bridges.commands import status
 from bridges.commands.status import DOWN, FAULTY, NONE, WELL, Daemon, daemons, show
 from bridges.host.places import Places
-from bridges.serve.holder import HOLDER
-from bridges.serve.record import Records, of
+from bridges.runtime import faults
+from bridges.runtime.holder import HOLDER
+from bridges.runtime.record import Records, of
 from bridges.settings.load import load
 from tests.commands.runtime import served
 
@@ -232,7 +233,7 @@ def test_each_fault_of_the_source_has_a_remedy_and_each_remedy_a_fault() -> None
 
 
 def test_the_page_of_faults_is_the_table_itself() -> None:
-    """`python -m bridges.commands.faults > docs/faults.md` brings it up to date."""
+    """`python -m bridges.runtime.faults > docs/faults.md` brings it up to date."""
     assert (ROOT / "docs" / "faults.md").read_text() == faults.page()
 
 

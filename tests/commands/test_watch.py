@@ -20,7 +20,7 @@ from bridges.commands.board import (
 from bridges.messages import definitions as d
 from bridges.messages.heard import Heard
 from bridges.messages.stamps import stamp
-from bridges.serve.diagnostics import diagnosis
+from bridges.runtime.diagnostics import diagnosis
 
 WALL = 1_700_000_000.0
 LIFT = d.LiftState(

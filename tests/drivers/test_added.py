@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from tests.serve.site import ROOT, command, daemon, environment
+from tests.runtime.site import ROOT, command, daemon, environment
 from tests.waiting import wait_until
 
 ADDED = Path(__file__).parent / "added"

@@ -18,7 +18,7 @@ from bridges.messages.stamps import stamp
 from bridges.messages.topics import Topic
 from bridges.rmf_rules.phases import DoorClose, DoorOpen, EndLiftSession, RequestLift
 from bridges.rmf_rules.robot import Phase, Robot
-from bridges.serve import diagnostics
+from bridges.runtime import diagnostics
 from tests.site import charging
 from tests.site.building import CHARGERS, devices
 from tests.site.daemons import (
@@ -186,7 +186,7 @@ class Scene:
         self.heard.append(Heard(now, EPOCH + now, topic.name, message))
 
     def _second(self) -> None:
-        """Each daemon says once a second what is wrong, as `bridges/serve/daemon.py` has it do."""
+        """Each daemon says once a second what is wrong, as `bridges/runtime/daemon.py` has it do."""
         if self._diagnoses:
             for name, daemon in self.daemons.items():
                 if daemon.alive:

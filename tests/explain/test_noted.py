@@ -13,7 +13,7 @@ from bridges.explain.site import Site
 from bridges.explain.timeline import Level
 from bridges.messages import definitions as d
 from bridges.messages.heard import Heard, Own
-from bridges.serve.diagnostics import diagnosis
+from bridges.runtime.diagnostics import diagnosis
 
 CORPUS = Path(__file__).parents[1] / "recording" / "corpus"
 

@@ -8,13 +8,13 @@ from datetime import UTC
 import pytest
 
 from bridges import cli
-from bridges.commands.faults import for_explain
 from bridges.explain.explanation import Explanation
 from bridges.explain.phrases import JOINS, on_graph
 from bridges.explain.site import Site
 from bridges.messages import definitions as d
 from bridges.messages.heard import Heard
 from bridges.messages.stamps import stamp
+from bridges.runtime.faults import for_explain
 from tests.explain.scenes import SCENES
 
 GRAPH = ("--config", "our site.yaml", "--domain-id", "7", "--transport", "zenoh", "--localhost")

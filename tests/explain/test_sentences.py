@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from bridges.commands.faults import remedies
 from bridges.explain.site import Site
 from bridges.explain.text import SCREEN_LINES, lines
+from bridges.runtime.faults import remedies
 from tests.explain.scenes import SCENES
 
 GOLDEN = Path(__file__).parent / "golden"

@@ -11,7 +11,7 @@ from bridges.messages import cdr, topics
 from bridges.messages import definitions as d
 from bridges.messages.releases import JAZZY, KILTED, Release
 from bridges.messages.rihs01 import type_hash
-from bridges.serve.outlet import Outlet
+from bridges.runtime.outlet import Outlet
 from bridges.transports.memory import MemoryNetwork, MemoryTransport
 from bridges.transports.peers import Announced, Peers
 from bridges.transports.transport import Transport

@@ -8,7 +8,7 @@ from bridges.messages.heard import Heard
 from bridges.messages.stamps import stamp
 from bridges.messages.topics import AnyTopic
 from bridges.page.site import GONE_AFTER_S, KEPT_S, MOST_DEVICES, MOST_ROBOTS, Site, Stands
-from bridges.serve.diagnostics import diagnosis
+from bridges.runtime.diagnostics import diagnosis
 
 WALL = 1_700_000_000.0
 LIFT = d.LiftState(

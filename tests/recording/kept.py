@@ -13,8 +13,8 @@ from bridges.kinds.shared.graph_kind import AnyGraphKind
 from bridges.kinds.shared.recording_section import Recording
 from bridges.recording.entries import Head
 from bridges.recording.ring import Ring
-from bridges.serve.clock import Clock
-from bridges.serve.witness import Witness
+from bridges.runtime.clock import Clock
+from bridges.runtime.witness import Witness
 from tests.site.building import Device
 from tests.site.daemons import DeviceDaemon, GraphDaemon
 from tests.site.day import Site

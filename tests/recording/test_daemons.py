@@ -10,7 +10,7 @@ import pytest
 from bridges.recording.entries import Known, Spoken, Step
 from bridges.recording.ring import DIED, Read
 from hal_fakes.wire import wire
-from tests.serve.site import daemon, shipped
+from tests.runtime.site import daemon, shipped
 from tests.waiting import wait_until
 
 

@@ -19,7 +19,7 @@ from bridges.recording.files import opened
 from bridges.recording.replayed import Cores, Replay, of_head
 from bridges.recording.sources import Notes
 from bridges.recording.trees import TYPE, UnknownValue, name_of, tree, value
-from bridges.serve.record import Record
+from bridges.runtime.record import Record
 from bridges.settings import names
 from drivers.profiles import texts
 from tests.recording.earlier import DAYS

@@ -19,7 +19,7 @@ from bridges.recording.entries import Spoken
 from bridges.recording.incidents import head_of, notes_in
 from bridges.recording.ring import Read
 from hal_fakes.wire import wire
-from tests.serve.site import daemon, environment, shipped
+from tests.runtime.site import daemon, environment, shipped
 from tests.waiting import PATIENCE_S, wait_until
 
 

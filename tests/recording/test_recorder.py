@@ -29,8 +29,8 @@ from bridges.recording.incidents import entries_in, head_of, notes_in
 from bridges.recording.recorder import Recorder
 from bridges.recording.ring import DIED, Read, Ring
 from bridges.recording.shelf import Shelf
-from bridges.serve.clock import Clock
-from bridges.serve.witness import Witness
+from bridges.runtime.clock import Clock
+from bridges.runtime.witness import Witness
 
 WALL = 1_800_000_000.0
 REPORT = LiftReport(

@@ -20,8 +20,8 @@ from bridges.recording.incident import Incident, timed
 from bridges.recording.mcap_write import write
 from bridges.recording.replayed import times
 from bridges.recording.ring import Read, Ring
-from bridges.serve.clock import Clock
-from bridges.serve.witness import Witness
+from bridges.runtime.clock import Clock
+from bridges.runtime.witness import Witness
 from tests.recording.test_recorder import REPORT, WALL
 
 HEAD = Head("r", 1, "1", "lift", "/l.yaml", b"", {}, False, {}, Recording())

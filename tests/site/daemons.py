@@ -16,14 +16,14 @@ from bridges.kinds.shared.graph_kind import AnyGraphKind
 from bridges.messages.definitions import Message
 from bridges.messages.topics import DOOR_REQUESTS, DOOR_SUPERVISOR_HEARTBEAT, LIFT_REQUESTS, Topic
 from bridges.rmf_rules.supervisors import DoorSupervisor, LiftSupervisor
-from bridges.serve.clock import Clock
-from bridges.serve.device import AnyNode, Node
-from bridges.serve.graph import AnyGraphNode, GraphNode
-from bridges.serve.subject import Status
-from bridges.serve.witness import NOBODY, Nobody
+from bridges.runtime.clock import Clock
+from bridges.runtime.device import AnyNode, Node
+from bridges.runtime.graph import AnyGraphNode, GraphNode
+from bridges.runtime.subject import Status
+from bridges.runtime.witness import NOBODY, Nobody
 from bridges.transports.transport import Publisher
 from hal_fakes.plants.plant import Edge
-from tests.serve.virtual_graph import Disk
+from tests.runtime.virtual_graph import Disk
 from tests.site.building import Device
 from tests.site.network import Air, Place
 from tests.site.timeline import EPOCH, NEVER, Alarm, Timeline

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from bridges.host.places import GROUPS
-from bridges.serve.drop_in import text
+from bridges.runtime.drop_in import text
 from bridges.settings.load import load
 from workbench.commissioning.examples import device_yamls
 

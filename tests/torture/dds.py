@@ -11,7 +11,7 @@ from pathlib import Path
 from bridges.messages.definitions import DoorState, Time
 from bridges.messages.topics import DOOR_REQUESTS, DOOR_STATES
 from hal_fakes.domain import domain_for_a_while
-from tests.serve.site import ROOT, Daemon
+from tests.runtime.site import ROOT, Daemon
 from tests.torture.table import Table
 from tests.transports.joining import joining
 from tests.waiting import wait_until

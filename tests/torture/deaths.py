@@ -12,9 +12,9 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from bridges.messages.definitions import DoorModeValue
-from bridges.serve.signals import ENDING
+from bridges.runtime.signals import ENDING
 from hal_fakes.domain import domain_for_a_while
-from tests.serve.site import SERVICE, Daemon, Graph, Module, command, environment
+from tests.runtime.site import SERVICE, Daemon, Graph, Module, command, environment
 from tests.torture.table import Table
 from tests.waiting import wait_until
 

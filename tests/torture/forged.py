@@ -16,7 +16,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from hal_fakes.domain import domain_for_a_while
-from tests.serve.site import ROOT, YAML, Daemon
+from tests.runtime.site import ROOT, YAML, Daemon
 from tests.torture.table import Table
 
 SERVICE = {"RMF_BRIDGE_SERVICE": "1"}

@@ -9,9 +9,9 @@ import threading
 from pathlib import Path
 
 from bridges.host.places import Distrusted, Places
-from bridges.serve import holder
-from bridges.serve.directory import RuntimeDirectory
-from tests.serve.hostile import (
+from bridges.runtime import holder
+from bridges.runtime.directory import RuntimeDirectory
+from tests.runtime.hostile import (
     NOBODY,
     group_member,
     live_before_dead,

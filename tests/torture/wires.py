@@ -13,7 +13,7 @@ from typing import Any, Final
 from bridges.messages.definitions import DoorModeValue
 from hal_fakes.domain import domain_for_a_while
 from tests.drivers.charger.test_can_wake import CHARGE, START, STOP, Sleeper
-from tests.serve.site import SERVICE, YAML, Daemon, Graph, Module, command
+from tests.runtime.site import SERVICE, YAML, Daemon, Graph, Module, command
 from tests.torture.forged import TcpLiar
 from tests.torture.table import Table
 from tests.transports.test_zenoh_tokens import stranger

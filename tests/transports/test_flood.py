@@ -54,7 +54,7 @@ def test_each_line_of_a_library_is_logged_once_and_every_line_of_ours(tmp_path: 
         "import logging; from bridges.host import log; log.start()\n"
         "for n in range(3):\n"
         "    logging.getLogger('pymodbus').warning('bad frame %s', n, exc_info=ValueError())\n"
-        "    logging.getLogger('bridges.serve').warning('ours %s', n)\n"
+        "    logging.getLogger('bridges.runtime').warning('ours %s', n)\n"
     )
     env = {**os.environ, "JOURNAL_STREAM": "1"}
     said = subprocess.run([sys.executable, "-c", text], capture_output=True, text=True, env=env)

@@ -16,7 +16,7 @@ from bridges.commands.doctoring.users import User, user, users
 from bridges.commands.graph import CommandLine
 from bridges.host import places as kept
 from bridges.host.places import Places
-from bridges.serve import directory
+from bridges.runtime import directory
 from bridges.settings.load import Config
 from drivers.hal.gpio.header import canonical
 

@@ -17,7 +17,7 @@ from bridges.commands.live import Ear
 from bridges.kinds.shared.graph_kind import GraphKind
 from bridges.messages import words
 from bridges.messages.definitions import PACKAGES
-from bridges.serve.service import named_by
+from bridges.runtime.service import named_by
 from bridges.settings import names as named
 from bridges.settings.load import Config
 from bridges.transports.addresses import addresses

@@ -19,7 +19,7 @@ from typing import Final
 from bridges.commands.doctoring.finding import Finding, ok, warning, wrong
 from bridges.commands.walking.core import Step
 from bridges.host.places import Places
-from bridges.serve.record import Records
+from bridges.runtime.record import Records
 
 KILL_TEST: Final = "kill test"
 STARTS_S: Final = 15.0

@@ -9,12 +9,12 @@ from pathlib import Path
 from typing import Final
 
 from bridges.commands.doctoring.finding import Finding, note, ok, warning, wrong
-from bridges.commands.faults import remedies
 from bridges.commands.status import Daemon, daemons
 from bridges.host.places import Places
-from bridges.serve import holder
-from bridges.serve.record import Records
-from bridges.serve.subject import Status
+from bridges.runtime import holder
+from bridges.runtime.faults import remedies
+from bridges.runtime.record import Records
+from bridges.runtime.subject import Status
 
 DAEMON: Final = "daemon"
 NOT_ASKED: Final = "its buses are not asked, because a controller has one master"

@@ -13,7 +13,7 @@ from typing import Any, Final
 from bridges.commands.by_hand import guarded, not_off
 from bridges.commands.walking.core import Step
 from bridges.commands.walking.steps import steps
-from bridges.serve import directory, guard, signals
+from bridges.runtime import directory, guard, signals
 from bridges.settings.load import Config, SettingsError, load
 from drivers import Driver, DriverError
 from drivers.hal import Bus

@@ -21,16 +21,16 @@ from bridges.commands.doctoring.served import served
 from bridges.host.places import Places
 from bridges.messages.definitions import DoorMode, DoorModeValue, DoorState, Time
 from bridges.messages.topics import DOOR_REQUESTS, DOOR_STATES
-from bridges.serve import record
-from bridges.serve.holder import HOLDER
-from bridges.serve.record import Records
+from bridges.runtime import record
+from bridges.runtime.holder import HOLDER
+from bridges.runtime.record import Records
 from bridges.settings.load import load
 from hal_fakes.__main__ import served as served_by
 from hal_fakes.caller import Caller
 from hal_fakes.wire import join, wire
 from tests.commands import runtime
 from tests.commands.terminal import Terminal
-from tests.serve.site import Module, command, daemon, environment
+from tests.runtime.site import Module, command, daemon, environment
 from tests.waiting import PATIENCE_S, wait_until
 
 READS = {1, 2, 3, 4}

@@ -9,11 +9,11 @@ import pytest
 
 from bridges import cli
 from bridges.host.places import Places
-from bridges.serve.record import Records, of
+from bridges.runtime.record import Records, of
 from bridges.settings.load import load
 from tests.commands.terminal import Terminal
 from tests.processes import running
-from tests.serve.site import Module, daemon, environment
+from tests.runtime.site import Module, daemon, environment
 from tests.waiting import wait_until
 
 

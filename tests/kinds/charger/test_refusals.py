@@ -20,9 +20,9 @@ from bridges.messages.definitions import (
     KeyValue,
     Time,
 )
-from bridges.serve.clock import Clock
-from bridges.serve.device import Node
-from bridges.serve.diagnostics import diagnosis
+from bridges.runtime.clock import Clock
+from bridges.runtime.device import Node
+from bridges.runtime.diagnostics import diagnosis
 
 FIRST = ChargerRequest("a", "tiny", "AMR01", Duration(60), "req-1")
 SECOND = ChargerRequest("a", "tiny", "AMR02", Duration(60), "req-2")

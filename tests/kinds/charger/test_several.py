@@ -9,8 +9,8 @@ import pytest
 
 from bridges.messages.definitions import ChargerState, ChargerStateValue
 from bridges.messages.topics import CHARGER_STATES
-from bridges.serve.service import service
-from bridges.serve.serving import stop
+from bridges.runtime.service import service
+from bridges.runtime.serving import stop
 from bridges.settings.load import load
 from bridges.transports.memory import MemoryNetwork, MemoryTransport
 from tests.drivers.hal.http.far_end import Caller, Conversation, FarEnd, always, answer

@@ -9,8 +9,8 @@ from bridges.kinds.charger.refusals import Refusal, read
 from bridges.kinds.charger_coordinator import KIND
 from bridges.messages import topics
 from bridges.messages.definitions import ChargerRequest, Duration
-from bridges.serve.clock import Clock
-from bridges.serve.graph import GraphNode
+from bridges.runtime.clock import Clock
+from bridges.runtime.graph import GraphNode
 from bridges.settings.load import load
 from bridges.transports.memory import MemoryNetwork, MemoryTransport
 

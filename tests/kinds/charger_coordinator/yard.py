@@ -15,9 +15,9 @@ from bridges.kinds.shared.decision import IoFailed, RequestRefused, Sampled
 from bridges.messages import definitions as d
 from bridges.messages import topics, words
 from bridges.messages.stamps import duration
-from bridges.serve.graph import GraphNode
+from bridges.runtime.graph import GraphNode
 from hal_fakes.rmf.fleet import Finishing, Fleet
-from tests.serve.virtual_graph import EPOCH, Disk, Served, Ticking, World, in_order
+from tests.runtime.virtual_graph import EPOCH, Disk, Served, Ticking, World, in_order
 
 STEP_S = 0.25
 GRAPH = {

@@ -14,7 +14,7 @@ import pytest
 from bridges.messages import topics
 from tests.depth import depth
 from tests.kinds.door_supervisor.world import DoorDaemon, OurSupervisor, Walker, holds
-from tests.serve.virtual_graph import Disk, World, in_order
+from tests.runtime.virtual_graph import Disk, World, in_order
 
 ROBOTS = ("fleet/a", "fleet/b", "other/c")
 STORM_S = 120.0

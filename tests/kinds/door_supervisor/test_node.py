@@ -9,11 +9,11 @@ from bridges.kinds.door_supervisor.settings import Settings
 from bridges.messages import definitions as d
 from bridges.messages import topics
 from bridges.messages.stamps import stamp
-from bridges.serve import graph as graph_node
-from bridges.serve.clock import Clock
-from bridges.serve.graph import GraphNode
+from bridges.runtime import graph as graph_node
+from bridges.runtime.clock import Clock
+from bridges.runtime.graph import GraphNode
 from bridges.transports.memory import MemoryNetwork, MemoryTransport
-from tests.serve.virtual_graph import Disk
+from tests.runtime.virtual_graph import Disk
 
 OPEN, CLOSE = d.DoorModeValue.MODE_OPEN, d.DoorModeValue.MODE_CLOSED
 HEARTBEAT = topics.DOOR_SUPERVISOR_HEARTBEAT

@@ -12,7 +12,7 @@ from tests.kinds.door_supervisor.world import (
     Walker,
     to_door,
 )
-from tests.serve.virtual_graph import EPOCH, Disk, World, in_order
+from tests.runtime.virtual_graph import EPOCH, Disk, World, in_order
 
 A, B = "fleet/a", "fleet/b"
 

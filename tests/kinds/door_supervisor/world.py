@@ -16,7 +16,7 @@ from bridges.rmf_rules.phases import DoorClose, DoorOpen
 from bridges.rmf_rules.robot import Phase, Robot
 from bridges.rmf_rules.supervisors import DoorSupervisor
 from tests.kinds.door.virtual import SCAN_S, Door
-from tests.serve.virtual_graph import EPOCH, NEVER, Disk, Served, StandIn, World, say
+from tests.runtime.virtual_graph import EPOCH, NEVER, Disk, Served, StandIn, World, say
 
 WARD = "ward"
 

@@ -26,8 +26,8 @@ from bridges.messages.definitions import (
     Message,
 )
 from bridges.messages.topics import LIFT_REQUESTS, LIFT_STATES, Topic
-from bridges.serve.clock import Clock
-from bridges.serve.device import Node
+from bridges.runtime.clock import Clock
+from bridges.runtime.device import Node
 from drivers import DriverError
 
 SCAN_S = 0.05

@@ -18,7 +18,7 @@ from bridges.messages.definitions import LiftMode
 from tests.depth import depth, examples
 from tests.kinds.lift_supervisor.alone import words
 from tests.kinds.lift_supervisor.world import LiftNode, OurSupervisor, Rider, requests
-from tests.serve.virtual_graph import World
+from tests.runtime.virtual_graph import World
 from tests.walk import reached
 
 TRIPS = [("L1", "L3"), ("L3", "L1"), ("L2", "L1")]

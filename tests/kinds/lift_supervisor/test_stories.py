@@ -22,7 +22,7 @@ from tests.kinds.lift_supervisor.world import (
     requests,
     sessions,
 )
-from tests.serve.virtual_graph import EPOCH, World
+from tests.runtime.virtual_graph import EPOCH, World
 
 A, B, C = "fleet/a", "fleet/b", "fleet/c"
 UP, DOWN = ("L1", "L3"), ("L3", "L1")

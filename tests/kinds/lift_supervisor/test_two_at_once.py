@@ -7,8 +7,8 @@ from typing import Any
 from bridges.kinds.lift_supervisor import KIND
 from bridges.kinds.lift_supervisor.settings import Settings
 from bridges.messages.topics import Topic
-from bridges.serve.clock import Clock
-from bridges.serve.graph import GraphNode
+from bridges.runtime.clock import Clock
+from bridges.runtime.graph import GraphNode
 from bridges.transports.memory import MemoryNetwork, MemoryTransport
 from bridges.transports.transport import Subscription
 

@@ -15,11 +15,11 @@ from bridges.messages.topics import LIFT_REQUESTS, LIFT_STATES, Topic
 from bridges.rmf_rules.phases import EndLiftSession, RequestLift
 from bridges.rmf_rules.robot import Phase, Robot
 from bridges.rmf_rules.supervisors import LiftSupervisor
-from bridges.serve.clock import Clock
-from bridges.serve.device import Node
+from bridges.runtime.clock import Clock
+from bridges.runtime.device import Node
 from tests.kinds.lift.story import Controller
 from tests.kinds.lift_supervisor.alone import words
-from tests.serve.virtual_graph import EPOCH, NEVER, Served, StandIn, World, say
+from tests.runtime.virtual_graph import EPOCH, NEVER, Served, StandIn, World, say
 
 FLOORS = ["L1", "L2", "L3"]
 

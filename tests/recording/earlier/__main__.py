@@ -16,7 +16,7 @@ from bridges.recording.incident import Incident, Note, part
 from bridges.recording.mcap_write import write
 from bridges.recording.ring import Read
 from bridges.recording.trees import tree
-from bridges.serve import record
+from bridges.runtime import record
 from bridges.settings.load import load
 from drivers.profiles import texts
 from tests.recording.earlier import HERE

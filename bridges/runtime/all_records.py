@@ -1,0 +1,78 @@
+"""`outputs-off --all-records`: what the services' records name is off before a daemon starts.
+
+The power was cut while they served. One process loads the program, and forks for each service: a wire
+that hangs delays no other, and each record has its own profiles. This machine's pins come first: they
+need no module that answers. All of it is bounded in time, as every daemon waits for it: what is left,
+a daemon makes safe when it starts.
+"""
+
+import argparse
+import logging
+import os
+import re
+import signal
+import time
+from collections.abc import Collection
+from contextlib import suppress
+from pathlib import Path
+
+from bridges.host import log
+from bridges.host.log import pairs
+from bridges.host.places import SERVICE_STATE
+from bridges.runtime import dead
+from bridges.runtime.record import PATTERN, read
+from bridges.yaml.problems import SettingsError
+from drivers.profiles import texts
+
+OWN_S, OTHERS_S = 4.0, 2.0
+"""For this machine's own pins, and then for all else: as long as the start of a daemon may take."""
+LOOK_EVERY_S = 0.01
+OWN_PINS = re.compile(rb"\btype: *[\"']?gpio\b")
+"""In a YAML; it decides only who comes first."""
+
+
+def switch_off_all(
+    state: Path = SERVICE_STATE, own_s: float = OWN_S, others_s: float = OTHERS_S
+) -> int:
+    """0 when every output that a record names is verified off, 1 when not."""
+    log.start()
+    own, others = list[Path](), list[Path]()
+    for path in sorted(state.glob(f"*/{PATTERN}")):
+        if record := read(path):
+            file = Path(record.file)
+            with suppress(SettingsError):  # it is said where the record is used
+                record.config()  # what that imports, each child has
+            (own if OWN_PINS.search(record.yaml) else others).append(file)
+    texts.give({})
+    left = _off(own, own_s) | _off(set(others) - set(own), others_s)
+    for file in sorted(left):
+        logging.warning(pairs("left_to_its_daemon", file=file))
+    return 1 if left else 0
+
+
+def _off(files: Collection[Path], within_s: float) -> set[Path]:
+    """Switch these services' outputs off, side by side; returns those not verified off in time."""
+    give_up_at = time.monotonic() + within_s
+    running = {_forked(file): file for file in dict.fromkeys(files)}
+    left = set(running.values())
+    while running and time.monotonic() < give_up_at:
+        pid, ended = os.waitpid(-1, os.WNOHANG)
+        if pid == 0:
+            time.sleep(LOOK_EVERY_S)
+        elif (file := running.pop(pid)) and ended == 0:
+            left.discard(file)
+    for pid in running:
+        os.kill(pid, signal.SIGKILL)
+        os.waitpid(pid, 0)
+    return left
+
+
+def _forked(file: Path) -> int:
+    """Switch a service's outputs off in a child, whose exit code is 0 when they are; its process id."""
+    if pid := os.fork():
+        return pid
+    code = 1
+    try:
+        code = dead.switch_off(argparse.Namespace(file=file, runtime_dir=None, record=[]))
+    finally:
+        os._exit(code)

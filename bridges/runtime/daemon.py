@@ -1,0 +1,235 @@
+"""The daemon that serves one YAML. It opens the transport, starts the loops and feeds systemd's
+watchdog. On SIGTERM, or any other signal that would end it, it switches every output off and leaves
+RMF's graph.
+"""
+
+import logging
+import os
+import platform
+import secrets
+import time
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import Any
+
+import msgspec
+
+from bridges import VERSION
+from bridges.host.log import pairs
+from bridges.messages.definitions import DiagnosticArray
+from bridges.messages.stamps import stamp
+from bridges.messages.topics import DIAGNOSTICS
+from bridges.recording.entries import Head
+from bridges.recording.ring import Ring
+from bridges.runtime import guard, last_mark, record, signals
+from bridges.runtime.diagnostics import diagnosis
+from bridges.runtime.directory import KEPT, MemoryFile, Once, RuntimeDirectory, state_file
+from bridges.runtime.guard import Guard
+from bridges.runtime.notify import notify, watchdog_s
+from bridges.runtime.predecessor import Predecessor
+from bridges.runtime.record import Record
+from bridges.runtime.service import OpenBus, clock_of, named_by, service
+from bridges.runtime.serving import stop
+from bridges.runtime.witness import NOBODY, Nobody, Witness
+from bridges.settings.load import Config
+from bridges.transports.choose import open_transport
+from bridges.transports.transport import Publisher, TransportError
+
+log = logging.getLogger(__name__)
+
+STOP_WITHIN_S = 5.0
+STATUS_EVERY_S = 1.0
+ALIVE = "WATCHDOG=1"
+STARTING = "WATCHDOG=1\nEXTEND_TIMEOUT_USEC=30000000"
+"""A start with many silent units takes long, and is not a hang."""
+
+
+class Daemon:
+    """Everything that one `rmf-bridge run` holds. `simulated`: shown in status and diagnostics."""
+
+    def __init__(
+        self,
+        config: Config,
+        runtime: RuntimeDirectory,
+        end: signals.End,
+        *,
+        open_bus: OpenBus | None = None,
+        localhost: bool = False,
+        simulated: bool = False,
+        ros_args: Sequence[str] = (),
+        outputs_off: Sequence[str] = (),
+    ) -> None:
+        """`outputs_off`: the command that switches the outputs off after this process has died.
+
+        Raises TransportError or HalError if a transport or bus cannot be opened.
+        """
+        self._config = config
+        self._runtime = runtime
+        self._end = end
+        self._simulated = simulated
+        self._once = Once()
+        self._guard: Guard | None = None
+        self._predecessor: Predecessor | None = None
+        ours, unsafe = record.of(config), frozenset[str]()
+        if config.buses and not simulated:
+            self._predecessor = Predecessor(runtime.records, ours, outputs_off)
+            unsafe = self._predecessor.make_safe(end.wait)
+        node_name = f"rmf_bridge_{config.path.stem}"
+        self._transport = open_transport(
+            config.rmf, node_name, localhost=localhost, ros_args=ros_args
+        )
+        kept = None if simulated else MemoryFile(state_file(config.path), runtime.path / KEPT)
+        open_bus = open_bus or config.open_bus
+        self._witness = self._witness_of(ours)
+        self._service = service(config, self._transport, open_bus, kept, unsafe, self._witness)
+        self._loops = self._service.loops
+        # Every bus is open, and no output is claimed before `serve`: a bus that cannot be opened leaves
+        # no record. `outputs-off` reads the record.
+        if config.buses and not simulated:
+            self._convenience("mark", partial(last_mark.leave, name=last_mark.CLAIMED))
+            runtime.claim(ours)
+            self._guard = Guard(outputs_off) if guard.needed() else None
+        self._health_topic = named_by(config, DIAGNOSTICS)
+        self._told = 0
+        self._diagnostics: Publisher[DiagnosticArray] | None = None
+        if config.rmf.diagnostics:
+            self._diagnostics = self._transport.publisher(self._health_topic)
+
+    def _witness_of(self, record: Record) -> Nobody:
+        """Keeps what happens in a ring, unless the YAML says otherwise."""
+        keep = self._config.recording
+        if keep.keep == "nothing":
+            return NOBODY
+        head = Head(
+            run=secrets.token_hex(8),
+            pid=os.getpid(),
+            version=VERSION,
+            kind=self._config.kind,
+            file=record.file,
+            yaml=record.yaml,
+            texts=record.texts,
+            simulated=self._simulated,
+            versions={"python": platform.python_version(), "transport": self._transport.speaks},
+            recording=keep,
+        )
+        make = partial(Ring, self._runtime.path, head, int(keep.ring_mb * 1e6))
+        return Witness(make, clock_of(self._transport), lambda: self._transport.release)
+
+    def serve(self) -> int:
+        """Run until a signal, and return the exit code: 0 when every output is off and verified."""
+        signals.on_reset(self._service.reset)
+        self._service.subscribe()
+        log.info(pairs("serving", file=self._config.path, kind=self._config.kind, **self._about()))
+        try:
+            for loop in self._loops:
+                loop.start()
+            self._watch()
+        except Exception as error:
+            self._witness.died(f"{type(error).__name__}: {error}")
+            raise
+        finally:
+            safe = self._shut_down()
+        return 0 if safe else 1
+
+    def _watch(self) -> None:
+        """Tell systemd that we are ready, and each time that every loop has finished scans."""
+        period_s = min(STATUS_EVERY_S, (watchdog_s() or 10.0) / 6)
+        told_ready, tell_at = False, 0.0
+        fed = [-1] * len(self._loops)
+        while not self._end.wait(0.02 if not told_ready else period_s):
+            self._require_life()
+            if not told_ready and all(loop.ready for loop in self._loops):
+                self._convenience("sd_notify", partial(notify, "READY=1"))
+                log.info(pairs("ready", file=self._config.path))
+                told_ready = True
+            finished = [loop.finished for loop in self._loops]
+            if all(now > before for now, before in zip(finished, fed, strict=True)):
+                self._convenience("sd_notify", partial(notify, ALIVE if told_ready else STARTING))
+                fed = finished
+            if self._predecessor is not None:
+                self._predecessor.tick(time.monotonic())
+            if told_ready and time.monotonic() >= tell_at:
+                tell_at = time.monotonic() + STATUS_EVERY_S - period_s / 2
+                self._convenience("graph", self._service.look)
+                self._witness.look()
+                self._convenience("status", self._tell)
+
+    def _require_life(self) -> None:
+        """What has died cannot be restarted in here; systemd starts us again."""
+        if not self._transport.lives:
+            log.critical(pairs("died", transport=self._transport.name))
+            self._witness.died(f"transport {self._transport.name}")
+        elif all(loop.alive for loop in self._loops):
+            return
+        else:
+            self._witness.died("; ".join(loop.died for loop in self._loops if loop.died))
+        raise SystemExit(os.EX_SOFTWARE)
+
+    def _shut_down(self) -> bool:
+        self._convenience("sd_notify", partial(notify, "STOPPING=1"))
+        safe = stop(self._loops, STOP_WITHIN_S)
+        self._witness.ended(safe=safe)
+        self._convenience("transport", self._transport.close)
+        if self._predecessor is not None:
+            self._predecessor.close()
+        if safe:
+            self._runtime.released()
+            if not self._left():
+                self._convenience("mark", last_mark.leave)
+            if self._guard is not None:
+                self._guard.dismiss()
+        log.info(pairs("stopped", outputs_off=safe))
+        return safe
+
+    def _left(self) -> list[str]:
+        """Records of dead daemons whose outputs are not verified off."""
+        return self._predecessor.left() if self._predecessor else []
+
+    def _convenience(self, what: str, do: Callable[[], None]) -> None:
+        """A failure is logged once and tried again; the daemon runs on."""
+        try:
+            do()
+        except Exception as error:  # noqa: BLE001 - logged by Once
+            self._once.failed(what, error)
+        else:
+            self._once.works(what)
+
+    def _about(self) -> dict[str, Any]:
+        about = {"version": VERSION, "node": self._transport.name, "pid": os.getpid()}
+        return about | ({"SIMULATED": "no hardware moves"} if self._simulated else {})
+
+    def _apart(self) -> list[dict[str, str]]:
+        """The faults that keep this node and others from hearing each other."""
+        return [{"code": code, "detail": detail} for code, detail in self._transport.faults()]
+
+    def _tell(self) -> None:
+        """Write the status file and publish diagnostics."""
+        service = self._service.status()
+        daemon = {
+            "simulated": self._simulated,
+            "file": str(self._config.path.absolute()),
+            "kind": self._config.kind,
+            **self._about(),
+            "transport": self._transport.speaks,
+            "release": self._transport.release.name,
+            "domain_id": self._transport.domain_id,
+            "samples_dropped": dict(self._transport.dropped),
+            "predecessor_not_off": self._left(),
+            **service,
+            "faults": [*service.get("faults", []), *self._apart()],
+        }
+        devices = self._service.devices()
+        self._runtime.write_status(msgspec.json.encode({**daemon, "devices": devices}))
+        if self._diagnostics is None:
+            return
+        try:
+            at = stamp(self._transport.wall())
+            found = diagnosis(self._transport.name, self._config.kind, daemon, devices, at)
+            self._diagnostics.publish(found)
+            self._told += 1
+            if self._told % max(1, len(devices)) == 0:  # their size grows with the devices
+                self._witness.spoken(self._health_topic.name, found, sent=True)
+        except (
+            TransportError
+        ) as error:  # when states cannot be published, that is logged as an error
+            log.debug(pairs("not_published", topic=DIAGNOSTICS.name, reason=error))

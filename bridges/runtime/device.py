@@ -1,0 +1,242 @@
+"""One device in service: the scan of a driver around its subject.
+
+A scan is a PLC's: read the inputs, decide, write every output, publish if it is due. The loop that
+owns the device's bus calls it; nothing here waits or keeps a thread.
+"""
+
+import logging
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any, Generic
+
+from bridges.host.log import pairs, plain
+from bridges.kinds.shared.decision import (
+    Fault,
+    IoFailed,
+    M,
+    O,
+    OperatorReset,
+    R,
+    RequestRefused,
+    RivalSeen,
+    Sampled,
+    Suspended,
+    WriteFailed,
+    X,
+)
+from bridges.kinds.shared.durations import AGES_AGO
+from bridges.kinds.shared.kind import Answer, DeviceEvent, E, Kind, L, S
+from bridges.messages.definitions import Message
+from bridges.messages.stamps import ClockError
+from bridges.messages.topics import Topic
+from bridges.runtime import diagnostics
+from bridges.runtime.answers import Answers
+from bridges.runtime.clock import Clock, Pace
+from bridges.runtime.contained import Contained
+from bridges.runtime.refusals import Refusals
+from bridges.runtime.subject import Core, Publish, Status, Subject
+from bridges.runtime.witness import NOBODY, Nobody
+from drivers import Driver, DriverError
+
+NotSent = Callable[[Topic[Message], Exception], None]
+
+log = logging.getLogger(__name__)
+
+
+class Node(Generic[S, L, M, X, E, O, R]):
+    """Serves one device. `publish(topic, message)` sends to RMF and does not raise.
+    `not_sent(topic, error)`: is told why a state cannot be."""
+
+    def __init__(
+        self,
+        name: str,
+        kind: Kind[S, L, M, X, E, O, R],
+        settings: S,
+        limits: L,
+        driver: Driver[X, O],
+        publish: Publish,
+        clock: Clock,
+        witness: Nobody = NOBODY,
+        not_sent: NotSent = lambda topic, error: None,
+    ) -> None:
+        self.name = name
+        self.wake_at = AGES_AGO
+        self._kind = kind
+        self._settings = settings
+        self._driver = Contained(name, driver, clock)
+        self._publish = publish
+        self._not_sent = not_sent
+        self._clock = clock
+        self._refusals = Refusals()
+        memory = kind.initial(limits, clock.monotonic())
+        core: Core[M, DeviceEvent[X, E], O, R] = Core(
+            "device",
+            lambda memory, event, now: kind.decide(memory, event, now, limits),
+            lambda report, now: kind.summary(report),
+            self._identity,
+        )
+        self.subject = Subject(name, memory, core, publish, self._refusals, clock, witness)
+        self._pace = Pace()
+        self._answers = Answers()
+        self._open = False
+        self._has_read = False
+        self._contacts: Mapping[str, bool] = {}
+        self._io_fault = ""
+        self._bus_words: set[str] = set()
+        self._failing = False
+        self._logged_outputs: O | None = None
+
+    @property
+    def ready(self) -> bool:
+        """Whether each input was read or timed out once, and the first state is published."""
+        return self._pace.told_at > AGES_AGO
+
+    @property
+    def answers(self) -> bool:
+        """Could the last scan read and write all of it?"""
+        return self._has_read and not self._io_fault
+
+    def event(self, topic: Topic[Message], message: Message) -> E | RivalSeen | None:
+        """The core's event for a message; None if it is refused. Called from any thread."""
+        if topic == self._kind.states:
+            return RivalSeen()
+        try:
+            return self._kind.requests[topic](message, self._settings)
+        except RequestRefused as refusal:
+            self._refusals.add(refusal.kind, refusal.detail, device=self.name)
+            self._answers.add(message, str(refusal))
+            return None
+
+    def was_suspended(self, for_s: float) -> None:
+        """Nothing was scanned for this long (s): everything read before may be outdated."""
+        self._decide(Suspended(f"nothing was read for {for_s:.1f} s"))
+
+    def scan(self, events: Iterable[DeviceEvent[X, E]] = ()) -> None:
+        """Read, decide with each event, write, publish."""
+        self._failing = False
+        self._bus_words.clear()
+        self._decide(self._read())
+        for event in events:
+            if isinstance(event, OperatorReset):  # a device that has failed is claimed again
+                self._open = self._open and not self._io_fault
+            self._decide(event)
+        self._write()
+        self._contacts = {} if self._failing else self._driver.contacts()
+        self._tell()
+        self._answer()
+        self._log()
+
+    def make_safe(self) -> bool:
+        """Every output off; False, and a log line, when that could not be done or verified."""
+        try:
+            self._driver.make_safe()
+        except DriverError as error:
+            log.error(pairs("outputs_not_off", device=self.name, reason=error))
+            return False
+        return True
+
+    def close(self) -> None:
+        """Outputs off, and the points released."""
+        self._driver.close()
+
+    @property
+    def refused(self) -> dict[str, int]:
+        """The number of refused requests, by reason."""
+        return self._refusals.counts()
+
+    def status(self) -> Status:
+        """For the status file: what RMF is shown, outputs, faults, the inputs' age, contacts."""
+        decision = self.subject.decision
+        if decision is None:
+            return {}
+        outputs = plain(decision.outputs)
+        shown = {**self.subject.status(), "outputs": outputs, "refused": self.refused}
+        contacts = {diagnostics.CONTACTS: self._contacts} if self._contacts else {}
+        return {**shown, **contacts, **self._answers.status()}
+
+    def _read(self) -> Sampled[X] | IoFailed:
+        try:
+            if not self._open:
+                self._driver.open()
+                self._open = True
+            sample = self._driver.read()
+        except DriverError as error:
+            return IoFailed(self._failed(error))
+        self._has_read = True
+        return Sampled(sample)
+
+    def _write(self) -> None:
+        """Outputs are levels: the whole set each scan, and nothing before the first reading."""
+        if not self._has_read or self.subject.decision is None:
+            return
+        try:
+            self._driver.write(self.subject.decision.outputs)
+        except DriverError as error:
+            self._decide(WriteFailed(self._failed(error)))
+
+    def _decide(self, event: DeviceEvent[X, E]) -> None:
+        decision = self.subject.decide(event)
+        if decision.refused:
+            self._answers.add(event, decision.refused)
+        outputs = decision.outputs
+        self._logged_outputs = outputs if self._logged_outputs is None else self._logged_outputs
+
+    def _tell(self) -> None:
+        """Publish if it is due; a request alone is no reason."""
+        subject, now = self.subject, self._clock.monotonic()
+        assert subject.decision is not None
+        report = subject.decision.report
+        news = report.news()
+        if now >= self._pace.due_at(news):
+            if self._send(report):  # a door that nobody was shown OPEN has let nobody in
+                subject.published(self._kind.published(subject.memory, report))
+            self._pace.published(news, now)
+        self.wake_at = min(subject.wake_at, self._pace.due_at(news))
+
+    def _answer(self) -> None:
+        """Publish why requests were refused, and who has the device."""
+        self._answers.say(self._clock.monotonic(), self._answered, self._publish)
+        self.wake_at = min(self.wake_at, self._answers.due_at)
+
+    def _answered(self, request: object, reason: str) -> Answer | None:
+        decision = self.subject.decision
+        assert decision is not None
+        return self._kind.answer(self.name, request, reason, decision.report)
+
+    def _send(self, report: R) -> bool:
+        """Publish the state; False if it was not sent."""
+        try:
+            at = self._clock.stamp(report.read_at)
+        except ClockError as error:
+            self._not_sent(self._kind.states, error)
+            return False
+        state = self._kind.state_message(self.name, self._settings, report, at)
+        return self._publish(self._kind.states, state) is not False
+
+    def _log(self) -> None:
+        """Comes last: a log line takes as long as a scan."""
+        decision = self.subject.decision
+        assert decision is not None
+        if decision.outputs != self._logged_outputs:
+            log.info(pairs("outputs", device=self.name, outputs=decision.outputs))
+        self._logged_outputs = decision.outputs
+        self.subject.log(decision.report)
+        if self._io_fault and not self._failing:  # reading and writing
+            log.info(pairs("device_back", device=self.name))
+            self._io_fault = ""
+
+    def _failed(self, error: DriverError) -> str:
+        """Log once when a device is lost, not in each scan."""
+        if not self._io_fault:
+            log.error(pairs("device_lost", device=self.name, reason=error))
+        self._failing = True
+        self._io_fault = str(error) or type(error).__name__
+        self._bus_words.add(self._io_fault)
+        return self._io_fault
+
+    def _identity(self, fault: Fault) -> object:
+        """Code and detail; the code alone if the detail is a bus's error text, which varies."""
+        return fault.code if fault.detail in ("", *self._bus_words) else fault
+
+
+AnyNode = Node[Any, Any, Any, Any, Any, Any, Any]
+"""A node of a kind that was found by its name."""

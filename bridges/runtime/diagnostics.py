@@ -1,0 +1,89 @@
+"""A daemon's diagnostics for ROS's `/diagnostics`, made from its status file.
+
+There is one status for the daemon and one for each device (of a supervisor: for each lift or door).
+`name` is `<node>: <device>`, as ROS's aggregator expects; `hardware_id` is the device's name; `message`
+names the faults. The values are the status file's, with each fault's detail under its code.
+LiftState, DoorState and ChargerState have no fields for this.
+
+    OK      the input is read, and there is no fault
+    WARN    the daemon: it is a simulation, or only listens in its quiet start
+    ERROR   the device or the daemon has faults: it cannot publish, or another node does its work
+    STALE   its input has not been read yet
+"""
+
+from collections.abc import Iterator, Mapping
+from itertools import islice
+from typing import Final
+
+from bridges.host.log import plain
+from bridges.messages.definitions import (
+    DiagnosticArray,
+    DiagnosticLevel,
+    DiagnosticStatus,
+    Header,
+    KeyValue,
+    Time,
+)
+from bridges.runtime.subject import Status
+
+MOST: Final = 100
+"""At most this many devices: a supervisor learns names from the network, which may flood it."""
+SIMULATED: Final = "SIMULATED"
+PASSIVE: Final = "PASSIVE"
+CONTACTS: Final = "contacts"
+"""Only in the status file: on the graph they would be most of the traffic."""
+
+
+def diagnosis(
+    node: str, kind: str, daemon: Status, devices: Mapping[str, Status], at: Time
+) -> DiagnosticArray:
+    """The message. `daemon` and `devices` (by name): as in the status file. `at`: now."""
+    statuses = [_daemon(node, kind, daemon)]
+    statuses += [_device(node, kind, *named) for named in islice(devices.items(), MOST)]
+    return DiagnosticArray(Header(at), tuple(statuses))
+
+
+def faults(status: DiagnosticStatus) -> tuple[str, ...]:
+    """The codes of the faults in a device's status."""
+    shown = status.message if status.level == DiagnosticLevel.ERROR else ""
+    return tuple(code for code in shown.split(", ") if code)
+
+
+def _daemon(node: str, kind: str, status: Status) -> DiagnosticStatus:
+    odd = [
+        word for key, word in (("simulated", SIMULATED), ("passive", PASSIVE)) if status.get(key)
+    ]
+    level = DiagnosticLevel.WARN if odd else DiagnosticLevel.OK
+    if found := status.get("faults"):
+        level, odd = DiagnosticLevel.ERROR, [fault["code"] for fault in found]
+    values = _values({"kind": kind, **status})
+    return DiagnosticStatus(level, f"{node}: daemon", ", ".join(odd) or "OK", node, values)
+
+
+def _device(node: str, kind: str, name: str, status: Status) -> DiagnosticStatus:
+    found = status.get("faults", ())
+    level, message = DiagnosticLevel.OK, "OK"
+    if found:
+        level, message = DiagnosticLevel.ERROR, ", ".join(fault["code"] for fault in found)
+    elif status.get("input_age_s") is None:
+        level, message = DiagnosticLevel.STALE, "not read yet"
+    return DiagnosticStatus(
+        level, f"{node}: {name}", message, name, _values({"kind": kind, **status})
+    )
+
+
+def _values(status: Status) -> tuple[KeyValue, ...]:
+    return tuple(KeyValue(key, value) for key, value in _pairs(status))
+
+
+def _pairs(status: Status) -> Iterator[tuple[str, str]]:
+    """Flatten a status: a fault becomes code and detail, a table one value for each entry."""
+    for key, value in status.items():
+        if key == CONTACTS:
+            continue
+        if key == "faults":
+            yield from ((fault["code"], fault["detail"]) for fault in value)
+        elif isinstance(value, Mapping):
+            yield from ((f"{key} {part}", plain(count)) for part, count in value.items())
+        else:
+            yield key, plain(value)

@@ -1,0 +1,86 @@
+"""What each fault means and what to do: faults.yaml, for `status` and for docs/faults.md.
+
+`python -m bridges.runtime.faults > docs/faults.md` writes the page.
+"""
+
+import re
+import shlex
+from collections.abc import Mapping
+from functools import cache
+from pathlib import Path
+from typing import Final
+
+import msgspec
+import yaml
+
+QUOTED: Final = re.compile(r"`([^`]*)`")
+HEAD: Final = """\
+# Faults, by name
+
+What `rmf-bridge status`, `watch`, the log and ROS's `/diagnostics` call a fault, its likely cause
+and what to do. `rmf-bridge status` prints the same for the faults that are there now. Other symptoms:
+[troubleshooting.md](troubleshooting.md).
+
+| fault | likely cause | do |
+|---|---|---|
+"""
+
+
+class Remedy(msgspec.Struct, frozen=True):
+    """The likely cause of a fault, and what to do."""
+
+    cause: str
+    do: str
+
+
+def remedies() -> dict[str, Remedy]:
+    """Each fault's remedy, by its code."""
+    text = Path(__file__).with_suffix(".yaml").read_text(encoding="utf-8")
+    return msgspec.convert(yaml.safe_load(text), dict[str, Remedy])
+
+
+def values(file: str, device: str) -> dict[str, str]:
+    """What the YAML of a daemon sets for its device: key -> value; nothing if it cannot be read."""
+    from bridges.settings.load import SettingsError, load
+
+    try:
+        settings = load(Path(file)).devices.get(device)
+    except (SettingsError, OSError):
+        return {}
+    parts = [settings, getattr(settings, "limits", None)]
+    found = {k: v for part in parts if part for k, v in msgspec.structs.asdict(part).items()}
+    return {
+        key: f"{value:g} s" if key.endswith("_s") else f"{value}"
+        for key, value in found.items()
+        if isinstance(value, int | float | str)
+    }
+
+
+def here(remedy: Remedy, file: str, device: str, known: Mapping[str, str]) -> Remedy:
+    """The remedy for this device: its name, its file and its settings where only a word stood."""
+    names = {"FILE": shlex.quote(file)} if file else {}
+    names |= (
+        dict.fromkeys(("NAME", "LIFT", "DOOR", "CHARGER"), shlex.quote(device)) if device else {}
+    )
+
+    def named(quoted: re.Match[str]) -> str:
+        text = re.sub(r"\b[A-Z]+\b", lambda word: names.get(word[0], word[0]), quoted[1])
+        return f"`{text}` ({known[text]})" if text in known else f"`{text}`"
+
+    return Remedy(*(QUOTED.sub(named, text) for text in (remedy.cause, remedy.do)))
+
+
+@cache
+def for_explain() -> dict[str, tuple[str, str]]:
+    """Each fault's likely cause and what to do, by its code, as `bridges/explain/` takes them."""
+    return {code: (one.cause, one.do) for code, one in remedies().items()}
+
+
+def page() -> str:
+    """docs/faults.md."""
+    rows = (f"| `{code}` | {one.cause} | {one.do} |" for code, one in remedies().items())
+    return HEAD + "\n".join(rows) + "\n"
+
+
+if __name__ == "__main__":
+    print(page(), end="")

@@ -1,0 +1,112 @@
+"""The memory that a kind without hardware has on disk, and the message about all its subjects.
+
+It writes to disk before it publishes, because others act on what is published. If writing fails, the
+kind goes on serving with the fault NOT_KEPT, and tries to write again each second.
+"""
+
+import logging
+from collections.abc import Mapping
+from typing import Final, Generic, Protocol
+
+from bridges.host.log import pairs
+from bridges.kinds.shared.decision import Fault, M, R
+from bridges.kinds.shared.durations import AGES_AGO, NEVER
+from bridges.kinds.shared.graph_kind import GraphKind
+from bridges.kinds.shared.kind import E, L, S
+from bridges.runtime.clock import Pace
+from bridges.runtime.subject import Publish
+
+log = logging.getLogger(__name__)
+
+AGAIN_S: Final = 1.0
+NOT_KEPT: Final = "NOT_KEPT"
+
+
+class MemoryStore(Protocol):
+    """The file that outlives the daemon; None before the first `write`, which replaces it as a whole.
+    Both may raise OSError."""
+
+    def read(self) -> bytes | None: ...
+
+    def write(self, kept: bytes) -> None: ...
+
+
+class Keeper(Generic[S, L, M, E, R]):
+    """The keeper of one node. `kept`: None to store nothing. `tell_at`: when to publish next."""
+
+    def __init__(
+        self, kind: GraphKind[S, L, M, E, R], kept: MemoryStore | None, publish: Publish
+    ) -> None:
+        self.tell_at = NEVER
+        self._kind = kind
+        self._kept = kept
+        self._publish = publish
+        self._bytes: bytes | None = None
+        self._again_at = AGES_AGO
+        self._fault: Fault | None = None
+        self._pace = Pace()
+
+    def restore(self, settings: S, now: float) -> Mapping[str, M]:
+        """The memories on disk; an invalid file is logged and ignored."""
+        if self._kept is None or self._kind.restore is None:
+            return {}
+        try:
+            kept = self._kept.read()
+            found = {} if kept is None else self._kind.restore(kept, settings, now)
+        except (OSError, ValueError) as error:
+            log.error(pairs("not_restored", kind=self._kind.name, reason=error))
+            return {}
+        self._bytes = kept
+        return found
+
+    @property
+    def wake_at(self) -> float:
+        """When to publish next, or to try writing again."""
+        return min(self.tell_at, self._again_at if self._fault else NEVER)
+
+    @property
+    def faults(self) -> tuple[Fault, ...]:
+        """NOT_KEPT, while the last memories are not on disk."""
+        return (self._fault,) if self._fault else ()
+
+    def keep(self, memories: Mapping[str, M], now: float) -> None:
+        """Write what must survive a restart, if it has changed."""
+        if (
+            self._kept is None
+            or self._kind.persist is None
+            or (self._fault and now < self._again_at)
+        ):
+            return
+        kept = self._kind.persist(memories)
+        if kept == self._bytes:
+            self._keeps()
+            return
+        try:
+            self._kept.write(kept)
+        except OSError as error:
+            self._again_at = now + AGAIN_S
+            self._fails(Fault(NOT_KEPT, f"a restart would forget what was published last: {error}"))
+        else:
+            self._bytes = kept
+            self._keeps()
+
+    def _fails(self, fault: Fault) -> None:
+        if self._fault is None:
+            log.error(pairs("fault", kind=self._kind.name, code=fault.code, detail=fault.detail))
+        self._fault = fault
+
+    def _keeps(self) -> None:
+        if self._fault is not None:
+            log.info(pairs("fault_over", kind=self._kind.name, code=NOT_KEPT))
+        self._fault = None
+
+    def tell(self, memories: Mapping[str, M], now: float, may_speak: bool) -> None:
+        """Publish the message about all subjects, if it is due."""
+        if self._kind.together is None or not may_speak:
+            self.tell_at = NEVER
+            return
+        topic, message = self._kind.together(memories)
+        if now >= self._pace.due_at(message):
+            self._publish(topic, message)
+            self._pace.published(message, now)
+        self.tell_at = self._pace.due_at(message)

@@ -1,0 +1,136 @@
+"""The loop: one bus and the devices on it.
+
+RMF callbacks and GPIO edges only put something into the inbox. A round scans each device that is due,
+has something in the inbox, or may have changed: first those that answered the last time, then the
+others, the longest overdue first. A round ends after a device that did not answer, so that silent
+devices are read one at a time between live ones: a live device's reading is never older than its
+period plus one silent device's timeout, even in the first rounds. A device that falls silent also
+costs its retries, once. At the end, whatever its cause, every output is made safe, those that
+answer first.
+"""
+
+import logging
+from collections.abc import Collection, Sequence
+
+from bridges.host.log import pairs
+from bridges.kinds.shared.durations import AGES_AGO, NEVER
+from bridges.runtime.clock import Clock
+from bridges.runtime.device import AnyNode
+from bridges.runtime.inbox import Inbox
+from bridges.runtime.serving import LEAST_GAP_S
+from bridges.runtime.witness import NOBODY, Nobody
+from drivers.hal import Bus
+
+log = logging.getLogger(__name__)
+
+SUSPENDED_S = 0.5
+"""A loop that wakes this late (s), with no bus to wait for, was suspended."""
+
+
+class Loop:
+    """Scans the nodes of one bus, each every `scan_s` (s) and whenever it asks to be woken."""
+
+    def __init__(
+        self,
+        bus_name: str,
+        bus: Bus,
+        nodes: Sequence[AnyNode],
+        scan_s: float,
+        clock: Clock,
+        witness: Nobody = NOBODY,
+    ) -> None:
+        self.name = f"bus-{bus_name}"
+        self.nodes = nodes
+        self.inbox: Inbox[object] = Inbox()
+        self._bus_name = bus_name
+        self._bus = bus
+        self._scan_s = scan_s
+        self._clock = clock
+        self._witness = witness
+        self._due = dict.fromkeys((node.name for node in nodes), AGES_AGO)
+        self._edge = False
+        self._ran_at = NEVER
+        self._scans = 0
+        bus.on_edge(self._on_edge)
+
+    @property
+    def wake_at(self) -> float:
+        """When the next device is due."""
+        return min(self._due.values())
+
+    @property
+    def finished(self) -> int:
+        """How much it has done so far: calls of its bus, good or bad, and scans. A call that hangs
+        does not count."""
+        return self._scans + self._bus.calls
+
+    @property
+    def ready(self) -> bool:
+        """Whether every device has been tried once and has published its first state."""
+        return all(node.ready for node in self.nodes)
+
+    def round(self) -> None:
+        """Scan whatever is due."""
+        self._notice_suspension()
+        self._take_edge()
+        self._scan_in_turn(self.inbox.waiting())
+        self._witness.flush()
+        if self.inbox.closed:
+            return
+        self._bus.scanned()
+        self._ran_at = self._clock.monotonic()
+
+    def end(self) -> bool:
+        """Every output off, and the bus released."""
+        self._bus.insist()
+        safe = [node.make_safe() for node in self._in_turn()]
+        for node in self.nodes:
+            node.close()
+        self._bus.close()
+        log.info(pairs("outputs_off", bus=self._bus_name, verified=all(safe)))
+        return all(safe)
+
+    def _notice_suspension(self) -> None:
+        """Has the process been stopped, or the machine slept, while nothing was to be done?"""
+        late_s = self._clock.monotonic() - max(self.wake_at, self._ran_at)
+        if late_s > SUSPENDED_S:
+            log.warning(pairs("suspended", bus=self._bus_name, for_s=f"{late_s:.1f}"))
+            for node in self.nodes:
+                node.was_suspended(late_s)
+
+    def _scan_in_turn(self, asked: Collection[str]) -> None:
+        """Scan what is due or asked for, until a silent device has had its turn."""
+        for node in self._in_turn():
+            if self.inbox.closed:
+                return
+            if node.name in asked or self._is_due(node):
+                calls = self._bus.calls
+                self._scan(node)
+                if not node.answers and self._bus.calls > calls:
+                    return
+
+    def _in_turn(self) -> list[AnyNode]:
+        """Those that answer, as the YAML has them; then the others, the longest overdue first."""
+        others = [node for node in self.nodes if not node.answers]
+        others.sort(key=lambda node: self._due[node.name])
+        return [node for node in self.nodes if node.answers] + others
+
+    def _scan(self, node: AnyNode) -> None:
+        started = self._clock.monotonic()
+        node.scan(self.inbox.take_for(node.name))
+        self._scans += 1
+        next_at = min(node.wake_at, started + self._scan_s)
+        self._due[node.name] = max(next_at, started + LEAST_GAP_S)
+
+    def _is_due(self, node: AnyNode) -> bool:
+        return self._clock.monotonic() >= self._due[node.name]
+
+    def _on_edge(self) -> None:
+        self._edge = True
+        self.inbox.wake()
+
+    def _take_edge(self) -> None:
+        """After an edge every device is due. One that comes meanwhile wakes the next round."""
+        if self._edge:
+            self._edge = False
+            self._due = dict.fromkeys(self._due, AGES_AGO)

@@ -1,0 +1,90 @@
+"""A node's publishers, by topic."""
+
+import logging
+import threading
+from collections.abc import Callable, Iterable
+
+from bridges.kinds.shared.decision import Fault
+from bridges.messages.definitions import Message
+from bridges.messages.instead import INSTEAD, converted
+from bridges.messages.topics import Topic
+from bridges.runtime.directory import Once
+from bridges.runtime.witness import NOBODY, Nobody
+from bridges.transports.transport import Publisher, Transport, TransportError
+
+Named = Callable[[Topic[Message]], Topic[Message]]
+"""Renames a topic as the site's YAML says."""
+
+
+class Outlet:
+    """Publishers that are declared while their node may speak.
+
+    Where RMF's release lacks a topic's message, `bridges/messages/instead.py` says what is sent.
+    An alarm and its end take the same way, even if the release changes in between.
+    """
+
+    def __init__(self, transport: Transport, named: Named, witness: Nobody = NOBODY) -> None:
+        self._transport = transport
+        self._named = named
+        self._witness = witness
+        self._ends: dict[str, Publisher[Message]] = {}
+        self._instead: set[str] = set()
+        self._once = Once("not_published", "published_again", "topic", logging.ERROR)
+        self._lock = threading.Lock()
+
+    def open(self, topics: Iterable[Topic[Message]]) -> None:
+        """Declare those that are not declared yet and that RMF's release has. Raises TransportError."""
+        for topic in topics:
+            if self._transport.release.has(topic.type):
+                self._end(topic)
+
+    def publish(self, topic: Topic[Message], message: Message) -> bool:
+        """Publish; False when it was not sent: a fault until the next one gets through."""
+        way, wanted = self._way(topic, message)
+        if wanted is None:
+            return True
+        try:
+            self._end(way).publish(wanted)
+        except TransportError as error:
+            self.failed(topic, error)
+            return False
+        self._once.works(topic.name)
+        self._witness.spoken(self._named(way).name, wanted, sent=True)
+        return True
+
+    def failed(self, topic: Topic[Message], error: Exception) -> None:
+        """Note that a message was not published; the first one is logged."""
+        self._once.failed(topic.name, error)
+
+    @property
+    def faults(self) -> tuple[Fault, ...]:
+        """NOT_PUBLISHED, for each topic whose last message was not; from any thread."""
+        failing = sorted(self._once.wrong.copy().items())
+        return tuple(Fault("NOT_PUBLISHED", f"{topic}: {why}") for topic, why in failing)
+
+    def _way(
+        self, topic: Topic[Message], message: Message
+    ) -> tuple[Topic[Message], Message | None]:
+        """Where a message goes, and as what: None for one that only the log takes."""
+        if self._transport.release.has(topic.type) and topic.name not in self._instead:
+            return topic, message
+        if topic.name in INSTEAD:
+            self._instead.add(topic.name)
+        return INSTEAD.get(topic.name, topic), converted(message)
+
+    def _end(self, topic: Topic[Message]) -> Publisher[Message]:
+        with self._lock:
+            if topic.name not in self._ends:
+                self._ends[topic.name] = self._transport.publisher(self._named(topic))
+            return self._ends[topic.name]
+
+    def heard_by(self) -> dict[str, int]:
+        """The number of subscriptions that receive each topic, by the topic's name."""
+        return {name: end.matched() for name, end in self._ends.copy().items()}
+
+    def close(self, topics: Iterable[Topic[Message]] | None = None) -> None:
+        """Withdraw these publishers; every one if none is named."""
+        names = list(self._ends) if topics is None else [topic.name for topic in topics]
+        for end in [self._ends.pop(name, None) for name in names]:
+            if end is not None:
+                end.close()

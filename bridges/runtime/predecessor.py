@@ -1,0 +1,125 @@
+"""Switches off what a dead daemon has left on, before this daemon claims anything.
+
+A separate process does it, as after every death: if it hangs, this daemon does not, and it uses the
+profiles as the dead daemon had them. Devices that do not answer are reported and retried while we
+serve. Those of our own record are not: each is made safe as soon as it answers.
+"""
+
+import logging
+import math
+import subprocess
+import time
+from collections.abc import Callable, Collection, Sequence
+from typing import Any
+
+from bridges.host.log import pairs
+from bridges.runtime.record import Record, Records
+from drivers import Driver
+
+log = logging.getLogger(__name__)
+
+PATIENCE_S = 15.0
+"""Time for a process that gives up after 5 s, on a slow machine."""
+PAUSE_FIRST_S, PAUSE_MOST_S = 5.0, 60.0
+
+
+LOOK_EVERY_S = 0.02
+
+
+class Predecessor:
+    """`ours`: this daemon's own record. `command`: the `outputs-off` of its file."""
+
+    def __init__(self, records: Records, ours: Record, command: Sequence[str]) -> None:
+        self._records = records
+        self._ours = ours
+        self._command = command
+        self._child: subprocess.Popen[bytes] | None = None
+        self._pause_s = PAUSE_FIRST_S
+        self._next_at = math.inf
+
+    def make_safe(self, wait: Callable[[float], bool]) -> frozenset[str]:
+        """Switch off what was left on, before anything is claimed.
+
+        Ends when everything is off, time is up, or `wait(s)` returns True because we are to end.
+        Returns the devices of our own record that are not verified off.
+        """
+        found = self._records.unreleased()
+        if found:
+            log.warning(pairs("daemon_had_died", claimed=", ".join(r.name for r in found)))
+            self._start([record.name for record in found])
+            give_up_at = time.monotonic() + PATIENCE_S
+            while self._running() and time.monotonic() < give_up_at:
+                if wait(LOOK_EVERY_S):
+                    break
+            self._judge(time.monotonic(), self._own_unsafe())
+        return self._own_unsafe()
+
+    def left(self) -> list[str]:
+        """The names of other records whose outputs are not verified off."""
+        return [r.name for r in self._records.unreleased() if r.name != self._ours.name]
+
+    def tick(self, now: float) -> None:
+        """Call about once a second: retries what has not answered."""
+        if self._child is not None and not self._running():
+            self._judge(now)
+        elif self._child is None and now >= self._next_at:
+            self._start(self.left())
+
+    def close(self) -> None:
+        """Stop trying; the `outputs-off` that runs after us handles the rest."""
+        if self._child is not None:
+            self._child.kill()
+            self._child.wait()
+            self._child = None
+
+    def _own_unsafe(self) -> frozenset[str]:
+        own = [r for r in self._records.unreleased() if r.name == self._ours.name]
+        return frozenset(name for r in own for name in r.config().devices if name not in r.safe)
+
+    def _start(self, names: Sequence[str]) -> None:
+        options = [word for name in names for word in ("--record", name)]
+        try:
+            self._child = subprocess.Popen(
+                [*self._command, *options], stdin=subprocess.DEVNULL, start_new_session=True
+            )
+        except OSError as error:
+            log.warning(pairs("not_started", command="outputs-off", reason=error))
+
+    def _running(self) -> bool:
+        return self._child is not None and self._child.poll() is None
+
+    def _judge(self, now: float, unsafe: Collection[str] = ()) -> None:
+        """Note the result of a try. `unsafe`: the rest of our own record, which is not retried here."""
+        self.close()
+        if left := self.left():
+            if self._next_at == math.inf:
+                log.error(pairs("predecessor_not_off", claimed=", ".join(left)))
+            self._next_at = now + self._pause_s
+            self._pause_s = min(2 * self._pause_s, PAUSE_MOST_S)
+            return
+        self._next_at = math.inf
+        if not unsafe:
+            log.info(pairs("predecessor_outputs_off"))
+
+
+class SafeFirst:
+    """Wraps a driver whose device a dead daemon may have left on and that has not answered yet: makes
+    it safe as soon as it answers, before anything else.
+    """
+
+    def __init__(self, name: str, driver: Driver[Any, Any]) -> None:
+        self._name = name
+        self._driver = driver
+        self._safe = False
+        self.read = driver.read
+        self.write = driver.write
+        self.make_safe = driver.make_safe
+        self.close = driver.close
+
+    def open(self) -> None:
+        """Claim the device, and make it safe the first time."""
+        self._driver.open()
+        if not self._safe:
+            self._driver.make_safe()
+            self._safe = True
+            log.info(pairs("predecessor_outputs_off", device=self._name))

@@ -1,0 +1,60 @@
+"""Starts the daemon as a ROS node: `ros2 launch rmf_bridges <kind>.launch.py config:=FILE`.
+
+After any death of the daemon its guard runs `rmf-bridge outputs-off` (`bridges/runtime/guard.py`). Only
+the launch files in `ros/launch/`, one for each kind, import this module. `ros2` runs it with ROS's own
+Python, which has `launch` and yaml and none of the project's other packages.
+"""
+
+from pathlib import Path
+
+import yaml
+from launch import LaunchContext, LaunchDescription
+from launch.actions import DeclareLaunchArgument, OpaqueFunction
+from launch.substitutions import LaunchConfiguration
+from launch_ros.actions import Node
+
+__all__ = ["LaunchDescription", "daemon"]
+
+
+def daemon(kind: str) -> LaunchDescription:
+    """The launch description for one kind. A file of another kind starts nothing."""
+    return LaunchDescription(
+        [
+            DeclareLaunchArgument("config", description=f"the YAML of the {kind}"),
+            DeclareLaunchArgument(
+                "simulate",
+                default_value="false",
+                choices=["true", "false"],
+                description="fake hardware, and this machine's nodes only",
+            ),
+            OpaqueFunction(function=lambda context: _actions(kind, context)),
+        ]
+    )
+
+
+def _actions(kind: str, context: LaunchContext) -> list[Node]:
+    file = str(Path(LaunchConfiguration("config").perform(context)).absolute())
+    simulate = LaunchConfiguration("simulate").perform(context) == "true"
+    _check(kind, file)
+    return [_rmf_bridge("run", file, *(["--simulate"] if simulate else []))]
+
+
+def _check(kind: str, file: str) -> None:
+    """Raises RuntimeError for a file of another kind; the daemon finds every other error."""
+    try:
+        settings = yaml.safe_load(Path(file).read_bytes())
+    except (OSError, yaml.YAMLError) as error:
+        raise RuntimeError(f"{file}: {error}") from None
+    found = settings.get("kind") if isinstance(settings, dict) else None
+    if found != kind:
+        raise RuntimeError(
+            f"{file} is for a {found}: ros2 launch rmf_bridges {found}.launch.py"
+            if found
+            else f"{file} does not say for which kind it is"
+        )
+
+
+def _rmf_bridge(*arguments: str) -> Node:
+    return Node(
+        package="rmf_bridges", executable="rmf-bridge", arguments=arguments, output="screen"
+    )

@@ -1,0 +1,221 @@
+"""What one daemon serves: devices on buses, or a kind without hardware.
+
+Either has threads, subscribes to RMF's topics for them, and reports their status.
+"""
+
+import logging
+from collections import Counter
+from collections.abc import Callable, Collection, Mapping, Sequence
+from functools import partial
+from typing import Protocol
+
+from bridges.host.log import pairs
+from bridges.kinds.shared.decision import Attended, OperatorReset
+from bridges.kinds.shared.graph_kind import GraphKind
+from bridges.kinds.shared.kind import AnyDeviceKind
+from bridges.kinds.shared.names import LONGEST_NAME
+from bridges.messages.definitions import Message
+from bridges.messages.topics import M_co, Topic
+from bridges.runtime.clock import Clock, machine_s
+from bridges.runtime.device import AnyNode, Node
+from bridges.runtime.graph import AnyGraphNode, GraphNode
+from bridges.runtime.keeper import MemoryStore
+from bridges.runtime.loop import Loop
+from bridges.runtime.outlet import Named, Outlet
+from bridges.runtime.predecessor import SafeFirst
+from bridges.runtime.serving import Serving
+from bridges.runtime.subject import Status
+from bridges.runtime.witness import NOBODY, Nobody
+from bridges.settings.load import Config
+from bridges.settings.names import kind_called
+from bridges.transports.transport import Subscription, Transport
+from drivers.hal import Bus
+
+log = logging.getLogger(__name__)
+
+OpenBus = Callable[[str], Bus]
+
+
+class Service(Protocol):
+    """Everything that a YAML asks a daemon to do."""
+
+    @property
+    def loops(self) -> Sequence[Serving]:
+        """Its threads."""
+
+    def subscribe(self) -> None:
+        """Subscribe to RMF's topics."""
+
+    def reset(self) -> None:
+        """An operator says that latched faults may clear."""
+
+    def look(self) -> None:
+        """Look who is on the graph; called each second."""
+
+    def status(self) -> Status:
+        """For the status file: the service as a whole."""
+
+    def devices(self) -> Mapping[str, Status]:
+        """For the status file: each device, lift or door by name."""
+
+
+def named_by(config: Config, topic: Topic[M_co]) -> Topic[M_co]:
+    """The topic, renamed if the YAML says so."""
+    return topic.named(config.rmf.topics.get(topic.name, topic.name))
+
+
+def clock_of(transport: Transport) -> Clock:
+    """Durations by the machine's clock, stamps by RMF's."""
+    return Clock(machine_s, transport.wall)
+
+
+def service(
+    config: Config,
+    transport: Transport,
+    open_bus: OpenBus,
+    kept: MemoryStore | None = None,
+    unsafe: Collection[str] = (),
+    witness: Nobody = NOBODY,
+) -> Service:
+    """The service for this YAML. Raises HalError when a bus cannot be opened.
+
+    `kept`: where a kind without hardware keeps its memory across restarts; None to keep nothing.
+    `unsafe`: devices that a dead daemon may have left on. `witness`: is told what happens.
+    """
+    kind = kind_called(config.kind)
+    named = partial(named_by, config)
+    clock = clock_of(transport)
+    if isinstance(kind, GraphKind):
+        node = GraphNode(kind, config.section, transport, clock, named, kept, witness)
+        return GraphService(node, clock)
+    return Devices(config, kind, transport, open_bus, named, clock, unsafe, witness)
+
+
+class GraphService:
+    """A supervisor or coordinator: one thread, no bus."""
+
+    def __init__(self, node: AnyGraphNode, clock: Clock) -> None:
+        self.loops = [Serving(node, clock)]
+        self.subscribe = node.subscribe
+        self.reset = node.reset
+        self.status = node.status
+        self.devices = node.devices
+
+    def look(self) -> None:
+        """Its node looks by itself."""
+
+
+class Devices:
+    """Lifts, doors or chargers: a loop with a thread for each bus, and a node for each device."""
+
+    def __init__(
+        self,
+        config: Config,
+        kind: AnyDeviceKind,
+        transport: Transport,
+        open_bus: OpenBus,
+        named: Named,
+        clock: Clock,
+        unsafe: Collection[str] = (),
+        witness: Nobody = NOBODY,
+    ) -> None:
+        self._config = config
+        self._witness = witness
+        self._unsafe = unsafe
+        self._kind = kind
+        self._transport = transport
+        self._clock = clock
+        self._named = named
+        self._strangers: Counter[str] = Counter()
+        self._outlet = Outlet(transport, named, witness)
+        self._outlet.open(self._topics())
+        self._hears: dict[str, Subscription] = {}
+        self._attended: bool | None = None
+        self._loops = [self._loop(name, open_bus) for name in config.buses]
+        self.loops = [Serving(loop, clock) for loop in self._loops]
+        self._placed = {node.name: (node, loop) for loop in self._loops for node in loop.nodes}
+
+    def subscribe(self) -> None:
+        """Subscribe to requests, and to states of our devices that other nodes publish."""
+        for topic in self._kind.requests:
+            hear = self._to_inbox(topic)
+            self._hears[topic.name] = self._transport.subscribe(self._named(topic), hear)
+        states = self._kind.states
+        self._transport.subscribe(self._named(states), self._to_inbox(states), others_only=True)
+
+    def reset(self) -> None:
+        """Put the reset into the inbox of each device."""
+        for device, (_, loop) in self._placed.items():
+            loop.inbox.put(device, OperatorReset())
+
+    def look(self) -> None:
+        """Tell each device when the nodes that may send it requests have come or gone."""
+        topic = self._kind.attended_by
+        if topic is None:
+            return
+        attended = self._hears[topic.name].matched() > 0
+        if attended == self._attended:
+            return
+        self._attended = attended
+        for device, (_, loop) in self._placed.items():
+            loop.inbox.put(device, Attended(attended))
+
+    def status(self) -> Status:
+        """For the status file."""
+        return {
+            "requests_for_others": self._strangers["requests"],
+            "events_dropped": sum(loop.inbox.dropped for loop in self._loops),
+            "faults": [{"code": f.code, "detail": f.detail} for f in self._outlet.faults],
+            "heard_by": self._outlet.heard_by(),
+            "hears": {name: end.matched() for name, end in self._hears.items()},
+        }
+
+    def devices(self) -> Mapping[str, Status]:
+        """For the status file."""
+        return {name: node.status() for name, (node, _) in self._placed.items()}
+
+    def _topics(self) -> list[Topic[Message]]:
+        others = {t for d in self._config.devices.values() for t in self._kind.publishes(d)}
+        return [self._kind.states, *others]
+
+    def _loop(self, bus_name: str, open_bus: OpenBus) -> Loop:
+        settings = self._config.buses[bus_name]
+        bus = open_bus(bus_name)
+        nodes = [self._node(name, bus) for name in self._config.devices_on(bus_name)]
+        return Loop(bus_name, bus, nodes, settings.scan_s, self._clock, self._witness)
+
+    def _node(self, name: str, bus: Bus) -> AnyNode:
+        device = self._config.devices[name]
+        driver_type = self._config.driver_type(name)
+        limits = self._kind.limits(device, driver_type.debounce(device))
+        driver = driver_type.create(name, device, bus)
+        if name in self._unsafe:
+            driver = SafeFirst(name, driver)
+        out, clock, witness = self._outlet, self._clock, self._witness
+        return Node(
+            name, self._kind, device, limits, driver, out.publish, clock, witness, out.failed
+        )
+
+    def _to_inbox(self, topic: Topic[Message]) -> Callable[[Message], None]:
+        """A callback for the transport's thread. States of others' devices are not counted."""
+        states = topic == self._kind.states
+        heard_on = self._named(topic).name
+
+        def put(message: Message) -> None:
+            device = self._kind.device_name(message)
+            if device in self._placed:
+                self._witness.spoken(heard_on, message, sent=False)
+                node, loop = self._placed[device]
+                event = node.event(topic, message)
+                if event is not None:
+                    sender = "" if states else self._kind.sender(message)
+                    loop.inbox.put(device, event, (topic.name, sender))
+            elif not states:
+                self._count_stranger(device)
+
+        return put
+
+    def _count_stranger(self, device: str) -> None:
+        if not self._strangers:
+            log.info(pairs("not_ours", kind=self._kind.name, name=device[:LONGEST_NAME]))
+        self._strangers["requests"] += 1

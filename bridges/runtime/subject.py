@@ -1,0 +1,124 @@
+"""One lift, door or charger (or a coordinator's site): holds its core's memory and acts on each
+decision: publishes messages, counts refusals, and logs states and faults when they change."""
+
+import logging
+from collections.abc import Callable, Mapping
+from typing import Any, Generic, TypeVar
+
+from msgspec import Struct
+
+from bridges.host.log import pairs, plain
+from bridges.kinds.shared.decision import Decision, Fault, M, O, R
+from bridges.kinds.shared.durations import NEVER
+from bridges.messages.definitions import Message
+from bridges.messages.topics import Topic
+from bridges.runtime.clock import Clock
+from bridges.runtime.refusals import Refusals
+from bridges.runtime.witness import NOBODY, Nobody
+
+log = logging.getLogger(__name__)
+
+Status = Mapping[str, Any]
+"""A part of the status file, as JSON values."""
+
+Publish = Callable[[Topic[Message], Message], bool | None]
+"""Sends to RMF, and does not raise. False: nobody can have heard it."""
+
+V = TypeVar("V")
+"""The events of a core."""
+
+
+class Core(Struct, Generic[M, V, O, R], frozen=True):
+    """A kind's core with its limits, as subjects need it.
+
+    `word`: the key of a subject's name in the log. `decide(memory, event, now)`.
+    `summary(report, now)`: key -> value for the log and the status file. `identity(fault)`: two faults
+    with equal identity are the same one, logged once.
+    """
+
+    word: str
+    decide: Callable[[M, V, float], Decision[M, O, R]]
+    summary: Callable[[R, float], Mapping[str, str]]
+    identity: Callable[[Fault], object]
+
+
+class Subject(Generic[M, V, O, R]):
+    """One subject of a core."""
+
+    def __init__(
+        self,
+        name: str,
+        memory: M,
+        core: Core[M, V, O, R],
+        publish: Publish,
+        refusals: Refusals,
+        clock: Clock,
+        witness: Nobody = NOBODY,
+    ) -> None:
+        self.name = name
+        self.memory = memory
+        self.wake_at = NEVER
+        self.decision: Decision[M, O, R] | None = None
+        self._core = core
+        self._whose = {core.word: name}
+        self._publish = publish
+        self._refusals = refusals
+        self._clock = clock
+        self._witness = witness
+        self._logged_news: object = None
+        self._logged: Mapping[str, str] = {}
+        self._faults: Mapping[object, Fault] = {}
+
+    def decide(self, event: V) -> Decision[M, O, R]:
+        """One step of the core."""
+        before, now = self.memory, self._clock.monotonic()
+        decision = self._core.decide(before, event, now)
+        self._witness.decided(self.name, before, event, now, decision)
+        self.memory, self.wake_at, self.decision = decision.memory, decision.wake_at, decision
+        for topic, message in decision.publish:
+            self._publish(topic, message)
+        if decision.refused:
+            kind, _, detail = decision.refused.partition(": ")
+            asked = plain(event)
+            self._refusals.add(kind, f"{detail}; {asked}" if detail else asked, **self._whose)
+        return decision
+
+    def published(self, memory: M) -> None:
+        """Note that its report was published. `memory`: as the core has it after that."""
+        if memory is not self.memory:
+            self.memory = memory
+            self._witness.published(self.name, memory, self._clock.monotonic())
+
+    def log(self, report: R) -> None:
+        """Log what has changed since the last report."""
+        news = report.news()
+        if news != self._logged_news:
+            self._logged_news = news
+            self._log_state(self._core.summary(report, self._clock.monotonic()))
+        if report.faults or self._faults:
+            self._log_faults({self._core.identity(fault): fault for fault in report.faults})
+
+    def status(self) -> Status:
+        """For the status file; from any thread."""
+        decision = self.decision
+        if decision is None:
+            return {}
+        report, now = decision.report, self._clock.monotonic()
+        read_at = report.read_at
+        return {
+            **self._core.summary(report, now),
+            "faults": [{"code": f.code, "detail": f.detail} for f in report.faults],
+            "input_age_s": None if read_at is None else round(now - read_at, 3),
+        }
+
+    def _log_state(self, summary: Mapping[str, str]) -> None:
+        if summary != self._logged:
+            log.info(pairs("state", **self._whose, **summary))
+        self._logged = summary
+
+    def _log_faults(self, faults: Mapping[object, Fault]) -> None:
+        before, self._faults = self._faults, faults
+        for fault in (faults[key] for key in faults if key not in before):
+            log.warning(pairs("fault", **self._whose, code=fault.code, detail=fault.detail))
+        for fault in (before[key] for key in before if key not in faults):
+            log.info(pairs("fault_over", **self._whose, code=fault.code, detail=fault.detail))

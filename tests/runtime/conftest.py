@@ -1,0 +1,37 @@
+"""A module on the wall, with a door's YAML for it; and RMF's end of the graph."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from bridges.host import places
+from tests.runtime.site import Graph, Module
+
+
+@pytest.fixture
+def module(domain: int, tmp_path: Path) -> Iterator[Module]:
+    standing = Module(tmp_path, domain)
+    yield standing
+    standing.close()
+
+
+@pytest.fixture
+def graph(module: Module) -> Iterator[Graph]:
+    joined = Graph(module.domain)
+    yield joined
+    joined.transport.close()
+
+
+@pytest.fixture
+def machine(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A machine with services and users, none of whom is told by systemd where things are."""
+    for name in ("RUNTIME_DIRECTORY", "STATE_DIRECTORY"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr(places, "SERVICE_RUN", tmp_path / "run")
+    monkeypatch.setattr(places, "SERVICE_STATE", tmp_path / "var")
+    monkeypatch.setattr(places, "USERS_RUN", tmp_path / "user")
+    monkeypatch.setattr(places, "TMP", tmp_path / "tmp")
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path / "user" / "7"))
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "home"))
+    return tmp_path

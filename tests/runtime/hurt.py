@@ -1,0 +1,73 @@
+"""`rmf-bridge`, with a part inside that fails as soon as a file exists.
+
+`python -m tests.runtime.hurt PART FILE run …`: `reader` is the transport's, which raises again and
+again; `bus` is Modbus, whose next reading never ends; `loop` is the thread of the bus `dead`, and
+`watch` the daemon's own, which raise.
+"""
+
+import sys
+import threading
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+from bridges import cli
+from bridges.runtime.loop import Loop
+from drivers.hal.modbus import ModbusBus
+from hal_fakes.wire import wire
+
+
+def _reader() -> type:
+    if wire() == "dds":
+        from bridges.transports.dds.transport import DdsTransport
+
+        return DdsTransport
+    from bridges.transports.zenoh.transport import ZenohTransport
+
+    return ZenohTransport
+
+
+def _daemon() -> type:
+    from bridges.runtime.daemon import Daemon
+
+    return Daemon
+
+
+def _raises(*_: Any) -> None:
+    raise MemoryError("none left")
+
+
+def _raises_for_the_dead(loop: Loop) -> None:
+    if loop.name == "bus-dead":
+        _raises()
+
+
+def _hangs(*_: Any) -> None:
+    threading.Event().wait()
+
+
+HURTS: dict[str, tuple[Callable[[], type], str, Callable[..., None]]] = {
+    "reader": (_reader, "_follow_network", _raises),
+    "bus": (lambda: ModbusBus, "read", _hangs),
+    "loop": (lambda: Loop, "round", _raises_for_the_dead),
+    "watch": (_daemon, "_require_life", _raises),
+}
+
+
+def main(argv: Sequence[str]) -> int:
+    """Serve until the file exists."""
+    what, file, *command = argv
+    owner, name, fail = HURTS[what]
+    whole = getattr(owner(), name)
+
+    def hurt(*arguments: Any) -> object:
+        if Path(file).exists():
+            fail(*arguments)
+        return whole(*arguments)
+
+    setattr(owner(), name, hurt)
+    return cli.main(command)
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,71 @@
+"""Switching off from a fresh process: silent devices keep no other's relay on."""
+
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from bridges.host.places import Places
+from bridges.runtime.last_shown import ages
+from bridges.runtime.switch_off import outputs_off
+from bridges.settings.load import load
+from tests.drivers.hal.modbus.module import Module, door
+from tests.runtime.test_silent_units import BUSES, DOOR, YAML
+
+SILENT = 30
+
+
+@pytest.fixture
+def module() -> Iterator[Module]:
+    """The last of many units answers, and its relay is on.
+
+    Who still asks silent ones when the time is up ends once the module is closed, and is waited for.
+    """
+    before = set(threading.enumerate())
+    standing = Module()
+    standing.units.clear()
+    door(standing, SILENT + 1)
+    standing.coils[SILENT + 1, 0] = True
+    yield standing
+    standing.close()
+    for thread in set(threading.enumerate()) - before:
+        thread.join()
+
+
+def yaml(module: Module, folder: Path, *units: int) -> Path:
+    file = folder / "corridor.yaml"
+    place = BUSES[Module].format(port=module.port)
+    file.write_text(YAML.format(place=place) + "".join(DOOR.format(unit=u) for u in units))
+    return file
+
+
+def test_the_device_that_answered_last_is_switched_off_before_silent_ones_use_up_the_time(
+    module: Module, tmp_path: Path
+) -> None:
+    config = load(yaml(module, tmp_path, *range(1, SILENT + 2)))
+    live = f"door{SILENT + 1}"
+    assert outputs_off(config, 1.0, ages={"door1": 9.0, live: 0.1}) == {live}
+    assert module.coils[SILENT + 1, 0] is False
+    assert module.units_asked()[0] == SILENT + 1
+
+
+def test_a_frame_that_is_lost_leaves_no_relay_on(module: Module, tmp_path: Path) -> None:
+    def lost(request: bytes) -> bytes:
+        return b"" if len(module.asked) == 1 else module.answer(request)
+
+    module.reply = lost
+    config = load(yaml(module, tmp_path, SILENT + 1))
+    assert outputs_off(config, 30.0) == set(config.devices)
+    assert module.coils[SILENT + 1, 0] is False
+
+
+def test_the_dead_daemons_status_says_which_devices_answered_last(tmp_path: Path) -> None:
+    there = Places(tmp_path, tmp_path)
+    assert ages(there) == {}
+    status = tmp_path / "status.json"
+    status.write_text('{"devices":{"a":{"input_age_s":0.1},"b":{"input_age_s":null},"c":{}}}')
+    assert ages(there) == {"a": 0.1}
+    for odd in ("", "[]", '{"devices":[]}', '{"devices":{"a":{"input_age_s":"x"}}}', "[" * 9999):
+        status.write_text(odd)
+        assert ages(there) == {}

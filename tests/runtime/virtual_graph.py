@@ -1,0 +1,351 @@
+"""RMF's graph in virtual time: parties, the network between them, and kinds as the daemon serves them.
+
+Every message takes its way over a network that may lose, delay, repeat and reorder it. A kind
+without hardware runs on the product's own runtime (`GraphNode`), whose rounds are called when they
+are due. Nothing has a thread.
+"""
+
+import heapq
+from collections import defaultdict, deque
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+from bridges.kinds.shared.graph_kind import GraphKind
+from bridges.messages.definitions import Message
+from bridges.messages.releases import NEWEST
+from bridges.messages.topics import Topic
+from bridges.rmf_rules import Party as RmfParty
+from bridges.rmf_rules import Said
+from bridges.runtime.clock import Clock
+from bridges.runtime.graph import GraphNode
+from bridges.transports.transport import Publisher, Subscription
+
+EPOCH = 2.0**30
+"""Wall time when the world's clock shows 0; a power of two, so that sums of times stay exact."""
+NEVER = float("inf")
+
+Route = Callable[[str, str], Sequence[float]]
+"""How long a message takes from one party to another (s), for each copy that arrives."""
+
+
+class Party(Protocol):
+    """Somebody who takes part: a node, a robot, a fleet adapter."""
+
+    name: str
+
+    def hear(self, topic: Topic[Any], message: Any) -> None:
+        """A message has arrived."""
+
+    def wake_at(self) -> float:
+        """When to call `wake`."""
+
+    def wake(self) -> None:
+        """The time has come."""
+
+
+def at_once(sender: str, receiver: str) -> Sequence[float]:
+    """A network without loss or delay worth mentioning, in order."""
+    return (0.01,)
+
+
+def in_order(sender: str, receiver: str) -> Sequence[float]:
+    """A network that takes no time."""
+    return (0.0,)
+
+
+class World:
+    """`sent`: (s, who, topic, message) of everything said; `watch` is told of each before it goes out.
+
+    `publishers`: topic -> who has declared that they publish it. `hears_others`: topic, and who does
+    not hear itself on it.
+    """
+
+    def __init__(self, route: Route = at_once) -> None:
+        self.now = 0.0
+        self.route = route
+        self.parties: dict[str, Party] = {}
+        self.hearers: dict[str, set[str]] = defaultdict(set)
+        self.publishers: dict[str, set[str]] = defaultdict(set)
+        self.hears_others: set[tuple[str, str]] = set()
+        self.retained: dict[str, deque[Said]] = {}
+        self.sent: list[tuple[float, str, Topic[Any], Any]] = []
+        self.watch: Callable[[str, Topic[Any], Any], None] = lambda sender, topic, message: None
+        self._post: list[tuple[float, int, str, Topic[Any], Message]] = []
+        self._numbers = 0
+
+    def add(self, party: Party, *topics: Topic[Any]) -> None:
+        """Let it take part, in the place of one of the same name; it hears these topics."""
+        self.parties[party.name] = party
+        for topic in topics:
+            self.hearers[topic.name].add(party.name)
+
+    def remove(self, name: str) -> None:
+        """Somebody is gone, with its publishers."""
+        del self.parties[name]
+        for names in (*self.hearers.values(), *self.publishers.values()):
+            names.discard(name)
+
+    def send(self, sender: str, topic: Topic[Any], message: Message) -> None:
+        """Publish."""
+        self.watch(sender, topic, message)
+        self.sent.append((round(self.now, 3), sender, topic, message))
+        if topic.subscribe.durability == "transient_local":
+            retained = self.retained.setdefault(sender, deque(maxlen=topic.publish.depth))
+            retained.append((topic, message))
+        for receiver in sorted(self.hearers[topic.name]):
+            if receiver == sender and (topic.name, sender) in self.hears_others:
+                continue
+            for delay in self.route(sender, receiver):
+                self._arrives_after(delay, receiver, topic, message)
+
+    def replay(self, receiver: str) -> None:
+        """What every sender has retained, as it comes to one who subscribes now."""
+        for sender in sorted(self.retained):
+            for topic, message in self.retained[sender]:
+                if receiver in self.hearers[topic.name]:
+                    self._arrives_after(0.05, receiver, topic, message)
+
+    def run(self, until: float, done: Callable[[], bool] = lambda: False) -> None:
+        """Let everything happen until this time, or until it is done."""
+        wakes = {name: party.wake_at() for name, party in self.parties.items()}
+        while not done():
+            at = min(wakes.values(), default=NEVER)
+            if self._post and self._post[0][0] <= at:
+                at, _, receiver, topic, message = self._post[0]
+                if at > until:
+                    break
+                heapq.heappop(self._post)
+                self.now = max(self.now, at)
+                if receiver in self.parties:
+                    self.parties[receiver].hear(topic, message)
+                    wakes[receiver] = self.parties[receiver].wake_at()
+                continue
+            if at > until:
+                break
+            self.now = max(self.now, at)
+            next(party for name, party in self.parties.items() if wakes[name] == at).wake()
+            # Who wakes may be the hand that restarts, adds or removes others.
+            wakes = {name: party.wake_at() for name, party in self.parties.items()}
+        else:
+            return
+        self.now = until
+
+    def said_on(self, topic: Topic[Any]) -> list[tuple[float, str, Any]]:
+        """Every message on this topic: (s, who, message)."""
+        return [(at, who, message) for at, who, on, message in self.sent if on == topic]
+
+    def _arrives_after(
+        self, delay: float, receiver: str, topic: Topic[Any], message: Message
+    ) -> None:
+        self._numbers += 1
+        heapq.heappush(self._post, (self.now + delay, self._numbers, receiver, topic, message))
+
+
+class WorldTransport:
+    """A node's place in the world (`bridges.transports.transport.Transport`)."""
+
+    speaks = "memory"
+    domain_id = 0
+    release = NEWEST
+
+    def __init__(self, world: World, name: str) -> None:
+        self.name = name
+        self.dropped: dict[str, int] = {}
+        self.world = world
+        self.received: dict[str, list[Callable[[Any], None]]] = defaultdict(list)
+
+    def publisher(self, topic: Topic[Any]) -> Publisher[Any]:
+        self.world.publishers[topic.name].add(self.name)
+        return _End(self, topic)
+
+    def subscribe(
+        self, topic: Topic[Any], received: Callable[[Any], None], *, others_only: bool = False
+    ) -> Subscription:
+        if others_only:
+            self.world.hears_others.add((topic.name, self.name))
+        self.received[topic.name].append(received)
+        self.world.hearers[topic.name].add(self.name)
+        return _End(self, topic)
+
+    def hear(self, topic: Topic[Any], message: Any) -> None:
+        """A message has arrived."""
+        for received in self.received[topic.name]:
+            received(message)
+
+    lives = True
+
+    def faults(self) -> list[tuple[str, str]]:
+        return []
+
+    def wall(self) -> float:
+        return EPOCH + self.world.now
+
+    def close(self) -> None:
+        for ends in self.world.publishers.values():
+            ends.discard(self.name)
+
+
+class _End:
+    def __init__(self, node: WorldTransport, topic: Topic[Any]) -> None:
+        self._node = node
+        self._topic = topic
+
+    def publish(self, message: Any) -> None:
+        assert self._node.name in self._node.world.publishers[self._topic.name], "it has no end"
+        self._node.world.send(self._node.name, self._topic, message)
+
+    def matched(self) -> int:
+        """How many publishers other nodes have on the topic."""
+        return len(self.senders())
+
+    def senders(self) -> list[str]:
+        """Those nodes."""
+        others = self._node.world.publishers[self._topic.name] - {self._node.name}
+        return sorted(f"/{name}" for name in others)
+
+    def close(self) -> None:
+        self._node.world.publishers[self._topic.name].discard(self._node.name)
+
+
+@dataclass
+class Disk:
+    """The state directory, which outlives the daemon; `written` counts. `full`: nothing more fits."""
+
+    kept: bytes | None = None
+    written: int = 0
+    full: bool = False
+
+    def read(self) -> bytes | None:
+        return self.kept
+
+    def write(self, kept: bytes) -> None:
+        if self.full:
+            raise OSError("no space left on device")
+        self.kept, self.written = kept, self.written + 1
+
+
+class Served:
+    """A kind without hardware, as the daemon serves it."""
+
+    def __init__(
+        self,
+        world: World,
+        kind: GraphKind[Any, Any, Any, Any, Any],
+        settings: Any,
+        name: str,
+        wall_skew: float = 0.0,
+        disk: Disk | None = None,
+    ) -> None:
+        self.name = name
+        self.world = world
+        self.disk = disk
+        self._kind, self._settings = kind, settings
+        self._clock = Clock(lambda: world.now, lambda: EPOCH + world.now + wall_skew)
+        self.transport = WorldTransport(world, name)
+        self.restart()
+
+    def restart(self) -> None:
+        """A new daemon: only what was kept is remembered, and everything retained heard again."""
+        self.transport.close()
+        self.world.add(self)
+        self.transport = WorldTransport(self.world, self.name)
+        self.node = GraphNode(
+            self._kind, self._settings, self.transport, self._clock, kept=self.disk
+        )
+        self.node.subscribe()
+        self.world.replay(self.name)
+        self.node.round()
+
+    def leave(self) -> None:
+        """It is stopped and leaves the graph."""
+        self.world.remove(self.name)
+
+    def reset(self) -> None:
+        """An operator says that latched faults may clear."""
+        self.node.reset()
+        self.node.round()
+
+    def hear(self, topic: Topic[Any], message: Any) -> None:
+        self.transport.hear(topic, message)
+        self.node.round()
+
+    def wake_at(self) -> float:
+        return self.node.wake_at
+
+    def wake(self) -> None:
+        self.node.round()
+
+    @property
+    def subjects(self) -> list[str]:
+        """The lifts or doors that it knows."""
+        return list(self.node.devices())
+
+    def faults(self) -> dict[str, list[str]]:
+        """What its status shows, by lift or door, where anything is wrong."""
+        shown = {name: status["faults"] for name, status in self.node.devices().items()}
+        return {
+            name: [f"{fault['code']}: {fault['detail']}" for fault in faults]
+            for name, faults in shown.items()
+            if faults
+        }
+
+
+class Ticking:
+    """A node with subscriptions, whose timer calls `tick` every so often."""
+
+    def __init__(self, world: World, name: str, every_s: float, tick: Callable[[], None]) -> None:
+        self.name = name
+        self.transport = WorldTransport(world, name)
+        self._every_s, self._tick = every_s, tick
+        self._next_at = world.now + every_s
+        world.add(self)
+
+    def hear(self, topic: Topic[Any], message: Any) -> None:
+        self.transport.hear(topic, message)
+
+    def wake_at(self) -> float:
+        return self._next_at
+
+    def wake(self) -> None:
+        self._next_at += self._every_s
+        self._tick()
+
+
+class StandIn:
+    """One of RMF's parties, played by its rules; `new` makes it."""
+
+    def __init__(
+        self, world: World, new: Callable[[], RmfParty], name: str, publishes: Topic[Any]
+    ) -> None:
+        self.name = name
+        self.world = world
+        self._new = new
+        self._publishes = publishes
+        self.restart()
+
+    def restart(self) -> None:
+        """A new one, which remembers nothing and hears everything retained again."""
+        self.party = self._new()
+        self.world.add(self, *self.party.subscribes)
+        self.world.publishers[self._publishes.name].add(self.name)
+        self.world.replay(self.name)
+
+    def leave(self) -> None:
+        """It is stopped and leaves the graph."""
+        self.world.remove(self.name)
+
+    def hear(self, topic: Topic[Any], message: Any) -> None:
+        say(self.world, self.name, self.party.hear(message, EPOCH + self.world.now))
+
+    def wake_at(self) -> float:
+        return self.party.wake_at() - EPOCH
+
+    def wake(self) -> None:
+        say(self.world, self.name, self.party.tick(EPOCH + self.world.now))
+
+
+def say(world: World, who: str, said: Iterable[Said]) -> None:
+    """Publish what one of RMF's parties sends."""
+    for topic, message in said:
+        world.send(who, topic, message)
