@@ -87,8 +87,8 @@ def _heard(second: int, part: float, topic: str, message: d.Message) -> Heard:
 
 def main(bag: Path) -> None:
     """Explain, and print figures as JSON."""
-    from bridges.commands.recordings import Span, told_between
     from bridges.explain.site import Site
+    from workbench.replay.recordings import Span, told_between
 
     began, site = time.process_time(), Site("Lift1")
     for heard in told_between(bag, Span(None, None), "bench", "Lift1"):

@@ -11,6 +11,10 @@ from bench.daemons import Content, cost, daemon, memory_mb, shipped
 from bench.figures import Row, Rows, Tables, compared
 from bench.latency import daemon_paths
 from bridges import __version__
+from bridges.blackbox.entries import Head
+from bridges.blackbox.recorder import Recorder
+from bridges.blackbox.ring import Ring
+from bridges.blackbox.shelf import Shelf
 from bridges.kinds.lift import KIND
 from bridges.kinds.lift.messages import state_message
 from bridges.kinds.lift.signals import Door, Ended, LiftSample, Requested
@@ -18,19 +22,15 @@ from bridges.kinds.shared.decision import Sampled
 from bridges.kinds.shared.recording_section import Recording
 from bridges.messages.definitions import LiftRequest, Time
 from bridges.messages.releases import JAZZY
-from bridges.recording.bags import heard_in
-from bridges.recording.entries import Head
-from bridges.recording.files import opened
-from bridges.recording.recorder import Recorder
-from bridges.recording.replayed import Cores, Replay, of_head
-from bridges.recording.ring import Ring
-from bridges.recording.shelf import Shelf
-from bridges.recording.sources import Notes
 from bridges.runtime.clock import Clock
 from bridges.runtime.refusals import Refusals
 from bridges.runtime.subject import Core, Subject
 from bridges.runtime.witness import Witness
 from bridges.settings.load import load
+from workbench.replay.bags import heard_in
+from workbench.replay.files import opened
+from workbench.replay.replayed import Cores, Replay, of_head
+from workbench.replay.sources import Notes
 
 ROUNDS, WATCHED_S = 2, 30.0
 SCAN_S, DAY_S, RIDES = 0.05, 86400.0, 4000

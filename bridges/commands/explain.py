@@ -23,14 +23,14 @@ from bridges.commands.graph import (
     seconds,
 )
 from bridges.commands.live import Ear
-from bridges.commands.recordings import Span, add_span_arguments, told_between, unreadable
 from bridges.explain.explanation import Explanation
 from bridges.explain.site import Site
 from bridges.explain.text import SCREEN_LINES, lines
 from bridges.explain.timeline import KINDS, Kind
-from bridges.recording.sources import BagError
 from bridges.runtime import faults
 from bridges.transports.transport import TransportError
+from workbench.replay.recordings import Span, add_span_arguments, told_between, unreadable
+from workbench.replay.sources import BagError
 
 LISTENS_S: Final = 5.0
 AGAIN_S: Final = 1.0

@@ -7,14 +7,14 @@ import time
 from datetime import datetime
 from pathlib import Path
 
+from bridges.blackbox.incident import AFTER_S, BEFORE_S, Incident, Note, part
+from bridges.blackbox.ring import DIED, NAME, Read, RingError
 from bridges.host.written import no_folder, not_written
-from bridges.recording.bags import INSTALL
-from bridges.recording.incident import AFTER_S, BEFORE_S, Incident, Note, part
-from bridges.recording.ring import DIED, NAME, Read, RingError
 from bridges.runtime import holder
 from bridges.runtime.clock import machine_s
 from bridges.runtime.directory import find
 from bridges.settings.load import SettingsError
+from workbench.replay.bags import INSTALL
 
 EX_UNAVAILABLE = 69
 
@@ -44,7 +44,7 @@ def run(args: argparse.Namespace) -> int:
     """0 when the file is written; 65 if its YAML cannot be made anonymous; 69 without a ring that can
     be read; 73 if the file cannot be written."""
     try:
-        from bridges.recording import mcap_write
+        from bridges.blackbox import mcap_write
     except ImportError as error:
         print(f"to write a recording, {error.name} is needed: {INSTALL}", file=sys.stderr)
         return EX_UNAVAILABLE
@@ -73,7 +73,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _anonymous(incident: Incident) -> Incident:
     """Raises SettingsError."""
-    from bridges.recording.anonymous import anonymous
+    from workbench.replay.anonymous import anonymous
 
     return anonymous(incident)
 

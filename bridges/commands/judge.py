@@ -25,7 +25,6 @@ from bridges.commands.graph import (
     seconds,
 )
 from bridges.commands.live import OF_DEVICES, Ear
-from bridges.commands.recordings import Span, add_span_arguments, unreadable, within
 from bridges.judge.judge import KINDS, Judge, Kind
 from bridges.judge.law import Verdict, shown
 from bridges.judge.plays import FLEET, Charge, Passages, Performance, Ride
@@ -34,9 +33,10 @@ from bridges.judge.stage import Stage
 from bridges.messages import topics
 from bridges.messages.definitions import Message
 from bridges.messages.heard import Heard
-from bridges.recording.sources import BagError
 from bridges.rmf_rules import NEVER, Said
 from bridges.transports.transport import Publisher, Transport, TransportError
+from workbench.replay.recordings import Span, add_span_arguments, unreadable, within
+from workbench.replay.sources import BagError
 
 NODE_NAME = "rmf_bridge_judge"
 LOOK_EVERY_S = 0.1

@@ -132,8 +132,8 @@ def _family(address: str) -> socket.AddressFamily:
 
 def _unreadable(recording: Path) -> int:
     """An exit code where nothing can be shown of this recording; 0 where something can."""
-    from bridges.commands.recordings import unreadable
-    from bridges.recording.bags import BagError, Notes, all_in
+    from workbench.replay.bags import BagError, Notes, all_in
+    from workbench.replay.recordings import unreadable
 
     try:
         next(all_in(recording, Notes()), None)

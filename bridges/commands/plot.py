@@ -12,15 +12,15 @@ from pathlib import Path
 from typing import Final
 
 from bridges.commands.graph import complain
-from bridges.commands.recordings import Span, add_span_arguments, told_between, unreadable
 from bridges.explain.lanes import Drawing
 from bridges.explain.palette import PAPER, Theme
 from bridges.explain.picture import svg
 from bridges.explain.site import Site
 from bridges.explain.text import lines
 from bridges.explain.timeline import KINDS, Timeline
-from bridges.recording.sources import BagError
 from bridges.runtime import faults
+from workbench.replay.recordings import Span, add_span_arguments, told_between, unreadable
+from workbench.replay.sources import BagError
 
 SUFFIXES: Final = (".html", ".svg", ".png")
 INSTALL: Final = "pip install 'rmf-bridges[plot]'"

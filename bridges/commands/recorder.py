@@ -6,13 +6,13 @@ import sys
 from contextlib import suppress
 from pathlib import Path
 
+from bridges.blackbox.recorder import Recorder
+from bridges.blackbox.shelf import Shelf
 from bridges.host import log, places
-from bridges.recording.bags import INSTALL
-from bridges.recording.recorder import Recorder
-from bridges.recording.shelf import Shelf
 from bridges.runtime import signals
 from bridges.runtime.clock import machine_s
 from bridges.runtime.notify import notify
+from workbench.replay.bags import INSTALL
 
 EX_UNAVAILABLE = 69
 EVERY_S = 1.0
@@ -29,7 +29,7 @@ def run(args: argparse.Namespace) -> int:
     """0 after SIGTERM or SIGINT; 69 where the library is missing."""
     log.start()
     try:
-        from bridges.recording import mcap_write  # noqa: F401 - later would be too late
+        from bridges.blackbox import mcap_write  # noqa: F401 - later would be too late
     except ImportError as error:
         print(f"the recorder needs {error.name}: {INSTALL}", file=sys.stderr)
         return EX_UNAVAILABLE

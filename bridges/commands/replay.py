@@ -10,14 +10,14 @@ from itertools import islice
 from pathlib import Path
 from typing import Final
 
-from bridges.commands.recordings import unreadable
+from bridges.blackbox.entries import Head
+from bridges.blackbox.trees import Tree, UnknownValue, value
 from bridges.host.log import plain
-from bridges.recording.entries import Head
-from bridges.recording.files import opened
-from bridges.recording.replayed import Cores, Course, Difference, Replay, of_head
-from bridges.recording.sources import BagError, Notes, NotReplayable
-from bridges.recording.trees import Tree, UnknownValue, value
 from bridges.settings.load import SettingsError, load
+from workbench.replay.files import opened
+from workbench.replay.recordings import unreadable
+from workbench.replay.replayed import Cores, Course, Difference, Replay, of_head
+from workbench.replay.sources import BagError, Notes, NotReplayable
 
 EX_DATAERR, EX_CONFIG = 65, 78
 MOST: Final = 200

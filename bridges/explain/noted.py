@@ -1,6 +1,6 @@
 """What one of our daemons noted of its own device: inputs, outputs, faults and refusals.
 
-In an incident file the texts are JSON under `/rmf_bridge/` (`bridges/recording/incident.py`,
+In an incident file the texts are JSON under `/rmf_bridge/` (`bridges/blackbox/incident.py`,
 `readable`). A file may come from anywhere, so a text of another shape is ignored.
 """
 

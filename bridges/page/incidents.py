@@ -21,9 +21,9 @@ from bridges.explain.explanation import Explanation
 from bridges.explain.lanes import Drawing
 from bridges.explain.timeline import Timeline
 from bridges.messages.heard import Heard
-from bridges.recording.bags import heard_in
-from bridges.recording.sources import BagError, Notes
 from bridges.runtime import faults
+from workbench.replay.bags import heard_in
+from workbench.replay.sources import BagError, Notes
 
 SUFFIX: Final = ".mcap"
 MOST_LISTED: Final = 500

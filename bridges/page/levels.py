@@ -6,10 +6,10 @@ The ring has what the driver made of the contacts, and what the core decided; no
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
-from bridges.recording.entries import AnyEntry, Known, Step
-from bridges.recording.incident import ERRORS, READING
-from bridges.recording.ring import NAME, RingError, Tail
-from bridges.recording.trees import HOLDS, TYPE, Tree
+from bridges.blackbox.entries import AnyEntry, Known, Step
+from bridges.blackbox.incident import ERRORS, READING
+from bridges.blackbox.ring import NAME, RingError, Tail
+from bridges.blackbox.trees import HOLDS, TYPE, Tree
 
 Rows = Mapping[str, str]
 """What something is called, and what it is now."""

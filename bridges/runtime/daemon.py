@@ -15,12 +15,12 @@ from typing import Any
 import msgspec
 
 from bridges import VERSION
+from bridges.blackbox.entries import Head
+from bridges.blackbox.ring import Ring
 from bridges.host.log import pairs
 from bridges.messages.definitions import DiagnosticArray
 from bridges.messages.stamps import stamp
 from bridges.messages.topics import DIAGNOSTICS
-from bridges.recording.entries import Head
-from bridges.recording.ring import Ring
 from bridges.runtime import guard, last_mark, record, signals
 from bridges.runtime.diagnostics import diagnosis
 from bridges.runtime.directory import KEPT, MemoryFile, Once, RuntimeDirectory, state_file

@@ -12,16 +12,16 @@ from collections.abc import Callable
 from contextlib import suppress
 from typing import Any, Final
 
+from bridges.blackbox import entries
+from bridges.blackbox.entries import AnyEntry, Clocks, Forgotten, Published, Same, Spoken
+from bridges.blackbox.ring import FRAME, Ring
+from bridges.blackbox.seen import AnyDecision, Seen, known, step
 from bridges.kinds.shared.decision import IoFailed, Sampled
 from bridges.kinds.shared.durations import AGES_AGO, NEVER
 from bridges.messages import cdr
 from bridges.messages.definitions import Message
 from bridges.messages.releases import Release
 from bridges.messages.rihs01 import type_name
-from bridges.recording import entries
-from bridges.recording.entries import AnyEntry, Clocks, Forgotten, Published, Same, Spoken
-from bridges.recording.ring import FRAME, Ring
-from bridges.recording.seen import AnyDecision, Seen, known, step
 from bridges.runtime.clock import Clock
 from bridges.runtime.directory import Once
 

@@ -8,7 +8,6 @@ from msgspec.structs import replace
 
 from bridges import cli
 from bridges.commands import live
-from bridges.commands.recordings import FIRST_OF_OTHERS, Sieve
 from bridges.explain.site import Site
 from bridges.messages import topics
 from bridges.messages.definitions import LiftState
@@ -18,6 +17,7 @@ from bridges.transports.memory import MemoryNetwork, MemoryTransport
 from hal_fakes.wire import wire
 from tests.explain.scenes import fire, held_by_another
 from tests.recording.written import MCAP, SQLITE, write
+from workbench.replay.recordings import FIRST_OF_OTHERS, Sieve
 
 PNG = b"\x89PNG\r\n"
 

@@ -5,8 +5,6 @@ from pathlib import Path
 
 import pytest
 
-from bridges.commands.recordings import Span as Part
-from bridges.commands.recordings import told_between
 from bridges.explain.lanes import Drawing
 from bridges.explain.noted import MOST, Noted, levels, noted
 from bridges.explain.site import Site
@@ -14,6 +12,8 @@ from bridges.explain.timeline import Level
 from bridges.messages import definitions as d
 from bridges.messages.heard import Heard, Own
 from bridges.runtime.diagnostics import diagnosis
+from workbench.replay.recordings import Span as Part
+from workbench.replay.recordings import told_between
 
 CORPUS = Path(__file__).parents[1] / "recording" / "corpus"
 

@@ -5,6 +5,9 @@ from pathlib import Path
 from msgspec.structs import replace
 
 from bridges import __version__
+from bridges.blackbox import mcap_write
+from bridges.blackbox.entries import AnyEntry, Clocks, Head, Spoken
+from bridges.blackbox.incident import Incident, Note
 from bridges.kinds.shared.recording_section import Recording
 from bridges.messages import cdr
 from bridges.messages import definitions as d
@@ -12,9 +15,6 @@ from bridges.messages.definitions import Message
 from bridges.messages.releases import RELEASES
 from bridges.messages.rihs01 import type_name
 from bridges.messages.stamps import stamp
-from bridges.recording import mcap_write
-from bridges.recording.entries import AnyEntry, Clocks, Head, Spoken
-from bridges.recording.incident import Incident, Note
 
 WALL = 1_795_000_000.0
 LIFT = d.LiftState(

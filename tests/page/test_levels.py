@@ -2,11 +2,11 @@
 
 from pathlib import Path
 
+from bridges.blackbox.entries import Step
+from bridges.blackbox.trees import tree
 from bridges.kinds.door.signals import DoorOutputs, DoorSample
 from bridges.kinds.shared.decision import IoFailed, Sampled
 from bridges.page.levels import Levels
-from bridges.recording.entries import Step
-from bridges.recording.trees import tree
 
 
 def step(event: object, *outputs: object) -> Step:

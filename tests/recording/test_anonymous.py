@@ -6,20 +6,20 @@ from pathlib import Path
 
 import pytest
 
+from bridges.blackbox import mcap_write
+from bridges.blackbox.entries import Head, Spoken
+from bridges.blackbox.incident import Incident
 from bridges.kinds import lift
 from bridges.kinds.shared.recording_section import Recording
 from bridges.messages import cdr
 from bridges.messages.definitions import LiftState
 from bridges.messages.releases import KILTED
-from bridges.recording import mcap_write
-from bridges.recording.anonymous import anonymous, our_words
-from bridges.recording.entries import Head, Spoken
-from bridges.recording.files import opened
-from bridges.recording.incident import Incident
-from bridges.recording.incidents import notes_in
-from bridges.recording.replayed import Cores, Replay, of_head
-from bridges.recording.sources import Notes
 from tests.recording.test_replay import CORPUS
+from workbench.replay.anonymous import anonymous, our_words
+from workbench.replay.files import opened
+from workbench.replay.incidents import notes_in
+from workbench.replay.replayed import Cores, Replay, of_head
+from workbench.replay.sources import Notes
 
 NAMES = (b"Lift1", b"Lift2", b"red", b"green", b"white", b"black", b"bay1", b"bay2", b"ward", b"L3")
 

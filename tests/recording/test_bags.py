@@ -21,9 +21,9 @@ from bridges.messages.heard import Heard
 from bridges.messages.releases import JAZZY, KILTED, RELEASES, Release
 from bridges.messages.rihs01 import type_name
 from bridges.messages.texts import MESSAGES, releases_of, text
-from bridges.recording.bags import BagError, Notes, heard_in
-from bridges.recording.sources import releases
 from tests.recording.written import MCAP, SQLITE, store, write
+from workbench.replay.bags import BagError, Notes, heard_in
+from workbench.replay.sources import releases
 
 WALL = 1_800_000_000.0
 FLEET = FleetState("mir", (RobotState(name="r1", mode=RobotMode(mode=2)),))

@@ -17,10 +17,10 @@ from bridges.messages import cdr
 from bridges.messages.definitions import LiftState
 from bridges.messages.releases import KILTED
 from bridges.messages.texts import text
-from bridges.recording.bags import BagError, Notes, heard_in
-from bridges.recording.mcap_read import FIRST_UNPACKED, LONGEST_RECORD, MAGIC, MOST_DECLARED
 from tests.recording.test_bags import RIDE
 from tests.recording.written import SQLITE, write
+from workbench.replay.bags import BagError, Notes, heard_in
+from workbench.replay.mcap_read import FIRST_UNPACKED, LONGEST_RECORD, MAGIC, MOST_DECLARED
 
 NAME = "rmf_lift_msgs/msg/LiftState"
 

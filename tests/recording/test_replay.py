@@ -6,17 +6,17 @@ import pytest
 import yaml
 from msgspec.structs import replace
 
+from bridges.blackbox.entries import Known, Step
+from bridges.blackbox.ring import Read
+from bridges.blackbox.trees import value
 from bridges.kinds.lift import core as lift_core
 from bridges.kinds.shared.decision import Fault
-from bridges.recording.entries import Known, Step
-from bridges.recording.files import opened
-from bridges.recording.replayed import CONTEXT, Cores, Difference, Replay, of_head
-from bridges.recording.ring import Read
-from bridges.recording.sources import Notes
-from bridges.recording.trees import value
+from tests.blackbox.kept import keep
 from tests.depth import depth
-from tests.recording.kept import keep
 from tests.site.day import Site
+from workbench.replay.files import opened
+from workbench.replay.replayed import CONTEXT, Cores, Difference, Replay, of_head
+from workbench.replay.sources import Notes
 
 MB = 1_000_000
 HERE = Path(__file__).parent / "corpus"

@@ -1,6 +1,6 @@
 """What an earlier version has left is read for ever; what a later one has, is read or refused by name.
 
-`earlier/<date>` is what the program of that day wrote. Rings and recordings: tests/recording/earlier.
+`earlier/<date>` is what the program of that day wrote. Rings and recordings: tests/blackbox/earlier.
 """
 
 import logging

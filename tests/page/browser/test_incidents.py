@@ -9,11 +9,11 @@ from mcap.writer import CompressionType
 from playwright.sync_api import BrowserContext, Page
 from zstandard import compress
 
-from bridges.recording.bags import heard_in
-from bridges.recording.mcap_read import LONGEST_RECORD, MAGIC
 from tests.page import recorded
 from tests.page.browser.conftest import Shot, page, serious_faults
 from tests.recording.test_hostile_bags import chunk, states
+from workbench.replay.bags import heard_in
+from workbench.replay.mcap_read import LONGEST_RECORD, MAGIC
 
 pytestmark = pytest.mark.browser
 HOSTILE = "<img src=x onerror=alert(1)>.mcap"

@@ -8,11 +8,11 @@ import sys
 import tempfile
 from pathlib import Path
 
-from bridges.recording.incident import Incident, part
-from bridges.recording.mcap_write import write
-from bridges.recording.ring import Read
-from bridges.recording.triggers import FAULT, REFUSED, Triggers
-from tests.recording.kept import keep
+from bridges.blackbox.incident import Incident, part
+from bridges.blackbox.mcap_write import write
+from bridges.blackbox.ring import Read
+from bridges.blackbox.triggers import FAULT, REFUSED, Triggers
+from tests.blackbox.kept import keep
 from tests.site.day import Site
 
 HERE = Path(__file__).parent

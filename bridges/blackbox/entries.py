@@ -1,0 +1,201 @@
+"""What a ring holds: the head of a daemon's run, and its entries.
+
+All times are by the daemon's monotonic clock (s); `Clocks` says what the wall clock showed then.
+A subject is a lift, a door, a charger, or a coordinator's site. Its core is a pure function, so its
+memory at one time and each event after it are enough to have every decision made again.
+"""
+
+from collections.abc import Callable
+from typing import Annotated, Final, TypeVar
+
+import msgspec
+from msgspec import Meta
+
+from bridges.blackbox.trees import Tree
+from bridges.kinds.shared.recording_section import Recording
+from bridges.messages.releases import RELEASES
+from bridges.messages.texts import MESSAGES
+
+LATEST_S: Final = 4e9
+"""Within this time, before and after zero, every sum of three is a date, and fits into an MCAP file."""
+Seconds = Annotated[float, Meta(ge=-LATEST_S, le=LATEST_S)]
+DEEPEST: Final = 60
+"""The most a tree is nested; a core's memory has a tenth of it."""
+E = TypeVar("E")
+
+
+class Invalid(ValueError):
+    """No entry, or no head, that this version can read. The text says why."""
+
+
+class Head(msgspec.Struct, frozen=True):
+    """One run of a daemon: what it is made of, and the file that it serves.
+
+    `file`: the YAML's path. `yaml`: its text. `texts`: profiles and DBC files that it uses.
+    """
+
+    run: Annotated[str, Meta(pattern=r"^[\w-]{1,64}$")]
+    pid: Annotated[int, Meta(ge=0, lt=2**31)]
+    version: str
+    kind: str
+    file: str
+    yaml: bytes
+    texts: dict[str, bytes]
+    simulated: bool
+    versions: dict[str, str]
+    recording: Recording
+
+
+class Entry(msgspec.Struct, frozen=True, array_like=True, tag_field="is"):
+    """Every entry."""
+
+    at: Seconds
+
+
+class Clocks(Entry, frozen=True, tag_field="is", tag=0):
+    """What the wall clock showed at this time (s since the epoch)."""
+
+    wall: Seconds
+
+
+class Spoken(Entry, frozen=True, tag_field="is", tag=1):
+    """A message heard from RMF's graph, or sent. `cdr`: as it is on the wire in `release`."""
+
+    sent: bool
+    topic: str
+    type: str
+    release: str
+    cdr: bytes
+
+
+class Known(Entry, frozen=True, tag_field="is", tag=2):
+    """All that a replay needs to start here: a subject's memory, its last reading, and what was last
+    decided; None before the first. `anew`: the memory is not what the last decision left."""
+
+    subject: str
+    memory: Tree
+    reading: Tree
+    outputs: Tree
+    report: Tree
+    anew: bool = False
+
+
+class Step(Entry, frozen=True, tag_field="is", tag=3):
+    """An event, and what the core decided. `outputs`, `news`, `faults`: only those that have
+    changed."""
+
+    subject: str
+    event: Tree
+    wake_at: Tree
+    refused: str = ""
+    outputs: list[Tree] = []
+    news: list[Tree] = []
+    faults: list[Tree] = []
+    publish: list[Tree] = []
+
+
+class Same(Entry, frozen=True, tag_field="is", tag=4):
+    """The last reading came again at each of these times (doubles), and changed no decision."""
+
+    subject: str
+    times: bytes
+
+
+class Published(Entry, frozen=True, tag_field="is", tag=5):
+    """The subject's report went out, and its memory took note of that."""
+
+    subject: str
+
+
+class Forgotten(Entry, frozen=True, tag_field="is", tag=6):
+    """The subject is no longer remembered."""
+
+    subject: str
+
+
+class Died(Entry, frozen=True, tag_field="is", tag=7):
+    """A defect ends the daemon."""
+
+    reason: str
+
+
+class Lost(Entry, frozen=True, tag_field="is", tag=8):
+    """This many entries could not be stored."""
+
+    number: int
+
+
+class Ended(Entry, frozen=True, tag_field="is", tag=9):
+    """The daemon ended in good order. `safe`: every output was verified off."""
+
+    safe: bool
+
+
+AnyEntry = Clocks | Spoken | Known | Step | Same | Published | Forgotten | Died | Lost | Ended
+
+_ENCODER: Final = msgspec.msgpack.Encoder()
+_DECODER: Final[msgspec.msgpack.Decoder[AnyEntry]] = msgspec.msgpack.Decoder(AnyEntry)
+_JSON: Final[msgspec.json.Decoder[AnyEntry]] = msgspec.json.Decoder(AnyEntry)
+_HEADS: Final = msgspec.msgpack.Decoder(Head)
+_JSON_HEADS: Final = msgspec.json.Decoder(Head)
+
+
+def encode(entry: AnyEntry | Head) -> bytes:
+    """An entry, or a head, as bytes."""
+    return _ENCODER.encode(entry)
+
+
+def decode(content: bytes) -> AnyEntry:
+    """Raises Invalid."""
+    return _known(_decoded(_DECODER.decode, content))
+
+
+def as_json(entry: AnyEntry | Head) -> str:
+    """An entry, or a head, as text."""
+    return msgspec.json.encode(entry).decode()
+
+
+def of_json(content: str) -> AnyEntry:
+    """Raises Invalid."""
+    return _known(_decoded(_JSON.decode, content))
+
+
+def head_of_json(content: str) -> Head:
+    """Raises Invalid."""
+    return _decoded(_JSON_HEADS.decode, content)
+
+
+def decode_head(content: bytes) -> Head:
+    """Raises Invalid."""
+    return _decoded(_HEADS.decode, content)
+
+
+def _decoded(decode: Callable[..., E], content: bytes | str) -> E:
+    try:
+        return decode(content)
+    except (msgspec.MsgspecError, RecursionError) as error:
+        raise Invalid(f"not of this version, or damaged: {error}") from None
+
+
+def _known(entry: AnyEntry) -> AnyEntry:
+    """The entry, if this version knows what it names. Raises Invalid."""
+    if isinstance(entry, Spoken):
+        kind, release = MESSAGES.get(entry.type), RELEASES.get(entry.release)
+        if kind is None or release is None or not release.has(kind):
+            raise Invalid(f"no {entry.type[:80]!r} of release {entry.release[:80]!r} is known")
+    elif isinstance(entry, Known):
+        for tree in (entry.memory, entry.reading, entry.outputs, entry.report):
+            _require_shallow(tree, DEEPEST)
+    elif isinstance(entry, Step):
+        for tree in (entry.event, *entry.outputs, *entry.news, *entry.faults, *entry.publish):
+            _require_shallow(tree, DEEPEST)
+    return entry
+
+
+def _require_shallow(tree: Tree, deeper: int) -> None:
+    """Raises Invalid."""
+    if isinstance(tree, dict | list):
+        if deeper == 0:
+            raise Invalid(f"a value is nested more than {DEEPEST} deep")
+        for part in tree.values() if isinstance(tree, dict) else tree:
+            _require_shallow(part, deeper - 1)

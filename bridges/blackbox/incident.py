@@ -1,0 +1,74 @@
+"""One incident: the entries of a daemon that belong to it, and why it was recorded. Pure."""
+
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
+from typing import Final
+
+import msgspec
+
+from bridges.blackbox.entries import AnyEntry, Clocks, Head, Known, Step
+from bridges.blackbox.trees import Tree, name_of
+from bridges.kinds.shared.decision import IoFailed, Sampled, Suspended, WriteFailed
+
+BEFORE_S: Final = 120.0
+AFTER_S: Final = 30.0
+READING: Final = name_of(Sampled)
+ERRORS: Final = (name_of(IoFailed), name_of(WriteFailed), name_of(Suspended))
+
+
+class Note(msgspec.Struct, frozen=True):
+    """Why there is a recording: a fixed name, and a text. `at`: monotonic s."""
+
+    at: float
+    code: str
+    text: str = ""
+    subject: str = ""
+
+
+class Incident(msgspec.Struct, frozen=True):
+    """The content of a file. `entries` begin where everything that a replay needs is known."""
+
+    head: Head
+    entries: Sequence[AnyEntry]
+    notes: tuple[Note, ...] = ()
+
+
+def part(entries: Sequence[AnyEntry], begin_at: float, end_at: float) -> Sequence[AnyEntry]:
+    """The entries from `begin_at` to `end_at` (monotonic s), with as many before as a replay needs."""
+    first = 0
+    for place, (entry, following) in enumerate(pairwise(entries)):
+        if entry.at > begin_at:
+            break
+        if isinstance(entry, Clocks) and isinstance(following, Known):
+            first = place
+    return [entry for entry in entries[first:] if entry.at <= end_at]
+
+
+def timed(entries: Sequence[AnyEntry]) -> Iterator[tuple[AnyEntry, float, float]]:
+    """Each entry with two times (s since the epoch): by a clock that never steps, and by the wall."""
+    clocks = [entry for entry in entries if isinstance(entry, Clocks)]
+    steady = wall = clocks[0].wall - clocks[0].at if clocks else 0.0
+    for entry in entries:
+        if isinstance(entry, Clocks):
+            wall = entry.wall - entry.at
+        yield entry, entry.at + steady, entry.at + wall
+
+
+def readable(step: Step) -> Iterator[tuple[str, Tree]]:
+    """A step as (topic, JSON), for readers in Foxglove or `ros2 bag`."""
+    event = step.event if isinstance(step.event, dict) else {}
+    kind = str(event.get("", ""))
+    if kind == READING:
+        yield "samples", {"subject": step.subject, "sample": event.get("sample")}
+    elif kind in ERRORS:
+        yield "bus_errors", {"subject": step.subject, "kind": kind, "reason": event.get("reason")}
+    else:
+        yield "events", {"subject": step.subject, "event": step.event}
+    if step.news or step.refused or step.publish:
+        news = step.news[0] if step.news else None
+        told = {"refused": step.refused, "news": news, "publish": step.publish}
+        yield "decisions", {"subject": step.subject, **told}
+    for outputs in step.outputs:
+        yield "outputs", {"subject": step.subject, "outputs": outputs}
+    for faults in step.faults:
+        yield "faults", {"subject": step.subject, "faults": faults}

@@ -1,0 +1,238 @@
+"""The recorder: one process beside all daemons of a machine, which turns their rings into files.
+
+It has no devices, and no daemon waits for it. Each second it reads what is new in each ring. An
+entry that triggers a recording (`triggers.py`) makes a file, once what follows is in the ring too.
+Nothing is written while all is well, unless a YAML asks for `keep: continuous`.
+"""
+
+import logging
+import os
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
+from typing import Final
+
+from bridges.blackbox.entries import AnyEntry, Clocks, Died, Ended, Head, Known, Step
+from bridges.blackbox.incident import AFTER_S, BEFORE_S, Incident, Note, part
+from bridges.blackbox.ring import DIED as DIED_NAME
+from bridges.blackbox.ring import NAME, Read, RingError, Tail
+from bridges.blackbox.shelf import Shelf
+from bridges.blackbox.triggers import AGAIN_S, DIED, Triggers
+from bridges.host.log import pairs
+from bridges.kinds.shared.durations import AGES_AGO
+from workbench.replay.bags import CONTINUOUS
+
+log = logging.getLogger(__name__)
+
+LATE_S: Final = 60.0
+"""An entry older than this when a ring is first seen was handled by an earlier recorder."""
+GRACE_S: Final = 2.0
+"""After this much more time, what follows is certainly in the ring."""
+PART_S: Final = 300.0
+"""How much one file of `keep: continuous` holds."""
+
+
+class Recorder:
+    """Follows the rings of all daemons. `folders`: their runtime directories. `now`: machine s."""
+
+    def __init__(
+        self, folders: Callable[[], Iterable[Path]], shelf: Shelf, now: Callable[[], float]
+    ) -> None:
+        self._folders = folders
+        self._shelf = shelf
+        self._now = now
+        self._followed: dict[Path, _Followed] = {}
+        self._seen_dead: set[tuple[int, int]] = set()
+        self._died_at: dict[str, float] = {}
+        self._failing = False
+
+    def look(self) -> None:
+        """Read what is new, and write what is due. Called each second; does not raise."""
+        folders = list(self._folders())
+        for folder in folders:
+            self._look_at(folder)
+        for folder in [known for known in self._followed if known not in folders]:
+            self._finish(self._followed.pop(folder))
+
+    def close(self) -> None:
+        """Write the recordings that have begun, as far as they go."""
+        for followed in self._followed.values():
+            self._finish(followed)
+        self._followed.clear()
+
+    def _look_at(self, folder: Path) -> None:
+        self._take_died(folder / DIED_NAME)
+        try:
+            followed = self._follow(folder)
+            followed.take(self._now())
+        except RingError:
+            if folder in self._followed:
+                self._finish(self._followed.pop(folder))
+            return
+        for due in followed.due(self._now()):
+            self._put(*due)
+        if not _runs(followed.head.pid):
+            self._take_died(folder / NAME)
+
+    def _follow(self, folder: Path) -> "_Followed":
+        """The ring of the run that is there now. Raises RingError."""
+        followed = self._followed.get(folder)
+        if followed is not None and not followed.is_replaced():
+            return followed
+        if followed is not None:
+            self._finish(self._followed.pop(folder))
+        self._followed[folder] = _Followed(folder / NAME, self._now())
+        return self._followed[folder]
+
+    def _finish(self, followed: "_Followed") -> None:
+        for due in followed.due(float("inf")):
+            self._put(*due)
+
+    def _take_died(self, path: Path) -> None:
+        """Record the ring of a run that did not end in good order, once. A run that never served has
+        nothing to show: a failed start is in the log."""
+        try:
+            identity = _identity(path)
+            if identity in self._seen_dead:
+                return
+            read = Read(path)
+        except RingError:
+            return
+        self._seen_dead.add(identity)
+        entries = list(read.entries())
+        served = any(isinstance(entry, Step) for entry in entries)
+        if served and not read.ended and self._is_first(read.head):
+            at = entries[-1].at
+            note = Note(at, DIED, _last_words(entries))
+            self._put(Incident(read.head, part(entries, at - BEFORE_S, at), (note,)), DIED)
+
+    def _is_first(self, head: Head) -> bool:
+        """Is it not recorded yet, and not one of many deaths in a row?"""
+        last = self._died_at.get(head.file, AGES_AGO)
+        if self._shelf.has(head, DIED) or self._now() < last + AGAIN_S:
+            return False
+        self._died_at[head.file] = self._now()
+        return True
+
+    def _put(self, incident: Incident, code: str) -> None:
+        """Write a file. A failure is logged once, and the recording is lost."""
+        try:
+            path = self._shelf.put(incident, wall_of(incident.entries), code)
+        except OSError as error:
+            if not self._failing:
+                log.warning(pairs("not_recorded", folder=self._shelf.folder, reason=error))
+            self._failing = True
+            return
+        self._failing = False
+        if code != CONTINUOUS:
+            why = "; ".join(f"{n.subject} {n.code} {n.text}".strip() for n in incident.notes)
+            log.info(pairs("recorded", file=path, why=why))
+
+
+class _Followed:
+    """One ring, and the parts of it that are to become files."""
+
+    def __init__(self, path: Path, now: float) -> None:
+        """Raises RingError."""
+        self._tail = Tail(path)
+        self.head = self._tail.head
+        self._identity = _identity(path)
+        self._triggers = Triggers(self.head.recording.waiting_s)
+        self._since = now - LATE_S
+        self._notes: list[Note] = []
+        self._kept: Read | None = None
+        self._part: list[AnyEntry] = []
+
+    def is_replaced(self) -> bool:
+        """Is another run's ring at this path?"""
+        return _identity(self._tail.path) != self._identity
+
+    def take(self, now: float) -> None:
+        """Read what is new. Raises RingError."""
+        new = self._tail.new()
+        for entry in new:
+            notes = self._triggers.take(entry)
+            if entry.at >= self._since:
+                self._notes += notes
+        if self._notes and self._kept is None:
+            self._kept = Read(self._tail.path)
+        if self.head.recording.keep == "continuous":
+            self._part += new
+
+    def due(self, now: float) -> list[tuple[Incident, str]]:
+        """The recordings that are complete now; with `now` infinite, all that have begun."""
+        found = []
+        if self._notes and now >= self._notes[0].at + AFTER_S + GRACE_S:
+            found.append(self._incident())
+        if self._part and (now == float("inf") or now >= self._part[0].at + PART_S):
+            found += self._continuous(whole=now == float("inf"))
+        return found
+
+    def _incident(self) -> tuple[Incident, str]:
+        first = self._notes[0]
+        end_at = first.at + AFTER_S
+        notes = tuple(note for note in self._notes if note.at <= end_at)
+        self._notes = [note for note in self._notes if note.at > end_at]
+        read, self._kept = self._read(), None
+        entries = part(list(read.entries()), first.at - BEFORE_S, end_at)
+        return Incident(read.head, entries, notes), first.code
+
+    def _read(self) -> Read:
+        """The ring as it is now; as it was at first, if it is gone."""
+        try:
+            read = Read(self._tail.path)
+            if read.head.run == self.head.run:
+                return read
+        except RingError:
+            pass
+        assert self._kept
+        return self._kept
+
+    def _continuous(self, *, whole: bool) -> list[tuple[Incident, str]]:
+        """What has come since the last file, up to a place where all is known: each file stands
+        alone."""
+        known = [at for at in range(1, len(self._part)) if begins(self._part, at)]
+        end = len(self._part) if whole or not known else known[-1]
+        entries, self._part = self._part[:end], self._part[end:]
+        return [(Incident(self.head, entries), CONTINUOUS)] if entries else []
+
+
+def _last_words(entries: Sequence[AnyEntry]) -> str:
+    """Why a run died, as far as it said so."""
+    for entry in entries:
+        if isinstance(entry, Died):
+            return entry.reason
+    if isinstance(entries[-1], Ended):
+        return "it ended, and not every output was verified off"
+    return "it ended without an entry: killed, or the machine stopped"
+
+
+def _runs(pid: int) -> bool:
+    """Is there a process of this number?"""
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return False
+    except OSError:
+        return True
+    return True
+
+
+def begins(entries: Sequence[AnyEntry], at: int) -> bool:
+    """Do the entries from this place on begin with all that is known?"""
+    following = entries[at + 1 : at + 2]
+    return isinstance(entries[at], Clocks) and bool(following) and isinstance(following[0], Known)
+
+
+def wall_of(entries: Sequence[AnyEntry]) -> float:
+    """The wall clock at the end of these entries (s since the epoch)."""
+    clocks = [entry for entry in entries if isinstance(entry, Clocks)]
+    return clocks[-1].wall - clocks[-1].at + entries[-1].at if clocks else 0.0
+
+
+def _identity(path: Path) -> tuple[int, int]:
+    """Raises RingError if there is no file."""
+    try:
+        found = os.stat(path)
+    except OSError as error:
+        raise RingError(f"{path}: {error.strerror}") from None
+    return found.st_dev, found.st_ino

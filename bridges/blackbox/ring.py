@@ -1,0 +1,233 @@
+"""The ring: a file of fixed size on tmpfs with a daemon's last minutes. It outlives a kill.
+
+It has a head, then SEGMENTS of equal size, used in turn. Each begins with its number and with what was
+known of every subject; entries follow, each with its length and a checksum. The checksum also covers
+the segment's number, so an entry of an earlier turn, or one that a kill has torn, is never taken for
+a valid one. It is written with `pwrite`, not mapped: if somebody truncates the file, no signal
+kills the daemon.
+"""
+
+import os
+import struct
+import zlib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import IO, Final
+
+from bridges.blackbox import entries
+from bridges.blackbox.entries import AnyEntry, Head
+from bridges.host import user_files
+
+MAGIC: Final = b"RMFRING1"
+SEGMENTS: Final = 8
+TOP: Final = struct.Struct("<8sBxxxII")
+"""Magic, whether the run has ended in good order, the size of a segment, the length of the head."""
+ENDED_AT: Final = 8
+MARK: Final = struct.Struct("<QI")
+"""A segment begins with its number, and the checksum of that."""
+FRAME: Final = struct.Struct("<II")
+"""An entry begins with its length and its checksum."""
+PAGE: Final = 4096
+LARGEST: Final = 72 << 20
+LONGEST_TOP: Final = 4 << 20
+NAME: Final = "ring"
+DIED: Final = "ring.died"
+
+
+class RingError(Exception):
+    """The file is not a ring, or it cannot be read."""
+
+
+class Ring:
+    """The writing end. Each method may raise OSError; then a new ring must be made."""
+
+    def __init__(self, folder: Path, head: Head, size: int) -> None:
+        """Make the file, with all its space claimed. The ring of a run that died stays beside it."""
+        self.path = folder / NAME
+        self._segment_size = max(size // SEGMENTS, PAGE)
+        told = entries.encode(head)
+        top = TOP.pack(MAGIC, 0, self._segment_size, len(told))
+        top += struct.pack("<I", zlib.crc32(told)) + told
+        self._first = -(-len(top) // PAGE) * PAGE
+        if _died(self.path):
+            os.replace(self.path, folder / DIED)
+        new = folder / f".{NAME}.{os.getpid()}"
+        flags = os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_NOFOLLOW | os.O_CLOEXEC
+        self._file = os.open(new, flags, 0o640)
+        try:
+            os.posix_fallocate(self._file, 0, self._first + SEGMENTS * self._segment_size)
+            os.pwrite(self._file, top, 0)
+            os.replace(new, self.path)
+        except OSError:
+            os.close(self._file)
+            raise
+        self._number = 0
+        self._offset = self._segment_size
+
+    @property
+    def lives(self) -> bool:
+        """Whether the file is still at its path."""
+        try:
+            return os.path.samestat(os.fstat(self._file), self.path.lstat())
+        except OSError:
+            return False
+
+    @property
+    def room(self) -> int:
+        """How much one entry may take at most (bytes)."""
+        return self._segment_size - MARK.size - 2 * FRAME.size
+
+    def fits(self, length: int) -> bool:
+        """Whether this many bytes of entries (with `frame`) still fit into this segment."""
+        return self._offset + length + FRAME.size <= self._segment_size
+
+    def begin_segment(self) -> None:
+        """Go on in the next segment; its old content is gone."""
+        self._number += 1
+        number = self._number.to_bytes(8, "little")
+        start = MARK.pack(self._number, zlib.crc32(number)) + bytes(FRAME.size)
+        os.pwrite(self._file, start, self._place)
+        self._offset = MARK.size
+
+    def frame(self, content: bytes) -> bytes:
+        """An entry as it stands in this segment."""
+        return FRAME.pack(len(content), zlib.crc32(content, self._number)) + content
+
+    def write(self, frames: bytes) -> None:
+        """Append entries, framed for this segment, in which they must fit."""
+        os.pwrite(self._file, frames + bytes(FRAME.size), self._place + self._offset)
+        self._offset += len(frames)
+
+    def close(self, *, ended: bool) -> None:
+        """`ended`: the run ended in good order, so its ring is not needed."""
+        try:
+            if ended:
+                os.pwrite(self._file, b"\1", ENDED_AT)
+        finally:
+            os.close(self._file)
+
+    @property
+    def _place(self) -> int:
+        return self._first + self._number % SEGMENTS * self._segment_size
+
+
+def _died(path: Path) -> bool:
+    """Is there a ring whose run did not end in good order?"""
+    try:
+        found = user_files.read(path, TOP.size - 1).content
+    except OSError:
+        return False
+    return found[: len(MAGIC)] == MAGIC and found[ENDED_AT : ENDED_AT + 1] == b"\0"
+
+
+class Read:
+    """A ring's content at one time. `head`: of the run. `ended`: it ended in good order.
+
+    `segments`: each one's number and entries, in order, without what is being written meanwhile or
+    was torn.
+    """
+
+    def __init__(self, path: Path) -> None:
+        """Raises RingError."""
+        self.head, first, size = _top(path)
+        try:
+            content = user_files.read(path, LARGEST).content
+        except OSError as error:
+            raise RingError(f"{path} cannot be read: {error.strerror}") from None
+        self.ended = content[ENDED_AT : ENDED_AT + 1] == b"\1"
+        starts = {}
+        for place in range(first, len(content) - MARK.size, size):
+            number, checksum = MARK.unpack_from(content, place)
+            if zlib.crc32(number.to_bytes(8, "little")) == checksum and number:
+                starts[number] = place
+        try:
+            self.segments = {
+                number: _entries(content[starts[number] : starts[number] + size], number)
+                for number in sorted(starts)
+            }
+        except entries.Invalid as error:
+            raise RingError(f"{path} has an entry that is invalid: {error}") from None
+
+    def entries(self) -> Iterator[AnyEntry]:
+        """Every entry, the oldest first."""
+        for found in self.segments.values():
+            yield from found
+
+
+class Tail:
+    """Follows a ring that is being written: what is new since the last look.
+
+    `head`: of the run. Raises RingError when it is made, and when the file cannot be read any more.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.head, self._first, self._size = _top(path)
+        self._number = 0
+        self._offset = MARK.size
+
+    def new(self) -> list[AnyEntry]:
+        """What was written since the last call; at first, all that is there. What the ring has lost
+        meanwhile is left out."""
+        try:
+            with self.path.open("rb") as ring:
+                return self._new(ring)
+        except (OSError, entries.Invalid) as error:
+            raise RingError(f"{self.path} cannot be followed: {error}") from None
+
+    def _new(self, ring: IO[bytes]) -> list[AnyEntry]:
+        found: list[AnyEntry] = []
+        starts = [self._start(ring, turn) for turn in range(SEGMENTS)]
+        for number, place in sorted((number, turn) for turn, number in enumerate(starts) if number):
+            if number < self._number:
+                continue
+            if number > self._number:
+                self._number, self._offset = number, MARK.size
+            ring.seek(self._first + place * self._size + self._offset)
+            content = ring.read(self._size - self._offset)
+            end = 0
+            for entry, end in frames(content, number, 0):  # noqa: B007 - the last one counts
+                found.append(entries.decode(entry))
+            self._offset += end
+        return found
+
+    def _start(self, ring: IO[bytes], turn: int) -> int:
+        """The number of the segment at a place; 0 for none."""
+        ring.seek(self._first + turn * self._size)
+        start = ring.read(MARK.size)
+        if len(start) < MARK.size:
+            return 0
+        number, checksum = MARK.unpack(start)
+        valid = zlib.crc32(number.to_bytes(8, "little")) == checksum
+        return number if valid else 0
+
+
+def _top(path: Path) -> tuple[Head, int, int]:
+    """A ring's head, where its first segment is, and the size of a segment. Raises RingError."""
+    try:
+        content = user_files.read(path, LONGEST_TOP).content
+        magic, _, size, length = TOP.unpack_from(content)
+        (checksum,) = struct.unpack_from("<I", content, TOP.size)
+        told = content[TOP.size + 4 : TOP.size + 4 + length]
+        if magic != MAGIC or zlib.crc32(told) != checksum or size < PAGE:
+            raise RingError(f"{path} is not a ring of this version")
+        return entries.decode_head(told), -(-(TOP.size + 4 + length) // PAGE) * PAGE, size
+    except OSError as error:
+        raise RingError(f"{path} cannot be read: {error.strerror}") from None
+    except (struct.error, entries.Invalid) as error:
+        raise RingError(f"{path} cannot be read as a ring: {error}") from None
+
+
+def _entries(segment: bytes, number: int) -> list[AnyEntry]:
+    return [entries.decode(content) for content, _ in frames(segment, number, MARK.size)]
+
+
+def frames(segment: bytes, number: int, at: int) -> Iterator[tuple[bytes, int]]:
+    """The entries of a segment from a place on, each with where it ends, up to the first torn one."""
+    while at + FRAME.size <= len(segment):
+        length, checksum = FRAME.unpack_from(segment, at)
+        content = segment[at + FRAME.size : at + FRAME.size + length]
+        if length == 0 or len(content) < length or zlib.crc32(content, number) != checksum:
+            return
+        at += FRAME.size + length
+        yield content, at

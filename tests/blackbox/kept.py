@@ -1,0 +1,74 @@
+"""The soak's site with a ring for each daemon: what a day of it leaves to be decided again."""
+
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import yaml
+
+from bridges import __version__
+from bridges.blackbox.entries import Head
+from bridges.blackbox.ring import Ring
+from bridges.kinds.shared.graph_kind import AnyGraphKind
+from bridges.kinds.shared.recording_section import Recording
+from bridges.runtime.clock import Clock
+from bridges.runtime.witness import Witness
+from tests.site.building import Device
+from tests.site.daemons import DeviceDaemon, GraphDaemon
+from tests.site.day import Site
+from tests.site.timeline import EPOCH, Timeline
+
+BUSES: dict[str, Any] = {
+    "gpio": {"type": "gpio"},
+    "modbus": {"type": "modbus", "tcp": {"host": "127.0.0.1"}},
+    "http": {"type": "http", "api_base": "http://127.0.0.1"},
+}
+
+
+def head(name: str, kind: str, content: dict[str, Any]) -> Head:
+    """The head of a run that serves this YAML."""
+    text = yaml.safe_dump({"kind": kind, **content}, sort_keys=False).encode()
+    return Head(name, 1, __version__, kind, f"/etc/{name}.yaml", text, {}, True, {}, Recording())
+
+
+def of_device(device: Device) -> Head:
+    """The head of a daemon with this device alone."""
+    bus = {0.0: "gpio", 0.05: "modbus", 0.5: "http"}[device.poll_s]
+    devices = {device.name: msgspec.to_builtins(device.settings)}
+    content = {
+        "driver": device.driver_name,
+        "buses": {"b": BUSES[bus]},
+        device.kind.devices_key: devices,
+    }
+    return head(device.name, device.kind.name, content)
+
+
+def of_graph(name: str, kind: AnyGraphKind, settings: Any) -> Head:
+    """The head of a supervisor or coordinator."""
+    return head(name, kind.name, {kind.devices_key: msgspec.to_builtins(settings)})
+
+
+def keep(site: Site, folder: Path, size: int) -> dict[str, Path]:
+    """Have each daemon of a site keep a ring of this size; gives where, by its name."""
+    found = {}
+    for daemon in (*site.daemons.values(), *site.nodes):
+        if isinstance(daemon, DeviceDaemon):
+            told = of_device(daemon.device)
+        elif isinstance(daemon, GraphDaemon):
+            told = of_graph(daemon.name, daemon.kind, daemon._settings)
+        else:
+            continue
+        place = folder / daemon.name
+        place.mkdir()
+        make = partial(Ring, place, told, size)
+        daemon.witness = witness(site.timeline, make, site)
+        found[daemon.name] = place / "ring"
+    return found
+
+
+def witness(timeline: Timeline, make: Callable[[], Ring], site: Site) -> Witness:
+    """A witness in virtual time."""
+    clock = Clock(lambda: timeline.now, lambda: EPOCH + timeline.now)
+    return Witness(make, clock, lambda: site.air.release)

@@ -1,0 +1,137 @@
+"""The recorder and the commands beside a real daemon, as a person runs them."""
+
+import io
+import json
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+from contextlib import chdir, redirect_stderr, redirect_stdout
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+
+from bridges import cli
+from bridges.blackbox.entries import Spoken
+from bridges.blackbox.ring import Read
+from hal_fakes.wire import wire
+from tests.runtime.site import daemon, environment, shipped
+from tests.waiting import PATIENCE_S, wait_until
+from workbench.replay.bags import heard_in
+from workbench.replay.incidents import head_of, notes_in
+
+
+@pytest.fixture
+def lift(tmp_path: Path) -> Path:
+    return shipped("lift_dry_contact.yaml", tmp_path, wire())
+
+
+class Told(NamedTuple):
+    """What a command has said, and its exit code."""
+
+    returncode: int
+    stdout: str
+    stderr: str
+
+
+def bridge(*words: str | Path) -> Told:
+    """A command, to its end, in the folder of its file."""
+    out, error = io.StringIO(), io.StringIO()
+    with redirect_stdout(out), redirect_stderr(error), chdir(Path(words[1]).parent):
+        code = cli.main([str(word) for word in words])
+    return Told(code, out.getvalue(), error.getvalue())
+
+
+def states(place: Path) -> int:
+    """How many states the ring shows to have been sent."""
+    try:
+        return sum(isinstance(one, Spoken) for one in Read(place / "ring").entries())
+    except Exception:  # noqa: BLE001 - it is not there yet
+        return 0
+
+
+def test_a_person_records_an_incident_and_replays_it(
+    lift: Path, tmp_path: Path, domain: int
+) -> None:
+    place = tmp_path / "run"
+    with daemon(lift, place, "--simulate", "--domain-id", str(domain)) as running:
+        wait_until(lambda: states(place) > 8, "states are in the ring")
+        where = ("--runtime-dir", str(place))
+        made = bridge(
+            "incident", lift, "--note", "it stood", "--after", "0", "-o", "a.mcap", *where
+        )
+        ring = bridge("replay", place / "ring")
+        running.end(signal.SIGTERM)
+    late = bridge("incident", lift, "-o", "late.mcap", *where)
+    file = tmp_path / "a.mcap"
+    told = bridge("replay", file, "--json")
+    other = tmp_path / "other.yaml"
+    other.write_text(lift.read_text())
+
+    assert made.returncode == 0, made.stderr
+    assert late.stdout.splitlines()[0] == f"no daemon serves {lift} now: nothing follows"
+    assert (late.returncode, (tmp_path / "late.mcap").exists()) == (0, True)
+    assert [(note.code, note.text) for note in notes_in(file)] == [("OPERATOR", "it stood")]
+    assert {one.topic for one in heard_in(file)} == {"lift_states", "diagnostics"}
+    assert (told.returncode, json.loads(told.stdout)["differences"]) == (0, [])
+    assert json.loads(told.stdout)["decisions"] > 5
+    assert (ring.returncode, ring.stdout.splitlines()[-1]) == (0, "all as recorded")
+    assert bridge("replay", file, "--config", other).stdout.endswith("changed none\n")
+
+
+def test_the_recorder_makes_a_file_of_a_daemon_that_is_killed(
+    lift: Path, tmp_path: Path, domain: int
+) -> None:
+    base = Path(tempfile.mkdtemp(prefix="rec", dir="/tmp"))  # a socket's path must be short
+    place = base / "rmf-bridge" / lift.stem
+    place.parent.mkdir(parents=True)
+    out = tmp_path / "out"
+    recorder = subprocess.Popen(
+        [sys.executable, "-m", "bridges.cli", "recorder", "-o", str(out)],
+        env=environment(XDG_RUNTIME_DIR=str(base)),
+    )
+    try:
+        with daemon(lift, place, "--simulate", "--domain-id", str(domain)) as running:
+            wait_until(lambda: states(place) > 2, "states are in the ring")
+            running.end(signal.SIGKILL)
+        wait_until(lambda: len(list(out.glob(f"{lift.stem}*.mcap"))) == 1, "a recording is written")
+        [file] = out.glob(f"{lift.stem}*.mcap")
+    finally:
+        recorder.send_signal(signal.SIGTERM)
+        code = recorder.wait(PATIENCE_S)
+        shutil.rmtree(base)
+
+    assert code == 0
+    assert [note.code for note in notes_in(file)] == ["DIED"]
+    assert head_of(file).yaml == lift.read_bytes()
+    assert bridge("replay", file).returncode == 0
+
+
+def test_a_command_without_a_ring_or_a_recording_says_what_to_do(
+    lift: Path, tmp_path: Path
+) -> None:
+    none = tmp_path / "none"
+    nothing = bridge("incident", lift, "--runtime-dir", str(none))
+    died = bridge("incident", lift, "--died", "--runtime-dir", str(none))
+    nowhere = bridge("incident", lift, "-o", none / "a.mcap", "--runtime-dir", str(none))
+    (tmp_path / "a.mcap").write_bytes(b"\x89MCAP0\r\n")
+    no_head = bridge("replay", tmp_path / "a.mcap")
+
+    assert (nothing.returncode, nothing.stdout) == (69, "")
+    assert nothing.stderr == (
+        f"{none}/ring cannot be read: No such file or directory."
+        " Does its daemon run, and does its YAML keep a ring?\n"
+    )
+    assert died.stderr == (
+        f"{none}/ring.died cannot be read: No such file or directory."
+        " --died is the run before the last one; for the last one, leave it out\n"
+    )
+    assert (nowhere.returncode, nowhere.stdout, nowhere.stderr) == (
+        73,
+        "",
+        f"{none}/a.mcap cannot be written: No such file or directory\n",
+    )
+    assert no_head.returncode == 66
+    assert "Traceback" not in nothing.stderr + no_head.stderr

@@ -1,0 +1,329 @@
+"""The recorder: when a file is made, what is in it, and how many there may be."""
+
+import os
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+
+import pytest
+from msgspec.structs import replace
+
+from bridges.blackbox import shelf as shelves
+from bridges.blackbox.entries import Head, Step
+from bridges.blackbox.recorder import Recorder
+from bridges.blackbox.ring import DIED, Read, Ring
+from bridges.blackbox.shelf import Shelf
+from bridges.kinds.lift.report import LiftReport
+from bridges.kinds.lift.signals import Door, LiftOutputs, LiftSample, Requested
+from bridges.kinds.shared.decision import Decision, Fault, IoFailed, Sampled
+from bridges.kinds.shared.durations import NEVER
+from bridges.kinds.shared.recording_section import Recording
+from bridges.messages.definitions import (
+    LiftDoor,
+    LiftMode,
+    LiftMotion,
+    LiftRequest,
+    LiftState,
+    Message,
+)
+from bridges.messages.releases import KILTED
+from bridges.runtime.clock import Clock
+from bridges.runtime.witness import Witness
+from workbench.replay.bags import Notes, heard_in
+from workbench.replay.incidents import entries_in, head_of, notes_in
+
+WALL = 1_800_000_000.0
+REPORT = LiftReport(
+    0.0, "L1", "", LiftDoor.DOOR_CLOSED, LiftMotion.MOTION_STOPPED, LiftMode.MODE_HUMAN, ""
+)
+SAMPLE = Sampled(LiftSample("L1", Door.CLOSED))
+
+
+class Machine:
+    """A machine with one daemon and a recorder, in virtual time."""
+
+    def __init__(self, folder: Path, keep: Recording = Recording()) -> None:  # noqa: B008
+        self.now = 1000.0
+        self.pid = os.getpid()
+        self.keep = keep
+        self.runtime = folder / "run" / "lift1"
+        self.runtime.mkdir(parents=True)
+        self.out = folder / "out"
+        self.recorder = Recorder(lambda: [self.runtime], Shelf(self.out), lambda: self.now)
+        self.runs = 0
+        self.start()
+
+    def start(self) -> None:
+        """A daemon starts."""
+        self.runs += 1
+        head = Head(
+            f"{self.runs:08x}",
+            self.pid,
+            "1",
+            "lift",
+            "/etc/lift1.yaml",
+            b"",
+            {},
+            False,
+            {},
+            self.keep,
+        )
+        make = partial(Ring, self.runtime, head, 200_000)
+        clock = Clock(lambda: self.now, lambda: WALL + self.now)
+        self.witness = Witness(make, clock, lambda: KILTED)
+        self.memory = object()
+        self.decide(SAMPLE)
+
+    def decide(self, event: object, refused: str = "", *faults: Fault) -> None:
+        """One scan of it."""
+        report = replace(REPORT, faults=faults)
+        decision = Decision(None, LiftOutputs(), report, NEVER, refused)
+        self.witness.decided("Lift1", None, event, self.now, decision)
+        self.witness.flush()
+
+    def say(self, topic: str, message: Message, *, sent: bool = False) -> None:
+        """A message goes by."""
+        self.witness.spoken(topic, message, sent=sent)
+        self.witness.flush()
+
+    def live(self, seconds: int, each: Callable[[], None] = lambda: None) -> None:
+        """Let time pass, with a reading and a look each second."""
+        for _ in range(seconds):
+            self.now += 1.0
+            self.decide(SAMPLE)
+            each()
+            self.witness.look()
+            self.recorder.look()
+
+    def files(self) -> list[str]:
+        """What was recorded, by name."""
+        return sorted(path.name for path in self.out.glob("*"))
+
+    def only(self) -> Path:
+        """The one recording."""
+        [path] = self.out.glob("*.mcap")
+        return path
+
+
+@pytest.fixture
+def machine(tmp_path: Path) -> Machine:
+    return Machine(tmp_path)
+
+
+def reasons(path: Path) -> list[tuple[str, str, str]]:
+    return [(note.code, note.subject, note.text) for note in notes_in(path)]
+
+
+def test_while_all_is_well_nothing_is_written(machine: Machine) -> None:
+    machine.live(300, lambda: machine.say("lift_states", LiftState(lift_name="Lift1"), sent=True))
+
+    assert machine.files() == []
+
+
+def test_a_fault_makes_one_file_with_what_went_before_and_what_followed(machine: Machine) -> None:
+    def state() -> None:
+        machine.say("lift_states", LiftState(lift_name="Lift1"), sent=True)
+
+    machine.live(200, state)
+    machine.decide(SAMPLE, "", Fault("FIRE"))
+    machine.live(31, state)
+    assert machine.files() == []
+    machine.live(2, state)
+
+    path = machine.only()
+    assert path.name.endswith("_fault_00000001.mcap")
+    assert reasons(path) == [("FAULT", "Lift1", "FIRE")]
+    assert head_of(path).run == "00000001"
+    times = [one.wall - WALL for one in heard_in(path)]
+    assert 1000 + 200 - 120 - 61 <= times[0] <= 1000 + 200 - 120
+    assert times[-1] == 1000 + 200 + 30
+    assert len(list(entries_in(path, Notes()))) > 5
+
+
+@pytest.mark.parametrize(
+    ("happens", "why"),
+    [
+        (lambda m: m.decide(Requested("r2", True, "L3"), "busy: r1 rides"), "REFUSED"),
+        (lambda m: m.decide(IoFailed("no answer"), "", Fault("INPUTS_NOT_FRESH")), "FAULT"),
+        (lambda m: m.decide(SAMPLE, "released a moment ago"), None),
+        (lambda m: m.decide(IoFailed("no answer")), None),
+    ],
+    ids=["refused", "fault", "handover", "one failed reading"],
+)
+def test_refusals_and_faults_are_reasons_for_a_recording_and_handovers_are_not(
+    machine: Machine, happens: Callable[[Machine], None], why: str | None
+) -> None:
+    happens(machine)
+    machine.live(40)
+
+    assert [name.split("_")[-2] for name in machine.files()] == ([why.lower()] if why else [])
+
+
+def test_the_same_cause_makes_no_second_file_within_ten_minutes(machine: Machine) -> None:
+    for _ in range(8):
+        machine.decide(SAMPLE, "", Fault("DOOR_STUCK", "a"))
+        machine.live(60)
+    assert len(machine.files()) == 1
+    machine.live(200)
+    machine.decide(SAMPLE, "", Fault("DOOR_STUCK", "b"))
+    machine.live(60)
+    assert len(machine.files()) == 2
+
+
+def test_a_robot_that_waits_too_long_for_a_lift_makes_a_file_and_a_served_one_does_not(
+    machine: Machine,
+) -> None:
+    asked = LiftRequest("Lift1", session_id="r1", request_type=1, destination_floor="L3")
+    there = LiftState(lift_name="Lift1", current_floor="L3", session_id="r1", door_state=2)
+    machine.live(150, lambda: machine.say("lift_requests", asked))
+    machine.say("lift_states", there, sent=True)
+    machine.live(150, lambda: machine.say("lift_requests", asked))
+    assert machine.files() == []
+    machine.live(70, lambda: machine.say("lift_requests", asked))
+
+    assert reasons(machine.only()) == [("WAITING", "Lift1", "r1 has waited for L3 for 180 s")]
+    assert len(list(heard_in(machine.only()))) > 100
+
+
+def test_a_request_that_is_no_longer_repeated_counts_as_waiting_no_longer(machine: Machine) -> None:
+    asked = LiftRequest("Lift1", session_id="r1", request_type=1, destination_floor="L3")
+    machine.live(100, lambda: machine.say("lift_requests", asked))
+    machine.live(20)
+    machine.live(120, lambda: machine.say("lift_requests", asked))
+
+    assert machine.files() == []
+
+
+def test_a_killed_run_is_recorded_once_even_if_the_recorder_restarts(
+    machine: Machine,
+) -> None:
+    machine.live(50)
+    machine.start()
+    machine.live(5)
+    machine.recorder = Recorder(lambda: [machine.runtime], Shelf(machine.out), lambda: machine.now)
+    machine.live(5)
+
+    assert reasons(machine.only()) == [
+        ("DIED", "", "it ended without an entry: killed, or the machine stopped")
+    ]
+    assert head_of(machine.only()).run == "00000001"
+
+
+def test_a_run_that_a_defect_ended_is_recorded_with_its_reason(machine: Machine) -> None:
+    machine.live(10)
+    machine.witness.died("bus-io: ZeroDivisionError")
+    machine.witness.ended(safe=True)
+    machine.pid = 2**22 + 1
+    machine.start()
+    machine.live(40)
+
+    assert [r for name in machine.files() for r in reasons(machine.out / name)][:1] == [
+        ("DIED", "", "bus-io: ZeroDivisionError")
+    ]
+
+
+def test_a_daemon_that_dies_again_and_again_makes_one_file_in_ten_minutes(
+    machine: Machine,
+) -> None:
+    for _ in range(20):
+        machine.live(3)
+        machine.start()
+    assert len(machine.files()) == 1
+    machine.live(600)
+    machine.start()
+    machine.live(3)
+    assert len(machine.files()) == 2
+
+
+def test_a_start_that_fails_makes_no_recording(machine: Machine) -> None:
+    machine.witness.ended(safe=True)
+    head = Read(machine.runtime / "ring").head
+    for number in range(3):
+        Ring(machine.runtime, replace(head, run=f"f{number}"), 200_000).close(ended=False)
+        machine.live(3)
+
+    assert machine.files() == []
+
+
+def test_a_run_that_ended_in_good_order_is_not_recorded(machine: Machine) -> None:
+    machine.live(10)
+    machine.witness.ended(safe=True)
+    machine.start()
+    machine.live(40)
+
+    assert machine.files() == []
+    assert not (machine.runtime / DIED).exists()
+
+
+def test_a_daemon_that_ends_before_the_30_s_are_over_is_recorded_up_to_its_end(
+    machine: Machine,
+) -> None:
+    machine.live(20)
+    machine.decide(SAMPLE, "", Fault("FIRE"))
+    machine.live(5)
+    machine.witness.ended(safe=True)
+    (machine.runtime / "ring").unlink()
+    machine.recorder.look()
+
+    assert reasons(machine.only()) == [("FAULT", "Lift1", "FIRE")]
+
+
+def test_the_oldest_recordings_of_a_daemon_make_room_and_those_of_others_stay(
+    tmp_path: Path,
+) -> None:
+    machine = Machine(tmp_path, Recording(files=2))
+    machine.out.mkdir()
+    other = machine.out / "lift1_b_2026-01-01_00-00-00_fault_abcdefab.mcap"
+    other.touch()
+    made = []
+    for number in range(4):
+        machine.decide(SAMPLE, "", Fault(f"F{number}"))
+        machine.live(40)
+        made.append(max(set(machine.files()) - {other.name}))
+
+    assert machine.files() == sorted([other.name, *made[2:]])
+
+
+def test_a_full_disk_loses_recordings_and_is_logged_once(
+    machine: Machine, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr(shelves, "LEAST_FREE", 1 << 62)
+    for number in range(3):
+        machine.decide(SAMPLE, "", Fault(f"F{number}"))
+        machine.live(40)
+
+    assert machine.files() == []
+    assert [r.getMessage().split(" ")[0] for r in caplog.records] == ["not_recorded"]
+
+
+def test_continuous_files_follow_each_other_without_gap_or_overlap(tmp_path: Path) -> None:
+    machine = Machine(tmp_path, Recording(keep="continuous"))
+    machine.live(1000, lambda: machine.say("lift_states", LiftState(), sent=True))
+    machine.recorder.close()
+
+    spoken = [one.at for name in machine.files() for one in heard_in(machine.out / name)]
+    assert len(machine.files()) == 4
+    assert len(spoken) == 1000
+    assert spoken == sorted(set(spoken))
+    assert {name.split("_")[-2] for name in machine.files()} == {"all"}
+
+
+def test_a_damaged_ring_keeps_no_other_from_being_recorded(
+    machine: Machine, tmp_path: Path
+) -> None:
+    broken = tmp_path / "run" / "broken"
+    broken.mkdir()
+    (broken / "ring").write_bytes(b"RMFRING1" + b"\xff" * 9000)
+    (broken / DIED).write_bytes(b"")
+    folders = [broken, machine.runtime, tmp_path / "none"]
+    machine.recorder = Recorder(lambda: folders, Shelf(machine.out), lambda: machine.now)
+    machine.decide(SAMPLE, "", Fault("FIRE"))
+    machine.live(40)
+
+    assert reasons(machine.only()) == [("FAULT", "Lift1", "FIRE")]
+
+
+def test_the_ring_shows_each_decision_of_the_machine(machine: Machine) -> None:
+    machine.live(3)
+    steps = [e for e in Read(machine.runtime / "ring").entries() if isinstance(e, Step)]
+    assert len(steps) == 1

@@ -1,0 +1,256 @@
+"""An incident without the site's names: each becomes `name01`, `name02` …, the same one everywhere.
+
+Names are the name fields of RMF's messages, the single words that cores remember, the devices, and
+what the YAML names. They are replaced in messages, memories, notes and the YAML, also
+inside of texts. Their order stays, because cores sort by names. A word that is also one of ours (a key
+or a value of the YAML, a word of a core, a topic) stays: without it the recording would no longer
+be the same. Comments of the YAML go; the addresses of its buses become `192.0.2.1`.
+"""
+
+import enum
+import inspect
+import re
+import typing
+from collections.abc import Callable, Iterator
+from functools import cache
+from types import ModuleType
+from typing import Any, Final
+
+import msgspec
+import yaml
+from msgspec.structs import replace
+
+from bridges.blackbox.entries import AnyEntry, Clocks, Died, Ended, Head, Known, Lost, Spoken, Step
+from bridges.blackbox.incident import Incident
+from bridges.blackbox.trees import HOLDS, TYPE, Tree
+from bridges.kinds.shared.graph_kind import GraphKind
+from bridges.messages import cdr
+from bridges.messages.definitions import Message
+from bridges.messages.heard import FREE_TEXTS
+from bridges.messages.releases import RELEASES
+from bridges.messages.texts import MESSAGES
+from bridges.settings import names as known
+from bridges.settings.config import Config
+from workbench.commissioning.reference import schema
+from workbench.replay.replayed import of_head
+from workbench.replay.sources import TOPICS
+
+SAID: Final = FREE_TEXTS | {"code", "detail", "reason", "code_fault", "errors", "lost", "io_fault"}
+"""Fields of a core's values that hold its own words."""
+NAME: Final = re.compile(r"(?!\d+$)[\w./-]{1,128}")
+ADDRESS: Final = "192.0.2.1"
+HOSTS: Final = ("host", "api_base", "url")
+
+Swap = Callable[[str], str]
+
+
+def anonymous(incident: Incident) -> Incident:
+    """The same incident without names. Raises SettingsError, if today's rules refuse its YAML."""
+    config = of_head(incident.head)
+    content = yaml.safe_load(incident.head.yaml)
+    own = {*_subjects(incident), *_own_names(config, content)}
+    whole = {*own, *_spoken_names(incident), *_remembered(incident)}
+    found = {part for name in whole for part in name.split("/")}
+    swap = _swap(sorted(found - our_words() - {""}, key=lambda name: (-len(name), name)))
+    return Incident(
+        _head(incident.head, content, swap),
+        [_entry(entry, swap) for entry in incident.entries],
+        tuple(replace(n, text=swap(n.text), subject=swap(n.subject)) for n in incident.notes),
+    )
+
+
+def _swap(names: list[str]) -> Swap:
+    """Replaces names, whole or inside of a text; the longest first."""
+    if not names:
+        return lambda text: text
+    width = len(str(len(names)))
+    aliases = {name: f"name{number:0{width}}" for number, name in enumerate(sorted(names), 1)}
+    pattern = re.compile(r"(?<!\w)(?:" + "|".join(map(re.escape, names)) + r")(?!\w)")
+    return lambda text: pattern.sub(lambda match: aliases[match[0]], text)
+
+
+def _spoken_names(incident: Incident) -> Iterator[str]:
+    for entry in incident.entries:
+        if isinstance(entry, Spoken) and (message := _decoded(entry)) is not None:
+            yield from _names_in(message)
+
+
+def _decoded(spoken: Spoken) -> Message | None:
+    try:
+        return cdr.decode(MESSAGES[spoken.type], spoken.cdr, RELEASES[spoken.release])
+    except (KeyError, cdr.CdrError):
+        return None
+
+
+def _names_in(value: object, field: str = "") -> Iterator[str]:
+    if isinstance(value, str):
+        if field not in FREE_TEXTS:
+            yield value
+    elif isinstance(value, tuple):
+        for part in value:
+            yield from _names_in(part, field)
+    elif isinstance(value, msgspec.Struct):
+        for name in value.__struct_fields__:
+            yield from _names_in(getattr(value, name), name)
+
+
+def _remembered(incident: Incident) -> Iterator[str]:
+    """Each text of one word in a memory or an event, except a core's own words."""
+    for entry in incident.entries:
+        if isinstance(entry, Known):
+            yield from _tree_names([entry.memory, entry.reading])
+        elif isinstance(entry, Step):
+            yield from _tree_names([entry.event, *entry.publish])
+
+
+def _tree_names(told: Tree) -> Iterator[str]:
+    if isinstance(told, str):
+        if NAME.fullmatch(told):
+            yield told
+    elif isinstance(told, list):
+        for part in told:
+            yield from _tree_names(part)
+    elif isinstance(told, dict) and not isinstance(told.get(HOLDS), str):
+        for key, part in told.items():
+            if key not in (TYPE, *SAID):
+                yield from _tree_names(part)
+
+
+def _subjects(incident: Incident) -> Iterator[str]:
+    for entry in incident.entries:
+        if subject := getattr(entry, "subject", ""):
+            yield subject
+
+
+def _own_names(config: Config, content: dict[str, Any]) -> Iterator[str]:
+    """The devices and places that the YAML names; of a kind without hardware, every word of its own."""
+    kind = known.kind_called(config.kind)
+    yield from content.get("rmf", {}).get("topics", {}).values()
+    if isinstance(kind, GraphKind):
+        yield from _words(content.get(kind.devices_key))
+        return
+    for name, device in config.devices.items():
+        yield name
+        yield from (place for _, _, place in kind.on_map(device))
+
+
+def _words(value: object) -> Iterator[str]:
+    if isinstance(value, str) and re.fullmatch(r"\w[\w /.-]*", value) and not value.isdecimal():
+        yield value
+    elif isinstance(value, dict):
+        for key, part in value.items():
+            yield from (*_words(key), *_words(part))
+    elif isinstance(value, list):
+        for part in value:
+            yield from _words(part)
+
+
+@cache
+def our_words() -> frozenset[str]:
+    """Every key and word that a YAML or a core may have by itself."""
+    found = {"site", *TOPICS}
+    _schema_words(schema(), found)
+    for kind in known.kind_names():
+        for module in known.kind_files(kind):
+            found |= set(_module_words(module))
+    return frozenset(found)
+
+
+def _schema_words(part: object, found: set[str]) -> None:
+    if isinstance(part, dict):
+        found |= set(part.get("properties", ())) | {str(part.get("const", ""))}
+        found |= {str(word) for word in part.get("enum", ())}
+        for below in part.values():
+            _schema_words(below, found)
+    elif isinstance(part, list):
+        for below in part:
+            _schema_words(below, found)
+
+
+def _module_words(module: ModuleType) -> Iterator[str]:
+    """The words that its types may hold: literals, and the values of enumerations."""
+    for kind in vars(module).values():
+        if inspect.isclass(kind) and issubclass(kind, enum.Enum):
+            yield from (str(member.value) for member in kind)
+        elif inspect.isclass(kind) and (issubclass(kind, msgspec.Struct)):
+            for hint in typing.get_type_hints(kind).values():
+                yield from _literals(hint)
+
+
+def _literals(hint: object) -> Iterator[str]:
+    for part in typing.get_args(hint):
+        if isinstance(part, str):
+            yield part
+        else:
+            yield from _literals(part)
+
+
+def _head(head: Head, content: dict[str, Any], swap: Swap) -> Head:
+    for bus in content.get("buses", {}).values():
+        _hide_address(bus)
+    content.get("rmf", {}).pop("zenoh", None)
+    text = yaml.safe_dump(_swapped(content, swap), sort_keys=False, allow_unicode=True)
+    return replace(head, yaml=text.encode(), file="/anonymous.yaml")
+
+
+def _hide_address(part: object) -> None:
+    for key, value in part.items() if isinstance(part, dict) else ():
+        if key in HOSTS and isinstance(value, str):
+            part[key] = f"http://{ADDRESS}" if "://" in value else ADDRESS  # type: ignore[index]
+        else:
+            _hide_address(value)
+
+
+def _swapped(value: Any, swap: Swap) -> Any:
+    if isinstance(value, str):
+        return swap(value)
+    if isinstance(value, dict):
+        return {_swapped(key, swap): _swapped(part, swap) for key, part in value.items()}
+    return [_swapped(part, swap) for part in value] if isinstance(value, list) else value
+
+
+def _entry(entry: AnyEntry, swap: Swap) -> AnyEntry:
+    if isinstance(entry, Clocks | Ended | Lost):
+        return entry
+    if isinstance(entry, Died):
+        return replace(entry, reason=swap(entry.reason))
+    if isinstance(entry, Spoken):
+        return _said(entry, swap)
+    changed = {
+        name: _tree(getattr(entry, name), swap)
+        for name in entry.__struct_fields__
+        if name not in ("at", "times", "anew")
+    }
+    return replace(entry, **changed)
+
+
+def _said(spoken: Spoken, swap: Swap) -> Spoken:
+    message = _decoded(spoken)
+    if message is None:
+        return replace(spoken, cdr=b"", topic=swap(spoken.topic))
+    told = cdr.encode(MESSAGES[spoken.type], _message(message, swap), RELEASES[spoken.release])
+    return replace(spoken, cdr=told)
+
+
+def _message(value: Any, swap: Swap) -> Any:
+    if isinstance(value, str):
+        return swap(value)
+    if isinstance(value, tuple):
+        return tuple(_message(part, swap) for part in value)
+    if isinstance(value, msgspec.Struct):
+        fields = value.__struct_fields__
+        return type(value)(**{name: _message(getattr(value, name), swap) for name in fields})
+    return value
+
+
+def _tree(told: Tree, swap: Swap) -> Tree:
+    """Texts are swapped; names of types, of fields and of members are not."""
+    if isinstance(told, str):
+        return swap(told)
+    if isinstance(told, list):
+        return [_tree(part, swap) for part in told]
+    if not isinstance(told, dict):
+        return told
+    if isinstance(told.get(HOLDS), str):
+        return told
+    return {key: part if key == TYPE else _tree(part, swap) for key, part in told.items()}

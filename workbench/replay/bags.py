@@ -1,0 +1,160 @@
+"""What was heard on RMF's graph, from a recording: ours, rosbag2's of any release (MCAP or sqlite3), or
+a daemon's ring itself.
+
+A recording is read as a stream, in bounded memory. Topics and types that are not RMF's are skipped and
+counted. If it is damaged, what can be read is yielded, and then the damage is noted.
+
+In our own files `log_time` is by a clock that never steps, and `publish_time` by the wall clock. Others
+have one clock, which may step: then `at` goes on from where it was.
+"""
+
+import logging
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Final
+
+from bridges.blackbox.entries import Spoken
+from bridges.blackbox.incident import timed
+from bridges.blackbox.ring import MAGIC, Read, RingError
+from bridges.host import user_files
+from bridges.host.log import pairs
+from bridges.messages import cdr
+from bridges.messages.heard import Heard, Own, bounded
+from workbench.replay.sources import BagError, Notes, Raw, releases, source
+
+__all__ = ["BagError", "Keep", "Notes", "all_in", "heard_in"]
+
+log = logging.getLogger(__name__)
+
+NS: Final = 1e-9
+CONTINUOUS: Final = "all"
+"""The word in the names of `keep: continuous` files; other files have their cause there."""
+STEPPED_NS: Final = 10**9
+"""A clock that goes back by this much was set back; less is disorder in the recording."""
+LONGEST_MESSAGE: Final = 8 << 20
+INSTALL: Final = "pip install 'rmf-bridges[recording,sqlite]'"
+
+
+Keep = Callable[[str, bytes, float], bool]
+"""Is a sample of this topic, recorded at this time (s), worth decoding?"""
+
+
+def heard_in(path: Path, notes: Notes | None = None, keep: Keep | None = None) -> Iterator[Heard]:
+    """All messages of RMF in a recording, as `all_in` gives them."""
+    return (one for one in all_in(path, notes, keep) if isinstance(one, Heard))
+
+
+def all_in(
+    path: Path, notes: Notes | None = None, keep: Keep | None = None
+) -> Iterator[Heard | Own]:
+    """Every message of RMF in a recording, and every text of ours, in the order of recording.
+
+    `path`: an MCAP file, a `.db3` file, a directory of rosbag2, or a ring. What is skipped or damaged
+    is noted in `notes`; damage is logged where there are none. What `keep` does not want is skipped
+    undecoded, which takes a tenth of the time. Raises BagError if it is not a recording.
+    """
+    noted = Notes() if notes is None else notes
+    clock = _Clock()
+    for raw in _raw(path, noted):
+        if keep is not None and not keep(raw.topic, raw.sample, raw.at * NS):
+            continue
+        try:
+            if len(raw.sample) > LONGEST_MESSAGE:
+                raise cdr.CdrError("too long")
+            at, wall = clock.at(raw.at) * NS, raw.wall * NS
+            if raw.decode is None:
+                yield Own(at, wall, raw.topic, cdr.decode_text(raw.sample))
+            else:
+                yield Heard(at, wall, raw.topic, bounded(raw.decode(raw.sample)))
+        except cdr.CdrError:
+            noted.skipped[f"{raw.topic}: cannot be decoded"] += 1
+    if noted.damage and notes is None:
+        log.warning(pairs("damaged", reason=noted.damage))
+
+
+class _Clock:
+    """Time that never runs backwards (ns)."""
+
+    def __init__(self) -> None:
+        self._shift = 0
+        self._last = -(1 << 63)
+
+    def at(self, recorded: int) -> int:
+        """When a message came that was recorded at this time."""
+        if recorded + self._shift < self._last - STEPPED_NS:
+            self._shift = self._last - recorded
+        self._last = max(self._last, recorded + self._shift)
+        return self._last
+
+
+def _raw(path: Path, noted: Notes) -> Iterator[Raw]:
+    for part in _parts(path):
+        yield from _raw_of(part, noted)
+
+
+def _parts(path: Path) -> list[Path]:
+    """The files of a recording in their order; its directory, if that is read as a whole."""
+    try:
+        if not path.is_dir():
+            return [path]
+        files = sorted(path.iterdir(), key=_number)
+    except OSError as error:
+        raise BagError(f"{path} cannot be read: {error.strerror}") from None
+    if bags := [file for file in files if file.suffix == ".mcap"]:
+        return continuous(bags)
+    if any(file.suffix == ".zstd" for file in files):
+        raise BagError(f"{path} is compressed as whole files: unpack them with zstd -d")
+    databases = [file for file in files if file.suffix == ".db3"]
+    if not databases:
+        raise BagError(f"{path} holds no recording: it has no .mcap or .db3 file")
+    return [path] if (path / "metadata.yaml").exists() else databases
+
+
+def continuous(files: list[Path]) -> list[Path]:
+    """The files of our recorder that follow each other without overlap; all, if there are none."""
+    return [file for file in files if f"_{CONTINUOUS}_" in file.name] or files
+
+
+def _number(path: Path) -> tuple[int, str]:
+    """rosbag2 numbers the files of a recording: name_2 comes before name_10."""
+    number = path.stem.rpartition("_")[2]
+    return int(number) if number.isdecimal() and len(number) < 7 else 0, path.name
+
+
+def _raw_of(part: Path, noted: Notes) -> Iterator[Raw]:
+    if not part.is_dir() and _beginning(part).startswith(MAGIC):
+        return _of_ring(part)
+    begins = b"SQLite format 3\0" if part.is_dir() else _beginning(part)
+    try:
+        if begins.startswith(b"\x89MCAP0"):
+            from workbench.replay import mcap_bags
+
+            return mcap_bags.raw_in(part, noted)
+        if begins.startswith(b"SQLite format 3\0"):
+            from workbench.replay import sqlite_bags
+
+            return sqlite_bags.raw_in(part, noted)
+    except ImportError as error:
+        raise BagError(f"to read {part}, {error.name} is needed: {INSTALL}") from None
+    raise BagError(f"{part} is not a recording: neither MCAP nor a .db3 file of rosbag2")
+
+
+def _of_ring(path: Path) -> Iterator[Raw]:
+    try:
+        entries = list(Read(path).entries())
+    except RingError as error:
+        raise BagError(str(error)) from None
+    for entry, steady, wall in timed(entries):
+        if isinstance(entry, Spoken):
+            found = source(entry.topic, entry.type, releases(entry.type, ""))
+            if found.decode is not None:
+                at, told = round(steady / NS), round(wall / NS)
+                yield Raw(at, told, found.topic, entry.cdr, found.decode)
+
+
+def _beginning(path: Path) -> bytes:
+    """Raises BagError if it cannot be read, or is not a regular file."""
+    try:
+        return user_files.read(path, 15).content
+    except OSError as error:
+        raise BagError(f"{path} cannot be read: {error.strerror}") from None

@@ -1,0 +1,62 @@
+"""RMF's messages in an MCAP file, ours or rosbag2's."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Final
+
+from mcap.records import Channel, Header, McapRecord, Message, Schema
+
+from bridges.explain.noted import OWN_TOPICS
+from bridges.messages.releases import Release
+from workbench.replay.mcap_read import Damaged, records
+from workbench.replay.sources import Notes, Raw, Source, releases, source
+
+LIBRARY: Final = "rmf-bridges"
+"""How the `library` in the header of our own files begins."""
+NO_CHANNEL: Final = Source("", None, "of no channel")
+
+
+def raw_in(path: Path, notes: Notes) -> Iterator[Raw]:
+    """Its messages of RMF, as they were recorded. Damage is noted where it ends them."""
+    declared = _Declared()
+    try:
+        for record in records(path):
+            if isinstance(record, Message):
+                found = declared.sources.get(record.channel_id, NO_CHANNEL)
+                if found.decode is None and not declared.is_ours(found):
+                    notes.skipped[found.why] += 1
+                    continue
+                wall = record.publish_time if declared.ours else record.log_time
+                yield Raw(record.log_time, wall, found.topic, record.data, found.decode)
+            else:
+                declared.take(record)
+    except (Damaged, OSError) as error:
+        notes.damaged(path, error)
+
+
+class _Declared:
+    """What a file has declared so far. `ours`: our recorder wrote it. `sources`: by channel."""
+
+    def __init__(self) -> None:
+        self.ours = False
+        self.sources: dict[int, Source] = {}
+        self._types: dict[int, tuple[str, list[Release]]] = {}
+
+    def is_ours(self, found: Source) -> bool:
+        """Is it one of our recorder's own topics?"""
+        return self.ours and found.topic.startswith(OWN_TOPICS)
+
+    def take(self, record: McapRecord) -> None:
+        """Note a header, a schema or a channel."""
+        if isinstance(record, Header):
+            self.ours = record.library.startswith(LIBRARY)
+        elif isinstance(record, Schema):
+            text = record.data if record.encoding == "ros2msg" else b""
+            self._types[record.id] = (
+                record.name,
+                releases(record.name, text.decode("utf-8", "replace")),
+            )
+        elif isinstance(record, Channel):
+            name, found = self._types.get(record.schema_id, ("", []))
+            is_cdr = record.message_encoding == "cdr"
+            self.sources[record.id] = source(record.topic, name if is_cdr else "", found)

@@ -1,0 +1,167 @@
+"""What the commands that read a recording share: the part that is asked for, and how they refuse."""
+
+import argparse
+import os
+import re
+from collections import Counter, OrderedDict
+from collections.abc import Iterator
+from dataclasses import dataclass
+from datetime import datetime, timedelta
+from pathlib import Path
+
+from bridges.commands.graph import complain
+from bridges.explain import noted
+from bridges.explain.noted import OWN_TOPICS
+from bridges.messages import topics
+from bridges.messages.heard import Heard, Own
+from workbench.replay.bags import Keep, all_in
+from workbench.replay.sources import BagError, Notes
+
+CLOCK = re.compile(r"(?:(\d{4}-\d\d-\d\d)[ T])?(\d\d?):(\d\d)(?::(\d\d(?:\.\d+)?))?")
+SAME_S = 2.4
+"""Shorter than the silence (3 s) after which a daemon counts as silent."""
+STAMPED = 12
+"""This many bytes of a DiagnosticArray are CDR's head and the stamp (OMG DDSI-RTPS 10.2; Header)."""
+MOST_TOLD = 512
+FIRST_OF_OTHERS = 300
+COORDINATOR = b"charger_coordinator"
+
+
+@dataclass(frozen=True, slots=True)
+class Time:
+    """A time as typed: s from the beginning, or a local time of a day (None: the first one)."""
+
+    after_s: float | None = None
+    day: str | None = None
+    of_day_s: float = 0.0
+
+    def wall(self, began: float) -> float:
+        """In s since the epoch, in a recording that began then."""
+        if self.after_s is not None:
+            return began + self.after_s
+        day = datetime.fromisoformat(self.day) if self.day else datetime.fromtimestamp(began)
+        midnight = day.replace(hour=0, minute=0, second=0, microsecond=0)
+        return (midnight + timedelta(seconds=self.of_day_s)).timestamp()
+
+
+@dataclass(slots=True)
+class Span:
+    """The part of a recording that is asked for. `begins_at`: when it began, by `Heard.at`."""
+
+    from_: Time | None
+    to: Time | None
+    begins_at: float = float("-inf")
+
+
+def unreadable(command: str, error: BagError) -> int:
+    """Say why there is no recording to read, and give the exit code, 66 for every command."""
+    complain(command, error)
+    return os.EX_NOINPUT
+
+
+def add_span_arguments(parser: argparse.ArgumentParser) -> None:
+    """`--from` and `--to`."""
+    times = (
+        "14:03, 14:03:07, '2026-11-22 14:03' (this machine's time), or +90: s from its beginning"
+    )
+    parser.add_argument(
+        "--from", dest="from_", type=_time, metavar="TIME", help=f"begin then: {times}"
+    )
+    parser.add_argument("--to", type=_time, metavar="TIME", help="end then")
+
+
+def _time(text: str) -> Time:
+    """Raises ArgumentTypeError."""
+    found = CLOCK.fullmatch(text)
+    try:
+        if found is None:
+            return Time(after_s=_plus(text))
+        day, hour, minute, second = found.groups()
+        if day:
+            datetime.fromisoformat(day)
+        if int(hour) > 23 or int(minute) > 59 or float(second or 0) >= 60:
+            raise ValueError
+    except ValueError:
+        why = "write 14:03:07, '2026-11-22 14:03:07', or +90 for 90 s after the beginning"
+        raise argparse.ArgumentTypeError(f"'{text}' is not a time: {why}") from None
+    return Time(None, day, int(hour) * 3600.0 + int(minute) * 60.0 + float(second or 0))
+
+
+def _plus(text: str) -> float:
+    if not re.fullmatch(r"\+\d{1,9}(\.\d+)?", text):
+        raise ValueError(text)
+    return float(text)
+
+
+class Sieve:
+    """Which samples are worth decoding, for one device or (name "") for all.
+
+    Diagnostics come each second and seldom change: those that differ from what their node has just
+    said by numbers alone (ages, counts) are taken every SAME_S only. Of other devices the first
+    samples are taken, for their names.
+    """
+
+    def __init__(self, name: str) -> None:
+        self._name = name.encode(errors="replace")
+        self._others: Counter[str] = Counter()
+        self._told: OrderedDict[bytes, float] = OrderedDict()
+
+    def keep(self, topic: str, sample: bytes, at: float) -> bool:
+        """Is it to be decoded?"""
+        if topic.startswith(OWN_TOPICS) and topic.removeprefix(OWN_TOPICS) not in noted.TOPICS:
+            return False
+        if self._name not in sample and not self._is_common(topic, sample):
+            self._others[topic] += 1
+            return self._others[topic] <= FIRST_OF_OTHERS
+        return topic != topics.DIAGNOSTICS.name or self._is_news(sample, at)
+
+    def _is_common(self, topic: str, sample: bytes) -> bool:
+        """Is it of all devices? A heartbeat without this door says that nobody holds it."""
+        return topic == topics.DOOR_SUPERVISOR_HEARTBEAT.name or COORDINATOR in sample
+
+    def _is_news(self, sample: bytes, at: float) -> bool:
+        essence = sample[STAMPED:].translate(None, b"0123456789")
+        if 0 <= at - self._told.get(essence, float("-inf")) < SAME_S:
+            return False
+        self._told[essence] = at
+        self._told.move_to_end(essence)
+        if len(self._told) > MOST_TOLD:
+            self._told.popitem(last=False)
+        return True
+
+
+def told_between(path: Path, span: Span, command: str, device: str) -> Iterator[Heard | Own]:
+    """What concerns the device ("": all), messages and our recorder's texts, as `between` gives it.
+
+    Messages that differ little from second to second are thinned out (`Sieve`).
+    """
+    return between(path, span, command, Sieve(device).keep)
+
+
+def between(
+    path: Path, span: Span, command: str, keep: Keep | None = None
+) -> Iterator[Heard | Own]:
+    """A recording until the end of the span; what is before it too, as states last.
+
+    Damage is told on standard error. Raises BagError.
+    """
+    notes, began, until = Notes(), None, float("inf")
+    for heard in all_in(path, notes, keep):
+        if began is None:
+            began = heard.wall
+            until = span.to.wall(began) if span.to else until
+        if span.from_ and span.begins_at == float("-inf") and heard.wall >= span.from_.wall(began):
+            span.begins_at = heard.at
+        if heard.wall > until:
+            break
+        yield heard
+    if notes.damage:
+        complain(command, notes.damage)
+
+
+def within(path: Path, span: Span, command: str) -> Iterator[Heard]:
+    """The messages of the span alone, none left out. Damage is told. Raises BagError."""
+    for heard in between(path, span, command):
+        has_begun = span.from_ is None or heard.at >= span.begins_at > float("-inf")
+        if has_begun and isinstance(heard, Heard):
+            yield heard

@@ -1,0 +1,307 @@
+"""A recording played again: today's core decides on what was recorded, and each decision is compared.
+
+A core is a pure function of its memory, an event, the time and its limits. A recording has the memory
+at its beginning and every event. So the decisions come out the same, to the bit, unless the core or
+its limits have changed.
+"""
+
+import struct
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any, Final
+
+from bridges.blackbox.entries import (
+    LATEST_S,
+    AnyEntry,
+    Clocks,
+    Forgotten,
+    Head,
+    Known,
+    Published,
+    Same,
+    Step,
+)
+from bridges.blackbox.trees import Tree, UnknownValue, first_difference, tree
+from bridges.host.log import plain
+from bridges.kinds.shared.decision import Decision, IoFailed, Sampled
+from bridges.kinds.shared.graph_kind import GraphKind
+from bridges.settings.config import Config
+from bridges.settings.load import understood
+from bridges.settings.names import kind_called
+from drivers.profiles import texts
+from workbench.replay.typed import typed, types_of
+
+AnyDecision = Decision[Any, Any, Any]
+Parts = tuple[str, Tree, Tree]
+"""A part of a decision that differs: its name, as recorded, and today."""
+CONTEXT: Final = 6
+"""A difference is reported with this many events before it."""
+PARTS: Final = ("outputs", "news", "refused")
+"""The parts that are compared when other limits are tried: those that are visible from outside."""
+
+
+@dataclass(frozen=True, slots=True)
+class Core:
+    """What a replay needs of a kind, with the limits of one subject. `types`: `typed.types_of`."""
+
+    decide: Callable[[Any, Any, float], Any]
+    published: Callable[[Any, Any], Any]
+    types: Mapping[str, Any]
+
+
+@dataclass(frozen=True, slots=True)
+class Difference:
+    """A decision that differs. `wall`: when (s since the epoch). `what`: which part of it.
+
+    `before`: the last events up to this one, each with its time, in words.
+    """
+
+    subject: str
+    wall: float
+    what: str
+    recorded: Tree
+    today: Tree
+    before: tuple[tuple[float, str], ...]
+
+
+@dataclass(slots=True)
+class Course:
+    """How far a replay has come. `decisions`: how many were compared. `unusable`: entries of subjects
+    that cannot be replayed. `subjects`: those that can. `began`, `ended`: s since the epoch."""
+
+    decisions: int = 0
+    unusable: int = 0
+    subjects: set[str] = field(default_factory=set)
+    began: float = 0.0
+    ended: float = 0.0
+    offset_s: float = 0.0
+
+    def reach(self, entry: AnyEntry) -> None:
+        """Note the time of an entry."""
+        if isinstance(entry, Clocks):
+            self.offset_s = entry.wall - entry.at
+        self.ended = entry.at + self.offset_s
+        self.began = self.began or self.ended
+
+
+def of_head(head: Head) -> Config:
+    """The settings that a daemon ran with. Raises SettingsError, if today's rules refuse them."""
+    texts.give(head.texts)
+    return understood(head.file, head.yaml)
+
+
+class Cores:
+    """The cores of a daemon, from its settings."""
+
+    def __init__(self, config: Config) -> None:
+        self._config = config
+        self._kind = kind_called(config.kind)
+        self._made: dict[str, Core | None] = {}
+
+    def of(self, subject: str) -> Core | None:
+        """The core of a subject; None where these settings have no such device."""
+        if subject not in self._made:
+            self._made[subject] = self._make(subject)
+        return self._made[subject]
+
+    def _make(self, subject: str) -> Core | None:
+        config, kind = self._config, self._kind
+        if isinstance(kind, GraphKind):
+            limits = kind.limits(config.section)
+            return Core(
+                _with(kind.decide, limits), lambda memory, report: memory, types_of(kind.decide)
+            )
+        if subject not in config.devices:
+            return None
+        debounce = config.driver_type(subject).debounce(config.devices[subject])
+        limits = kind.limits(config.devices[subject], debounce)
+        return Core(_with(kind.decide, limits), kind.published, types_of(kind.decide))
+
+
+def _with(decide: Callable[..., Any], limits: Any) -> Callable[[Any, Any, float], Any]:
+    return lambda memory, event, now: decide(memory, event, now, limits)
+
+
+class _Subject:
+    """One subject, whose decisions are made again from its memory on."""
+
+    def __init__(self, core: Core, known: Known) -> None:
+        self._core = core
+        self._memory = typed(known.memory, core.types["memory"])
+        self._reading = typed(known.reading, core.types["event"] | None)
+        self._report = typed(known.report, core.types["report"])
+        self._outputs: object = typed(known.outputs, core.types["outputs"])
+        self._news = self._report.news() if self._report else None
+        self._recorded = _trees(self._outputs, self._report)
+        self.last: deque[tuple[float, object]] = deque(maxlen=CONTEXT)
+
+    @property
+    def has_decided(self) -> bool:
+        """Whether there is a reading to come again, and a report to go out."""
+        return self._report is not None
+
+    def memory(self) -> Tree:
+        """What is remembered now."""
+        return tree(self._memory)
+
+    def published(self) -> None:
+        """The report has gone out."""
+        self._memory = self._core.published(self._memory, self._report)
+
+    def step(self, step: Step) -> list[Parts]:
+        """Decide on an event; gives what differs."""
+        event = typed(step.event, self._core.types["event"])
+        if type(event) in (Sampled, IoFailed):
+            self._reading = event
+        for part, new in (("outputs", step.outputs), ("news", step.news), ("faults", step.faults)):
+            if new:
+                self._recorded[part] = new[0]
+        told = {"refused": step.refused, "publish": step.publish, "wake_at": step.wake_at}
+        decision = self._decide(event, step.at)
+        self._outputs, self._news = decision.outputs, decision.report.news()
+        return _differing(self._recorded | told, decision)
+
+    def again(self, at: float) -> list[Parts]:
+        """The last reading once more, which changed nothing when it was recorded."""
+        outputs, news, report = self._outputs, self._news, self._report
+        decision = self._decide(self._reading, at)
+        if (
+            decision.outputs == outputs
+            and decision.report.faults == report.faults
+            and decision.report.news() == news
+            and not decision.refused
+            and not decision.publish
+        ):
+            return []
+        self._outputs, self._news = decision.outputs, decision.report.news()
+        return _differing(self._recorded | {"refused": "", "publish": []}, decision)
+
+    def _decide(self, event: object, at: float) -> AnyDecision:
+        self.last.append((at, event))
+        try:
+            decision: AnyDecision = self._core.decide(self._memory, event, at)
+        except Exception as error:  # it never raises for what a core has remembered itself
+            why = f"{type(error).__name__}: {error}"
+            raise UnknownValue(f"the core cannot decide on what was recorded: {why}") from error
+        self._memory, self._report = decision.memory, decision.report
+        return decision
+
+
+def _trees(outputs: object, report: Any) -> dict[str, Tree]:
+    if report is None:
+        return {"outputs": None, "news": None, "faults": None}
+    news, faults = tree(report.news()), tree(report.faults)
+    return {"outputs": tree(outputs), "news": news, "faults": faults}
+
+
+def _differing(recorded: dict[str, Tree], decision: AnyDecision) -> list[Parts]:
+    today: dict[str, Tree] = {
+        **_trees(decision.outputs, decision.report),
+        "refused": decision.refused,
+        "publish": [[topic.name, tree(message)] for topic, message in decision.publish],
+        "wake_at": tree(decision.wake_at),
+    }
+    return [
+        (part, was, today[part])
+        for part, was in recorded.items()
+        if today[part] != was and first_difference(was, today[part])
+    ]
+
+
+class Replay:
+    """A recording played again. `course`: how far it has come."""
+
+    def __init__(self, entries: Iterable[AnyEntry], cores: Cores) -> None:
+        self.course = Course()
+        self._entries = entries
+        self._cores = cores
+        self._subjects: dict[str, _Subject | None] = {}
+
+    def differences(self) -> Iterator[Difference]:
+        """The first difference of each subject: today's core decides, or remembers, something else."""
+        for entry in self._entries:
+            self.course.reach(entry)
+            for at, found in self._played(entry, strict=True):
+                if found:
+                    yield self._difference(entry, at, found[0])
+                    self._subjects[_name(entry)] = None
+                    break
+
+    def changes(self) -> Iterator[Difference]:
+        """Where other limits decide differently: each time that outputs, state or refusal begin to
+        differ, differ in another way, or become as recorded again."""
+        shown: dict[tuple[str, str], Tree] = {}
+        for entry in self._entries:
+            self.course.reach(entry)
+            for at, found in self._played(entry, strict=False):
+                differing = {part: (was, now) for part, was, now in found}
+                for part in PARTS:
+                    was, now = differing.get(part, (None, None))
+                    key = (_name(entry), part)
+                    if shown.get(key) != now:
+                        shown[key] = now
+                        yield self._difference(entry, at, (part, was, now))
+
+    def _difference(self, entry: AnyEntry, at: float, found: Parts) -> Difference:
+        subject, offset_s = self._subjects[_name(entry)], self.course.offset_s
+        last = subject.last if subject else ()
+        words = tuple((when + offset_s, f"{_kind(event)} {plain(event)}") for when, event in last)
+        return Difference(_name(entry), at + offset_s, *found, words)
+
+    def _played(self, entry: AnyEntry, *, strict: bool) -> Iterator[tuple[float, list[Parts]]]:
+        """Each decision of one entry: when, and what differs. `strict`: memories are compared too."""
+        if isinstance(entry, Known):
+            yield from self._known(entry, strict=strict)
+        elif isinstance(entry, Forgotten):
+            self._subjects.pop(entry.subject, None)
+        elif isinstance(entry, Step | Same | Published):
+            subject = self._subjects.get(entry.subject)
+            if subject is not None and (isinstance(entry, Step) or subject.has_decided):
+                yield from self._decided(subject, entry)
+            else:
+                self.course.unusable += entry.subject not in self._subjects
+
+    def _decided(
+        self, subject: _Subject, entry: Step | Same | Published
+    ) -> Iterator[tuple[float, list[Parts]]]:
+        if isinstance(entry, Published):
+            subject.published()
+        elif isinstance(entry, Step):
+            self.course.decisions += 1
+            yield entry.at, subject.step(entry)
+        else:
+            for at in times(entry):
+                self.course.decisions += 1
+                yield at, subject.again(at)
+
+    def _known(self, entry: Known, *, strict: bool) -> Iterator[tuple[float, list[Parts]]]:
+        """Begin a subject's course, or compare the memory that it has come to."""
+        name = entry.subject
+        if entry.anew or name not in self._subjects:
+            core = self._cores.of(name)
+            self._subjects[name] = _Subject(core, entry) if core else None
+            self.course.subjects |= {name} if core else set()
+            return
+        subject = self._subjects[name]
+        if strict and subject and (found := first_difference(entry.memory, subject.memory())):
+            place, was, now = found
+            yield entry.at, [(f"memory {place}".strip(), was, now)]
+
+
+def _name(entry: AnyEntry) -> str:
+    return getattr(entry, "subject", "")
+
+
+def _kind(event: object) -> str:
+    return type(event).__name__
+
+
+def times(entry: Same) -> tuple[float, ...]:
+    """When the reading came again. Raises UnknownValue."""
+    if len(entry.times) % 8:
+        raise UnknownValue("not a list of times")
+    found = struct.unpack(f"<{len(entry.times) // 8}d", entry.times)
+    if not all(abs(at) < LATEST_S for at in found):
+        raise UnknownValue("a time of no machine")
+    return found
