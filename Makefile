@@ -67,7 +67,7 @@ test-page: .venv/ready
 	@command -v chromium >/dev/null || { test "$$(id -u)" = 0 && apt-get update -q && \
 	  apt-get install -y -q --no-install-recommends chromium; } || { \
 	  echo "Chromium is missing: sudo apt install chromium"; exit 1; }
-	$(BIN)/pytest -m browser -n 3 --dist loadfile --no-loadscope-reorder tests/page/browser
+	$(BIN)/pytest -m browser -n 3 --dist loadfile --no-loadscope-reorder tests/workbench/page/browser
 
 # Walks to their full depth and every example. Run it before a release and after a change to a core.
 deep: .venv/compiled

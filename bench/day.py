@@ -4,10 +4,10 @@ import time
 from pathlib import Path
 
 from bench.figures import Tables
-from bridges.rmf_rules.phases import EndLiftSession, RequestLift
-from bridges.rmf_rules.robot import Phase
 from tests.kinds.lift_supervisor.world import LiftNode, OurSupervisor, Rider
 from tests.runtime.virtual_graph import World
+from workbench.rmf_model.phases import EndLiftSession, RequestLift
+from workbench.rmf_model.robot import Phase
 
 DAY_S = 86400.0
 

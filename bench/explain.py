@@ -30,7 +30,7 @@ VALUES = ("mode", "floor", "door", "motion", "session", "boarded", "destination"
 
 def measure(scratch: Path) -> dict[str, Any]:
     """Explain the day in a process of its own."""
-    from tests.recording.written import write
+    from tests.workbench.replay.written import write
 
     bag = write(scratch / "day", day(), NEWEST)
     told = json.loads(
@@ -87,7 +87,7 @@ def _heard(second: int, part: float, topic: str, message: d.Message) -> Heard:
 
 def main(bag: Path) -> None:
     """Explain, and print figures as JSON."""
-    from bridges.explain.site import Site
+    from workbench.explain.site import Site
     from workbench.replay.recordings import Span, told_between
 
     began, site = time.process_time(), Site("Lift1")

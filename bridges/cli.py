@@ -1,4 +1,5 @@
-"""The command `rmf-bridge`. Each subcommand is a file in `bridges/commands/`."""
+"""The command `rmf-bridge`. Each subcommand is a file in `bridges/commands/` or
+`workbench/commands/`."""
 
 import argparse
 import atexit
@@ -101,6 +102,11 @@ COMMANDS = {
     ),
 }
 """What each subcommand does, and an example."""
+WORKBENCH = frozenset(
+    {"init", "schema", "watch", "page", "doctor", "explain", "plot", "send"}
+    | {"judge", "release", "walk", "press", "fail", "replay"}
+)
+"""Those of the workbench, which no daemon needs."""
 
 
 def main(argv: list[str] | None = None) -> int:
@@ -196,7 +202,8 @@ def split_ros_args(argv: list[str]) -> tuple[list[str], list[str]]:
 
 
 def _module(command: str):  # type: ignore[no-untyped-def]
-    return importlib.import_module(f"bridges.commands.{command.replace('-', '_')}")
+    house = "workbench" if command in WORKBENCH else "bridges"
+    return importlib.import_module(f"{house}.commands.{command.replace('-', '_')}")
 
 
 if __name__ == "__main__":

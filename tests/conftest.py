@@ -15,7 +15,7 @@ from hal_fakes.domain import domain_for_a_while
 from tests.depth import DEEP
 from tests.processes import end_with_us
 
-ON_WIRES = ("commands", "drivers", "hal_fakes", "page", "transports", "runtime", "site")
+ON_WIRES = ("commands", "drivers", "hal_fakes", "transports", "runtime", "site", "workbench")
 """The folders whose tests have threads, processes and sockets. In the others time is virtual."""
 WIRES_HANG_AFTER_S = 900
 """No test that passes takes so long, however busy the machine is."""

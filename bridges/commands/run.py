@@ -8,7 +8,6 @@ from pathlib import Path
 
 from msgspec.structs import replace
 
-from bridges.commands.graph import TRANSPORTS, overridden
 from bridges.host import log, places
 from bridges.runtime import directory as runtime
 from bridges.runtime import drop_in, guard, signals
@@ -17,6 +16,7 @@ from bridges.settings.load import Config, SettingsError, load
 from bridges.transports.ros2 import setup as ros_setup
 from bridges.transports.transport import TransportError
 from drivers.hal import HalError
+from workbench.graph.join import TRANSPORTS, overridden
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -72,7 +72,7 @@ def here(remedy: Remedy, file: str, device: str, known: Mapping[str, str]) -> Re
 
 @cache
 def for_explain() -> dict[str, tuple[str, str]]:
-    """Each fault's likely cause and what to do, by its code, as `bridges/explain/` takes them."""
+    """Each fault's likely cause and what to do, by its code, as `workbench/explain/` takes them."""
     return {code: (one.cause, one.do) for code, one in remedies().items()}
 
 

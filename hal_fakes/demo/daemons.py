@@ -11,10 +11,10 @@ from collections.abc import Callable, Iterable
 from contextlib import suppress
 from pathlib import Path
 
-from bridges.page import access
 from hal_fakes.caller import Caller, Refused
 from hal_fakes.plants.plant import Edge
 from hal_fakes.wire import wire
+from workbench.page import access
 
 STOP_WITHIN_S = 20.0
 CONNECT_WITHIN_S = 60.0

@@ -9,12 +9,12 @@ from typing import Final
 from bridges.messages import definitions as d
 from bridges.messages import topics, words
 from bridges.messages.stamps import duration
-from bridges.rmf_rules.phases import DoorClose, DoorOpen, EndLiftSession, RequestLift
-from bridges.rmf_rules.robot import Phase, Robot
-from bridges.rmf_rules.supervisors import DoorSupervisor, LiftSupervisor
 from hal_fakes.demo.journal import Journal
 from hal_fakes.demo.stage import Demo
 from hal_fakes.demo.world import World
+from workbench.rmf_model.phases import DoorClose, DoorOpen, EndLiftSession, RequestLift
+from workbench.rmf_model.robot import Phase, Robot
+from workbench.rmf_model.supervisors import DoorSupervisor, LiftSupervisor
 
 FLEET, ROBOT = "demo", "robot"
 SESSION = f"{FLEET}/{ROBOT}"

@@ -14,10 +14,10 @@ from typing import Final
 from bridges.messages import definitions as d
 from bridges.messages import topics
 from bridges.messages.stamps import duration
-from bridges.rmf_rules.phases import DoorClose, DoorOpen, EndLiftSession, RequestLift
-from bridges.rmf_rules.robot import Phase, Robot
 from hal_fakes.demo.stage import Demo
 from hal_fakes.demo.world import World
+from workbench.rmf_model.phases import DoorClose, DoorOpen, EndLiftSession, RequestLift
+from workbench.rmf_model.robot import Phase, Robot
 
 CONFIG = Path(__file__).parents[2] / "config"
 HERE = Path(__file__).parent

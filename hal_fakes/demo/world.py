@@ -14,11 +14,11 @@ from bridges.messages import definitions as d
 from bridges.messages import topics, words
 from bridges.messages.topics import AnyTopic
 from bridges.messages.words import Requested, Stated
-from bridges.rmf_rules import Party, Said
 from bridges.transports.transport import Publisher, Transport
 from hal_fakes.demo.daemons import Daemon, Wrong
 from hal_fakes.demo.journal import SETTLES_S, Journal
 from hal_fakes.plants.plant import Edge
+from workbench.rmf_model import Party, Said
 
 TO_DAEMONS: Final[tuple[AnyTopic, ...]] = (
     topics.LIFT_REQUESTS,

@@ -13,10 +13,10 @@ from bridges.kinds.charger.settings import Robot
 from bridges.kinds.charger_coordinator.settings import Settings
 from bridges.messages import definitions as d
 from bridges.messages.topics import CHARGING_ASSIGNMENTS, DIAGNOSTICS, AnyTopic
-from bridges.rmf_rules import Party, Said
 from hal_fakes.demo.world import World
-from hal_fakes.rmf.fleet import Finishing, Fleet, FleetRobot
-from hal_fakes.rmf.tutorial import tutorial_fleet
+from workbench.rmf_model import Party, Said
+from workbench.rmf_model.fleet import Finishing, Fleet, FleetRobot
+from workbench.rmf_model.tutorial import tutorial_fleet
 
 WARD: Final = "ward"
 DRIVE_S: Final = 1.0

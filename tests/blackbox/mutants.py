@@ -31,8 +31,8 @@ from bridges.messages.definitions import Message
 from bridges.messages.releases import RELEASES
 from bridges.messages.rihs01 import type_name
 from bridges.messages.texts import MESSAGES, text
-from bridges.page.incidents import read
-from bridges.page.levels import Levels
+from workbench.page.incidents import read
+from workbench.page.levels import Levels
 from workbench.replay.bags import heard_in
 from workbench.replay.files import opened
 from workbench.replay.sources import BagError, Notes

@@ -1,13 +1,12 @@
 """What `--help` says: each command with an example, and each example is a right command line."""
 
 import argparse
-import importlib
 import shlex
 
 import pytest
 
 from bridges import cli
-from bridges.commands.drafts.answers import LIFT_INPUTS
+from workbench.commissioning.init.answers import LIFT_INPUTS
 
 
 @pytest.mark.parametrize("command", cli.COMMANDS)
@@ -28,7 +27,7 @@ def test_each_example_is_a_right_command_line(command: str) -> None:
     if ">" in arguments:
         arguments = arguments[: arguments.index(">")]
     parser = argparse.ArgumentParser()
-    module = importlib.import_module(f"bridges.commands.{command.replace('-', '_')}")
+    module = cli._module(command)
     module.add_arguments(parser)
     parser.parse_args(arguments)
 

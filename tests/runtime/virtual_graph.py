@@ -15,11 +15,11 @@ from bridges.kinds.shared.graph_kind import GraphKind
 from bridges.messages.definitions import Message
 from bridges.messages.releases import NEWEST
 from bridges.messages.topics import Topic
-from bridges.rmf_rules import Party as RmfParty
-from bridges.rmf_rules import Said
 from bridges.runtime.clock import Clock
 from bridges.runtime.graph import GraphNode
 from bridges.transports.transport import Publisher, Subscription
+from workbench.rmf_model import Party as RmfParty
+from workbench.rmf_model import Said
 
 EPOCH = 2.0**30
 """Wall time when the world's clock shows 0; a power of two, so that sums of times stay exact."""

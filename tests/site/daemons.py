@@ -15,7 +15,6 @@ from bridges.kinds.shared.decision import OperatorReset
 from bridges.kinds.shared.graph_kind import AnyGraphKind
 from bridges.messages.definitions import Message
 from bridges.messages.topics import DOOR_REQUESTS, DOOR_SUPERVISOR_HEARTBEAT, LIFT_REQUESTS, Topic
-from bridges.rmf_rules.supervisors import DoorSupervisor, LiftSupervisor
 from bridges.runtime.clock import Clock
 from bridges.runtime.device import AnyNode, Node
 from bridges.runtime.graph import AnyGraphNode, GraphNode
@@ -27,6 +26,7 @@ from tests.runtime.virtual_graph import Disk
 from tests.site.building import Device
 from tests.site.network import Air, Place
 from tests.site.timeline import EPOCH, NEVER, Alarm, Timeline
+from workbench.rmf_model.supervisors import DoorSupervisor, LiftSupervisor
 
 SCAN_S = 0.9
 """Less than a state may be old (1 s); states go out at 1 Hz, which `wake_at` sees to."""

@@ -1,6 +1,6 @@
 """What must hold at every moment of the day. Nothing here asks a core's memory or a report.
 
-What can be judged from the graph is judged by the laws of `rmf-bridge judge` (`bridges/judge/`), with
+What can be judged from the graph is judged by the laws of `rmf-bridge judge` (`workbench/judge/`), with
 the node's own ears. Here are those that need more: the relays as they are driven at the terminal block,
 and where car, doors, robots and current really are. What a sensor lies about (a stuck or noisy
 wire) nobody can know: while it does, and a moment longer, the states that rest on it are not held
@@ -12,8 +12,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, cast
 
-from bridges.judge.judge import LAWS, Judge, Kind
-from bridges.judge.law import Verdict
 from bridges.kinds.charger.signals import CURRENT_FLOWS
 from bridges.kinds.lift.signals import Side
 from bridges.messages import definitions as d
@@ -27,6 +25,8 @@ from hal_fakes.plants.plant import Edge
 from tests.site.daemons import DeviceDaemon
 from tests.site.timeline import EPOCH, NEVER, Timeline
 from tests.site.trouble import Ills
+from workbench.judge.judge import LAWS, Judge, Kind
+from workbench.judge.law import Verdict
 
 AT_ONCE_S = 0.3
 """The longest debounce, a poll and a scan."""

@@ -1,4 +1,4 @@
-"""The robots: each with its fleet adapter (RMF's rules, `bridges.rmf_rules`) and a day without end.
+"""The robots: each with its fleet adapter (RMF's rules, `workbench.rmf_model`) and a day without end.
 
 Again and again: through a door, to another floor by lift, through another door, sometimes to a charger,
 sometimes a rest. Now and then a task is cancelled while it waits. An adapter that dies forgets all but
@@ -13,11 +13,11 @@ from typing import Any, Protocol
 from bridges.messages import definitions as d
 from bridges.messages import topics
 from bridges.messages.stamps import duration
-from bridges.rmf_rules.phases import DoorClose, DoorOpen, EndLiftSession, RequestLift
-from bridges.rmf_rules.robot import Phase, Robot
 from bridges.transports.transport import Transport
 from tests.site.charging import Charge
 from tests.site.timeline import EPOCH, NEVER, Alarm, Timeline
+from workbench.rmf_model.phases import DoorClose, DoorOpen, EndLiftSession, RequestLift
+from workbench.rmf_model.robot import Phase, Robot
 
 FRESH_S = 2.5
 """A charger's state as old as this is not driven by."""

@@ -14,9 +14,9 @@ from bridges.host import log
 from bridges.messages import definitions as d
 from bridges.messages import topics
 from bridges.transports.transport import TransportError
-from tests.explain.scene import Scene
 from tests.site.daemons import GraphDaemon
 from tests.site.network import Place
+from tests.workbench.explain.scene import Scene
 
 SERVED = ("Lift1", "Lift2", "ward", "gate", "bay1")
 MOST = 3

@@ -9,7 +9,7 @@ from tests.site.growth import Look, growth
 from tests.site.laws import Broken
 
 SEEDS = depth([2], [1, 2, 3])
-"""tests/recording/test_replay.py has days of 1 and 3: each is that of another supervisor."""
+"""tests/workbench/replay/test_replay.py has days of 1 and 3: each is that of another supervisor."""
 MINUTES = depth(8, 20)
 """Robots go home in the last minutes of a day (`WIND_DOWN_S`): a shorter one has nothing else."""
 

@@ -8,17 +8,17 @@ from typing import Final
 
 import zstandard
 
-from bridges.page import access, incidents
 from hal_fakes.domain import domain_for_a_while
 from hal_fakes.wire import join
 from tests.blackbox.mutants import Mutator, endings
-from tests.page.browser.conftest import PASSWORD, USER, on_graph, page
-from tests.page.browser.test_bad_days import page_pid, rss_mb
-from tests.page.browser.test_safety import ask
-from tests.page.strangers import half_requests, long_names, strange_frames
-from tests.recording.test_hostile_bags import chunk, record
 from tests.torture.table import Table
 from tests.waiting import wait_until
+from tests.workbench.page.browser.conftest import PASSWORD, USER, on_graph, page
+from tests.workbench.page.browser.test_bad_days import page_pid, rss_mb
+from tests.workbench.page.browser.test_safety import ask
+from tests.workbench.page.strangers import half_requests, long_names, strange_frames
+from tests.workbench.replay.test_hostile_bags import chunk, record
+from workbench.page import access, incidents
 from workbench.replay.mcap_read import MAGIC
 
 UNIT_MB: Final = 256

@@ -6,8 +6,8 @@ from typing import Final
 
 from mcap.records import Channel, Header, McapRecord, Message, Schema
 
-from bridges.explain.noted import OWN_TOPICS
 from bridges.messages.releases import Release
+from workbench.explain.noted import OWN_TOPICS
 from workbench.replay.mcap_read import Damaged, records
 from workbench.replay.sources import Notes, Raw, Source, releases, source
 

@@ -1,7 +1,7 @@
 """The charging scenarios by their numbers, under every `finishing_request` and with RMF's retreat.
 
-The fleet shows of its robots what RMF's adapter shows (`hal_fakes/rmf/fleet.py`): IDLE and no task
-while a robot charges as its finishing request, CHARGING in every task after its first charge.
+The fleet shows of its robots what RMF's adapter shows (`workbench/rmf_model/fleet.py`): IDLE and
+no task while a robot charges as its finishing request, CHARGING in every task after its first charge.
 """
 
 from typing import Final
@@ -11,8 +11,8 @@ import pytest
 from bridges.kinds.charger_coordinator.schedule import Charging
 from bridges.kinds.shared.decision import OperatorReset
 from bridges.messages import definitions as d
-from hal_fakes.rmf.fleet import Finishing
 from tests.kinds.charger_coordinator.yard import Yard, settings
+from workbench.rmf_model.fleet import Finishing
 
 FINISHING: Final[tuple[Finishing, ...]] = ("charge", "park", "nothing")
 EACH: Final = pytest.mark.parametrize("finishing", FINISHING)

@@ -16,8 +16,8 @@ from bridges.messages import definitions as d
 from bridges.messages import topics, words
 from bridges.messages.stamps import duration
 from bridges.runtime.graph import GraphNode
-from hal_fakes.rmf.fleet import Finishing, Fleet
 from tests.runtime.virtual_graph import EPOCH, Disk, Served, Ticking, World, in_order
+from workbench.rmf_model.fleet import Finishing, Fleet
 
 STEP_S = 0.25
 GRAPH = {

@@ -6,9 +6,9 @@ from bridges.kinds.door import messages
 from bridges.messages import topics
 from bridges.messages.definitions import DoorModeValue, DoorRequest
 from bridges.messages.stamps import stamp
-from bridges.rmf_rules import door_request
-from bridges.rmf_rules.supervisors import DoorSupervisor
 from tests.kinds.door.virtual import FIRE, OBSTRUCTION, SCAN_S, Door
+from workbench.rmf_model import door_request
+from workbench.rmf_model.supervisors import DoorSupervisor
 
 
 class Corridor:

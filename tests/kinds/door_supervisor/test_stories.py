@@ -3,7 +3,6 @@
 from bridges.kinds.door_supervisor import keep
 from bridges.messages import definitions as d
 from bridges.messages import topics
-from bridges.rmf_rules import NEVER, door_request
 from tests.kinds.door_supervisor.world import (
     WARD,
     DoorDaemon,
@@ -13,6 +12,7 @@ from tests.kinds.door_supervisor.world import (
     to_door,
 )
 from tests.runtime.virtual_graph import EPOCH, Disk, World, in_order
+from workbench.rmf_model import NEVER, door_request
 
 A, B = "fleet/a", "fleet/b"
 

@@ -12,11 +12,11 @@ from bridges.kinds.door_supervisor.settings import Settings
 from bridges.messages import definitions as d
 from bridges.messages import topics
 from bridges.messages.stamps import stamp
-from bridges.rmf_rules.phases import DoorClose, DoorOpen
-from bridges.rmf_rules.robot import Phase, Robot
-from bridges.rmf_rules.supervisors import DoorSupervisor
 from tests.kinds.door.virtual import SCAN_S, Door
 from tests.runtime.virtual_graph import EPOCH, NEVER, Disk, Served, StandIn, World, say
+from workbench.rmf_model.phases import DoorClose, DoorOpen
+from workbench.rmf_model.robot import Phase, Robot
+from workbench.rmf_model.supervisors import DoorSupervisor
 
 WARD = "ward"
 

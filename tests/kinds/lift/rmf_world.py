@@ -5,11 +5,11 @@ from collections.abc import Callable, Sequence
 from bridges.kinds.lift.messages import OWN_REQUESTS
 from bridges.messages.definitions import LiftRequest, LiftState, Message
 from bridges.messages.topics import ADAPTER_LIFT_REQUESTS, LIFT_REQUESTS, LIFT_STATES, AnyTopic
-from bridges.rmf_rules import Party, Said
-from bridges.rmf_rules.phases import EndLiftSession, RequestLift
-from bridges.rmf_rules.robot import Robot
-from bridges.rmf_rules.supervisors import LiftSupervisor
 from tests.kinds.lift.story import WALL, Story
+from workbench.rmf_model import Party, Said
+from workbench.rmf_model.phases import EndLiftSession, RequestLift
+from workbench.rmf_model.robot import Robot
+from workbench.rmf_model.supervisors import LiftSupervisor
 
 STEP_S = 0.25
 

@@ -10,13 +10,13 @@ import pytest
 
 from bridges.kinds.lift.signals import LiftOutputs
 from bridges.messages.definitions import LiftState
-from bridges.rmf_rules.robot import Robot
 from drivers.lift.dry_contact import wires
 from hal_fakes.plants.lift import FAILS
 from hal_fakes.plants.plant import FailureMode
 from tests.depth import part
 from tests.kinds.lift.rmf_world import World
 from tests.kinds.lift.wired import WiredStory, shipped
+from workbench.rmf_model.robot import Robot
 
 LATE_S = 0.3
 """Debounce, a scan, and states that may not follow each other faster: how old a truth may be."""

@@ -12,10 +12,10 @@ from bridges.kinds.lift.messages import OWN_REQUESTS
 from bridges.kinds.lift.signals import LiftOutputs
 from bridges.messages.definitions import LiftRequest
 from bridges.messages.stamps import stamp
-from bridges.rmf_rules.robot import Robot
 from tests.kinds.lift.rmf_world import World
 from tests.kinds.lift.story import AGV, END, WALL, Building, Controller, Story
 from tests.kinds.lift.test_with_rmf import A, B, ons, sessions, world
+from workbench.rmf_model.robot import Robot
 
 
 def one_inside_one_waiting(adapters_first: bool = False) -> tuple[World, Robot, Robot]:

@@ -10,12 +10,12 @@ import pytest
 from bridges.kinds.lift.signals import Hazard, LiftOutputs
 from bridges.messages.definitions import LiftRequest
 from bridges.messages.stamps import stamp
-from bridges.rmf_rules.robot import Robot
-from bridges.rmf_rules.supervisors import LiftSupervisor
 from tests.kinds.lift.rmf_world import World
 from tests.kinds.lift.story import AGV, END, WALL
 from tests.kinds.lift.test_forgotten import Overheard
 from tests.kinds.lift.test_with_rmf import A, B, ons, sessions, world
+from workbench.rmf_model.robot import Robot
+from workbench.rmf_model.supervisors import LiftSupervisor
 
 SILENT_S = 5.0
 LEFT_S = 60.0

@@ -5,11 +5,11 @@ import logging
 import pytest
 
 from bridges.messages.definitions import LiftRequest
-from bridges.rmf_rules.robot import Robot
-from bridges.rmf_rules.supervisors import LiftSupervisor
 from tests.kinds.lift.rmf_world import World
 from tests.kinds.lift.story import END, Controller, Story
 from tests.kinds.lift.test_with_rmf import A, B, world
+from workbench.rmf_model.robot import Robot
+from workbench.rmf_model.supervisors import LiftSupervisor
 
 
 def warnings(caplog: pytest.LogCaptureFixture) -> list[str]:

@@ -12,12 +12,12 @@ from bridges.kinds.lift import KIND, core
 from bridges.kinds.lift.signals import Door, Hazard, LiftSample, Motion
 from bridges.kinds.shared.decision import Sampled
 from bridges.messages.definitions import LiftDoor, LiftRequest, LiftState
-from bridges.rmf_rules.robot import Robot
 from tests.depth import examples
 from tests.kinds.lift.invariants import check
 from tests.kinds.lift.rmf_world import World as Rmf
 from tests.kinds.lift.story import AGV, END, HUMAN, Building, Controller, Story
 from tests.kinds.lift.walk import Step, World
+from workbench.rmf_model.robot import Robot
 
 FEW = settings(max_examples=examples(60))
 STORMS = settings(max_examples=examples(40))

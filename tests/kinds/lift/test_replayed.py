@@ -7,11 +7,11 @@ import pytest
 from bridges.kinds.lift.memory import Doubted, Session
 from bridges.kinds.lift.replayed import LASTS_S, MOST, doubt, noted
 from bridges.kinds.lift.signals import Door, Ended, LiftSample, Motion, Requested
-from bridges.rmf_rules.robot import Robot
 from tests.kinds.lift.rmf_world import World
 from tests.kinds.lift.story import AGV, END, Building
 from tests.kinds.lift.test_forgotten import Overheard
 from tests.kinds.lift.test_with_rmf import A, B, ons, sessions, world
+from workbench.rmf_model.robot import Robot
 
 OPEN_FOR_A = "AGV, open at L2, fleet/a to L2"
 

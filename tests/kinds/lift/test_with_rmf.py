@@ -4,9 +4,9 @@ import pytest
 
 from bridges.kinds.lift.signals import Hazard, LiftOutputs
 from bridges.messages.definitions import LiftRequest, Time
-from bridges.rmf_rules.robot import Robot
 from tests.kinds.lift.rmf_world import World
 from tests.kinds.lift.story import AGV, END, Controller, Story
+from workbench.rmf_model.robot import Robot
 
 A, B = "fleet/a", "fleet/b"
 

@@ -7,8 +7,6 @@ from itertools import pairwise
 import pytest
 from msgspec.structs import replace
 
-from bridges.commands.requests import Seen
-from bridges.commands.requests.lift import LiftEnd
 from bridges.kinds.lift.signals import Hazard
 from bridges.kinds.lift_supervisor.settings import Settings
 from bridges.messages.definitions import LiftRequest
@@ -23,6 +21,8 @@ from tests.kinds.lift_supervisor.world import (
     sessions,
 )
 from tests.runtime.virtual_graph import EPOCH, World
+from workbench.graph.requests import Seen
+from workbench.graph.requests.lift import LiftEnd
 
 A, B, C = "fleet/a", "fleet/b", "fleet/c"
 UP, DOWN = ("L1", "L3"), ("L3", "L1")

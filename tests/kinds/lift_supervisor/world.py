@@ -12,14 +12,14 @@ from bridges.kinds.lift_supervisor import KIND as SUPERVISOR
 from bridges.kinds.lift_supervisor.settings import Settings
 from bridges.messages.definitions import Message
 from bridges.messages.topics import LIFT_REQUESTS, LIFT_STATES, Topic
-from bridges.rmf_rules.phases import EndLiftSession, RequestLift
-from bridges.rmf_rules.robot import Phase, Robot
-from bridges.rmf_rules.supervisors import LiftSupervisor
 from bridges.runtime.clock import Clock
 from bridges.runtime.device import Node
 from tests.kinds.lift.story import Controller
 from tests.kinds.lift_supervisor.alone import words
 from tests.runtime.virtual_graph import EPOCH, NEVER, Served, StandIn, World, say
+from workbench.rmf_model.phases import EndLiftSession, RequestLift
+from workbench.rmf_model.robot import Phase, Robot
+from workbench.rmf_model.supervisors import LiftSupervisor
 
 FLOORS = ["L1", "L2", "L3"]
 

@@ -1,0 +1,173 @@
+"""`rmf-bridge init`: every draft passes `check`, and nothing is overwritten."""
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from jsonschema import Draft202012Validator
+from yaml import safe_load
+
+from bridges import cli
+from bridges.settings.load import load
+from tests.commands.terminal import Terminal
+from workbench.commissioning.init import WIRINGS
+
+MAP = """
+levels:
+  Ground: {vertices: [[0, 0, 0, lobby]]}
+  Ward 1: {vertices: []}
+  Roof: {vertices: []}
+lifts:
+  East: {level_doors: {Ground: [east_g], Ward 1: [east_1]}}
+"""
+
+
+@pytest.fixture(autouse=True)
+def data(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The user's data directory, where the schema is kept."""
+    monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path / "data"))
+    return tmp_path / "data"
+
+
+def combinations() -> Iterator[tuple[str, ...]]:
+    for kind, wirings in WIRINGS.items():
+        for wiring in wirings:
+            for encoding in ("binary", "gray", "one_hot") if kind == "lift" else ("",):
+                yield (kind, wiring, encoding)
+
+
+@pytest.mark.parametrize(("kind", "wiring", "encoding"), list(combinations()))
+def test_each_draft_passes_check_and_the_schema_that_it_names(
+    tmp_path: Path, kind: str, wiring: str, encoding: str
+) -> None:
+    file = tmp_path / "device.yaml"
+    words = ["init", str(file), "--yes", "--kind", kind, "--wiring", wiring]
+    assert cli.main(words + (["--encoding", encoding] if encoding else [])) == 0
+    assert list(load(file).devices) == [f"{kind.capitalize()}1"]
+    first, text = file.read_text().split("\n", 1)
+    assert first.startswith("# yaml-language-server: $schema=")
+    schema = json.loads(Path(first.partition("=")[2]).read_text())
+    assert list(Draft202012Validator(schema).iter_errors(safe_load(text))) == []
+    misspelt = safe_load(text) | {"busses": {}}
+    assert list(Draft202012Validator(schema).iter_errors(misspelt)) != []
+
+
+def test_options_are_the_answers(tmp_path: Path) -> None:
+    file = tmp_path / "device.yaml"
+    words = "--kind lift --wiring modbus --address 10.0.0.7 --unit 3 --name no --floors G,1,2,3"
+    words += " --signals fire_alarm,agv_mode,door_opened --domain-id 42 --yes"
+    assert cli.main(["init", str(file), *words.split()]) == 0
+    written = safe_load(file.read_text())
+    assert (written["rmf"]["domain_id"], written["buses"]["module"]["tcp"]["host"]) == (
+        42,
+        "10.0.0.7",
+    )
+    lift = written["lifts"]["no"]
+    assert lift["floors"] == ["G", "1", "2", "3"]
+    assert lift["inputs"] == {
+        "fire_alarm": {"point": "unit 3 discrete input 0", "active": "low"},
+        "agv_mode": {"point": "unit 3 discrete input 1", "active": "high"},
+        "door": {"point": "unit 3 discrete input 2", "active": "high", "proves": "open"},
+    }
+    assert list(load(file).devices) == ["no"]
+
+
+@pytest.mark.parametrize("contacts", ["high", "low"])
+@pytest.mark.parametrize("relays", ["high", "low"])
+@pytest.mark.parametrize("kind", ["lift", "door", "charger"])
+def test_on_the_header_a_cut_wire_and_the_time_before_the_daemon_are_safe(
+    tmp_path: Path, kind: str, contacts: str, relays: str
+) -> None:
+    file = tmp_path / "device.yaml"
+    words = f"--kind {kind} --wiring gpio --contacts {contacts} --relays {relays} --yes"
+    assert cli.main(["init", str(file), *words.split()]) == 0
+    load(file)  # check refuses what is unsafe
+
+
+def test_a_map_gives_the_only_lift_and_its_floors(tmp_path: Path) -> None:
+    site, file = tmp_path / "site.building.yaml", tmp_path / "device.yaml"
+    site.write_text(MAP)
+    assert cli.main(["init", str(file), "--kind", "lift", "--from", str(site), "--yes"]) == 0
+    assert safe_load(file.read_text())["lifts"]["East"]["floors"] == ["Ground", "Ward 1"]
+
+
+def test_an_existing_file_is_never_overwritten(tmp_path: Path) -> None:
+    file = tmp_path / "device.yaml"
+    file.write_text("mine")
+    assert cli.main(["init", str(file), "--kind", "door", "--yes"]) == 73
+    assert cli.main(["init", str(file)]) == 73  # before a question is asked
+    assert file.read_text() == "mine"
+
+
+def test_a_missing_folder_is_reported_before_any_question_is_asked(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "none" / "device.yaml"
+    assert cli.main(["init", str(file)]) == 73
+    assert capsys.readouterr().err == f"{file} cannot be written: No such file or directory\n"
+
+
+@pytest.mark.parametrize(
+    ("words", "answer"),
+    [
+        ("--kind door", "no terminal to ask on: give --name, or --yes for 'Door1'"),
+        ("--kind door --floors L1 --yes", "--floors has no meaning for a door on modbus"),
+        ("--kind lift --wiring http --yes", "a lift is not wired by http: gpio, modbus, rs485"),
+        ("--kind lift --floors L1 --yes", "a lift has at least two floors, each name once, not L1"),
+        (
+            "--kind lift --floors A,B,C,D,E,F,G,H,I,J,K --encoding one_hot --yes",
+            "more signals than",
+        ),
+        ("--kind lift --signals fire --yes", "a lift has no input fire; there are fire_alarm"),
+        ("--kind door --unit 0 --yes", "unit is '0': write a whole number from 1 to 247"),
+        ("--kind door --domain-id x --yes", "domain_id is 'x': write a whole number from 0 to 232"),
+        ("--kind charger --wiring http --address x_y!:z --yes", "with these answers check would"),
+        ("--kind door --name= --yes", "'' is not a name for a door"),
+    ],
+)
+def test_an_impossible_answer_is_reported_and_nothing_is_written(
+    tmp_path: Path, words: str, answer: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "device.yaml"
+    assert cli.main(["init", str(file), *words.split()]) == 64
+    assert capsys.readouterr().err.startswith(f"rmf-bridge init: {answer}")
+    assert not file.exists()
+
+
+def test_a_file_that_is_not_a_map_is_reported(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    site = tmp_path / "site.yaml"
+    site.write_text("a: 1\n")
+    assert cli.main(["init", str(tmp_path / "x.yaml"), "--from", str(site), "--yes"]) == 66
+    assert "has no 'levels:'" in capsys.readouterr().err
+
+
+def test_on_a_terminal_it_asks_one_thing_after_the_other(tmp_path: Path) -> None:
+    file = tmp_path / "device.yaml"
+    terminal = Terminal("init", str(file), "--domain-id", "5")
+    terminal.wait_for("What is it?")
+    terminal.type("\x1b[B\r")  # down: door
+    terminal.wait_for("Its name on RMF's map?")
+    terminal.type("ward\r")
+    terminal.wait_for("How is it wired?")
+    terminal.type("\r")
+    terminal.wait_for("Its host")
+    terminal.type("\r")
+    terminal.wait_for("unit id?")
+    terminal.type("\r")
+    terminal.wait_for("is written")
+    assert terminal.end() == 0
+    assert list(load(file).devices) == ["ward"]
+    assert load(file).rmf.domain_id == 5
+
+
+def test_ctrl_c_writes_nothing(tmp_path: Path) -> None:
+    file = tmp_path / "device.yaml"
+    terminal = Terminal("init", str(file))
+    terminal.wait_for("What is it?")
+    terminal.type("\x03")
+    terminal.wait_for("nothing is written")
+    assert terminal.end() == 130
+    assert not file.exists()

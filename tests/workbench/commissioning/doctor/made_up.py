@@ -1,0 +1,90 @@
+"""A made-up machine: a directory tree, scripts for its commands, and what its GPIO chips answer."""
+
+import errno
+import os
+from collections.abc import Collection, Mapping
+from pathlib import Path
+
+from tests.workbench.commissioning.doctor.kernel_gpio import (
+    GET_CHIPINFO,
+    GET_LINEINFO,
+    INPUT,
+    OUTPUT,
+    USED,
+    GpiochipInfo,
+    LineInfo,
+)
+from workbench.commissioning.doctor.machine import Machine
+from workbench.commissioning.doctor.users import User
+
+OURS = os.getegid()
+"""The group of every file here: a user in it may use them."""
+OTHERS = OURS + 4321
+
+
+class MadeUp:
+    """Files are written below `root`; `machine` is what a doctor sees of them."""
+
+    def __init__(
+        self, root: Path, gids: Collection[int] = (OURS,), installed: Collection[str] = ("lgpio",)
+    ) -> None:
+        self.root = root
+        self._chips: dict[str, tuple[str, Mapping[int, str], Collection[int]]] = {}
+        self.hidden: set[str] = set()
+        """Chips that the doctor's own process may not open."""
+        self.synchronised: bool | None = True
+        self.machine = Machine(
+            root,
+            self._ioctl,
+            installed.__contains__,
+            lambda: self.synchronised,
+            os.geteuid() + 1,
+            frozenset(gids),
+        )
+        self.user = User("pi", self.machine.uid, self.machine.gids, service=False)
+        (root / "proc").mkdir()
+        self.write("/etc/group", f"root:x:0:\ngpio:x:{OURS}:\ndialout:x:{OURS}:\n")
+        self.write("/etc/passwd", f"pi:x:{self.machine.uid}:1000::/home/pi:/bin/bash\n")
+
+    def write(self, path: str, text: str = "", mode: int = 0o660) -> None:
+        """A file, or a device."""
+        place = self.root / path.lstrip("/")
+        place.parent.mkdir(parents=True, exist_ok=True)
+        place.write_text(text)
+        place.chmod(mode)
+
+    def link(self, path: str, to: str) -> None:
+        """A symbolic link, relative as udev makes them."""
+        place = self.root / path.lstrip("/")
+        place.parent.mkdir(parents=True, exist_ok=True)
+        place.symlink_to(to)
+
+    def command(self, name: str, prints: str) -> None:
+        """A command that prints this."""
+        self.write(f"/usr/bin/{name}.out", prints)
+        script = f"#!/bin/sh\nexec /bin/cat '{self.root}/usr/bin/{name}.out'\n"
+        self.write(f"/usr/bin/{name}", script, 0o755)
+
+    def chip(
+        self,
+        number: int,
+        label: str,
+        held: Mapping[int, str] | None = None,
+        outputs: Collection[int] = (),
+        mode: int = 0o660,
+    ) -> None:
+        """A GPIO chip. `held`: line -> its consumer; `outputs`: the lines that are driven."""
+        self.write(f"/dev/gpiochip{number}", mode=mode)
+        self._chips[f"gpiochip{number}"] = (label, held or {}, outputs)
+
+    def _ioctl(self, device: Path, request: int, argument: bytes) -> bytes:
+        label, held, outputs = self._chips[device.name]
+        if device.name in self.hidden:
+            raise PermissionError(errno.EACCES, "Permission denied")
+        if request == GET_CHIPINFO:
+            return bytes(GpiochipInfo(device.name.encode(), label.encode(), 58))
+        assert request == GET_LINEINFO
+        offset = LineInfo.from_buffer_copy(argument).offset
+        flags = USED * (offset in held) | (OUTPUT if offset in outputs else INPUT)
+        consumer = held.get(offset, "").encode()
+        return bytes(LineInfo(f"GPIO{offset}".encode(), consumer, offset, 0, flags))

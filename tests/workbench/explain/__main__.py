@@ -1,0 +1,11 @@
+"""Writes the golden texts anew: `python -m tests.workbench.explain [NAME …]`."""
+
+import logging
+import sys
+
+from tests.workbench.explain.scenes import SCENES
+from tests.workbench.explain.test_sentences import GOLDEN, told
+
+logging.disable(logging.CRITICAL)
+for name in sys.argv[1:] or SCENES:
+    (GOLDEN / f"{name}.txt").write_text("\n".join(told(name)) + "\n", encoding="utf-8")

@@ -1,0 +1,204 @@
+"""Short scenes at the soak's site, in virtual time: real cores, drivers and plants, RMF by its rules.
+
+Everything that is said on the graph is kept as `Heard`, as a recording or a listener would have it.
+"""
+
+from collections.abc import Sequence
+from random import Random
+from typing import Any
+
+from bridges.kinds.charger_coordinator import KIND as COORDINATOR
+from bridges.kinds.door_supervisor import KIND as DOOR_SUPERVISOR
+from bridges.kinds.lift_supervisor import KIND as LIFT_SUPERVISOR
+from bridges.kinds.shared.graph_kind import AnyGraphKind
+from bridges.messages import definitions as d
+from bridges.messages import topics
+from bridges.messages.heard import Heard
+from bridges.messages.stamps import stamp
+from bridges.messages.topics import Topic
+from bridges.runtime import diagnostics
+from tests.site import charging
+from tests.site.building import CHARGERS, devices
+from tests.site.daemons import (
+    DeviceDaemon,
+    GraphDaemon,
+    RmfsSupervisor,
+    rmfs_door_supervisor,
+    rmfs_lift_supervisor,
+)
+from tests.site.network import CLEAR, Air, Place
+from tests.site.timeline import EPOCH, Alarm, Timeline
+from workbench.rmf_model.phases import DoorClose, DoorOpen, EndLiftSession, RequestLift
+from workbench.rmf_model.robot import Phase, Robot
+
+SUPERVISORS: dict[str, AnyGraphKind] = {
+    "lift_supervisor": LIFT_SUPERVISOR,
+    "door_supervisor": DOOR_SUPERVISOR,
+}
+
+
+class Guest:
+    """A fleet adapter with one robot, on the air. `behind_s`: its clock's error."""
+
+    def __init__(self, timeline: Timeline, air: Air, name: str) -> None:
+        self.robot = Robot(name)
+        self.behind_s = 0.0
+        self.place = Place(air, name, lambda: None)
+        self._timeline = timeline
+        self._alarm = Alarm(timeline, self._tick)
+        self._mouths = {
+            topic.name: self.place.publisher(topic)
+            for topic in (topics.ADAPTER_LIFT_REQUESTS, topics.ADAPTER_DOOR_REQUESTS)
+        }
+        for topic in self.robot.subscribes:
+            self.place.subscribe(topic, self._hear)
+
+    def begin(self, phase: Phase) -> None:
+        """Its task comes to this phase."""
+        self._say(self.robot.begin(phase, self._now))
+
+    def asks(self, lift: str, floor: str, *, inside: bool = False) -> None:
+        """RequestLift."""
+        self.begin(RequestLift(lift, floor, inside=inside))
+
+    def ends(self, lift: str) -> None:
+        """EndLiftSession."""
+        self.begin(EndLiftSession(lift))
+
+    def opens(self, door: str) -> None:
+        """DoorOpen."""
+        self.begin(DoorOpen(door))
+
+    def closes(self, door: str) -> None:
+        """DoorClose."""
+        self.begin(DoorClose(door))
+
+    def dies(self) -> None:
+        """Its adapter is gone, without a word."""
+        self.place.close()
+        self.robot.phase = None
+
+    @property
+    def _now(self) -> float:
+        return EPOCH + self._timeline.now - self.behind_s
+
+    def _hear(self, message: Any) -> None:
+        self._say(self.robot.hear(message, self._now))
+
+    def _tick(self) -> None:
+        self._say(self.robot.tick(self._now))
+
+    def _say(self, said: Sequence[tuple[Topic[Any], d.Message]]) -> None:
+        for topic, message in said:
+            self._mouths[topic.name].publish(message)
+        self._alarm.set(self.robot.wake_at() - EPOCH + self.behind_s)
+
+
+class Scene:
+    """`serves`: the devices with a running daemon. `rmf`: with RMF's own supervisors, not ours."""
+
+    def __init__(self, *serves: str, rmf: bool = False, diagnoses: bool = True) -> None:
+        self.timeline = Timeline()
+        self.air = Air(self.timeline, Random(7))
+        self.air.weather = CLEAR
+        self.air.watch = self._watch
+        self.heard: list[Heard] = []
+        self.devices = devices(self.timeline)
+        self.daemons = {
+            name: DeviceDaemon(self.timeline, self.air, self.devices[name]) for name in serves
+        }
+        self.supervisors: dict[str, GraphDaemon | RmfsSupervisor] = {}
+        self._diagnoses = diagnoses
+        for daemon in self.daemons.values():
+            daemon.start()
+        self._supervise(rmf)
+        self._second()
+        self.run(4.0)  # supervisors listen before they speak
+        self.heard.clear()
+        self.run(2.0)
+
+    def robot(self, name: str) -> Guest:
+        """A robot of this name, FLEET/ROBOT."""
+        return Guest(self.timeline, self.air, name)
+
+    def run(self, seconds: float) -> None:
+        """So much time passes."""
+        self.timeline.run(self.timeline.now + seconds)
+
+    def until(self, guest: Guest, within_s: float = 90.0) -> None:
+        """Until the robot's phase is done."""
+        end = self.timeline.now + within_s
+        while not guest.robot.done:
+            assert self.timeline.now < end, f"not within {within_s} s"
+            self.run(0.25)
+
+    def rides(self, guest: Guest, lift: str, start: str, end: str) -> None:
+        """A whole ride."""
+        guest.asks(lift, start)
+        self.until(guest)
+        self.run(5.0)
+        guest.asks(lift, end, inside=True)
+        self.until(guest)
+        self.run(5.0)
+        guest.ends(lift)
+        self.until(guest)
+
+    def press(self, device: str, signal: str, on: bool) -> None:
+        """The building acts."""
+        daemon = self.daemons[device]
+        daemon.advance()
+        self.devices[device].plant.press(signal, on, self.timeline.now)
+        daemon.look()
+
+    def fail(self, device: str, part: str, mode: Any) -> None:
+        """A wire or part fails."""
+        daemon = self.daemons[device]
+        daemon.advance()
+        self.devices[device].plant.fail(part, mode)
+        daemon.look()
+
+    def says(self, topic: Topic[Any], message: d.Message) -> None:
+        """Some other node says this."""
+        Place(self.air, "somebody", lambda: None).publisher(topic).publish(message)
+
+    def coordinate(self, *robots: str) -> None:
+        """A charger coordinator is started."""
+        settings = charging.settings(CHARGERS, robots)
+        name = "coordinator"
+        self.supervisors[name] = node = GraphDaemon(
+            self.timeline, self.air, name, COORDINATOR, settings=settings
+        )
+        node.start()
+
+    def _supervise(self, rmf: bool) -> None:
+        if rmf:
+            for made in (rmfs_lift_supervisor, rmfs_door_supervisor):
+                theirs = made(self.timeline, self.air)
+                self.supervisors[theirs.name] = theirs
+        else:
+            for name, kind in SUPERVISORS.items():
+                self.supervisors[name] = GraphDaemon(self.timeline, self.air, name, kind)
+        for supervisor in self.supervisors.values():
+            supervisor.start()
+
+    def _watch(self, speaker: str, topic: Topic[Any], message: d.Message) -> None:
+        now = self.timeline.now
+        self.heard.append(Heard(now, EPOCH + now, topic.name, message))
+
+    def _second(self) -> None:
+        """Each daemon says once a second what is wrong, as `bridges/runtime/daemon.py` has it do."""
+        if self._diagnoses:
+            for name, daemon in self.daemons.items():
+                if daemon.alive:
+                    self._diagnose(
+                        f"rmf_bridge_{name}", daemon.device.kind.name, {name: daemon.status()}
+                    )
+            for name, node in self.supervisors.items():
+                if isinstance(node, GraphDaemon) and node.alive:
+                    self._diagnose(name, node.kind.name, node.summary())
+        self.timeline.after(1.0, self._second)
+
+    def _diagnose(self, node: str, kind: str, devices: Any) -> None:
+        at = stamp(EPOCH + self.timeline.now)
+        array = diagnostics.diagnosis(node, kind, {}, devices, at)
+        self._watch(node, topics.DIAGNOSTICS, array)

@@ -1,0 +1,33 @@
+"""What `explain` says of each common situation, word for word: `golden/*.txt`.
+
+`python -m tests.workbench.explain` writes them anew; read the difference before you keep it.
+"""
+
+from datetime import UTC
+from pathlib import Path
+
+import pytest
+
+from bridges.runtime.faults import remedies
+from tests.workbench.explain.scenes import SCENES
+from workbench.explain.site import Site
+from workbench.explain.text import SCREEN_LINES, lines
+
+GOLDEN = Path(__file__).parent / "golden"
+
+
+def told(name: str) -> list[str]:
+    """The situation's screen."""
+    heard, kind, device = SCENES[name]()
+    site = Site(device)
+    for one in heard:
+        site.take(one)
+    known = dict.fromkeys(remedies(), ("its cause", "its remedy"))
+    return lines(site.explain(kind, device, UTC, known), UTC)
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_a_situation_is_explained_on_one_screen(name: str) -> None:
+    screen = told(name)
+    assert len(screen) <= SCREEN_LINES
+    assert screen == (GOLDEN / f"{name}.txt").read_text(encoding="utf-8").splitlines()

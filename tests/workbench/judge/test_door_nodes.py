@@ -1,0 +1,66 @@
+"""Each defect of a door's node is caught by its own law, and by no other."""
+
+import pytest
+
+from bridges.messages import topics
+from tests.workbench.judge.nodes.close_drives_shut import CloseDrivesShut
+from tests.workbench.judge.nodes.door_answers import DoorAnswers
+from tests.workbench.judge.nodes.door_falls_silent import DoorFallsSilent
+from tests.workbench.judge.nodes.door_flaps import DoorFlaps
+from tests.workbench.judge.nodes.door_hears_adapters import DoorHearsAdapters
+from tests.workbench.judge.nodes.door_numbers_mixed import DoorNumbersMixed
+from tests.workbench.judge.nodes.door_stale_open import DoorStaleOpen
+from tests.workbench.judge.nodes.door_vendor_codes import DoorVendorCodes
+from tests.workbench.judge.nodes.door_without_stamps import DoorWithoutStamps
+from tests.workbench.judge.nodes.open_as_asked import OpenAsAsked
+from tests.workbench.judge.nodes.right_door import RightDoor
+from tests.workbench.judge.nodes.silence_closes import SilenceCloses
+from tests.workbench.judge.script import Script, door
+from tests.workbench.judge.world import passes, watched
+from workbench.rmf_model import Party
+from workbench.rmf_model.supervisors import DoorSupervisor
+
+RED, BLUE = "fleet/red", "fleet/blue"
+
+
+@pytest.mark.parametrize(
+    ("node", "law"),
+    [
+        (SilenceCloses, "D2.stays"),
+        (DoorStaleOpen, "D3.fresh"),
+        (DoorAnswers, "D1.answer"),
+        (DoorNumbersMixed, "D2.opens"),
+        (DoorFlaps, "D2.holds"),
+        (OpenAsAsked, "D3.travel"),
+        (DoorVendorCodes, "T1.numbers"),
+        (DoorWithoutStamps, "D3.stamp"),
+        (DoorFallsSilent, "D1.rate"),
+    ],
+)
+def test_passages_find_the_defect(node: type[RightDoor], law: str) -> None:
+    found, _ = passes(node())
+    assert found["broken"] == {law}
+
+
+PUSHES = (5.0, 20.0, 35.0)
+
+
+@pytest.mark.parametrize(("node", "broken"), [(CloseDrivesShut, {"D2.people"}), (RightDoor, set())])
+def test_a_door_that_people_opened_is_closed_by_rmf_and_shut_by_nobody(
+    node: type[RightDoor], broken: set[str]
+) -> None:
+    """RMF's supervisor says CLOSE at each state of an open door that no robot has asked for."""
+    found = watched("door", "ward", node(PUSHES), DoorSupervisor())
+    assert found["broken"] == broken
+    assert ("D2.people" in found["kept"]) == (not broken)
+
+
+def test_one_robots_close_closes_the_door_on_another() -> None:
+    """Finding 11: around the supervisor, who knows of both."""
+    adapters: Party = Script(
+        (5.4, topics.ADAPTER_DOOR_REQUESTS, door(2, RED)),
+        (8.4, topics.ADAPTER_DOOR_REQUESTS, door(2, BLUE)),
+        (10.4, topics.ADAPTER_DOOR_REQUESTS, door(0, RED)),
+    )
+    found = watched("door", "ward", DoorHearsAdapters(), DoorSupervisor(), adapters, for_s=20.0)
+    assert found["broken"] == {"D1.bypass"}

@@ -1,0 +1,174 @@
+"""The judge at work in virtual time, on the memory transport: nodes, RMF's parties, and its stage."""
+
+from collections.abc import Callable, Iterable
+from functools import partial
+
+from bridges.messages import topics
+from bridges.messages.definitions import Message
+from bridges.messages.heard import Heard
+from bridges.messages.topics import AnyTopic
+from bridges.transports.transport import Publisher
+from tests.site.network import CLEAR, Air, Place
+from tests.site.timeline import EPOCH, NEVER, Alarm, Timeline
+from workbench.judge.judge import Judge, Kind
+from workbench.judge.law import Verdict
+from workbench.judge.plays import Charge, Passages, Performance, Ride
+from workbench.judge.stage import Stage
+from workbench.rmf_model import Party, Said
+
+HEARD: tuple[AnyTopic, ...] = (
+    *(topics.LIFT_STATES, topics.LIFT_REQUESTS, topics.ADAPTER_LIFT_REQUESTS),
+    *(topics.DOOR_STATES, topics.DOOR_REQUESTS, topics.ADAPTER_DOOR_REQUESTS),
+    *(topics.DOOR_SUPERVISOR_HEARTBEAT, topics.FIRE_ALARM_TRIGGER.live()),
+    *(topics.CHARGER_STATES, topics.CHARGER_REQUESTS, topics.CHARGER_CANCELS),
+    topics.CHARGER_REFUSALS,
+)
+Verdicts = dict[str, set[str]]
+
+
+class Seat:
+    """A party's place on the graph. Its clock is the wall clock, in step by `skew_s`."""
+
+    def __init__(self, world: "World", party: Party, skew_s: float = 0.0) -> None:
+        self.party = party
+        self.skew_s = skew_s
+        self._world = world
+        self._place = Place(world.air, type(party).__name__, lambda: None)
+        self._alarm = Alarm(world.timeline, self._wake)
+        self._publishers: dict[AnyTopic, Publisher[Message]] = {}
+        for topic in party.subscribes:
+            self._place.subscribe(topic, self._hear)
+        self._wake()
+
+    @property
+    def _now(self) -> float:
+        return EPOCH + self._world.timeline.now + self.skew_s
+
+    def leave(self) -> None:
+        """It dies."""
+        self._alarm.set(NEVER)
+        self._place.close()
+
+    def say(self, said: Iterable[Said]) -> None:
+        for topic, message in said:
+            if topic not in self._publishers:
+                self._publishers[topic] = self._place.publisher(topic)
+            self._publishers[topic].publish(message)
+
+    def _hear(self, message: Message) -> None:
+        self.say(self.party.hear(message, self._now))
+        self._set()
+
+    def _wake(self) -> None:
+        self.say(self.party.tick(self._now))
+        self._set()
+
+    def _set(self) -> None:
+        self._alarm.set(max(self.party.wake_at() - EPOCH - self.skew_s, self._world.timeline.now))
+
+
+class World:
+    """A graph without loss, and everybody on it."""
+
+    def __init__(self) -> None:
+        from random import Random
+
+        self.timeline = Timeline()
+        self.air = Air(self.timeline, Random(1))
+        self.air.weather = CLEAR
+
+    def add(self, *parties: Party) -> list[Seat]:
+        return [Seat(self, party) for party in parties]
+
+    def judge(
+        self,
+        kind: Kind,
+        name: str,
+        performance: Performance | None = None,
+        for_s: float = NEVER,
+        most_s: float = 600.0,
+        also: Callable[[Stage], None] = lambda stage: None,
+    ) -> Stage:
+        """Listen, or play and leave; at most `most_s`."""
+        stage = Stage(Judge(kind, name), performance, for_s)
+        place = Place(self.air, "judge", lambda: None)
+        publishers: dict[AnyTopic, Publisher[Message]] = {}
+
+        def say(said: list[Said]) -> None:
+            for topic, message in said:
+                if topic not in publishers:
+                    publishers[topic] = place.publisher(topic)
+                publishers[topic].publish(message)
+            alarm.set(max(stage.wake_at(), self.timeline.now + 0.001))
+
+        def hear(topic: AnyTopic, message: Message) -> None:
+            if not stage.done:
+                now = self.timeline.now
+                say(stage.hear(Heard(now, EPOCH + now, topic.name, message)))
+
+        def turn() -> None:
+            if not stage.done:
+                say(stage.turn(self.timeline.now, EPOCH + self.timeline.now))
+
+        alarm = Alarm(self.timeline, turn)
+        stage.begin(self.timeline.now, EPOCH + self.timeline.now)
+        for topic in HEARD:
+            place.subscribe(topic, partial(hear, topic), others_only=True)
+        ends = [
+            place.subscribe(topic, lambda message: None)
+            for topic in (topics.FIRE_ALARM_TRIGGER.live(), topics.FIRE_ALARM_TRIGGER)
+        ]
+        ends.append(place.subscribe(topics.LIFT_REQUESTS, lambda message: None, others_only=True))
+        say([])
+        also(stage)
+        until = self.timeline.now + most_s
+        while not stage.done and self.timeline.now < until:
+            self.timeline.run(self.timeline.now + 0.5)
+            publishing, retaining, supervisors = (end.matched() for end in ends)
+            now = self.timeline.now
+            stage.judge.fire_ends(publishing, retaining, supervisors, now, EPOCH + now)
+        place.close()
+        return stage
+
+
+def told(stage: Stage, now: float) -> Verdicts:
+    """The ids of the laws, by verdict."""
+    found: Verdicts = {verdict.value: set() for verdict in Verdict}
+    for judged in stage.judge.end(now, EPOCH + now):
+        found[judged.verdict.value].add(judged.law.id)
+    return found
+
+
+def rides(
+    *nodes: Party, robots: int = 1, restarts: bool = False, name: str = "Lift1"
+) -> tuple[Verdicts, str]:
+    """The verdict on a lift that robots ride from L1 to L3, and why, if they did not."""
+    world = World()
+    world.add(*nodes)
+    ride = Ride(name, ("L1", "L3"), robots, 60.0, restarts=restarts)
+    stage = world.judge("lift", name, ride)
+    return told(stage, world.timeline.now), stage.note
+
+
+def passes(*nodes: Party, times: int = 3, restarts: bool = False) -> tuple[Verdicts, str]:
+    """The verdict on a door that a robot passes."""
+    world = World()
+    world.add(*nodes)
+    stage = world.judge("door", "ward", Passages("ward", times, 60.0, restarts=restarts))
+    return told(stage, world.timeline.now), stage.note
+
+
+def charges(*nodes: Party) -> tuple[Verdicts, str]:
+    """The verdict on a charger that is requested."""
+    world = World()
+    world.add(*nodes)
+    stage = world.judge("charger", "bay1", Charge("bay1", "fleet/red", "r1", 20.0))
+    return told(stage, world.timeline.now), stage.note
+
+
+def watched(kind: Kind, name: str, *parties: Party, for_s: float = 60.0) -> Verdicts:
+    """The verdict on a device that the judge only listens to."""
+    world = World()
+    world.add(*parties)
+    stage = world.judge(kind, name, for_s=for_s, most_s=for_s + 1.0)
+    return told(stage, world.timeline.now)

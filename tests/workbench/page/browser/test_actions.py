@@ -1,0 +1,169 @@
+"""Actions in a real browser, on a real daemon beside the page; and who may not act."""
+
+import json
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import Page
+
+from tests.workbench.page.browser.conftest import (
+    PASSWORD,
+    SCHEMES,
+    USER,
+    Graph,
+    Shot,
+    Until,
+    log_in,
+    on_graph,
+    page,
+    program,
+    serious_faults,
+    settled,
+)
+
+pytestmark = pytest.mark.browser
+COLOURS = """selector => { const style = getComputedStyle(document.querySelector(selector));
+  return [style.color, style.backgroundColor]; }"""
+"""Under a dialog axe-core takes the body's colour for every background. So a dialog has the colours of
+the buttons and panels that it has found good without one."""
+DOOR = Path("config/door_modbus.yaml").absolute()
+LIFT = Path("config/lift_dry_contact.yaml").absolute()
+
+
+@pytest.fixture(scope="module", autouse=True)
+def daemons(folder: Path, module_domain: int) -> Iterator[None]:
+    """A lift and a door, simulated, on this test's domain."""
+    graph = on_graph(module_domain)[1:]
+    lift = ("run", str(LIFT), "--simulate", "--runtime-dir", str(folder / "run/lift"), *graph)
+    door = ("run", str(DOOR), "--simulate", "--runtime-dir", str(folder / "run/door"), *graph)
+    with program(*lift), program(*door):
+        yield
+
+
+def confirm(tab: Page, button: str, until: Until) -> None:
+    """Press a button, and say yes when it asks once more."""
+    until(lambda: tab.get_by_role("button", name=button, exact=True).count() == 1, button)
+    tab.get_by_role("button", name=button, exact=True).click()
+    tab.get_by_role("button", name="Yes").click()
+
+
+def now_of(tab: Page, signal: str) -> str:
+    """What the wiring table says that a contact is now."""
+    row = tab.locator("tr", has=tab.locator("td:first-child", has_text=re.compile(f"^{signal}$")))
+    return row.first.locator("td").nth(1).inner_text() if row.count() else ""
+
+
+def main(tab: Page) -> str:
+    return tab.locator("#main").inner_text()
+
+
+def colours(tab: Page, selector: str) -> list[str]:
+    """In front and behind."""
+    found: list[str] = tab.evaluate(COLOURS, selector)
+    return found
+
+
+def logged(folder: Path) -> str:
+    """What the page has said in its log."""
+    return (folder / "log").read_text()
+
+
+def deeds(folder: Path) -> list[tuple[str, int, str]]:
+    """Who did what, as the page has recorded it."""
+    file = folder / "state/actions.jsonl"
+    lines = file.read_text().splitlines() if file.exists() else []
+    told = [json.loads(line) for line in lines]
+    return [(one["user"], one["exit"], one["command"][0]) for one in told]
+
+
+@pytest.fixture(scope="module")
+def address(module_domain: int, folder: Path) -> Iterator[str]:
+    (folder / "state").mkdir()
+    words = ["--passwords", str(folder / "passwords"), "--runtime-dirs", str(folder / "run")]
+    with page(
+        *on_graph(module_domain), *words, state=folder / "state", log=folder / "log"
+    ) as found:
+        yield found
+
+
+def test_a_simulation_can_be_pressed_and_failed_and_each_action_is_recorded(
+    tab: Page, address: str, until: Until, folder: Path, shot: Shot
+) -> None:
+    tab.goto(address)
+    until(lambda: tab.get_by_role("link", name="Lift1").count() == 1, "the lift")
+    log_in(tab, address, PASSWORD, "/lift/Lift1")
+    until(lambda: "floor_bit0" in main(tab), "the wiring of the daemon beside the page")
+    until(lambda: "SIMULATED" in main(tab), "the daemon's diagnostics")
+    confirm(tab, "Press", until)
+    said = tab.locator(".q-notification")
+    assert said.evaluate("one => getComputedStyle(one).backgroundColor") == "rgb(0, 103, 76)"
+    until(lambda: "fire" in tab.locator("article.card").inner_text().lower(), "the fire")
+    until(lambda: now_of(tab, "fire_alarm").startswith("● asserted ("), "the contact itself")
+    until(lambda: f"{USER}\tPress fire_alarm" in main(tab), "who did what")
+    shot("actions")
+    confirm(tab, "Let go", until)
+    until(lambda: len(deeds(folder)) == 2, "the release of the button")
+    until(lambda: now_of(tab, "fire_alarm").startswith("○ not asserted ("), "its contact again")
+    confirm(tab, "Let it fail", until)
+    until(lambda: len(deeds(folder)) == 3, "three deeds")
+    assert deeds(folder) == [(USER, 0, "press"), (USER, 0, "press"), (USER, 0, "fail")]
+    told = re.findall(r"action user=(\w+) command=\"rmf-bridge (\w+) .* exit=(\d)", logged(folder))
+    assert told == [(USER, "press", "0"), (USER, "press", "0"), (USER, "fail", "0")]
+
+
+def test_what_the_driver_senses_is_seen_live(tab: Page, address: str, until: Until) -> None:
+    tab.goto(f"{address}door/ward_door")
+    until(lambda: "Levels now" in main(tab), "the levels")
+    assert re.search(r"closed\s+sensed\s+on", main(tab))
+
+
+def test_a_release_reaches_the_daemon(
+    tab: Page, address: str, graph: Graph, until: Until, folder: Path
+) -> None:
+    before = len(deeds(folder))
+    asked = ("send", "lift", "Lift1", "L3", "--session", "me", "--direct", *graph.options)
+    log_in(tab, address, PASSWORD, "/lift/Lift1")
+    with program(*asked, ends=130):  # somebody asks, and goes without an END
+        until(lambda: "me" in tab.locator("article.card").inner_text().split(), "the session")
+    confirm(tab, "Release the lift", until)
+    until(lambda: len(deeds(folder)) > before, "the command's end")
+    assert deeds(folder)[before:] == [(USER, 0, "release")]
+    until(lambda: "held by" not in tab.locator("article.card").inner_text(), "the release")
+
+
+def test_a_session_that_has_ended_can_do_nothing(
+    tab: Page, address: str, until: Until, folder: Path
+) -> None:
+    before = len(deeds(folder))
+    log_in(tab, address, PASSWORD, "/lift/Lift1")
+    until(lambda: tab.get_by_role("button", name="Let it fail").count() == 1, "the button")
+    other = tab.context.new_page()
+    other.goto(address)
+    other.get_by_role("button", name="Log out").click()
+    other.get_by_role("link", name="Log in").wait_for()
+    confirm(tab, "Let it fail", until)
+    tab.get_by_text("nothing was done").wait_for()
+    assert len(deeds(folder)) == before
+
+
+def test_axe_finds_no_serious_fault_in_the_question_of_an_action(
+    tab: Page, address: str, until: Until
+) -> None:
+    tab.goto(address)
+    until(lambda: tab.get_by_role("link", name="Lift1").count() == 1, "the lift")
+    log_in(tab, address, PASSWORD, "/lift/Lift1")
+    until(lambda: tab.get_by_role("button", name="Let it fail").count() == 1, "the buttons")
+    for button in ("Reset faults", "Press", "Let go", "Let it fail"):
+        tab.get_by_role("button", name=button, exact=True).click()
+        tab.get_by_role("dialog").get_by_role("button", name="Yes").wait_for()
+        found = [one for one in serious_faults(tab) if one[1] != "color-contrast"]
+        assert (button, found) == (button, [])
+        for scheme in SCHEMES:
+            tab.emulate_media(color_scheme=scheme)
+            settled(tab)
+            assert colours(tab, ".q-dialog .q-btn") == colours(tab, ".actions .q-btn")
+            assert colours(tab, ".q-dialog .q-card") == colours(tab, "section.panel")
+        tab.keyboard.press("Escape")
+        tab.get_by_role("dialog").wait_for(state="detached")

@@ -1,0 +1,92 @@
+"""Devices as HTML and SVG: what is told in words, what is marked, and that no name is markup."""
+
+from xml.etree import ElementTree
+
+import pytest
+
+from bridges.messages import definitions as d
+from bridges.messages.words import Stated
+from workbench.graph.board import Row
+from workbench.page import drawing
+from workbench.page.site import DeviceView, Robot, Stands
+
+HOSTILE = "<script>alert(1)</script>\"'&"
+LIFT = d.LiftState(
+    lift_name="Lift1",
+    available_floors=("L1", "L2", "L3"),
+    current_floor="L2",
+    destination_floor="L3",
+    door_state=d.LiftDoor.DOOR_CLOSED,
+    motion_state=d.LiftMotion.MOTION_UP,
+)
+
+
+def well_formed(html: str) -> ElementTree.Element:
+    return ElementTree.fromstring(f"<all>{html}</all>")
+
+
+def test_a_shaft_has_its_highest_floor_on_top_and_says_what_it_shows() -> None:
+    root = well_formed(drawing.shaft(LIFT))
+    texts = [(one.text or "").strip() for one in root.iter("text")]
+    assert texts == ["◎ L3", "L2", "L1", "▲"]
+    (svg,) = root.iter("svg")
+    assert svg.get("aria-label") == (
+        "car at L2, going up, door closed, mode UNKNOWN, destination L3"
+    )
+
+
+def test_a_car_at_no_known_floor_is_not_drawn() -> None:
+    root = well_formed(drawing.shaft(d.LiftState(available_floors=("L1", "L2"))))
+    assert [one.get("class") for one in root.iter("rect")] == ["shaft", "shaft"]
+
+
+def test_a_lift_with_a_thousand_floors_is_described_in_words_only() -> None:
+    floors = tuple(map(str, range(1000)))
+    assert drawing.shaft(d.LiftState(available_floors=floors)) == ""
+
+
+@pytest.mark.parametrize("kind", ["lift", "door", "charger", "coordinator", "robot"])
+def test_a_name_is_shown_as_text_and_never_as_markup(kind: str) -> None:
+    row = Row(kind, HOSTILE, HOSTILE, HOSTILE, HOSTILE, HOSTILE, HOSTILE, True, HOSTILE)
+    states: dict[str, Stated] = {
+        "lift": d.LiftState(available_floors=(HOSTILE,), current_floor=HOSTILE),
+        "door": d.DoorState(door_name=HOSTILE),
+        "charger": d.ChargerState(charger_name=HOSTILE, error_message=HOSTILE),
+    }
+    root = well_formed(drawing.card(DeviceView(row, states.get(kind))))
+    assert not list(root.iter("script"))
+    assert HOSTILE in "".join(root.itertext())
+
+
+def test_a_device_has_a_page_of_its_own_whatever_its_name() -> None:
+    assert drawing.path_of("door", "a/../b?c#d") == "/door/a%2F..%2Fb%3Fc%23d"
+
+
+def test_an_old_state_says_that_it_is_old_and_how_old() -> None:
+    html = drawing.card(DeviceView(Row("door", "ward", "open", age="12.0 s", mark="SILENT 12 s")))
+    text = "".join(well_formed(html).itertext())
+    assert "OLD: silent 12 s, last reading 12.0 s old" in text
+    assert "was" in text
+    assert "now" not in text
+
+
+@pytest.mark.parametrize(
+    ("stands", "told"),
+    [
+        (Stands(59.0, at_least=False), "less than a minute"),
+        (Stands(185.0, at_least=False), "3 min"),
+        (Stands(185.0, at_least=True), "at least 3 min"),
+        (Stands(5.0, at_least=True), "since before this page heard of it"),
+    ],
+)
+def test_a_charger_says_how_long_its_robot_has_it(stands: Stands, told: str) -> None:
+    html = drawing.card(DeviceView(Row("charger", "pad", "charging", "fleet/R1"), stands=stands))
+    texts = [one.text for one in well_formed(html).iter("dd")]
+    assert texts == ["charging", "fleet/R1", told]
+
+
+def test_a_robot_whose_fleet_is_silent_is_old() -> None:
+    state = d.RobotState("r1", battery_percent=250.0, location=d.Location(level_name="L1"))
+    root = well_formed(drawing.robots([Robot("fleet", state, 100.0)], now=120.0))
+    cells = [cell.text for cell in root.iter("td")]
+    assert cells == ["fleet/r1", "idle (OLD: silent 20 s)", "L1", "100 %"]

@@ -1,0 +1,88 @@
+"""Incidents without names: nothing of the site is left, and they are decided as before."""
+
+import re
+import sys
+from pathlib import Path
+
+import pytest
+
+from bridges.blackbox import mcap_write
+from bridges.blackbox.entries import Head, Spoken
+from bridges.blackbox.incident import Incident
+from bridges.kinds import lift
+from bridges.kinds.shared.recording_section import Recording
+from bridges.messages import cdr
+from bridges.messages.definitions import LiftState
+from bridges.messages.releases import KILTED
+from tests.workbench.replay.test_replay import CORPUS
+from workbench.replay.anonymous import anonymous, our_words
+from workbench.replay.files import opened
+from workbench.replay.incidents import notes_in
+from workbench.replay.replayed import Cores, Replay, of_head
+from workbench.replay.sources import Notes
+
+NAMES = (b"Lift1", b"Lift2", b"red", b"green", b"white", b"black", b"bay1", b"bay2", b"ward", b"L3")
+
+
+def whole(file: Path) -> Incident:
+    """What a file holds, with its messages."""
+    head, entries = opened(file, Notes())
+    return Incident(head, list(entries), tuple(notes_in(file)))
+
+
+@pytest.mark.parametrize("file", CORPUS, ids=lambda file: file.stem)
+def test_an_anonymous_incident_is_decided_as_before_and_names_nobody(
+    file: Path, tmp_path: Path
+) -> None:
+    hidden = anonymous(whole(file))
+    written = tmp_path / "a.mcap"
+    mcap_write.write(written, hidden)
+    head, entries = opened(written, Notes())
+    replay = Replay(entries, Cores(of_head(head)))
+
+    assert list(replay.differences()) == []
+    assert replay.course.decisions > 40
+    told = [head.yaml, str(list(opened(written, Notes())[1])).encode()]
+    assert [name for name in NAMES for text in told if _is_in(name, text)] == []
+
+
+def _is_in(name: bytes, text: bytes) -> bool:
+    return re.search(rb"(?<![\w])" + name + rb"(?![\w])", text) is not None
+
+
+def test_a_name_is_the_same_in_messages_and_decisions_and_comments_and_addresses_go() -> None:
+    yaml = (
+        b"# Saint Mary's\nkind: lift_supervisor\n"
+        b"rmf: {zenoh: {connect: [tcp/mary.local:7447]}, transport: zenoh}\n"
+    )
+    head = Head("r", 1, "1", "lift_supervisor", "/home/mary.yaml", yaml, {}, False, {}, Recording())
+    state = LiftState(lift_name="East", current_floor="L1", session_id="fleet/joe")
+    told = anonymous(Incident(head, [_spoken(state)]))
+
+    assert told.head.yaml == b"kind: lift_supervisor\nrmf:\n  transport: zenoh\n"
+    assert told.head.file == "/anonymous.yaml"
+    [spoken] = told.entries
+    assert isinstance(spoken, Spoken)
+    assert b"East" not in spoken.cdr
+    assert (
+        spoken.cdr
+        == _spoken(
+            LiftState(lift_name="name1", current_floor="name2", session_id="fleet/name3")
+        ).cdr
+    )
+
+
+def test_a_kind_whose_words_cannot_be_read_makes_nothing_anonymous(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Its words would be taken for the site's names, and the recording could not be decided again."""
+    monkeypatch.setitem(sys.modules, lift.__name__ + ".report", None)
+    our_words.cache_clear()
+
+    with pytest.raises(ImportError):
+        anonymous(whole(CORPUS[0]))
+
+
+def _spoken(state: LiftState) -> Spoken:
+    told = cdr.encode(LiftState, state, KILTED)
+    return Spoken(1.0, True, "lift_states", "rmf_lift_msgs/msg/LiftState", "kilted", told)

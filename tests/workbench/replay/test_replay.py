@@ -1,0 +1,121 @@
+"""What the soak's daemons kept is decided again, each decision and each memory the same."""
+
+from pathlib import Path
+
+import pytest
+import yaml
+from msgspec.structs import replace
+
+from bridges.blackbox.entries import Known, Step
+from bridges.blackbox.ring import Read
+from bridges.blackbox.trees import value
+from bridges.kinds.lift import core as lift_core
+from bridges.kinds.shared.decision import Fault
+from tests.blackbox.kept import keep
+from tests.depth import depth
+from tests.site.day import Site
+from workbench.replay.files import opened
+from workbench.replay.replayed import CONTEXT, Cores, Difference, Replay, of_head
+from workbench.replay.sources import Notes
+
+MB = 1_000_000
+HERE = Path(__file__).parent / "corpus"
+CORPUS = sorted(HERE.glob("*.mcap"))
+
+
+@pytest.mark.long(5)
+@pytest.mark.parametrize("seed", depth([1], [1, 3]))
+def test_whatever_happens_at_a_site_is_decided_again_in_the_same_way(
+    seed: int, tmp_path: Path
+) -> None:
+    site = Site(seed)
+    rings = keep(site, tmp_path, 64 * MB)
+    site.run(depth(6, 20) / 60)
+    found = {}
+    for name, ring in rings.items():
+        read = Read(ring)
+        replay = Replay(read.entries(), Cores(of_head(read.head)))
+        assert list(replay.differences()) == []
+        found[name] = (replay.course.decisions > 30, replay.course.unusable)
+
+    assert found == dict.fromkeys(rings, (True, 0))
+
+
+@pytest.mark.long(3)
+def test_a_ring_that_has_turned_many_times_begins_where_all_is_known(tmp_path: Path) -> None:
+    site = Site(3)
+    rings = keep(site, tmp_path, MB // 24)
+    site.run(depth(6, 20) / 60)
+
+    for name in ("Lift1", "ward", "bay1"):
+        read = Read(rings[name])
+        replay = Replay(read.entries(), Cores(of_head(read.head)))
+        assert list(replay.differences()) == []
+        assert (replay.course.subjects, replay.course.unusable) == ({name}, 0)
+        assert min(read.segments) > 1
+
+
+@pytest.mark.parametrize("file", CORPUS, ids=lambda file: file.stem)
+def test_each_incident_of_the_soak_is_decided_as_it_was_recorded(file: Path) -> None:
+    """If this fails for a change that is meant: `python -m tests.workbench.replay.corpus` renews
+    them."""
+    notes = Notes()
+    head, entries = opened(file, notes)
+    replay = Replay(entries, Cores(of_head(head)))
+
+    assert [summary(one) for one in replay.differences()] == []
+    assert (notes.damage, replay.course.unusable) == ("", 0)
+    assert replay.course.decisions > 40
+
+
+def test_a_change_of_a_core_is_seen_with_what_led_to_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A lift that keeps its faults to itself."""
+    monkeypatch.setattr(lift_core, "_faults", lambda memory, view, now, limits: ())
+    head, entries = opened(HERE / "Lift1_1.mcap", Notes())
+
+    [found] = Replay(entries, Cores(of_head(head))).differences()
+
+    recorded, today = value(found.recorded), value(found.today)
+    assert (found.subject, found.what) == ("Lift1", "news")
+    assert recorded[-1] == tuple(fault.code for fault in recorded_faults())
+    assert today == (*recorded[:-1], ())
+    assert len(found.before) == CONTEXT
+    assert found.before[-1][0] == found.wall
+
+
+def test_other_limits_show_what_they_would_have_changed_and_the_same_ones_nothing() -> None:
+    head, _ = opened(HERE / "Lift1_1.mcap", Notes())
+    content = yaml.safe_load(head.yaml)
+    limits = content["lifts"]["Lift1"].setdefault("limits", {})
+    found = {}
+    for wait_s in (limits["dead_time_s"], 3.0):
+        limits["dead_time_s"] = wait_s
+        other = replace(head, yaml=yaml.safe_dump(content).encode())
+        _, entries = opened(HERE / "Lift1_1.mcap", Notes())
+        changes = list(Replay(entries, Cores(of_head(other))).changes())
+        found[wait_s] = {one.what for one in changes}
+
+    assert found.pop(3.0) >= {"outputs"}
+    assert list(found.values()) == [set()]
+
+
+def test_what_cannot_be_replayed_is_counted(tmp_path: Path) -> None:
+    """Entries before all is known, as a damaged beginning leaves them."""
+    head, entries = opened(HERE / "bay1_1.mcap", Notes())
+    replay = Replay([one for one in entries if not isinstance(one, Known)], Cores(of_head(head)))
+
+    assert list(replay.differences()) == []
+    assert (replay.course.decisions, replay.course.subjects) == (0, set())
+    assert replay.course.unusable > 5
+
+
+def recorded_faults() -> tuple[Fault, ...]:
+    """The first fault that the recording of Lift1 shows."""
+    _, entries = opened(HERE / "Lift1_1.mcap", Notes())
+    steps = [one for one in entries if isinstance(one, Step) and one.faults not in ([], [[]])]
+    return tuple(value(steps[0].faults[0]))
+
+
+def summary(found: Difference) -> str:
+    """A difference in one line, for a failed test."""
+    return f"{found.subject} {found.what}: {found.recorded} -> {found.today} after {found.before}"

@@ -1,0 +1,1 @@
+"""The subcommands of `rmf-bridge` that no daemon needs, a file each."""

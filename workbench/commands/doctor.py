@@ -1,0 +1,185 @@
+"""`rmf-bridge doctor FILE`: what stands between this machine and a bridge that works, and what to do.
+
+On the target machine, before and after installing. It reads, and switches nothing, except the one
+output of a `--kill-test`. It opens no bus of a running service. The subjects are in `doctoring/`.
+"""
+
+import argparse
+import json
+import os
+import sys
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Final, TextIO
+
+import msgspec
+from msgspec.structs import replace
+
+from bridges.commands.completion import completed_by, device_names
+from bridges.host import log
+from bridges.host.paint import bold, red
+from bridges.messages.words import printable
+from bridges.settings.load import Config, SettingsError, load
+from workbench.commissioning.by_hand import NoDevice, device_of
+from workbench.commissioning.doctor.finding import Finding, exit_code
+from workbench.graph.join import TRANSPORTS, command_line, interruptible, overridden, seconds
+
+if TYPE_CHECKING:
+    from bridges.settings.building_map import BuildingMap
+
+INTERRUPTED: Final = 130
+LISTEN_S: Final = 3.0
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """The options of `doctor`."""
+    parser.description = (
+        f"{parser.description} Exit codes: 0 all well; 1 warnings; 2 something is wrong; 64 the kill"
+        " test was not confirmed; 78 the YAML has an error."
+    )
+    parser.add_argument("file", type=Path, metavar="FILE", help="the device YAML")
+    parser.add_argument("--json", action="store_true", help="for programs")
+    parser.add_argument(
+        "--form",
+        type=Path,
+        metavar="OUT",
+        help="also write the form of docs/hardware.md, for a person",
+    )
+    parser.add_argument(
+        "--scan", action="store_true", help="ask every unit or node of a bus, not only 1 to 16"
+    )
+    parser.add_argument(
+        "--listen",
+        type=seconds(0, 60),
+        default=LISTEN_S,
+        metavar="SECONDS",
+        help="how long to hear RMF's graph (default 3; 0: do not join it)",
+    )
+    parser.add_argument("--localhost", action="store_true", help="join the graph on loopback alone")
+    parser.add_argument("--domain-id", type=int, metavar="N", help="overrides the YAML's domain_id")
+    parser.add_argument("--transport", choices=TRANSPORTS, help="overrides the YAML's transport")
+    parser.add_argument(
+        "--building-map", metavar="MAP", help="compare the names with RMF's, as check does"
+    )
+    kill = parser.add_argument_group("the kill test, the only thing that switches an output on")
+    kill.add_argument(
+        "--kill-test",
+        action="store_true",
+        help="hold one output on, kill the process that does, and see that it goes off",
+    )
+    device = kill.add_argument(
+        "--device", metavar="NAME", help="whose output (default: the first device)"
+    )
+    completed_by(device, device_names)
+    kill.add_argument("--output", metavar="NAME", help="which output, as walk names it")
+    kill.add_argument("--yes", action="store_true", help="do not ask again")
+    parser.add_argument("--runtime-dir", metavar="DIR", help="the daemon's runtime directory")
+
+
+def run(args: argparse.Namespace) -> int:
+    """0 all well, 1 warnings, 2 something is wrong, 64 not confirmed, 78 a YAML that is wrong."""
+    log.start("CRITICAL")  # what the buses would log is told as findings
+    try:
+        config = load(args.file)
+        config = replace(config, rmf=overridden(config.rmf, args))
+        building = _building(args.building_map)
+    except SettingsError as error:
+        print("\n".join(map(str, error.problems)), file=sys.stderr)
+        return os.EX_CONFIG
+    if args.kill_test and (why := _not_confirmed(config, args)):
+        print(why, file=sys.stderr)
+        return os.EX_USAGE
+    found: list[Finding] = []
+    show = Page(sys.stdout).show if not args.json else _nothing
+    try:
+        with interruptible():
+            for one in _examined(config, building, args):
+                found.append(one)
+                show(one)
+    except KeyboardInterrupt:
+        return INTERRUPTED
+    if args.json:
+        print(json.dumps(msgspec.to_builtins(found)))
+    return _form(config, found, args.form) if args.form else exit_code(found)
+
+
+def _form(config: Config, found: Sequence[Finding], out: Path) -> int:
+    from bridges.host.written import not_written
+    from workbench.commissioning.doctor.form import form
+    from workbench.commissioning.doctor.machine import Machine
+
+    try:
+        out.write_text(form(config, found, Machine()), encoding="utf-8")
+    except OSError as error:
+        return not_written(out, error.strerror)
+    return exit_code(found)
+
+
+def _building(file: str | None) -> "BuildingMap | None":
+    if file is None:
+        return None
+    from bridges.settings.building_map import load_map
+
+    return load_map(file)
+
+
+def _not_confirmed(config: Config, args: argparse.Namespace) -> str:
+    """Why no output may be switched on; "" if it may."""
+    from workbench.commissioning.doctor.victim import step_called
+
+    try:
+        args.device = device_of(config, args.device or next(iter(config.devices), None))
+    except NoDevice as error:
+        return str(error)
+    step = step_called(config, args.device, args.output)
+    if step is None:
+        return f"{args.device} has no such output: rmf-bridge walk shows those that it has"
+    text = f"{step.name} of {args.device} will be ON for some seconds: it {step.does}."
+    if args.yes:
+        return ""
+    if not sys.stdin.isatty():
+        return f"{text} Write --yes if nobody can come to harm"
+    print(f"{text} Nobody can come to harm? Type yes:", file=sys.stderr, end=" ", flush=True)
+    return "" if sys.stdin.readline().strip().lower() == "yes" else "nothing was switched"
+
+
+def _examined(
+    config: Config, building: "BuildingMap | None", args: argparse.Namespace
+) -> Iterator[Finding]:
+    from workbench.commissioning.doctor.examination import Options, examined
+    from workbench.commissioning.doctor.machine import Machine
+
+    asked = Options(
+        runtime_dir=args.runtime_dir,
+        whole_scan=args.scan,
+        listen_s=args.listen,
+        localhost=args.localhost,
+        ros_args=args.ros_args,
+        kill_test=(args.device, args.output) if args.kill_test else None,
+        line=command_line(argparse.Namespace(**vars(args), config=args.file)),
+    )
+    return examined(config, building, Machine(), asked)
+
+
+def _nothing(one: Finding) -> None:
+    """JSON is printed at the end."""
+
+
+class Page:
+    """The findings as they come, under a heading for each subject."""
+
+    def __init__(self, out: TextIO) -> None:
+        self._out = out
+        self._subject = ""
+
+    def show(self, one: Finding) -> None:
+        """A line, and what it means and what to do below it."""
+        if one.subject != self._subject:
+            self._subject = one.subject
+            print(bold(printable(one.subject), self._out), file=self._out)
+        text = f"  {one.level:<8} {printable(one.found)}"
+        print(red(text, self._out) if one.level == "wrong" else text, file=self._out)
+        for word, said in (("means", one.means), ("do", one.do)):
+            if said:
+                print(f"           {word}: {printable(said)}", file=self._out)
+        self._out.flush()

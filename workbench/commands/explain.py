@@ -1,0 +1,177 @@
+"""`rmf-bridge explain`: why a robot waits for a lift, a door or a charger, in one screen of sentences.
+
+From a recording, or live from the graph. The sentences are made in `workbench/explain/`.
+"""
+
+import argparse
+import json
+import shutil
+import sys
+import time
+from contextlib import closing
+from dataclasses import asdict
+from pathlib import Path
+from typing import Final
+
+from bridges.runtime import faults
+from bridges.transports.transport import TransportError
+from workbench.explain.explanation import Explanation
+from workbench.explain.site import Site
+from workbench.explain.text import SCREEN_LINES, lines
+from workbench.explain.timeline import KINDS, Kind
+from workbench.graph.board import SECONDS
+from workbench.graph.join import (
+    add_graph_arguments,
+    command_line,
+    complain,
+    interruptible,
+    open_graph,
+    seconds,
+)
+from workbench.graph.live import Ear
+from workbench.replay.recordings import Span, add_span_arguments, told_between, unreadable
+from workbench.replay.sources import BagError
+
+LISTENS_S: Final = 5.0
+AGAIN_S: Final = 1.0
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Options of `explain`."""
+    parser.add_argument(
+        "file",
+        type=Path,
+        nargs="?",
+        metavar="FILE",
+        help="a recording: MCAP (ours, or of `ros2 bag`), .db3, or a folder of `ros2 bag record`",
+    )
+    parser.add_argument(
+        "device", nargs="?", metavar="DEVICE", help="its name; default: every device"
+    )
+    parser.add_argument("--live", metavar="DEVICE", help="listen to the graph instead of a FILE")
+    parser.add_argument(
+        "--for",
+        dest="for_s",
+        type=seconds(0.1, 86400),
+        default=LISTENS_S,
+        metavar="SECONDS",
+        help=f"with --live: how long to listen (default {LISTENS_S:.0f})",
+    )
+    parser.add_argument(
+        "--follow",
+        action="store_true",
+        help="with --live: keep listening, and print each change; Ctrl-C ends",
+    )
+    parser.add_argument("--kind", choices=KINDS, help="where a lift and a door have the same name")
+    parser.add_argument("--session", default="", metavar="ID", help="the session in question")
+    parser.add_argument("--json", action="store_true", help="the explanation as JSON")
+    add_span_arguments(parser)
+    add_graph_arguments(parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    """0; 1 when the device or anything of RMF was not heard, or the graph cannot be joined; 66 when
+    FILE is not a recording that can be read."""
+    if (args.file is None) == (args.live is None):
+        complain("explain", "name either a FILE or --live DEVICE")
+        return 2
+    try:
+        return _live(args) if args.file is None else _recorded(args)
+    except BagError as error:
+        return unreadable("explain", error)
+    except TransportError as error:
+        complain("explain", error)
+        return 1
+    except KeyboardInterrupt:
+        return 0
+
+
+# ---- a recording
+
+
+def _recorded(args: argparse.Namespace) -> int:
+    site = Site(args.device or "", args.session)
+    span = Span(args.from_, args.to)
+    for heard in told_between(args.file, span, "explain", args.device or ""):
+        site.take(heard)
+    site.story_from(span.begins_at)
+    if not site.messages:
+        complain(
+            "explain", f"{args.file} has nothing about RMF's lifts, doors and chargers in that time"
+        )
+        return 1
+    if args.device is None and len(devices := site.devices()) != 1:
+        return _all(site, devices, as_json=args.json)
+    return _one(site, args)
+
+
+def _all(site: Site, devices: list[tuple[Kind, str]], *, as_json: bool) -> int:
+    """Each device in a line, or as JSON."""
+    told = [site.explain(kind, name, None, faults.for_explain()) for kind, name in devices]
+    if as_json:
+        print(json.dumps([asdict(one) for one in told]))
+        return 0
+    for one in told:
+        print(f"{one.kind} {one.device}: {one.now[0]}")
+    print("\nFor more about one of them, give its name after FILE.")
+    return 0
+
+
+def _one(site: Site, args: argparse.Namespace) -> int:
+    """The device that was named, or the only one."""
+    name = args.device or args.live or site.devices()[0][1]
+    kinds = [args.kind] if args.kind else site.kinds(name) or ["lift"]
+    if len(kinds) > 1:
+        several = " and a ".join(kinds)
+        complain("explain", f"'{name}' is a {several}: say which with --kind")
+        return 2
+    found = site.explain(kinds[0], name, None, faults.for_explain())
+    _tell(found, as_json=args.json)
+    return 0 if (kinds[0], name) in site.devices() else 1
+
+
+def _tell(found: Explanation, *, as_json: bool) -> None:
+    if as_json:
+        print(json.dumps(asdict(found)))
+        return
+    size = shutil.get_terminal_size((100, SCREEN_LINES + 1))
+    for line in lines(found, None, size.columns, max(24, min(SCREEN_LINES, size.lines - 1))):
+        print(line)
+    sys.stdout.flush()
+
+
+# ---- the graph
+
+
+def _live(args: argparse.Namespace) -> int:
+    with interruptible(), closing(open_graph(args, "rmf_bridge_explain")) as transport:
+        ear = Ear(transport)
+        site = Site(args.live, args.session, graph=command_line(args).options)
+        if args.follow:
+            _follow(ear, site, args)
+        _listen(ear, site, args.for_s)
+        return _one(site, args)
+
+
+def _listen(ear: Ear, site: Site, for_s: float) -> None:
+    """Listen for this long (s)."""
+    until = time.monotonic() + for_s
+    site.passed(time.monotonic(), time.time())
+    while (left_s := until - time.monotonic()) > 0:
+        for heard in ear.listen(left_s):
+            site.take(heard)
+    site.passed(time.monotonic(), time.time())
+
+
+def _follow(ear: Ear, site: Site, args: argparse.Namespace) -> None:
+    """Print each change, until Ctrl-C."""
+    told: object = None
+    _listen(ear, site, args.for_s)
+    while True:
+        kinds: list[Kind] = [args.kind] if args.kind else site.kinds(args.live) or ["lift"]
+        found = site.explain(kinds[0], args.live, None, faults.for_explain())
+        news = [SECONDS.sub("", text) for text in found.now], found.next
+        if news != told:
+            _tell(found, as_json=args.json)
+        told = news
+        _listen(ear, site, AGAIN_S)

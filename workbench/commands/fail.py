@@ -1,0 +1,30 @@
+"""`rmf-bridge fail FILE PART MODE`: in a simulation, a wire or a part of the device fails."""
+
+import argparse
+
+from bridges.commands.completion import completed_by
+from workbench.graph.plants import add_simulation, names, obey, tell
+
+MODES = ("off", "stuck", "slow", "garbage", "wrong", "ok")
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """The options of `fail`."""
+    add_simulation(parser)
+    part = parser.add_argument(
+        "part",
+        metavar="PART",
+        nargs="?",
+        help="a signal of the file, or a part such as car; without one: print what there is",
+    )
+    completed_by(part, names("fail"))
+    parser.add_argument("mode", nargs="?", choices=MODES, help="how it fails; ok mends it")
+
+
+def run(args: argparse.Namespace) -> int:
+    """0; 1 if it cannot fail like this; 69 if no simulation of the file runs."""
+    if args.part is None:
+        return tell(args, "fail")
+    if args.mode is None:
+        args.usage(f"how does {args.part} fail? {', '.join(MODES[:-1])}; ok mends it")
+    return obey(args, "fail", args.part, args.mode)

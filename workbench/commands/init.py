@@ -1,0 +1,295 @@
+"""`rmf-bridge init FILE`: write a first YAML for the device that stands in front of you.
+
+It asks, or takes every answer as an option. What it writes passes `check`; it never overwrites a file.
+"""
+
+import argparse
+import json
+import os
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final, get_args
+
+from bridges import __version__
+from bridges.host.written import no_folder, not_written
+from bridges.settings.building_map import BuildingMap, load_map
+from bridges.settings.load import understood
+from bridges.yaml.nodes import SettingsError
+from workbench.commissioning.init import ADDRESSES, WIRINGS, draft
+from workbench.commissioning.init.answers import (
+    LIFT_INPUTS,
+    OFFERED,
+    Answers,
+    Encoding,
+    Impossible,
+    Kind,
+    Level,
+    Wiring,
+)
+
+EX_USAGE, EX_NOINPUT, EX_CANTCREAT, EX_INTERRUPTED = 64, 66, 73, 130
+Given = dict[str, Any]
+"""Answers so far, by their names in Answers."""
+
+
+@dataclass(frozen=True, slots=True)
+class Question:
+    """One answer: its name in Answers, how to ask for it, and when.
+
+    `offered`: the answer to begin with. `choices`: all that are possible; () for any text.
+    """
+
+    name: str
+    text: str
+    offered: Callable[[Given], Any]
+    choices: Callable[[Given], tuple[str, ...]] = lambda given: ()
+    needed: Callable[[Given], bool] = lambda given: True
+    several: bool = False
+
+
+def _is_lift(given: Given) -> bool:
+    return bool(given["kind"] == "lift")
+
+
+def _on_the_header(given: Given) -> bool:
+    return bool(given["wiring"] == "gpio")
+
+
+QUESTIONS: Final = (
+    Question("kind", "What is it?", lambda given: "lift", lambda given: get_args(Kind)),
+    Question("name", "Its name on RMF's map?", lambda given: f"{given['kind'].capitalize()}1"),
+    Question(
+        "wiring",
+        "How is it wired?",
+        lambda given: WIRINGS[given["kind"]][0],
+        lambda given: WIRINGS[given["kind"]],
+    ),
+    Question(
+        "address",
+        "Its host, serial port or CAN interface?",
+        lambda given: ADDRESSES[given["wiring"]],
+        needed=lambda given: given["wiring"] in ADDRESSES,
+    ),
+    Question(
+        "unit",
+        "The module's unit id?",
+        lambda given: "1",
+        needed=lambda given: given["wiring"] in ("modbus", "rs485"),
+    ),
+    Question(
+        "floors", "Its floors, from below?", lambda given: "L1,L2,L3", needed=_is_lift, several=True
+    ),
+    Question(
+        "signals",
+        "Which inputs are wired?",
+        lambda given: ",".join(OFFERED),
+        lambda given: tuple(LIFT_INPUTS),
+        needed=_is_lift,
+        several=True,
+    ),
+    Question(
+        "encoding",
+        "How do the lines say the floor?",
+        lambda given: "binary",
+        lambda given: get_args(Encoding),
+        needed=_is_lift,
+    ),
+    Question(
+        "contacts",
+        "Level of a closed contact (high: to 3.3 V, low: to ground)?",
+        lambda given: "high",
+        lambda given: get_args(Level),
+        needed=_on_the_header,
+    ),
+    Question(
+        "relays",
+        "Level that switches a relay on?",
+        lambda given: "high",
+        lambda given: get_args(Level),
+        needed=_on_the_header,
+    ),
+    Question("domain_id", "RMF's ROS_DOMAIN_ID?", lambda given: "0"),
+)
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """The file, and an option for each question."""
+    parser.add_argument("file", type=Path, metavar="FILE", help="the YAML to write")
+    parser.add_argument("--kind", choices=get_args(Kind))
+    parser.add_argument("--name", help="as on RMF's map")
+    parser.add_argument("--wiring", choices=get_args(Wiring), help="modbus is Modbus TCP")
+    parser.add_argument("--address", help="host, serial port or CAN interface")
+    parser.add_argument("--unit", help="unit id of a Modbus module")
+    parser.add_argument("--floors", help="such as L1,L2,L3, from below")
+    parser.add_argument("--signals", help=f"some of: {', '.join(LIFT_INPUTS)}")
+    parser.add_argument("--encoding", choices=get_args(Encoding), help="of the floor lines")
+    parser.add_argument("--contacts", choices=get_args(Level), help="level of a closed contact")
+    parser.add_argument("--relays", choices=get_args(Level), help="level that switches a relay on")
+    parser.add_argument("--domain-id", help="RMF's ROS_DOMAIN_ID")
+    parser.add_argument(
+        "--from",
+        dest="map",
+        metavar="MAP",
+        help="take the name and the floors from RMF's building map or navigation graph",
+    )
+    parser.add_argument(
+        "-y", "--yes", action="store_true", help="ask nothing: take what is offered"
+    )
+
+
+def run(args: argparse.Namespace) -> int:
+    """0; 64: answers are missing or do not go together; 66: the map; 73: the file is there already."""
+    if os.path.lexists(args.file):  # before anything is asked
+        return _there_already(args.file)
+    if why := no_folder(args.file):
+        return not_written(args.file, why)
+    try:
+        given = answered(args, load_map(args.map) if args.map else None)
+    except SettingsError as error:
+        print("\n".join(map(str, error.problems)), file=sys.stderr)
+        return EX_NOINPUT
+    except KeyboardInterrupt:
+        print("nothing is written", file=sys.stderr)
+        return EX_INTERRUPTED
+    except Impossible as error:
+        print(f"rmf-bridge init: {error}", file=sys.stderr)
+        return EX_USAGE
+    return _written(args.file, given)
+
+
+def _there_already(file: Path) -> int:
+    print(f"{file} already exists and is not changed: choose another name", file=sys.stderr)
+    return EX_CANTCREAT
+
+
+def _written(file: Path, given: Given) -> int:
+    """Write the draft, if `check` finds no error in it."""
+    try:
+        text = draft(answers(given))
+        understood(file, text.encode())
+        write(file, f"{_schema_line()}{text}")
+    except SettingsError as error:
+        told = "\n".join(problem.text for problem in error.problems)
+        print(f"rmf-bridge init: with these answers check would say:\n{told}", file=sys.stderr)
+        return EX_USAGE
+    except Impossible as error:
+        print(f"rmf-bridge init: {error}", file=sys.stderr)
+        return EX_USAGE
+    except FileExistsError:
+        return _there_already(file)
+    except OSError as error:
+        return not_written(file, error.strerror)
+    print(f"{file} is written. Compare it with the wires; then:")
+    print(f"  rmf-bridge check {file}\n  rmf-bridge run {file} --simulate")
+    return 0
+
+
+def answered(args: argparse.Namespace, found: BuildingMap | None) -> Given:
+    """Every answer: from the options, else from the map, else by asking. Raises Impossible."""
+    given: Given = {}
+    for question in QUESTIONS:
+        if not _needed(question, given, args):
+            continue
+        told = getattr(args, question.name)
+        told = told if told is not None else _of_map(question.name, given, found)
+        if told is None:
+            offered = question.offered(given)
+            told = offered if args.yes else _ask(question, offered, given, found)
+        given[question.name] = told
+    return given
+
+
+def _needed(question: Question, given: Given, args: argparse.Namespace) -> bool:
+    if question.needed(given):
+        return True
+    if getattr(args, question.name) is not None:
+        raise Impossible(
+            f"--{question.name} has no meaning for a {given['kind']} on {given['wiring']}"
+        )
+    return False
+
+
+def _of_map(name: str, given: Given, found: BuildingMap | None) -> str | None:
+    """The answer that the map leaves no choice about."""
+    if found is None:
+        return None
+    if name == "name" and len(names := tuple(found.named[given["kind"]])) == 1:
+        return names[0]
+    if name == "floors":
+        return ",".join(found.stops.get(given["name"], found.named["floor"]))
+    return None
+
+
+def _ask(question: Question, offered: str, given: Given, found: BuildingMap | None) -> str:
+    if not (sys.stdin.isatty() and sys.stdout.isatty()):
+        option = question.name.replace("_", "-")
+        raise Impossible(f"no terminal to ask on: give --{option}, or --yes for '{offered}'")
+    try:
+        import questionary
+    except ModuleNotFoundError:
+        raise Impossible(
+            "to ask, it needs questionary: pip install 'rmf-bridges[laptop]'; or give every answer as"
+            " an option, or --yes"
+        ) from None
+    choices = question.choices(given)
+    if found is not None and question.name == "name":
+        choices = tuple(found.named[given["kind"]])
+    if choices and question.several:
+        ticked = offered.split(",")
+        boxes = [questionary.Choice(c, checked=c in ticked) for c in choices]
+        told = questionary.checkbox(question.text, boxes).unsafe_ask()
+        return ",".join(told)
+    if choices:
+        first = offered if offered in choices else None
+        return str(questionary.select(question.text, list(choices), default=first).unsafe_ask())
+    return str(questionary.text(f"{question.text} [{offered}]").unsafe_ask()) or offered
+
+
+def answers(given: Given) -> Answers:
+    """The answers as the draft takes them. Raises Impossible with what to write instead."""
+    told = dict(given)
+    for name, most in (("unit", 247), ("domain_id", 232)):
+        if name in told:
+            told[name] = _number(name, told[name], most)
+    if not told["name"].strip() or not told["name"].isprintable():
+        raise Impossible(f"{told['name']!r} is not a name for a {told['kind']}")
+    for name in ("floors", "signals"):
+        if name in told:
+            told[name] = tuple(part.strip() for part in told[name].split(",") if part.strip())
+    if unknown := [signal for signal in told.get("signals", ()) if signal not in LIFT_INPUTS]:
+        raise Impossible(
+            f"a lift has no input {', '.join(unknown)}; there are {', '.join(LIFT_INPUTS)}"
+        )
+    return Answers(**told)
+
+
+def _number(name: str, text: str, most: int) -> int:
+    least = 1 if name == "unit" else 0
+    if not (text.isascii() and text.isdigit() and least <= int(text) <= most):
+        raise Impossible(f"{name} is '{text}': write a whole number from {least} to {most}")
+    return int(text)
+
+
+def write(path: Path, text: str) -> None:
+    """Write a new file. Raises OSError if there is one already, or it cannot be written."""
+    with path.open("x", encoding="utf-8") as out:
+        out.write(text)
+
+
+def _schema_line() -> str:
+    """The line by which an editor completes and checks the file; "" if the schema cannot be kept.
+
+    The schema of this version is kept among the user's data.
+    """
+    from workbench.commissioning.reference import schema
+
+    base = os.environ.get("XDG_DATA_HOME") or os.path.expanduser("~/.local/share")
+    path = Path(base) / "rmf-bridges" / f"schema-{__version__}.json"
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(json.dumps(schema()), encoding="utf-8")
+    except OSError:
+        return ""
+    return f"# yaml-language-server: $schema={path}\n"

@@ -1,0 +1,301 @@
+"""`rmf-bridge judge`: check any lift, door or charger node against RMF's contract.
+
+`workbench/judge/` has the laws and the plays; here are the options, the graph, the clock and the
+verdict. Exit code 0: every law that was seen is kept. 1: one is broken. 2: a wrong command line.
+66: the recording cannot be read. 69: nothing was heard, the graph cannot be joined, or what was to
+be played was not.
+"""
+
+import argparse
+import os
+import shutil
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import closing, contextmanager, suppress
+from pathlib import Path
+from uuid import uuid4
+
+from bridges.messages import topics
+from bridges.messages.definitions import Message
+from bridges.messages.heard import Heard
+from bridges.transports.transport import Publisher, Transport, TransportError
+from workbench.graph.join import (
+    add_graph_arguments,
+    complain,
+    ended_by,
+    interruptible,
+    open_graph,
+    seconds,
+)
+from workbench.graph.live import OF_DEVICES, Ear
+from workbench.judge.judge import KINDS, Judge, Kind
+from workbench.judge.law import Verdict, shown
+from workbench.judge.plays import FLEET, Charge, Passages, Performance, Ride
+from workbench.judge.report import Report, as_json, junit, markdown, report, text, verdict
+from workbench.judge.stage import Stage
+from workbench.replay.recordings import Span, add_span_arguments, unreadable, within
+from workbench.replay.sources import BagError
+from workbench.rmf_model import NEVER, Said
+
+NODE_NAME = "rmf_bridge_judge"
+LOOK_EVERY_S = 0.1
+FIRE = topics.FIRE_ALARM_TRIGGER
+WIDTH = 120
+BESIDE: dict[str, tuple[str, ...]] = {
+    "supervisor": (
+        topics.LIFT_REQUESTS.name,
+        topics.DOOR_REQUESTS.name,
+        topics.DOOR_SUPERVISOR_HEARTBEAT.name,
+    ),
+    "fleet": (topics.ADAPTER_LIFT_REQUESTS.name, topics.ADAPTER_DOOR_REQUESTS.name),
+    "coordinator": (topics.CHARGER_REQUESTS.name, topics.CHARGER_CANCELS.name),
+}
+"""Whose topics a play may share, with `--beside`."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Which device, for how long, and what to play."""
+    parser.add_argument("kind", choices=KINDS)
+    parser.add_argument("name", metavar="NAME", nargs="?", help="the device, as RMF names it")
+    add_graph_arguments(parser)
+    parser.add_argument(
+        "--for",
+        type=seconds(0.1, 7 * 86400),
+        dest="for_s",
+        default=NEVER,
+        metavar="S",
+        help="listen for S seconds (default: until Ctrl-C, which judges)",
+    )
+    parser.add_argument("--json", action="store_true", help="the verdict as one JSON object")
+    parser.add_argument("--junit", type=Path, metavar="FILE", help="the verdict for a CI server")
+    parser.add_argument(
+        "--laws",
+        action="store_true",
+        help="print the laws of this kind, with their reasons; no NAME",
+    )
+    parser.add_argument(
+        "--recording",
+        type=Path,
+        metavar="FILE",
+        help="judge a recording instead of the graph: MCAP (ours, or of `ros2 bag`) or .db3",
+    )
+    add_span_arguments(parser)
+    _add_plays(parser)
+
+
+def _add_plays(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--active",
+        action="store_true",
+        help="move the device: needs --ride, --passages or --charge, and a device that is idle",
+    )
+    parser.add_argument(
+        "--ride", nargs=2, metavar="FLOOR", help="play a robot that rides from one floor to another"
+    )
+    parser.add_argument(
+        "--robots", type=int, choices=(1, 2), default=1, help="two: the second rides back"
+    )
+    parser.add_argument("--passages", type=int, metavar="N", help="play N passages of a door")
+    parser.add_argument("--charge", action="store_true", help="request a charger, and cancel")
+    parser.add_argument(
+        "--robot",
+        default=f"{FLEET}/robot1",
+        metavar="FLEET/ROBOT",
+        help="the robot to request the charger for; one that the charger knows",
+    )
+    parser.add_argument(
+        "--restarts",
+        action="store_true",
+        help="restart RMF's supervisor in between; in a simulation only (--localhost)",
+    )
+    parser.add_argument(
+        "--beside",
+        action="append",
+        choices=tuple(BESIDE),
+        default=[],
+        help="play although this one is on the graph; rides and passages go through a supervisor",
+    )
+    parser.add_argument(
+        "--patience",
+        type=seconds(0.1, 7 * 86400),
+        default=120.0,
+        metavar="S",
+        help="how long a robot waits at each step (default: 120)",
+    )
+
+
+def performance_of(args: argparse.Namespace) -> Performance | None:
+    """What is to be played; None to listen alone. A contradiction ends with exit code 2."""
+    kinds: dict[Kind, bool] = {
+        "lift": args.ride is not None,
+        "door": args.passages is not None,
+        "charger": args.charge,
+    }
+    wanted = [kind for kind, asked in kinds.items() if asked]
+    if not wanted and not args.active:
+        return None
+    if wanted != [args.kind]:
+        args.usage("a lift is played by --ride A B, a door by --passages N, a charger by --charge")
+    if not args.active:
+        args.usage(f"this moves {words_of(args)}: say --active as well")
+    if args.restarts and not args.localhost:
+        args.usage("--restarts needs --localhost: never restart a supervisor with a real device")
+    through = "supervisor" in args.beside
+    match args.kind:
+        case "lift":
+            floors = (args.ride[0], args.ride[1])
+            how = {"through": through, "restarts": args.restarts}
+            return Ride(args.name, floors, args.robots, args.patience, **how)
+        case "door":
+            how = {"through": through, "restarts": args.restarts}
+            return Passages(args.name, max(1, args.passages), args.patience, **how)
+        case _:
+            request_id = f"{FLEET}-{uuid4().hex[:8]}"
+            return Charge(args.name, args.robot, request_id, min(args.patience, 30.0))
+
+
+def words_of(args: argparse.Namespace) -> str:
+    """The device, in words."""
+    return f"the {args.kind} {shown(args.name)}"
+
+
+def run(args: argparse.Namespace) -> int:
+    """Listen, play or read, and judge."""
+    if args.laws:
+        print(markdown(args.kind))
+        return 0
+    if not args.name:
+        args.usage(f"which {args.kind}? Give its NAME")
+    performance = performance_of(args)
+    if args.recording is None:
+        return _live(args, performance)
+    if performance is not None:
+        args.usage("a recording cannot be moved: leave --active out")
+    try:
+        return _recorded(args)
+    except BagError as error:
+        return unreadable("judge", error)
+
+
+def _recorded(args: argparse.Namespace) -> int:
+    judge = Judge(args.kind, args.name)
+    last: Heard | None = None
+    for last in within(args.recording, Span(args.from_, args.to), "judge"):
+        judge.hear(last)
+    if last is None or judge.first is None:
+        complain("judge", f"{args.recording} has no message of RMF in that time")
+        return os.EX_UNAVAILABLE
+    return tell(report(judge, judge.end(last.at, last.wall), last.at - judge.first.at), args)
+
+
+def _live(args: argparse.Namespace, performance: Performance | None) -> int:
+    stage: Stage | None = None
+    try:
+        with interruptible(), closing(open_graph(args, NODE_NAME)) as transport:
+            live = Live(transport, args.kind, args.beside, performance)
+            stage = Stage(Judge(args.kind, args.name), performance, args.for_s, live.strangers)
+            if sys.stderr.isatty():
+                complain("judge", _begins(args, performance))
+            live.judge(stage)
+    except TransportError as error:
+        complain("judge", error)
+    except KeyboardInterrupt:
+        pass
+    if stage is None:
+        return os.EX_UNAVAILABLE
+    now = time.monotonic()
+    judged = stage.judge.end(now, time.time())
+    notes = [f"not played to its end: {stage.note}"] if stage.note else []
+    return tell(report(stage.judge, judged, now - stage.began_at, *notes), args)
+
+
+def _begins(args: argparse.Namespace, performance: Performance | None) -> str:
+    """What is under way, for whoever waits for the verdict."""
+    if performance is not None:
+        return f"plays with {words_of(args)}; Ctrl-C releases it, and judges"
+    until = "until Ctrl-C" if args.for_s == NEVER else f"for {args.for_s:g} s"
+    return f"listens to {words_of(args)} {until}"
+
+
+def tell(found: Report, args: argparse.Namespace) -> int:
+    """Print the verdict, write the file, and give the exit code."""
+    if args.junit is not None:
+        try:
+            args.junit.write_text(junit(found), "utf-8")
+        except OSError as error:
+            complain("judge", f"{args.junit} cannot be written: {error.strerror or error}")
+            return os.EX_CANTCREAT
+    width = shutil.get_terminal_size((WIDTH, 50)).columns if sys.stdout.isatty() else 10**6
+    print(as_json(found) if args.json else text(found, width))
+    sys.stdout.flush()
+    if verdict(found) is Verdict.BROKEN:
+        return 1
+    return os.EX_UNAVAILABLE if found.notes or not found.states else 0
+
+
+class Live:
+    """The graph: what is heard on it, in order of arrival, and what is said."""
+
+    def __init__(
+        self, transport: Transport, kind: Kind, beside: list[str], performance: Performance | None
+    ) -> None:
+        self._transport = transport
+        self._publishers: dict[str, Publisher[Message]] = {}
+        self._ear = Ear(transport, (*OF_DEVICES, FIRE.live()), others_only=True)
+        self._retained = transport.subscribe(FIRE, lambda message: None)
+        allowed = {topic for name in beside for topic in BESIDE[name]}
+        speaks = {topic.name for topic in performance.speaks} if performance else set()
+        self._sole = sorted(speaks - allowed)
+        self._looks_at_fire = kind == "lift"
+        self._looked_at = 0.0
+
+    def strangers(self) -> str:
+        """Who else publishes on the play's topics."""
+        found = [name for name in self._sole if self._ear.ends[name].matched()]
+        if not found:
+            return ""
+        who = [name for name, topics in BESIDE.items() if set(topics) & set(found)]
+        beside = " ".join(f"--beside {name}" for name in who)
+        return f"others publish on {', '.join(found)}: to play all the same, add {beside}"
+
+    def judge(self, stage: Stage) -> None:
+        """Run until there is a verdict. Whatever ends a play, the device is released first."""
+        stage.begin(time.monotonic(), time.time())
+        try:
+            with _told_to_end() as told:
+                while not stage.done:
+                    if told():
+                        self._say(stage.stop())
+                    self._turn(stage)
+        except BaseException:
+            with suppress(TransportError):
+                self._say(stage.stop())
+            raise
+
+    def _turn(self, stage: Stage) -> None:
+        waits_s = min(stage.wake_at() - time.monotonic(), LOOK_EVERY_S)
+        for heard in self._ear.listen(waits_s):
+            self._say(stage.hear(heard))
+        now, wall = time.monotonic(), time.time()
+        if self._looks_at_fire and now > self._looked_at + 1.0:
+            self._looked_at = now
+            publishers = self._ear.ends[FIRE.name].matched()
+            supervisors = self._ear.ends[topics.LIFT_REQUESTS.name].matched()
+            retaining = self._retained.matched()
+            stage.judge.fire_ends(publishers, retaining, supervisors, now, wall)
+        self._say(stage.turn(now, wall))
+
+    def _say(self, said: list[Said]) -> None:
+        for topic, message in said:
+            if topic.name not in self._publishers:
+                self._publishers[topic.name] = self._transport.publisher(topic)
+            self._publishers[topic.name].publish(message)
+
+
+@contextmanager
+def _told_to_end() -> Iterator[Callable[[], bool]]:
+    """Whether Ctrl-C, SIGTERM or SIGHUP has come; none of them interrupts what is under way."""
+    told: list[int] = []
+    with ended_by(lambda number, _: told.append(number)):
+        yield lambda: bool(told)

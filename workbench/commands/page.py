@@ -1,0 +1,175 @@
+"""`rmf-bridge page`: a web page of what is on RMF's graph, or of one recording.
+
+It needs the extra `page` (NiceGUI), which no daemon imports. It listens on 127.0.0.1 unless `--listen`
+says otherwise, which needs a password file or a reverse proxy.
+"""
+
+import argparse
+import getpass
+import ipaddress
+import os
+import socket
+import sys
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Final
+
+from bridges.host import log, places
+from workbench.graph.join import add_graph_arguments, command_line, complain, open_graph
+
+INSTALL: Final = "pip install 'rmf-bridges[page]', or apt install ./rmf-bridges-page_*.deb"
+PORT: Final = 8080
+LOOPBACK: Final = "127.0.0.1"
+RECORDER: Final = Path("/var/lib/rmf-bridge-recorder")
+"""`rmf-bridge-recorder.service` writes there."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """The options of `page`."""
+    parser.add_argument(
+        "recording", nargs="?", type=Path, metavar="FILE", help="show this recording, and no graph"
+    )
+    parser.add_argument(
+        "--listen",
+        type=_address,
+        default=(LOOPBACK, PORT),
+        metavar="ADDRESS:PORT",
+        help=f"default: {LOOPBACK}:{PORT}; port 0 takes a free one",
+    )
+    parser.add_argument(
+        "--host",
+        action="append",
+        default=[],
+        metavar="NAME",
+        help="another name that browsers use for this page, such as rmf.hospital.example",
+    )
+    parser.add_argument(
+        "--passwords", type=Path, metavar="FILE", help="who may log in and act (see --add-user)"
+    )
+    parser.add_argument(
+        "--add-user", metavar="NAME", help="ask for a password, write it to --passwords, and end"
+    )
+    parser.add_argument(
+        "--proxy", metavar="ADDRESS", help="a reverse proxy whose --proxy-header names the user"
+    )
+    parser.add_argument("--proxy-header", default="X-Remote-User", metavar="HEADER")
+    parser.add_argument(
+        "--incidents",
+        type=Path,
+        default=_incidents(),
+        metavar="DIR",
+        help="the folder of recorded incidents (default: the recorder's)",
+    )
+    parser.add_argument(
+        "--runtime-dirs", type=Path, metavar="DIR", help="the daemons of this machine are here"
+    )
+    add_graph_arguments(parser)
+
+
+def _incidents() -> Path:
+    """The recorder service's folder where this user may read it, else this user's own recorder's."""
+    if os.access(RECORDER, os.R_OK | os.X_OK):
+        return RECORDER
+    return places.state_base() / "recordings"
+
+
+def _address(text: str) -> tuple[str, int]:
+    host, _, port = text.rpartition(":")
+    host = host.strip("[]")
+    try:
+        ipaddress.ip_address(host)
+        number = int(port)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"'{text}' is not ADDRESS:PORT, as 0.0.0.0:8080") from None
+    if not 0 <= number <= 65535:
+        raise argparse.ArgumentTypeError(f"'{text}': a port is 0 to 65535")
+    return host, number
+
+
+def run(args: argparse.Namespace) -> int:
+    """0 after Ctrl-C or SIGTERM; 64, 66, 69 or 78 with what to do."""
+    from workbench.page.access import PasswordError, users
+
+    log.start()
+    try:
+        if args.add_user:
+            return _add_user(args)
+        known = users(args.passwords) if args.passwords else {}
+    except PasswordError as error:
+        complain("page", error)
+        return os.EX_CONFIG
+    if why := _unsafe(args):
+        complain("page", why)
+        return os.EX_USAGE
+    if args.recording and (code := _unreadable(args.recording)):
+        return code
+    address, port = args.listen
+    try:
+        opened = socket.create_server(args.listen, family=_family(address))
+    except OSError as error:
+        why = os.strerror(error.errno) if error.errno else str(error)
+        other = f"another port: --listen {address}:0 takes a free one"
+        complain("page", f"{address} port {port}: {why}; {other}")
+        return os.EX_UNAVAILABLE
+    with opened:
+        return _serve(args, opened, known)
+
+
+def _serve(args: argparse.Namespace, opened: socket.socket, known: Mapping[str, str]) -> int:
+    """With NiceGUI, whose import takes seconds on a Raspberry Pi: what is wrong was said before."""
+    try:
+        from workbench.page import web
+    except ImportError as error:
+        complain("page", f"{error}: to install it: {INSTALL}")
+        return os.EX_UNAVAILABLE
+    web.serve(args, opened, known, lambda: open_graph(args, "rmf_bridge_page"), _graph(args))
+    return 0
+
+
+def _family(address: str) -> socket.AddressFamily:
+    return socket.AF_INET6 if ":" in address else socket.AF_INET
+
+
+def _unreadable(recording: Path) -> int:
+    """An exit code where nothing can be shown of this recording; 0 where something can."""
+    from workbench.replay.bags import BagError, Notes, all_in
+    from workbench.replay.recordings import unreadable
+
+    try:
+        next(all_in(recording, Notes()), None)
+    except BagError as error:
+        return unreadable("page", error)
+    return 0
+
+
+def _graph(args: argparse.Namespace) -> Sequence[str]:
+    return command_line(args).options
+
+
+def _add_user(args: argparse.Namespace) -> int:
+    from workbench.page.access import add_user
+
+    if args.passwords is None:
+        complain("page", "--add-user needs --passwords FILE, where the user is written")
+        return os.EX_USAGE
+    if sys.stdin.isatty():
+        password = getpass.getpass(f"Password of {args.add_user}: ")
+        if getpass.getpass("Once more: ") != password:
+            complain("page", "the two passwords differ; nothing was written")
+            return os.EX_USAGE
+    else:
+        password = sys.stdin.readline().rstrip("\n")
+    add_user(args.passwords, args.add_user, password)
+    print(f"{args.add_user} may log in: {args.passwords}")
+    return 0
+
+
+def _unsafe(args: argparse.Namespace) -> str:
+    """Why the page may not listen there; "" if it may."""
+    loopback = ipaddress.ip_address(args.listen[0]).is_loopback
+    if loopback or args.passwords or args.proxy:
+        return ""
+    return (
+        f"on {args.listen[0]} everybody on that network would see the site: give --passwords FILE,"
+        " or --proxy ADDRESS for a reverse proxy that knows its users"
+    )

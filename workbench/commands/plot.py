@@ -1,0 +1,177 @@
+"""`rmf-bridge plot`: the timeline of a device from a recording, as one file: HTML, SVG or PNG.
+
+The file needs no network and no script. HTML has the explanation under the picture. PNG is made of
+the SVG by resvg, an extra, imported here and nowhere else.
+"""
+
+import argparse
+import os
+from collections.abc import Iterator
+from html import escape
+from pathlib import Path
+from typing import Final
+
+from bridges.runtime import faults
+from workbench.explain.lanes import Drawing
+from workbench.explain.palette import PAPER, Theme
+from workbench.explain.picture import svg
+from workbench.explain.site import Site
+from workbench.explain.text import lines
+from workbench.explain.timeline import KINDS, Timeline
+from workbench.graph.join import complain
+from workbench.replay.recordings import Span, add_span_arguments, told_between, unreadable
+from workbench.replay.sources import BagError
+
+SUFFIXES: Final = (".html", ".svg", ".png")
+INSTALL: Final = "pip install 'rmf-bridges[plot]'"
+NARROWEST, WIDEST = 480, 8000
+
+
+class PlotError(Exception):
+    """No picture can be made. The text says what to do."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Options of `plot`."""
+    parser.add_argument(
+        "file", type=Path, metavar="FILE", help="a recording, as `explain` reads it"
+    )
+    parser.add_argument("--device", metavar="NAME", help="default: the only one in the recording")
+    parser.add_argument("--kind", choices=KINDS, help="where a lift and a door have the same name")
+    parser.add_argument(
+        "-o",
+        "--output",
+        type=_output,
+        required=True,
+        metavar="PICTURE",
+        help="a name that ends with .html, .svg or .png; an existing file is replaced",
+    )
+    parser.add_argument(
+        "--width",
+        type=_width,
+        default=1200,
+        metavar="PIXELS",
+        help=f"of the picture, {NARROWEST} to {WIDEST} (default 1200)",
+    )
+    parser.add_argument(
+        "--theme",
+        choices=("light", "dark"),
+        help="default: as the reader's screen; a PNG is light",
+    )
+    add_span_arguments(parser)
+
+
+def _output(text: str) -> Path:
+    if Path(text).suffix.lower() not in SUFFIXES:
+        raise argparse.ArgumentTypeError(f"'{text}' does not end with one of {', '.join(SUFFIXES)}")
+    return Path(text)
+
+
+def _width(text: str) -> int:
+    if not text.isascii() or not text.isdigit() or not NARROWEST <= int(text[:6]) <= WIDEST:
+        raise argparse.ArgumentTypeError(f"'{text}': write pixels, {NARROWEST} to {WIDEST}")
+    return int(text)
+
+
+def run(args: argparse.Namespace) -> int:
+    """0; 1 when there is nothing to draw, or the picture cannot be written; 66 when FILE is no
+    recording that can be read."""
+    try:
+        name = args.device or _only(args)
+        timeline, words = _read(args, name)
+        _write(args.output, _picture(args, timeline, words))
+    except BagError as error:
+        return unreadable("plot", error)
+    except PlotError as error:
+        complain("plot", error)
+        return 1
+    print(f"{args.output}: {timeline.kind} {timeline.device}, {len(timeline.lanes)} rows")
+    left_out = timeline.left_out + sum(lane.left_out for lane in timeline.lanes)
+    if left_out:
+        complain("plot", f"{left_out} older parts did not fit: choose a time with --from and --to")
+    return 0
+
+
+def _only(args: argparse.Namespace) -> str:
+    """The only device of the recording. Raises PlotError where there are more."""
+    site = Site()
+    for heard in told_between(args.file, Span(args.from_, args.to), "plot", ""):
+        site.take(heard)
+    names = {name: f"{kind} {name}" for kind, name in site.devices() if args.kind in (None, kind)}
+    if len(names) > 1:
+        listed = ", ".join([*names.values()][:20])
+        raise PlotError(f"say with --device which one: {listed}")
+    for name in names:
+        return name
+    raise PlotError(f"{args.file} holds no state of any lift, door or charger in that time")
+
+
+def _read(args: argparse.Namespace, name: str) -> tuple[Timeline, list[str]]:
+    """The device's lanes, and its explanation in lines. Raises PlotError if it shows no state."""
+    span, site = Span(args.from_, args.to), Site(name)
+    drawings = {kind: Drawing(kind, name) for kind in KINDS if args.kind in (None, kind)}
+    for heard in told_between(args.file, span, "plot", name):
+        site.take(heard)
+        for drawing in drawings.values():
+            drawing.take(heard)
+    kinds = [kind for kind, shown in site.devices() if shown == name and kind in drawings]
+    if len(kinds) > 1:
+        raise PlotError(f"'{name}' is a {' and a '.join(kinds)}: say which with --kind")
+    for kind in kinds:
+        site.story_from(span.begins_at)
+        words = lines(site.explain(kind, name, None, faults.for_explain()))
+        return drawings[kind].timeline(span.begins_at), words
+    raise PlotError(f"{args.file} holds no state of '{name}' in that time")
+
+
+def _picture(args: argparse.Namespace, timeline: Timeline, words: list[str]) -> bytes:
+    theme: Theme | None = args.theme
+    match args.output.suffix.lower():
+        case ".svg":
+            return svg(timeline, args.width, None, theme).encode()
+        case ".png":
+            return _png(svg(timeline, args.width, None, theme or "light"))
+    return "".join(_page(svg(timeline, args.width, None, theme), words, theme)).encode()
+
+
+def _png(picture: str) -> bytes:
+    """Raises PlotError without resvg."""
+    try:
+        import resvg_py
+    except ImportError:
+        raise PlotError(f"a PNG needs resvg: {INSTALL}; or write .svg or .html") from None
+    return bytes(resvg_py.svg_to_bytes(svg_string=picture, zoom=2))
+
+
+def _page(picture: str, words: list[str], theme: Theme | None) -> Iterator[str]:
+    """One page, with the picture in it. A narrow screen scrolls the picture."""
+    colours = [
+        f"body{{background:{PAPER[theme or 'light'][0]};color:{PAPER[theme or 'light'][1]}}}"
+    ]
+    if theme is None:
+        back, text = PAPER["dark"][:2]
+        colours.append(
+            f"@media (prefers-color-scheme: dark){{body{{background:{back};color:{text}}}}}"
+        )
+    yield "<!DOCTYPE html>\n<html lang='en'><head><meta charset='utf-8'>"
+    yield "<meta name='viewport' content='width=device-width, initial-scale=1'>"
+    yield "<meta name='color-scheme' content='light dark'>"
+    yield f"<title>{escape(words[0])}</title><style>"
+    yield "body{font-family:system-ui,sans-serif;margin:1rem}.wide{overflow-x:auto}"
+    yield "pre{white-space:pre-wrap;font-size:.85rem;line-height:1.4}"
+    yield "".join(colours)
+    yield f"</style></head><body><main><div class='wide' tabindex='0'>{picture}</div>"
+    yield f"<pre>{escape(chr(10).join(words))}</pre></main></body></html>\n"
+
+
+def _write(file: Path, content: bytes) -> None:
+    """Whole or not at all. Raises PlotError."""
+    beside = file.with_name(f".{file.name}.{os.getpid()}")
+    try:
+        try:
+            beside.write_bytes(content)
+            beside.replace(file)
+        finally:
+            beside.unlink(missing_ok=True)
+    except OSError as error:
+        raise PlotError(f"{file} cannot be written: {error.strerror}") from None

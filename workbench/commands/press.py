@@ -1,0 +1,23 @@
+"""`rmf-bridge press FILE SIGNAL`: in a simulation, a person or the building acts."""
+
+import argparse
+
+from bridges.commands.completion import completed_by
+from workbench.graph.plants import add_simulation, names, obey, tell
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """The options of `press`."""
+    add_simulation(parser)
+    signal = parser.add_argument(
+        "signal", metavar="SIGNAL", nargs="?", help="without one: print what there is"
+    )
+    completed_by(signal, names("press"))
+    parser.add_argument("how", nargs="?", choices=("on", "off"), default="on", help="default: on")
+
+
+def run(args: argparse.Namespace) -> int:
+    """0; 1 if there is no such signal; 69 if no simulation of the file runs."""
+    if args.signal is None:
+        return tell(args, "press")
+    return obey(args, "press", args.signal, args.how)

@@ -1,0 +1,312 @@
+"""`rmf-bridge send`: one request to a lift, door or charger, as RMF would send it, and its effect.
+
+Exit code 0 when the effect was seen, 1 when not (with the reason), 2 for a wrong command line, 130
+after Ctrl-C.
+"""
+
+import argparse
+import sys
+import time
+from contextlib import closing
+from typing import TextIO
+from uuid import uuid4
+
+from msgspec.structs import replace
+
+from bridges.messages import definitions as d
+from bridges.messages import topics, words
+from bridges.messages.heard import Heard
+from bridges.messages.stamps import stamp
+from bridges.transports.transport import Publisher, Transport, TransportError
+from workbench.graph.exchange import step
+from workbench.graph.join import (
+    add_graph_arguments,
+    command_line,
+    complain,
+    graph_of,
+    interruptible,
+    open_graph,
+    seconds,
+)
+from workbench.graph.live import Ear
+from workbench.graph.requests import Done, Failed, Request, Seen
+from workbench.graph.requests.charger import Charge, ChargeCancel, QueuedCancel, QueuedCharge
+from workbench.graph.requests.door import DoorMove
+from workbench.graph.requests.lift import LiftEnd, LiftRide
+
+NODE_NAME = "rmf_bridge_send"
+LOOK_EVERY_S = 0.1
+STATES = (topics.LIFT_STATES, topics.DOOR_STATES, topics.CHARGER_STATES)
+"""Also those of other kinds: a name may be another kind's."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """`lift`, `door` and `charger`, each with the options of the graph."""
+    kinds = parser.add_subparsers(dest="kind", required=True, metavar="lift|door|charger")
+    for kind, (text, example, add) in {
+        "lift": (
+            "ask for a lift, or end its session",
+            "Lift1 L3 --session fleet/robot",
+            _lift_arguments,
+        ),
+        "door": ("hold a door open, or let it close", "ward_door open", _door_arguments),
+        "charger": (
+            "assign a charger, or cancel that",
+            "any --queue --robot fleet/robot",
+            _charger_arguments,
+        ),
+    }.items():
+        example = f"example: rmf-bridge send {kind} {example}"
+        add(kinds.add_parser(kind, help=text, epilog=example))
+
+
+def add_shared_arguments(parser: argparse.ArgumentParser, *, direct: bool) -> None:
+    """Which graph, how long, and with `direct` whom to ask."""
+    add_graph_arguments(parser)
+    parser.add_argument(
+        "--timeout",
+        type=seconds(0, 86400),
+        default=60.0,
+        metavar="S",
+        help="give up after S seconds (default: 60)",
+    )
+    if direct:
+        parser.add_argument(
+            "--direct",
+            action="store_true",
+            help="ask the device's own daemon, not RMF's supervisor",
+        )
+    parser.set_defaults(usage=parser.error)
+
+
+def _lift_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("name", metavar="NAME", help="the lift, as RMF names it")
+    parser.add_argument("floor", metavar="FLOOR", nargs="?", help="its name in LiftState")
+    parser.add_argument("--session", default="", metavar="ID", help="fleet/robot, or any name")
+    parser.add_argument(
+        "--end",
+        action="store_true",
+        help="end the session that --session names (default: that of whoever holds the lift)",
+    )
+    parser.add_argument(
+        "--granted-only", action="store_true", help="wait for the session, not for the car"
+    )
+    add_shared_arguments(parser, direct=True)
+
+
+def _door_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("name", metavar="NAME", help="the door, as RMF names it")
+    parser.add_argument("action", choices=("open", "close"))
+    parser.add_argument(
+        "--requester", default=NODE_NAME, metavar="ID", help=f"default: {NODE_NAME}"
+    )
+    add_shared_arguments(parser, direct=True)
+
+
+def _charger_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("name", metavar="NAME", help="the charger, as RMF names it")
+    what = parser.add_mutually_exclusive_group(required=True)
+    what.add_argument("--robot", metavar="FLEET/ROBOT", help="assign the charger to this robot")
+    what.add_argument("--cancel", metavar="REQUEST_ID", help="cancel the request of this id")
+    parser.add_argument(
+        "--queue",
+        action="store_true",
+        help="ask the charger coordinator, which may choose another charger; NAME may be `any`",
+    )
+    parser.add_argument("--request-id", metavar="ID", help="default: a new one")
+    parser.add_argument(
+        "--start-timeout",
+        type=seconds(0, 86400),
+        default=0.0,
+        metavar="S",
+        help="cancel if charging has not begun after S seconds (default: the charger's own limit)",
+    )
+    add_shared_arguments(parser, direct=False)
+
+
+def request_of(args: argparse.Namespace) -> Request:
+    """The request that the command line asks for. A contradiction in it ends with exit code 2."""
+    match args.kind:
+        case "lift":
+            return _lift_request(args)
+        case "door":
+            opened = args.action == "open"
+            return DoorMove(
+                args.name, opened, args.requester, direct=args.direct, line=command_line(args)
+            )
+        case _:
+            return _charger_request(args)
+
+
+def _lift_request(args: argparse.Namespace) -> Request:
+    if args.end == (args.floor is not None):
+        args.usage("give either a FLOOR or --end")
+    line = command_line(args)
+    if args.end:
+        if args.granted_only:
+            args.usage("--granted-only needs a FLOOR")
+        fall = getattr(args, "falls_back", False), getattr(args, "car_empty", False)
+        return LiftEnd(args.name, args.session, *fall, direct=args.direct, line=line)
+    if not args.session:
+        args.usage("whose session is it? --session FLEET/ROBOT, or any name")
+    return LiftRide(
+        args.name, args.floor, args.session, args.granted_only, direct=args.direct, line=line
+    )
+
+
+def _charger_request(args: argparse.Namespace) -> Request:
+    line = command_line(args)
+    if args.cancel is not None:
+        cancel = QueuedCancel if args.queue else ChargeCancel
+        return cancel(args.name, args.cancel, line=line)
+    fleet, slash, robot = args.robot.partition("/")
+    if not (fleet and slash and robot):
+        args.usage(f"--robot '{args.robot}' is not FLEET/ROBOT")
+    request_id = args.request_id or f"{NODE_NAME}-{uuid4().hex[:8]}"
+    charge = QueuedCharge if args.queue else Charge
+    return charge(args.name, fleet, robot, request_id, args.start_timeout, line=line)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Send and wait."""
+    request = request_of(args)
+    try:
+        with interruptible(), closing(open_graph(args, NODE_NAME)) as transport:
+            return send(
+                transport,
+                request,
+                args.timeout,
+                sys.stdout,
+                command=args.command,
+                graph=graph_of(args, transport.speaks),
+            )
+    except TransportError as error:
+        complain(args.command, error)
+        return 1
+    except KeyboardInterrupt:  # before anything was sent
+        return _interrupted(args.command, sent=False)
+
+
+def _interrupted(command: str, *, sent: bool) -> int:
+    rest = "the last request remains in effect" if sent else "no request was sent"
+    complain(command, f"interrupted; {rest}")
+    return 130
+
+
+def send(
+    transport: Transport,
+    request: Request,
+    timeout_s: float,
+    out: TextIO,
+    *,
+    command: str = "send",
+    graph: str = "",
+) -> int:
+    """0 when the effect was seen within `timeout_s`, else 1; 130 after Ctrl-C. `graph`: for people."""
+    exchange = _Exchange(transport, request, timeout_s, out, command, graph)
+    try:
+        while True:
+            code = exchange.look()
+            if code is not None:
+                return code
+    except KeyboardInterrupt:
+        return _interrupted(command, sent=exchange.seen.first_sent_at is not None)
+
+
+class _Exchange:
+    """Calls `exchange.step` with the clock, the transport and the terminal."""
+
+    def __init__(
+        self,
+        transport: Transport,
+        request: Request,
+        timeout_s: float,
+        out: TextIO,
+        command: str = "send",
+        graph: str = "",
+    ) -> None:
+        self.command = command
+        self.request, self.out, self.transport = request, out, transport
+        self.publishers: dict[str, Publisher[d.Message]] = {}
+        self.publisher = self._publisher(request.topic)
+        self.ear = Ear(transport, (*STATES, *request.answers, topics.DIAGNOSTICS))
+        self.supervisor = (
+            None
+            if request.supervisor is None
+            else transport.subscribe(request.supervisor, lambda message: None)
+        )
+        self.seen = Seen(began_at=time.monotonic(), timeout_s=timeout_s, graph=graph)
+        self.asked: set[str] = set()
+        self.described = ""
+
+    def look(self) -> int | None:
+        """Take what was heard and do the next step; returns an exit code at the end."""
+        for heard in self.ear.listen(LOOK_EVERY_S):
+            self._take(heard)
+        now = time.monotonic()
+        self.seen = replace(self.seen, listeners=self._listeners())
+        todo = step(self.request, self.seen, now)
+        if todo.outcome is not None:
+            return self._finish(todo.outcome)
+        if todo.hint and todo.hint not in self.seen.hinted:
+            left_s = max(0.0, self.seen.began_at + self.seen.timeout_s - now)
+            self.seen = replace(self.seen, hinted=self.seen.hinted | {todo.hint})
+            complain(self.command, f"waits {left_s:.0f} s more: {todo.hint}")
+        if todo.send is not None:
+            self._send(todo.send, now, self.request.own if todo.direct else self.request.topic)
+        return None
+
+    def _publisher(self, topic: topics.AnyTopic) -> Publisher[d.Message]:
+        if topic.name not in self.publishers:
+            self.publishers[topic.name] = self.transport.publisher(topic)
+        return self.publishers[topic.name]
+
+    def _listeners(self) -> int:
+        """How many hear us; none while nobody is there who would pass it on."""
+        if self.supervisor is not None and not self.supervisor.matched():
+            return 0
+        return self.publisher.matched()
+
+    def _take(self, heard: Heard) -> None:
+        if isinstance(heard.message, d.DiagnosticArray):
+            boarded = _boarded(heard.message, self.request.name)
+            self.seen = replace(self.seen, boarded=boarded or self.seen.boarded)
+            return
+        before, self.seen = self.seen, self.seen.hears(heard, self.request.about)
+        if self.seen.states == before.states:
+            return
+        text = words.described(self.seen.states[-1])
+        if text != self.described:
+            self.described = text
+            self._line(heard.at, "state", text)
+
+    def _send(self, message: words.Requested, now: float, topic: topics.AnyTopic) -> None:
+        if isinstance(message, d.LiftRequest | d.DoorRequest):
+            message = replace(message, request_time=stamp(time.time()))
+        if topic.name not in self.asked:
+            self.asked.add(topic.name)
+            self._line(now, "request", f"{words.request(message)} on {topic.name}")
+        self.seen = self.seen.sends(now)
+        self._publisher(topic).publish(message)
+
+    def _finish(self, outcome: Done | Failed) -> int:
+        if isinstance(outcome, Done):
+            self._line(time.monotonic(), "done", outcome.text)
+            return 0
+        complain(self.command, outcome.text)
+        return 1
+
+    def _line(self, at: float, what: str, text: str) -> None:
+        elapsed_s = max(0.0, at - self.seen.began_at)
+        line = f"{elapsed_s:8.3f} s  {what:<7}  {self.request.name}  {text}"
+        self.out.write(words.printable(line) + "\n")
+        self.out.flush()
+
+
+def _boarded(message: d.DiagnosticArray, lift: str) -> str:
+    """What a lift's own diagnostics say of a robot inside; "" if they are another's."""
+    for status in message.status:
+        values = {value.key: value.value for value in status.values}
+        if (status.hardware_id, values.get("kind")) == (lift, "lift"):
+            return values.get("boarded", "")
+    return ""

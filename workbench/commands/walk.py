@@ -1,0 +1,181 @@
+"""`rmf-bridge walk FILE`: try every wire of a device with the electrician, and sign what was seen.
+
+Every input is shown live; each output is switched on alone, after a key, for a few seconds. Nothing
+else may serve the device meanwhile. However it ends, every output is off: a guard switches them off
+even after a kill -9.
+"""
+
+import argparse
+import getpass
+import importlib.util
+import logging
+import os
+import sys
+import time
+from contextlib import ExitStack
+from datetime import datetime
+from pathlib import Path
+
+from bridges.commands.completion import completed_by, device_names
+from bridges.host import log
+from bridges.runtime import directory as runtime
+from bridges.runtime import guard, signals
+from bridges.settings.load import Config, SettingsError, load
+from drivers.hal import Bus, HalError
+from workbench.commissioning.by_hand import NoDevice, device_of, guarded
+
+NOT_OFF = 1
+DRAW_S = 0.05
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """The options of `walk`."""
+    parser.add_argument("file", type=Path, metavar="FILE", help="the device YAML")
+    device = parser.add_argument(
+        "--device", metavar="NAME", help="which device, if the file has several"
+    )
+    completed_by(device, device_names)
+    parser.add_argument(
+        "--by", metavar="NAME", help="who does it, for the record (default: the user)"
+    )
+    parser.add_argument(
+        "--record",
+        type=Path,
+        metavar="PATH",
+        help="where PATH.md and PATH.json are written (default: walk-DEVICE-DATE here)",
+    )
+    parser.add_argument("--simulate", action="store_true", help="practise on fake hardware")
+    parser.add_argument("--runtime-dir", metavar="DIR", help=argparse.SUPPRESS)
+
+
+def run(args: argparse.Namespace) -> int:
+    """0: all off; 1: not verified off; 64: no terminal, device; 69: in use; 73: no record; 78: YAML."""
+    log.start("WARNING")
+    if why := _no_screen():
+        print(why, file=sys.stderr)
+        return os.EX_USAGE
+    try:
+        config = load(args.file)
+        device = device_of(config, args.device)
+    except SettingsError as error:
+        print("\n".join(map(str, error.problems)), file=sys.stderr)
+        return os.EX_CONFIG
+    except NoDevice as error:
+        print(error, file=sys.stderr)
+        return os.EX_USAGE
+    args.file = args.file.absolute()  # `guarded` changes to another directory
+    end = signals.End()
+    signals.ignore_reset()
+    try:
+        held = runtime.held(args.file, args.runtime_dir, serves=False, simulated=args.simulate)
+    except (runtime.AlreadyRunning, PermissionError) as error:
+        print(f"walk needs the device for itself: {error}", file=sys.stderr)
+        return os.EX_UNAVAILABLE
+    try:
+        return _walk(args, config, device, held, end)
+    except HalError as error:
+        print(error, file=sys.stderr)
+        return os.EX_UNAVAILABLE
+    finally:
+        held.close()
+
+
+def _no_screen() -> str:
+    if not (sys.stdin.isatty() and sys.stdout.isatty()):
+        return "walk needs a terminal: it switches outputs by keys"
+    if importlib.util.find_spec("rich") is None:
+        return "walk needs rich to draw: pip install 'rmf-bridges[laptop]'"
+    return ""
+
+
+def _walk(
+    args: argparse.Namespace,
+    config: Config,
+    device: str,
+    held: runtime.RuntimeDirectory,
+    end: signals.End,
+) -> int:
+    if not args.simulate and held.records.unreleased():
+        print(f"a dead daemon may have left outputs on: rmf-bridge outputs-off {args.file}")
+        return os.EX_UNAVAILABLE
+    with ExitStack() as stack:
+        path = _record_path(args, device).absolute()
+        if args.simulate:
+            from hal_fakes.simulate import Simulation
+
+            simulation = Simulation(config, held.path)
+            stack.callback(simulation.close)
+            return _on(args, config, device, simulation.open_bus(config.bus_of(device)), path, end)
+        bus, all_off = guarded(config, device, held, guard.command(args.file, args.runtime_dir))
+        code = _on(args, config, device, bus, path, end)
+        if code != NOT_OFF:
+            all_off()
+        return code
+
+
+def _record_path(args: argparse.Namespace, device: str) -> Path:
+    day = datetime.now().strftime("%Y-%m-%d-%H%M")
+    return args.record or Path(
+        f"{'practice' if args.simulate else 'walk'}-{device.replace('/', '_')}-{day}"
+    )
+
+
+def _on(
+    args: argparse.Namespace, config: Config, device: str, bus: Bus, path: Path, end: signals.End
+) -> int:
+    from workbench.commissioning.walk import signed
+    from workbench.commissioning.walk.bench import Bench, Input
+    from workbench.commissioning.walk.screen import Screen, keyboard, keys
+    from workbench.commissioning.walk.steps import OFF, steps
+    from workbench.commissioning.walk.tap import Tap
+
+    settings, driver_type = config.devices[device], config.driver_type(device)
+    tap = Tap(bus)
+    wires = config.wires(device)
+    inputs = [Input(w, tap.canonical(w.point)) for w in wires if w.direction == "in"]
+    tried = steps(config, device)
+    bench = Bench(driver_type.create(device, settings, tap), tap, inputs, tried, OFF[config.kind])
+    begun = datetime.now()
+    by = args.by or getpass.getuser()
+
+    def note(how: str) -> None:
+        signed.write(
+            path,
+            signed.record(
+                args.file,
+                device,
+                by,
+                begun,
+                inputs=inputs,
+                steps=tried,
+                memory=bench.memory,
+                end=how,
+                simulated=args.simulate,
+            ),
+        )
+
+    how, noted = "interrupted", None
+    try:
+        with bench, keyboard() as terminal, Screen(device, bench) as screen:
+            while not end.wait(0):
+                if not all(map(screen.obey, keys(terminal, DRAW_S))):
+                    how = "ended by key"
+                    break
+                screen.draw(time.monotonic())
+                if bench.memory.results != noted:
+                    noted = bench.memory.results
+                    note("not ended")
+    except OSError as error:
+        how = f"interrupted: {error.strerror}"  # the terminal has gone
+    finally:
+        off = "every output verified off" if bench.verified_off else "outputs NOT verified off"
+        bus.close()
+    code, told = 0, f"{path}.md and .json"
+    try:
+        note(f"{how}; {off}")
+    except OSError as error:
+        code, told = os.EX_CANTCREAT, f"not written: {error}"
+    print(f"{off}. Record: {told}")
+    if not bench.verified_off:
+        logging.error("cut the relays' supply before working on the device")
+    return code if bench.verified_off else NOT_OFF

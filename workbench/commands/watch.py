@@ -1,0 +1,115 @@
+"""`rmf-bridge watch`: the lifts, doors and chargers of the RMF graph, live, one row each.
+
+`board.py` makes the rows. On a terminal the table is redrawn in place; a pipe gets one line for each
+change. Ctrl-C is the normal end, so it exits 0.
+"""
+
+import argparse
+import json
+import shutil
+import sys
+import time
+from collections.abc import Callable
+from contextlib import closing
+from typing import TextIO
+
+from msgspec.structs import asdict
+
+from bridges.host.paint import coloured
+from bridges.messages import topics
+from bridges.transports.transport import Transport, TransportError
+from workbench.graph.board import Board, Row, change_line, changes, json_line, repaint, table
+from workbench.graph.join import add_graph_arguments, complain, interruptible, open_graph
+from workbench.graph.live import Ear
+
+REDRAW_S = 0.5
+REDRAW_AT_MOST_EVERY_S = 0.1
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Options of `watch`."""
+    add_graph_arguments(parser)
+    parser.add_argument(
+        "--once",
+        type=float,
+        nargs="?",
+        const=3.0,
+        metavar="SECONDS",
+        help="listen for SECONDS (default 3), print the table, exit 0, or 1 if nothing was heard",
+    )
+    parser.add_argument(
+        "--json", action="store_true", help="a line of JSON for each change; with --once one list"
+    )
+
+
+def run(args: argparse.Namespace) -> int:
+    """0; 1 when `--once` heard nothing or the graph cannot be joined."""
+    try:
+        with interruptible(), closing(open_graph(args, "rmf_bridge_watch")) as transport:
+            ear = listen_on(transport)
+            if args.once is not None:
+                return show_once(ear, args.once, sys.stdout, as_json=args.json)
+            live = sys.stdout.isatty() and not args.json
+            show(ear, sys.stdout, live=live, line=json_line if args.json else change_line)
+    except TransportError as error:
+        complain("watch", error)
+        return 1
+    except KeyboardInterrupt:
+        return 0
+    return 0
+
+
+def listen_on(transport: Transport) -> Ear:
+    """An ear for every topic that `watch` shows."""
+    shown = (
+        topics.LIFT_STATES,
+        topics.DOOR_STATES,
+        topics.CHARGER_STATES,
+        topics.DOOR_SUPERVISOR_HEARTBEAT,
+        topics.CHARGING_ASSIGNMENTS,
+        topics.DIAGNOSTICS,
+    )
+    return Ear(transport, shown)
+
+
+def show_once(ear: Ear, seconds: float, out: TextIO, *, as_json: bool = False) -> int:
+    """Listen for `seconds` and print the table, or JSON. Returns 0, or 1 if nothing was heard."""
+    board, until = Board(), time.monotonic() + seconds
+    while (left_s := until - time.monotonic()) > 0:
+        for heard in ear.listen(left_s):
+            board.take(heard)
+    rows = board.rows(time.monotonic(), time.time())
+    if not rows:
+        complain("watch", "no lift, door or charger state heard: check the domain and network")
+        return 1
+    told = json.dumps([asdict(row) for row in rows]) if as_json else "\n".join(table(rows))
+    out.write(told + "\n")
+    out.flush()
+    return 0
+
+
+def settled(board: Board, now: float, wall: float) -> list[Row]:
+    """The rows without those that might not say yet that they are simulated."""
+    young = board.unsettled(now)
+    return [row for row in board.rows(now, wall) if (row.kind, row.name) not in young]
+
+
+def show(
+    ear: Ear, out: TextIO, *, live: bool, line: Callable[[Row, float], str] = change_line
+) -> None:
+    """Show the rows until interrupted: redrawn in place, or a line for each change."""
+    board, rows, drawn = Board(), list[Row](), 0
+    next_at = 0.0
+    while True:
+        for heard in ear.listen(REDRAW_S):
+            board.take(heard)
+        now, wall = time.monotonic(), time.time()
+        before, rows = rows, settled(board, now, wall)
+        if not live:
+            out.writelines(line(row, wall) + "\n" for row in changes(before, rows))
+        elif now >= next_at:
+            size = shutil.get_terminal_size()
+            text, drawn = repaint(rows, drawn, size.columns, size.lines, coloured=coloured(out))
+            out.write(text)
+            next_at = now + REDRAW_AT_MOST_EVERY_S
+        out.flush()

@@ -1,0 +1,205 @@
+"""Who answers on the buses of a file: each device read once, then a bounded scan for others.
+
+Nothing is written. A driver is only read, never opened, because opening claims outputs and may switch
+them off; a module's watchdog, which a driver would arm, is left out.
+"""
+
+import re
+import time
+from collections.abc import Callable, Iterable, Iterator
+from typing import Any, Final
+
+import msgspec
+
+from bridges.host.log import plain
+from bridges.settings.load import Config
+from drivers import DriverError
+from drivers.hal import Bus, HalError
+from workbench.commissioning.doctor.finding import Finding, note, ok, warning, wrong
+
+TRIES: Final = 3
+HEARD_S: Final = 1.5
+"""Slow broadcasts come once a second."""
+UNITS_MOST: Final = {"modbus": 247, "can": 127}
+"""Modbus over Serial Line V1.02, 2.2; CiA 301."""
+SOME: Final = 16
+LOOK_AT: Final = {
+    "modbus": 'supply and cable; docs/wiring.md, "RS-485"',
+    "can": 'supply and cable; docs/wiring.md, "CAN"',
+    "http": "curl with the same address",
+}
+TEXTS: Final = "docs/troubleshooting.md"
+NO_PATH: Final = (10, 11)
+"""Exceptions of a gateway whose unit is silent (Modbus Application Protocol V1.1b3, section 7)."""
+DEVICE_TYPE: Final = (0x1000, 0, 4)
+"""The object that every CANopen node has: its device type (CiA 301, 7.5.2.1)."""
+
+
+def answers(config: Config, bus_name: str, whole: bool) -> Iterator[Finding]:
+    """The subject of one bus that is not GPIO. `whole`: scan every unit or node, not only 1 to 16."""
+    subject, kind = f"bus {bus_name}", config.bus_types[bus_name]
+    try:
+        bus = _opened(config, bus_name)
+    except HalError as error:
+        yield wrong(subject, str(error), "no device on it can be served", LOOK_AT.get(kind, TEXTS))
+        return
+    try:
+        yield from readings(config, bus_name, bus, subject)
+        yield from SCANS.get(kind, _nothing)(config, bus_name, bus, whole)
+    finally:
+        bus.close()
+
+
+def _opened(config: Config, bus_name: str) -> Bus:
+    return config.bus_type(bus_name).open_bus(unarmed(config.buses[bus_name]))
+
+
+def unarmed(settings: msgspec.Struct) -> msgspec.Struct:
+    """A bus's settings without the modules' watchdogs, which a reading would arm."""
+    if getattr(settings, "module_watchdog", None) is None:
+        return settings
+    return msgspec.structs.replace(settings, module_watchdog=None)
+
+
+def readings(config: Config, bus_name: str, bus: Any, subject: str) -> Iterator[Finding]:
+    """What each device of this bus answers, decoded by its driver."""
+    devices = config.devices_on(bus_name)
+    drivers = {n: config.driver_type(n).create(n, config.devices[n], bus) for n in devices}
+    _listened(bus)
+    for name, driver in drivers.items():
+        try:
+            sample = _read(driver.read, bus)
+        except DriverError as error:
+            means = f"{name} cannot be served: RMF is told that it is out of order"
+            yield wrong(
+                subject, f"{name}: {error}", means, LOOK_AT.get(config.bus_types[bus_name], TEXTS)
+            )
+            continue
+        if fault := getattr(sample, "code_fault", ""):
+            do = "compare codes: with the lines, in rmf-bridge walk"
+            yield warning(subject, f"{name}: {fault}", "RMF is told no floor", do)
+        yield ok(subject, f"{name} answers: {plain(sample)}")
+
+
+def _read(read: Callable[[], Any], bus: Bus) -> Any:
+    """A reading; the first may come too late on a line that was asleep. Raises DriverError."""
+    for _ in range(TRIES - 1):
+        bus.insist()
+        try:
+            return read()
+        except DriverError:
+            continue
+    bus.insist()
+    return read()
+
+
+def _listened(bus: Any) -> None:
+    """On CAN: take what comes for a while; the readings say what is wrong with the bus."""
+    if not hasattr(bus, "wait"):
+        return
+    try:
+        bus.wait(lambda: False, HEARD_S)
+    except HalError:
+        return
+
+
+def _nothing(config: Config, bus_name: str, bus: Bus, whole: bool) -> Iterator[Finding]:
+    yield from ()
+
+
+def _modbus(config: Config, bus_name: str, bus: Any, whole: bool) -> Iterator[Finding]:
+    from drivers.hal.modbus.points import Range
+    from drivers.hal.modbus.wire import Refused
+
+    def answering(unit: int) -> bool:
+        bus.insist()
+        try:
+            bus.read(Range(unit, "holding register", 0, 1))
+        except Refused as refusal:
+            return refusal.code not in NO_PATH
+        except HalError:
+            return False
+        return True
+
+    ours = set(numbers(config, bus_name, "unit"))
+    yield _scanned(f"bus {bus_name}", "unit", "modbus", ours, whole, answering)
+
+
+def _can(config: Config, bus_name: str, bus: Any, whole: bool) -> Iterator[Finding]:
+    """CANopen nodes are asked for their device type; other stations are only heard."""
+    from drivers.hal.can.canopen import Aborted, CanOpenNode
+    from drivers.hal.can.frames import named
+
+    if others := bus.others():
+        heard = ", ".join(map(named, others))
+        yield note(f"bus {bus_name}", f"frames of no device of this file are heard: {heard}")
+
+    def answering(node: int) -> bool:
+        bus.insist()
+        try:
+            CanOpenNode(bus, node, None).read(*DEVICE_TYPE)
+        except Aborted:
+            return True
+        except HalError:
+            return False
+        return True
+
+    if ours := set(numbers(config, bus_name, "node")):
+        yield _scanned(f"bus {bus_name}", "node", "can", ours, whole, answering)
+
+
+SCANS: Final = {"modbus": _modbus, "can": _can}
+
+
+def _scanned(
+    subject: str,
+    what: str,
+    kind: str,
+    ours: set[int],
+    whole: bool,
+    answering: Callable[[int], bool],
+) -> Finding:
+    most = UNITS_MOST[kind] if whole else SOME
+    asked = sorted({*range(1, most + 1), *ours})
+    began = time.monotonic()
+    found = [number for number in asked if answering(number)]
+    took_s = time.monotonic() - began
+    text = (
+        f"of the {what}s {ranges(asked)} these answer: {ranges(found) or 'none'} ({took_s:.1f} s)"
+    )
+    strangers = sorted(set(found) - ours)
+    if found == asked:
+        return note(subject, text, f"it answers whatever the {what} is, as many TCP modules do")
+    if strangers and not ours <= set(found):
+        do = f"write the {what} that answers, or give the device its own"
+        means = f"{what} {ranges(sorted(ours))} of this file may be wrong"
+        return warning(subject, text, means, do)
+    if strangers:
+        return note(subject, text, f"{what} {ranges(strangers)} is in no device of this file")
+    if not found:
+        do = "supply, cable (A and B), baud rate and parity, the gateway's own timeout"
+        return wrong(subject, text, "nothing is there, or nothing is heard", do)
+    return ok(subject, text)
+
+
+def numbers(config: Config, bus_name: str, what: str) -> Iterator[int]:
+    """The units or nodes that the file names on this bus."""
+    for name in config.devices_on(bus_name):
+        settings, driver = config.devices[name], config.driver_type(name)
+        claimed = [place for place, _ in driver.claims(settings)]
+        places = [*(wire.point for wire in driver.wires(settings)), *claimed]
+        for place in places:
+            yield from map(int, re.findall(rf"^{what} (\d+)\b", place.lower()))
+        if isinstance(number := getattr(settings, what, None), int):
+            yield number
+
+
+def ranges(numbers: Iterable[int]) -> str:
+    """`1, 3 to 16`."""
+    runs: list[list[int]] = []
+    for number in numbers:
+        if runs and runs[-1][-1] == number - 1:
+            runs[-1].append(number)
+        else:
+            runs.append([number])
+    return ", ".join(str(r[0]) if len(r) == 1 else f"{r[0]} to {r[-1]}" for r in runs)

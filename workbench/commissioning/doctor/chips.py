@@ -1,0 +1,69 @@
+"""GPIO chips and lines as the kernel describes them, without claiming a line (linux/gpio.h)."""
+
+import struct
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from workbench.commissioning.doctor.machine import Machine
+
+CHIP_INFO: Final = 0x8044B401
+"""GPIO_GET_CHIPINFO_IOCTL: name, label and number of lines."""
+CHIP: Final = struct.Struct("=32s32sI")
+LINE_INFO: Final = 0xC100B405
+"""GPIO_V2_GET_LINEINFO_IOCTL: name, consumer, offset, attributes, flags."""
+LINE: Final = struct.Struct("=32s32sIIQ176x")
+USED, OUTPUT = 1, 8
+"""GPIO_V2_LINE_FLAG_USED and _OUTPUT."""
+
+
+@dataclass(frozen=True, slots=True)
+class Chip:
+    """One chip: its device, its label, and how many lines it has."""
+
+    device: Path
+    label: str
+    lines: int
+
+    @property
+    def number(self) -> int:
+        """Its N in gpiochipN."""
+        return int(self.device.name.removeprefix("gpiochip"))
+
+
+@dataclass(frozen=True, slots=True)
+class LineNow:
+    """One line as it is. `consumer`: the kernel's name of who holds it; "" if nobody does."""
+
+    consumer: str
+    output: bool
+
+
+def devices(machine: Machine) -> list[Path]:
+    """Every GPIO chip's device, by its number."""
+    found = (p for p in machine.folder("/dev", "gpiochip*") if p.name[8:].isdecimal())
+    return sorted(found, key=lambda path: int(path.name[8:]))
+
+
+def chips(machine: Machine) -> Iterator[Chip]:
+    """Those chips that this process may look at."""
+    for device in devices(machine):
+        try:
+            answer = machine.ioctl(device, CHIP_INFO, bytes(CHIP.size))
+        except OSError:
+            continue
+        _, label, lines = CHIP.unpack(answer)
+        yield Chip(device, _text(label), lines)
+
+
+def line(machine: Machine, chip: Chip, offset: int) -> LineNow:
+    """A line of this chip. Raises OSError if there is none, or the kernel is older than 5.10."""
+    asked = LINE.pack(b"", b"", offset, 0, 0)
+    _, consumer, _, _, flags = LINE.unpack(machine.ioctl(chip.device, LINE_INFO, asked))
+    held = _text(consumer) or "somebody" if flags & USED else ""
+    return LineNow(held, bool(flags & OUTPUT))
+
+
+def _text(octets: bytes) -> str:
+    return octets.split(b"\0")[0].decode(errors="replace")

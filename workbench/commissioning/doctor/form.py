@@ -1,0 +1,89 @@
+"""The form for an afternoon with real hardware (docs/hardware.md): the machine and what was found are
+filled in, what a person has to see is not.
+"""
+
+import platform
+import time
+from collections.abc import Iterable
+from typing import Final
+
+import msgspec
+
+from bridges import __version__
+from bridges.messages.words import printable
+from bridges.settings.load import Config
+from workbench.commissioning.doctor.finding import Finding
+from workbench.commissioning.doctor.machine import Machine
+
+ALL: Final = frozenset({"gpio", "modbus", "http", "can"})
+
+
+class Step(msgspec.Struct, frozen=True):
+    """One step of docs/hardware.md. `buses`: those that it is for. `seen`: what must be seen."""
+
+    number: str
+    buses: frozenset[str]
+    seen: str
+
+
+STEPS: Final = (
+    Step("H1", frozenset({"gpio"}), "no relay moves from power-on until the daemon has claimed it"),
+    Step("H2", ALL, "off after `kill -9` with the output on; s until off; V on the pin afterwards"),
+    Step("H3", ALL, "off after SIGSTOP with the output on; s until off"),
+    Step(
+        "H4", ALL, "the Pi's power is cut with the output on: off at once, or s after power is back"
+    ),
+    Step(
+        "H5",
+        frozenset({"gpio"}),
+        "the supply falls to 4.0 V in steps: no relay comes on; V of reset",
+    ),
+    Step("H6", ALL, "the card is pulled with the output on, then `kill -9`: off; s until off"),
+    Step(
+        "H7",
+        frozenset({"modbus"}),
+        "ms from request's end to A-B free and to the reply; none lost",
+    ),
+    Step(
+        "H8",
+        frozenset({"modbus", "can"}),
+        "the USB adapter is pulled, put back: fault, then served",
+    ),
+    Step(
+        "H9",
+        frozenset({"modbus"}),
+        "the line is cut with the output on: s until the module lets go",
+    ),
+    Step(
+        "H10",
+        frozenset({"can"}),
+        "CAN_H and CAN_L shorted for 1 s: fault, then served; no charge",
+    ),
+    Step("H11", ALL, "24 h of service: faults in the log, hottest °C, bits of get_throttled"),
+)
+
+
+def form(config: Config, found: Iterable[Finding], machine: Machine) -> str:
+    """The form as Markdown, with the steps for this file's buses."""
+    buses = set(config.bus_types.values())
+    model = machine.text("/proc/device-tree/model") or platform.machine()
+    lines = [
+        f"# {config.path.name} on {model}",
+        f"{time.strftime('%Y-%m-%d %H:%M')}, rmf-bridges {__version__}, kernel {platform.release()},"
+        f" Python {platform.python_version()}, buses: {', '.join(sorted(buses)) or 'none'}",
+        "",
+        "| subject | | found by `doctor` |",
+        "|---|---|---|",
+        *(f"| {_cell(one.subject)} | {one.level} | {_cell(one.found)} |" for one in found),
+        "",
+        "Steps of docs/hardware.md, each three times. An empty cell: not measured.",
+        "",
+        "| step | must be seen | seen | figures of three times | with which parts | who, when |",
+        "|---|---|---|---|---|---|",
+        *(f"| {one.number} | {one.seen} | | | | |" for one in STEPS if one.buses & buses),
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def _cell(text: str) -> str:
+    return printable(text).replace("|", "\\|")

@@ -1,0 +1,111 @@
+"""The machine itself: its clock, its watchdog, its disks and the daemon's directories."""
+
+import os
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Final
+
+from bridges.host.places import Places
+from workbench.commissioning.doctor.finding import Finding, note, ok, warning, wrong
+from workbench.commissioning.doctor.machine import Machine
+from workbench.commissioning.doctor.users import User
+
+FREE_LEAST: Final = 50 << 20
+"""With less free space than this (bytes) a growing log soon fills the disk."""
+
+
+def clock(machine: Machine) -> Iterator[Finding]:
+    """The subject `clock`: RMF compares the stamps of states with its own clock."""
+    found = "the clock is not synchronised"
+    means = (
+        "states carry wrong stamps, and RMF may take them for old; durations do not depend on it"
+    )
+    do = "timedatectl timesync-status; is the time server reached? A Pi has no clock of its own"
+    synchronised = machine.synchronised()
+    if synchronised:
+        yield ok("clock", "the clock is synchronised")
+    elif synchronised is None:
+        yield note("clock", "the kernel does not say whether it is synchronised", means, do)
+    elif "NTP=no" in (machine.printed("timedatectl", "show") or "").splitlines():
+        yield warning("clock", f"{found}, and NTP is off", means, "sudo timedatectl set-ntp true")
+    else:
+        yield warning("clock", found, means, do)
+
+
+def watchdog(machine: Machine) -> Iterator[Finding]:
+    """The subject `watchdog`: who restarts this machine when its kernel or systemd hangs?"""
+    subject = "watchdog"
+    means = "when the kernel hangs, relays stay as they are until somebody cuts the supply"
+    if not machine.folder("/dev", "watchdog*"):
+        do = "dtparam=watchdog=on in /boot/firmware/config.txt, and reboot"
+        yield warning(subject, "this machine has no hardware watchdog", means, do)
+        return
+    words = ("systemctl", "show", "--property=RuntimeWatchdogUSec", "--value")
+    fed = (machine.printed(*words) or "").strip()
+    if not fed:
+        do = "systemctl show --property=RuntimeWatchdogUSec on the target"
+        yield note(
+            subject, "it is not known whether systemd feeds the hardware watchdog", means, do
+        )
+    elif fed in ("0", "infinity"):
+        do = (
+            "RuntimeWatchdogSec=10 below [Manager] in /etc/systemd/system.conf.d/watchdog.conf, then"
+            " sudo systemctl daemon-reexec (a Raspberry Pi's has 15 s at most)"
+        )
+        yield warning(
+            subject, "there is a hardware watchdog, but systemd does not feed it", means, do
+        )
+    else:
+        yield ok(subject, f"the hardware restarts this machine if systemd is silent for {fed}")
+
+
+def directories(machine: Machine, places: Places, who: User) -> Iterator[Finding]:
+    """The subject `disk`: can the daemon keep its files?"""
+    for folder in places.folders:
+        found = existing(machine.at(folder))
+        yield disk(str(folder), os.statvfs(found))
+        if not who.service and not _may_write(found, machine, who):
+            yield wrong(
+                "disk",
+                f"{who.name} may not write in {machine.named(found)}, where {folder} belongs",
+                "there is no status, and after a death nobody knows what was on",
+                "start the daemon as a user who may, or give it another place with --runtime-dir",
+            )
+
+
+def disk(what: str, found: os.statvfs_result) -> Finding:
+    """How much room there is. A disk in memory may be small."""
+    means = "the device is served all the same, but status, log and the record of outputs get lost"
+    if found.f_flag & os.ST_RDONLY:
+        do = "an overlay or tmpfs for this directory; after errors of an SD card: replace it"
+        return wrong("disk", f"{what} is on a disk that is read-only", means, do)
+    free, whole = found.f_bavail * found.f_frsize, found.f_blocks * found.f_frsize
+    if found.f_files and not found.f_favail:
+        return wrong(
+            "disk", f"{what} is on a disk without free inodes", means, "delete small files"
+        )
+    if free < min(FREE_LEAST, whole // 20):
+        do = "df -h; journalctl --vacuum-size=50M; SystemMaxUse=50M in journald.conf"
+        text = f"{what} has {_size(free)} free of {_size(whole)}"
+        return wrong("disk", text, means, do) if not free else warning("disk", text, means, do)
+    return ok("disk", f"{what} has {_size(free)} free")
+
+
+def existing(folder: Path) -> Path:
+    """The directory itself, or the nearest one above it that exists."""
+    return next(place for place in (folder, *folder.parents) if _is_there(place))
+
+
+def _is_there(folder: Path) -> bool:
+    try:
+        return folder.is_dir()
+    except PermissionError:  # it is below one that this user may not search
+        return False
+
+
+def _may_write(folder: Path, machine: Machine, who: User) -> bool:
+    return who.uid == 0 or who.may(folder.stat())
+
+
+def _size(octets: int) -> str:
+    return f"{octets / (1 << 30):.1f} GiB" if octets >= 1 << 30 else f"{octets / (1 << 20):.1f} MiB"

@@ -1,0 +1,123 @@
+"""The kill test: does an output go off when the process that holds it on is killed?
+
+Another process (`victim.py`) switches one output on as the daemon would, with its lock, its record and
+its guard. It is killed with -9. Then the guard must switch the output off and verify it, as
+systemd's ExecStopPost does after the death of a service. On GPIO the line is checked in between: does
+the kernel keep it as an output?
+"""
+
+import os
+import select
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Final
+
+from bridges.host.places import Places
+from bridges.runtime.record import Records
+from workbench.commissioning.doctor.finding import Finding, ok, warning, wrong
+from workbench.commissioning.walk.core import Step
+
+KILL_TEST: Final = "kill test"
+STARTS_S: Final = 15.0
+SEEN_S: Final = 1.0
+"""How long (s) a relay is on before the kill, so that somebody beside it can see it."""
+OFF_WITHIN_S: Final = 15.0
+"""`outputs-off` has 5 s, and may be tried twice."""
+LOOK_S: Final = 0.02
+CUT: Final = "cut the relays' supply; then rmf-bridge outputs-off FILE"
+
+StillDriven = Callable[[], bool | None]
+"""Whether the kernel still drives the line; None where that cannot be seen."""
+
+
+def kill_test(
+    file: Path, device: str, step: Step, places: Places, runtime_dir: str | None, kept: StillDriven
+) -> Iterator[Finding]:
+    """The subject `kill test`. Nobody else may serve the file."""
+    name = f"{device} {step.name}"
+    victim = _started(file, device, step.name, runtime_dir)
+    try:
+        said = _line(victim, STARTS_S)
+        if said != "on":
+            why = said or "the test's process says nothing"
+            yield wrong(KILL_TEST, f"{name} was not switched on: {why}", "nothing is shown", why)
+            return
+        if early := _line(victim, SEEN_S) or _ended_early(victim):
+            yield wrong(
+                KILL_TEST, f"{name} went off before the kill: {early}", "nothing is shown", early
+            )
+            return
+        victim.kill()
+        victim.wait()
+        died_at, still = time.monotonic(), kept()
+    finally:
+        _ended(victim)
+    yield from _kernel(name, still)
+    yield _outcome(name, _off_after(places, file, died_at))
+
+
+def _kernel(name: str, still: bool | None) -> Iterator[Finding]:
+    if still is None:
+        return
+    if still:
+        do = "dtparam=strict_gpiod in /boot/firmware/config.txt, reboot, and test again"
+        means = "if outputs-off cannot run, the relay stays on"
+        yield warning(KILL_TEST, f"{name}: the kernel kept the line as it was", means, do)
+    else:
+        yield ok(KILL_TEST, f"{name}: the kernel let the line go at once")
+
+
+def _outcome(name: str, off_after_s: float | None) -> Finding:
+    if off_after_s is None:
+        found = f"{name} is not verified off {OFF_WITHIN_S:g} s after kill -9"
+        return wrong(KILL_TEST, found, "IT MAY STILL BE ON", CUT)
+    done = "the guard switched it off and verified that"
+    found = f"{name} was on, its process was killed with -9, and {done}"
+    return ok(KILL_TEST, f"{found} after {off_after_s:.1f} s")
+
+
+def _started(
+    file: Path, device: str, step: str, runtime_dir: str | None
+) -> "subprocess.Popen[bytes]":
+    words = [sys.executable, "-m", "workbench.commissioning.doctor.victim", str(file), device, step]
+    return subprocess.Popen(
+        [*words, runtime_dir or ""],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+    )
+
+
+def _line(victim: "subprocess.Popen[bytes]", within_s: float) -> str:
+    """What the victim says next; "" if it says nothing in time, or has ended."""
+    assert victim.stdout
+    if not select.select([victim.stdout], [], [], within_s)[0]:
+        return ""
+    return os.read(victim.stdout.fileno(), 4096).decode(errors="replace").strip()
+
+
+def _ended_early(victim: "subprocess.Popen[bytes]") -> str:
+    return "" if victim.poll() is None else "the test's process has ended by itself"
+
+
+def _ended(victim: "subprocess.Popen[bytes]") -> None:
+    """Wait until the victim has ended. A victim that lives switches off when its input ends."""
+    assert victim.stdin
+    assert victim.stdout
+    victim.stdin.close()
+    victim.stdout.close()
+    victim.wait()
+
+
+def _off_after(places: Places, file: Path, died_at: float) -> float | None:
+    """How long (s) until the record was gone, which `outputs-off` removes when all is verified off."""
+    pause = threading.Event()
+    while (after_s := time.monotonic() - died_at) < OFF_WITHIN_S:
+        if not Records(places, file).unreleased():
+            return after_s
+        pause.wait(LOOK_S)
+    return None

@@ -1,0 +1,68 @@
+"""Serial ports, of RS-485 lines and of CAN adapters that speak slcan."""
+
+import re
+from collections.abc import Iterator
+from typing import Final
+
+from drivers.hal.gpio.holders import holders
+from workbench.commissioning.doctor.finding import Finding, ok, warning, wrong
+from workbench.commissioning.doctor.machine import Machine
+from workbench.commissioning.doctor.users import User, group_of, join
+
+PORT: Final = "serial port"
+BY_ID: Final = "/dev/serial/by-id"
+DEAF: Final = "nobody on this line is heard"
+
+
+def port(machine: Machine, path: str, who: User, *, served: bool) -> Iterator[Finding]:
+    """The subject `serial port`. `served`: a daemon of this file runs, and has it open."""
+    if not machine.at(path).exists():
+        seen = ", ".join(machine.named(one) for one in machine.folder(BY_ID))
+        do = (
+            f"plug it in, or write one of: {seen}"
+            if seen
+            else "plug it in; then ls /dev/serial/by-id"
+        )
+        yield wrong(PORT, f"{path} is not there", DEAF, do)
+        return
+    device = machine.target(path)
+    yield _permission(machine, path, device, who)
+    yield from _stable(machine, path, device)
+    if device in _consoles(machine):
+        do = "sudo raspi-config: no login shell over serial; or take console= out of cmdline.txt"
+        yield wrong(
+            PORT, f"the kernel's console is on {device}", "its texts go out on the line", do
+        )
+    others = [] if served else holders(machine.at(device), machine.at("/proc"))
+    if others:
+        found = f"{device} is open in {' and '.join(others)}"
+        yield wrong(PORT, found, "two masters spoil each other's frames", "stop that program")
+
+
+def _permission(machine: Machine, path: str, device: str, who: User) -> Finding:
+    state = machine.at(device).stat()
+    if who.may(state):
+        return ok(PORT, f"{path} is there, and {who.name} may use it")
+    group = group_of(machine, state.st_gid)
+    text = f"{who.name} may not open {device} (mode {state.st_mode & 0o777:o}, group {group})"
+    return wrong(PORT, text, DEAF, join(who, group))
+
+
+def _stable(machine: Machine, path: str, device: str) -> Iterator[Finding]:
+    """Is it named by a path that the next boot may give to another adapter?"""
+    if not re.match(r"/dev/tty(USB|ACM)", path):
+        return
+    same = [machine.named(one) for one in machine.folder(BY_ID)]
+    same = [name for name in same if machine.target(name) == device]
+    do = f"port: {same[0]}" if same else "port: what ls /dev/serial/by-id/* prints"
+    yield warning(
+        PORT, f"{path} is named by its number", "after a boot it may be another adapter", do
+    )
+
+
+def _consoles(machine: Machine) -> set[str]:
+    words = (machine.text("/proc/cmdline") or "").split()
+    names = [
+        word.removeprefix("console=").split(",")[0] for word in words if word.startswith("console=")
+    ]
+    return {machine.target(f"/dev/{name}") for name in names}

@@ -1,0 +1,104 @@
+"""Whether a daemon serves this file now, and what it says: its buses are then not opened.
+
+A gateway may take one client only, and two masters on one line spoil each other's frames.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Final
+
+from bridges.commands.status import Daemon, daemons
+from bridges.host.places import Places
+from bridges.runtime import holder
+from bridges.runtime.faults import remedies
+from bridges.runtime.record import Records
+from bridges.runtime.subject import Status
+from workbench.commissioning.doctor.finding import Finding, note, ok, warning, wrong
+
+DAEMON: Final = "daemon"
+NOT_ASKED: Final = "its buses are not asked, because a controller has one master"
+
+
+@dataclass(frozen=True, slots=True)
+class Served:
+    """What is known of the daemon. `busy`: why its buses must not be opened; "" if they may be.
+
+    `serving`: a daemon serves this file; None where that cannot be seen. `simulated`: on fake hardware,
+    and on loopback.
+    """
+
+    findings: list[Finding] = field(default_factory=list)
+    busy: str = ""
+    serving: bool | None = False
+    simulated: bool = False
+
+
+def served(places: Places, file: Path, wall: float) -> Served:
+    """The subject `daemon`. `wall`: now, for the age of its status (s since the epoch)."""
+    try:
+        held_by = holder.look(places)
+    except PermissionError as error:
+        return unseen(str(error))
+    if held_by is None:
+        return _nobody(places, file)
+    if not held_by.serves:
+        found = f"{held_by} uses it: walk, outputs-off or another doctor"
+        return Served([warning(DAEMON, found, NOT_ASKED, "wait until it has ended")], found)
+    one = next(daemons([places.runtime], {}, wall))
+    busy, simulated = f"process {held_by.pid} serves it", bool(one.status.get("simulated"))
+    return Served(list(_told(one)), busy, True, simulated)
+
+
+def unseen(why: str) -> Served:
+    """This user cannot see whether a daemon runs."""
+    return Served([wrong(DAEMON, why, NOT_ASKED, "sudo before the command")], why, None)
+
+
+def _nobody(places: Places, file: Path) -> Served:
+    if Records(places, file).unreleased():
+        found = "it has died, and may have left outputs on"
+        do = f"rmf-bridge outputs-off {file}"
+        return Served([wrong(DAEMON, found, "a relay may hold a door or a call", do)], found)
+    return Served([ok(DAEMON, "none serves this file, so its buses are asked here")])
+
+
+def _told(one: Daemon) -> Iterator[Finding]:
+    if one.state != "serving":
+        do = "rmf-bridge log FILE; then restart it"
+        age = "never" if one.age_s is None else f"{one.age_s:.0f} s ago"
+        yield wrong(DAEMON, f"it runs, but wrote its status {age}", "it may hang", do)
+    else:
+        version = one.status.get("version", "?")
+        yield ok(DAEMON, f"it serves this file, version {version}; {NOT_ASKED}")
+    if one.status.get("simulated"):
+        means = "no hardware moves; what follows about pins and ports is for a real device"
+        yield note(DAEMON, "it is a SIMULATION", means, "run it without --simulate on the Pi")
+    else:
+        yield from _listeners(one.status)
+    yield from _faults("", one.status)
+    for name, device in one.devices.items():
+        age_s = device.get("input_age_s")
+        if age_s is None:
+            yield wrong(DAEMON, f"{name} was never read", "RMF is told nothing of it", "its faults")
+        else:
+            yield ok(DAEMON, f"{name} was read {age_s:.1f} s before its status")
+        yield from _faults(f"{name}: ", device)
+
+
+def _listeners(status: Status) -> Iterator[Finding]:
+    """Who hears the states. Other topics often have no listener."""
+    for topic, nodes in status.get("heard_by", {}).items():
+        if nodes:
+            yield ok(DAEMON, f"{topic}: heard by {nodes} node{'s' if nodes > 1 else ''}")
+        elif topic.endswith("_states"):
+            do = "docs/ros.md: domain, multicast, interfaces"
+            yield warning(DAEMON, f"{topic}: nobody listens", "RMF does not see the device", do)
+
+
+def _faults(of: str, part: Status) -> Iterator[Finding]:
+    known = remedies() if part.get("faults") else {}
+    for fault in part.get("faults", ()):
+        found = of + ": ".join(filter(None, (fault["code"], fault["detail"])))
+        remedy = known.get(fault["code"])
+        yield wrong(DAEMON, found, remedy.cause if remedy else "", remedy.do if remedy else "")

@@ -1,0 +1,121 @@
+"""Who the daemon runs as, and whether that user may open a device.
+
+With the unit installed it is the service's user, with the groups that a drop-in gives; else whoever
+asks. Users and groups are read from /etc/passwd and /etc/group.
+"""
+
+import os
+import stat
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Final
+
+from bridges.host.places import GROUPS, SERVICE_USER
+from workbench.commissioning.doctor.finding import Finding, note, ok, wrong
+from workbench.commissioning.doctor.machine import Machine
+
+UNITS: Final = ("/etc/systemd/system", "/usr/lib/systemd/system", "/lib/systemd/system")
+UNIT: Final = "rmf-bridge@.service"
+
+
+@dataclass(frozen=True, slots=True)
+class User:
+    """Whoever opens the devices. `service`: systemd's unit starts the daemon."""
+
+    name: str
+    uid: int
+    gids: frozenset[int]
+    service: bool
+
+    def may(self, found: os.stat_result) -> bool:
+        """Whether this user may read and write there, by its mode (access lists are not looked at)."""
+        if self.uid == 0:
+            return True
+        if found.st_uid == self.uid:
+            wanted = stat.S_IRUSR | stat.S_IWUSR
+        elif found.st_gid in self.gids:
+            wanted = stat.S_IRGRP | stat.S_IWGRP
+        else:
+            wanted = stat.S_IROTH | stat.S_IWOTH
+        return found.st_mode & wanted == wanted
+
+
+def has_unit(machine: Machine) -> bool:
+    """Whether the unit of rmf-bridges is installed."""
+    return any(machine.at(f"{place}/{UNIT}").exists() for place in UNITS)
+
+
+def user(machine: Machine) -> User:
+    """The daemon's user."""
+    if not has_unit(machine):
+        return User(_name(machine, machine.uid), machine.uid, machine.gids, service=False)
+    ids = _passwd(machine).get(SERVICE_USER, (-1, -1))
+    groups = _groups(machine)
+    gids = {
+        gid for name, (gid, members) in groups.items() if name in GROUPS or SERVICE_USER in members
+    }
+    return User(SERVICE_USER, ids[0], frozenset({ids[1], *gids}), service=True)
+
+
+def users(machine: Machine) -> Iterator[Finding]:
+    """The subject `user`: does the unit's user exist, with its groups?"""
+    subject = "user"
+    if not has_unit(machine):
+        name = _name(machine, machine.uid)
+        yield note(
+            subject,
+            f"the unit {UNIT} is not installed; what follows is checked for {name}",
+            "the daemon does not start at boot, and nobody restarts it",
+            'README, "On the Pi, under systemd"',
+        )
+        return
+    if SERVICE_USER not in _passwd(machine):
+        yield wrong(
+            subject,
+            f"there is no user {SERVICE_USER}, whom the unit names",
+            "systemd cannot start the service (status=217/USER)",
+            f"sudo useradd --system --no-create-home {SERVICE_USER}",
+        )
+    missing = [group for group in GROUPS if group not in _groups(machine)]
+    if missing:
+        yield wrong(
+            subject,
+            f"there is no group {' and no group '.join(missing)}, which a service may need",
+            "`rmf-bridge enable` cannot give it to the daemon, which then cannot open its devices",
+            "; ".join(f"sudo groupadd --system {group}" for group in missing)
+            + "; then sudo rmf-bridge enable FILE",
+        )
+    if not missing and SERVICE_USER in _passwd(machine):
+        yield ok(subject, f"the service runs as {SERVICE_USER}, in the groups {', '.join(GROUPS)}")
+
+
+def join(who: User, group: str) -> str:
+    """What to do so that this user is in a group."""
+    if who.service:
+        return f"sudo rmf-bridge enable FILE: its drop-in gives the service the group {group}"
+    return f"sudo usermod -aG {group} {who.name}, then log in again"
+
+
+def group_of(machine: Machine, gid: int) -> str:
+    """The name of a group; its number if it has none."""
+    return next((n for n, (found, _) in _groups(machine).items() if found == gid), str(gid))
+
+
+def _name(machine: Machine, uid: int) -> str:
+    return next((n for n, (found, _) in _passwd(machine).items() if found == uid), f"uid {uid}")
+
+
+def _rows(machine: Machine, path: str) -> Iterator[list[str]]:
+    for line in (machine.text(path) or "").splitlines():
+        row = line.split(":")
+        if len(row) >= 4 and row[2].isdecimal():
+            yield row
+
+
+def _passwd(machine: Machine) -> dict[str, tuple[int, int]]:
+    rows = _rows(machine, "/etc/passwd")
+    return {row[0]: (int(row[2]), int(row[3])) for row in rows if row[3].isdecimal()}
+
+
+def _groups(machine: Machine) -> dict[str, tuple[int, list[str]]]:
+    return {row[0]: (int(row[2]), row[3].split(",")) for row in _rows(machine, "/etc/group")}

@@ -1,0 +1,93 @@
+"""The process that the kill test kills: it switches one output on as the daemon would, and says `on`.
+
+`python -m workbench.commissioning.doctor.victim FILE DEVICE STEP RUNTIME_DIR`. It switches off and ends
+when its input ends or after ON_S, because whoever started it may have died.
+"""
+
+import select
+import sys
+from contextlib import suppress
+from pathlib import Path
+from typing import Any, Final
+
+from bridges.runtime import directory, guard, signals
+from bridges.settings.load import Config, SettingsError, load
+from drivers import Driver, DriverError
+from drivers.hal import Bus
+from workbench.commissioning.by_hand import guarded, not_off
+from workbench.commissioning.walk.core import Step
+from workbench.commissioning.walk.steps import steps
+
+ON_S: Final = 5.0
+
+
+def main(file: Path, device: str, step: str, runtime_dir: str | None) -> int:
+    """0 when the output is verified off."""
+    signals.End()
+    try:
+        config = load(file)
+        held = directory.held(file, runtime_dir, serves=False)
+    except (SettingsError, directory.AlreadyRunning, PermissionError) as error:
+        return _say(f"{error}")
+    try:
+        return _held(config, device, step, held, guard.command(file, runtime_dir))
+    finally:
+        held.close()
+
+
+def _held(
+    config: Config,
+    device: str,
+    step: str,
+    held: directory.RuntimeDirectory,
+    switches_off: list[str],
+) -> int:
+    try:
+        bus, all_off = guarded(config, device, held, switches_off)
+    except DriverError as error:
+        return _say(f"{error}")
+    try:
+        driver = config.driver_type(device).create(device, config.devices[device], bus)
+        off = _on_for_a_while(driver, bus, step_called(config, device, step))
+    except DriverError as error:
+        return _say(f"{error}")
+    if off:
+        all_off()
+    return 0 if off else 1
+
+
+def step_called(config: Config, device: str, name: str | None) -> Step | None:
+    """The output of this name; the first one by default, None if there is no such."""
+    return next((step for step in steps(config, device) if name in (None, step.name)), None)
+
+
+def _on_for_a_while(driver: Driver[Any, Any], bus: Bus, step: Step | None) -> bool:
+    """Switch it on, and off again if nobody has killed us. True when it was verified off."""
+    assert step is not None  # or the kill test would not have started
+    try:
+        driver.open()
+        if why := step.hindrance(driver.read()):
+            _say(why)
+        else:
+            driver.write(step.outputs)
+            bus.scanned()
+            _say("on")
+            select.select([sys.stdin], [], [], ON_S)
+    except DriverError as error:
+        _say(f"{error}")
+    try:
+        return not not_off(driver, bus.insist)
+    finally:
+        driver.close()
+        bus.close()
+
+
+def _say(text: str) -> int:
+    with suppress(OSError):
+        print(text, flush=True)
+    return 1
+
+
+if __name__ == "__main__":
+    _, file, device, step, runtime_dir = sys.argv
+    sys.exit(main(Path(file), device, step, runtime_dir or None))

@@ -1,0 +1,89 @@
+"""Gives each signal of a draft the next free pin of the header, or address of the module."""
+
+from collections.abc import Iterator
+from itertools import count
+from typing import Final, Protocol
+
+from workbench.commissioning.init.answers import Answers, Impossible, Level
+
+REST_LOW: Final = (11, 13, 15, 16, 18, 22, 32, 33, 35, 36, 37, 38, 40, 12)
+REST_HIGH: Final = (7, 29, 31, 26, 24)
+"""Positions on J8 by the level to which the Pi pulls them from power-on until the daemon starts: a
+relay belongs where that keeps it off. Source: BCM2835 ARM Peripherals, table 6-31 (BCM0 to 8 high)."""
+
+
+class Points(Protocol):
+    """Where the next signals are wired; each answer is the inside of a YAML mapping."""
+
+    def contact(self) -> str:
+        """A contact that is closed while its signal is on; a cut wire reads off."""
+
+    def loop(self) -> str:
+        """A contact that opens to say its signal, as an alarm loop does; a cut wire reads on."""
+
+    def relay(self) -> str:
+        """A relay that works when it is on."""
+
+
+class Header:
+    """The Pi's 40-pin header. Its methods raise Impossible when its pins are used up."""
+
+    def __init__(self, contacts: Level, relays: Level) -> None:
+        self._closed, self._relays = contacts, relays
+        self._pull = "down" if contacts == "high" else "up"
+        high = relays == "high"
+        self._outputs = list(REST_LOW if high else REST_HIGH)
+        self._inputs = list(REST_HIGH if high else REST_LOW)
+
+    def contact(self) -> str:
+        """The next pin for an input, pulled to the level of an open contact."""
+        return f'point: "J8:{self._input()}", active: {self._closed}, pull: {self._pull}'
+
+    def loop(self) -> str:
+        """The same, on while the contact is open."""
+        opened = "low" if self._closed == "high" else "high"
+        return f'point: "J8:{self._input()}", active: {opened}, pull: {self._pull}'
+
+    def relay(self) -> str:
+        """The next pin whose relay stays off from power-on."""
+        return f'point: "J8:{_first(self._outputs)}", active: {self._relays}'
+
+    def _input(self) -> int:
+        return _first(self._inputs or self._outputs)
+
+
+def _first(pins: list[int]) -> int:
+    if not pins:
+        raise Impossible(
+            "more signals than the header has free pins that suit: leave some out, take encoding"
+            " binary, relays that are on at high, or a Modbus I/O module"
+        )
+    return pins.pop(0)
+
+
+class Module:
+    """A Modbus I/O module: contacts are discrete inputs, relays are coils."""
+
+    def __init__(self, unit: int) -> None:
+        self._unit = unit
+        self._inputs: Iterator[int] = count()
+        self._coils: Iterator[int] = count()
+
+    def contact(self) -> str:
+        """The next discrete input; an open contact reads 0."""
+        return f'point: "unit {self._unit} discrete input {next(self._inputs)}", active: high'
+
+    def loop(self) -> str:
+        """The same, on while it reads 0."""
+        return f'point: "unit {self._unit} discrete input {next(self._inputs)}", active: low'
+
+    def relay(self) -> str:
+        """The next coil."""
+        return f'point: "unit {self._unit} coil {next(self._coils)}", active: high'
+
+
+def points_for(answers: Answers) -> Points:
+    """A fresh set of points for this wiring."""
+    if answers.wiring == "gpio":
+        return Header(answers.contacts, answers.relays)
+    return Module(answers.unit)

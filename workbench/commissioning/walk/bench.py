@@ -1,0 +1,126 @@
+"""Scans one device for a walk, on its own thread: a slow or dead terminal delays no output's end."""
+
+import threading
+import time
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+from bridges.host.log import plain
+from drivers import Driver, DriverError
+from drivers.hal.points import Wire
+from workbench.commissioning.by_hand import not_off
+from workbench.commissioning.walk import core
+from workbench.commissioning.walk.core import Event, Lost, Memory, Read, Step, Tick
+from workbench.commissioning.walk.tap import Tap
+
+SCAN_S: Final = 0.05
+
+
+@dataclass(slots=True)
+class Input:
+    """One contact as it was read. `seen`: the meanings that it has shown so far."""
+
+    wire: Wire
+    point: str
+    level: int | None = None
+    changed_at: float | None = None
+    seen: frozenset[bool] = frozenset()
+
+    @property
+    def asserted(self) -> bool | None:
+        """What its level means; None before it was read."""
+        return None if self.level is None else self.wire.asserted(self.level)
+
+
+class Bench:
+    """A device under test on its bus, which has a tap. `off`: every output off.
+
+    Use it as a context: at its end every output is off, `verified_off` says whether that was seen.
+    """
+
+    def __init__(
+        self,
+        driver: Driver[Any, Any],
+        bus: Tap,
+        inputs: Sequence[Input],
+        steps: Sequence[Step],
+        off: object,
+    ) -> None:
+        self.inputs = inputs
+        self.steps = steps
+        self.memory = Memory()
+        self.verified_off = False
+        self._driver = driver
+        self._bus = bus
+        self._off = off
+        self._opened = False
+        self._events: deque[Event] = deque()
+        self._stop = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="walk")
+
+    def __enter__(self) -> "Bench":
+        self._thread.start()
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self._stop.set()
+        self._thread.join()
+
+    def put(self, event: Event) -> None:
+        """Something that the person did; from any thread."""
+        self._events.append(event)
+
+    @property
+    def decoded(self) -> str:
+        """What the driver makes of the inputs, in words."""
+        return "" if self.memory.sample is None else plain(self.memory.sample)
+
+    def _run(self) -> None:
+        try:
+            while not self._stop.wait(SCAN_S):
+                self._scan()
+        finally:
+            self.verified_off = self._make_safe()
+            self._driver.close()
+
+    def _scan(self) -> None:
+        self._decide(self._read())
+        while self._events:
+            self._decide(self._events.popleft())
+        self._decide(Tick())
+        try:
+            if self._opened and self.steps:
+                outputs = core.output_of(self.memory, self.steps)
+                self._driver.write(self._off if outputs is None else outputs)
+        except DriverError as error:
+            self._decide(Lost(str(error)))
+        self._bus.scanned()
+
+    def _decide(self, event: Event) -> None:
+        self.memory = core.decide(self.memory, event, time.monotonic(), self.steps)
+
+    def _read(self) -> Event:
+        try:
+            if not self._opened:
+                self._driver.open()
+                self._opened = True
+            sample = self._driver.read()
+        except DriverError as error:
+            return Lost(str(error))
+        now = time.monotonic()
+        for one in self.inputs:
+            level = self._bus.levels.get(one.point)
+            if level is not None and level != one.level:
+                one.level, one.changed_at = level, now
+                one.seen |= {one.wire.asserted(level)}
+        return Read(sample)
+
+    def _make_safe(self) -> bool:
+        """Without outputs to try, nothing was commanded, and a charge under way goes on."""
+        if not self.steps:
+            return True
+        if why := not_off(self._driver, self._bus.insist):
+            self._decide(Lost(why))
+        return not why

@@ -1,0 +1,119 @@
+"""The outputs of each kind that a walk tries, and what its inputs should then show."""
+
+from collections.abc import Callable, Collection, Iterator
+from typing import Any, Final
+
+from bridges.kinds.charger.signals import CURRENT_FLOWS, ChargerOutputs, ChargerSample
+from bridges.kinds.door.signals import DoorOutputs, DoorSample
+from bridges.kinds.lift.settings import LiftSettings
+from bridges.kinds.lift.signals import Door, LiftOutputs, LiftSample, Motion, Side
+from bridges.settings.load import Config
+from workbench.commissioning.walk.core import Step
+
+Wired = Collection[str] | None
+"""The names of the output lines; None where the driver has no lines."""
+
+
+def _lift(settings: LiftSettings, wired: Wired) -> Iterator[Step]:
+    if settings.agv_mode == "requested" and _has("agv_mode_request", wired):
+        yield Step(
+            "agv_mode_request",
+            "asks the lift for AGV mode",
+            LiftOutputs(agv_request=True),
+            "AGV mode is confirmed",
+            lambda sample: sample.agv is True,
+            _hazard,
+        )
+    for level in settings.levels():
+        yield Step(
+            f"call {level}",
+            f"calls the car to {level}",
+            LiftOutputs(call=level),
+            f"the car is at {level}",
+            _arrived(level),
+            _hazard,
+        )
+    for side in dict.fromkeys(stop.side for stop in settings.stops().values()):
+        name = "door_open" if side is Side.FRONT else "rear_door_open"
+        yield Step(
+            name,
+            f"opens the {side.value} door and holds it",
+            LiftOutputs(hold_door=side),
+            "the door is open",
+            _opened(side),
+            _not_standing,
+        )
+
+
+def _has(signal: str, wired: Wired) -> bool:
+    return wired is None or signal in wired
+
+
+def _hazard(sample: LiftSample) -> str:
+    return f"the lift shows {', '.join(sorted(sample.hazards))}" if sample.hazards else ""
+
+
+def _not_standing(sample: LiftSample) -> str:
+    if hazard := _hazard(sample):
+        return hazard
+    if sample.motion not in (None, Motion.STOPPED):
+        return f"the car is {sample.motion.value}"
+    return "" if sample.level is not None else "no floor is shown: the car may be between floors"
+
+
+def _arrived(level: str) -> Callable[[LiftSample], bool]:
+    return lambda sample: sample.level == level and sample.motion in (None, Motion.STOPPED)
+
+
+def _opened(side: Side) -> Callable[[LiftSample], bool]:
+    return lambda s: (s.door if side is Side.FRONT else s.rear_door) is Door.OPEN
+
+
+def _door(settings: object, wired: Wired) -> Iterator[Step]:
+    def fire(sample: DoorSample) -> str:
+        return "the fire alarm is on" if sample.fire else ""
+
+    yield Step(
+        "hold_open",
+        "opens the door and holds it",
+        DoorOutputs(hold_open=True),
+        "the door is open",
+        lambda sample: sample.opened is True,
+        fire,
+    )
+
+
+def _charger(settings: object, wired: Wired) -> Iterator[Step]:
+    if wired is None:
+        return  # a charge over HTTP, CAN or registers is a request: `rmf-bridge send charger`
+
+    def at_fault(sample: ChargerSample) -> str:
+        return f"the station shows an error {sample.error_text}".rstrip() if _fault(sample) else ""
+
+    yield Step(
+        "enable",
+        "lets the station charge a robot on its pad",
+        ChargerOutputs(power=True),
+        "current flows",
+        lambda sample: sample.activity in CURRENT_FLOWS,
+        at_fault,
+    )
+
+
+def _fault(sample: ChargerSample) -> bool:
+    return sample.activity.value in ("error", "unknown")
+
+
+KINDS: Final[dict[str, Callable[[Any, Wired], Iterator[Step]]]] = {
+    "lift": _lift,
+    "door": _door,
+    "charger": _charger,
+}
+OFF: Final = {"lift": LiftOutputs(), "door": DoorOutputs(), "charger": ChargerOutputs(power=False)}
+
+
+def steps(config: Config, device: str) -> list[Step]:
+    """Every output of a device, in the order in which they are tried."""
+    wires = config.wires(device)
+    wired = {wire.signal for wire in wires if wire.direction == "out"} if wires else None
+    return list(KINDS[config.kind](config.devices[device], wired))

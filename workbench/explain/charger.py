@@ -1,0 +1,154 @@
+"""Who has a charger, and why a robot is not charged at it: sentences, from what was heard of it.
+
+RMF itself asks no charger for anything; requests come from the charger coordinator, another node or an
+operator, and a refusal is published on `charger_refusals` (`bridges/kinds/charger/refusals.py`).
+"""
+
+from collections.abc import Mapping
+from typing import Final
+
+from bridges.kinds.charger.pad import misplaced_in
+from bridges.kinds.charger.report import Diagnosis, diagnosis
+from workbench.explain import answer as common
+from workbench.explain.answer import Answer
+from workbench.explain.charger_facts import NOBODY, ChargerFacts
+from workbench.explain.explanation import Step
+from workbench.explain.phrases import Clock, lasted
+from workbench.explain.rows import label
+
+REFUSED_LATELY_S: Final = 60.0
+
+Coordinator = Mapping[str, str]
+"""What the coordinator's diagnostics say: each charger's state, `queue`, `schedule`, `assigns`."""
+
+
+def answer(
+    charger: ChargerFacts, clock: Clock, around: common.Heard, coordinator: Coordinator
+) -> Answer:
+    """The charger at the end of what was heard. `coordinator`: what it says now, {} if nothing."""
+    if charger.last_state is None:
+        found = common.unheard(charger, around, clock)
+        _refusal(found, charger, clock)
+        return found
+    stopped = common.silent(charger, clock)
+    if stopped is not None:
+        return stopped
+    found = Answer(since=min([one.first.at for one in charger.claims], default=float("-inf")))
+    _state(found, charger, clock)
+    if old := common.old_reading(charger, clock):
+        found.say(old)
+    _next(found, charger, clock)
+    _refusal(found, charger, clock)
+    _coordinated(found, charger, coordinator)
+    return found
+
+
+def _state(found: Answer, charger: ChargerFacts, clock: Clock) -> None:
+    who, request = charger.robot.value, charger.request.value
+    assigned = charger.state.value == "assigned"
+    whose = "" if who == NOBODY else f" {'to' if assigned else 'for'} {who}"
+    asked = f" (request {request})" if request else ""
+    state = {"error": "in error"}.get(charger.state.value, charger.state.value)
+    found.say(f"{charger.name} has been {state}{whose}{asked} {clock.since(charger.state.since)}.")
+
+
+def _next(found: Answer, charger: ChargerFacts, clock: Clock) -> None:
+    who = charger.robot.value
+    match charger.state.value:
+        case "idle":
+            _idle(found, charger, clock)
+        case "assigned":
+            found.say(
+                f"It does not see {who} on its pad yet, or cannot charge it yet.",
+                Step("the robot", f"{who} has to come to {charger.name} and park exactly"),
+            )
+        case "charging":
+            left = f"in {lasted(charger.full_in_s)}" if charger.full_in_s > 0 else "when it is full"
+            found.say(
+                f"{who} is being charged.",
+                Step("the controller", f"end the charge {left}, or when it is cancelled"),
+            )
+        case "released":
+            found.say(
+                "The charge is over, and the pad is not clear yet.",
+                Step("the robot", f"{who if who != NOBODY else 'the robot'} has to leave the pad"),
+            )
+        case "error":
+            _error(found, charger)
+        case other:
+            found.say(
+                f"RMF defines no charger state {other}.",
+                Step("the device's node", "publish RMF's states"),
+            )
+
+
+def _idle(found: Answer, charger: ChargerFacts, clock: Clock) -> None:
+    asking = [
+        one
+        for one in charger.claims
+        if one.ended is None and one.granted is None and one.asks(clock.now)
+    ]
+    if not asking:
+        found.say("Nobody asks for it.", Step("nobody", "there is nothing to do"))
+        return
+    first = asking[0]
+    found.say(
+        f"It has been asked to charge {first.wants} {clock.since(first.first)} (request {first.who}),"
+        " and has not taken the request.",
+        Step("the device's node", "take the request; a refusal is explained below, or in its log"),
+    )
+
+
+def _error(found: Answer, charger: ChargerFacts) -> None:
+    """Which side is at fault, as its text says."""
+    text = charger.error.value
+    misplaced = misplaced_in(text)
+    if misplaced is not None and misplaced.robot is not None:
+        who = label(str(misplaced.robot))
+        wanted = misplaced.expected
+        instead = (
+            f"; it is meant for {label(str(wanted))}" if wanted else ", which nobody requested"
+        )
+        found.say(
+            f"Wrong station: {who} stands at {charger.name}{instead}.",
+            Step("the robot", f"{who} has to leave the pad; then the error ends by itself"),
+        )
+        return
+    says = {
+        Diagnosis.ROBOT: ("The robot is at fault", "check the robot's receiver"),
+        Diagnosis.STATION: ("The station is at fault", "repair it, then `rmf-bridge reset FILE`"),
+        Diagnosis.PAD: (
+            "What stands on the pad should not be there",
+            "clear the pad; add a new receiver to `receivers:`",
+        ),
+        Diagnosis.LOST: (
+            "The station cannot be reached or commanded",
+            "check its power and network",
+        ),
+    }
+    side, do = says.get(
+        diagnosis(text),
+        ("Its text does not say whether robot or station is at fault", "check both"),
+    )
+    found.say(f"{side}: {text or 'no text was given'}.", Step("a person", do))
+
+
+def _refusal(found: Answer, charger: ChargerFacts, clock: Clock) -> None:
+    refusal = charger.refusal
+    if refusal is None or clock.now.at - refusal.at.at > REFUSED_LATELY_S:
+        return
+    found.say(
+        f"At {clock.time(refusal.at.wall)} it refused {refusal.who} (request {refusal.request}):"
+        f" {refusal.text}."
+    )
+
+
+def _coordinated(found: Answer, charger: ChargerFacts, coordinator: Coordinator) -> None:
+    """What the coordinator says of this charger, of the queue and of the schedule."""
+    of_it = coordinator.get(charger.id, "")
+    if of_it:
+        found.say(f"The coordinator lists it as {label(of_it)}.")
+    for key, text in (("queue", "Its queue: "), ("schedule", "Its schedule: ")):
+        told = coordinator.get(key, "-")
+        if told not in ("-", ""):
+            found.say(text + label(told, 300) + ".")

@@ -1,0 +1,262 @@
+"""What is known of every kind of device: its states and their age, its daemons' faults, its story."""
+
+import sys
+from collections import deque
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Final
+
+from bridges.messages import definitions as d
+from bridges.runtime import diagnostics
+from workbench.explain.explanation import Line
+from workbench.explain.noted import Noted
+from workbench.explain.phrases import Moment, lasted
+from workbench.explain.rows import label
+from workbench.explain.timeline import Kind
+
+MOST_LINES: Final = 600
+MOST_NODES: Final = 8
+MOST_CODES: Final = 20
+SILENT_S: Final = 3.0
+"""States and diagnostics come at 1 Hz: after three missed ones a node is silent."""
+OLD_S: Final = 3.0
+CLOCKS_DIFFER_S: Final = 5.0
+BACK_S: Final = 0.2
+BACK_TIMES: Final = 3
+BACK_WITHIN_S: Final = 15.0
+"""Stamps that go back this far, this often within this time come from two nodes."""
+REFUSED: Final = "refused "
+QUIET_S: Final = 60.0
+"""A refusal that comes again within this time is not reported again."""
+
+
+@dataclass(slots=True)
+class Fact:
+    """Something that is so, and since when."""
+
+    value: str
+    since: Moment
+
+    def say(self, value: str, moment: Moment) -> bool:
+        """Set its present value. True if that is a change."""
+        if value == self.value:
+            return False
+        self.value, self.since = value, moment
+        return True
+
+
+@dataclass(slots=True)
+class Refused:
+    """How often a node of ours has refused for one reason, and when it last did."""
+
+    count: int
+    last: Moment
+
+
+@dataclass(slots=True)
+class Diagnosis:
+    """What one node says of the device. `faults`: code -> (detail, since when)."""
+
+    kind: str
+    last: Moment
+    values: Mapping[str, str] = field(default_factory=dict)
+    faults: dict[str, tuple[str, Moment]] = field(default_factory=dict)
+    refused: dict[str, Refused] = field(default_factory=dict)
+
+
+class Device:
+    """One device as it was heard. `id`: its name on the graph. `name`: the same as a text that can be
+    shown. `began`: when anything was heard first.
+    """
+
+    kind: Kind
+
+    def __init__(self, name: str, began: Moment) -> None:
+        self.id = name
+        self.name = label(name)
+        self.began = began
+        self.lines: deque[Line] = deque(maxlen=MOST_LINES)
+        self.told = 0
+        self.diagnoses: dict[str, Diagnosis] = {}
+        self.noted: Diagnosis | None = None
+        self.notes_faults = False
+        self.first_state: Moment | None = None
+        self.last_state: Moment | None = None
+        self.stamp_age_s = 0.0
+        self.stamped = False
+        self.old: Fact = Fact("", began)
+        self._newest_stamp = 0.0
+        self._stamps_back: deque[float] = deque(maxlen=BACK_TIMES)
+
+    def tell(self, moment: Moment, text: str) -> None:
+        """A line of the story."""
+        self.told += 1
+        self.lines.append(Line(moment.at, moment.wall, sys.intern(label(text, 200))))
+
+    def lines_since(self, at: float) -> tuple[Line, ...]:
+        """The story from this time on."""
+        return tuple(line for line in self.lines if line.at >= at)
+
+    def state_came(self, moment: Moment, stamped_at: float) -> Moment:
+        """A state of it has come. Returns since when its content is known."""
+        last = self.last_state
+        if last is None:
+            self.first_state = moment
+            near = moment.at - self.began.at <= SILENT_S
+            moment = Moment(moment.at, moment.wall, seen=not near)
+            if moment.seen:
+                self.tell(moment, f"the first state of {self.name} comes")
+        elif moment.at - last.at > SILENT_S:
+            gap = lasted(moment.at - last.at)
+            self.tell(moment, f"states of {self.name} come again, after {gap} without one")
+        self.last_state = moment
+        if stamped_at < self._newest_stamp - BACK_S:
+            self._stamps_back.append(moment.at)
+        self._newest_stamp = stamped_at
+        self.stamped = stamped_at > 0
+        self.stamp_age_s = moment.wall - stamped_at
+        self._age(moment)
+        return moment
+
+    def two_nodes(self, now: Moment) -> bool:
+        """Do the stamps go back and forth, as those of two nodes do?"""
+        back = self._stamps_back
+        return len(back) == BACK_TIMES and now.at - back[0] < BACK_WITHIN_S
+
+    def silent_s(self, now: Moment) -> float:
+        """How long ago its last state came (s)."""
+        return 0.0 if self.last_state is None else now.at - self.last_state.at
+
+    def diagnose(self, moment: Moment, status: d.DiagnosticStatus, kind: str) -> None:
+        """What a daemon of ours says of it."""
+        found = self.diagnoses.get(status.name)
+        if found is None:
+            if len(self.diagnoses) >= MOST_NODES:
+                return
+            first = Moment(moment.at, moment.wall, moment.at - self.began.at > SILENT_S)
+            found = self.diagnoses[status.name] = Diagnosis(kind, first)
+            moment = first
+        found.last = moment
+        found.values = {pair.key: pair.value for pair in status.values}
+        self._faults(found, moment, status)
+        self._refusals(found, moment)
+
+    def note(self, moment: Moment, note: Noted) -> None:
+        """What its own daemon noted: it writes what changes, so each note holds until the next."""
+        if self.noted is None:
+            near = moment.at - self.began.at <= SILENT_S
+            self.noted = Diagnosis(self.kind, Moment(moment.at, moment.wall, seen=not near))
+        known = self.noted
+        if note.outputs is not None:
+            on = [f"{label(name)} {label(value)}" for name, value in note.outputs.items() if value]
+            known.values = {"outputs": ", ".join(on).replace(" on", " yes") or "-"}
+        if note.faults is not None:
+            self._set_faults(
+                known,
+                moment,
+                {
+                    label(code): "" if text == code else label(text)
+                    for code, text in note.faults.items()
+                },
+            )
+            self.notes_faults = True
+        if note.refused:
+            self._refuses(known, moment, label(note.refused.partition(": ")[0]))
+
+    def _refuses(self, known: Diagnosis, moment: Moment, reason: str) -> None:
+        before = known.refused.get(reason)
+        if before is None and len(known.refused) >= MOST_CODES:
+            return
+        if before is None or moment.at - before.last.at > QUIET_S:
+            self.tell(moment, f"its daemon refuses a request: {reason}")
+        known.refused[reason] = Refused(before.count + 1 if before else 1, moment)
+
+    def heard_from(self, now: Moment) -> Iterator[Diagnosis]:
+        """What daemons of ours say now, and what the device's own noted."""
+        if self.noted is not None:
+            yield self.noted
+        yield from (one for one in self.diagnoses.values() if now.at - one.last.at <= SILENT_S)
+
+    def own(self, now: Moment) -> Diagnosis | None:
+        """What the device's own daemon says now; None if that is not ours, or silent."""
+        return next((one for one in self.heard_from(now) if one.kind == self.kind), None)
+
+    def faults(self, now: Moment) -> dict[str, tuple[str, Moment]]:
+        """Code -> detail, and since when; the device's own first."""
+        found: dict[str, tuple[str, Moment]] = {}
+        for one in sorted(self.heard_from(now), key=lambda one: one.kind != self.kind):
+            for code, fault in one.faults.items():
+                found.setdefault(code, fault)
+        return found
+
+    def waits(self, now: Moment) -> dict[str, str]:
+        """What those wait for that ask our daemons for it, by the daemon's kind."""
+        said = ((one.kind, one.values.get("waits")) for one in self.heard_from(now))
+        return {kind: label(text, 200) for kind, text in said if text}
+
+    def refusals(self, now: Moment, since: float) -> list[str]:
+        """Why requests were refused since then (s), the last reason first."""
+        found = [
+            (refused.last.at, reason)
+            for one in self.heard_from(now)
+            for reason, refused in one.refused.items()
+            if refused.last.seen and refused.last.at >= since
+        ]
+        return [reason for _, reason in sorted(found, reverse=True)]
+
+    def _age(self, moment: Moment) -> None:
+        """Add to the story when the readings behind the states get old."""
+        text = ""
+        if not self.stamped:
+            text = "was never read"
+        elif self.stamp_age_s > OLD_S:
+            text = "is old"
+        elif self.stamp_age_s < -CLOCKS_DIFFER_S:
+            text = "is from the future"
+        if self.old.say(text, moment):
+            told = (
+                f"the reading behind the states {text}" if text else "the readings are fresh again"
+            )
+            self.tell(moment, told)
+
+    def _faults(self, found: Diagnosis, moment: Moment, status: d.DiagnosticStatus) -> None:
+        codes = {
+            label(code): label(found.values.get(code, ""))
+            for code in diagnostics.faults(status)[:MOST_CODES]
+        }
+        self._set_faults(found, moment, codes)
+
+    def _of_its_own(self) -> Iterator[Diagnosis]:
+        """What its own daemon noted, and what it says on the graph."""
+        if self.noted is not None:
+            yield self.noted
+        yield from (one for one in self.diagnoses.values() if one.kind == self.kind)
+
+    def _set_faults(self, found: Diagnosis, moment: Moment, codes: Mapping[str, str]) -> None:
+        """Take its faults. A daemon notes a fault, and publishes it later: the story has it once."""
+        repeated = self.notes_faults and found is not self.noted and found.kind == self.kind
+        told = {code for one in self._of_its_own() for code in one.faults}
+        for code in [code for code in found.faults if code not in codes]:
+            del found.faults[code]
+            if not repeated:
+                self.tell(moment, f"fault {code} is over")
+        for code, detail in codes.items():
+            if not repeated and code not in found.faults and code not in told:
+                self.tell(moment, f"fault {code}" + (f": {detail}" if detail else ""))
+            found.faults[code] = detail, found.faults.get(code, ("", moment))[1]
+
+    def _refusals(self, found: Diagnosis, moment: Moment) -> None:
+        for key, value in found.values.items():
+            if not key.startswith(REFUSED) or not value.isdecimal() or len(value) > 18:
+                continue
+            reason, count = label(key.removeprefix(REFUSED)), int(value)
+            before = found.refused.get(reason)
+            if before is None:
+                if len(found.refused) < MOST_CODES:
+                    found.refused[reason] = Refused(count, moment)
+                    if moment.seen:
+                        self.tell(moment, f"its daemon refuses a request: {reason}")
+            elif count != before.count:
+                if moment.at - before.last.at > QUIET_S:
+                    self.tell(moment, f"its daemon refuses a request: {reason}")
+                before.count, before.last = count, Moment(moment.at, moment.wall)

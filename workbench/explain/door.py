@@ -1,0 +1,221 @@
+"""Why a robot waits at a door, and why a door stays open: sentences, from what was heard of it.
+
+RMF's DoorOpen waits for two things: the door's state OPEN, and a heartbeat of the door supervisor that
+lists the robot for this door. DoorClose waits until no heartbeat lists it (rmf_ros2, DoorOpen.cpp and
+DoorClose.cpp). A robot that drives through says nothing meanwhile.
+"""
+
+from shlex import quote
+from typing import Final
+
+from workbench.explain import answer as common
+from workbench.explain.answer import Answer
+from workbench.explain.claims import Claim
+from workbench.explain.door_facts import CLOSED, OPEN, DoorFacts
+from workbench.explain.explanation import Field, Step
+from workbench.explain.phrases import Clock, Moment
+
+SETTLES_S: Final = 2.0
+LONG_S: Final = 60.0
+"""No robot takes longer than this to drive through a doorway."""
+AWAY: Final = ("offline", "unknown")
+
+
+def answer(door: DoorFacts, clock: Clock, around: common.Heard, focus: str = "") -> Answer:
+    """The door at the end of what was heard. `focus`: the requester in question; "" for whoever
+    waits."""
+    if door.last_state is None:
+        return _with_askers(common.unheard(door, around, clock), door, clock)
+    stopped = common.silent(door, clock)
+    if stopped is not None:
+        return _with_askers(stopped, door, clock)
+    claim = _in_question(door, clock, focus)
+    found = Answer(since=_begins(door, claim))
+    if claim is not None:
+        wants = "open" if claim.wants == OPEN else "released"
+        found.say(
+            f"{claim.who} has waited for {door.name} to be {wants} {clock.since(claim.since)}."
+        )
+    holders = [f"{who} {clock.since(since)}" for who, since in [*door.holders.items()][:4]]
+    held = f"It has been held by {', '.join(holders)}." if holders else "Nobody holds it."
+    if door.last_heartbeat is None:
+        held = "Who holds it is not known."
+    found.say(f"{door.name} has been {door.mode.value} {clock.since(door.mode.since)}. {held}")
+    if old := common.old_reading(door, clock):
+        found.say(old)
+    if claim is None:
+        _nobody_asks(found, door, clock)
+        return found
+    found.asks, found.fields = claim.who, _fields(door, claim, clock)
+    found.notes += common.clock_of(claim)
+    if door.mode.value in AWAY:
+        _away(found, door, clock)
+    elif claim.wants == OPEN:
+        _opens(found, door, claim, clock)
+    else:
+        _not_let_go(found, door, claim, clock)
+    return found
+
+
+def waiters(door: DoorFacts, clock: Clock) -> list[Claim]:
+    """Those who repeat their request now and still wait; the earliest first."""
+    asks = [one for one in door.claims if one.asks(clock.now) and not _met(door, one)]
+    return sorted(asks, key=lambda one: one.since.at)
+
+
+def _met(door: DoorFacts, claim: Claim) -> bool:
+    held = claim.who in door.holders
+    return (held and door.mode.value == OPEN) if claim.wants == OPEN else not held
+
+
+def _in_question(door: DoorFacts, clock: Clock, focus: str) -> Claim | None:
+    waiting = waiters(door, clock)
+    if focus:
+        return next((one for one in waiting if one.who == focus), None)
+    return waiting[0] if waiting else None
+
+
+def _begins(door: DoorFacts, claim: Claim | None) -> float:
+    starts = [claim.since.at] if claim else []
+    starts += [since.at - SETTLES_S for since in door.holders.values()]
+    return min(starts, default=float("-inf"))
+
+
+def _with_askers(found: Answer, door: DoorFacts, clock: Clock) -> Answer:
+    for claim in [one for one in door.claims if one.wants == OPEN and one.asks(clock.now)][:3]:
+        found.say(f"{claim.who} has waited for it to be open {clock.since(claim.since)}.")
+        found.since = min(found.since, claim.since.at)
+    return found
+
+
+def _fields(door: DoorFacts, claim: Claim, clock: Clock) -> tuple[Field, ...]:
+    """What DoorOpen or DoorClose checks, as this requester's fleet adapter sees it."""
+    held = door.holders.get(claim.who)
+    listed = "lists it" if held else "does not list it"
+    if door.last_heartbeat is None:
+        listed = "not heard"
+    since = clock.since(held or claim.since)
+    if claim.wants != OPEN:
+        return (Field("heartbeat", listed, "does not list it", held is None, since),)
+    opened = door.mode.value == OPEN
+    return (
+        Field("door", door.mode.value, OPEN, opened, clock.since(door.mode.since)),
+        Field("heartbeat", listed, "lists it", held is not None, since),
+    )
+
+
+# ---- somebody waits
+
+
+def _away(found: Answer, door: DoorFacts, clock: Clock) -> None:
+    own = door.own(clock.now)
+    why = "its fault says why" if own and own.faults else "its daemon's log says why"
+    found.say(
+        f"The door is shown as {door.mode.value}: it cannot be read or believed, so nobody can pass.",
+        Step("a person", f"check the door's wires, bus and power: {why}"),
+    )
+
+
+def _opens(found: Answer, door: DoorFacts, claim: Claim, clock: Clock) -> None:
+    """It waits for the door to be open."""
+    if claim.who not in door.holders:
+        _not_listed(found, door, claim, clock)
+        return
+    asked = door.asked
+    passed = asked is not None and asked.value == OPEN
+    if not passed:
+        what = "asks for CLOSE" if asked is not None else "has not asked the door to open"
+        found.say(
+            f"The supervisor lists {claim.who}, and {what}.",
+            Step("the supervisor", f"send OPEN for {door.name}"),
+        )
+        return
+    on = common.relays(door, clock)
+    found.say(
+        f"The supervisor asks for OPEN, and the door has been {door.mode.value}"
+        f" {clock.since(door.mode.since)}{on}.",
+        Step("the controller", f"open {door.name} fully, and show it by its contact"),
+    )
+    if clock.now.at - door.mode.since.at > LONG_S:
+        found.say("That is long: an obstacle, a locked door, or a contact that shows nothing.")
+
+
+def _not_listed(found: Answer, door: DoorFacts, claim: Claim, clock: Clock) -> None:
+    if clock.now.at - claim.since.at < SETTLES_S and claim.since.seen:
+        found.say("It was asked for a moment ago.", Step("the supervisor", f"list {claim.who}"))
+    elif door.last_heartbeat is None:
+        found.say(
+            "Nobody takes the request: no door supervisor was heard on `door_supervisor_heartbeat`.",
+            Step("a person", "start rmf_door_supervisor, or a door supervisor of rmf-bridges"),
+        )
+    else:
+        found.say(
+            f"The door supervisor does not list {claim.who}: it takes its requests for replays, or"
+            " has too many requesters.",
+            Step(
+                "the supervisor", f"take the request of {claim.who}; its log says why it does not"
+            ),
+        )
+
+
+def _not_let_go(found: Answer, door: DoorFacts, claim: Claim, clock: Clock) -> None:
+    found.say(
+        f"It asks for CLOSE, and the supervisor's heartbeat has listed it"
+        f" {clock.since(door.holders[claim.who])}.",
+        Step("the supervisor", f"remove {claim.who} from its list"),
+    )
+
+
+# ---- nobody waits
+
+
+def _nobody_asks(found: Answer, door: DoorFacts, clock: Clock) -> None:
+    asked = door.asked.value if door.asked else ""
+    if door.holders:
+        _held_open(found, door, clock)
+    elif door.last_heartbeat is None and asked == OPEN and door.mode.value not in AWAY:
+        _asked_open(found, door, clock)
+    elif door.mode.value == CLOSED:
+        found.say("Nobody waits for it.", Step("nobody", "there is nothing to do"))
+    elif door.mode.value in AWAY:
+        _away(found, door, clock)
+    else:
+        found.say(
+            "No robot keeps it open: a person or the door's own controller does. RMF's supervisor sends"
+            " CLOSE at each of its states meanwhile; that releases a hold and shuts nothing.",
+            Step("the controller", f"close {door.name} when nobody is in the doorway"),
+        )
+
+
+def _asked_open(found: Answer, door: DoorFacts, clock: Clock) -> None:
+    """Only the supervisor was heard, or a person with `send --direct`, as the door's own daemon hears
+    them."""
+    assert door.asked is not None
+    found.say(f"On door_requests {door.sender} has asked for OPEN {clock.since(door.asked.since)}.")
+    opened = Step("the robot", "drive through; then its fleet adapter sends CLOSE")
+    opens = Step("the controller", f"open {door.name} fully, and show it by its contact")
+    found.next.append(opened if door.mode.value == OPEN else opens)
+
+
+def _held_open(found: Answer, door: DoorFacts, clock: Clock) -> None:
+    """Who holds it, and whether they are alive. A robot in a doorway is silent, so silence is
+    normal."""
+    who, since = min(door.holders.items(), key=lambda one: one[1].at)
+    claim = door.claims.get(who)
+    last: Moment | None = claim.last if claim else None
+    said = f"It last asked at {clock.time(last.wall)}." if last else "It was not heard asking."
+    if clock.now.at - since.at <= LONG_S:
+        found.say(
+            f"{said} A robot in the doorway says nothing until it is through.",
+            Step("the robot", f"{who} has to drive through; then its fleet adapter sends CLOSE"),
+        )
+        return
+    found.say(
+        f"{said} RMF has no time limit: a robot that died in the doorway, or a dashboard that somebody"
+        " left, keeps the door open for ever.",
+        Step(
+            "a person",
+            f"look into the doorway; if nobody is there: `rmf-bridge send door {quote(door.name)}"
+            f" close --requester {quote(who)}`",
+        ),
+    )

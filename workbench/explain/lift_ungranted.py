@@ -1,0 +1,72 @@
+"""Why a lift that nobody has is not given to the robot that asks for it."""
+
+from typing import Final
+
+from workbench.explain.answer import Answer
+from workbench.explain.claims import Claim
+from workbench.explain.explanation import Step
+from workbench.explain.lift_facts import LiftFacts
+from workbench.explain.phrases import Clock
+
+SETTLES_S: Final = 2.0
+"""This much time between a request and its grant, or a supervisor's change of mind, is normal."""
+
+
+def not_granted(found: Answer, lift: LiftFacts, claim: Claim, clock: Clock) -> None:
+    """The lift is free, and yet it is not given to the requester."""
+    if lift.floors and claim.wants not in lift.floors:
+        found.say(
+            f"{lift.name} serves {', '.join(lift.floors[:12])}, not {claim.wants or 'an empty name'}:"
+            " the request is refused.",
+            Step("a person", "give the floor one name, on RMF's map and in the lift's settings"),
+        )
+        return
+    if clock.now.at - claim.since.at < SETTLES_S and claim.since.seen:
+        found.say("It was asked for a moment ago.", Step("the device's node", "grant the session"))
+        return
+    if _not_passed_on(found, lift, claim, clock):
+        return
+    reasons = lift.refusals(clock.now, max(claim.since.at, clock.now.at - 10.0))
+    if reasons:
+        found.say(
+            f"Its daemon refuses the request: {', '.join(reasons)}.",
+            Step(
+                "the device's node", "grant the session once that is over; its log has the details"
+            ),
+        )
+    else:
+        found.say(
+            "The request is passed on to the lift's node, which does not grant it and gives no reason"
+            " on the graph.",
+            Step("the device's node", "grant the session; its log says why it does not"),
+        )
+
+
+def _not_passed_on(found: Answer, lift: LiftFacts, claim: Claim, clock: Clock) -> bool:
+    """Does the supervisor keep the request to itself?"""
+    passed = claim.passed_on
+    if not claim.own or (passed is not None and clock.now.at - passed.at < 5.0):
+        return False
+    if "lift_supervisor" in lift.waits(clock.now):
+        found.say(
+            "Its supervisor does not pass the request on.",
+            Step("a person", "end what it waits for; `rmf-bridge status` on its machine says how"),
+        )
+    elif lift.supervisor_last is None:
+        found.say(
+            "Nobody passes the request on: no supervisor was heard on `lift_requests`.",
+            Step("a person", "start rmf_lift_supervisor, or a lift supervisor of rmf-bridges"),
+        )
+    else:
+        other = lift.supervisor.value if lift.supervisor else ""
+        instead = ""
+        if other not in ("", claim.who):
+            instead = f" {lift.sender(other).capitalize()} asks for {other}."
+        found.say(
+            f"The supervisor does not pass the request on.{instead}",
+            Step(
+                "the supervisor",
+                f"pass on the request of {claim.who}; its log says why it does not",
+            ),
+        )
+    return True

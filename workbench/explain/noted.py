@@ -1,0 +1,95 @@
+"""What one of our daemons noted of its own device: inputs, outputs, faults and refusals.
+
+In an incident file the texts are JSON under `/rmf_bridge/` (`bridges/blackbox/incident.py`,
+`readable`). A file may come from anywhere, so a text of another shape is ignored.
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Final
+
+import msgspec
+
+from workbench.explain.timeline import Level
+
+OWN_TOPICS: Final = "rmf_bridge/"
+TOPICS: Final = ("samples", "outputs", "faults", "decisions")
+MOST: Final = 40
+"""At most this many inputs, outputs or faults of one device are read."""
+
+
+@dataclass(frozen=True, slots=True)
+class Noted:
+    """One note about `subject`. `inputs`, `outputs`, `faults`: all of them, as name -> value ("": off),
+    or None where the note is about something else. `refused`: why a request was refused.
+    """
+
+    subject: str
+    inputs: Mapping[str, str] | None = None
+    outputs: Mapping[str, str] | None = None
+    faults: Mapping[str, str] | None = None
+    refused: str = ""
+
+
+def noted(topic: str, text: str) -> Noted | None:
+    """The note in a text of this topic (its last part); None if it is not a note."""
+    try:
+        told = msgspec.json.decode(text)
+    except (msgspec.MsgspecError, RecursionError):
+        return None
+    if not isinstance(told, dict) or not isinstance(subject := told.get("subject"), str):
+        return None
+    match topic:
+        case "samples":
+            return Noted(subject, inputs=dict(_fields(told.get("sample"))))
+        case "outputs":
+            return Noted(subject, outputs=dict(_fields(told.get("outputs"))))
+        case "faults":
+            return Noted(subject, faults=dict(_faults(told.get("faults"))))
+        case "decisions" if isinstance(refused := told.get("refused"), str) and refused:
+            return Noted(subject, refused=refused)
+    return None
+
+
+def levels(at: float, note: Noted, on: dict[tuple[str, str], str]) -> Iterator[Level]:
+    """What has changed by this note. `on`: what was on before; it is brought up to date."""
+    lanes = (("inputs", note.inputs), ("relays", note.outputs), ("faults", note.faults))
+    for lane, found in lanes:
+        if found is None:
+            continue
+        names = [name for known, name in on if known == lane and name not in found]
+        for name, value in {**dict.fromkeys(names, ""), **found}.items():
+            if on.get((lane, name), "") != value:
+                on[lane, name] = value
+                yield Level(at, lane, name, value)  # type: ignore[arg-type]
+
+
+def _fields(struct: object) -> Iterator[tuple[str, str]]:
+    """The fields of a sample or of outputs that are on, off or one of a few words; no measurements."""
+    if not isinstance(struct, dict):
+        return
+    for name, value in [*struct.items()][:MOST]:
+        if isinstance(name, str) and name and (shown := _shown(value)) is not None:
+            yield name, shown
+
+
+def _shown(value: object) -> str | None:
+    match value:
+        case None | False:
+            return ""
+        case True:
+            return "on"
+        case str():
+            return value
+        case {"=": str() as word}:
+            return word.lower().replace("_", " ")
+        case {"=": list() as several}:
+            return ", ".join(filter(None, (_shown(one) for one in several[:MOST])))
+    return None
+
+
+def _faults(found: object) -> Iterator[tuple[str, str]]:
+    for fault in found[:MOST] if isinstance(found, list) else ():
+        match fault:
+            case {"code": str() as code, "detail": str() as detail}:
+                yield code, detail or code

@@ -1,0 +1,83 @@
+"""How each tone looks, by day and by night: colours that colour-blind people tell apart, and patterns.
+
+The colours are Okabe's and Ito's (https://jfly.uni-koeln.de/color/). No tone differs from another
+only by colour: a label says what it is, and what is wrong, unknown or only wanted has a pattern.
+"""
+
+from dataclasses import dataclass
+from typing import Final, Literal
+
+from workbench.explain.timeline import Tone
+
+Theme = Literal["light", "dark"]
+TONES: Final[tuple[Tone, ...]] = ("calm", "works", "open", "held", "asks", "wrong", "unknown")
+MEANING: Final[dict[Tone, str]] = {
+    "calm": "at rest",
+    "works": "moves or is on",
+    "open": "open",
+    "held": "has a session",
+    "asks": "is asked for",
+    "wrong": "fault or hazard",
+    "unknown": "not known",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Look:
+    """A tone in one theme. `text`: on the fill. `pattern`: lines over it; "" for none."""
+
+    fill: str
+    text: str
+    pattern: str = ""
+
+
+LIGHT: Final[dict[Tone, Look]] = {
+    "calm": Look("#dcdfe3", "#1b1d21"),
+    "works": Look("#8fcdf2", "#10181d"),
+    "open": Look("#4fc3a1", "#0c1a15"),
+    "held": Look("#f3bf4a", "#1d1604"),
+    "asks": Look("#f7f0b0", "#1d1b04", "#a89a1c"),
+    "wrong": Look("#e8854a", "#1d0d04", "#7a2f00"),
+    "unknown": Look("#ffffff", "#44484f", "#b4b9c1"),
+}
+DARK: Final[dict[Tone, Look]] = {
+    "calm": Look("#474c55", "#f2f4f7"),
+    "works": Look("#236f9d", "#ffffff"),
+    "open": Look("#0a8463", "#ffffff"),
+    "held": Look("#c68a12", "#140e00"),
+    "asks": Look("#5c5614", "#fffbd1", "#c9bb2e"),
+    "wrong": Look("#d8641c", "#140700", "#4a1c00"),
+    "unknown": Look("#17191d", "#c3c8d0", "#5a606a"),
+}
+LOOKS: Final[dict[Theme, dict[Tone, Look]]] = {"light": LIGHT, "dark": DARK}
+PAPER: Final[dict[Theme, tuple[str, str, str, str]]] = {
+    "light": ("#ffffff", "#1b1d21", "#5b616b", "#d3d7dd"),
+    "dark": ("#17191d", "#eceff3", "#a7adb8", "#363b44"),
+}
+"""Background, text, weaker text, grid."""
+
+
+def css(theme: Theme) -> str:
+    """The rules of one theme."""
+    back, text, weak, grid = PAPER[theme]
+    rules = [
+        f".paper{{fill:{back}}}",
+        f".ink{{fill:{text}}}",
+        f".weak{{fill:{weak}}}",
+        f".grid{{stroke:{grid};stroke-width:1}}",
+        f".edge{{stroke:{weak}}}",
+        f".step{{stroke:{LOOKS[theme]['wrong'].fill};stroke-width:1.5;stroke-dasharray:4 3}}",
+    ]
+    for tone, look in LOOKS[theme].items():
+        halo = f";stroke:{look.fill};stroke-width:4;paint-order:stroke" if look.pattern else ""
+        rules += [f".f-{tone}{{fill:{look.fill}}}", f".t-{tone}{{fill:{look.text}{halo}}}"]
+        if look.pattern:
+            rules.append(f".p-{tone}{{stroke:{look.pattern};fill:none}}")
+    return "".join(rules)
+
+
+def style(theme: Theme | None) -> str:
+    """The style sheet: of one theme, or of both, as the reader's screen has it."""
+    if theme is not None:
+        return css(theme)
+    return f"{css('light')}@media (prefers-color-scheme: dark){{{css('dark')}}}"

@@ -1,0 +1,101 @@
+"""Rows of a timeline while they grow: a value holds until the next one, or until it has expired."""
+
+import sys
+from collections import deque
+from collections.abc import Iterator
+from typing import Final
+
+from bridges.messages import words
+from workbench.explain.timeline import Mark, Span, Tone
+
+LONGEST_LABEL: Final = 120
+MOST_SPANS: Final = 2000
+"""A row keeps this many spans and marks: the newest."""
+NOT_HEARD: Final = "not heard"
+
+
+def label(text: str, longest: int = LONGEST_LABEL) -> str:
+    """A text from the network as a label: one line, not too long."""
+    shown = words.printable(text[: longest + 1])
+    return shown if len(shown) <= longest else shown[: longest - 1] + "…"
+
+
+class Row:
+    """Spans that never overlap, and marks.
+
+    A value holds for `keeps_s` (s) at most; with `fills` a span then says NOT_HEARD. What ended
+    `past_s` (s) before the newest is forgotten.
+    """
+
+    def __init__(
+        self,
+        keeps_s: float = float("inf"),
+        *,
+        fills: bool = False,
+        past_s: float = float("inf"),
+    ) -> None:
+        self.heard_at = float("-inf")
+        self.left_out = 0
+        self._keeps_s = keeps_s
+        self._fills = fills
+        self._past_s = past_s
+        self._spans: deque[Span] = deque(maxlen=MOST_SPANS)
+        self._marks: deque[Mark] = deque(maxlen=MOST_SPANS)
+        self._open: tuple[float, str, Tone] | None = None
+
+    def say(self, at: float, text: str, tone: Tone) -> None:
+        """Set its value from now on; "" for nothing."""
+        self._expire(at)
+        if self._open is not None and self._open[1:] != (text, tone):
+            self._close(at)
+        if text and self._open is None:
+            self._open = at, sys.intern(text), tone  # thousands of spans say the same few words
+        self.heard_at = at
+
+    def mark(self, at: float, text: str, tone: Tone) -> None:
+        """Mark an event."""
+        self.left_out += len(self._marks) == MOST_SPANS
+        self._marks.append(Mark(at, text, tone))
+        while self._marks[0].at_s < at - self._past_s:
+            self._marks.popleft()
+        self.heard_at = max(self.heard_at, at)
+
+    def spans(self, from_s: float, to_s: float) -> Iterator[Span]:
+        """The spans between these times, cut to them; the last one may still go on."""
+        for span in (*self._spans, *self._going_on(to_s)):
+            if span.to_s > from_s and span.from_s < to_s:
+                yield Span(max(from_s, span.from_s), min(to_s, span.to_s), span.label, span.tone)
+
+    def marks(self, from_s: float, to_s: float) -> Iterator[Mark]:
+        """The marks between these times."""
+        return (mark for mark in self._marks if from_s <= mark.at_s <= to_s)
+
+    def _going_on(self, to_s: float) -> Iterator[Span]:
+        until = self.heard_at + self._keeps_s
+        late = to_s > until
+        if self._open is not None:
+            since, text, tone = self._open
+            yield Span(since, self.heard_at if late else to_s, text, tone)
+        if late and self._fills:
+            yield Span(self.heard_at, to_s, NOT_HEARD, "unknown")
+
+    def _expire(self, at: float) -> None:
+        """Close what nobody has confirmed for too long, at its last confirmation."""
+        if at <= self.heard_at + self._keeps_s or self.heard_at == float("-inf"):
+            return
+        self._close(self.heard_at)
+        if self._fills:
+            self._append(Span(self.heard_at, at, NOT_HEARD, "unknown"))
+
+    def _close(self, at: float) -> None:
+        if self._open is not None:
+            since, text, tone = self._open
+            self._append(Span(since, at, text, tone))
+        self._open = None
+
+    def _append(self, span: Span) -> None:
+        if span.to_s > span.from_s:
+            self.left_out += len(self._spans) == MOST_SPANS
+            self._spans.append(span)
+            while self._spans[0].to_s < span.to_s - self._past_s:
+                self._spans.popleft()

@@ -1,0 +1,346 @@
+"""What `watch` shows: rows made from messages and a time. Pure.
+
+RMF's states have no field for faults, queues and simulations. Our daemons publish those on
+`/diagnostics`.
+"""
+
+import json
+import re
+import time
+from collections.abc import Iterable, Iterator, Sequence
+from typing import Final
+
+from msgspec import Struct
+from msgspec.structs import asdict, replace
+
+from bridges.host.columns import aligned
+from bridges.messages import definitions as d
+from bridges.messages import words
+from bridges.messages.heard import Heard
+from bridges.runtime import diagnostics
+from workbench.graph.join import SILENT_AFTER_S
+
+KINDS: Final = {d.LiftState: "lift", d.DoorState: "door", d.ChargerState: "charger"}
+SETTLES_S: Final = 1.5
+"""A daemon's diagnostics come at 1 Hz."""
+COORDINATOR: Final = "charger_coordinator"
+HEADINGS: Final = ("kind", "name", "state", "held by", "waiting", "age", "", "faults")
+MOST_DIAGNOSES: Final = 2000
+MOST_VALUES: Final = 100
+"""Of one diagnosis; ours have a third of it."""
+MOST_PLACES: Final = 500
+"""Of robots. Anybody can make names up, and the page listens for months."""
+SECONDS: Final = re.compile(r"\d+(\.\d+)? (s|min)\b")
+
+Device = tuple[str, str]
+"""Its kind and its name on RMF's graph."""
+
+
+class Row(Struct, frozen=True):
+    """One device, the charger coordinator, or a robot with its assigned place.
+
+    `waiting`: who waits, or what the one that has it waits for. `age`: age of the reading.
+    `mark`: why the row may be wrong. `simulated`: no hardware is behind it.
+    `faults`: those that its daemons report.
+    """
+
+    kind: str
+    name: str
+    state: str
+    held_by: str = "-"
+    waiting: str = ""
+    age: str = "-"
+    mark: str = ""
+    simulated: bool = False
+    faults: str = ""
+
+    @property
+    def wrong(self) -> bool:
+        """Whether the row needs attention."""
+        return bool(self.mark or self.faults)
+
+    def cells(self) -> tuple[str, ...]:
+        """The row's texts, in the order of HEADINGS."""
+        marks = " ".join(
+            word for word in ("SIMULATED" if self.simulated else "", self.mark) if word
+        )
+        state = (self.kind, self.name, self.state, self.held_by)
+        return (*state, self.waiting, self.age, marks, self.faults)
+
+    def news(self) -> tuple[object, ...]:
+        """The parts whose change is printed: seconds that only count on are left out."""
+        told = (self.state, self.held_by, self.waiting, self.mark, self.faults)
+        return (self.simulated, *(SECONDS.sub("", text) for text in told))
+
+
+class Diagnosis(Struct, frozen=True):
+    """A daemon's latest diagnostic status of one device, and when it arrived (monotonic s)."""
+
+    at: float
+    kind: str
+    status: d.DiagnosticStatus
+
+    def value(self, key: str) -> str:
+        """The value of this key; "" if it is missing or "-"."""
+        found = next((pair.value for pair in self.status.values if pair.key == key), "")
+        return "" if found == "-" else found
+
+    def is_current(self, now: float) -> bool:
+        """Whether it was said so lately that it counts."""
+        return now - self.at <= SILENT_AFTER_S
+
+    def waiting(self) -> str:
+        """Who waits, and for what: `fleet/b (12 s): for END of fleet/a`."""
+        return ": ".join(filter(None, (self.value("waiting"), self.value("waits"))))
+
+    @property
+    def of_daemon(self) -> bool:
+        """Whether it is about the daemon itself, not about a device."""
+        return self.status.name == f"{self.status.hardware_id}: daemon"
+
+    @property
+    def device(self) -> Device:
+        """Kind and name of the device; for a supervisor those of its lift or door."""
+        return self.kind.removesuffix("_supervisor"), self.status.hardware_id
+
+    def faults(self) -> Iterator[str]:
+        """One text for each fault, such as `OVERLOAD (since 3 s)`."""
+        for code in diagnostics.faults(self.status):
+            detail = self.value(code)
+            yield f"{code} ({detail})" if detail else code
+
+
+class Board:
+    """The latest state and diagnosis of each device."""
+
+    def __init__(self) -> None:
+        self._latest: dict[Device, words.Stated] = {}
+        self._heard_at: dict[Device, float] = {}
+        self._first_at: dict[Device, float] = {}
+        self._requesters: dict[str, str] = {}
+        self._places: dict[str, str] = {}
+        self._diagnoses: dict[str, Diagnosis] = {}
+        self._full_until = float("-inf")
+
+    def take(self, heard: Heard) -> None:
+        """Take one message that was heard."""
+        match heard.message:
+            case d.SupervisorHeartbeat():
+                self._requesters = {
+                    door.door_name: " ".join(s.requester_id for s in door.sessions)
+                    for door in heard.message.all_sessions
+                }
+            case d.ChargingAssignments(fleet_name=fleet):
+                for one in heard.message.assignments:
+                    place = f"{words.plain(d.ChargingMode, one.mode)} at {one.waypoint_name}"
+                    who = words.printable(f"{fleet}/{one.robot_name}")
+                    if who in self._places or len(self._places) < MOST_PLACES:
+                        self._places[who] = place
+            case d.DiagnosticArray():
+                for status in heard.message.status:
+                    self._diagnose(status, heard.at)
+            case d.LiftState() | d.DoorState() | d.ChargerState() as state:
+                key = (KINDS[type(state)], words.device(state))
+                self._latest[key], self._heard_at[key] = state, heard.at
+                self._first_at.setdefault(key, heard.at)
+
+    def unsettled(self, now: float) -> set[Device]:
+        """Kind and name of devices heard only just now, whose daemon may yet say that it simulates."""
+        known = {(one.kind, one.status.hardware_id) for one in self._current(now)}
+        young = {key for key, at in self._first_at.items() if now - at < SETTLES_S}
+        return {(kind, words.printable(name)) for kind, name in young - known}
+
+    def forget(self, kind: str, name: str) -> None:
+        """A device that is silent gives way to another."""
+        self._latest.pop((kind, name), None)
+
+    def rows_of(self, devices: Iterable[Device], now: float, wall: float) -> list[Row]:
+        """The rows of these devices, in their order; none of one that has published no state."""
+        about: dict[Device, list[Diagnosis]] = {}
+        for one in self._current(now):
+            if not one.of_daemon:
+                about.setdefault(one.device, []).append(one)
+        return [
+            self._device(key, self._latest[key], about.get(key, ()), now, wall)
+            for key in devices
+            if key in self._latest
+        ]
+
+    def rows(self, now: float, wall: float) -> list[Row]:
+        """The rows, sorted by kind and name. `now`: monotonic s; `wall`: the clock of the stamps."""
+        devices = self.rows_of(sorted(self._latest, key=_order), now, wall)
+        return [*devices, *self._coordinators(now), *self._robots()]
+
+    def _diagnose(self, status: d.DiagnosticStatus, at: float) -> None:
+        """Keep a status of our daemons under `<node>: <device>`. Other nodes' have no `kind`."""
+        kind = next((pair.value for pair in status.values if pair.key == "kind"), "")
+        diagnosis = Diagnosis(at, kind, status)
+        of_daemon = bool(kind) and diagnosis.of_daemon
+        ours = of_daemon or kind == COORDINATOR or diagnosis.device in self._latest
+        if ours and (status.name in self._diagnoses or self._room(at)):
+            kept = replace(status, values=status.values[:MOST_VALUES])
+            self._diagnoses[status.name] = Diagnosis(at, kind, kept)
+
+    def _room(self, now: float) -> bool:
+        """For one more diagnosis: anybody can make names up, and a silent one gives way."""
+        if len(self._diagnoses) >= MOST_DIAGNOSES and now > self._full_until:
+            self._diagnoses = {one.status.name: one for one in self._current(now)}
+            self._full_until = now + SILENT_AFTER_S
+        return len(self._diagnoses) < MOST_DIAGNOSES
+
+    def _device(
+        self,
+        key: Device,
+        state: words.Stated,
+        found: Sequence[Diagnosis],
+        now: float,
+        wall: float,
+    ) -> Row:
+        kind, name = key
+        held_by = words.holder(state)
+        if isinstance(state, d.DoorState):
+            held_by = words.printable(self._requesters.get(state.door_name, ""))
+        return Row(
+            kind,
+            words.printable(name),
+            words.condition(state),
+            held_by or "-",
+            words.printable(", ".join(filter(None, (one.waiting() for one in found)))),
+            _age(words.stamped_at(state), wall),
+            _mark(state, now - self._heard_at[key], wall),
+            any(one.kind == kind and self._simulated(one, now) for one in found),
+            _faults(found),
+        )
+
+    def _coordinators(self, now: float) -> Iterator[Row]:
+        for diagnosis in self._current(now):
+            if diagnosis.kind != COORDINATOR or diagnosis.of_daemon:
+                continue
+            daemon = self._daemon(diagnosis, now)
+            passive = daemon.value(diagnostics.PASSIVE) if daemon else ""
+            queue = diagnosis.value("queue")
+            yield Row(
+                "coordinator",
+                words.printable(diagnosis.status.name.partition(": ")[0]),
+                words.printable(f"passive: {passive}") if passive else _coordinates(diagnosis),
+                waiting=words.printable(queue),
+                simulated=self._simulated(diagnosis, now),
+                faults=_faults([diagnosis]),
+            )
+
+    def _robots(self) -> Iterator[Row]:
+        for who, place in sorted(self._places.items()):
+            yield Row("robot", who, words.printable(place))
+
+    def _current(self, now: float) -> list[Diagnosis]:
+        return [one for one in self._diagnoses.values() if one.is_current(now)]
+
+    def _daemon(self, diagnosis: Diagnosis, now: float) -> Diagnosis | None:
+        node = diagnosis.status.name.partition(": ")[0]
+        daemon = self._diagnoses.get(f"{node}: daemon")
+        return daemon if daemon and daemon.is_current(now) else None
+
+    def _simulated(self, diagnosis: Diagnosis, now: float) -> bool:
+        daemon = self._daemon(diagnosis, now)
+        return daemon is not None and diagnostics.SIMULATED in daemon.status.message
+
+
+def _coordinates(diagnosis: Diagnosis) -> str:
+    """What the coordinator does, and its schedule."""
+    silent = diagnosis.value("assigns").startswith("no:")
+    does = "asks for chargers that another node assigns" if silent else "assigns chargers"
+    schedule = diagnosis.value("schedule")
+    return words.printable(f"{does}, schedule {schedule}" if schedule else does)
+
+
+def _faults(found: Iterable[Diagnosis]) -> str:
+    texts = [text for diagnosis in found for text in diagnosis.faults()]
+    return words.printable("; ".join(dict.fromkeys(texts)))
+
+
+def _order(device: Device) -> tuple[int, str]:
+    kind, name = device
+    return list(KINDS.values()).index(kind), name
+
+
+def _age(stamped_at: float, wall: float) -> str:
+    if stamped_at == 0:
+        return "never read"
+    age = wall - stamped_at
+    if age < 60:
+        return f"{age:.1f} s"
+    return f"{age / 60:.0f} min" if age < 7200 else f"{age / 3600:.0f} h"
+
+
+def _mark(state: words.Stated, silent_s: float, wall: float) -> str:
+    age = wall - words.stamped_at(state)
+    if silent_s > SILENT_AFTER_S:
+        return f"SILENT {silent_s:.0f} s"
+    if age < -SILENT_AFTER_S:
+        return "CLOCK AHEAD"
+    return "STALE" if age - silent_s > SILENT_AFTER_S else ""
+
+
+def table(rows: Iterable[Row]) -> list[str]:
+    """The rows in columns, under headings; columns for queues, marks and faults only if needed."""
+    shown = [row.cells() for row in rows]
+    if not shown:
+        return ["nothing heard yet"]
+    optional = ("waiting", "", "faults")
+    columns = [
+        [heading, *cells]
+        for heading, *cells in zip(HEADINGS, *shown, strict=True)
+        if heading not in optional or any(cells)
+    ]
+    return aligned([*zip(*columns, strict=True)])
+
+
+def changes(before: list[Row], after: list[Row]) -> list[Row]:
+    """The rows that have changed, not counting ages and running seconds."""
+    known = {(row.kind, row.name): row.news() for row in before}
+    return [row for row in after if known.get((row.kind, row.name)) != row.news()]
+
+
+def change_line(row: Row, wall: float) -> str:
+    """A changed row as one line, for a pipe."""
+    clock = time.strftime("%H:%M:%S", time.localtime(wall)) + f".{int(wall * 1000) % 1000:03d}"
+    kind, name, state, held_by, waiting, age, marks, faults = row.cells()
+    parts = [clock, f"{kind:<7}", f"{name:<12}", f"{state:<38}", held_by]
+    parts += [f"waiting: {waiting}"] if waiting else []
+    parts += [f"age {age}", *filter(None, (marks, faults))]
+    return "  ".join(parts)
+
+
+def json_line(row: Row, wall: float) -> str:
+    """A changed row as one line of JSON, with the time of the change (s since the epoch)."""
+    return json.dumps({"at": round(wall, 3), **asdict(row)})
+
+
+def repaint(
+    rows: list[Row], lines_before: int, columns: int, lines: int, *, coloured: bool = True
+) -> tuple[str, int]:
+    """The text that redraws a terminal showing `lines_before` lines of the table, and the new number
+    of lines. No line wraps and nothing scrolls away.
+    """
+    shown = list(_fitting(rows, columns - 1))
+    if len(shown) >= lines:
+        more = len(shown) - lines + 2
+        shown = [*shown[: lines - 2], (f"… and {more} more", False)]
+    text = f"\x1b[{lines_before}A" if lines_before else ""
+    for line, wrong in shown:
+        line = line[: columns - 1]
+        red = coloured and wrong
+        text += f"\r\x1b[K\x1b[31m{line}\x1b[0m\n" if red else f"\r\x1b[K{line}\n"
+    return text + "\x1b[J", len(shown)
+
+
+def _fitting(rows: list[Row], width: int) -> Iterator[tuple[str, bool]]:
+    """Each line of the table, and whether it needs attention. Where it is too long for a terminal, its
+    marks and faults follow on a line of their own."""
+    heading, *lines = table(rows)
+    yield heading, False
+    for row, line in zip(rows, lines, strict=True):
+        yield line, row.wrong
+        told = " ".join(filter(None, row.cells()[-2:]))
+        if told and len(line) > width:
+            yield f"  {told}", row.wrong

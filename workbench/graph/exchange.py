@@ -1,0 +1,101 @@
+"""When `send` sends, when it ends, and what it says when the request has no effect.
+
+Pure: `step(request, seen, now)`. A request is repeated at 1 Hz until its effect is seen, as in RMF.
+Only a state heard after the first request counts, because an earlier one may show the same for another
+reason. Each request's message, and what fulfils it, are in `requests/`.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Final
+
+from bridges.messages import words
+from workbench.graph.join import SILENT_AFTER_S
+from workbench.graph.requests import Done, Failed, Obstacle, Request, Seen
+
+REPEAT_S: Final = 1.0
+PATIENCE_S: Final = 2.0
+"""States come at 1 Hz. After two seconds of silence a request is sent all the same."""
+HINT_AFTER_S: Final = 3.0
+"""A node that starts needs a second or two to find the others. Then `send` says what it waits for."""
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """The next step: a request to send now, a hint to print once, or the outcome. `direct`: the request
+    goes to the device's own daemon."""
+
+    send: words.Requested | None = None
+    hint: str = ""
+    outcome: Done | Failed | None = None
+    direct: bool = False
+
+
+def step(request: Request, seen: Seen, now: float) -> Step:
+    """What to do now."""
+    over = request.outcome(seen)
+    if over is not None:
+        return Step(outcome=over)
+    late = now >= seen.began_at + min(HINT_AFTER_S, seen.timeout_s)
+    if late and (wrong_kind := request.misnamed(seen)):
+        return Step(outcome=Failed(wrong_kind))
+    if now >= seen.began_at + seen.timeout_s:
+        return Step(outcome=Failed(_reason(request, seen, now)))
+    hint, direct = _hint(request, seen, now), request.goes_direct(seen, now)
+    if not _may_send(request, seen, now, direct=direct):
+        return Step(hint=hint)
+    return Step(request.message(seen), hint, direct=direct)
+
+
+def _may_send(request: Request, seen: Seen, now: float, *, direct: bool) -> bool:
+    if seen.last_sent_at is not None:
+        return now >= seen.last_sent_at + REPEAT_S
+    heard_or_late = request.ready(seen) or now >= seen.began_at + PATIENCE_S
+    return (direct or seen.listeners > 0) and heard_or_late
+
+
+def _hint(request: Request, seen: Seen, now: float) -> str:
+    """What the user can do, before the timeout."""
+    if now < seen.began_at + HINT_AFTER_S:
+        return ""
+    if missed := _missed(request, seen):
+        return _said(missed)
+    if seen.first_sent_at is None or now < seen.first_sent_at + PATIENCE_S:
+        return ""
+    obstacle = _first(request.obstacles(seen))
+    return _said(obstacle) if obstacle.remedy else ""
+
+
+def _reason(request: Request, seen: Seen, now: float) -> str:
+    """Why the request timed out, and where to look next."""
+    if missed := _missed(request, seen):
+        return _given_up("", seen) if _said(missed) in seen.hinted else _said(missed)
+    silent_s = now - seen.stated_at
+    if silent_s > SILENT_AFTER_S:
+        return f"{request.name} fell silent {silent_s:.0f} s ago: is its daemon still running?"
+    obstacle = _first(request.obstacles(seen))
+    state = words.described(seen.states[-1])
+    whole = _said(obstacle._replace(text=f"{obstacle.text} (last state: {state})"))
+    return (
+        whole if _said(obstacle) not in seen.hinted else _given_up(f"; last state: {state}", seen)
+    )
+
+
+def _missed(request: Request, seen: Seen) -> Obstacle | None:
+    """Who is not on the graph: whoever takes the request, or the device."""
+    if seen.first_sent_at is None and seen.listeners == 0:
+        return request.nobody(seen)
+    return None if seen.states else request.unheard(seen)
+
+
+def _given_up(more: str, seen: Seen) -> str:
+    """The end of a wait whose reason was said when it began."""
+    return f"gave up after {seen.timeout_s:g} s{more}"
+
+
+def _first(obstacles: Iterable[Obstacle]) -> Obstacle:
+    return next(obstacle for obstacle in obstacles if obstacle.present)
+
+
+def _said(obstacle: Obstacle) -> str:
+    return f"{obstacle.text}; {obstacle.remedy}" if obstacle.remedy else obstacle.text

@@ -1,0 +1,163 @@
+"""What the commands of a graph share: the options that name it, joining it, seconds, and an end."""
+
+import argparse
+import os
+import shlex
+import signal
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+from types import FrameType
+
+import msgspec
+
+from bridges.kinds.shared.rmf_section import Rmf
+from bridges.messages import words
+from bridges.transports.transport import Transport, TransportError
+from workbench.graph.renamed import Renamed
+
+SILENT_AFTER_S = 3.0
+"""States come at 1 Hz: three missed ones, or a reading three seconds old, get a mark."""
+TRANSPORTS = ("auto", "ros2", "dds", "zenoh")
+
+
+def add_graph_arguments(parser: argparse.ArgumentParser) -> None:
+    """The options that say which graph: `--config`, `--domain-id`, `--transport`, `--localhost`."""
+    parser.add_argument(
+        "--config",
+        type=Path,
+        metavar="FILE",
+        help="a device YAML, for its `rmf:` section: routers, certificates, domain",
+    )
+    parser.add_argument(
+        "--domain-id", type=_domain, metavar="N", help="ROS domain (default: ROS_DOMAIN_ID, else 0)"
+    )
+    parser.add_argument(
+        "--transport",
+        choices=TRANSPORTS,
+        help="ros2 needs rclpy, dds and zenoh need no ROS; auto (default) takes the first one here",
+    )
+    parser.add_argument(
+        "--localhost",
+        action="store_true",
+        help="use only the loopback interface, as `run --simulate` does",
+    )
+
+
+def _domain(text: str) -> int:
+    if not text.isascii() or not text.isdigit() or int(text) > 232:
+        raise argparse.ArgumentTypeError(f"'{text}' is not a DDS domain id: write 0 to 232")
+    return int(text)
+
+
+def seconds(least: float, most: float) -> Callable[[str], float]:
+    """A reader of an option's number of seconds, for argparse."""
+
+    def read(text: str) -> float:
+        with suppress(ValueError):
+            if least <= float(text) <= most:
+                return float(text)
+        raise argparse.ArgumentTypeError(f"'{text}': write {least:g} to {most:g} seconds")
+
+    return read
+
+
+def open_graph(args: argparse.Namespace, node_name: str) -> Transport:
+    """Join the graph that the options name. Raises TransportError."""
+    from bridges.transports.choose import open_transport
+
+    rmf = overridden(_configured(args.config), args)
+    joined = open_transport(rmf, node_name, localhost=args.localhost, ros_args=args.ros_args)
+    return Renamed(joined, rmf.topics) if rmf.topics else joined
+
+
+def graph_of(args: argparse.Namespace, speaks: str) -> str:
+    """Where the joined graph is, for people: `dds in domain 7, on this machine alone`."""
+    from bridges.transports.choose import domain_id, stays_on_loopback
+
+    rmf = overridden(_configured(args.config), args)
+    alone = args.localhost or stays_on_loopback(rmf, os.environ)
+    where = f"{speaks} in domain {domain_id(rmf, os.environ)}"
+    return f"{where}, on this machine alone" if alone else where
+
+
+def overridden(rmf: Rmf, args: argparse.Namespace) -> Rmf:
+    """A YAML's `rmf:` section, changed by the options of the command line."""
+    if args.domain_id is not None:
+        rmf = msgspec.structs.replace(rmf, domain_id=args.domain_id)
+    if args.transport is not None:
+        rmf = msgspec.structs.replace(rmf, transport=args.transport)
+    return rmf
+
+
+def _configured(file: Path | None) -> Rmf:
+    if file is None:
+        return Rmf()
+    from bridges.settings.load import SettingsError, load
+
+    try:
+        return load(file).rmf
+    except SettingsError as error:
+        raise TransportError("\n".join(map(str, error.problems))) from None
+
+
+def interruptible() -> AbstractContextManager[None]:
+    """SIGINT, SIGTERM and SIGHUP raise KeyboardInterrupt.
+
+    Otherwise the node of a killed command would stay on the graph for over 10 s.
+    """
+    return ended_by(signal.default_int_handler)
+
+
+@contextmanager
+def ended_by(action: Callable[[int, FrameType | None], object]) -> Iterator[None]:
+    """SIGINT, SIGTERM and SIGHUP do this, and what they did before afterwards."""
+    signals = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+    before = {number: signal.signal(number, action) for number in signals}
+    try:
+        yield
+    finally:
+        for number, earlier in before.items():
+            signal.signal(number, earlier)
+
+
+def complain(command: str, text: object) -> None:
+    """Write one line to standard error: the command's name and the text, control characters escaped."""
+    sys.stderr.write(words.printable(f"rmf-bridge {command}: {text}") + "\n")
+
+
+@dataclass(frozen=True, slots=True)
+class CommandLine:
+    """The command line as typed, so that a proposed command has the same options and can be copied.
+
+    `typed`: every word after `rmf-bridge`. `options`: what another command needs to act on the same
+    graph.
+    """
+
+    typed: tuple[str, ...] = ()
+    options: tuple[str, ...] = ()
+
+    def again_with(self, option: str) -> str:
+        """The same command with one more option."""
+        return shlex.join(("rmf-bridge", *self.typed, option))
+
+    def other(self, *command: str) -> str:
+        """Another command, on the same graph. Only `send` knows `--direct`."""
+        options = [one for one in self.options if one != "--direct" or command[0] == "send"]
+        return shlex.join(("rmf-bridge", *command, *options))
+
+
+def command_line(args: argparse.Namespace) -> CommandLine:
+    """From parsed arguments; `args.typed` is what `cli` was given."""
+    options = ["--direct"] if getattr(args, "direct", False) else []
+    if args.config is not None:
+        options += ["--config", str(args.config)]
+    if args.domain_id is not None:
+        options += ["--domain-id", str(args.domain_id)]
+    if args.transport is not None:
+        options += ["--transport", args.transport]
+    if args.localhost:
+        options += ["--localhost"]
+    return CommandLine(tuple(args.typed), tuple(options))

@@ -1,0 +1,238 @@
+"""Every request that `send` can make: its message, when it is fulfilled, and why it is not.
+
+Messages and the conditions that fulfil them are those of RMF's fleet adapters (rmf_ros2 9dedd0f).
+There is one file for each kind of device; this one has what they share. A request's `obstacles` are a
+table, most specific first; the last one always applies.
+"""
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+from difflib import get_close_matches
+from typing import ClassVar, Final, NamedTuple, TypeVar
+
+from msgspec import Struct
+from msgspec.structs import replace
+
+from bridges.kinds.charger.refusals import Refusal, read
+from bridges.messages import words
+from bridges.messages.definitions import DiagnosticStatus, SupervisorHeartbeat
+from bridges.messages.heard import Heard
+from bridges.messages.topics import AnyTopic
+from workbench.graph.join import CommandLine
+
+State = TypeVar("State", bound=words.Stated)
+NEVER_AT: Final = float("-inf")
+
+
+class Seen(Struct, frozen=True):
+    """What has happened since the command began; times are monotonic s.
+
+    `listeners`: matched subscriptions of the request's topic. `states`: those that concern the
+    request, in order, the last at `stated_at`. `there`: kind and name of every device that was heard.
+    `graph`: where we listen, for people. `hinted`: the hints that were said. `heartbeat`: the latest
+    of the door supervisor, at `heartbeat_at`.
+    `boarded`: what the lift's diagnostics say of a robot inside, "yes" or "no"; "" if
+    they were not heard. `refusals`: those of chargers, after our first request.
+    """
+
+    began_at: float
+    timeout_s: float
+    listeners: int = 0
+    first_sent_at: float | None = None
+    last_sent_at: float | None = None
+    states: tuple[words.Stated, ...] = ()
+    stated_at: float = NEVER_AT
+    there: frozenset[tuple[str, str]] = frozenset()
+    graph: str = ""
+    hinted: frozenset[str] = frozenset()
+    heartbeat: SupervisorHeartbeat | None = None
+    heartbeat_at: float = NEVER_AT
+    boarded: str = ""
+    refusals: tuple[Refusal, ...] = ()
+
+    def hears(self, heard: Heard, about: Callable[[words.Stated], bool]) -> "Seen":
+        """Take a message that was heard. `about(state)`: does the state concern the request?"""
+        message = heard.message
+        if isinstance(message, SupervisorHeartbeat):
+            return replace(self, heartbeat=message, heartbeat_at=heard.at)
+        if isinstance(message, DiagnosticStatus):
+            refusal = read(message) if self.first_sent_at is not None else None
+            return replace(self, refusals=(*self.refusals, refusal)) if refusal else self
+        if not isinstance(message, words.Stated):
+            return self
+        there = self.there | {(words.kind(message), words.device(message))}
+        if not about(message):
+            return replace(self, there=there)
+        return replace(self, there=there, states=(*self.states, message), stated_at=heard.at)
+
+    def names(self, kind: str) -> list[str]:
+        """Every device of this kind that was heard, sorted."""
+        return sorted(name for one, name in self.there if one == kind)
+
+    def sends(self, now: float) -> "Seen":
+        """The request is sent now."""
+        first = now if self.first_sent_at is None else self.first_sent_at
+        return replace(self, first_sent_at=first, last_sent_at=now)
+
+    def states_of(self, kind: type[State]) -> list[State]:
+        """The states heard, in order. `kind`: their type."""
+        return [state for state in self.states if isinstance(state, kind)]
+
+    def answer(self, kind: type[State]) -> State | None:
+        """The last state if it was heard after our first request, else None."""
+        sent_at = self.first_sent_at
+        if sent_at is None or not self.states or self.stated_at < sent_at:
+            return None
+        return self.states_of(kind)[-1]
+
+    def requesters(self, door: str) -> list[str] | None:
+        """Who holds the door, by a heartbeat heard after our first request; None without one."""
+        sent_at = self.first_sent_at
+        if self.heartbeat is None or sent_at is None or self.heartbeat_at < sent_at:
+            return None
+        return [
+            session.requester_id
+            for sessions in self.heartbeat.all_sessions
+            if sessions.door_name == door
+            for session in sessions.sessions
+        ]
+
+
+WHERE: Final = (
+    "is it in another domain (--domain-id), on another transport (--transport), on another machine"
+    " (without --localhost)? rmf-bridge status shows a daemon's, on its own machine"
+)
+
+
+class Done(Struct, frozen=True):
+    """The request took effect."""
+
+    text: str
+
+
+class Failed(Struct, frozen=True):
+    """The request had no effect; `text` says why."""
+
+    text: str
+
+
+class Obstacle(NamedTuple):
+    """A possible reason why a request has no effect; `remedy`: the command that helps."""
+
+    present: bool
+    text: str
+    remedy: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Request(ABC):
+    """A request about the device of this `name`: to its daemon if `direct`, else to the supervisor.
+
+    `answers`: topics that are heard beside the states.
+    """
+
+    name: str
+    direct: bool = field(default=False, kw_only=True)
+    line: CommandLine = field(default=CommandLine(), kw_only=True)
+
+    kind: ClassVar[str]
+    states: ClassVar[AnyTopic]
+    own: ClassVar[AnyTopic]
+    adapter: ClassVar[AnyTopic | None] = None
+    listener: ClassVar[str] = ""
+    answers: ClassVar[tuple[AnyTopic, ...]] = ()
+
+    @property
+    def topic(self) -> AnyTopic:
+        """The daemon's own topic, or the one that fleet adapters use."""
+        return self.own if self.direct or self.adapter is None else self.adapter
+
+    @abstractmethod
+    def message(self, seen: Seen) -> words.Requested | None:
+        """The message to send, without its stamp; None while it cannot be made yet."""
+
+    @abstractmethod
+    def outcome(self, seen: Seen) -> Done | Failed | None:
+        """The outcome, if the states show one."""
+
+    @abstractmethod
+    def obstacles(self, seen: Seen) -> Iterable[Obstacle]:
+        """Why there is no effect, judged by the last state; the first `present` one counts."""
+
+    @property
+    def supervisor(self) -> AnyTopic | None:
+        """The topic on which the supervisor speaks, if others hear adapters as it does."""
+        return None
+
+    def goes_direct(self, seen: Seen, now: float) -> bool:
+        """Whether it is time to ask the device's own daemon, which the supervisor has not done."""
+        return False
+
+    def about(self, state: words.Stated) -> bool:
+        """Whether the state is of this device."""
+        return (words.kind(state), words.device(state)) == (self.kind, self.name)
+
+    def ready(self, seen: Seen) -> bool:
+        """Whether the device has been heard."""
+        return bool(seen.states)
+
+    def misnamed(self, seen: Seen) -> str:
+        """Which other kind of device has this name; "" if none was heard."""
+        if self.ready(seen):
+            return ""
+        kinds = sorted(kind for kind, name in seen.there if name == self.name and kind != self.kind)
+        if not kinds:
+            return ""
+        there = f"rmf-bridge send {kinds[0]} --help"
+        return f"{self.name} is a {' and a '.join(kinds)}, not a {self.kind}; {there}"
+
+    def nobody(self, seen: Seen) -> Obstacle:
+        """No supervisor or daemon subscribes to the request."""
+        silence = f"no node subscribes to {self.topic.name}"
+        if self.supervisor is not None:
+            silence = f"no node publishes {self.supervisor.name}"
+        who = f"{self.kind} supervisor"
+        if self.topic == self.own:
+            who = self.listener or f"{self.kind} daemon"
+        text = f"no {who} runs in this domain: {silence}; {self._hears(seen)}"
+        if self.topic == self.own or self.name not in seen.names(self.kind):
+            return Obstacle(True, text, self._elsewhere(seen))
+        there = self.line.again_with("--direct")
+        return Obstacle(True, text, f"to ask the {self.kind}'s own daemon: {there}")
+
+    def unheard(self, seen: Seen) -> Obstacle:
+        """The device has not been heard; perhaps another has a similar name."""
+        topic, names = self.states.name, seen.names(self.kind)
+        if not names:
+            text = f"no {self.kind} is heard on {topic}; {self._hears(seen)}"
+            return Obstacle(True, text, self._elsewhere(seen))
+        return Obstacle(True, f"no '{self.name}' on {topic}; {self._hears(seen)}")
+
+    def _hears(self, seen: Seen) -> str:
+        """Whom we hear: devices of the kind, else any; else where we listen."""
+        if names := seen.names(self.kind):
+            near = "" if self.name in names else nearest(self.name, names)
+            return f"{self.kind}s heard: {', '.join(names)}{near}"
+        if seen.there:
+            return f"heard: {', '.join(map(' '.join, sorted(seen.there)))}"
+        return f"nothing is heard{seen.graph and f' by {seen.graph}'}"
+
+    def _elsewhere(self, seen: Seen) -> str:
+        """Where else the device may be: on loopback, in another domain, on another transport."""
+        if self._loopback():
+            return self._loopback()
+        return "" if seen.there else WHERE
+
+    def _loopback(self) -> str:
+        if "--localhost" in self.line.options:
+            return ""
+        there = self.line.again_with("--localhost")
+        return f"for a simulation on the loopback interface: {there}"
+
+
+def nearest(name: str, names: Iterable[str]) -> str:
+    """`; did you mean 'Lift1'?`, or "" when no name is similar."""
+    folded = {n.lower(): n for n in names}
+    near = get_close_matches(name.lower(), folded, n=1, cutoff=0.6)
+    return f"; did you mean '{folded[near[0]]}'?" if near else ""

@@ -1,0 +1,196 @@
+"""Assigning a charger to a robot and cancelling that: by its daemon, or by the coordinator's queue."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import ClassVar, Final
+
+from bridges.kinds.charger.refusals import OCCUPIED
+from bridges.messages import definitions as d
+from bridges.messages import topics, words
+from bridges.messages.stamps import duration
+from bridges.messages.topics import AnyTopic
+from workbench.graph.requests import Done, Failed, Obstacle, Request, Seen
+
+ANY: Final = "any"
+SERVING: Final = (
+    d.ChargerStateValue.CHARGER_ASSIGNED,
+    d.ChargerStateValue.CHARGER_CHARGING,
+    d.ChargerStateValue.CHARGER_RELEASED,
+)
+
+
+class _Charger(Request):
+    __slots__ = ()
+    kind = "charger"
+    states = topics.CHARGER_STATES
+
+
+@dataclass(frozen=True, slots=True)
+class Charge(_Charger):
+    """Assign the charger to a robot under our request id."""
+
+    fleet: str
+    robot: str
+    request_id: str
+    start_timeout_s: float
+
+    own: ClassVar[AnyTopic] = topics.CHARGER_REQUESTS
+    answers: ClassVar[tuple[AnyTopic, ...]] = (topics.CHARGER_REFUSALS,)
+
+    def message(self, seen: Seen) -> d.ChargerRequest:
+        """The request, always with the same id, so that a repeat is not a new request."""
+        charger = "" if self.name == ANY else self.name
+        limit = duration(self.start_timeout_s)
+        return d.ChargerRequest(charger, self.fleet, self.robot, limit, self.request_id)
+
+    def outcome(self, seen: Seen) -> Done | Failed | None:
+        """Done when a state with our id shows that the charger serves the robot; Failed when the
+        request is refused."""
+        answer = seen.answer(d.ChargerState)
+        if answer is None or answer.state not in SERVING or answer.request_id != self.request_id:
+            return self._refused(seen)
+        state = words.plain(d.ChargerStateValue, answer.state)
+        return Done(f"{self.name} is {state} for request {self.request_id}")
+
+    def _refused(self, seen: Seen) -> Failed | None:
+        refusal = next((r for r in seen.refusals if r.request_id == self.request_id), None)
+        if refusal is None:
+            return None
+        text = f"{refusal.charger or self.name} refuses the request: {refusal.text}"
+        if refusal.reason != OCCUPIED or not refusal.held_request:
+            return Failed(text)
+        cancel = ("send", "charger", refusal.charger, "--cancel", refusal.held_request)
+        return Failed(f"{text}; to cancel that: {self.line.other(*cancel)}")
+
+    def obstacles(self, seen: Seen) -> Iterable[Obstacle]:
+        """An error, or another request."""
+        state = seen.states_of(d.ChargerState)[-1]
+        cancel = self.line.other("send", "charger", self.name, "--cancel", state.request_id)
+        return (
+            _error(state),
+            Obstacle(
+                state.request_id not in ("", self.request_id),
+                f"{self.name} serves request {state.request_id}",
+                f"to cancel that: {cancel}",
+            ),
+            Obstacle(True, f"{self.name} did not accept the request: its daemon's log says why"),
+        )
+
+
+def _error(state: d.ChargerState) -> Obstacle:
+    failed = state.state == d.ChargerStateValue.CHARGER_ERROR
+    return Obstacle(failed, f"{state.charger_name} reports an error: {state.error_message}")
+
+
+@dataclass(frozen=True, slots=True)
+class ChargeCancel(_Charger):
+    """Cancel the request that the charger is assigned to."""
+
+    request_id: str
+
+    own: ClassVar[AnyTopic] = topics.CHARGER_CANCELS
+
+    def message(self, seen: Seen) -> d.ChargerCancel:
+        """The cancel of this request id."""
+        return d.ChargerCancel(self.name, self.request_id)
+
+    def outcome(self, seen: Seen) -> Done | Failed | None:
+        """Done when the charger is released or shows another id; Failed if it never showed this one."""
+        answer = seen.answer(d.ChargerState)
+        if answer is None or self._holds(answer):
+            return None
+        if any(map(self._holds, seen.states_of(d.ChargerState))):
+            return Done(f"{self.name} no longer serves request {self.request_id}")
+        state = words.described(answer)
+        return Failed(f"{self.name} does not serve request '{self.request_id}' (state: {state})")
+
+    def _holds(self, state: d.ChargerState) -> bool:
+        released = (d.ChargerStateValue.CHARGER_IDLE, d.ChargerStateValue.CHARGER_RELEASED)
+        return state.request_id == self.request_id and state.state not in released
+
+    def obstacles(self, seen: Seen) -> Iterable[Obstacle]:
+        """The charger still serves the request."""
+        text = f"{self.name} still serves request {self.request_id}: its daemon's log says why"
+        return (Obstacle(True, text),)
+
+
+COORDINATOR: Final = "charger coordinator"
+
+
+@dataclass(frozen=True, slots=True)
+class QueuedCharge(Charge):
+    """Ask the coordinator for the charger of this `name`, or for any (ANY), for this robot."""
+
+    own = topics.ADAPTER_CHARGER_REQUESTS
+    listener = COORDINATOR
+
+    @property
+    def who(self) -> str:
+        """The robot as FLEET/ROBOT."""
+        return f"{self.fleet}/{self.robot}"
+
+    def about(self, state: words.Stated) -> bool:
+        """Whether a charger shows this robot."""
+        return isinstance(state, d.ChargerState) and (
+            (state.robot_fleet, state.robot_name) == (self.fleet, self.robot)
+        )
+
+    def ready(self, seen: Seen) -> bool:
+        """Whether any charger has been heard."""
+        return bool(seen.names(self.kind))
+
+    def outcome(self, seen: Seen) -> Done | Failed | None:
+        """Done when a charger serves the robot; Failed when the coordinator refuses the request."""
+        answer = seen.answer(d.ChargerState)
+        if answer is None or answer.state not in SERVING:
+            return self._refused(seen)
+        state = words.plain(d.ChargerStateValue, answer.state)
+        return Done(f"{answer.charger_name} is {state} for {self.who}")
+
+    def unheard(self, seen: Seen) -> Obstacle:
+        """No charger shows the robot yet: it probably waits in the queue."""
+        if not seen.names(self.kind):
+            return super(QueuedCharge, self).unheard(seen)
+        cancel = ("send", "charger", ANY, "--queue", "--cancel", self.request_id)
+        return Obstacle(
+            True,
+            f"no charger serves {self.who} yet: it waits in the {COORDINATOR}'s queue"
+            f" (see `{self.line.other('watch')}`), or the request was refused (see the"
+            " coordinator's log)",
+            f"to withdraw the request: {self.line.other(*cancel)}",
+        )
+
+    def obstacles(self, seen: Seen) -> Iterable[Obstacle]:
+        """The charger's error, or no charger assigned."""
+        text = f"the {COORDINATOR} has not assigned {self.who} a charger: its log says why"
+        return _error(seen.states_of(d.ChargerState)[-1]), Obstacle(True, text)
+
+
+@dataclass(frozen=True, slots=True)
+class QueuedCancel(ChargeCancel):
+    """Withdraw a queued request; no state shows whether there was one."""
+
+    own = topics.ADAPTER_CHARGER_CANCELS
+    listener = COORDINATOR
+
+    def message(self, seen: Seen) -> d.ChargerCancel:
+        """The cancel of this request id, for any charger."""
+        return d.ChargerCancel("", self.request_id)
+
+    def about(self, state: words.Stated) -> bool:
+        """No state shows a queued request."""
+        return False
+
+    def ready(self, seen: Seen) -> bool:
+        """Whether any charger has been heard."""
+        return bool(seen.names(self.kind))
+
+    def outcome(self, seen: Seen) -> Done | None:
+        """Done once the cancel has been sent."""
+        if seen.first_sent_at is None:
+            return None
+        return Done(f"the {COORDINATOR} was told that request {self.request_id} is withdrawn")
+
+    def unheard(self, seen: Seen) -> Obstacle:
+        """The cancel was never sent."""
+        return Obstacle(True, f"the cancel was not sent: no {COORDINATOR} listens")

@@ -1,0 +1,74 @@
+"""Holding a door open and releasing it, as DoorOpen.cpp and DoorClose.cpp do."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from bridges.messages import definitions as d
+from bridges.messages import topics
+from workbench.graph.requests import Done, Obstacle, Request, Seen
+
+
+@dataclass(frozen=True, slots=True)
+class DoorMove(Request):
+    """Open or close the door.
+
+    On the adapter topic it also waits for the supervisor's heartbeat, as a fleet adapter does: it must
+    list us while we hold the door, and no longer after we have released it.
+    """
+
+    opened: bool
+    requester: str
+
+    kind = "door"
+    states, own = topics.DOOR_STATES, topics.DOOR_REQUESTS
+    adapter = topics.ADAPTER_DOOR_REQUESTS
+    answers = (topics.DOOR_SUPERVISOR_HEARTBEAT,)
+
+    @property
+    def mode(self) -> d.DoorModeValue:
+        """The requested mode."""
+        return d.DoorModeValue.MODE_OPEN if self.opened else d.DoorModeValue.MODE_CLOSED
+
+    def message(self, seen: Seen) -> d.DoorRequest:
+        """The request for that mode."""
+        return d.DoorRequest(
+            requester_id=self.requester,
+            door_name=self.name,
+            requested_mode=d.DoorMode(int(self.mode)),
+        )
+
+    def outcome(self, seen: Seen) -> Done | None:
+        """Done when the door has the mode and, on the adapter topic, the heartbeat agrees."""
+        answer = seen.answer(d.DoorState)
+        if answer is None or answer.current_mode.value != self.mode:
+            return None
+        if not self.direct and not self._heartbeat_agrees(seen):
+            return None
+        return Done(f"{self.name} is {'open' if self.opened else 'closed'}")
+
+    def _heartbeat_agrees(self, seen: Seen) -> bool:
+        requesters = seen.requesters(self.name)
+        return requesters is not None and (self.requester in requesters) == self.opened
+
+    def obstacles(self, seen: Seen) -> Iterable[Obstacle]:
+        """Judged by the mode of the door."""
+        mode, name = seen.states_of(d.DoorState)[-1].current_mode.value, self.name
+        others = ", ".join(r for r in seen.requesters(name) or [] if r != self.requester)
+        return (
+            Obstacle(
+                mode == d.DoorModeValue.MODE_OFFLINE,
+                f"the daemon cannot reach the controller of {name}",
+            ),
+            Obstacle(
+                mode == d.DoorModeValue.MODE_UNKNOWN,
+                f"the contacts of {name} contradict each other, or the door took too long",
+            ),
+            Obstacle(
+                mode == self.mode,
+                f"{name} is {'open' if self.opened else 'closed'}, but no heartbeat of a door"
+                " supervisor confirms it",
+            ),
+            Obstacle(self.opened, f"{name} did not open"),
+            Obstacle(bool(others), f"{name} is held open by {others}"),
+            Obstacle(True, f"{name} was released, but something keeps it open"),
+        )

@@ -1,0 +1,173 @@
+"""Requesting a lift, as RequestLift.cpp does, and ending a session, as EndLiftSession.cpp does."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Final
+
+from bridges.messages import definitions as d
+from bridges.messages import topics, words
+from bridges.messages.topics import AnyTopic
+from workbench.graph.requests import Done, Failed, Obstacle, Request, Seen, nearest
+
+OBEYS_WITHIN_S: Final = 5.0
+"""A supervisor that obeys ends a session within a few states."""
+SHUT_OUT: Final = (d.LiftMode.MODE_FIRE, d.LiftMode.MODE_OFFLINE, d.LiftMode.MODE_EMERGENCY)
+
+
+class _Lift(Request):
+    __slots__ = ()
+    kind = "lift"
+    states, own = topics.LIFT_STATES, topics.LIFT_REQUESTS
+    adapter = topics.ADAPTER_LIFT_REQUESTS
+
+    @property
+    def supervisor(self) -> AnyTopic | None:
+        """A lift's own daemon hears adapters too: only who speaks to it is a supervisor."""
+        return None if self.direct else self.own
+
+    @property
+    def _release(self) -> str:
+        return self.line.other("send", "lift", self.name, "--end")
+
+
+@dataclass(frozen=True, slots=True)
+class LiftRide(_Lift):
+    """Ask for a session, and for the car at this floor with its door open, as a fleet adapter does."""
+
+    floor: str
+    session: str
+    granted_only: bool = False
+
+    def message(self, seen: Seen) -> d.LiftRequest:
+        """Always AGV_MODE with DOOR_OPEN: fleets send nothing else."""
+        return d.LiftRequest(
+            lift_name=self.name,
+            session_id=self.session,
+            request_type=d.LiftRequestType.REQUEST_AGV_MODE,
+            destination_floor=self.floor,
+            door_state=d.LiftRequestDoor.DOOR_OPEN,
+        )
+
+    def outcome(self, seen: Seen) -> Done | Failed | None:
+        """Done when RequestLift's four fields match; an unserved floor fails at once."""
+        states = seen.states_of(d.LiftState)
+        served = states[-1].available_floors if states else ()
+        if served and self.floor not in served:
+            floors, near = ", ".join(served), nearest(self.floor, served)
+            return Failed(f"{self.name} serves {floors}, not '{self.floor}'{near}")
+        if not self._fulfilled(seen.answer(d.LiftState)):
+            return None
+        where = "" if self.granted_only else f" at {self.floor}, door open,"
+        return Done(f"{self.name} is{where} held by {self.session}; to end that: {self._release}")
+
+    def _remedy(self, seen: Seen) -> str:
+        if seen.boarded != "yes":
+            return f"to end that session: {self._release}"
+        release = self.line.other("release", self.name, "--car-empty")
+        return f"a robot may be in the car; if it is empty: {release}"
+
+    def _fulfilled(self, state: d.LiftState | None) -> bool:
+        if state is None or state.session_id != self.session:
+            return False
+        arrived = (state.current_floor, state.door_state) == (self.floor, d.LiftDoor.DOOR_OPEN)
+        return self.granted_only or arrived
+
+    def obstacles(self, seen: Seen) -> Iterable[Obstacle]:
+        """The session, the mode, or the floor or door that the car has not reached."""
+        state = seen.states_of(d.LiftState)[-1]
+        name, session, mode = self.name, state.session_id, state.current_mode
+        word = words.word(d.LiftMode, mode)
+        return (
+            Obstacle(
+                session not in ("", self.session),
+                f"{name} is held by {session}",
+                self._remedy(seen),
+            ),
+            Obstacle(mode in SHUT_OUT, f"{name} serves no robot while its mode is {word}"),
+            Obstacle(not session, f"{name} did not grant the session: its daemon's log says why"),
+            Obstacle(
+                mode != d.LiftMode.MODE_AGV,
+                f"{name} granted the session, but its mode is {word}, not AGV"
+                " (a key switch, or still in use)",
+            ),
+            Obstacle(
+                state.current_floor != self.floor,
+                f"{name} granted the session, but the car has not come to {self.floor}",
+            ),
+            Obstacle(True, f"the car is at {self.floor}, but its door is not seen open"),
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class LiftEnd(_Lift):
+    """End `session`; if it is "", that of the first LiftState heard.
+
+    `falls_back`: if the supervisor does not obey within OBEYS_WITHIN_S, the lift's own daemon is asked;
+    where a robot may be inside, only if the operator says that the car is empty (`car_empty`).
+    """
+
+    session: str = ""
+    falls_back: bool = False
+    car_empty: bool = False
+
+    def _ending(self, seen: Seen) -> str:
+        first = (state.session_id for state in seen.states_of(d.LiftState))
+        return self.session or next(first, "")
+
+    def message(self, seen: Seen) -> d.LiftRequest | None:
+        """END_SESSION without a floor, as fleets send it; DOOR_OPEN tells our lifts that a person ends
+        it, who counts for more than a robot that goes on asking."""
+        session = self._ending(seen)
+        if not session:
+            return None
+        return d.LiftRequest(
+            lift_name=self.name,
+            session_id=session,
+            request_type=d.LiftRequestType.REQUEST_END_SESSION,
+            door_state=d.LiftRequestDoor.DOOR_OPEN,
+        )
+
+    def outcome(self, seen: Seen) -> Done | None:
+        """Done when the state shows another session, or none."""
+        session = self._ending(seen)
+        if seen.states and not session:
+            return Done(f"{self.name} has no session: nothing to end")
+        answer = seen.answer(d.LiftState)
+        if answer is None or answer.session_id == session:
+            return None
+        if any(state.session_id == session for state in seen.states_of(d.LiftState)):
+            return Done(f"{self.name} is no longer held by {session}")
+        holder = answer.session_id
+        instead = f"; {holder} has it" if holder else ""
+        return Done(f"{self.name} is not held by {session}: nothing to end{instead}")
+
+    def goes_direct(self, seen: Seen, now: float) -> bool:
+        """The supervisor, if there is one, has had its time, and nobody is in the car."""
+        asked_at = seen.began_at if seen.first_sent_at is None else seen.first_sent_at
+        late = now >= asked_at + OBEYS_WITHIN_S
+        return self.falls_back and not self.direct and late and self._outside(seen)
+
+    def nobody(self, seen: Seen) -> Obstacle:
+        """Without a supervisor too, a robot may be in the car."""
+        found = super(LiftEnd, self).nobody(seen)
+        if self.direct or not self.falls_back or not seen.states:
+            return found
+        if self._outside(seen):
+            return found._replace(remedy="the lift's own daemon is asked instead")
+        return found._replace(remedy=f"if the car is empty: {self.line.again_with('--car-empty')}")
+
+    def _outside(self, seen: Seen) -> bool:
+        return self.car_empty or seen.boarded == "no"
+
+    def obstacles(self, seen: Seen) -> Iterable[Obstacle]:
+        """The session is still shown."""
+        if self.falls_back and not self._outside(seen):
+            text = f"{self.name} still shows the session, and its robot may be in the car: look into it"
+            there = self.line.again_with("--car-empty")
+            return (Obstacle(True, text, f"if the car is empty: {there}"),)
+        if self.direct or self.falls_back:
+            text = f"{self.name} still shows the session: its daemon's log says why"
+            return (Obstacle(True, text),)
+        text = f"{self.name} still shows the session: the supervisor may have dropped the request"
+        there = self.line.again_with("--direct")
+        return (Obstacle(True, text, f"to ask the lift's own daemon: {there}"),)

@@ -1,0 +1,226 @@
+"""The laws of a charger's node. No part of RMF sends ChargerRequest: these rest on the messages' own
+texts and on what robots and coordinators need."""
+
+from typing import Final
+
+from bridges.messages import definitions as d
+from bridges.messages import words
+from bridges.messages.stamps import in_seconds
+from workbench.judge.charger_scene import (
+    ASSIGNED,
+    CHARGING,
+    ERROR,
+    IDLE,
+    RELEASED,
+    ChargerScene,
+    unrequested,
+)
+from workbench.judge.law import KEPT, Doubt, Finding, Law, shown
+from workbench.judge.scene import NOT_YET
+from workbench.judge.shared_laws import ANSWERED, ONE, RATE, STAMP, fresh, named, stamped
+
+LATE_S: Final = 10.0
+CANCELLED_WITHIN_S: Final = 5.0
+RAMPS_DOWN_S: Final = 120.0
+FOREIGN_S: Final = 2.0
+UNREACHED_S: Final = 15.0
+
+
+def _numbers(scene: ChargerScene) -> Finding:
+    if scene.new is None:
+        return None
+    known = scene.new.state in list(d.ChargerStateValue)
+    return KEPT if known else f"state {scene.new.state}: RMF has no such number"
+
+
+def _known(scene: ChargerScene) -> d.ChargerState | None:
+    """The state, if it is one of RMF's."""
+    state = scene.new
+    return state if state is not None and state.state in list(d.ChargerStateValue) else None
+
+
+def _has_id(scene: ChargerScene) -> Finding:
+    state = _known(scene)
+    if state is None or state.state == IDLE:
+        return None
+    return KEPT if state.request_id else f"no request_id: {words.described(state)}"
+
+
+def _has_text(scene: ChargerScene) -> Finding:
+    state = _known(scene)
+    if state is None:
+        return None
+    if (state.state == ERROR) == bool(state.error_message):
+        return KEPT
+    if state.state == ERROR:
+        return "ERROR, and error_message is blank"
+    word = words.word(d.ChargerStateValue, state.state)
+    return f"{word}, and error_message is {shown(state.error_message)}"
+
+
+def _same_robot(scene: ChargerScene) -> Finding:
+    state = _known(scene)
+    asked = scene.requests.get(state.request_id) if state else None
+    if state is None or asked is None or state.state == IDLE:
+        return None
+    wanted = asked.fleet_name, asked.robot_name
+    if _robot(state) == wanted:
+        return KEPT
+    whose = f"request {shown(asked.request_id)} is for {shown('/'.join(wanted))}"
+    return f"{whose}: {words.described(state)}"
+
+
+def _keeps(scene: ChargerScene) -> Finding:
+    """One charge belongs to one request. What nobody requested becomes its own robot's charge when that
+    robot's request comes, and a node that has started again may know of no request."""
+    state, before = scene.new, scene.before
+    if state is None or before is None or (before.state, state.state) != (CHARGING, CHARGING):
+        return None
+    same = state.request_id == before.request_id or unrequested(state.request_id)
+    if same or not before.request_id:
+        return KEPT
+    if unrequested(before.request_id) and before.robot_name and _robot(before) == _robot(state):
+        return KEPT
+    return f"charged for {_whose(before)}, and now calls it {_whose(state)}"
+
+
+def _robot(state: d.ChargerState) -> tuple[str, str]:
+    return state.robot_fleet, state.robot_name
+
+
+def _whose(state: d.ChargerState) -> str:
+    return f"{shown(state.request_id)} of {shown('/'.join(_robot(state)))}"
+
+
+def _starts_in_time(scene: ChargerScene) -> Finding:
+    state = scene.new
+    asked = scene.requests.get(state.request_id) if state else None
+    if state is None or asked is None or state.state != ASSIGNED:
+        return None
+    limit_s, kept_s = in_seconds(asked.start_timeout), scene.now - scene.same_since
+    if limit_s <= 0.0:
+        return None
+    if kept_s <= limit_s + LATE_S:
+        return KEPT
+    who = shown(state.robot_name)
+    return f"assigned to {who} for {kept_s:.0f} s; its start_timeout is {limit_s:.0f} s"
+
+
+def _cancels(scene: ChargerScene) -> Finding:
+    state = scene.new
+    if state is None:
+        return None
+    at = scene.cancels.get(state.request_id, NOT_YET)
+    if at == NOT_YET:
+        return None
+    limit_s = {ASSIGNED: CANCELLED_WITHIN_S, CHARGING: RAMPS_DOWN_S}.get(
+        d.ChargerStateValue(state.state) if state.state in list(d.ChargerStateValue) else IDLE
+    )
+    if limit_s is None or scene.now - at <= limit_s:
+        return KEPT
+    return f"{words.described(state)} {scene.now - at:.0f} s after its ChargerCancel"
+
+
+def _foreign_cancel(scene: ChargerScene) -> Finding:
+    state, before = scene.new, scene.before
+    if state is None or before is None or before.state != ASSIGNED or not before.request_id:
+        return None
+    if unrequested(before.request_id):
+        return None  # it ends when its robot leaves, which nobody announces
+    if scene.now - scene.foreign_at > FOREIGN_S:
+        return None
+    if state.state not in (IDLE, RELEASED) or before.request_id in scene.cancels:
+        return KEPT
+    mine = before.request_id
+    text = f"the ChargerCancel of another request ended {shown(mine)}"
+    return Doubt(text, lambda: mine in scene.cancels)
+
+
+def _claims(state: d.ChargerState) -> bool:
+    return state.state != ERROR
+
+
+CHARGER_STATE: Final = "ChargerState.msg"
+
+LAWS: Final[tuple[Law[ChargerScene], ...]] = (
+    named(
+        RATE,
+        "C4.rate",
+        reason="A coordinator sends robots by the latest states; it cannot use a silent station",
+        source="ChargerState.msg, charger_time",
+    ),
+    named(
+        ANSWERED,
+        "C4.answer",
+        reason="A node that repeats its request until a state answers would never stop",
+        source="as for lifts: rmf_ros2 agv/RobotContext.cpp:1732-1735",
+    ),
+    named(ONE, "B0.one"),
+    named(STAMP, "C4.stamp", check=stamped(lambda state: state.state == ERROR)),
+    Law(
+        "C1.numbers",
+        "state is a number of ChargerState.msg: 1, 2, 3, 4 or 200",
+        "A vendor's codes mean something else there: an Xnergy's 3, a handshake, reads as CHARGING",
+        CHARGER_STATE,
+        _numbers,
+    ),
+    Law(
+        "C5.id",
+        "request_id is set in every state but IDLE",
+        "It says who has the station",
+        CHARGER_STATE,
+        _has_id,
+    ),
+    Law(
+        "C5.robot",
+        "robot_fleet and robot_name are those of the request",
+        "Two robots would believe that the station is theirs",
+        CHARGER_STATE,
+        _same_robot,
+    ),
+    Law(
+        "C5.text",
+        "error_message says what is wrong in ERROR, and is blank otherwise",
+        "It is all that a technician reads",
+        CHARGER_STATE,
+        _has_text,
+    ),
+    Law(
+        "C1.keeps",
+        "A charge keeps its request_id until it ends; one that nobody requested (`unrequested/…`) may"
+        " get that of the robot that it shows",
+        "The next robot's request must not take a charge over while the first robot stands there",
+        "ChargerRequest.msg, request_id",
+        _keeps,
+    ),
+    Law(
+        "C2.start",
+        "ASSIGNED ends when start_timeout is over",
+        "A robot that never comes would keep the station for ever",
+        "ChargerRequest.msg, start_timeout",
+        _starts_in_time,
+    ),
+    Law(
+        "C3.cancel",
+        "A ChargerCancel ends its request: at once if ASSIGNED, after the ramp-down if CHARGING",
+        "The station is promised to the next robot",
+        "ChargerCancel.msg",
+        _cancels,
+        sensed=True,
+    ),
+    Law(
+        "C3.foreign",
+        "A ChargerCancel of another request changes nothing",
+        "It comes late, or is meant for a request that is over",
+        "ChargerCancel.msg",
+        _foreign_cancel,
+    ),
+    Law(
+        "C4.fresh",
+        "A station that cannot be reached is shown as ERROR; in other states charger_time advances",
+        "A remembered IDLE sends a robot to a station that may be on fire",
+        "ChargerState.msg, charger_time",
+        fresh(_claims, UNREACHED_S),
+        sensed=True,
+    ),
+)

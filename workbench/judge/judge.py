@@ -1,0 +1,132 @@
+"""Checks one device's messages against the laws of its kind."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import Any, Final, Literal
+
+from bridges.messages.heard import Heard
+from workbench.judge import charger_laws, door_laws, lift_laws
+from workbench.judge.charger_scene import ChargerScene
+from workbench.judge.door_scene import DoorScene
+from workbench.judge.law import Doubt, Evidence, Judged, Law, Verdict
+from workbench.judge.lift_scene import LiftScene
+from workbench.judge.scene import Scene
+
+Kind = Literal["lift", "door", "charger"]
+KINDS: Final[tuple[Kind, ...]] = ("lift", "door", "charger")
+LAWS: Final[Mapping[Kind, tuple[Law[Any], ...]]] = MappingProxyType(
+    {"lift": lift_laws.LAWS, "door": door_laws.LAWS, "charger": charger_laws.LAWS}
+)
+SCENES: Final[Mapping[Kind, type[Scene[Any]]]] = MappingProxyType(
+    {"lift": LiftScene, "door": DoorScene, "charger": ChargerScene}
+)
+LEEWAY_S: Final = 1.0
+"""How far apart in time (s) two topics may be heard."""
+SHOWN: Final = 3
+"""The most pieces of evidence stored for one law."""
+
+
+@dataclass
+class _Tally:
+    """The score of one law. `doubt`: what may still be excused, and the evidence that it would be."""
+
+    law: Law[Any]
+    kept: int = 0
+    broken: int = 0
+    evidence: list[Evidence] = field(default_factory=list)
+    doubt: tuple[Doubt, Evidence] | None = None
+
+    def found(self, heard: Evidence) -> None:
+        """Count a breach."""
+        self.broken += 1
+        if len(self.evidence) < SHOWN:
+            self.evidence.append(heard)
+
+    def judged(self) -> Judged:
+        """The law with its verdict."""
+        if self.broken:
+            return Judged(self.law, Verdict.BROKEN, self.broken, tuple(self.evidence))
+        return Judged(self.law, Verdict.KEPT if self.kept else Verdict.NOT_SEEN, self.kept)
+
+
+class Judge:
+    """Judges one device, by RMF's name for it, in bounded memory.
+
+    `only`: the ids of the laws to judge by; all of the kind without it. `broken`: any of them is.
+    """
+
+    def __init__(self, kind: Kind, name: str, only: Iterable[str] | None = None) -> None:
+        ids = {law.id for law in LAWS[kind]} if only is None else set(only)
+        self.kind: Kind = kind
+        self.name = name
+        self.scene = SCENES[kind](name)
+        self.first: Heard | None = None
+        self.broken = False
+        self._volatile_before: bool | None = None
+        self._tallies = [_Tally(law) for law in LAWS[kind] if law.id in ids]
+
+    def hear(self, heard: Heard) -> None:
+        """Take the next message, of any device, in order of arrival."""
+        self.first = self.first or heard
+        if self.scene.take(heard):
+            for tally in self._tallies:
+                self._check(tally, heard.at, heard.wall)
+        self._resolve(heard.at)
+
+    def fire_ends(
+        self, publishers: int, retaining: int, supervisors: int, at: float, wall: float
+    ) -> None:
+        """How many publishers the fire topic has, how many of them retain, and how many supervisors
+        there are; only if one lift is on the graph, because the topic does not say whose alarm it is.
+        Jazzy's lift supervisor has a volatile publisher, and never uses it (rmf_ros2 7eef65a,
+        lift_supervisor/Node.cpp:52). Only what is found twice counts, because ends are discovered
+        one by one."""
+        if isinstance(self.scene, LiftScene) and publishers and not self.scene.others:
+            volatile = publishers - retaining
+            found = None if 0 < volatile <= supervisors else volatile > 0
+            self.scene.volatile = found if found == self._volatile_before else None
+            self._volatile_before = found
+            for tally in self._tallies:
+                if tally.law.id == "L12.retained":
+                    self._check(tally, at, wall)
+
+    def end(self, at: float, wall: float) -> tuple[Judged, ...]:
+        """End the hearing. Returns each law with its verdict, in the laws' order."""
+        self.scene.pass_time(at)
+        if self.scene.states:
+            for tally in self._tallies:
+                self._check(tally, at, wall)
+        self._resolve(at)
+        return self.verdicts()
+
+    def verdicts(self) -> tuple[Judged, ...]:
+        """Each law with its verdict so far."""
+        return tuple(tally.judged() for tally in self._tallies)
+
+    def _breaks(self, tally: _Tally, evidence: Evidence) -> None:
+        self.broken = True
+        tally.found(evidence)
+
+    def _check(self, tally: _Tally, at: float, wall: float) -> None:
+        finding = tally.law.check(self.scene)
+        if finding is None:
+            return
+        if isinstance(finding, Doubt):
+            tally.doubt = tally.doubt or (finding, Evidence(at, wall, finding.text))
+        elif finding:
+            self._breaks(tally, Evidence(at, wall, finding))
+        else:
+            tally.kept += 1
+
+    def _resolve(self, now: float) -> None:
+        for tally in self._tallies:
+            if tally.doubt is None:
+                continue
+            doubt, evidence = tally.doubt
+            if doubt.excused():
+                tally.doubt = None
+                tally.kept += 1
+            elif now - evidence.at > LEEWAY_S:
+                tally.doubt = None
+                self._breaks(tally, evidence)

@@ -1,0 +1,169 @@
+"""RMF's nodes, played towards one device: fleet adapters with their robots, and their supervisor.
+
+By RMF's rules (`workbench/rmf_model/`), without I/O and clock. The played supervisor does not get the
+states of other devices, because it would end their sessions. If a supervisor is on the graph already,
+only fleet adapters are played, and their requests go through it.
+"""
+
+from collections import deque
+from collections.abc import Callable, Iterator
+from typing import Final
+
+from bridges.messages import definitions as d
+from bridges.messages import topics, words
+from workbench.rmf_model import NEVER, Party, Said
+from workbench.rmf_model.robot import Phase, Robot
+
+DEAF_S: Final = 6.0
+"""The played supervisor is silent for this long after an END without a floor. RMF's would send one with
+a floor at once, and so hide that the first was refused."""
+RETAINED: Final = topics.ADAPTER_LIFT_REQUESTS.publish.depth
+
+Step = Phase | float
+Script = Callable[[Robot], Iterator[Step]]
+"""What a robot does: phases, and seconds in which it drives."""
+
+
+class Traveller:
+    """A robot with its fleet adapter. `waits_since`: when its phase began; inf while it drives."""
+
+    def __init__(self, requester_id: str, script: Script) -> None:
+        self.robot = Robot(requester_id)
+        self.done = False
+        self.waits_since = NEVER
+        self._steps = script(self.robot)
+        self._drives_until = -NEVER
+
+    @property
+    def waits_for(self) -> str:
+        """What RMF waits for: the name of its phase."""
+        phase = self.robot.phase
+        return type(phase).__name__ if phase is not None and not phase.done else ""
+
+    def go_on(self, now: float) -> list[Said]:
+        """Begin the next step, if the last one is over."""
+        if self.done or not self.robot.done or now < self._drives_until:
+            return []
+        step = next(self._steps, None)
+        if step is None:
+            self.done, self.robot.on_task, self.robot.phase = True, False, None
+            self.waits_since = NEVER
+            return []
+        if isinstance(step, Phase):
+            self.waits_since = now
+            return self.robot.begin(step, now)
+        self._drives_until, self.waits_since = now + step, NEVER
+        return []
+
+    def wake_at(self) -> float:
+        """When its timer is due, or its drive is over."""
+        drives = self._drives_until if self.robot.done and not self.done else NEVER
+        return min(self.robot.wake_at(), drives)
+
+
+class Play:
+    """One performance for one device. `now` is RMF's clock (s since the epoch).
+
+    `supervisor`: makes a new one; None if one is on the graph. `over`: every step was done, or `failed`
+    says why not. Methods return the messages to be published and judged.
+    """
+
+    def __init__(
+        self,
+        device: str,
+        travellers: list[Traveller],
+        supervisor: Callable[[], Party] | None,
+        patience_s: float,
+    ) -> None:
+        self.device = device
+        self.travellers = travellers
+        self.failed = ""
+        self._makes = supervisor
+        self._supervisor = supervisor() if supervisor else None
+        self._patience_s = patience_s
+        self._retained: deque[d.Message] = deque(maxlen=RETAINED)
+        self._deaf_until = -NEVER
+
+    @property
+    def over(self) -> bool:
+        """There is nothing more to play."""
+        return bool(self.failed) or all(traveller.done for traveller in self.travellers)
+
+    @property
+    def names(self) -> set[str]:
+        """The sessions that are ours."""
+        return {traveller.robot.requester_id for traveller in self.travellers}
+
+    def begin(self, now: float) -> list[Said]:
+        """Start every robot."""
+        return self._go_on(now)
+
+    def hear(self, topic: str, message: d.Message, now: float) -> list[Said]:
+        """A message of the graph, ours not among them. `topic`: its name."""
+        if isinstance(message, words.Stated) and words.device(message) != self.device:
+            return []
+        said = self._spread(topic, message, now)
+        return said + self._go_on(now)
+
+    def tick(self, now: float) -> list[Said]:
+        """A timer is due."""
+        said = []
+        for traveller in self.travellers:
+            if now >= traveller.robot.wake_at():
+                said += self._say(traveller.robot.tick(now), now)
+            self._give_up(traveller, now)
+        return said + self._go_on(now)
+
+    def wake_at(self) -> float:
+        """When to call `tick` at the latest."""
+        waits = (t.waits_since + self._patience_s for t in self.travellers)
+        return min([*(t.wake_at() for t in self.travellers), *waits])
+
+    def restart_supervisor(self, now: float) -> list[Said]:
+        """The played supervisor dies, and a new one hears what fleet adapters have retained."""
+        if self._makes is None:
+            return []
+        self._supervisor = self._makes()
+        said = []
+        for message in list(self._retained):
+            said += self._say(self._supervisor.hear(message, now), now)
+        return said
+
+    def _go_on(self, now: float) -> list[Said]:
+        said = []
+        for traveller in self.travellers:
+            if not self.failed:
+                said += self._say(traveller.go_on(now), now)
+        return said
+
+    def _give_up(self, traveller: Traveller, now: float) -> None:
+        if now - traveller.waits_since < self._patience_s or self.failed:
+            return
+        who = traveller.robot.requester_id
+        self.failed = f"{traveller.waits_for} of {who} has not ended in {self._patience_s:.0f} s"
+
+    def _say(self, said: list[Said], now: float) -> list[Said]:
+        """These messages, with the answers of the other played nodes."""
+        out = []
+        for topic, message in said:
+            out.append((topic, message))
+            if topic == topics.ADAPTER_LIFT_REQUESTS:
+                self._retained.append(message)
+            out += self._spread(topic.name, message, now)
+        return out
+
+    def _spread(self, topic: str, message: d.Message, now: float) -> list[Said]:
+        said: list[Said] = []
+        for party in self._parties():
+            deaf = party is self._supervisor and now < self._deaf_until
+            deaf = deaf and isinstance(message, d.LiftState)
+            if topic in (heard.name for heard in party.subscribes) and not deaf:
+                said += self._say(party.hear(message, now), now)
+        bare = isinstance(message, d.LiftRequest) and not message.destination_floor
+        if bare and topic == topics.LIFT_REQUESTS.name:
+            self._deaf_until = now + DEAF_S
+        return said
+
+    def _parties(self) -> list[Party]:
+        robots: list[Party] = [traveller.robot for traveller in self.travellers]
+        return [*robots, self._supervisor] if self._supervisor is not None else robots

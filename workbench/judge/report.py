@@ -1,0 +1,181 @@
+"""The verdict as a person, a program and a CI server read it."""
+
+from dataclasses import dataclass
+from datetime import datetime
+from typing import Final
+from xml.etree import ElementTree
+
+import msgspec
+
+from bridges.messages import words
+from workbench.judge.judge import LAWS, Judge, Kind
+from workbench.judge.law import Evidence, Judged, Verdict, shown
+
+ORDER: Final = (Verdict.BROKEN, Verdict.KEPT, Verdict.NOT_SEEN)
+OTHERS: Final = 5
+NARROWEST: Final = 60
+
+
+@dataclass(frozen=True, slots=True)
+class Report:
+    """One judgement. `wall`: when it began (s since the epoch). `heard_s`: how long we listened.
+    `states`: how many the device sent. `others`: other devices of its kind. `notes`: remarks of the
+    listener."""
+
+    kind: Kind
+    name: str
+    wall: float
+    heard_s: float
+    states: int
+    others: tuple[str, ...]
+    judged: tuple[Judged, ...]
+    notes: tuple[str, ...] = ()
+
+    def of(self, verdict: Verdict) -> list[Judged]:
+        """The laws with this verdict."""
+        return [judged for judged in self.judged if judged.verdict is verdict]
+
+
+def report(judge: Judge, judged: tuple[Judged, ...], heard_s: float, *notes: str) -> Report:
+    """What a judge has found."""
+    wall, scene = judge.first.wall if judge.first else 0.0, judge.scene
+    others = tuple(sorted(scene.others))
+    return Report(judge.kind, judge.name, wall, heard_s, scene.states, others, judged, notes)
+
+
+def text(report: Report, width: int) -> str:
+    """One screen: broken laws first, with their evidence; a line for each other one."""
+    name = words.printable(report.name)
+    if not report.states:
+        lines = [f"{report.kind} {name}: no state heard in {report.heard_s:.0f} s{_others(report)}"]
+        return "\n".join([*lines, *report.notes])
+    counts = ", ".join(f"{len(report.of(verdict))} {verdict}" for verdict in ORDER)
+    head = f"{report.kind} {name}: {counts}; {report.states} states in {report.heard_s:.0f} s"
+    lines = [head, ""]
+    for verdict in ORDER:
+        for judged in report.of(verdict):
+            lines += _lines(judged, max(width, NARROWEST))
+    return "\n".join([*lines, *(f"\n{note}" for note in report.notes)])
+
+
+def _lines(judged: Judged, width: int) -> list[str]:
+    law, verdict = judged.law, judged.verdict
+    line = f"{verdict.upper() if verdict is Verdict.BROKEN else verdict:8}  {law.id:14}  "
+    if verdict is not Verdict.BROKEN:
+        return [line + _cut(law.sentence, width - len(line))]
+    told = [f"            {_time(e.wall)}  {e.text}" for e in judged.evidence]
+    more = judged.times - len(judged.evidence)
+    told += [f"            and {more} times more"] if more else []
+    return [line + law.sentence, *told, f"            why: {law.reason} ({law.source})"]
+
+
+def _cut(sentence: str, room: int) -> str:
+    return sentence if len(sentence) <= room else sentence[: room - 1] + "…"
+
+
+def _time(wall: float) -> str:
+    """The local time of day, to the millisecond; the number where no calendar has it."""
+    try:
+        return f"{datetime.fromtimestamp(wall):%H:%M:%S}.{int(wall * 1000) % 1000:03d}"
+    except (OverflowError, ValueError, OSError):
+        return f"{wall:.3f}"
+
+
+def _others(report: Report) -> str:
+    if not report.others:
+        return (
+            ": check the name, the domain and the network. States that are published BEST_EFFORT are"
+            " not heard, nor does RMF on Cyclone DDS hear them"
+        )
+    some = ", ".join(shown(other) for other in report.others[:OTHERS])
+    more = len(report.others) - OTHERS
+    return f"; heard: {some}" + (f" and {more} more" if more > 0 else "")
+
+
+class LawJson(msgspec.Struct, frozen=True):
+    """A law as JSON has it."""
+
+    id: str
+    verdict: str
+    sentence: str
+    reason: str
+    source: str
+    times: int
+    evidence: tuple[Evidence, ...]
+
+
+class ReportJson(msgspec.Struct, frozen=True):
+    """A report as JSON has it."""
+
+    kind: str
+    name: str
+    verdict: str
+    wall: float
+    heard_s: float
+    states: int
+    notes: tuple[str, ...]
+    laws: tuple[LawJson, ...]
+
+
+def verdict(report: Report) -> Verdict:
+    """The verdict on all laws together."""
+    return next((v for v in ORDER if report.of(v)), Verdict.NOT_SEEN)
+
+
+def as_json(report: Report) -> str:
+    """One JSON object."""
+    laws = tuple(
+        LawJson(
+            *(j.law.id, j.verdict, j.law.sentence, j.law.reason, j.law.source),
+            times=j.times,
+            evidence=j.evidence,
+        )
+        for j in report.judged
+    )
+    told = ReportJson(
+        *(report.kind, report.name, verdict(report), report.wall, report.heard_s, report.states),
+        notes=report.notes,
+        laws=laws,
+    )
+    return msgspec.json.encode(told).decode()
+
+
+def junit(report: Report) -> str:
+    """JUnit's XML: each law a test case, a broken one a failure, one that was not seen skipped."""
+    suite = ElementTree.Element(
+        "testsuite",
+        name=words.printable(f"rmf-bridge judge {report.kind} {report.name}"),
+        tests=str(len(report.judged)),
+        failures=str(len(report.of(Verdict.BROKEN))),
+        skipped=str(len(report.of(Verdict.NOT_SEEN))),
+        time=f"{report.heard_s:.3f}",
+    )
+    for judged in report.judged:
+        _case(suite, report, judged)
+    ElementTree.indent(suite)
+    return f'<?xml version="1.0" encoding="utf-8"?>\n{ElementTree.tostring(suite, "unicode")}\n'
+
+
+def _case(suite: ElementTree.Element, report: Report, judged: Judged) -> None:
+    law = judged.law
+    case = ElementTree.SubElement(
+        suite,
+        "testcase",
+        classname=words.printable(f"{report.kind}.{report.name}"),
+        name=f"{law.id}: {law.sentence}",
+    )
+    if judged.verdict is Verdict.BROKEN:
+        told = [f"{_time(e.wall)} {e.text}" for e in judged.evidence]
+        failure = ElementTree.SubElement(case, "failure", message=told[0])
+        failure.text = "\n".join([*told, f"{law.reason} ({law.source})"])
+    elif judged.verdict is Verdict.NOT_SEEN:
+        ElementTree.SubElement(case, "skipped", message="not seen")
+
+
+def markdown(kind: Kind) -> str:
+    """A kind's laws as the table of docs/judge.md; * marks those that a wire can break too."""
+    rows = [
+        f"| `{law.id}`{'*' if law.sensed else ''} | {law.sentence} | {law.reason} | {law.source} |"
+        for law in LAWS[kind]
+    ]
+    return "\n".join(["| law | | why | source |", "|---|---|---|---|", *rows])

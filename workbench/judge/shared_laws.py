@@ -1,0 +1,111 @@
+"""Laws that lifts, doors and chargers share; each kind numbers them in its own contract."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any, Final
+
+from bridges.messages import words
+from workbench.judge.law import KEPT, Finding, Law
+from workbench.judge.scene import BURST, SILENT_S, Scene
+
+AnyScene = Scene[Any]
+
+STALE_S: Final = 5.0
+"""No site may call a reading of this age fresh."""
+BURST_WITHIN_S: Final = 1.0
+ANSWERS: Final = 5
+STEPS_BACK: Final = 4
+STEPS_WITHIN_S: Final = 30.0
+
+
+def rate(scene: AnyScene) -> Finding:
+    """States keep coming."""
+    if scene.news is None:
+        silent_s = scene.now - scene.heard_at
+        return f"silent since then, for {silent_s:.1f} s" if silent_s > SILENT_S else None
+    if scene.new is None or scene.states == 1:
+        return None
+    return KEPT if scene.gap_s <= SILENT_S else f"no state for {scene.gap_s:.1f} s before this one"
+
+
+def answers(scene: AnyScene) -> Finding:
+    """No state is caused by a request alone."""
+    if scene.new is None:
+        return None
+    if scene.burst_s < BURST_WITHIN_S:
+        return f"{BURST} unchanged states in {scene.burst_s:.2f} s"
+    if scene.answers >= ANSWERS:
+        return f"{ANSWERS} of 8 requests were each answered by an unchanged state"
+    return KEPT
+
+
+def one_node(scene: AnyScene) -> Finding:
+    """Stamps of one node go forwards; a clock steps back once, not again and again."""
+    if scene.new is None:
+        return None
+    again = len(scene.back) == STEPS_BACK and scene.now - scene.back[0] < STEPS_WITHIN_S
+    return f"stamps go back and forth: {STEPS_BACK} times in 30 s" if again else KEPT
+
+
+def stamped(blind: Callable[[Any], bool]) -> Callable[[AnyScene], Finding]:
+    """A state that claims something was read at some time. `blind(state)`: it claims nothing."""
+
+    def check(scene: AnyScene) -> Finding:
+        state = scene.new
+        if state is None:
+            return None
+        if words.stamped_at(state) > 0.0:
+            return KEPT
+        return None if blind(state) else f"stamp 0: {words.described(state)}"
+
+    return check
+
+
+def fresh(claims: Callable[[Any], bool], stale_s: float = STALE_S) -> Callable[[AnyScene], Finding]:
+    """A robot must not act on an old reading. `claims(state)`: a robot would act on it."""
+
+    def check(scene: AnyScene) -> Finding:
+        state = scene.new
+        if state is None or not claims(state) or words.stamped_at(state) == 0.0:
+            return None
+        if scene.frozen_s <= stale_s:
+            return KEPT
+        return f"{words.described(state)}, and its stamp has stood still for {scene.frozen_s:.1f} s"
+
+    return check
+
+
+RATE: Final[Law[AnyScene]] = Law(
+    "RATE",
+    "States keep coming, whether the hardware answers or not: never 5 s without one",
+    "A fleet adapter asks and releases once for each state: without states it waits for ever",
+    "rmf_ros2 agv/RobotContext.cpp:1700-1735",
+    rate,
+)
+ANSWERED: Final[Law[AnyScene]] = Law(
+    "ANSWER",
+    "No request causes a state: states come by timer and by change",
+    "RMF repeats its request at each state: a state for each request would loop for ever",
+    "rmf_ros2 agv/RobotContext.cpp:1732-1735, lift_supervisor/Node.cpp:58-140",
+    answers,
+    sensed=True,  # a noisy wire may change what is noted beside the state, ten times a second
+)
+ONE: Final[Law[AnyScene]] = Law(
+    "ONE",
+    "Only one node publishes under this name",
+    "RMF believes the latest state: with two nodes the device would jump between two states",
+    "follows from RequestLift.cpp and DoorOpen.cpp, which keep one state",
+    one_node,
+)
+STAMP: Final[Law[AnyScene]] = Law(
+    "STAMP",
+    "A state that claims anything carries the time of its reading",
+    "Without it a reading cannot be told from a remembered value; 0 means: never read",
+    "LiftState.msg, DoorState.msg, ChargerState.msg: the time of the state",
+    stamped(lambda state: True),
+)
+
+
+def named(law: Law[AnyScene], id: str, **changes: Any) -> Law[Any]:
+    """A shared law under the number that it has in a kind's contract."""
+    return replace(law, id=id, **changes)

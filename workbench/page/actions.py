@@ -1,0 +1,182 @@
+"""What somebody who has logged in may do, and the command that does it.
+
+The page has no rights and no topics of its own: each action is a command of this program, run as the
+page's user, as it would be in this machine's shell. Each is logged with who asked for it. Names come
+from the network and may look like options: options have their value after `=`, names stand after `--`.
+"""
+
+import asyncio
+import json
+import logging
+import os
+import sys
+import time
+from collections import deque
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from bridges.host.log import pairs
+from bridges.messages import definitions as d
+from bridges.messages.words import printable
+from workbench.page.site import DeviceView
+
+log = logging.getLogger(__name__)
+
+TIMEOUT_S: Final = 30.0
+WAITS: Final = "--timeout=20"
+MOST_OUTPUT: Final = 16 * 1024
+MOST_KEPT: Final = 100
+LONGEST_FILE: Final = 1_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class Action:
+    """A button: its text, the question that confirms it, and the command's words."""
+
+    text: str
+    question: str
+    words: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Local:
+    """A daemon on this machine that serves the device: its YAML, and what a simulation can do.
+
+    `presses`, `fails`: the signals and parts of its plant; none if it is not a simulation.
+    """
+
+    file: str
+    presses: tuple[str, ...] = ()
+    fails: tuple[str, ...] = ()
+    runtime: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Done:
+    """One past action. `code`: the command's exit code; None if it took too long."""
+
+    wall: float
+    user: str
+    text: str
+    code: int | None
+    said: str
+
+    @property
+    def came(self) -> str:
+        """The outcome, in a few sentences."""
+        if self.code is None:
+            return f"no answer within {TIMEOUT_S:.0f} s: check what the device does"
+        return self.said.strip() or ("done" if self.code == 0 else f"exit code {self.code}")
+
+
+def actions(view: DeviceView, local: Local | None, graph: Sequence[str]) -> list[Action]:
+    """What can be done to this device. `graph`: the options that name the page's graph."""
+    found = [*_on_graph(view, graph)]
+    if local is not None:
+        words = ("reset", *_runtime(local), "--", local.file)
+        found.append(
+            Action("Reset faults", "May the latched faults clear, if their cause is gone?", words)
+        )
+    return found
+
+
+def _on_graph(view: DeviceView, graph: Sequence[str]) -> list[Action]:
+    match view.state:
+        case d.LiftState(lift_name=name, session_id=session) if session:
+            who = printable(session)
+            return [
+                Action(
+                    "Release the lift",
+                    f"End the session of {who}? A robot that is in the car may be left there.",
+                    ("release", f"--session={session}", WAITS, *graph, "--", name),
+                )
+            ]
+        case d.ChargerState(charger_name=name, request_id=request) if request:
+            return [
+                Action(
+                    "Cancel the charge",
+                    f"Cancel request {printable(request)}? The robot has to leave the pad.",
+                    ("send", "charger", f"--cancel={request}", WAITS, *graph, "--", name),
+                )
+            ]
+        case _:
+            return []
+
+
+def queue(name: str, robot: str, graph: Sequence[str]) -> Action:
+    """Ask the coordinator for a charge. `robot`: FLEET/ROBOT."""
+    words = ("send", "charger", "--queue", f"--robot={robot}", WAITS, *graph, "--", name)
+    return Action("Queue a charge", f"Ask for a charge of {printable(robot)}?", words)
+
+
+def press(local: Local, device: str, signal: str, on: bool) -> Action:
+    """In a simulation: somebody presses or lets go."""
+    how = "on" if on else "off"
+    words = ("press", f"--device={device}", *_runtime(local), "--", local.file, signal, how)
+    return Action(f"Press {signal}", f"{signal} {how}, in the simulation?", words)
+
+
+def fail(local: Local, device: str, part: str, how: str) -> Action:
+    """In a simulation: a part fails, or is mended (`ok`)."""
+    words = ("fail", f"--device={device}", *_runtime(local), "--", local.file, part, how)
+    return Action(f"Fail {part}", f"{part} {how}, in the simulation?", words)
+
+
+def _runtime(local: Local) -> tuple[str, ...]:
+    return (f"--runtime-dir={local.runtime}",) if local.runtime else ()
+
+
+class Deeds:
+    """Carries actions out, and remembers who did what."""
+
+    def __init__(self, folder: Path | None) -> None:
+        """`folder`: where `actions.jsonl` is written, if anywhere."""
+        self._file = folder / "actions.jsonl" if folder else None
+        self.latest: deque[Done] = deque(maxlen=MOST_KEPT)
+
+    async def do(self, action: Action, user: str) -> Done:
+        """Run the command. Never raises; `said` has what went wrong."""
+        code, said = await _run(action.words)
+        done = Done(time.time(), user, action.text, code, said)
+        self.latest.appendleft(done)
+        command = " ".join(("rmf-bridge", *action.words))
+        log.info(pairs("action", user=user, command=command, exit=code))
+        self._write(done, action.words)
+        return done
+
+    def _write(self, done: Done, words: Sequence[str]) -> None:
+        if self._file is None:
+            return
+        line = {"at": round(done.wall, 3), "user": done.user, "exit": done.code, "command": words}
+        with suppress(OSError):
+            if self._file.exists() and self._file.stat().st_size > LONGEST_FILE:
+                self._file.replace(self._file.with_suffix(".jsonl.1"))
+            with self._file.open("a", encoding="utf-8") as out:
+                out.write(json.dumps(line) + "\n")
+
+
+async def _run(words: Sequence[str]) -> tuple[int | None, str]:
+    """The exit code and the output's beginning; None if it was ended because it took too long."""
+    try:
+        child = await asyncio.create_subprocess_exec(
+            sys.executable,
+            "-P",
+            "-m",
+            "bridges.cli",
+            *words,
+            stdin=asyncio.subprocess.DEVNULL,
+            stdout=asyncio.subprocess.PIPE,
+            stderr=asyncio.subprocess.STDOUT,
+        )
+    except OSError as error:
+        return os.EX_OSERR, str(error)
+    try:
+        said, _ = await asyncio.wait_for(child.communicate(), TIMEOUT_S)
+    except TimeoutError:
+        child.terminate()
+        said, _ = await child.communicate()
+        return None, said[:MOST_OUTPUT].decode(errors="replace")
+    return child.returncode, said[:MOST_OUTPUT].decode(errors="replace")

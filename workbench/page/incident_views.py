@@ -1,0 +1,124 @@
+"""The views of recordings: the folder's list, and one recording explained and drawn."""
+
+import asyncio
+import time
+from collections.abc import Iterator
+from html import escape
+from pathlib import Path
+from urllib.parse import quote
+
+from fastapi import Request, Response
+from fastapi.responses import FileResponse
+from nicegui import Client, app, ui
+
+from bridges.messages.words import printable
+from workbench.explain.picture import svg
+from workbench.page import incidents
+from workbench.page.head import head, main, part
+from workbench.page.login import Login
+from workbench.page.why import explanation, story, timeline
+
+
+class IncidentViews:
+    """The recordings of one folder, or one `recording` alone."""
+
+    def __init__(self, folder: Path, recording: Path | None, login: Login) -> None:
+        self._folder = folder
+        self._recording = recording
+        self._login = login
+        self._one_at_a_time = asyncio.Lock()
+
+    def install(self) -> None:
+        """Put the views at their addresses."""
+        if self._recording is not None:
+            ui.page("/", title=self._recording.name)(self.alone)
+        ui.page("/incidents", title="Incidents")(self.all)
+        ui.page("/incidents/{name}", title="Incident")(self.one)
+        app.get("/incidents/{name}/file")(self.download)
+
+    def all(self, request: Request) -> None:
+        """The list."""
+        head("Incidents", self._login, request)
+        with main():
+            part(self._list())
+
+    async def one(self, name: str, request: Request, client: Client) -> None:
+        """A recording of the folder."""
+        head(name, self._login, request)
+        await self._view(self._path(name), client, _download(name))
+
+    async def alone(self, request: Request, client: Client) -> None:
+        """The recording that the page was started for."""
+        assert self._recording is not None
+        head(self._recording.name, self._login, request)
+        await self._view(self._recording, client)
+
+    def download(self, name: str) -> Response:
+        """The file itself."""
+        path = self._path(name)
+        if path is None:
+            return Response("there is no incident of that name", status_code=404)
+        return FileResponse(path, filename=name, media_type="application/octet-stream")
+
+    def _path(self, name: str) -> Path | None:
+        try:
+            return incidents.path_in(self._folder, name)
+        except OSError:
+            return None
+
+    def _list(self) -> str:
+        try:
+            items = "".join(map(_item, incidents.listed(self._folder)))
+        except OSError as error:
+            return (
+                f"<p>{escape(f'{self._folder}: {error.strerror}. No incident can be shown.')}</p>"
+            )
+        return f'<ul class="incidents">{items}</ul>' if items else "<p>There are no incidents.</p>"
+
+    async def _view(self, path: Path | None, client: Client, link: str = "") -> None:
+        """Show the view at once, and fill it when the recording has been read, which may take long."""
+        with main():
+            if path is None:
+                part("<p>There is no incident of that name.</p>")
+                return
+            box = part('<p role="status">The recording is being read …</p>')
+        await client.connected()
+        async with self._one_at_a_time:
+            if client.is_deleted:
+                return
+            try:
+                found = await incidents.read_apart(path)
+            except incidents.BagError as error:
+                box.set_content(f"<p>{escape(str(error))}</p>")
+                return
+        box.set_content(link + "".join(_told(found)))
+
+
+def _address(name: str) -> str:
+    return f"/incidents/{quote(name, safe='', errors='replace')}"
+
+
+def _item(one: incidents.File) -> str:
+    at = time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(one.wall))
+    link = f'<a href="{_address(one.name)}">{escape(one.name)}</a>'
+    if not one.name.isprintable():
+        link = (
+            f"<span>{escape(printable(one.name))}: a strange name; rename it to see it here</span>"
+        )
+    size = f"{one.size / 1024:.0f} KiB"
+    return f'<li class="panel"><span class="when">{at}</span>{link}<span>{size}</span></li>'
+
+
+def _download(name: str) -> str:
+    return f'<p><a href="{_address(name)}/file">Download the recording (MCAP)</a></p>'
+
+
+def _told(found: incidents.Recording) -> Iterator[str]:
+    yield "".join(f"<p>{escape(note)}</p>" for note in found.notes)
+    if not found.devices:
+        yield "<p>It has nothing about RMF's lifts, doors and chargers.</p>"
+    for told, drawing in found.devices:
+        yield f"<h2>{escape(f'{told.kind} {told.device}')}</h2>"
+        yield explanation(told)
+        yield f"<details><summary>What happened</summary>{story(told)}</details>"
+        yield timeline(svg(drawing))

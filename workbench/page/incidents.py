@@ -1,0 +1,152 @@
+"""The folder of recordings: what is in it, and one of them understood. No other folder is ever read.
+
+A recording may come from elsewhere and be hostile, so it is read in a process of its own
+(`python -m workbench.page.incidents FILE`) with limited memory and time.
+"""
+
+import asyncio
+import resource
+import sys
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import msgspec
+
+from bridges.messages.heard import Heard
+from bridges.runtime import faults
+from workbench.explain import site
+from workbench.explain.answer import Remedies
+from workbench.explain.explanation import Explanation
+from workbench.explain.lanes import Drawing
+from workbench.explain.timeline import Timeline
+from workbench.replay.bags import heard_in
+from workbench.replay.sources import BagError, Notes
+
+SUFFIX: Final = ".mcap"
+MOST_LISTED: Final = 500
+MOST_DEVICES: Final = 50
+"""The most devices shown of one recording; more are counted."""
+LONGEST_S: Final = 20.0
+"""A recording is read for this long (s) at most; the page says that the rest is left out."""
+
+ENDED_S: Final = 60.0
+"""Its process is ended after this long (s): the recording is full of messages that are not RMF's."""
+MOST_MEMORY: Final = 128 << 20
+"""The memory of its process (bytes), which shares the unit's 256 MB with the page."""
+
+
+@dataclass(frozen=True, slots=True)
+class File:
+    """A recording in the folder. `wall`: when it was written last (s since the epoch)."""
+
+    name: str
+    size: int
+    wall: float
+
+
+@dataclass(frozen=True, slots=True)
+class Recording:
+    """What a recording tells: each device's explanation and timeline, and what could not be read."""
+
+    devices: tuple[tuple[Explanation, Timeline], ...]
+    notes: tuple[str, ...]
+
+
+def listed(folder: Path) -> list[File]:
+    """The newest recordings first. Raises OSError."""
+    found = sorted(_files(folder), key=lambda one: one.wall, reverse=True)
+    return found[:MOST_LISTED]
+
+
+def _files(folder: Path) -> Iterator[File]:
+    for path in folder.iterdir():
+        if path.suffix == SUFFIX and path.is_file() and not path.is_symlink():
+            found = path.stat()
+            yield File(path.name, found.st_size, found.st_mtime)
+
+
+def path_in(folder: Path, name: str) -> Path | None:
+    """The recording of this name in the folder; None if there is none, whatever the name says."""
+    return next((folder / one.name for one in _files(folder) if one.name == name), None)
+
+
+async def read_apart(path: Path) -> Recording:
+    """`read`, in a process of its own. Raises BagError."""
+    child = await asyncio.create_subprocess_exec(
+        sys.executable,
+        "-P",
+        "-m",
+        __name__,
+        str(path.absolute()),
+        stdin=asyncio.subprocess.DEVNULL,
+        stdout=asyncio.subprocess.PIPE,
+    )
+    try:
+        told, _ = await asyncio.wait_for(child.communicate(), ENDED_S)
+    except TimeoutError:
+        raise BagError(f"{path} takes more than {ENDED_S:.0f} s to read") from None
+    finally:
+        if child.returncode is None:
+            child.kill()
+    if child.returncode:
+        raise BagError(told.decode() or f"{path} cannot be read")
+    return _RECORDING.decode(told)
+
+
+def main(path: Path) -> int:
+    """Read, and write the recording to standard output, or why it cannot be read."""
+    resource.setrlimit(resource.RLIMIT_DATA, (MOST_MEMORY, MOST_MEMORY))
+    try:
+        code, told = 0, msgspec.msgpack.encode(read(path, faults.for_explain()))
+    except BagError as error:
+        code, told = 1, str(error).encode()
+    except MemoryError:
+        code, told = 1, f"{path} takes too much memory to read".encode()
+    sys.stdout.buffer.write(told)
+    return code
+
+
+def read(path: Path, remedies: Remedies) -> Recording:
+    """The whole recording, in bounded time. Raises BagError if it is none."""
+    notes, story = Notes(), site.Site()
+    cut = not _all_of(path, notes, story.take)
+    devices = story.devices()
+    drawings = {key: Drawing(*key) for key in devices[:MOST_DEVICES]}
+
+    def draw(heard: Heard) -> None:
+        for drawing in drawings.values():
+            drawing.take(heard)
+
+    cut = not _all_of(path, Notes(), draw) or cut
+    told = [(story.explain(*key, None, remedies), one.timeline()) for key, one in drawings.items()]
+    return Recording(tuple(told), tuple(_notes(notes, len(devices), cut=cut)))
+
+
+def _all_of(path: Path, notes: Notes, take: Callable[[Heard], None]) -> bool:
+    """Whether the time was enough for all of it."""
+    until = time.monotonic() + LONGEST_S
+    for heard in heard_in(path, notes):
+        take(heard)
+        if time.monotonic() > until:
+            return False
+    return True
+
+
+def _notes(notes: Notes, devices: int, *, cut: bool) -> Iterator[str]:
+    if notes.damage:
+        yield f"The file is damaged: {notes.damage}"
+    if cut:
+        yield f"Only what could be read in {LONGEST_S:.0f} s is shown."
+    if (more := devices - MOST_DEVICES) > 0:
+        yield f"{more} more devices are not shown."
+
+
+_RECORDING: Final = msgspec.msgpack.Decoder(Recording)
+
+__all__ = ["BagError", "File", "Recording", "listed", "path_in", "read", "read_apart"]
+
+if __name__ == "__main__":
+    sys.exit(main(Path(sys.argv[1])))

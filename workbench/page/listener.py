@@ -1,0 +1,98 @@
+"""The page's place on the graph: it listens and never speaks; it joins again when the graph is lost."""
+
+import logging
+import threading
+import time
+from collections.abc import Callable
+from contextlib import closing
+from queue import Empty, Full, Queue
+from typing import Final
+
+from bridges.host.log import pairs
+from bridges.messages.definitions import Message
+from bridges.messages.heard import Heard, bounded
+from bridges.messages.topics import AnyTopic
+from bridges.transports.transport import Transport, TransportError
+from workbench.page.site import HEARD, Site
+
+log = logging.getLogger(__name__)
+
+WAITING: Final = 20_000
+"""The most messages that wait for the site. More come only in a flood: they are lost, and counted."""
+LONGEST_TURN_S: Final = 0.05
+"""A flood must not keep the browsers waiting."""
+AGAIN_S: Final = 3.0
+
+
+class Listener:
+    """Fills a site from the graph, on a thread of its own."""
+
+    def __init__(self, site: Site, join: Callable[[], Transport]) -> None:
+        self._site = site
+        self._join = join
+        self._queue: Queue[Heard] = Queue(WAITING)
+        self._ended = threading.Event()
+        self._thread = threading.Thread(target=self._listen, name="graph", daemon=True)
+        self.lost = 0
+        self.cut = 0
+        self.trouble = "has not joined RMF's graph yet"
+
+    def start(self) -> None:
+        """Join, in the background."""
+        self._thread.start()
+
+    def end(self) -> None:
+        """Leave the graph."""
+        self._ended.set()
+        self._thread.join(timeout=5.0)
+
+    def hear(self, heard: Heard) -> None:
+        """Keep a message until the next turn. Called from any thread."""
+        try:
+            self._queue.put_nowait(heard)
+        except Full:
+            self.lost += 1
+
+    def turn(self) -> bool:
+        """Take what has arrived, on the caller's thread. True if there was anything."""
+        any_heard = False
+        until = time.monotonic() + LONGEST_TURN_S
+        while time.monotonic() < until:
+            try:
+                heard = self._queue.get_nowait()
+            except Empty:
+                break
+            self._site.take(heard)
+            any_heard = True
+        return any_heard
+
+    def _listen(self) -> None:
+        while not self._ended.is_set():
+            try:
+                with closing(self._join()) as transport:
+                    for topic in HEARD:
+                        transport.subscribe(topic, self._receive(topic))
+                    self.trouble = ""
+                    self._stay(transport)
+            except TransportError as error:
+                if not self.trouble.endswith(str(error)):
+                    log.error(pairs("graph_lost", reason=error))
+                self.trouble = f"cannot join RMF's graph: {error}"
+                self._ended.wait(AGAIN_S)
+
+    def _stay(self, transport: Transport) -> None:
+        while not self._ended.wait(1.0):
+            if not transport.lives:
+                raise TransportError("the transport's thread has ended")
+            if found := transport.faults():
+                self.trouble = "; ".join(f"{code}: {detail}" for code, detail in found)
+            else:
+                self.trouble = ""
+
+    def _receive(self, topic: AnyTopic) -> Callable[[Message], None]:
+        def receive(message: Message) -> None:
+            kept = bounded(message)
+            self.cut += kept is not message
+            self.hear(Heard(time.monotonic(), time.time(), topic.name, kept))
+
+        return receive

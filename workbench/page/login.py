@@ -1,0 +1,128 @@
+"""Who asks for a page: by the cookie of a login, or by the header of a trusted proxy.
+
+A session's cookie is HttpOnly and SameSite=Strict, and Secure where the
+form came over TLS; a form carries a proof beside it. The header of a
+reverse proxy is believed only from the proxy's address.
+"""
+
+import asyncio
+import time
+from html import escape
+from pathlib import Path
+from typing import Final
+from urllib.parse import parse_qs, quote
+
+from fastapi import Request, Response
+from fastapi.requests import HTTPConnection
+from fastapi.responses import HTMLResponse, RedirectResponse
+
+from bridges.messages.words import printable
+from workbench.page.access import Door, Sessions
+
+COOKIE: Final = "rmf_bridge_page"
+STYLE: Final = (Path(__file__).parent / "style.css").read_text(encoding="utf-8")
+FORM: Final = """<!doctype html><html lang="en"><head><meta charset="utf-8">
+<title>Log in · RMF bridges</title>
+<meta name="viewport" content="width=device-width, initial-scale=1"><style>{style}</style></head><body>
+<main id="main"><form class="login panel" method="post" action="/login?next={next}"><h1>Log in</h1>
+<p class="alert" role="alert">{why}</p>
+<label for="user">User</label><input id="user" name="user" autocomplete="username" required autofocus>
+<label for="password">Password</label>
+<input id="password" name="password" type="password" autocomplete="current-password" required>
+<button>Log in</button></form></main></body></html>"""
+
+
+class Login:
+    """Knows who asks. Without a password file and a proxy nobody can log in, and nobody may act."""
+
+    def __init__(self, door: Door | None, *, proxy: str = "", header: str = "") -> None:
+        """`proxy`: the address whose `header` names the user."""
+        self._door = door
+        self._proxy = proxy
+        self._header = header
+        self._sessions = Sessions()
+        self._one_at_a_time = asyncio.Lock()
+
+    def user(self, request: HTTPConnection) -> str:
+        """Who asks; "" for somebody who has not logged in."""
+        if self._proxy and request.client and request.client.host == self._proxy:
+            return printable(request.headers.get(self._header, ""))[:64]
+        session = self._sessions.find(request.cookies.get(COOKIE), time.monotonic())
+        return session.user if session else ""
+
+    def form(self, request: Request, user: str) -> str:
+        """HTML for the head of a page: who is logged in, or the way to log in."""
+        session = self._sessions.find(request.cookies.get(COOKIE), time.monotonic())
+        if user and session:
+            return (
+                f'<form class="who" method="post" action="/logout">{escape(user)}'
+                f'<input type="hidden" name="proof" value="{escape(session.proof)}">'
+                "<button>Log out</button></form>"
+            )
+        if user:
+            return f'<p class="who">{escape(user)}</p>'
+        if self._door is None:
+            return ""
+        return f'<p class="who"><a href="/login?next={quote(request.url.path)}">Log in</a></p>'
+
+    def show(self, request: Request) -> HTMLResponse:
+        """The form in which somebody logs in."""
+        return self._page(request)
+
+    def _page(self, request: Request, why: str = "", status: int = 200) -> HTMLResponse:
+        if self._door is None:
+            why = "This page was started without a password file, so nobody can log in."
+        html = FORM.format(style=STYLE, why=escape(why), next=quote(_next(request)))
+        return HTMLResponse(html, status_code=status)
+
+    async def log_in(self, request: Request) -> Response:
+        """Check user and password."""
+        fields = await _fields(request)
+        user, password = fields.get("user", ""), fields.get("password", "")
+        address = request.client.host if request.client else ""
+        if self._door is None:
+            return self._page(request, status=403)
+        async with self._one_at_a_time:  # scrypt takes 16 MB and 50 ms
+            why = await asyncio.to_thread(
+                self._door.refuses, user, password, address, time.monotonic()
+            )
+        if why:
+            return self._page(request, why, status=403)
+        answer = RedirectResponse(_next(request), status_code=303)
+        self._sessions.end(request.cookies.get(COOKIE))
+        answer.set_cookie(
+            COOKIE,
+            self._sessions.begin(user, time.monotonic()),
+            httponly=True,
+            samesite="strict",
+            secure=request.headers.get("origin", "").startswith("https://"),
+        )
+        return answer
+
+    async def log_out(self, request: Request) -> Response:
+        """End the session, if the form is ours."""
+        secret = request.cookies.get(COOKIE)
+        session = self._sessions.find(secret, time.monotonic())
+        fields = await _fields(request)
+        if session is None or fields.get("proof") != session.proof:
+            return HTMLResponse("this form is too old", status_code=403)
+        self._sessions.end(secret)
+        answer = RedirectResponse("/", status_code=303)
+        answer.delete_cookie(COOKIE)
+        return answer
+
+
+async def _fields(request: Request) -> dict[str, str]:
+    """A form's fields; none of a form with too many."""
+    try:
+        found = parse_qs((await request.body()).decode(errors="replace"), max_num_fields=10)
+    except ValueError:
+        return {}
+    return {name: values[0] for name, values in found.items()}
+
+
+def _next(request: Request) -> str:
+    """Where to go afterwards: a path of this page alone."""
+    path = request.query_params.get("next", "/")
+    plain = path.startswith("/") and not path.startswith(("//", "/\\")) and path.isprintable()
+    return path if plain else "/"

@@ -1,0 +1,144 @@
+"""The page's application: which view is at which address, its head, and the process that serves it.
+
+NiceGUI is imported here and in the views alone. What a browser does reaches the graph only by a
+command (`actions.py`).
+"""
+
+import argparse
+import asyncio
+import ipaddress
+import logging
+import os
+import socket
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import Final
+
+from nicegui import app, ui
+
+from bridges.transports.transport import Transport
+from workbench.graph.join import interruptible
+from workbench.page import connections
+from workbench.page.access import Door
+from workbench.page.actions import Deeds
+from workbench.page.gallery import Gallery
+from workbench.page.gate import Gate
+from workbench.page.guard import Guard
+from workbench.page.here import Here
+from workbench.page.incident_views import IncidentViews
+from workbench.page.listener import Listener
+from workbench.page.login import STYLE, Login
+from workbench.page.site import Site
+from workbench.page.site_views import SiteViews
+
+log = logging.getLogger(__name__)
+
+PUMP_S: Final = 0.1
+HERE_S: Final = 1.0
+RECONNECT_S: Final = 30.0
+"""A browser that is away for longer loads its view again."""
+MOST_HISTORY: Final = 100
+"""How many missed updates a browser is sent when it is back; after more it loads its view again."""
+MOST_CONNECTIONS: Final = 200
+MOST_BYTES: Final = 64 * 1024
+"""The longest message from a browser; the library's own are a hundredth of it."""
+
+
+def serve(
+    args: argparse.Namespace,
+    opened: socket.socket,
+    known: Mapping[str, str],
+    join: Callable[[], Transport],
+    graph: Sequence[str],
+) -> None:
+    """Serve until a signal ends it. `opened`: listens at `args.listen`. `known`: users and their
+    hashes. `graph`: the options that name the page's graph, for its commands."""
+    address, _ = args.listen
+    shown = f"[{address}]" if ":" in address else address
+    netloc = f"{shown}:{opened.getsockname()[1]}"
+    login = Login(Door(known) if known else None, proxy=args.proxy or "", header=args.proxy_header)
+    ui.add_css(STYLE, shared=True)
+    # Quasar draws a progress bar that has no name over the page during each request of a script.
+    app.config.quasar_config["loadingBar"]["skipHijack"] = True
+    app.get("/login")(login.show)
+    app.post("/login")(login.log_in)
+    app.post("/logout")(login.log_out)
+    IncidentViews(args.incidents, args.recording, login).install()
+    listener = None
+    if args.recording is None:
+        listener = _live(args, join, login, graph)
+    gate = Gate(login, closed=not ipaddress.ip_address(address).is_loopback)
+    app.add_middleware(Guard, hosts=_hosts(address, netloc, args.host), gate=gate)
+    for name in ("engineio.server", "socketio.server"):
+        logging.getLogger(name).handlers.clear()  # strange frames would fill the log
+    app.on_startup(lambda: connections.watch())
+    app.on_startup(lambda: _say(f"the page is at http://{netloc}/ (Ctrl-C ends it)"))
+    try:
+        with interruptible(), suppress(KeyboardInterrupt):
+            ui.run(
+                reload=False,
+                show=False,
+                fd=opened.fileno(),
+                show_welcome_message=False,
+                proxy_headers=False,
+                server_header=False,
+                title="RMF bridges",
+                tailwind=False,
+                reconnect_timeout=RECONNECT_S,
+                message_history_length=MOST_HISTORY,
+                limit_concurrency=MOST_CONNECTIONS,
+                ws_max_size=MOST_BYTES,
+                log_config=None,  # its lines go the way of ours
+                language="en-GB",
+            )
+    finally:
+        if listener is not None:
+            listener.end()
+
+
+def _live(
+    args: argparse.Namespace,
+    join: Callable[[], Transport],
+    login: Login,
+    graph: Sequence[str],
+) -> Listener:
+    site = Site(graph)
+    listener = Listener(site, join)
+    gallery, here = Gallery(site, listener), Here(args.runtime_dirs)
+    state = os.environ.get("STATE_DIRECTORY")
+    deeds = Deeds(Path(state) if state else None)
+    SiteViews(site, gallery, here, login, deeds, graph).install()
+    app.on_startup(lambda: _pump(gallery))
+    app.on_startup(lambda: _look(here))
+    listener.start()
+    return listener
+
+
+async def _pump(gallery: Gallery) -> None:
+    while True:
+        await asyncio.sleep(PUMP_S)
+        try:
+            gallery.turn()
+        except Exception:  # the page goes on, whatever a message does to one card
+            log.exception("page")
+
+
+async def _look(here: Here) -> None:
+    """See which daemons are on this machine, off the pump's path."""
+    while True:
+        with suppress(OSError):
+            await asyncio.to_thread(here.look)
+        await asyncio.sleep(HERE_S)
+
+
+def _hosts(address: str, netloc: str, names: Sequence[str]) -> set[str]:
+    port = netloc.rpartition(":")[2]
+    loopback = ipaddress.ip_address(address).is_loopback
+    return {netloc, *names, *((f"localhost:{port}",) if loopback else ())}
+
+
+def _say(text: str) -> None:
+    sys.stdout.write(text + "\n")
+    sys.stdout.flush()

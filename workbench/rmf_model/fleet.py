@@ -1,0 +1,214 @@
+"""A fleet adapter and its robots, as far as charging goes.
+
+Read in rmf_ros2 9dedd0f (TaskManager.cpp, tasks/ChargeBattery.cpp, phases/WaitForCharge.cpp,
+FleetUpdateHandle.cpp) and seen with Jazzy's:
+1. ChargeBattery goes to the robot's dedicated waypoint and waits there for its battery. An assignment
+   whose waypoint or mode differs from the last one starts it again, and moves no robot without it. A
+   waypoint that the graph does not have is the end of the adapter.
+2. It is a task when RMF finds the battery too low for the way to the dedicated waypoint (the automatic
+   retreat; never while the robot stands there already, and Jazzy's never below the recharge threshold),
+   or when its planner wants it. That task ends at recharge_soc. As the fleet's `finishing_request:
+   charge` it is not a task, and lasts until the next task, however full the battery is. With
+   `nothing` a robot stays. With `park` it drives to a parking spot; Jazzy's (branch jazzy, 7eef65a)
+   knows no spots, and goes where ChargeBattery would, at each assignment too.
+3. A robot without a task shows the mode IDLE and no task id, also while it charges. WaitForCharge
+   alone sets CHARGING, and nothing sets it back: every later task shows it too.
+4. An EasyFullControl adapter that starts forgets the assignments: it takes the retained one, and a
+   moment later the charger of its file in its place.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final, Literal
+
+from bridges.messages import definitions as d
+from bridges.messages.topics import CHARGING_ASSIGNMENTS, FLEET_STATES, AnyTopic
+from workbench.rmf_model import Party, Said
+
+EVERY_S: Final = 1.0
+RECHARGE_PERCENT: Final = 100.0
+RETREAT_PERCENT: Final = 12.0
+TOO_LATE_PERCENT: Final = 10.0
+IDLE: Final = d.RobotModeValue.MODE_IDLE
+Graph = Mapping[str, tuple[str, float, float]]
+"""Waypoint -> level, x, y (m)."""
+Finishing = Literal["charge", "park", "nothing"]
+Doing = Literal["", "work", "charge", "idle charge", "idle park"]
+
+
+class AdapterCrashed(Exception):
+    """What RMF's fleet adapter does when it is sent to a waypoint that it does not know."""
+
+
+@dataclass
+class FleetRobot:
+    """`place`: the waypoint at which it stands; "" on the road. `goes_to`: where it drives.
+    `dedicated`, `waits`: its charging assignment. `doing`: its task, or what it does without one.
+    `task_id`: "" without a task. `mode`: the last that a phase has set. `stuck`: it cannot drive."""
+
+    name: str
+    place: str
+    dedicated: str
+    battery_percent: float = 100.0
+    waits: bool = False
+    doing: Doing = ""
+    task_id: str = ""
+    goes_to: str = ""
+    arrives_at: float = 0.0
+    came_from: str = ""
+    mode: d.RobotModeValue = d.RobotModeValue.MODE_IDLE
+    stuck: bool = False
+
+    @property
+    def charges(self) -> bool:
+        """Its ChargeBattery runs, as a task or without one."""
+        return self.doing in ("charge", "idle charge")
+
+
+class Fleet(Party):
+    """Publishes FleetState at 1 Hz and hears ChargingAssignments."""
+
+    subscribes: Sequence[AnyTopic] = (CHARGING_ASSIGNMENTS,)
+
+    def __init__(
+        self,
+        name: str,
+        graph: Graph,
+        robots: Mapping[str, str],
+        drive_s: float,
+        finishing: Finishing = "nothing",
+        jazzy: bool = False,
+    ) -> None:
+        """`robots`: each where it stands, which is a parking spot. `drive_s`: how long every way takes.
+        `finishing`: the fleet's `finishing_request`. `jazzy`: by Jazzy's rules where they differ."""
+        self.name = name
+        self.graph = graph
+        self.drive_s = drive_s
+        self.finishing = finishing
+        self.jazzy = jazzy
+        self.robots = {who: FleetRobot(who, place, place) for who, place in robots.items()}
+        self._spots = dict(robots)
+        self._tasks = 0
+        self._told_at = -EVERY_S
+        for robot in self.robots.values():
+            self._rest(robot, 0.0)
+
+    def charge(self, who: str, now: float, percent: float = 40.0) -> None:
+        """RMF's planner finds its battery low: ChargeBattery begins, as a task."""
+        self.robots[who].battery_percent = percent
+        self._begin(self.robots[who], "charge", now)
+
+    def works(self, who: str, place: str, now: float) -> None:
+        """Another task takes it away."""
+        self._begin(self.robots[who], "work", now, place)
+
+    def rests(self, who: str, now: float) -> None:
+        """Its task is over, and the fleet's finishing request begins."""
+        self._rest(self.robots[who], now)
+
+    def starts_again(self, now: float) -> None:
+        """The adapter was killed and is up again: each robot has the charger of its file."""
+        for robot in self.robots.values():
+            robot.dedicated, robot.waits, robot.mode = self._spots[robot.name], False, IDLE
+            self._rest(robot, now)
+
+    def strays(self, who: str, place: str, now: float) -> None:
+        """It drives there in the task that it has, whatever that wants."""
+        self._go(self.robots[who], place, now)
+
+    def hear(self, message: d.Message, now: float) -> list[Said]:
+        """Charging assignments."""
+        if isinstance(message, d.ChargingAssignments) and message.fleet_name == self.name:
+            for assignment in message.assignments:
+                if assignment.waypoint_name not in self.graph:
+                    raise AdapterCrashed(assignment.waypoint_name)
+                robot = self.robots.get(assignment.robot_name)
+                if robot is not None:
+                    waits = assignment.mode == d.ChargingMode.MODE_WAIT
+                    self._dedicate(robot, assignment.waypoint_name, waits, now)
+        return []
+
+    def tick(self, now: float) -> list[Said]:
+        """Robots drive on, low ones retreat, full ones end their task, the state goes out."""
+        for robot in self.robots.values():
+            self._move(robot, now)
+            self._retreat(robot, now)
+        if now < self._told_at + EVERY_S:
+            return []
+        self._told_at = now
+        states = tuple(self._state(robot, now) for robot in self.robots.values())
+        return [(FLEET_STATES, d.FleetState(self.name, states))]
+
+    def wake_at(self) -> float:
+        """The next state, or the next arrival."""
+        ways = [robot.arrives_at for robot in self.robots.values() if robot.goes_to]
+        return min([self._told_at + EVERY_S, *ways])
+
+    # ---- tasks
+
+    def _begin(self, robot: FleetRobot, doing: Doing, now: float, place: str = "") -> None:
+        named = "patrol.dispatch-" if doing == "work" else "Charge"
+        robot.doing, robot.task_id = doing, f"{named}{self._tasks}"
+        self._tasks += 1
+        self._go(robot, place or robot.dedicated, now)
+
+    def _rest(self, robot: FleetRobot, now: float) -> None:
+        robot.doing, robot.task_id = "", ""
+        if self.finishing == "charge":
+            robot.doing = "idle charge"
+            self._go(robot, robot.dedicated, now)
+        elif self.finishing == "park":
+            robot.doing = "idle park"
+            self._go(robot, robot.dedicated if self.jazzy else self._spots[robot.name], now)
+
+    def _retreat(self, robot: FleetRobot, now: float) -> None:
+        """consider_retreating_to_charger: not with a task, and not where it is dedicated to."""
+        low = robot.battery_percent < RETREAT_PERCENT
+        if self.jazzy and robot.battery_percent <= TOO_LATE_PERCENT:
+            return
+        if low and not robot.task_id and robot.dedicated not in (robot.place, robot.goes_to):
+            self._begin(robot, "charge", now)
+
+    def _dedicate(self, robot: FleetRobot, waypoint: str, waits: bool, now: float) -> None:
+        changed = (waypoint, waits) != (robot.dedicated, robot.waits)
+        robot.dedicated, robot.waits = waypoint, waits
+        if changed and (robot.charges or (self.jazzy and robot.doing == "idle park")):
+            self._go(robot, waypoint, now)
+
+    # ---- on the road
+
+    def _go(self, robot: FleetRobot, place: str, now: float) -> None:
+        if robot.place == place:
+            robot.goes_to = ""
+            self._arrived(robot)
+            return
+        if robot.stuck:
+            return
+        robot.came_from = robot.place or robot.came_from
+        robot.place, robot.goes_to, robot.arrives_at = "", place, now + self.drive_s
+
+    def _move(self, robot: FleetRobot, now: float) -> None:
+        if robot.goes_to and now >= robot.arrives_at:
+            robot.place, robot.goes_to = robot.goes_to, ""
+            self._arrived(robot)
+        if robot.doing == "charge" and robot.battery_percent >= RECHARGE_PERCENT:
+            self._rest(robot, now)
+
+    def _arrived(self, robot: FleetRobot) -> None:
+        if robot.charges:
+            robot.mode = d.RobotModeValue.MODE_CHARGING
+
+    def _state(self, robot: FleetRobot, now: float) -> d.RobotState:
+        level, x, y = self.graph[robot.place or robot.came_from]
+        if robot.goes_to:
+            level, x_to, y_to = self.graph[robot.goes_to]
+            done = 1.0 - max(0.0, robot.arrives_at - now) / self.drive_s
+            x, y = x + (x_to - x) * done, y + (y_to - y) * done
+        mode = robot.mode if robot.task_id else d.RobotModeValue.MODE_IDLE
+        return d.RobotState(
+            name=robot.name,
+            task_id=robot.task_id,
+            mode=d.RobotMode(int(mode)),
+            battery_percent=robot.battery_percent,
+            location=d.Location(x=x, y=y, level_name=level),
+        )

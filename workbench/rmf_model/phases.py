@@ -1,0 +1,134 @@
+"""The phases of a robot's task that concern us: RequestLift, EndLiftSession, DoorOpen, DoorClose.
+
+Source: rmf_ros2 9dedd0f, rmf_fleet_adapter/src/rmf_fleet_adapter/phases/. None of them gives up.
+Left out: the lift watchdog, localisation, holding points (they send nothing to us).
+"""
+
+from typing import Final
+
+from msgspec.structs import replace
+
+from bridges.messages import definitions as d
+from workbench.rmf_model import Said, has_session
+from workbench.rmf_model.robot import LiftDestination, Phase, Robot
+
+REPEAT_S: Final = 1.0
+
+
+class RequestLift(Phase):
+    """Waits for a LiftState with our floor, DOOR_OPEN and our session; it looks at no mode.
+
+    Its own 1 s timer publishes nothing once a destination is set: the repeats come from the
+    context, one for each LiftState.
+    """
+
+    claims_lift = True
+
+    def __init__(self, lift: str, floor: str, *, inside: bool) -> None:
+        self.wanted = LiftDestination(lift, floor, inside)
+
+    def begin(self, robot: Robot, now: float) -> list[Said]:
+        """Sends the request. If the robot is outside and the lift has come, the phase is done at
+        once."""
+        if not self.wanted.inside and robot.has_lift_arrived(self.wanted.lift, self.wanted.floor):
+            self.done = True
+            return robot.set_lift_destination(replace(self.wanted, inside=True), now)
+        return robot.set_lift_destination(self.wanted, now)
+
+    def hear(self, robot: Robot, message: d.Message, now: float) -> list[Said]:
+        """RequestLift.cpp:322-326, _finish: once the lift has come, it requests as from inside."""
+        match message:
+            case d.LiftState(
+                lift_name=self.wanted.lift,
+                current_floor=self.wanted.floor,
+                door_state=d.LiftDoor.DOOR_OPEN,
+                session_id=robot.requester_id,
+            ):
+                self.done = True
+        if not self.done or self.wanted.inside:
+            return []
+        said = robot.set_lift_destination(replace(self.wanted, inside=True), now)
+        robot.lift_arrived = True
+        return said
+
+
+class EndLiftSession(Phase):
+    """Releases the lift. Done when a state of the lift shows a session other than ours."""
+
+    def __init__(self, lift: str) -> None:
+        self.lift = lift
+
+    def begin(self, robot: Robot, now: float) -> list[Said]:
+        """Sends nothing: END_SESSION goes out at the next LiftState that shows our session."""
+        return robot.release_lift()
+
+    def hear(self, robot: Robot, message: d.Message, now: float) -> list[Said]:
+        """EndLiftSession.cpp, _init_obs."""
+        if isinstance(message, d.LiftState) and message.lift_name == self.lift:
+            self.done = message.session_id != robot.requester_id
+        return []
+
+
+class DoorOpen(Phase):
+    """OPEN at the start and every second, until the door is OPEN *and* the heartbeat lists us.
+
+    Only the latest state (of whichever door) and the latest heartbeat since the start count.
+    """
+
+    def __init__(self, door: str) -> None:
+        self.door = door
+        self._state: d.DoorState | None = None
+        self._heartbeat: d.SupervisorHeartbeat | None = None
+
+    def begin(self, robot: Robot, now: float) -> list[Said]:
+        """Begins to hold the door, and sends OPEN."""
+        robot.holding_door = self.door
+        return self.tick(robot, now)
+
+    def hear(self, robot: Robot, message: d.Message, now: float) -> list[Said]:
+        """DoorOpen.cpp, _update_status."""
+        match message:
+            case d.DoorState():
+                self._state = message
+            case d.SupervisorHeartbeat():
+                self._heartbeat = message
+        self.done = (
+            self._state is not None
+            and self._heartbeat is not None
+            and self._state.door_name == self.door
+            and self._state.current_mode.value == d.DoorModeValue.MODE_OPEN
+            and has_session(self._heartbeat, robot.requester_id, self.door)
+        )
+        return []
+
+    def tick(self, robot: Robot, now: float) -> list[Said]:
+        """Sends OPEN again."""
+        self.due_at = now + REPEAT_S
+        return [robot.ask_door(self.door, d.DoorModeValue.MODE_OPEN, now)]
+
+
+class DoorClose(Phase):
+    """CLOSE at the start and every second, until a heartbeat no longer lists us.
+
+    It does not wait for the door.
+    """
+
+    def __init__(self, door: str) -> None:
+        self.door = door
+
+    def begin(self, robot: Robot, now: float) -> list[Said]:
+        """Stops holding the door, and sends CLOSE."""
+        if robot.holding_door == self.door:
+            robot.holding_door = None
+        return self.tick(robot, now)
+
+    def hear(self, robot: Robot, message: d.Message, now: float) -> list[Said]:
+        """DoorClose.cpp, _update_status."""
+        if isinstance(message, d.SupervisorHeartbeat):
+            self.done = not has_session(message, robot.requester_id, self.door)
+        return []
+
+    def tick(self, robot: Robot, now: float) -> list[Said]:
+        """Sends CLOSE again."""
+        self.due_at = now + REPEAT_S
+        return [robot.ask_door(self.door, d.DoorModeValue.MODE_CLOSED, now)]

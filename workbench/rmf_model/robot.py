@@ -1,0 +1,192 @@
+"""A fleet adapter, for one robot: what its context does by itself, whichever phase is running.
+
+Source: rmf_ros2 9dedd0f, rmf_fleet_adapter/src/rmf_fleet_adapter/agv/RobotContext.cpp:1281-1324 and
+1600-1800. The phases are in `phases.py`. `jazzy`: by Jazzy's rules where they differ (branch jazzy,
+7eef65a, RobotContext.cpp:1054-1095 and 1329-1419).
+"""
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+
+from msgspec import Struct
+
+from bridges.messages import definitions as d
+from bridges.messages import topics
+from bridges.messages.stamps import stamp
+from workbench.rmf_model import NEVER, Party, Said, door_request, has_session
+
+
+class LiftDestination(Struct, frozen=True):
+    """Where the robot wants its lift; `inside` once it may be in the car."""
+
+    lift: str
+    floor: str
+    inside: bool
+
+
+class Phase(ABC):
+    """One step of a robot's task.
+
+    `due_at`: its wall timer. `claims_lift`: while it runs, the lift is not released for idleness.
+    """
+
+    done = False
+    due_at = NEVER
+    claims_lift = False
+
+    @abstractmethod
+    def begin(self, robot: "Robot", now: float) -> list[Said]:
+        """Start."""
+
+    @abstractmethod
+    def hear(self, robot: "Robot", message: d.Message, now: float) -> list[Said]:
+        """Take a message, after the context's own rules have."""
+
+    def tick(self, robot: "Robot", now: float) -> list[Said]:
+        """The phase's wall timer fires."""
+        return []
+
+
+class Robot(Party):
+    """A fleet adapter's RobotContext (`requester_id` is fleet/robot) and its one running phase.
+
+    `on_task`: it has a task. `in_car`: its position is inside the lift. The caller sets both.
+    A cancelled phase is `robot.phase = None`.
+    """
+
+    subscribes: Sequence[topics.AnyTopic] = (
+        topics.LIFT_STATES,
+        topics.DOOR_STATES,
+        topics.DOOR_SUPERVISOR_HEARTBEAT,
+    )
+
+    def __init__(self, requester_id: str, jazzy: bool = False) -> None:
+        self.requester_id = requester_id
+        self.jazzy = jazzy
+        self.phase: Phase | None = None
+        self.on_task = True
+        self.in_car = False
+        self.destination: LiftDestination | None = None
+        self.lift_arrived = False
+        self.holding_door: str | None = None
+        self._idle_since: float | None = None
+        self._tasked_at = float("-inf")
+
+    def begin(self, phase: Phase, now: float) -> list[Said]:
+        """Start this phase; the one before is dropped, done or not."""
+        self.phase = phase
+        return phase.begin(self, now)
+
+    @property
+    def done(self) -> bool:
+        """No phase is running."""
+        return self.phase is None or self.phase.done
+
+    def hear(self, message: d.Message, now: float) -> list[Said]:
+        """The context's own rules first, then the phase's."""
+        said: list[Said] = []
+        match message:
+            case d.LiftState():
+                said += self._check_lift_state(message, now)
+            case d.SupervisorHeartbeat():
+                said += self._check_door_supervisor(message, now)
+        if self.phase is not None and not self.phase.done:
+            said += self.phase.hear(self, message, now)
+        return said
+
+    def tick(self, now: float) -> list[Said]:
+        """The phase's wall timer."""
+        return [] if self.phase is None or self.done else self.phase.tick(self, now)
+
+    def wake_at(self) -> float:
+        """When that is due."""
+        return NEVER if self.phase is None or self.done else self.phase.due_at
+
+    # ---- lift
+
+    def set_lift_destination(self, wanted: LiftDestination, now: float) -> list[Said]:
+        """Ask for the lift now, and again at each of its states."""
+        self.lift_arrived = self.has_lift_arrived(wanted.lift, wanted.floor)
+        self.destination = wanted
+        self._idle_since = None
+        return self._publish_destination(now)
+
+    def has_lift_arrived(self, lift: str, floor: str) -> bool:
+        """The lift has come for this destination already."""
+        at = self.destination
+        return self.lift_arrived and at is not None and (at.lift, at.floor) == (lift, floor)
+
+    def release_lift(self) -> list[Said]:
+        """Forget the lift. END goes out once a LiftState shows our session; Jazzy sends one now too."""
+        said = []
+        if self.jazzy and self.destination is not None:
+            said = [self._end(self.destination.lift, self.destination.floor, 0.0)]
+        self.destination = None
+        self.lift_arrived = False
+        self._idle_since = None
+        return said
+
+    def _end(self, lift: str, floor: str, now: float) -> Said:
+        end = d.LiftRequest(
+            lift_name=lift,
+            request_time=stamp(now),
+            session_id=self.requester_id,
+            request_type=d.LiftRequestType.REQUEST_END_SESSION,
+            destination_floor=floor,
+        )
+        return topics.ADAPTER_LIFT_REQUESTS, end
+
+    def _publish_destination(self, now: float) -> list[Said]:
+        if self.destination is None:
+            return []
+        request = d.LiftRequest(
+            lift_name=self.destination.lift,
+            request_time=stamp(now),
+            session_id=self.requester_id,
+            request_type=d.LiftRequestType.REQUEST_AGV_MODE,
+            destination_floor=self.destination.floor,
+            door_state=d.LiftRequestDoor.DOOR_OPEN,
+        )
+        return [(topics.ADAPTER_LIFT_REQUESTS, request)]
+
+    def _check_lift_state(self, state: d.LiftState, now: float) -> list[Said]:
+        said = self._release_if_idle(now)
+        if self.destination is not None and self.destination.lift == state.lift_name:
+            return said + self._publish_destination(now)
+        if state.session_id == self.requester_id:
+            said.append(self._end(state.lift_name, "", 0.0 if self.jazzy else now))
+        return said + (self._publish_destination(now) if self.jazzy else [])
+
+    def _release_if_idle(self, now: float) -> list[Said]:
+        claimed = self.phase is not None and self.phase.claims_lift and not self.phase.done
+        if self.destination is None or claimed:
+            return []
+        if self.destination.inside and self.on_task:
+            return []
+        if self.destination.inside and self.in_car:
+            self._idle_since = None
+        elif self.jazzy and not self.destination.inside:
+            return self.release_lift()
+        elif self._idle_since is None:
+            self._idle_since = now
+        elif self.jazzy or now - self._idle_since > (10.0 if self.destination.inside else 30.0):
+            return self.release_lift()
+        return []
+
+    # ---- door
+
+    def ask_door(self, door: str, mode: d.DoorModeValue, now: float) -> Said:
+        """The adapter's DoorRequest."""
+        return topics.ADAPTER_DOOR_REQUESTS, door_request(door, self.requester_id, mode, now)
+
+    def _check_door_supervisor(self, heartbeat: d.SupervisorHeartbeat, now: float) -> list[Said]:
+        if self.on_task:
+            self._tasked_at = now
+        elif self._tasked_at + 10.0 < now:
+            self.holding_door = None
+        return [
+            self.ask_door(door.door_name, d.DoorModeValue.MODE_CLOSED, now)
+            for door in heartbeat.all_sessions
+            if has_session(heartbeat, self.requester_id, door.door_name)
+            and door.door_name != self.holding_door
+        ]
