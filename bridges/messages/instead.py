@@ -4,28 +4,19 @@
 - Alert: the log. What it is about is among the daemon's faults too, and so in its diagnostics.
 """
 
-import logging
 from typing import Final
 
-from bridges.host.log import pairs
-from bridges.messages.definitions import Alert, Bool, EmergencySignal, Message
+from bridges.messages.definitions import Bool, EmergencySignal, Message
 from bridges.messages.releases import RELEASES
 from bridges.messages.topics import EMERGENCY_SIGNAL, FIRE_ALARM_TRIGGER, AnyTopic
-
-log = logging.getLogger(__name__)
 
 INSTEAD: Final[dict[str, AnyTopic]] = {EMERGENCY_SIGNAL.name: FIRE_ALARM_TRIGGER}
 """Topic -> the one that serves the same purpose in every release."""
 
 
 def converted(message: Message) -> Message | None:
-    """The message for the topic in INSTEAD. None for one that goes into the log, which happens here."""
-    match message:
-        case EmergencySignal():
-            return Bool(message.is_emergency)
-        case Alert():
-            log.warning(pairs("alert", title=message.title, message=message.message))
-    return None
+    """The message for the topic in INSTEAD. None for one that goes into the log."""
+    return Bool(message.is_emergency) if isinstance(message, EmergencySignal) else None
 
 
 def remarks(topic: AnyTopic, wanted: str) -> list[str]:

@@ -4,13 +4,12 @@ import math
 from typing import Final
 
 from bridges.messages.definitions import Duration, Time
-from bridges.transports.transport import TransportError
 
 ENDS: Final = 2**31
 """RMF's Time counts seconds in 31 bits: its last second is on 2038-01-19."""
 
 
-class ClockError(TransportError):
+class ClockError(Exception):
     """The wall clock shows a time that no stamp can hold."""
 
 

@@ -19,7 +19,7 @@ from bridges.blackbox.entries import Head
 from bridges.blackbox.ring import Ring
 from bridges.host.log import pairs
 from bridges.messages.definitions import DiagnosticArray
-from bridges.messages.stamps import stamp
+from bridges.messages.stamps import ClockError, stamp
 from bridges.messages.topics import DIAGNOSTICS
 from bridges.runtime import guard, last_mark, record, signals
 from bridges.runtime.diagnostics import diagnosis
@@ -230,6 +230,7 @@ class Daemon:
             if self._told % max(1, len(devices)) == 0:  # their size grows with the devices
                 self._witness.spoken(self._health_topic.name, found, sent=True)
         except (
-            TransportError
+            TransportError,
+            ClockError,
         ) as error:  # when states cannot be published, that is logged as an error
             log.debug(pairs("not_published", topic=DIAGNOSTICS.name, reason=error))

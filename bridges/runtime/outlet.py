@@ -4,13 +4,16 @@ import logging
 import threading
 from collections.abc import Callable, Iterable
 
+from bridges.host.log import pairs
 from bridges.kinds.shared.decision import Fault
-from bridges.messages.definitions import Message
+from bridges.messages.definitions import Alert, Message
 from bridges.messages.instead import INSTEAD, converted
 from bridges.messages.topics import Topic
 from bridges.runtime.directory import Once
 from bridges.runtime.witness import NOBODY, Nobody
 from bridges.transports.transport import Publisher, Transport, TransportError
+
+log = logging.getLogger(__name__)
 
 Named = Callable[[Topic[Message]], Topic[Message]]
 """Renames a topic as the site's YAML says."""
@@ -42,6 +45,8 @@ class Outlet:
         """Publish; False when it was not sent: a fault until the next one gets through."""
         way, wanted = self._way(topic, message)
         if wanted is None:
+            if isinstance(message, Alert):
+                log.warning(pairs("alert", title=message.title, message=message.message))
             return True
         try:
             self._end(way).publish(wanted)
