@@ -72,3 +72,13 @@ def readable(step: Step) -> Iterator[tuple[str, Tree]]:
         yield "outputs", {"subject": step.subject, "outputs": outputs}
     for faults in step.faults:
         yield "faults", {"subject": step.subject, "faults": faults}
+
+
+OWN_TOPICS: Final = "rmf_bridge/"
+
+
+INSTALL: Final = "pip install 'rmf-bridges[recording,sqlite]'"
+
+
+LIBRARY: Final = "rmf-bridges"
+"""How the `library` in the header of our own files begins."""

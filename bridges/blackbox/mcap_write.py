@@ -16,14 +16,12 @@ from mcap.writer import CompressionType, Writer
 from bridges import __version__
 from bridges.blackbox import entries
 from bridges.blackbox.entries import AnyEntry, Spoken, Step
-from bridges.blackbox.incident import Incident, readable, timed
+from bridges.blackbox.incident import LIBRARY, OWN_TOPICS, Incident, readable, timed
 from bridges.blackbox.trees import Tree
 from bridges.messages import cdr, topics
 from bridges.messages.releases import RELEASES
 from bridges.messages.rihs01 import type_hash
 from bridges.messages.texts import MESSAGES, text
-from workbench.explain.noted import OWN_TOPICS
-from workbench.replay.mcap_bags import LIBRARY
 
 ENTRIES: Final = f"{OWN_TOPICS}entries"
 NOTES: Final = f"{OWN_TOPICS}notes"

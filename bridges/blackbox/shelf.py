@@ -76,3 +76,7 @@ def _stem(head: Head) -> str:
 def _is_of(path: Path, head: Head) -> bool:
     """Is this a file of that daemon? A file of `door_1` is not one of `door`."""
     return path.stem.rsplit("_", 4)[0] == _stem(head)
+
+
+CONTINUOUS: Final = "all"
+"""The word in the names of `keep: continuous` files; other files have their cause there."""

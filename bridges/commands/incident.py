@@ -7,14 +7,13 @@ import time
 from datetime import datetime
 from pathlib import Path
 
-from bridges.blackbox.incident import AFTER_S, BEFORE_S, Incident, Note, part
+from bridges.blackbox.incident import AFTER_S, BEFORE_S, INSTALL, Incident, Note, part
 from bridges.blackbox.ring import DIED, NAME, Read, RingError
 from bridges.host.written import no_folder, not_written
 from bridges.runtime import holder
 from bridges.runtime.clock import machine_s
 from bridges.runtime.directory import find
 from bridges.settings.load import SettingsError
-from workbench.replay.bags import INSTALL
 
 EX_UNAVAILABLE = 69
 

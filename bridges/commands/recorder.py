@@ -6,13 +6,13 @@ import sys
 from contextlib import suppress
 from pathlib import Path
 
+from bridges.blackbox.incident import INSTALL
 from bridges.blackbox.recorder import Recorder
 from bridges.blackbox.shelf import Shelf
 from bridges.host import log, places
 from bridges.runtime import signals
 from bridges.runtime.clock import machine_s
 from bridges.runtime.notify import notify
-from workbench.replay.bags import INSTALL
 
 EX_UNAVAILABLE = 69
 EVERY_S = 1.0

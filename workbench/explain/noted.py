@@ -12,7 +12,6 @@ import msgspec
 
 from workbench.explain.timeline import Level
 
-OWN_TOPICS: Final = "rmf_bridge/"
 TOPICS: Final = ("samples", "outputs", "faults", "decisions")
 MOST: Final = 40
 """At most this many inputs, outputs or faults of one device are read."""

@@ -14,8 +14,9 @@ from pathlib import Path
 from typing import Final
 
 from bridges.blackbox.entries import Spoken
-from bridges.blackbox.incident import timed
+from bridges.blackbox.incident import INSTALL, timed
 from bridges.blackbox.ring import MAGIC, Read, RingError
+from bridges.blackbox.shelf import CONTINUOUS
 from bridges.host import user_files
 from bridges.host.log import pairs
 from bridges.messages import cdr
@@ -27,12 +28,9 @@ __all__ = ["BagError", "Keep", "Notes", "all_in", "heard_in"]
 log = logging.getLogger(__name__)
 
 NS: Final = 1e-9
-CONTINUOUS: Final = "all"
-"""The word in the names of `keep: continuous` files; other files have their cause there."""
 STEPPED_NS: Final = 10**9
 """A clock that goes back by this much was set back; less is disorder in the recording."""
 LONGEST_MESSAGE: Final = 8 << 20
-INSTALL: Final = "pip install 'rmf-bridges[recording,sqlite]'"
 
 
 Keep = Callable[[str, bytes, float], bool]

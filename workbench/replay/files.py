@@ -4,9 +4,10 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from bridges.blackbox.entries import AnyEntry, Head
+from bridges.blackbox.incident import INSTALL
 from bridges.blackbox.ring import MAGIC, Read, RingError
 from bridges.host import user_files
-from workbench.replay.bags import INSTALL, continuous
+from workbench.replay.bags import continuous
 from workbench.replay.sources import BagError, Notes
 
 

@@ -6,13 +6,11 @@ from typing import Final
 
 from mcap.records import Channel, Header, McapRecord, Message, Schema
 
+from bridges.blackbox.incident import LIBRARY, OWN_TOPICS
 from bridges.messages.releases import Release
-from workbench.explain.noted import OWN_TOPICS
 from workbench.replay.mcap_read import Damaged, records
 from workbench.replay.sources import Notes, Raw, Source, releases, source
 
-LIBRARY: Final = "rmf-bridges"
-"""How the `library` in the header of our own files begins."""
 NO_CHANNEL: Final = Source("", None, "of no channel")
 
 

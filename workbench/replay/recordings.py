@@ -9,10 +9,10 @@ from dataclasses import dataclass
 from datetime import datetime, timedelta
 from pathlib import Path
 
+from bridges.blackbox.incident import OWN_TOPICS
 from bridges.messages import topics
 from bridges.messages.heard import Heard, Own
 from workbench.explain import noted
-from workbench.explain.noted import OWN_TOPICS
 from workbench.graph.join import complain
 from workbench.replay.bags import Keep, all_in
 from workbench.replay.sources import BagError, Notes
