@@ -9,6 +9,7 @@ from pathlib import Path
 from msgspec.structs import replace
 
 from bridges.host import log, places
+from bridges.kinds.shared.rmf_section import TRANSPORTS, overridden
 from bridges.runtime import directory as runtime
 from bridges.runtime import drop_in, guard, signals
 from bridges.runtime.notify import watchdog_s
@@ -16,7 +17,6 @@ from bridges.settings.load import Config, SettingsError, load
 from bridges.transports.ros2 import setup as ros_setup
 from bridges.transports.transport import TransportError
 from drivers.hal import HalError
-from workbench.graph.join import TRANSPORTS, overridden
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -15,14 +15,15 @@ from typing import TYPE_CHECKING, Final, TextIO
 import msgspec
 from msgspec.structs import replace
 
-from bridges.commands.completion import completed_by, device_names
 from bridges.host import log
 from bridges.host.paint import bold, red
+from bridges.kinds.shared.rmf_section import TRANSPORTS, overridden
 from bridges.messages.words import printable
+from bridges.runtime.completers import completed_by, device_names
+from bridges.settings.config import NoDevice, device_of
 from bridges.settings.load import Config, SettingsError, load
-from workbench.commissioning.by_hand import NoDevice, device_of
 from workbench.commissioning.doctor.finding import Finding, exit_code
-from workbench.graph.join import TRANSPORTS, command_line, interruptible, overridden, seconds
+from workbench.graph.join import command_line, interruptible, seconds
 
 if TYPE_CHECKING:
     from bridges.settings.building_map import BuildingMap

@@ -2,10 +2,8 @@
 
 import argparse
 
-from bridges.commands.completion import completed_by
-from workbench.graph.plants import add_simulation, names, obey, tell
-
-MODES = ("off", "stuck", "slow", "garbage", "wrong", "ok")
+from bridges.runtime.completers import completed_by
+from workbench.graph.plants import MODES, add_simulation, names, obey, tell
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -2,7 +2,7 @@
 
 import argparse
 
-from bridges.commands.completion import completed_by
+from bridges.runtime.completers import completed_by
 from workbench.graph.plants import add_simulation, names, obey, tell
 
 

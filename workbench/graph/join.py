@@ -11,16 +11,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from types import FrameType
 
-import msgspec
-
-from bridges.kinds.shared.rmf_section import Rmf
+from bridges.kinds.shared.rmf_section import TRANSPORTS, Rmf, overridden
 from bridges.messages import words
 from bridges.transports.transport import Transport, TransportError
 from workbench.graph.renamed import Renamed
 
 SILENT_AFTER_S = 3.0
 """States come at 1 Hz: three missed ones, or a reading three seconds old, get a mark."""
-TRANSPORTS = ("auto", "ros2", "dds", "zenoh")
 
 
 def add_graph_arguments(parser: argparse.ArgumentParser) -> None:
@@ -81,15 +78,6 @@ def graph_of(args: argparse.Namespace, speaks: str) -> str:
     alone = args.localhost or stays_on_loopback(rmf, os.environ)
     where = f"{speaks} in domain {domain_id(rmf, os.environ)}"
     return f"{where}, on this machine alone" if alone else where
-
-
-def overridden(rmf: Rmf, args: argparse.Namespace) -> Rmf:
-    """A YAML's `rmf:` section, changed by the options of the command line."""
-    if args.domain_id is not None:
-        rmf = msgspec.structs.replace(rmf, domain_id=args.domain_id)
-    if args.transport is not None:
-        rmf = msgspec.structs.replace(rmf, transport=args.transport)
-    return rmf
 
 
 def _configured(file: Path | None) -> Rmf:

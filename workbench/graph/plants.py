@@ -9,8 +9,8 @@ import sys
 from contextlib import suppress
 from pathlib import Path
 
-from bridges.commands.completion import Completer, completed_by, device_names
 from bridges.host.places import as_given, by_hand, opened
+from bridges.runtime.completers import Completer, completed_by, device_names
 
 ANSWER_S = 5.0
 
@@ -70,8 +70,8 @@ def obey(args: argparse.Namespace, verb: str, *words: str) -> int:
 
     0; 1 if it is refused; 69 without a simulation; 64 for no such device; 78 for a wrong YAML.
     """
+    from bridges.settings.config import NoDevice, device_of
     from bridges.settings.load import SettingsError, load
-    from workbench.commissioning.by_hand import NoDevice, device_of
 
     try:
         device = args.device or device_of(load(args.file), None)
@@ -114,3 +114,6 @@ def ask(path: Path, words: list[str]) -> str:
         caller.sendall(shlex.join(words).encode() + b"\n")
         with caller.makefile(encoding="utf-8") as lines:
             return lines.readline().strip()
+
+
+MODES = ("off", "stuck", "slow", "garbage", "wrong", "ok")

@@ -9,7 +9,7 @@ from typing import Final, Literal
 from fastapi import Request
 from nicegui import ui
 
-from workbench.commands.fail import MODES
+from workbench.graph.plants import MODES
 from workbench.page.actions import Action, Deeds, Local, actions, fail, press, queue
 from workbench.page.gallery import AGES_S, Gallery, Key
 from workbench.page.head import part

@@ -1,5 +1,6 @@
 """The `rmf:` section of a YAML: which transport reaches Open-RMF, and how."""
 
+import argparse
 from collections.abc import Iterable
 from typing import Annotated, Literal
 
@@ -122,3 +123,15 @@ class Rmf(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
             yield ("release",), "transport ros2 takes what is installed: leave it out"
         if self.zenoh and self.transport in ("ros2", "dds"):
             yield ("zenoh",), f"transport {self.transport} does not read it: write transport: zenoh"
+
+
+TRANSPORTS = ("auto", "ros2", "dds", "zenoh")
+
+
+def overridden(rmf: Rmf, args: argparse.Namespace) -> Rmf:
+    """A YAML's `rmf:` section, changed by the options of the command line."""
+    if args.domain_id is not None:
+        rmf = msgspec.structs.replace(rmf, domain_id=args.domain_id)
+    if args.transport is not None:
+        rmf = msgspec.structs.replace(rmf, transport=args.transport)
+    return rmf

@@ -17,7 +17,7 @@ from msgspec.structs import replace
 
 from bridges.cli import main
 from bridges.kinds.charger.refusals import Refusal
-from bridges.kinds.shared.rmf_section import Rmf
+from bridges.kinds.shared.rmf_section import Rmf, overridden
 from bridges.messages import definitions as d
 from bridges.messages import topics
 from bridges.messages.topics import Topic
@@ -29,7 +29,7 @@ from hal_fakes.wire import Wire, runs_here
 from tests.transports.zenoh_programs import Router
 from tests.waiting import LEASE_S, PATIENCE_S, wait_until
 from workbench.commands import send, watch
-from workbench.graph.join import add_graph_arguments, overridden
+from workbench.graph.join import add_graph_arguments
 from workbench.graph.renamed import Renamed
 from workbench.graph.requests import Request
 from workbench.graph.requests.charger import Charge, ChargeCancel
