@@ -8,10 +8,10 @@ import time
 from pathlib import Path
 from typing import NoReturn
 
-from bridges.commands.status import daemons, units
 from bridges.host.log import pairs
 from bridges.host.places import runtimes
 from bridges.runtime.completers import completed_by, device_names, service_names
+from bridges.runtime.daemons import daemons, units
 from bridges.runtime.services import CONFIG
 
 EX_UNAVAILABLE = 69

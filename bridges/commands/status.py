@@ -6,94 +6,22 @@ It reads the daemons' status files and asks systemd; it opens no bus and joins n
 import argparse
 import json
 import os
-import shutil
-import subprocess
 import sys
 import time
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import suppress
 from pathlib import Path
-from typing import Any, Final, TextIO, cast
+from typing import Final, TextIO
 
 import msgspec
 
-from bridges.host import files
 from bridges.host.paint import bold, red
-from bridges.host.places import SERVICE_RUN, SERVICE_STATE, Places, owner_of, runtimes, state_base
+from bridges.host.places import runtimes
 from bridges.messages.words import printable
-from bridges.runtime import holder
+from bridges.runtime.daemons import NONE, Daemon, daemons, units
 from bridges.runtime.faults import Remedy, here, remedies, values
-from bridges.runtime.record import paths, read
 from bridges.runtime.subject import Status
 
-UNIT: Final = "rmf-bridge@"
-RUNS: Final = ("active (running)", "activating (start)", "deactivating (stop-sigterm)")
-"""What systemd says of a unit whose process is there."""
-ASK_SYSTEMD_S: Final = 3.0
-WELL, FAULTY, DOWN, NONE = 0, 1, 2, 3
-"""Exit codes, as monitoring plugins have them: OK, WARNING, CRITICAL, UNKNOWN."""
 NOT_TOLD: Final = ("contacts", "faults", "input_age_s", "outputs", "refused")
-LEVEL_OF: Final = {
-    "serving": WELL,
-    "old": DOWN,
-    "died": DOWN,
-    "left on": DOWN,
-    "failed": DOWN,
-    "unknown": NONE,
-    "stopped": WELL,
-}
-
-
-class FaultStatus(msgspec.Struct):
-    """A fault in a status file."""
-
-    code: str
-    detail: str
-
-
-class DeviceStatus(msgspec.Struct):
-    """What every device's status has; its other keys are the kind's own."""
-
-    faults: list[FaultStatus] = []
-    input_age_s: float | None = None
-
-
-class StatusFile(msgspec.Struct):
-    """What `status` relies on in a status file."""
-
-    devices: dict[str, DeviceStatus] = {}
-    faults: list[FaultStatus] = []
-    heard_by: dict[str, int] = {}
-    hears: dict[str, int] = {}
-
-
-class Daemon(msgspec.Struct, kw_only=True):
-    """One daemon, or a unit without one.
-
-    `state`: `serving`; `old`: it writes no status any more; `died` without tidying up; `left on`: it
-    died with outputs that nobody has verified off; `failed`: systemd has given up; `stopped`;
-    `unknown`: this user may not see it. `unit`: what systemd says.
-    """
-
-    name: str
-    state: str
-    by: str
-    unit: str = ""
-    why: str = ""
-    age_s: float | None = None
-    status: dict[str, Any] = {}
-
-    @property
-    def devices(self) -> Mapping[str, Status]:
-        """Its devices' part of the status file."""
-        return cast(Mapping[str, Status], self.status.get("devices", {}))
-
-    @property
-    def level(self) -> int:
-        """Its exit code."""
-        level = LEVEL_OF[self.state]
-        parts = (self.status, *self.devices.values())
-        return max(level, FAULTY) if any(part.get("faults") for part in parts) else level
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -123,88 +51,6 @@ def run(args: argparse.Namespace) -> int:
     else:
         show(found, sys.stdout)
     return max((one.level for one in found), default=NONE)
-
-
-def daemons(
-    folders: Iterable[Path], found_units: Mapping[str, str], wall: float
-) -> Iterator[Daemon]:
-    """The daemon of each runtime directory, and each of systemd's units without one. `wall`: now."""
-    rest = dict(found_units)
-    for folder in folders:
-        service = folder.parent == SERVICE_RUN
-        unit = rest.pop(folder.name, "") if service else ""
-        by = "service" if service else f"by hand, {owner_of(folder)}"
-        with suppress(NotADirectoryError, FileNotFoundError):
-            yield _daemon(folder, by, unit, wall)
-    for name, unit in rest.items():
-        yield Daemon(name=name, state=_without_directory(unit), by="service", unit=unit)
-
-
-def _daemon(folder: Path, by: str, unit: str, wall: float) -> Daemon:
-    one = Daemon(name=folder.name, state="stopped", by=by, unit=unit)
-    try:
-        held_by = holder.look(Places(folder, folder))
-        status, one.age_s = _read(folder / holder.STATUS, wall)
-    except PermissionError as error:
-        one.state, one.why = "unknown", str(error)
-        return one
-    one.status = status
-    if unit in RUNS or (held_by is not None and held_by.serves):
-        fresh = one.age_s is not None and one.age_s <= holder.FRESH_S
-        one.state = "serving" if fresh else "old"
-    elif status:
-        one.state = "died"
-    elif left := _unreleased(folder):
-        one.state, one.why = "left on", left
-    elif unit.startswith("failed"):
-        one.state = "failed"
-    return one
-
-
-def _unreleased(folder: Path) -> str:
-    """What to do about outputs of a dead daemon that nobody has verified off; "" without a record."""
-    state = SERVICE_STATE if folder.parent == SERVICE_RUN else state_base()
-    for path in paths(Places(folder, state / folder.name)):
-        if record := read(path):
-            return (
-                f"do: rmf-bridge outputs-off {record.file}; if that hardware is gone, cut its"
-                f" supply and remove {path}"
-            )
-    return ""
-
-
-def _without_directory(unit: str) -> str:
-    return "failed" if unit.startswith("failed") else "stopped"
-
-
-def _read(path: Path, wall: float) -> tuple[dict[str, Any], float | None]:
-    """The status and its age (s); nothing if there is none, or it cannot be understood."""
-    try:
-        written_at = path.lstat().st_mtime
-        text = files.read(path, holder.STATUS_MAX)
-        msgspec.json.decode(text, type=StatusFile)
-        found = msgspec.json.decode(text, type=dict[str, Any])
-    except PermissionError:
-        raise
-    except (OSError, msgspec.MsgspecError, UnicodeDecodeError):
-        return {}, None
-    return found, max(0.0, wall - written_at)
-
-
-def units() -> dict[str, str]:
-    """State of each of our units by instance, such as `active (running)`; empty without systemd."""
-    if shutil.which("systemctl") is None:
-        return {}
-    ask = ("systemctl", "list-units", "--all", "--plain", "--output=json", f"{UNIT}*")
-    try:
-        told = subprocess.run(ask, capture_output=True, timeout=ASK_SYSTEMD_S, check=True).stdout
-        found = json.loads(told)
-    except (OSError, subprocess.SubprocessError, ValueError):
-        return {}
-    return {
-        one["unit"].removeprefix(UNIT).removesuffix(".service"): f"{one['active']} ({one['sub']})"
-        for one in found
-    }
 
 
 def show(found: Iterable[Daemon], out: TextIO) -> None:

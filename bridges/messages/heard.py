@@ -10,9 +10,9 @@ from typing import Any, Final
 from msgspec import Struct
 from msgspec.structs import replace
 
-from bridges.kinds.shared.names import LONGEST_NAME
 from bridges.messages.definitions import Message
 
+LONGEST_NAME: Final = 256
 FREE_TEXTS: Final = frozenset(
     {"error_message", "message", "title", "subtitle", "value", "performing_action", "model"}
 )

@@ -13,8 +13,8 @@ from bridges.host.log import pairs
 from bridges.kinds.shared.decision import Attended, OperatorReset
 from bridges.kinds.shared.graph_kind import GraphKind
 from bridges.kinds.shared.kind import AnyDeviceKind
-from bridges.kinds.shared.names import LONGEST_NAME
 from bridges.messages.definitions import Message
+from bridges.messages.heard import LONGEST_NAME
 from bridges.messages.topics import M_co, Topic
 from bridges.runtime.clock import Clock, machine_s
 from bridges.runtime.device import AnyNode, Node

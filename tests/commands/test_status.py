@@ -10,9 +10,10 @@ import pytest
 
 from bridges import cli
 from bridges.commands import status
-from bridges.commands.status import DOWN, FAULTY, NONE, WELL, Daemon, daemons, show
+from bridges.commands.status import show
 from bridges.host.places import Places
 from bridges.runtime import faults
+from bridges.runtime.daemons import DOWN, FAULTY, NONE, WELL, Daemon, daemons
 from bridges.runtime.holder import HOLDER
 from bridges.runtime.record import Records, of
 from bridges.settings.load import load

@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 
 from bridges import cli
-from bridges.commands import status
 from bridges.host import places
 from bridges.host.places import Distrusted, Places, opened
+from bridges.runtime import daemons as status
 from bridges.runtime import directory, holder
 from bridges.runtime.directory import KEPT, MemoryFile, RuntimeDirectory, state_file
 from bridges.runtime.record import Record

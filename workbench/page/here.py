@@ -11,8 +11,8 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from bridges.commands.status import Daemon, daemons
 from bridges.host.places import runtimes
+from bridges.runtime.daemons import Daemon, daemons
 from bridges.runtime.diagnostics import CONTACTS
 from workbench.graph.plants import ask
 from workbench.page.actions import Local

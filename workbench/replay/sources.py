@@ -5,9 +5,9 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from typing import Final, NamedTuple
 
-from bridges.kinds.shared.names import LONGEST_NAME
 from bridges.messages import cdr, topics
 from bridges.messages.definitions import Message
+from bridges.messages.heard import LONGEST_NAME
 from bridges.messages.releases import NEWEST, RELEASES, Release
 from bridges.messages.rihs01 import releases_of as releases_of_hash
 from bridges.messages.texts import MESSAGES, releases_of

@@ -14,8 +14,8 @@ from bridges.kinds.charger.report import ChargerReport
 from bridges.kinds.charger.settings import Robot
 from bridges.kinds.charger.signals import Requested
 from bridges.kinds.shared.kind import Answer
-from bridges.kinds.shared.names import LONGEST_NAME
 from bridges.messages.definitions import ChargerRequest, DiagnosticLevel, DiagnosticStatus, KeyValue
+from bridges.messages.heard import LONGEST_NAME
 from bridges.messages.topics import CHARGER_REFUSALS
 
 NAME = "ChargerRequest refused"

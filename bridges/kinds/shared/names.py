@@ -4,8 +4,8 @@ from collections.abc import Collection
 from typing import Final
 
 from bridges.kinds.shared.decision import RequestRefused
+from bridges.messages.heard import LONGEST_NAME
 
-LONGEST_NAME: Final = 256
 LONGEST_TEXT: Final = 10_000
 """The longest error_message of a ChargerState."""
 

@@ -8,9 +8,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final
 
-from bridges.commands.status import Daemon, daemons
 from bridges.host.places import Places
 from bridges.runtime import holder
+from bridges.runtime.daemons import Daemon, daemons
 from bridges.runtime.faults import remedies
 from bridges.runtime.record import Records
 from bridges.runtime.subject import Status
