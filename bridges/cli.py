@@ -13,6 +13,7 @@ from collections.abc import Iterable, Sequence
 from typing import NoReturn
 
 from bridges import VERSION
+from bridges.host.installed import NotInstalled, of_workbench
 
 EX_PIPE = 141
 """The reader of our output has gone: what a shell shows for a program that SIGPIPE ended."""
@@ -129,7 +130,12 @@ def main(argv: list[str] | None = None) -> int:
     ):  # a terminal may have no sign for what is to be said
         sys.stdout.reconfigure(errors="backslashreplace")
     typed = argparse.Namespace(ros_args=ros_args, typed=arguments)
-    parsed, unknown = parser(arguments).parse_known_args(arguments, typed)
+    try:
+        asked = parser(arguments)
+    except NotInstalled as error:
+        sys.stderr.write(f"rmf-bridge {arguments[0]}: {error}\n")
+        return os.EX_UNAVAILABLE
+    parsed, unknown = asked.parse_known_args(arguments, typed)
     if unknown:
         parsed.usage(f"unrecognized arguments: {' '.join(unknown)}")
     try:
@@ -202,8 +208,10 @@ def split_ros_args(argv: list[str]) -> tuple[list[str], list[str]]:
 
 
 def _module(command: str):  # type: ignore[no-untyped-def]
-    house = "workbench" if command in WORKBENCH else "bridges"
-    return importlib.import_module(f"{house}.commands.{command.replace('-', '_')}")
+    name = f"commands.{command.replace('-', '_')}"
+    return (
+        of_workbench(name) if command in WORKBENCH else importlib.import_module(f"bridges.{name}")
+    )
 
 
 if __name__ == "__main__":

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from bridges.blackbox.incident import AFTER_S, BEFORE_S, INSTALL, Incident, Note, part
 from bridges.blackbox.ring import DIED, NAME, Read, RingError
+from bridges.host.installed import NotInstalled, of_workbench
 from bridges.host.written import no_folder, not_written
 from bridges.runtime import holder
 from bridges.runtime.clock import machine_s
@@ -47,6 +48,12 @@ def run(args: argparse.Namespace) -> int:
     except ImportError as error:
         print(f"to write a recording, {error.name} is needed: {INSTALL}", file=sys.stderr)
         return EX_UNAVAILABLE
+    if args.anonymous:
+        try:
+            of_workbench("replay.anonymous")
+        except NotInstalled as error:
+            print(error, file=sys.stderr)
+            return EX_UNAVAILABLE
     path = args.output or Path(f"{args.file.stem}_{datetime.now():%Y-%m-%d_%H-%M-%S}.mcap")
     if why := no_folder(path):  # before the wait
         return not_written(path, why)
@@ -72,9 +79,8 @@ def run(args: argparse.Namespace) -> int:
 
 def _anonymous(incident: Incident) -> Incident:
     """Raises SettingsError."""
-    from workbench.replay.anonymous import anonymous
-
-    return anonymous(incident)
+    hidden: Incident = of_workbench("replay.anonymous").anonymous(incident)
+    return hidden
 
 
 def _hint(*, died: bool) -> str:

@@ -1,0 +1,35 @@
+"""Without the workbench: the daemon's commands work, and the others say what to install."""
+
+import subprocess
+import sys
+
+import pytest
+
+ALONE = (
+    "import sys; sys.modules['workbench'] = None; from bridges.cli import main; sys.exit(main())"
+)
+
+
+def alone(*words: str) -> subprocess.CompletedProcess[str]:
+    """What `rmf-bridge WORDS` does where only the daemons are installed."""
+    return subprocess.run([sys.executable, "-c", ALONE, *words], capture_output=True, text=True)
+
+
+@pytest.mark.parametrize("command", ["run", "check", "incident"])
+def test_a_command_of_the_daemons_needs_no_workbench(command: str) -> None:
+    done = alone(command, "--help")
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_a_command_that_is_not_installed_says_what_to_install() -> None:
+    done = alone("watch", "--localhost")
+    assert (done.returncode, done.stdout) == (69, "")
+    assert done.stderr.startswith(
+        "rmf-bridge watch: this needs the workbench, which is not installed: "
+    )
+
+
+def test_an_incident_cannot_be_made_anonymous_and_nothing_is_written() -> None:
+    done = alone("incident", "lift.yaml", "--anonymous")
+    assert (done.returncode, done.stdout) == (69, "")
+    assert done.stderr.startswith("this needs the workbench")
