@@ -8,7 +8,8 @@ from msgspec.structs import replace
 
 from bridges.blackbox.trees import UnknownValue, first_difference, tree, value
 from bridges.kinds.charger.settings import Robot
-from bridges.kinds.lift.memory import Channel, Memory, Relays, Senses, Session
+from bridges.kinds.lift.memory import Memory, Senses, Session
+from bridges.kinds.lift.relays import Channel, Relays
 from bridges.kinds.lift.signals import Door, Hazard, LiftOutputs, LiftSample, Requested, Side
 from bridges.kinds.shared.decision import Fault, IoFailed, OperatorReset, Sampled
 from bridges.kinds.shared.durations import NEVER

@@ -1,6 +1,6 @@
 """Lifts: RMF's LiftRequest becomes outputs, and the lift's inputs become LiftState."""
 
-from bridges.kinds.lift import core, memory, messages, report, signals
+from bridges.kinds.lift import core, memory, messages, relays, report, signals
 from bridges.kinds.lift.memory import LiftLimits, Memory
 from bridges.kinds.lift.report import LiftReport
 from bridges.kinds.lift.settings import LiftSettings
@@ -35,14 +35,14 @@ KIND: Kind[
 )
 
 RECORDED: Recorded = {
-    "lift.memory.Channel": memory.Channel,
+    "lift.memory.Channel": relays.Channel,
     "lift.memory.Doubted": memory.Doubted,
     "lift.memory.Forgotten": memory.Forgotten,
     "lift.memory.Grace": memory.Grace,
     "lift.memory.Memory": memory.Memory,
     "lift.memory.OwnWords": memory.OwnWords,
     "lift.memory.Position": memory.Position,
-    "lift.memory.Relays": memory.Relays,
+    "lift.memory.Relays": relays.Relays,
     "lift.memory.Senses": memory.Senses,
     "lift.memory.Session": memory.Session,
     "lift.report.LiftReport": report.LiftReport,

@@ -147,7 +147,7 @@ def _drive(
         grace = None
     elif grace and allowed:
         outputs = drive.stays_on(grace, relays, view, now, limits)
-    relays = relays.step(outputs, now, limits)
+    relays = relays.step(outputs, now, limits.t)
     if session and relays.call.on and session.call_at is None:
         session = replace(session, call_at=now)
     return replace(memory, session=session, grace=grace, relays=relays), outputs
@@ -266,7 +266,7 @@ def _wake_at(
 ) -> float:
     due = [
         view.changes_at,
-        memory.relays.changes_at(outputs, now, limits),
+        memory.relays.changes_at(outputs, now, limits.t),
         _unwritten_at(memory, limits),
     ]
     if memory.session:

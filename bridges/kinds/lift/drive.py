@@ -19,12 +19,13 @@ Rules:
   mode during the ride is such a fault too. With `by_call` AGV mode may end between two destinations,
   while neither a call nor the hold is on. During an overload no timeout runs.
 - Switching off is immediate. Switching on waits until the relay has been off for `min_off_s`, and is
-  limited to `max_cycles_per_min` (`Channel` in `memory.py`).
+  limited to `max_cycles_per_min` (`Channel` in `relays.py`).
 """
 
 from msgspec.structs import replace
 
-from bridges.kinds.lift.memory import Grace, LiftLimits, Relays, Session, Waiting
+from bridges.kinds.lift.memory import Grace, LiftLimits, Session, Waiting
+from bridges.kinds.lift.relays import Relays
 from bridges.kinds.lift.sensing import View
 from bridges.kinds.lift.signals import Hazard, LiftOutputs
 from bridges.kinds.shared.decision import Fault

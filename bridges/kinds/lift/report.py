@@ -4,7 +4,8 @@ import msgspec
 from msgspec.structs import replace
 
 from bridges.kinds.lift import drive, forgotten
-from bridges.kinds.lift.memory import LiftLimits, Memory, Relays, Session
+from bridges.kinds.lift.memory import LiftLimits, Memory, Session
+from bridges.kinds.lift.relays import Relays
 from bridges.kinds.lift.sensing import View
 from bridges.kinds.lift.signals import Hazard, LiftOutputs, Motion
 from bridges.kinds.shared.decision import Fault
@@ -81,7 +82,7 @@ def report(
 
 def _worn(relays: Relays, wanted: LiftOutputs, now: float, limits: LiftLimits) -> tuple[Fault, ...]:
     """A relay was switched on too often, so that the lift stands. It hides no open door."""
-    output, worn = relays.resting(wanted, now, limits)
+    output, worn = relays.resting(wanted, now, limits.t)
     most = f"its relay came on {limits.t.max_cycles_per_min} times within a minute"
     return (Fault("RELAY_RESTS", f"{output}: {most}"),) if worn else ()
 
@@ -104,7 +105,7 @@ def _waits(
         return f"for its inputs: {view.blind}"
     if wanted == LiftOutputs() and drive.silent(session, now, limits):
         return f"for a request of {session.id}"
-    if output := relays.resting(wanted, now, limits)[0]:
+    if output := relays.resting(wanted, now, limits.t)[0]:
         return f"for {output}: its relay must rest"
     if wanted.agv_request and session.waiting:
         at = f" at {session.destination}"

@@ -3,20 +3,19 @@
 import pytest
 from msgspec.structs import replace
 
-from bridges.kinds.lift.memory import Channel, LiftLimits, Relays
-from bridges.kinds.lift.settings import Durations, LiftSettings
+from bridges.kinds.lift.relays import Channel, Relays
+from bridges.kinds.lift.settings import Durations
 from bridges.kinds.lift.signals import Door, Hazard, LiftOutputs, LiftSample, Motion, Side
 from tests.kinds.lift.story import Building, Controller, Story
 
 AT_L1 = LiftSample("L1", Door.OPEN, motion=Motion.STOPPED, agv=True)
 
 
-def limits(**changes: float) -> LiftLimits:
-    settings = LiftSettings(floors=["L1", "L2", "L3"], limits=Durations(**changes))  # type: ignore[arg-type]
-    return LiftLimits.of(settings, {})
+def limits(**changes: float) -> Durations:
+    return Durations(**changes)  # type: ignore[arg-type]
 
 
-def driven(relays: Relays, wishes: list[tuple[float, LiftOutputs]], rules: LiftLimits) -> list[str]:
+def driven(relays: Relays, wishes: list[tuple[float, LiftOutputs]], rules: Durations) -> list[str]:
     """What is on after each wish: `A` for AGV mode, the called floor, the held door."""
     shown = []
     for now, wish in wishes:

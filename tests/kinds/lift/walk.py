@@ -12,7 +12,8 @@ import msgspec
 from msgspec.structs import replace
 
 from bridges.kinds.lift.core import decide, initial, published
-from bridges.kinds.lift.memory import Channel, Forgotten, LiftLimits, Memory, OwnWords
+from bridges.kinds.lift.memory import Forgotten, LiftLimits, Memory, OwnWords
+from bridges.kinds.lift.relays import Channel
 from bridges.kinds.lift.settings import Durations, LiftSettings
 from bridges.kinds.lift.signals import (
     Door,

@@ -1,0 +1,100 @@
+"""The lift's outputs from scan to scan: what rests before it comes on, how often it may, and what is
+never on together. Off never waits."""
+
+import math
+from collections.abc import Iterator
+from typing import Any, Generic, TypeVar
+
+import msgspec
+from msgspec.structs import replace
+
+from bridges.kinds.lift.settings import Durations
+from bridges.kinds.lift.signals import LiftOutputs, Side
+from bridges.kinds.shared.durations import AGES_AGO, NEVER
+
+T = TypeVar("T")
+
+
+class Channel(msgspec.Struct, Generic[T], frozen=True):
+    """One output, or a group of which one at a time may be on.
+
+    `on`: what is on now. `off_at`: when it last went off. `ons`: the latest times it was switched on.
+    """
+
+    on: T | None = None
+    off_at: float = AGES_AGO
+    ons: tuple[float, ...] = ()
+
+    def step(self, wanted: T | None, now: float, ready_at: float, t: Durations) -> "Channel[T]":
+        """The next state. It goes off at once. It comes on, or changes, only after its rest and after
+        `ready_at`."""
+        if self.on is not None:
+            return self if wanted == self.on else replace(self, on=None, off_at=now)
+        if wanted is None or now < self.may_switch_on_at(now, ready_at, t):
+            return self
+        return Channel(wanted, self.off_at, (*self.recent(now), now))
+
+    def recent(self, now: float) -> tuple[float, ...]:
+        """When it was switched on during the last minute."""
+        return tuple(at for at in self.ons if now - at < 60.0)
+
+    def may_switch_on_at(self, now: float, ready_at: float, t: Durations) -> float:
+        """The earliest time at which it may be energised."""
+        recent = self.recent(now)
+        most = t.max_cycles_per_min
+        rested_at = recent[-most] + 60.0 if len(recent) >= most else AGES_AGO
+        return max(self.off_at + t.min_off_s, ready_at, rested_at)
+
+
+class Relays(msgspec.Struct, frozen=True):
+    """Every output with its history. A call and a door command are never on together."""
+
+    agv: Channel[bool] = Channel()
+    call: Channel[str] = Channel()
+    hold: Channel[Side] = Channel()
+
+    def outputs(self) -> LiftOutputs:
+        """What the driver is to write."""
+        return LiftOutputs(bool(self.agv.on), self.call.on, self.hold.on)
+
+    def step(self, wanted: LiftOutputs, now: float, t: Durations) -> "Relays":
+        """Move every output towards what is wanted, as far as is allowed now."""
+        agv = self.agv.step(wanted.agv_request or None, now, AGES_AGO, t)
+        rested_at = self._rested_at(t) if agv.on else NEVER
+        call_ready_at = NEVER if self.hold.on else rested_at
+        call = self.call.step(wanted.call, now, call_ready_at, t)
+        hold_ready_at = NEVER if self.call.on or call.on else rested_at
+        hold = self.hold.step(wanted.hold_door, now, hold_ready_at, t)
+        return Relays(agv, call, hold)
+
+    def changes_at(self, wanted: LiftOutputs, now: float, t: Durations) -> float:
+        """When an output that is wanted and still off may come on; always later than `now`."""
+        off = self._still_off(wanted, now, t)
+        due = [channel.may_switch_on_at(now, ready_at, t) for _, channel, ready_at in off]
+        return max(min(due, default=NEVER), math.nextafter(now, NEVER))
+
+    def resting(self, wanted: LiftOutputs, now: float, t: Durations) -> tuple[str, bool]:
+        """The first output that is wanted and must rest before it comes on, and whether
+        `max_cycles_per_min` is why; "" for none."""
+        for name, channel, ready_at in self._still_off(wanted, now, t):
+            unused = replace(channel, ons=())
+            at = channel.may_switch_on_at(now, ready_at, t)
+            return name, at > unused.may_switch_on_at(now, ready_at, t)
+        return "", False
+
+    def _still_off(
+        self, wanted: LiftOutputs, now: float, t: Durations
+    ) -> Iterator[tuple[str, Channel[Any], float]]:
+        """Each output that is wanted and off, its name, and when the others let it come on."""
+        agv_at = now if self.agv.on else self.agv.may_switch_on_at(now, AGES_AGO, t)
+        ready_at = max(agv_at, self._rested_at(t))
+        if wanted.agv_request and not self.agv.on:
+            yield "AGV mode", self.agv, AGES_AGO
+        if wanted.call and not self.call.on:
+            yield "the call", self.call, ready_at
+        if wanted.hold_door and not self.hold.on:
+            yield "the door", self.hold, ready_at
+
+    def _rested_at(self, t: Durations) -> float:
+        """When call and door command will both have been off for `dead_time_s`."""
+        return max(self.call.off_at, self.hold.off_at) + t.dead_time_s
