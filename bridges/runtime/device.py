@@ -17,7 +17,6 @@ from bridges.kinds.shared.decision import (
     OperatorReset,
     R,
     RequestRefused,
-    RivalSeen,
     Sampled,
     Suspended,
     WriteFailed,
@@ -95,16 +94,10 @@ class Node(Generic[S, L, M, X, E, O, R]):
         """Could the last scan read and write all of it?"""
         return self._has_read and not self._io_fault
 
-    def event(self, topic: Topic[Message], message: Message) -> E | RivalSeen | None:
-        """The core's event for a message; None if it is refused. Called from any thread."""
-        if topic == self._kind.states:
-            return RivalSeen()
-        try:
-            return self._kind.requests[topic](message, self._settings)
-        except RequestRefused as refusal:
-            self._refusals.add(refusal.kind, refusal.detail, device=self.name)
-            self._answers.add(message, str(refusal))
-            return None
+    def refuse(self, message: Message, refusal: RequestRefused) -> None:
+        """Count a message that makes no event, and answer it. Called from any thread."""
+        self._refusals.add(refusal.kind, refusal.detail, device=self.name)
+        self._answers.add(message, str(refusal))
 
     def was_suspended(self, for_s: float) -> None:
         """Nothing was scanned for this long (s): everything read before may be outdated."""

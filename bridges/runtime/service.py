@@ -7,10 +7,10 @@ import logging
 from collections import Counter
 from collections.abc import Callable, Collection, Mapping, Sequence
 from functools import partial
-from typing import Protocol
+from typing import Any, Protocol
 
 from bridges.host.log import pairs
-from bridges.kinds.shared.decision import Attended, OperatorReset
+from bridges.kinds.shared.decision import Attended, OperatorReset, RequestRefused, RivalSeen
 from bridges.kinds.shared.graph_kind import GraphKind
 from bridges.kinds.shared.kind import AnyDeviceKind
 from bridges.messages.definitions import Message
@@ -137,11 +137,12 @@ class Devices:
 
     def subscribe(self) -> None:
         """Subscribe to requests, and to states of our devices that other nodes publish."""
-        for topic in self._kind.requests:
-            hear = self._to_inbox(topic)
+        for topic, accept in self._kind.requests.items():
+            hear = self._to_inbox(topic, accept)
             self._hears[topic.name] = self._transport.subscribe(self._named(topic), hear)
         states = self._kind.states
-        self._transport.subscribe(self._named(states), self._to_inbox(states), others_only=True)
+        hear = self._to_inbox(states, lambda state, settings: RivalSeen())
+        self._transport.subscribe(self._named(states), hear, others_only=True)
 
     def reset(self) -> None:
         """Put the reset into the inbox of each device."""
@@ -196,7 +197,9 @@ class Devices:
             name, self._kind, device, limits, driver, out.publish, clock, witness, out.failed
         )
 
-    def _to_inbox(self, topic: Topic[Message]) -> Callable[[Message], None]:
+    def _to_inbox(
+        self, topic: Topic[Message], accept: Callable[[Any, Any], object]
+    ) -> Callable[[Message], None]:
         """A callback for the transport's thread. States of others' devices are not counted."""
         states = topic == self._kind.states
         heard_on = self._named(topic).name
@@ -206,8 +209,11 @@ class Devices:
             if device in self._placed:
                 self._witness.spoken(heard_on, message, sent=False)
                 node, loop = self._placed[device]
-                event = node.event(topic, message)
-                if event is not None:
+                try:
+                    event = accept(message, self._config.devices[device])
+                except RequestRefused as refusal:
+                    node.refuse(message, refusal)
+                else:
                     sender = "" if states else self._kind.sender(message)
                     loop.inbox.put(device, event, (topic.name, sender))
             elif not states:

@@ -5,9 +5,8 @@ from collections.abc import Callable, Sequence
 from bridges.kinds.door import KIND
 from bridges.kinds.door.memory import DoorLimits
 from bridges.kinds.door.settings import DoorSettings
-from bridges.kinds.door.signals import DoorOutputs, DoorSample
-from bridges.messages import topics
-from bridges.messages.definitions import DoorMode, DoorModeValue, DoorRequest, DoorState, Message
+from bridges.kinds.door.signals import DoorOutputs, DoorSample, OpenRequested
+from bridges.messages.definitions import DoorState, Message
 from bridges.messages.topics import Topic
 from bridges.runtime.clock import Clock
 from bridges.runtime.device import Node
@@ -112,10 +111,4 @@ class Corridor:
 
     def asks(self, door: str) -> None:
         """RMF wants it open."""
-        request = DoorRequest(
-            requester_id="a",
-            door_name=door,
-            requested_mode=DoorMode(int(DoorModeValue.MODE_OPEN)),
-        )
-        node = next(node for node in self.loop.nodes if node.name == door)
-        self.loop.inbox.put(door, node.event(topics.DOOR_REQUESTS, request))
+        self.loop.inbox.put(door, OpenRequested("a"))

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable, Mapping
 from functools import partial
 from typing import Any
 
-from bridges.kinds.shared.decision import OperatorReset
+from bridges.kinds.shared.decision import OperatorReset, RivalSeen
 from bridges.kinds.shared.graph_kind import AnyGraphKind
 from bridges.messages.definitions import Message
 from bridges.messages.topics import DOOR_REQUESTS, DOOR_SUPERVISOR_HEARTBEAT, LIFT_REQUESTS, Topic
@@ -22,6 +22,7 @@ from bridges.runtime.subject import Status
 from bridges.runtime.witness import NOBODY, Nobody
 from bridges.transports.transport import Publisher
 from hal_fakes.plants.plant import Edge
+from tests.accepted import accepted
 from tests.runtime.virtual_graph import Disk
 from tests.site.building import Device
 from tests.site.network import Air, Place
@@ -155,8 +156,11 @@ class DeviceDaemon:
         if self.device.kind.device_name(message) != self.name:
             return
         self.witness.spoken(topic.name, message, sent=False)
-        event = self._node.event(topic, message)
-        if event is not None:
+        kind, settings = self.device.kind, self.device.settings
+        if topic == kind.states:
+            self.scan(RivalSeen())
+            return
+        for event in accepted(self._node, kind, settings, (topic, message)):
             self.scan(event)
 
     def _publish(self, topic: Topic[Any], message: Message) -> None:

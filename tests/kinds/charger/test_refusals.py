@@ -23,6 +23,7 @@ from bridges.messages.definitions import (
 from bridges.runtime.clock import Clock
 from bridges.runtime.device import Node
 from bridges.runtime.diagnostics import diagnosis
+from tests.accepted import accepted
 
 FIRST = ChargerRequest("a", "tiny", "AMR01", Duration(60), "req-1")
 SECOND = ChargerRequest("a", "tiny", "AMR02", Duration(60), "req-2")
@@ -60,20 +61,20 @@ class Station:
     said: list[tuple[str, Any]] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        settings, clock = ChargerSettings(), Clock(lambda: self.now, lambda: 1e9 + self.now)
-        limits = ChargerLimits.of(settings)
-        self.node = Node("a", KIND, settings, limits, Idle(), self._say, clock)
+        self.settings, clock = ChargerSettings(), Clock(lambda: self.now, lambda: 1e9 + self.now)
+        limits = ChargerLimits.of(self.settings)
+        self.node = Node("a", KIND, self.settings, limits, Idle(), self._say, clock)
 
     def _say(self, topic: Any, message: Any) -> None:
         self.said.append((topic.name, message))
 
     def hears(self, *requests: ChargerRequest | ChargerCancel, after_s: float = 1.0) -> "Station":
         cancel = topics.CHARGER_CANCELS
-        found = [
-            self.node.event(cancel if isinstance(r, ChargerCancel) else topics.CHARGER_REQUESTS, r)
+        heard = [
+            (cancel if isinstance(r, ChargerCancel) else topics.CHARGER_REQUESTS, r)
             for r in requests
         ]
-        self.node.scan([event for event in found if event is not None])
+        self.node.scan(accepted(self.node, KIND, self.settings, *heard))
         self.now += after_s
         return self
 

@@ -14,7 +14,7 @@ from bridges.kinds.lift import KIND
 from bridges.kinds.lift.memory import LiftLimits
 from bridges.kinds.lift.settings import Durations, Floor, LiftSettings
 from bridges.kinds.lift.signals import Door, Hazard, LiftOutputs, LiftSample, Motion
-from bridges.kinds.shared.decision import OperatorReset
+from bridges.kinds.shared.decision import OperatorReset, RivalSeen
 from bridges.kinds.shared.kind import AnyDeviceKind
 from bridges.messages.definitions import (
     LiftDoor,
@@ -29,6 +29,7 @@ from bridges.messages.topics import LIFT_REQUESTS, LIFT_STATES, Topic
 from bridges.runtime.clock import Clock
 from bridges.runtime.device import Node
 from drivers import DriverError
+from tests.accepted import accepted
 
 SCAN_S = 0.05
 LEAST_GAP_S = 0.001
@@ -265,11 +266,11 @@ class Story:
 
     def receive(self, *said: tuple[Topic[Any], LiftRequest]) -> None:
         """These arrive in one scan, each on its topic."""
-        self._scan(*(self.node.event(topic, request) for topic, request in said))
+        self._scan(*accepted(self.node, self._kind, self.settings, *said))
 
     def rival(self) -> None:
         """Somebody else publishes a state of this lift."""
-        self._scan(self.node.event(LIFT_STATES, LiftState(lift_name="Lift1")))
+        self._scan(RivalSeen())
 
     def resets(self) -> None:
         """An operator's `rmf-bridge reset`."""
@@ -316,7 +317,7 @@ class Story:
 
     def _scan(self, *events: Any) -> None:
         self.building.advance(self.now)
-        self.node.scan([event for event in events if event is not None])
+        self.node.scan(events)
         if self.incoming:
             arrived, self.incoming = self.incoming, []
             self.receive(*arrived)

@@ -14,6 +14,7 @@ from bridges.messages.definitions import Message
 from bridges.messages.topics import LIFT_REQUESTS, LIFT_STATES, Topic
 from bridges.runtime.clock import Clock
 from bridges.runtime.device import Node
+from tests.accepted import accepted
 from tests.kinds.lift.story import Controller
 from tests.kinds.lift_supervisor.alone import words
 from tests.runtime.virtual_graph import EPOCH, NEVER, Served, StandIn, World, say
@@ -86,8 +87,7 @@ class LiftNode:
 
     def hear(self, topic: Topic[Any], message: Any) -> None:
         if message.lift_name == self.name:
-            event = self.node.event(topic, message)
-            self._scan(*([] if event is None else [event]))
+            self._scan(*accepted(self.node, LIFT, self.settings, (topic, message)))
 
     def wake_at(self) -> float:
         return self._scan_at

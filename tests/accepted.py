@@ -1,0 +1,22 @@
+"""Passes messages on as the daemon's service does, for stories whose node has none."""
+
+from typing import Any
+
+from bridges.kinds.shared.decision import RequestRefused
+from bridges.kinds.shared.kind import AnyDeviceKind
+from bridges.messages.definitions import Message
+from bridges.messages.topics import Topic
+from bridges.runtime.device import AnyNode
+
+
+def accepted(
+    node: AnyNode, kind: AnyDeviceKind, settings: Any, *heard: tuple[Topic[Any], Message]
+) -> list[Any]:
+    """The events of these requests, each heard on its topic. The node is told of those refused."""
+    events = []
+    for topic, request in heard:
+        try:
+            events.append(kind.requests[topic](request, settings))
+        except RequestRefused as refusal:
+            node.refuse(request, refusal)
+    return events
