@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import msgspec
 
+from bridges.kinds import kind_names, recorded
 from bridges.kinds.shared.recorded import SHARED
 
 if TYPE_CHECKING:
@@ -158,8 +159,6 @@ def name_of(kind: type) -> str:
 def _type(name: str) -> type[Any]:
     """The type of this name; of the kinds only the one that it begins with is loaded. Raises
     UnknownValue."""
-    from bridges.settings.names import kind_names, recorded
-
     kind = name.partition(".")[0]
     known = recorded(kind) if kind in kind_names() else SHARED
     if name not in known:

@@ -1,1 +1,62 @@
-"""What a bridge can be, a folder for each kind: pure rules about lifts, doors and chargers."""
+"""What a bridge can be, a folder for each kind: pure rules about lifts, doors and chargers.
+
+A kind is found by the name in a YAML. Only names of existing folders are imported: there is no table to
+edit, and no other file imports a kind by its name.
+"""
+
+import importlib
+import pkgutil
+import re
+from collections.abc import Callable, Iterable, Iterator
+from functools import cache
+from pathlib import Path
+from types import ModuleType
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from bridges.kinds.shared.graph_kind import AnyKind
+    from bridges.kinds.shared.recorded import Recorded
+
+
+def kind_names() -> list[str]:
+    """What `kind:` may be: the folders here that hold a `KIND`."""
+    return holding(__path__, "*/__init__.py", "KIND", lambda path: path.parent.name)
+
+
+def holding(
+    roots: Iterable[str], pattern: str, record: str, name: Callable[[Path], str]
+) -> list[str]:
+    """Names of the files in these folders that hold such a record."""
+    return sorted({name(path) for path in _files(tuple(roots), pattern, record)})
+
+
+@cache
+def _files(roots: tuple[str, ...], pattern: str, record: str) -> list[Path]:
+    """The files that hold such a record. They are read, once, and not imported: some need a vendor's
+    library."""
+    found = (path for root in roots for path in Path(root).glob(pattern))
+    holds = re.compile(rf"^{record}(:| =)", re.MULTILINE).search
+    return [path for path in found if holds(path.read_text("utf-8"))]
+
+
+def kind_called(name: str) -> "AnyKind":
+    """The kind that `kind:` names; one of `kind_names()`."""
+    kind: AnyKind = _package(name).KIND
+    return kind
+
+
+def recorded(kind: str) -> "Recorded":
+    """The names of a kind's values in recordings; none if its values are those of another kind."""
+    found: Recorded = getattr(_package(kind), "RECORDED", {})
+    return found
+
+
+def kind_files(name: str) -> Iterator[ModuleType]:
+    """Every file of a kind. Raises ImportError if one cannot be imported."""
+    package = _package(name)
+    for file in pkgutil.iter_modules(package.__path__, f"{package.__name__}."):
+        yield importlib.import_module(file.name)
+
+
+def _package(kind: str) -> ModuleType:
+    return importlib.import_module(f"{__name__}.{kind}")

@@ -10,6 +10,7 @@ from functools import partial
 from typing import Any, Protocol
 
 from bridges.host.log import pairs
+from bridges.kinds import kind_called
 from bridges.kinds.shared.decision import Attended, OperatorReset, RequestRefused, RivalSeen
 from bridges.kinds.shared.graph_kind import GraphKind
 from bridges.kinds.shared.kind import AnyDeviceKind
@@ -27,7 +28,6 @@ from bridges.runtime.serving import Serving
 from bridges.runtime.subject import Status
 from bridges.runtime.witness import NOBODY, Nobody
 from bridges.settings.load import Config
-from bridges.settings.names import kind_called
 from bridges.transports.transport import Subscription, Transport
 from drivers.hal import Bus
 

@@ -8,8 +8,8 @@ from collections.abc import Iterable, Iterator, Sequence
 
 from msgspec import Struct
 
+from bridges.kinds import kind_called
 from bridges.kinds.shared.graph_kind import GraphKind
-from bridges.settings import names as named
 from bridges.settings.load import Config
 from bridges.yaml.nodes import Page, Problem, compose
 from bridges.yaml.spelling import unknown
@@ -101,7 +101,7 @@ def _gateways(config: Config) -> Iterator[Claim]:
 
 def _claims(config: Config, one_machine: bool) -> Iterator[Claim]:
     """Names on RMF's graph, and places on buses."""
-    kind = named.kind_called(config.kind)
+    kind = kind_called(config.kind)
     if isinstance(kind, GraphKind):
         yield Claim(config, f"kind: {kind.name}", ("kind",))
         return
@@ -171,14 +171,14 @@ def _unspoken(configs: Sequence[Config]) -> Iterator[Problem]:
         speaker = next(claim.config for k, _, claim in spoken if k == kind)
         for name, config in _devices(configs, kind).items():
             if name not in names:
-                key = named.kind_called(kind).devices_key
+                key = kind_called(kind).devices_key
                 text = f"warning: '{name}' is not served: {speaker.path} does not name it"
                 yield _said(Claim(config, "", (key, name)), text)
 
 
 def _spoken(configs: Sequence[Config]) -> Iterator[tuple[Claim, str, str]]:
     for config in configs:
-        kind = named.kind_called(config.kind)
+        kind = kind_called(config.kind)
         if isinstance(kind, GraphKind):
             for path, what, name in kind.speaks_of(config.section):
                 yield Claim(config, name, (kind.devices_key, *path)), what, name

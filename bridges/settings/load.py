@@ -19,6 +19,7 @@ from typing import Final
 import msgspec
 from yaml import MappingNode, Node, ScalarNode
 
+from bridges.kinds import kind_called, kind_names
 from bridges.kinds.shared.fields import DeviceSettings, Name
 from bridges.kinds.shared.graph_kind import AnyGraphKind, AnyKind, GraphKind
 from bridges.kinds.shared.recording_section import Recording
@@ -138,10 +139,10 @@ class _Reading:
         self._collect_unwatched()
 
     def _read_kind(self, entry: Entry | None) -> None:
-        name = word(self._values, entry, named.kind_names())
+        name = word(self._values, entry, kind_names())
         if name:
             self._kind_name = name
-            self._kind = named.kind_called(name)
+            self._kind = kind_called(name)
 
     def _read_driver(self, entry: Entry | None) -> None:
         if self._kind is None:

@@ -7,9 +7,9 @@ waits forever.
 from collections.abc import Iterator
 from pathlib import Path
 
+from bridges.kinds import kind_called
 from bridges.kinds.shared.graph_kind import GraphKind
 from bridges.kinds.shared.kind import CHARGER, DOOR, FLOOR, LIFT, WAYPOINT, Place
-from bridges.settings import names as named
 from bridges.settings.building_map import BuildingMap
 from bridges.settings.load import Config
 from bridges.yaml.nodes import Page, Problem, compose
@@ -19,7 +19,7 @@ from bridges.yaml.spots import Spot, locate
 
 def places(config: Config) -> list[Place]:
     """Every name in a file that RMF's map must have, with its path in the file."""
-    kind = named.kind_called(config.kind)
+    kind = kind_called(config.kind)
     if isinstance(kind, GraphKind):
         found = kind.on_map(config.section)
         return [((kind.devices_key, *path), what, name) for path, what, name in found]

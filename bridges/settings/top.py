@@ -5,6 +5,7 @@ from typing import Final
 from msgspec.inspect import LiteralType
 from msgspec.structs import fields
 
+from bridges.kinds import kind_called, kind_names
 from bridges.kinds.shared.graph_kind import AnyKind, GraphKind
 from bridges.kinds.shared.recording_section import Recording
 from bridges.kinds.shared.rmf_section import Rmf
@@ -19,11 +20,11 @@ MAPPING: Final = "a mapping (key: value)"
 
 def top_keys(kind: AnyKind | None) -> dict[str, str | None]:
     """Key -> what its value must be, or None if it is optional. `kind`: None while it is not known."""
-    first = {"kind": either(named.kind_names())}
+    first = {"kind": either(kind_names())}
     if isinstance(kind, GraphKind):
         return {**first, "rmf": None, "recording": None, kind.devices_key: None}
     if kind is None:
-        all_kinds = map(named.kind_called, named.kind_names())
+        all_kinds = map(kind_called, kind_names())
         sections = dict.fromkeys(found.devices_key for found in all_kinds)
         return {
             **first,

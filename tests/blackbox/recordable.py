@@ -9,10 +9,10 @@ from typing import Any
 
 import msgspec
 
+from bridges.kinds import kind_called, kind_names
 from bridges.kinds.shared.decision import Decision
 from bridges.messages import constants
 from bridges.messages.definitions import Message
-from bridges.settings.names import kind_called, kind_names
 
 PLAIN: dict[Any, Any] = {bool: True, int: 1, float: 1.5, str: "a", None: None, type(None): None}
 BOXES: dict[Any, Any] = {tuple: tuple, frozenset: frozenset, set: frozenset}

@@ -14,10 +14,10 @@ import pytest
 
 from bridges.blackbox.entries import AnyEntry, Head, Known, Step
 from bridges.blackbox.trees import TYPE, UnknownValue, name_of, tree, value
+from bridges.kinds import kind_called, kind_names, recorded
 from bridges.kinds.shared.graph_kind import GraphKind
 from bridges.kinds.shared.recorded import SHARED
 from bridges.runtime.record import Record
-from bridges.settings import names
 from drivers.profiles import texts
 from tests.blackbox.earlier import DAYS
 from tests.blackbox.recordable import recordable, specimens
@@ -59,8 +59,8 @@ def test_every_type_that_a_daemon_can_record_has_a_name_and_comes_back() -> None
 
 def test_a_name_is_given_once_to_a_type_that_a_daemon_records_and_begins_with_its_kind() -> None:
     every = [*SHARED.items()]
-    for kind in names.kind_names():
-        own = names.recorded(kind)
+    for kind in kind_names():
+        own = recorded(kind)
         assert [name for name in own if not name.startswith(f"{kind}.")] == []
         every += own.items()
     assert len({name for name, _ in every}) == len(every)
@@ -133,7 +133,7 @@ def _values(entry: AnyEntry) -> Iterator[Any]:
 )
 def test_what_a_kind_without_hardware_kept_is_restored_whole(file: Path) -> None:
     head: Head = opened(file.with_suffix(".mcap"), Notes())[0]
-    kind = names.kind_called(head.kind)
+    kind = kind_called(head.kind)
     assert isinstance(kind, GraphKind)
     assert kind.restore
     assert kind.persist

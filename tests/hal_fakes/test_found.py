@@ -4,10 +4,11 @@ from importlib import import_module
 
 import pytest
 
+from bridges.kinds import kind_names
 from bridges.settings import names as named
 from hal_fakes.fake import Fake, Inside, Outside
 
-DRIVERS = [(kind, name) for kind in named.kind_names() for name in named.driver_names(kind)]
+DRIVERS = [(kind, name) for kind in kind_names() for name in named.driver_names(kind)]
 
 
 @pytest.mark.parametrize(("kind", "driver"), DRIVERS)

@@ -6,8 +6,8 @@ from configparser import ConfigParser
 from pathlib import Path
 
 from bridges import __version__
+from bridges.kinds import kind_names
 from bridges.messages.definitions import PACKAGES
-from bridges.settings import names as named
 
 ROS = Path(__file__).parents[2] / "ros"
 PACKAGE = ElementTree.parse(ROS / "package.xml").getroot()
@@ -38,4 +38,4 @@ def test_every_kind_has_a_launch_file_that_starts_that_kind() -> None:
             node for node in ast.walk(ast.parse(file.read_text())) if isinstance(node, ast.Call)
         ]
         started[file.name] = [ast.unparse(call) for call in calls]
-    assert started == {f"{kind}.launch.py": [f"daemon('{kind}')"] for kind in named.kind_names()}
+    assert started == {f"{kind}.launch.py": [f"daemon('{kind}')"] for kind in kind_names()}

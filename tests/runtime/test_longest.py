@@ -8,6 +8,7 @@ import pytest
 from msgspec import Struct
 from msgspec.structs import replace
 
+from bridges.kinds import kind_called
 from bridges.kinds.shared.decision import RequestRefused
 from bridges.kinds.shared.graph_kind import GraphKind
 from bridges.messages import definitions as d
@@ -15,7 +16,6 @@ from bridges.messages import topics
 from bridges.messages.definitions import Message
 from bridges.messages.topics import Topic
 from bridges.settings.load import load
-from bridges.settings.names import kind_called
 
 CONFIG = Path(__file__).parents[2] / "config"
 HUGE = "x" * 10_000_000

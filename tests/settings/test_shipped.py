@@ -28,6 +28,7 @@ from msgspec.inspect import (
 )
 from yaml import CollectionNode, MappingNode, Node, ScalarNode, SequenceNode
 
+from bridges.kinds import kind_names
 from bridges.kinds.shared.rmf_section import Rmf
 from bridges.settings import names as named
 from bridges.settings.load import load
@@ -182,7 +183,7 @@ def leaves(wanted: Type) -> Iterator[Type]:
 
 def test_every_field_of_every_driver_and_bus_is_of_a_sort_that_is_read() -> None:
     structs = [Rmf, *(named.bus_called(name).settings for name in named.bus_types())]
-    for kind in named.kind_names():
+    for kind in kind_names():
         structs += [named.driver_called(kind, name).settings for name in named.driver_names(kind)]
     sorts = {type(leaf) for struct in structs for leaf in leaves(type_info(struct))}
     assert sorts <= {BoolType, EnumType, FloatType, IntType, LiteralType, NoneType, StrType}

@@ -16,6 +16,7 @@ from msgspec.inspect import (
     type_info,
 )
 
+from bridges.kinds import kind_called, kind_names
 from bridges.kinds.shared.graph_kind import GraphKind
 from bridges.kinds.shared.rmf_section import Rmf
 from bridges.settings import names as named
@@ -178,8 +179,8 @@ def patterns(wanted: Type, words: str = "") -> Iterator[tuple[str, str]]:
 
 def test_every_pattern_is_said_in_words() -> None:
     structs = [Rmf, *(named.bus_called(name).settings for name in named.bus_types())]
-    for name in named.kind_names():
-        kind = named.kind_called(name)
+    for name in kind_names():
+        kind = kind_called(name)
         structs += [kind.settings] if isinstance(kind, GraphKind) else []
         structs += [named.driver_called(name, d).settings for d in named.driver_names(name)]
     found = {pattern: words for struct in structs for pattern, words in patterns(type_info(struct))}

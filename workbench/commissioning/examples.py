@@ -12,6 +12,7 @@ import yaml
 from msgspec import inspect as mi
 
 import drivers
+from bridges.kinds import kind_names
 from bridges.settings import names as named
 from bridges.settings.load import load
 from bridges.settings.shown import is_section
@@ -85,7 +86,7 @@ def _shipped() -> Found:
 
 def _profiles() -> Iterator[Profile[msgspec.Struct]]:
     """Every sort of profile that a driver reads."""
-    for kind in named.kind_names():
+    for kind in kind_names():
         for driver in named.driver_names(kind):
             found = vars(named.driver_module(kind, driver)).get("PROFILE")
             if isinstance(found, Profile):

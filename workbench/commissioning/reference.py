@@ -12,6 +12,7 @@ import msgspec
 from msgspec import inspect as mi
 
 from bridges import __version__
+from bridges.kinds import kind_called, kind_names
 from bridges.kinds.shared.graph_kind import AnyGraphKind, GraphKind
 from bridges.kinds.shared.recording_section import Recording
 from bridges.kinds.shared.rmf_section import Rmf
@@ -38,15 +39,15 @@ class Shape(msgspec.Struct, frozen=True):
 
 def shapes() -> Iterator[Shape]:
     """Every combination of kind and driver."""
-    for kind in named.kind_names():
-        key = named.kind_called(kind).devices_key
+    for kind in kind_names():
+        key = kind_called(kind).devices_key
         for driver in named.driver_names(kind):
             yield Shape(kind, key, driver, named.driver_called(kind, driver))
 
 
 def graph_kinds() -> list[AnyGraphKind]:
     """Every kind without devices."""
-    kinds = (named.kind_called(name) for name in named.kind_names())
+    kinds = (kind_called(name) for name in kind_names())
     return [kind for kind in kinds if isinstance(kind, GraphKind)]
 
 

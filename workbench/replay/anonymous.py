@@ -23,13 +23,13 @@ from msgspec.structs import replace
 from bridges.blackbox.entries import AnyEntry, Clocks, Died, Ended, Head, Known, Lost, Spoken, Step
 from bridges.blackbox.incident import Incident
 from bridges.blackbox.trees import HOLDS, TYPE, Tree
+from bridges.kinds import kind_called, kind_files, kind_names
 from bridges.kinds.shared.graph_kind import GraphKind
 from bridges.messages import cdr
 from bridges.messages.definitions import Message
 from bridges.messages.heard import FREE_TEXTS
 from bridges.messages.releases import RELEASES
 from bridges.messages.texts import MESSAGES
-from bridges.settings import names as known
 from bridges.settings.config import Config
 from workbench.commissioning.reference import schema
 from workbench.replay.replayed import of_head
@@ -124,7 +124,7 @@ def _subjects(incident: Incident) -> Iterator[str]:
 
 def _own_names(config: Config, content: dict[str, Any]) -> Iterator[str]:
     """The devices and places that the YAML names; of a kind without hardware, every word of its own."""
-    kind = known.kind_called(config.kind)
+    kind = kind_called(config.kind)
     yield from content.get("rmf", {}).get("topics", {}).values()
     if isinstance(kind, GraphKind):
         yield from _words(content.get(kind.devices_key))
@@ -150,8 +150,8 @@ def our_words() -> frozenset[str]:
     """Every key and word that a YAML or a core may have by itself."""
     found = {"site", *TOPICS}
     _schema_words(schema(), found)
-    for kind in known.kind_names():
-        for module in known.kind_files(kind):
+    for kind in kind_names():
+        for module in kind_files(kind):
             found |= set(_module_words(module))
     return frozenset(found)
 

@@ -24,11 +24,11 @@ from bridges.blackbox.entries import (
 )
 from bridges.blackbox.trees import Tree, UnknownValue, first_difference, tree
 from bridges.host.log import plain
+from bridges.kinds import kind_called
 from bridges.kinds.shared.decision import Decision, IoFailed, Sampled
 from bridges.kinds.shared.graph_kind import GraphKind
 from bridges.settings.config import Config
 from bridges.settings.load import understood
-from bridges.settings.names import kind_called
 from drivers.profiles import texts
 from workbench.replay.typed import typed, types_of
 

@@ -5,10 +5,10 @@ from collections.abc import Sequence
 
 import msgspec
 
+from bridges.kinds import kind_called
 from bridges.kinds.shared.graph_kind import GraphKind
 from bridges.kinds.shared.table import Table
 from bridges.messages import instead
-from bridges.settings import names as named
 from bridges.settings.load import Config
 from bridges.settings.shown import choices_of, plain
 from bridges.yaml.nodes import Problem
@@ -81,7 +81,7 @@ def findings(config: Config, errors: Sequence[Problem] = (), notes: Sequence[str
 
 def _lacking(config: Config) -> list[str]:
     """What takes another way where RMF's release lacks its message."""
-    kind = named.kind_called(config.kind)
+    kind = kind_called(config.kind)
     if isinstance(kind, GraphKind):
         topics = [*kind.publishes]
     else:
@@ -97,7 +97,7 @@ def _bus(config: Config, name: str) -> BusShown:
 
 def _graph(config: Config) -> Part:
     """A kind without devices: its own tables, and its settings."""
-    kind = named.kind_called(config.kind)
+    kind = kind_called(config.kind)
     assert isinstance(kind, GraphKind)
     tables = [*kind.tables(config.section), _settings(config.section)]
     return Part(device=config.kind, bus="", tables=tables)

@@ -3,7 +3,7 @@
 import tomllib
 from pathlib import Path
 
-from bridges.settings.names import kind_names
+from bridges.kinds import kind_names
 
 PYPROJECT = Path(__file__).parents[3] / "pyproject.toml"
 

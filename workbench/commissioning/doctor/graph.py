@@ -12,11 +12,11 @@ from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from typing import Any, Final
 
+from bridges.kinds import kind_called
 from bridges.kinds.shared.graph_kind import GraphKind
 from bridges.messages import words
 from bridges.messages.definitions import PACKAGES
 from bridges.runtime.service import named_by
-from bridges.settings import names as named
 from bridges.settings.load import Config
 from bridges.transports.addresses import addresses
 from bridges.transports.choose import domain_id, open_transport, stays_on_loopback
@@ -92,7 +92,7 @@ def _interface(domain: int, loopback: bool) -> Finding:
 
 
 def _heard(config: Config, transport: Transport, look: Look) -> Iterator[Finding]:
-    kind = named.kind_called(config.kind)
+    kind = kind_called(config.kind)
     ends = {
         topic.name: transport.subscribe(named_by(config, topic), _ignore) for topic in kind.requests
     }
