@@ -1,1 +1,1 @@
-"""What was heard on RMF's graph and what a daemon did: stored, read again and understood."""
+"""What a daemon heard, decided and sent: kept in a ring, and written to files by the recorder."""

@@ -1,7 +1,7 @@
 """`rmf-bridge check FILE...`: what is wrong with device YAMLs, or all that an electrician signs.
 
 Each file is read and checked, then all of them together (`bridges/settings/across.py`). The findings
-about a file are gathered once (`sheets/findings.py`), and printed as text, as JSON or as a sheet.
+about a file are gathered once (`sheets/findings.py` there), and printed as text, as JSON or as a sheet.
 """
 
 import argparse

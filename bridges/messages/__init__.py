@@ -1,1 +1,1 @@
-"""The way to Open-RMF: message definitions, topic names, QoS, and the transports."""
+"""RMF's messages: definitions, bytes, topic names and QoS, and what each release lacks."""

@@ -9,8 +9,8 @@
 
 A kind without hardware has only `kind`, `rmf`, `recording` and one section of its own.
 
-Structs define what a section may contain (`values.py`); this file and `wiring.py` check what concerns
-several sections. The daemon takes nothing else from the file, and checks nothing again.
+Structs define what a section may contain (`bridges/yaml/values.py`); this file and `wiring.py` check
+what concerns several sections. The daemon takes nothing else from the file, and checks nothing again.
 """
 
 from pathlib import Path

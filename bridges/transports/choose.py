@@ -1,7 +1,7 @@
 """Which transport a daemon uses, in which ROS domain, on which network.
 
 The YAML decides. Where it says nothing, ROS's environment variables do, as for any ROS node. Each
-transport has a file beside this one: `ros2.py`, `dds.py`, `zenoh.py`.
+transport has a folder beside this file: `ros2/`, `dds/`, `zenoh/`.
 """
 
 import importlib

@@ -1,4 +1,5 @@
-"""Converts YAML nodes to msgspec structs; reports all independent problems with line and column.
+"""Converts YAML nodes to msgspec structs; reports all independent problems with line and column,
+unknown and duplicate keys among them.
 
 `msgspec.convert` stops at the first problem and knows no lines, so this module walks the nodes itself.
 The structs, with their bounds and units, remain the only description of a file's contents.

@@ -1,7 +1,7 @@
 """The types of `definitions.py` for rclpy: the classes of the installed ROS packages.
 
-Samples pass through rclpy as bytes (`ros2.py`), so these classes only name their types. Their fields
-are compared with `definitions.py`, because bytes of another definition would be misread.
+Samples pass through rclpy as bytes (`transport.py`), so these classes only name their types. Their
+fields are compared with `definitions.py`, because bytes of another definition would be misread.
 """
 
 import importlib

@@ -1,6 +1,6 @@
 """What the ends on a zenoh graph announce, by their tokens.
 
-Each end of ours watches the tokens on its own topic (`zenoh_place.py`). Those that show RMF's release
+Each end of ours watches the tokens on its own topic (`place.py`). Those that show RMF's release
 are watched here, whatever our topics are.
 """
 
