@@ -10,12 +10,15 @@ import os
 from collections.abc import Mapping
 from pathlib import Path
 
+import msgspec
+
 from bridges.host import log
+from bridges.host.files import read
 from bridges.host.log import pairs
 from bridges.host.places import Places, act_as_owner, by_hand, work_somewhere
 from bridges.runtime import directory as runtime
 from bridges.runtime import last_mark, signals
-from bridges.runtime.last_shown import ages
+from bridges.runtime.holder import STATUS, STATUS_MAX
 from bridges.runtime.record import Record, Records
 from bridges.runtime.switch_off import outputs_off
 from bridges.settings.config import Config
@@ -123,6 +126,25 @@ def _unsafe(
     config: Config, safe: tuple[str, ...], answered: Mapping[str, float], within_s: float
 ) -> set[str]:
     return set(config.devices) - set(safe) - outputs_off(config, within_s, safe, answered)
+
+
+class _Device(msgspec.Struct):
+    input_age_s: float | None = None
+
+
+class _StatusFile(msgspec.Struct):
+    devices: dict[str, _Device] = {}
+
+
+def ages(places: Places) -> Mapping[str, float]:
+    """How long ago (s) each device had answered when the dead daemon wrote its last status, if that is
+    still there; those that never had are left out."""
+    try:
+        shown = msgspec.json.decode(read(places.runtime / STATUS, STATUS_MAX), type=_StatusFile)
+    except (OSError, msgspec.MsgspecError, UnicodeDecodeError, RecursionError):
+        return {}
+    found = {name: device.input_age_s for name, device in shown.devices.items()}
+    return {name: age for name, age in found.items() if age is not None}
 
 
 def _told(all_off: bool) -> int:

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from bridges.host.places import Places
-from bridges.runtime.last_shown import ages
+from bridges.runtime.dead import ages
 from bridges.runtime.switch_off import outputs_off
 from bridges.settings.load import load
 from tests.drivers.hal.modbus.module import Module, door
