@@ -10,7 +10,7 @@ from typing import ClassVar, Final
 
 from bridges.host.log import pairs
 from bridges.messages.releases import Release
-from bridges.transports import addresses, wall_clock
+from bridges.transports import addresses
 from bridges.transports.peers import Peers
 from bridges.transports.transport import TransportError
 
@@ -19,6 +19,41 @@ log = logging.getLogger(__name__)
 LOOK_EVERY_S: Final = 1.0
 """How often (s) to look whether the machine's addresses have changed. No library does that: one that
 starts with only `lo` up stays there forever, and none notices a changed address."""
+SET_BACK_S: Final = 1.0
+"""A smaller step back is slept through: Cyclone renews a lease of 10 s every 8 s."""
+
+
+class WallClock:
+    """Notices that the wall clock was set back, because Cyclone DDS waits by it.
+
+    0.10.5 (ROS 2 Jazzy) always does (github.com/eclipse-cyclonedds/cyclonedds, issue 1995); 11.0.1 does
+    in the wheel on PyPI, which is built without pthread_condattr_setclock. When the clock is set back,
+    Cyclone's threads sleep longer by the size of the step. Meanwhile a node renews no lease, so that
+    others forget it after 10 s; it answers no new node, and asks for nothing that was lost. A node that
+    has joined since waits by the new time. A step forward wakes the threads early, which does no harm.
+
+    `ahead_s`, here and below: how far the wall clock is ahead of one that never steps (s).
+    """
+
+    def __init__(self, ahead_s: float) -> None:
+        self._most_s = ahead_s
+
+    def set_back_s(self, ahead_s: float) -> float:
+        """How far it was set back since a step was last found; 0 for SET_BACK_S or less.
+
+        Small steps add up, because a thread may sleep through all of them.
+        """
+        self._most_s = max(self._most_s, ahead_s)
+        back_s = self._most_s - ahead_s
+        if back_s <= SET_BACK_S:
+            return 0.0
+        self._most_s = ahead_s
+        return back_s
+
+
+def ahead_s() -> float:
+    """How far the wall clock is ahead of the time since the machine's start, its sleep included (s)."""
+    return time.time() - time.clock_gettime(time.CLOCK_BOOTTIME)
 
 
 class Threaded:
@@ -39,7 +74,7 @@ class Threaded:
         self._closed = False
         self._stop = threading.Event()
         self._clock_thread: threading.Thread | None = None
-        self._wall_clock = wall_clock.WallClock(wall_clock.ahead_s())
+        self._wall_clock = WallClock(ahead_s())
         self._set_back = False
         self._look_at = -math.inf
         self._addresses: addresses.Addresses = frozenset()
@@ -77,7 +112,7 @@ class Threaded:
 
     def _look_at_clock(self) -> None:
         while not self._stop.wait(LOOK_EVERY_S):
-            if back_s := self._wall_clock.set_back_s(wall_clock.ahead_s()):
+            if back_s := self._wall_clock.set_back_s(ahead_s()):
                 log.info(pairs("clock_set_back", node=self.name, by_s=round(back_s, 1)))
                 with self._lock:
                     self._set_back = True

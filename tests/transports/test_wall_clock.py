@@ -7,9 +7,9 @@ import pytest
 
 from bridges.messages import definitions as d
 from bridges.messages.topics import DOOR_STATES, FIRE_ALARM_TRIGGER
-from bridges.transports import wall_clock
+from bridges.transports import threaded
+from bridges.transports.threaded import WallClock, ahead_s
 from bridges.transports.transport import TransportError
-from bridges.transports.wall_clock import WallClock
 from tests.transports import peer
 from tests.transports.conftest import ROS2
 from tests.transports.joining import joining
@@ -42,8 +42,8 @@ def test_a_clock_that_is_set_back_by_more_than_a_second_is_found_once(
 
 
 def test_the_clock_is_ahead_of_the_machines_start_by_years_and_runs_with_it() -> None:
-    clock = WallClock(wall_clock.ahead_s())
-    assert (wall_clock.ahead_s() > YEAR_S, clock.set_back_s(wall_clock.ahead_s())) == (True, 0.0)
+    clock = WallClock(ahead_s())
+    assert (ahead_s() > YEAR_S, clock.set_back_s(ahead_s())) == (True, 0.0)
 
 
 @pytest.mark.parametrize("transport", [pytest.param("dds", marks=pytest.mark.dds), ROS2])
@@ -56,7 +56,7 @@ def test_a_node_whose_clock_is_set_back_joins_again_with_all_its_ends(
     """On loopback its thread waits for messages alone, without end: it has to be woken."""
     caplog.set_level(logging.INFO)
     ahead = [0.0]
-    monkeypatch.setattr(wall_clock, "ahead_s", lambda: ahead[-1])
+    monkeypatch.setattr(threaded, "ahead_s", lambda: ahead[-1])
     node, heard = joining(transport, domain)("node"), list[d.Message]()
     node.subscribe(DOOR_STATES.named("pong_door_states"), heard.append)
     node.subscribe(FIRE_ALARM_TRIGGER.named("pong_fire_alarm_trigger"), heard.append)
