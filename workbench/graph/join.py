@@ -5,7 +5,7 @@ import os
 import shlex
 import signal
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,8 +13,9 @@ from types import FrameType
 
 from bridges.kinds.shared.rmf_section import TRANSPORTS, Rmf, overridden
 from bridges.messages import words
-from bridges.transports.transport import Transport, TransportError
-from workbench.graph.renamed import Renamed
+from bridges.messages.releases import Release
+from bridges.messages.topics import Topic
+from bridges.transports.transport import M, Publisher, Subscription, Transport, TransportError
 
 SILENT_AFTER_S = 3.0
 """States come at 1 Hz: three missed ones, or a reading three seconds old, get a mark."""
@@ -68,6 +69,47 @@ def open_graph(args: argparse.Namespace, node_name: str) -> Transport:
     rmf = overridden(_configured(args.config), args)
     joined = open_transport(rmf, node_name, localhost=args.localhost, ros_args=args.ros_args)
     return Renamed(joined, rmf.topics) if rmf.topics else joined
+
+
+class Renamed:
+    """A transport on which topics have the names that a site has given them (`rmf.topics` of a YAML).
+
+    `names`: RMF's topic name -> the site's.
+    """
+
+    def __init__(self, transport: Transport, names: Mapping[str, str]) -> None:
+        self.name, self.speaks, self.dropped = transport.name, transport.speaks, transport.dropped
+        self.domain_id = transport.domain_id
+        self.wall, self.close = transport.wall, transport.close
+        self._transport = transport
+        self._names = names
+
+    def publisher(self, topic: Topic[M]) -> Publisher[M]:
+        """Declare a publisher under the site's name."""
+        return self._transport.publisher(self._named(topic))
+
+    def subscribe(
+        self, topic: Topic[M], received: Callable[[M], None], *, others_only: bool = False
+    ) -> Subscription:
+        """Declare a subscription under the site's name."""
+        return self._transport.subscribe(self._named(topic), received, others_only=others_only)
+
+    @property
+    def release(self) -> Release:
+        """The release of RMF's messages that it speaks now."""
+        return self._transport.release
+
+    def faults(self) -> list[tuple[str, str]]:
+        """(code, detail) of what now keeps this node and others from hearing each other."""
+        return self._transport.faults()
+
+    @property
+    def lives(self) -> bool:
+        """Whether its thread runs."""
+        return self._transport.lives
+
+    def _named(self, topic: Topic[M]) -> Topic[M]:
+        return topic.named(self._names.get(topic.name, topic.name))
 
 
 def graph_of(args: argparse.Namespace, speaks: str) -> str:

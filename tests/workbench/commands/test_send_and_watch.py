@@ -29,8 +29,7 @@ from hal_fakes.wire import Wire, runs_here
 from tests.transports.zenoh_programs import Router
 from tests.waiting import LEASE_S, PATIENCE_S, wait_until
 from workbench.commands import send, watch
-from workbench.graph.join import add_graph_arguments
-from workbench.graph.renamed import Renamed
+from workbench.graph.join import Renamed, add_graph_arguments
 from workbench.graph.requests import Request
 from workbench.graph.requests.charger import Charge, ChargeCancel
 from workbench.graph.requests.door import DoorMove
