@@ -14,11 +14,21 @@ from drivers.driver_type import DriverType
 from drivers.hal.modbus import ModbusBus
 from drivers.hal.modbus.lines import Lines
 from drivers.hal.modbus.registers import WRITABLE, Unit, at, misplaced
-from drivers.lift import checks, register_tables
-from drivers.lift.register_map import Flag, LiftMap, Number, Problems
+from drivers.lift import checks
+from drivers.lift.register_map import (
+    DoorField,
+    Flag,
+    FloorField,
+    LiftMap,
+    MotionField,
+    Number,
+    Problems,
+)
 from drivers.lift.table import DEBOUNCE_S, HAZARD_DEBOUNCE_S
+from drivers.lift.tables import BETWEEN, FAULT, floors, how_long
 
 DOOR: Final = {"open": Door.OPEN, "closed": Door.CLOSED, "moving": Door.BETWEEN}
+NUMBERS: Final = ("means", "number", "register reads")
 HOLD: Final = {Side.FRONT: "door_open", Side.REAR: "rear_door_open"}
 
 
@@ -112,8 +122,48 @@ def describe(settings: Settings, bus: object) -> Iterator[tuple[str, str]]:
 
 
 def tables(settings: Settings) -> Iterator[Table]:
-    """The floors, what each number means, and what is written."""
-    return register_tables.tables(settings, settings.map)
+    """The floors from the lowest up, each part's numbers, and what is written for each command."""
+    yield floors(settings)
+    for name, part in settings.map.parts().items():
+        if isinstance(part, Number):
+            yield Table(f"{name} numbers", NUMBERS, tuple(_numbers(part)))
+    yield _outputs(settings)
+
+
+def _numbers(part: Number) -> Iterator[tuple[str, str, str]]:
+    meanings = [(number, str(meaning)) for number, meaning in part.codes.items()]
+    if isinstance(part, FloorField):
+        meanings += [(number, BETWEEN) for number in part.between_floors]
+    others = ", other bits 0" if part.bits else ""
+    for number, meaning in sorted(meanings):
+        yield meaning, str(number), f"0x{part.word(number):04X}{others}"
+    yield _unlisted(part), "any other", "-"
+
+
+def _unlisted(part: Number) -> str:
+    if isinstance(part, FloorField):
+        return FAULT
+    if isinstance(part, DoorField):
+        return "neither open nor closed"
+    return "a car that moves" if isinstance(part, MotionField) else "out_of_service"
+
+
+def _outputs(settings: Settings) -> Table:
+    """Commands that share a register are written as one value; here each is alone."""
+    commands, off = settings.map.commands, settings.map.commands.words((), None)
+    levels = settings.levels()
+    rows = []
+    for signal, _, command in commands.singles():
+        if not signal.startswith("call_"):
+            rows.append((signal, command.at, commands.words([signal], None)[command.at]))
+    for level in levels:
+        at = commands.call.at if commands.call else commands.calls[level].at
+        rows.append((f"call {level}", at, commands.words([f"call_{level}"], level)[at]))
+    told = tuple(
+        (output, f"{at}: {value}", str(off[at]), how_long(settings, output))
+        for output, at, value in rows
+    )
+    return Table("outputs", ("output", "writes", "off", "how long"), told)
 
 
 def _meaning(part: Number | Flag) -> str:

@@ -2,21 +2,27 @@
 
 An output is written only after it has been read. It is read back after the write and compared in each
 reading. So a module that restarts with its outputs off is noticed, and so are a tripped watchdog and
-another master (`rivals.py`). Every output that goes to its safe value is written, even if another
+another master (`Rivals`). Every output that goes to its safe value is written, even if another
 output, an input or the unit's watchdog fails.
 """
 
-from collections.abc import Iterable, Mapping
+import math
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import AbstractContextManager, nullcontext
-from typing import Protocol
+from typing import Final, Protocol
 
 from drivers.hal import HalError
 from drivers.hal.every import Every
 from drivers.hal.modbus.dead_man import Guard
 from drivers.hal.modbus.points import Point, Range, parse, pieces, ranges
-from drivers.hal.modbus.rivals import Rivals
 from drivers.hal.modbus.wire import ILLEGAL_ADDRESS, Refused
 from drivers.hal.points import Flash
+
+AGAIN_S: Final = 5.0
+"""A contradiction later than this (s) after a pause counts as a first one."""
+FIRST_S: Final = 1.0
+LONGEST_S: Final = 30.0
+"""An output that another master writes is left alone for so long (s), at first and at most."""
 
 
 class Units(Protocol):
@@ -73,6 +79,39 @@ class Image:
         at = self._ranges.index(part)
         self._ranges[at : at + 1] = parts
         return {}
+
+
+class Rivals:
+    """The outputs, by name, that another master writes too: each reads differently from what was
+    written, again and again.
+
+    After the first time the output is written again at once: the module may have restarted. If another
+    master writes the coil, that would switch the relay to and fro for ever. So after the second time
+    the output is left alone for 1 s, then for twice as long each time, up to 30 s. Meanwhile every
+    write of its device fails, and the error names the fault. Only safe values are still written, at
+    once and every time.
+    """
+
+    def __init__(self, now: Callable[[], float]) -> None:
+        self._now = now
+        self._pause_s: dict[str, float] = {}
+        self._at: dict[str, float] = {}
+
+    def contradicted(self, name: str) -> None:
+        """This output reads differently from what was written."""
+        now, before_s = self._now(), self._pause_s.get(name, 0.0)
+        again = now - self._at.get(name, -math.inf) <= before_s + AGAIN_S
+        self._at[name] = now
+        self._pause_s[name] = min(max(FIRST_S, 2 * before_s), LONGEST_S) if again else 0.0
+
+    def check(self, names: Iterable[str]) -> None:
+        """Raises HalError for the first of these outputs that is left alone now."""
+        for name in names:
+            if self._now() - self._at.get(name, -math.inf) < self._pause_s.get(name, 0.0):
+                raise HalError(
+                    f"another master writes {name} too: it reads other than it was written, again and"
+                    f" again; it is tried again after {self._pause_s[name]:g} s"
+                )
 
 
 class Lines:
