@@ -1,17 +1,16 @@
 """What `rmf-bridge init` writes: a commented YAML made from a few answers. Pure: answers in, text out.
 
-`lift.py`, `door.py` and `charger.py` write the section of a device, `points.py` gives each signal a
-pin or an address of its own.
+`points.py` gives each signal a pin or an address of its own.
 """
 
+from collections.abc import Iterator
 from typing import Final
 
-from workbench.commissioning.init import charger, door, lift
-from workbench.commissioning.init.answers import Answers, Impossible
-from workbench.commissioning.init.points import points_for
-from workbench.commissioning.init.scalar import quoted
+import msgspec
 
-DEVICES: Final = {"lift": lift.section, "door": door.section, "charger": charger.section}
+from workbench.commissioning.init.answers import LIFT_INPUTS, Answers, Impossible
+from workbench.commissioning.init.points import Points, points_for
+
 DRIVERS: Final = {"http": "http", "can": "canopen"}
 """The driver for a wiring; `dry_contact` for any other."""
 WIRINGS: Final = {
@@ -34,6 +33,34 @@ ADDRESSES: Final = {
     "can": "can0",
 }
 """The address that is offered for a wiring; a GPIO header has none."""
+HAZARDS: Final = tuple(LIFT_INPUTS)[:7]
+DOOR_ENDS: Final = {"door_opened": "open", "door_closed": "closed"}
+BOOLEANS: Final = ("y", "n", "yes", "no", "on", "off", "true", "false", "null")
+SHELLY: Final = """\
+    # A Shelly of the second generation. Its own timer (toggle_after) releases the door when the
+    # network is gone, and the daemon renews it in each scan.
+    limits: {stale_after_s: 4}
+    state_path: /rpc/Shelly.GetStatus
+    inputs:                          # names with dots between them
+      opened: {field: "input:0.state"}
+      closed: {field: "input:1.state"}
+    held: {field: "switch:0.output"}
+    hold: {path: "/rpc/Switch.Set?id=0&on=true&toggle_after=10", method: GET}
+    release: {path: "/rpc/Switch.Set?id=0&on=false", method: GET}
+    switches_off_after_s: 10         # the same number as toggle_after"""
+CHARGER_HTTP: Final = """\
+    # What the maker's state numbers mean: ask the maker. An unlisted number is an error.
+    codes:
+      idle: [0]
+      handshake: [1, 2, 3, 4]
+      charging: [5]
+      stopping: [6]                  # current still flows
+      released: [7]
+      error: [8, 255]"""
+CHARGER_CANOPEN: Final = """\
+    node: 10                         # the receiver's node id
+    heartbeat_timeout_s: 0.5         # it comes each 0.1 s
+    on_death: stop                   # what the daemon's end means for a charge: stop, or keep"""
 
 
 def draft(answers: Answers) -> str:
@@ -58,6 +85,91 @@ def draft(answers: Answers) -> str:
         "",
         f"{answers.kind}s:",
         f"  {quoted(answers.name)}:",
-        *DEVICES[answers.kind](answers, points_for(answers)),
+        *SECTIONS[answers.kind](answers, points_for(answers)),
     ]
     return "\n".join(lines) + "\n"
+
+
+def _lift(answers: Answers, points: Points) -> Iterator[str]:
+    """The lines below the name of a lift on contacts."""
+    floors = [quoted(floor) for floor in answers.floors]
+    if len(floors) < 2 or len(set(floors)) < len(floors):
+        raise Impossible(f"a lift has at least two floors, each name once, not {', '.join(floors)}")
+    calls = [
+        f"      {floor}: {{{points.relay()}}}" for floor in floors
+    ]  # first: they need most pins
+    request, hold = points.relay(), points.relay()
+    yield f"    floors: [{', '.join(floors)}]        # RMF's names, from below"
+    yield "    inputs:"
+    yield "      # Alarm loops are closed while all is well: an open contact or a cut wire is an alarm."
+    for signal, meaning in LIFT_INPUTS.items():
+        if signal in answers.signals:
+            yield f"      {_input(signal, answers, points)}   # {meaning}"
+    yield from _floor_code(answers, floors, points)
+    yield "    outputs:"
+    if "agv_mode" in answers.signals:
+        yield f"      agv_mode_request: {{{request}}}   # asks the lift for AGV mode"
+    yield f"      door_open: {{{hold}}}   # holds the door open for a robot"
+    yield "    calls:                     # a car call for each floor"
+    yield from calls
+
+
+def _input(signal: str, answers: Answers, points: Points) -> str:
+    if signal in HAZARDS:
+        return f"{signal}: {{{points.loop()}}}"
+    if signal in DOOR_ENDS and not set(DOOR_ENDS) <= set(answers.signals):
+        return f"door: {{{points.contact()}, proves: {DOOR_ENDS[signal]}}}"
+    return f"{signal}: {{{points.contact()}}}"
+
+
+def _floor_code(answers: Answers, floors: list[str], points: Points) -> Iterator[str]:
+    yield "    floor_code:                # lines that say where the car is"
+    yield f"      encoding: {answers.encoding}"
+    if answers.encoding == "one_hot":
+        yield "      lines:                   # one for each floor; none is between floors"
+        for floor in floors:
+            yield f"        {floor}: {{{points.contact()}}}"
+        return
+    yield "      bits:                    # least significant first"
+    for _ in range(len(floors).bit_length()):
+        yield f"        - {{{points.contact()}}}"
+    yield "      # The parity line shows a broken line. A lift without it: leave it out; check warns."
+    yield f"      parity: {{{points.contact()}, total: even}}"
+    codes = ", ".join(f"{number}: {floor}" for number, floor in enumerate(floors, start=1))
+    yield f"      codes: {{{codes}}}"
+
+
+def _door(answers: Answers, points: Points) -> Iterator[str]:
+    """The lines below the name of a door on contacts, or on a relay that answers HTTP."""
+    if answers.wiring == "http":
+        yield from SHELLY.splitlines()
+        return
+    yield "    inputs:"
+    yield f"      opened: {{{points.contact()}}}   # on while the door is fully open"
+    yield f"      closed: {{{points.contact()}}}   # on while it is fully closed"
+    yield "    outputs:"
+    yield f"      hold_open: {{{points.relay()}}}   # holds the door open while it is on"
+
+
+def _charger(answers: Answers, points: Points) -> Iterator[str]:
+    """The lines below the name of a charger on HTTP, on CANopen, or on contacts."""
+    if answers.wiring in ("http", "can"):
+        yield from (CHARGER_HTTP if answers.wiring == "http" else CHARGER_CANOPEN).splitlines()
+        return
+    yield "    inputs:"
+    yield f"      charging: {{{points.contact()}}}   # on while current flows"
+    yield f"      ready: {{{points.contact()}}}   # on while it could charge"
+    yield f"      fault: {{{points.loop()}}}   # opens at a fault, as a cut wire does"
+    yield "    outputs:"
+    yield f"      enable: {{{points.relay()}}}   # lets it charge while it is on"
+
+
+def quoted(text: str) -> str:
+    """A scalar that YAML reads as this text, also where it looks like a number or boolean."""
+    plain = text[:1].isalpha() and text.replace("_", "a").replace("-", "a").isalnum()
+    if plain and text.lower() not in BOOLEANS:
+        return text
+    return msgspec.json.encode(text).decode()
+
+
+SECTIONS: Final = {"lift": _lift, "door": _door, "charger": _charger}
