@@ -1,4 +1,4 @@
-"""The page's application: which view is at which address, its head, and the process that serves it.
+"""The page's application: which view is at which address, who is let in, and the process that serves.
 
 NiceGUI is imported here and in the views alone. What a browser does reaches the graph only by a
 command (`actions.py`).
@@ -11,25 +11,30 @@ import logging
 import os
 import socket
 import sys
-from collections.abc import Callable, Mapping, Sequence
+import time
+from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
+from urllib.parse import quote
 
-from nicegui import app, ui
+from fastapi.requests import HTTPConnection
+from nicegui import Client, app, core, ui
+from nicegui.server import Server
 
+from bridges.host.log import pairs
+from bridges.kinds.shared.durations import AGES_AGO
 from bridges.transports.transport import Transport
 from workbench.graph.join import interruptible
-from workbench.page import connections
 from workbench.page.access import Door
 from workbench.page.actions import Deeds
 from workbench.page.gallery import Gallery
-from workbench.page.gate import Gate
-from workbench.page.guard import Guard
+from workbench.page.guard import Guard, Refusal, Scope
 from workbench.page.here import Here
 from workbench.page.incident_views import IncidentViews
 from workbench.page.listener import Listener
 from workbench.page.login import STYLE, Login
+from workbench.page.silent import Silent
 from workbench.page.site import Site
 from workbench.page.site_views import SiteViews
 
@@ -44,6 +49,36 @@ MOST_HISTORY: Final = 100
 MOST_CONNECTIONS: Final = 200
 MOST_BYTES: Final = 64 * 1024
 """The longest message from a browser; the library's own are a hundredth of it."""
+MOST_BROWSERS: Final = 50
+"""The most views at once; each takes up to a megabyte. An unused view is dropped within a minute."""
+OF_EVERYBODY: Final = ("/login", "/favicon.ico")
+LIBRARY: Final = "/_nicegui/"
+"""The library's own scripts and styles."""
+SOCKET: Final = "/_nicegui_ws/"
+LOOK_S: Final = 1.0
+QUIET_S: Final = 60.0
+"""How often (s) at most it is said that browsers do not read."""
+MOST_WAITING: Final = 50
+"""The most unread packets of a browser: about five seconds of them. A browser that reads has a few."""
+
+
+class Gate:
+    """Who may look at the page, and how many browsers at once. `closed`: only logged-in users."""
+
+    def __init__(self, login: Login, *, closed: bool) -> None:
+        self._login = login
+        self._closed = closed
+
+    def __call__(self, scope: Scope) -> Refusal | None:
+        """Why a request is not answered; None if it is."""
+        path = str(scope["path"])
+        if path in OF_EVERYBODY or path.startswith(LIBRARY):
+            return None
+        if self._closed and not self._login.user(HTTPConnection(scope)):
+            return Refusal(303, "log in first", f"/login?next={quote(path)}")
+        if not path.startswith(SOCKET) and len(Client.instances) >= MOST_BROWSERS:
+            return Refusal(503, "too many browsers have this page open; try again in a minute")
+        return None
 
 
 def serve(
@@ -73,7 +108,7 @@ def serve(
     app.add_middleware(Guard, hosts=_hosts(address, netloc, args.host), gate=gate)
     for name in ("engineio.server", "socketio.server"):
         logging.getLogger(name).handlers.clear()  # strange frames would fill the log
-    app.on_startup(lambda: connections.watch())
+    app.on_startup(lambda: _end_useless())
     app.on_startup(lambda: _say(f"the page is at http://{netloc}/ (Ctrl-C ends it)"))
     try:
         with interruptible(), suppress(KeyboardInterrupt):
@@ -131,6 +166,43 @@ async def _look(here: Here) -> None:
         with suppress(OSError):
             await asyncio.to_thread(here.look)
         await asyncio.sleep(HERE_S)
+
+
+async def _end_useless() -> None:
+    """For ever: end the connection of a browser that does not read, and one that sends no request."""
+    silent = Silent()
+    ended: set[object] = set()
+    told_at = AGES_AGO
+    while True:
+        await asyncio.sleep(LOOK_S)
+        told_at = await _end_deaf(ended, told_at)
+        unasked = dict(_unasked(Server.instance.server_state.connections))
+        for one in silent.too_long(unasked, time.monotonic()):
+            unasked[one].transport.close()
+
+
+def _unasked(connections: Iterable[Any]) -> Iterator[tuple[Hashable, Any]]:
+    """The connections on which no request is being answered, each under its last request."""
+    for one in connections:
+        last = getattr(one, "cycle", one)
+        if last is None or getattr(last, "response_complete", False):
+            yield (one, last), one
+
+
+async def _end_deaf(ended: set[object], told_at: float) -> float:
+    """`ended`: which were ended before, and may take a while to go. Returns when it was said last."""
+    sockets = core.sio.eio.sockets.copy()
+    ended &= sockets.keys()
+    deaf = [one for one in sockets.keys() - ended if sockets[one].queue.qsize() > MOST_WAITING]
+    for one in deaf:
+        ended.add(one)
+        with suppress(Exception):  # it may be closing already
+            await sockets[one].close(wait=False)
+    now = time.monotonic()
+    if not deaf or now < told_at + QUIET_S:
+        return told_at
+    log.warning(pairs("browser_does_not_read", browsers=len(deaf)))
+    return now
 
 
 def _hosts(address: str, netloc: str, names: Sequence[str]) -> set[str]:
