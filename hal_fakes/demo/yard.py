@@ -5,18 +5,18 @@ the charger says that it charges. The first fleet's finishing request is `charge
 `nothing`.
 """
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from pathlib import Path
-from typing import Final
+from typing import Final, cast, get_args
 
 from bridges.kinds.charger.settings import Robot
 from bridges.kinds.charger_coordinator.settings import Settings
 from bridges.messages import definitions as d
 from bridges.messages.topics import CHARGING_ASSIGNMENTS, DIAGNOSTICS, AnyTopic
+from bridges.settings.fleet_config import load_fleet
 from hal_fakes.demo.world import World
 from workbench.rmf_model import Party, Said
-from workbench.rmf_model.fleet import Finishing, Fleet, FleetRobot
-from workbench.rmf_model.tutorial import tutorial_fleet
+from workbench.rmf_model.fleet import Finishing, Fleet, FleetRobot, Graph
 
 WARD: Final = "ward"
 DRIVE_S: Final = 1.0
@@ -138,3 +138,25 @@ def _fleet(name: str, site: Settings) -> Fleet:
     if name in CONFIGURED:
         return tutorial_fleet(CONFIGURED[name], graph, DRIVE_S, only=homes)
     return Fleet(name, graph, homes, DRIVE_S, FINISHING[name])
+
+
+def tutorial_fleet(file: Path, graph: Graph, drive_s: float, only: Collection[str] = ()) -> Fleet:
+    """A fleet from its adapter's configuration file, as RMF's tutorial shapes it, each robot at its
+    charger's waypoint. Raises SettingsError, or ValueError.
+
+    `graph`: its navigation graph. `drive_s`: how long every way takes. `only`: these robots; all of the
+    file when empty.
+    """
+    found = load_fleet(str(file))
+    places: dict[str, str] = {}
+    for _, name, robot in found.robots():
+        _, waypoint = robot.waypoint()
+        if only and name not in only:
+            continue
+        if waypoint is None or waypoint not in graph:
+            raise ValueError(f"{file}: '{name}' has its charger at {waypoint!r}, not in the graph")
+        places[name] = waypoint
+    request = found.fleet.finishing_request or "nothing"
+    if request not in get_args(Finishing):
+        raise ValueError(f"{file}: no finishing_request {request!r}")
+    return Fleet(found.fleet.name, graph, places, drive_s, cast(Finishing, request))

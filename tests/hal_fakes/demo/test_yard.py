@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from workbench.rmf_model.tutorial import tutorial_fleet
+from hal_fakes.demo.yard import tutorial_fleet
 
 TINY = Path("config/fleet_tiny.yaml")
 GRAPH = {f"wait_{n}": ("L1", 4.0, 2.0 * n) for n in (1, 2, 3)}
