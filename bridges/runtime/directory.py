@@ -214,6 +214,7 @@ class RuntimeDirectory:
 
     def _unlock(self) -> None:
         for lock in self._locks.values():
+            fcntl.flock(lock, fcntl.LOCK_UN)  # a process that another thread forks now has a copy
             os.close(lock)
         self._locks.clear()
 

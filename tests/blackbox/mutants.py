@@ -37,7 +37,7 @@ from workbench.replay.bags import heard_in
 from workbench.replay.files import opened
 from workbench.replay.sources import BagError, Notes
 
-CORPUS: Final = Path(__file__).parent / "corpus"
+CORPUS: Final = Path(__file__).parents[1] / "workbench/replay/corpus"
 NUMBERS: Final = (
     *(0, -1, 1, 3, 2**31, 2**53, 2**63 - 1, -(2**63), 2**64 - 1),
     *(0.5, -0.0, 1e-300, 1e10, 9e18, 1e300, -1e300, float("nan"), float("inf"), float("-inf")),

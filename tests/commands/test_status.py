@@ -9,9 +9,9 @@ from typing import Any
 import pytest
 
 from bridges import cli
-from bridges.commands import status
 from bridges.commands.status import show
 from bridges.host.places import Places
+from bridges.runtime import daemons as on_machine
 from bridges.runtime import faults
 from bridges.runtime.daemons import DOWN, FAULTY, NONE, WELL, Daemon, daemons
 from bridges.runtime.holder import HOLDER
@@ -141,7 +141,7 @@ def test_of_a_service_systemd_says_whether_it_runs(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, unit: str, state: str
 ) -> None:
     """Also where it could not write its name."""
-    monkeypatch.setattr(status, "SERVICE_RUN", tmp_path)
+    monkeypatch.setattr(on_machine, "SERVICE_RUN", tmp_path)
     with served(tmp_path / "lift_a", lift()) as folder:
         (folder / HOLDER).unlink()
         found = seen(folder, units={"lift_a": unit})

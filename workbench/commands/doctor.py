@@ -1,7 +1,7 @@
 """`rmf-bridge doctor FILE`: what stands between this machine and a bridge that works, and what to do.
 
 On the target machine, before and after installing. It reads, and switches nothing, except the one
-output of a `--kill-test`. It opens no bus of a running service. `commissioning/doctor/` has the subjects.
+output of a `--kill-test`. It opens no bus of a running service. Its subjects: `commissioning/doctor/`.
 """
 
 import argparse
