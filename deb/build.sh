@@ -74,6 +74,7 @@ done
 mkdir "$root/usr/lib/systemd/system/multi-user.target.wants" # whatever is enabled: off is safe
 ln -s ../rmf-bridge-outputs-off.service "$root/usr/lib/systemd/system/multi-user.target.wants/"
 unit "$page" rmf-bridge-page.service
+put "$root" systemd/rmf-bridges-slice.conf 'usr/lib/systemd/system/system-rmf\x2dbridge.slice.d/10-boot.conf'
 put "$root" systemd/rmf-bridges.sysusers usr/lib/sysusers.d/rmf-bridges.conf
 put "$page" systemd/rmf-bridges-page.sysusers usr/lib/sysusers.d/rmf-bridges-page.conf
 put "$root" systemd/rmf-bridges.tmpfiles usr/lib/tmpfiles.d/rmf-bridges.conf
