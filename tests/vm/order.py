@@ -1,11 +1,14 @@
 """The checks in turn: functions in `guest/`, and what the host does to the machine between them."""
 
+import os
 from typing import Final
 
 CUT: Final = "power cut"
 REBOOT: Final = "reboot"
 CUT_OFF: Final = "upgrades.cut"
 """A check that cuts the power itself, in the machine, at a random moment."""
+CUTS: Final = int(os.environ.get("CUTS", "3"))
+"""So often: each is a boot and two upgrades, minutes of a busy host."""
 LIFT: Final = ("install.package", "install.lift")
 PARTS: Final = {
     "lift": (
@@ -64,7 +67,7 @@ PARTS: Final = {
         "upgrades.refused",
         "upgrades.absent",
         "upgrades.back",
-        *(CUT_OFF, "upgrades.completed") * 3,
+        *(CUT_OFF, "upgrades.completed") * CUTS,
         "upgrades.purged",
     ),
 }
