@@ -28,6 +28,8 @@ OFF_S, READY_S = 12.0, 20.0
 """What docs/reliability.md promises after a power cut, from the kernel's start."""
 YAML = Path("/etc/rmf-bridges/lift.yaml")
 CURRENT = Path("/usr/lib/rmf-bridges/current")
+NOT_OURS = ("/var/cache/", "/run/systemd/", "/var/tmp/systemd-private-")
+"""apt's, and what systemd keeps of a unit until the next boot."""
 UPGRADE_S = 45.0
 """A cut comes within this time: an upgrade takes less."""
 FORCE = ("dpkg", "--force-confold", "--install")
@@ -219,7 +221,7 @@ def purged() -> str:
     """`apt purge`: nothing of it is left but the user and the groups."""
     sh("env", "DEBIAN_FRONTEND=noninteractive", "apt-get", "purge", "--yes", "rmf-bridges")
     left = sh("find", "/etc", "/usr", "/var", "/run", "-xdev", "-name", "*rmf-bridge*").split()
-    left = [name for name in left if not name.startswith("/var/cache")]
+    left = [name for name in left if not name.startswith(NOT_OURS)]
     if left:
         raise Wrong(f"left: {left}")
     return "nothing"
