@@ -56,16 +56,16 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _one_after_another(here: Path, seed: int, options: argparse.Namespace, table: Table) -> None:
     signals(here / "c", table)
     shortages(here / "d", random.Random(seed + 2), options.times, table)
-    dead_bus_first(here / "f", table)
-    readers(here / "g", options.times, table)
-    looks(here / "h", table)
-    planted(here / "i", table)
-    forged(here / "e", random.Random(seed + 3), options.forged_s, table)
-    wires(here / "f", random.Random(seed + 4), options.forged_s, options.times, table)
-    long_names(here / "g", options.forged_s / 4, table)
+    dead_bus_first(here / "e", table)
+    readers(here / "f", options.times, table)
+    looks(here / "g", table)
+    planted(here / "h", table)
+    forged(here / "i", random.Random(seed + 3), options.forged_s, table)
+    wires(here / "j", random.Random(seed + 4), options.forged_s, options.times, table)
+    long_names(here / "k", options.forged_s / 4, table)
     lost_network(table)
-    pages(here / "i", random.Random(seed + 5), table)
-    recordings(here / "j", seed + 6, options.recordings, table)
+    pages(here / "l", random.Random(seed + 5), table)
+    recordings(here / "m", seed + 6, options.recordings, table)
 
 
 def _tried(part: Callable[[], None], failed: list[str]) -> None:
