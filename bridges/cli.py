@@ -120,14 +120,12 @@ def main(argv: list[str] | None = None) -> int:
         argcomplete.autocomplete(whole_parser())
     arguments, ros_args = split_ros_args(sys.argv[1:] if argv is None else argv)
     for argument in arguments:
-        if any(
-            "\ud800" <= one <= "\udfff" for one in argument
-        ):  # no log, JSON or message can have it
+        # No log, JSON or message can have half a character.
+        if any("\ud800" <= one <= "\udfff" for one in argument):
             sys.stderr.write(f"rmf-bridge: {os.fsencode(argument)!r} is not UTF-8: rename it\n")
             return 2
-    if isinstance(
-        sys.stdout, io.TextIOWrapper
-    ):  # a terminal may have no sign for what is to be said
+    # A terminal may have no sign for what is to be said.
+    if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="backslashreplace")
     typed = argparse.Namespace(ros_args=ros_args, typed=arguments)
     try:
