@@ -21,7 +21,7 @@ help:
 	@echo "make soak    a whole site for a day in virtual time: SEED=7 HOURS=24 plays one day again; RMF=jazzy: its supervisors"
 	@echo "             (KILL_EVERY=27: nothing goes wrong but that RMF's lift supervisor dies so often)"
 	@echo "make torture  kill, starve and lie to real daemons for ten minutes, and print docs/reliability.md's table"
-	@echo "make test-vm  boot Debian 13 in QEMU, install our package, and kill and hang it there (ARCH=arm64)"
+	@echo "make test-vm  boot Debian 13 in QEMU, install our packages, and kill and hang it there (ARCH=arm64)"
 	@echo "             (one of its machines: ONLY=lift, site or upgrade)"
 	@echo "make mutate  break the cores in every small way, and list what no test noticed (docs/mutation.md)"
 	@echo "make man     the manual page, build/rmf-bridge.1"
@@ -124,7 +124,7 @@ soak: .venv/ready
 torture: .venv/ready
 	@$(BIN)/python -m tests.torture $(if $(SEED),--seed $(SEED))
 
-# The package that was built last; it is built if there is none. The image is built once, in build/vm.
+# The packages that were built last; they are built if there are none. The image is built once, in build/vm.
 ARCH ?= amd64
 test-vm: .venv/ready
 	@ls dist/*+deb13_$(ARCH).deb >/dev/null 2>&1 || $(MAKE) --no-print-directory deb ARCHS=$(ARCH) PYTHONS=3.13

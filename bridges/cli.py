@@ -13,7 +13,7 @@ from collections.abc import Iterable, Sequence
 from typing import NoReturn
 
 from bridges import VERSION
-from bridges.host.installed import NotInstalled, of_workbench
+from bridges.host.installed import NotInstalled, is_there, of_workbench
 
 EX_PIPE = 141
 """The reader of our output has gone: what a shell shows for a program that SIGPIPE ended."""
@@ -129,15 +129,13 @@ def main(argv: list[str] | None = None) -> int:
         sys.stdout.reconfigure(errors="backslashreplace")
     typed = argparse.Namespace(ros_args=ros_args, typed=arguments)
     try:
-        asked = parser(arguments)
+        parsed, unknown = parser(arguments).parse_known_args(arguments, typed)
+        if unknown:
+            parsed.usage(f"unrecognized arguments: {' '.join(unknown)}")
+        return int(_module(parsed.command).run(parsed))
     except NotInstalled as error:
         sys.stderr.write(f"rmf-bridge {arguments[0]}: {error}\n")
         return os.EX_UNAVAILABLE
-    parsed, unknown = asked.parse_known_args(arguments, typed)
-    if unknown:
-        parsed.usage(f"unrecognized arguments: {' '.join(unknown)}")
-    try:
-        return int(_module(parsed.command).run(parsed))
     except BrokenPipeError:  # the reader of a pipe has closed it, as `head` does
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return EX_PIPE
@@ -170,8 +168,10 @@ def parser(arguments: Sequence[str]) -> argparse.ArgumentParser:
 
 
 def whole_parser() -> argparse.ArgumentParser:
-    """The parser with every subcommand's options: for the manual page (`make man`) and completion."""
-    return _parser(COMMANDS, whole=True)
+    """The parser with the options of every installed subcommand: for the manual page (`make man`) and
+    completion."""
+    lacks = frozenset() if is_there("workbench") else WORKBENCH
+    return _parser((name for name in COMMANDS if name not in lacks), whole=True)
 
 
 def _parser(names: Iterable[str], whole: bool) -> argparse.ArgumentParser:
@@ -207,9 +207,9 @@ def split_ros_args(argv: list[str]) -> tuple[list[str], list[str]]:
 
 def _module(command: str):  # type: ignore[no-untyped-def]
     name = f"commands.{command.replace('-', '_')}"
-    return (
-        of_workbench(name) if command in WORKBENCH else importlib.import_module(f"bridges.{name}")
-    )
+    if command in WORKBENCH:
+        return of_workbench(f"workbench.{name}")
+    return importlib.import_module(f"bridges.{name}")
 
 
 if __name__ == "__main__":

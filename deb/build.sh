@@ -1,7 +1,7 @@
 #!/bin/sh
-# Builds the two Debian packages of one architecture and one Python: deb/build.sh ARCH PYTHON (`make deb`).
-# rmf-bridges has the daemons and the recorder, as one archive that its postinst unpacks; rmf-bridges-page adds what the
-# web page needs.
+# Builds the three Debian packages of one architecture and one Python: deb/build.sh ARCH PYTHON (`make deb`).
+# rmf-bridges has the daemons and the recorder, as one archive that its postinst unpacks; rmf-bridges-workbench adds the
+# workbench and the fakes; rmf-bridges-page adds what the web page needs. The latter two lie in a folder of their version.
 # As an ordinary user, on any machine: wheels are fetched for the target. lgpio has none for Python 3.13: lgpio.sh
 # builds it.
 set -eu
@@ -14,32 +14,41 @@ here=$(cd "$(dirname "$0")/.." && pwd)
 bin=$here/.venv/bin
 maintainer="${DEBFULLNAME:-rmf-bridges maintainers} <${DEBEMAIL:-rmf-bridges@localhost}>"
 work=$here/build/deb/$release-$arch
-root=$work/root page=$work/page tree=$work/tree wheels=$here/build/deb/wheels
+root=$work/root bench=$work/workbench page=$work/page tree=$work/tree wheels=$here/build/deb/wheels
 lib=usr/lib/rmf-bridges
 site=$tree/lib/python$python/site-packages
-beside=usr/lib/rmf-bridges-page # the page's libraries
 SOURCE_DATE_EPOCH=${SOURCE_DATE_EPOCH:-$(git -C "$here" log -1 --format=%ct 2>/dev/null || date +%s)}
 export SOURCE_DATE_EPOCH
 
 rm -rf "$work" "$here"/build/lib "$here"/build/bdist.* # else a wheel keeps modules that are gone
 umask 022
-mkdir -p "$root/DEBIAN" "$page/DEBIAN" "$root/$lib/bin" "$root/usr/bin" "$tree/bin" "$page/usr/lib" "$work/wheel" "$wheels"
+mkdir -p "$root/DEBIAN" "$bench/DEBIAN" "$page/DEBIAN" "$root/$lib/bin" "$root/usr/bin" "$tree/bin" "$work/wheel" "$wheels"
 
-# The libraries. The page's are those that the daemons have not. Left out is what only Cyclone's own commands import,
-# and what colorzero was built with: half of the byte code that an installation would have to make.
+# The libraries: the workbench's are those that the daemons have not, the page's those that neither has. Left out is what
+# only Cyclone's own commands import, what colorzero was built with, and how rich would colour sources and Markdown: half
+# of the byte code that an installation would have to make.
 [ "$python" != 3.13 ] || "$here/deb/lgpio.sh" "$arch" "$wheels"
 "$bin/pip" wheel --quiet --disable-pip-version-check --no-deps --wheel-dir "$work/wheel" "$here"
 version=$(basename "$work"/wheel/*.whl | cut -d- -f2)+$release # it has the commit: setup.py
 fill() {
   into=$1; shift
   "$bin/python" "$here/deb/wheels.py" "$work"/wheel/*.whl --arch "$arch" --python "$python" \
-    --find-links "$wheels" --without cyclonedds:rich-click --without colorzero:setuptools --target "$into" "$@"
+    --find-links "$wheels" --without cyclonedds:rich-click --without colorzero:setuptools \
+    --without rich:pygments --without rich:markdown-it-py --target "$into" "$@"
 }
+# without PLACE OTHER: leaves in PLACE what OTHER has not.
+without() { (cd "$2" && find . ! -type d -print0) | (cd "$1" && xargs -0 rm -f); }
+in_bench=$bench/usr/lib/rmf-bridges-workbench/$version in_page=$page/usr/lib/rmf-bridges-page/$version
+mkdir -p "$in_bench" "$in_page"
 fill "$site" --extra=gpio --extra=recording
-cp -R "$site" "$page/$beside"
-fill "$page/$beside" --extra=gpio --extra=recording --extra=page
-(cd "$site" && find . ! -type d -print0) | (cd "$page/$beside" && xargs -0 rm -f)
-for each in "$site" "$page/$beside"; do
+cp -R "$site/." "$in_bench"
+fill "$in_bench" --extra=gpio --extra=recording --extra=laptop --extra=plot
+cp -R "$in_bench/." "$in_page"
+fill "$in_page" --extra=gpio --extra=recording --extra=laptop --extra=plot --extra=page
+without "$in_page" "$in_bench"
+rm -rf "$site/workbench" "$site/hal_fakes"
+without "$in_bench" "$site"
+for each in "$site" "$in_bench" "$in_page"; do
   rm -rf "$each/bin" "$each/cyclonedds/tools" "$each/cyclonedds/.libs/idlc" # programs of the libraries
   find "$each" -type f -exec chmod 644 {} +
   find "$each" -type d -empty -delete
@@ -47,7 +56,6 @@ done
 
 # A virtual environment that sees the system's packages (rclpy), on the system's own Python. Its program gets its first
 # line where it is unpacked (postinst), so that a daemon imports from its own tree whatever `current` says later.
-echo "/$beside" > "$site/rmf-bridges-page.pth"
 ln -s "/usr/bin/python$python" "$tree/bin/python3"
 printf 'home = /usr/bin\ninclude-system-site-packages = true\nversion = %s\n' "$python" > "$tree/pyvenv.cfg"
 cat > "$tree/bin/rmf-bridge" <<'SCRIPT'
@@ -127,7 +135,12 @@ package rmf-bridges "$root" "python$python, $libc, systemd (>= 252)" \
  building: dry contacts, Modbus, HTTP and CAN. Each is configured by one YAML
  and run by systemd.
 DESCRIPTION
-package rmf-bridges-page "$page" "rmf-bridges (= $version), $libc" \
+package rmf-bridges-workbench "$bench" "rmf-bridges (= $version), $libc" \
+  "look at Open-RMF's lifts, doors and chargers, and commission them" <<'DESCRIPTION'
+ The commands of rmf-bridge that no daemon needs: watch, send, explain, plot,
+ judge, replay, init, doctor and walk, and fake hardware to simulate a device.
+DESCRIPTION
+package rmf-bridges-page "$page" "rmf-bridges-workbench (= $version), $libc" \
   "web page of Open-RMF's lifts, doors and chargers" <<'DESCRIPTION'
  What rmf-bridge page needs: a web page of what is on RMF's graph, of each
  device and of what was recorded, as a service with a user of its own.

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from bridges.blackbox.incident import AFTER_S, BEFORE_S, INSTALL, Incident, Note, part
 from bridges.blackbox.ring import DIED, NAME, Read, RingError
-from bridges.host.installed import NotInstalled, of_workbench
+from bridges.host.installed import of_workbench
 from bridges.host.written import no_folder, not_written
 from bridges.runtime import holder
 from bridges.runtime.clock import machine_s
@@ -42,20 +42,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """0 when the file is written; 65 if its YAML cannot be made anonymous; 69 without a ring that can
-    be read; 73 if the file cannot be written."""
+    be read; 73 if the file cannot be written. Raises NotInstalled: only the workbench can make it
+    anonymous."""
     try:
         from bridges.blackbox import mcap_write
     except ImportError as error:
         print(f"to write a recording, {error.name} is needed: {INSTALL}", file=sys.stderr)
         return EX_UNAVAILABLE
     if args.anonymous:
-        try:
-            of_workbench("replay.anonymous")
-        except NotInstalled as error:
-            print(error, file=sys.stderr)
-            return EX_UNAVAILABLE
+        of_workbench("workbench.replay.anonymous")  # before the wait
     path = args.output or Path(f"{args.file.stem}_{datetime.now():%Y-%m-%d_%H-%M-%S}.mcap")
-    if why := no_folder(path):  # before the wait
+    if why := no_folder(path):
         return not_written(path, why)
     try:
         places = find(args.file.absolute(), args.runtime_dir)
@@ -79,7 +76,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _anonymous(incident: Incident) -> Incident:
     """Raises SettingsError."""
-    hidden: Incident = of_workbench("replay.anonymous").anonymous(incident)
+    hidden: Incident = of_workbench("workbench.replay.anonymous").anonymous(incident)
     return hidden
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 from msgspec.structs import replace
 
 from bridges.host import log, places
+from bridges.host.installed import of_workbench
 from bridges.kinds.shared.rmf_section import TRANSPORTS, overridden
 from bridges.runtime import directory as runtime
 from bridges.runtime import drop_in, guard, signals
@@ -47,7 +48,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Validate, claim, serve. Returns 78 for an invalid configuration."""
+    """Validate, claim, serve. Returns 78 for an invalid configuration. Raises NotInstalled: what
+    simulates is not part of the daemons."""
     log.start(args.log_level.upper(), json=args.log_format == "json")
     if args.simulate and os.environ.get("RMF_BRIDGE_SERVICE") == "1":
         logging.error("a service never simulates: --simulate is refused where RMF_BRIDGE_SERVICE=1")
@@ -104,10 +106,9 @@ def _serve(
         outputs_off = guard.command(args.file, args.runtime_dir)
         places.work_somewhere(held.places)  # lgpio leaves a FIFO in the working directory
         return Daemon(config, held, end, ros_args=args.ros_args, outputs_off=outputs_off).serve()
-    from hal_fakes.simulate import Simulation
-
+    simulate = of_workbench("hal_fakes.simulate")
     logging.warning("SIMULATED: no hardware moves, and RMF is told simulated states")
-    simulation = Simulation(config, held.path, log_format=args.log_format)
+    simulation = simulate.Simulation(config, held.path, log_format=args.log_format)
     from bridges.runtime.daemon import Daemon  # imported while the fakes start
 
     try:

@@ -1,4 +1,4 @@
-"""A small package with our own maintainer scripts, and a root into which the real dpkg installs it.
+"""Small packages with our own maintainer scripts, and a root into which the real dpkg installs them.
 
 What the scripts call is real but for systemd: `systemctl` keeps a file for each unit. Each command that
 changes something counts, and at a chosen one everything is killed, dpkg included, as by a power cut.
@@ -15,6 +15,7 @@ from pathlib import Path
 SCRIPTS = Path(__file__).parents[2] / "deb/scripts"
 LIB = Path("usr/lib/rmf-bridges")
 COUNTED = ("cp", "ln", "mv", "nice", "rm", "sync", "systemctl")
+SITE = Path("lib/python3/site-packages")
 FORCE = ("script-chrootless", "not-root", "bad-path", "confold")
 PROGRAM = """#!/usr/bin/python3
 # A program that tells its version, and in which tree it is.
@@ -29,7 +30,7 @@ if command == "check":
 if command == "enable":
     print(f"drop-in of {{version}}")
 if command == "outputs-off":
-    print(version, *sorted(p.name for p in (tree / "lib").iterdir()))
+    print(version, *sorted(p.name for p in (tree / "lib").glob("module_*")))
 """
 FAKE = """#!/bin/sh
 n=$(($(cat {here}/count 2>/dev/null || echo 0) + 1)); echo $n > {here}/count
@@ -58,7 +59,7 @@ def package(folder: Path, version: str, modules: Collection[str], *, old: bool =
     work = folder / version
     tree = work / LIB if old else work.with_suffix(".tree")
     (tree / "bin").mkdir(parents=True)
-    (tree / "lib").mkdir()
+    (tree / SITE).mkdir(parents=True)
     for name in modules:
         (tree / "lib" / name).write_text(version)
     (tree / "pyvenv.cfg").touch()
@@ -66,21 +67,30 @@ def package(folder: Path, version: str, modules: Collection[str], *, old: bool =
     program = tree / "bin/rmf-bridge"
     program.write_text(PROGRAM.format(version=version))
     program.chmod(0o755)
-    (work / "DEBIAN").mkdir(parents=True)
-    (work / "DEBIAN/control").write_text(
-        f"Package: rmf-bridges\nVersion: {version}\nArchitecture: all\nMaintainer: n <n@n>\n"
-        "Description: small\n"
-    )
     if not old:
-        (work / LIB / "bin").mkdir(parents=True)
-        (work / LIB / "bin/rmf-bridge").symlink_to("../current/bin/rmf-bridge")
-        shutil.make_archive(str(work / LIB / "tree"), "xztar", tree)
-        for script in SCRIPTS.glob("rmf-bridges.*"):
-            target = work / "DEBIAN" / script.suffix[1:]
-            text = script.read_text().replace("@PYTHON@", "3").replace("@VERSION@", version)
-            target.write_text(text)
-            target.chmod(0o755)
-    made = folder / f"{version}.deb"
+        archived(work, tree)
+    return built(work, "rmf-bridges", version, scripts=not old)
+
+
+def archived(work: Path, tree: Path) -> None:
+    """Put this tree into a package, as deb/build.sh does."""
+    (work / LIB / "bin").mkdir(parents=True)
+    (work / LIB / "bin/rmf-bridge").symlink_to("../current/bin/rmf-bridge")
+    shutil.make_archive(str(work / LIB / "tree"), "xztar", tree)
+
+
+def built(work: Path, name: str, version: str, *more: str, scripts: bool = True) -> Path:
+    """The package of what is in this folder, with `more` fields, and with our maintainer `scripts`."""
+    fields = (f"Package: {name}", f"Version: {version}", "Architecture: all", *more)
+    control = "\n".join((*fields, "Maintainer: n <n@n>", "Description: small", ""))
+    (work / "DEBIAN").mkdir(parents=True)
+    (work / "DEBIAN/control").write_text(control)
+    for script in SCRIPTS.glob(f"{name}.*") if scripts else ():
+        target = work / "DEBIAN" / script.suffix[1:]
+        text = script.read_text().replace("@PYTHON@", "3").replace("@VERSION@", version)
+        target.write_text(text)
+        target.chmod(0o755)
+    made = work.with_name(f"{work.name}.deb")
     words = ["dpkg-deb", "--root-owner-group", "-Znone", "--build", str(work), str(made)]
     subprocess.run(words, check=True, capture_output=True)
     return made

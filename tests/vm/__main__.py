@@ -26,7 +26,7 @@ RESTARTS: dict[str, Callable[[Machine], None]] = {
 ROOT = Path(__file__).parents[2]
 CACHE = ROOT / "build/vm"
 NEXT = "next"
-"""The folder, among the packages, of the one to upgrade to (`guest/install.py`)."""
+"""The folder, among the packages, of those to upgrade to (`guest/upgrades.py`)."""
 
 
 def main() -> int:
@@ -80,7 +80,7 @@ def _packages(arch: str, folder: Path) -> Path:
     (packages / NEXT).mkdir(parents=True)
     for each in found:
         os.link(each, packages / each.name)
-        if each.name.startswith("rmf-bridges_"):
+        if not each.name.startswith("rmf-bridges-page_"):
             _as_next(each, packages / NEXT)
     return packages
 
@@ -90,10 +90,14 @@ def _as_next(package: Path, folder: Path) -> None:
     needed({"dpkg-deb": "dpkg"})
     tree = folder / "tree"
     subprocess.run(["dpkg-deb", "--raw-extract", str(package), str(tree)], check=True)
-    version = package.name.split("_")[1]
+    name, version, _ = package.name.split("_")
     for file in (tree / "DEBIAN").iterdir():
         file.write_text(file.read_text().replace(version, f"{version}.1"))
-    _with_a_new_module(tree / "usr/lib/rmf-bridges/tree.tar.xz", folder / "unpacked")
+    if name == "rmf-bridges":
+        _with_a_new_module(tree / "usr/lib/rmf-bridges/tree.tar.xz", folder / "unpacked")
+    else:
+        place = tree / "usr/lib" / name / version
+        place.rename(f"{place}.1")
     words = ["dpkg-deb", "--root-owner-group", "-Znone", "--build", str(tree), str(folder)]
     subprocess.run(words, check=True, stdout=subprocess.DEVNULL)
     shutil.rmtree(tree)

@@ -15,9 +15,9 @@ from pathlib import Path
 from typing import Final
 
 from bridges.host import log, places
+from bridges.host.installed import how_to_install
 from workbench.graph.join import add_graph_arguments, command_line, complain, open_graph
 
-INSTALL: Final = "pip install 'rmf-bridges[page]', or apt install ./rmf-bridges-page_*.deb"
 PORT: Final = 8080
 LOOPBACK: Final = "127.0.0.1"
 RECORDER: Final = Path("/var/lib/rmf-bridge-recorder")
@@ -120,7 +120,7 @@ def _serve(args: argparse.Namespace, opened: socket.socket, known: Mapping[str, 
     try:
         from workbench.page import web
     except ImportError as error:
-        complain("page", f"{error}: to install it: {INSTALL}")
+        complain("page", f"{error}: {how_to_install('page')}")
         return os.EX_UNAVAILABLE
     web.serve(args, opened, known, lambda: open_graph(args, "rmf_bridge_page"), _graph(args))
     return 0

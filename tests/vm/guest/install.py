@@ -1,7 +1,8 @@
-"""The package, and services made of YAMLs."""
+"""The packages, and services made of YAMLs."""
 
 import grp
 import time
+from collections.abc import Sequence
 from pathlib import Path
 
 from tests.vm.guest import header
@@ -25,31 +26,34 @@ from tests.vm.guest.system import (
 )
 
 PAGE = "rmf-bridge-page.service"
+OURS = ("rmf-bridges", "rmf-bridges-workbench")
 EXPOSED = 2.0
 """The score of `systemd-analyze security` that no unit may exceed."""
 
 
 def package() -> str:
-    """`apt install ./rmf-bridges_….deb` on a fresh Debian."""
-    found = deb("rmf-bridges")
-    install(found)
+    """`apt install ./rmf-bridges_….deb ./rmf-bridges-workbench_….deb` on a fresh Debian."""
+    found = debs()
+    install(*found)
     chip = (header.CONFIGFS / "bank0/chip_name").read_text().strip()
     group = grp.getgrgid(Path(f"/dev/{chip}").stat().st_gid).gr_name
     if group != "gpio":
         raise Wrong(f"/dev/{chip} belongs to the group {group}")
-    return f"{found.name}: {sh('rmf-bridge', '--version').strip()}; /dev/{chip} is the group gpio's"
+    return (
+        f"{found[0].name}: {sh('rmf-bridge', '--version').strip()}; /dev/{chip} is the group gpio's"
+    )
 
 
-def install(file: Path) -> None:
+def install(*files: Path) -> None:
     """As people do it, but that nothing is asked."""
     apt = ("env", "DEBIAN_FRONTEND=noninteractive", "apt-get", "install", "--yes")
-    sh(*apt, "--no-install-recommends", str(file))
+    sh(*apt, "--no-install-recommends", *map(str, files))
 
 
-def deb(name: str) -> Path:
-    """The package of this name, which the host shares."""
-    (found,) = mounted("packages", "/srv").glob(f"{name}_*.deb")
-    return found
+def debs(folder: str = ".", names: Sequence[str] = OURS) -> list[Path]:
+    """The packages of these names, which the host shares; in `next` those of the next version."""
+    there = mounted("packages", "/srv") / folder
+    return [file for (file,) in (there.glob(f"{name}_*.deb") for name in names)]
 
 
 def lift() -> str:
@@ -88,7 +92,7 @@ def wrong_yaml() -> str:
 
 def page() -> str:
     """The web page, a package of its own: started by systemd it answers, below its memory limit."""
-    install(deb("rmf-bridges-page"))
+    install(*debs(names=["rmf-bridges-page"]))
     began = time.monotonic()
     sh("systemctl", "start", PAGE)
     until(_answers, "the page answers")
@@ -134,7 +138,7 @@ def upgrade() -> str:
     service = unit("lift")
     relays, old = energise(), pid(service)
     when = header.now()
-    install(deb("next/rmf-bridges"))
+    install(*debs("next"))
     back(service, old)
     version = sh("dpkg-query", "-W", "-f", "${Version}", "rmf-bridges")
     off = header.off_at(relays, when)

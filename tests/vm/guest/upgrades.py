@@ -8,7 +8,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from tests.vm.guest import header
-from tests.vm.guest.install import deb
+from tests.vm.guest.install import OURS, debs
 from tests.vm.guest.rides import LIFT, end, energise, send
 from tests.vm.guest.system import (
     Wrong,
@@ -33,6 +33,10 @@ NOT_OURS = ("/var/cache/", "/run/systemd/", "/var/tmp/systemd-private-")
 UPGRADE_S = 45.0
 """A cut comes within this time: an upgrade takes less."""
 FORCE = ("dpkg", "--force-confold", "--install")
+BEFORE, NEXT = ".", "next"
+"""The folders of both versions, among the packages."""
+TARGET = Path("/var/lib/checks-target")
+"""What was being installed when the power was cut."""
 
 
 def site() -> str:
@@ -85,6 +89,16 @@ def version() -> str:
     return sh("dpkg-query", "-W", "-f", "${Version}", "rmf-bridges")
 
 
+def _states() -> str:
+    """Of each package its state and version, as dpkg has them."""
+    return sh("dpkg-query", "-W", "-f", "${db:Status-Status} ${Version}, ", *OURS).rstrip(", ")
+
+
+def _force(folder: str, fails: bool = False) -> str:
+    """Install these by dpkg alone, as after a cut; returns what it says."""
+    return sh(*FORCE, *map(str, debs(folder)), fails=fails)
+
+
 def _status() -> str:
     """What `rmf-bridge status` ends with: 0 well, 1 faults, 2 somebody died."""
     import subprocess
@@ -101,7 +115,7 @@ def refused() -> str:
     old, tree, text = pid(unit("lift")), CURRENT.readlink(), YAML.read_text()
     YAML.write_text(text + "flors: [L1]\n")
     try:
-        told = sh(*FORCE, str(deb("next/rmf-bridges")), fails=True)
+        told = _force(NEXT, fails=True)
     finally:
         YAML.write_text(text)
     state = sh("dpkg-query", "-W", "-f", "${db:Status-Status}", "rmf-bridges")
@@ -133,7 +147,7 @@ def absent() -> str:
 def back() -> str:
     """The version before is installed again, two relays on: off, and every service is back."""
     relays, when = energise(), header.now()
-    sh(*FORCE, str(deb("rmf-bridges")))
+    _force(BEFORE)
     off = header.off_at(relays, when)
     if off.keys() != relays.keys() or not all(map(is_active, map(unit, SERVICES))):
         raise Wrong(f"{version()}: off {off}")
@@ -164,19 +178,18 @@ def full_var() -> str:
         _status()
         end()
         old = pid(unit("lift"))
-        told = sh(*FORCE, str(deb("next/rmf-bridges")), fails=True)
+        told = _force(NEXT, fails=True)
         if pid(unit("lift")) != old or not all(map(is_active, map(unit, SERVICES))):
             raise Wrong(f"the services have not stayed: {told[-300:]}")
     was = version()
-    sh(*FORCE, str(deb("rmf-bridges")))
+    _force(BEFORE)
     return f"enable and upgrade fail ({was}), a ride succeeds; with room again dpkg succeeds"
 
 
 def cut() -> str:
     """(the power is cut at a random moment of an upgrade or of the way back)"""
-    names = ("next/rmf-bridges", "rmf-bridges")
-    target = deb(names[version().endswith(".1")])
-    Path("/var/lib/checks-target").write_text(str(target))
+    target = debs((NEXT, BEFORE)[version().endswith(".1")])
+    TARGET.write_text(" ".join(map(str, target)))
     if is_active(unit("lift")):
         energise()
     sh("sync")
@@ -185,7 +198,7 @@ def cut() -> str:
     os.sync()
     words = f"sleep {moment}; echo b > /proc/sysrq-trigger"
     sh("systemd-run", "sh", "-c", words)
-    sh("systemd-run", *FORCE, str(target))
+    sh("systemd-run", *FORCE, *map(str, target))
     return "soon"
 
 
@@ -197,20 +210,20 @@ def completed() -> str:
     if on:
         raise Wrong(f"cut after {moment} s: on at boot {on}")
     sh("rmf-bridge", "outputs-off", "--help")
-    state = sh("dpkg-query", "-W", "-f", "${db:Status-Status} ${Version}", "rmf-bridges")
+    state = _states()
     tree = CURRENT.readlink().name
     status = _status()
-    target = Path("/var/lib/checks-target").read_text()
-    if state.startswith("half-installed"):
-        sh(*FORCE, target)
+    target = TARGET.read_text().split()
+    wanted = {f"installed {Path(file).name.split('_')[1]}" for file in target}
+    if "half-installed" in state:
+        sh(*FORCE, *target)
     else:
         sh("dpkg", "--configure", "-a")
-        if version() not in target:
-            sh(*FORCE, target)
+        if set(_states().split(", ")) != wanted:
+            sh(*FORCE, *target)
     _wires_back()
     until(lambda: all(map(is_active, map(unit, SERVICES))), "every service is back")
-    done = sh("dpkg-query", "-W", "-f", "${db:Status-Status} ${Version}", "rmf-bridges")
-    if done.split()[0] != "installed" or done.split()[1] not in target:
+    if set((done := _states()).split(", ")) != wanted:
         raise Wrong(f"cut after {moment} s: {state}, then {done}")
     return (
         f"cut after {moment} s: {state}, by {tree}, off {first:.1f} s, status {status}; completed"
@@ -219,7 +232,7 @@ def completed() -> str:
 
 def purged() -> str:
     """`apt purge`: nothing of it is left but the user and the groups."""
-    sh("env", "DEBIAN_FRONTEND=noninteractive", "apt-get", "purge", "--yes", "rmf-bridges")
+    sh("env", "DEBIAN_FRONTEND=noninteractive", "apt-get", "purge", "--yes", *OURS)
     left = sh("find", "/etc", "/usr", "/var", "/run", "-xdev", "-name", "*rmf-bridge*").split()
     left = [name for name in left if not name.startswith(NOT_OURS)]
     if left:
