@@ -1,16 +1,18 @@
 """The ROS package, for colcon: the packages of the folder above, the marker, launch files, examples.
 
-pip does not read this file; its own is pyproject.toml, above.
+pip does not read this file; its own is pyproject.toml, above, which lists packages and data for both.
 """
 
 import os
 import re
+import tomllib
 from pathlib import Path
 
 from setuptools import find_packages, setup
 
 HERE = Path(__file__).resolve().parent
 ABOVE = Path(os.path.relpath(HERE.parent))
+ALL = tomllib.loads((ABOVE / "pyproject.toml").read_text())["tool"]["setuptools"]
 VERSION = re.search(r'__version__ = "(.*)"', (ABOVE / "bridges/__init__.py").read_text())
 
 
@@ -24,11 +26,9 @@ setup(
     version=VERSION[1],
     description="Daemons that connect Open-RMF to the lifts, doors and chargers of a building",
     license="Apache-2.0",
-    packages=find_packages(
-        str(ABOVE), include=["bridges*", "drivers*", "hal_fakes*", "workbench*"]
-    ),
+    packages=find_packages(str(ABOVE), **ALL["packages"]["find"]),
     package_dir={"": str(ABOVE)},
-    package_data={"drivers": ["profiles/*.yaml"]},
+    package_data=ALL["package-data"],
     data_files=[
         ("share/ament_index/resource_index/packages", files("ros/resource/rmf_bridges")),
         ("share/rmf_bridges", files("ros/package.xml")),

@@ -1,4 +1,4 @@
-"""What a bridge can be, a folder for each kind: pure rules about lifts, doors and chargers.
+"""What a bridge can be, a folder for each kind. Their rules are pure; this file finds them.
 
 A kind is found by the name in a YAML. Only names of existing folders are imported: there is no table to
 edit, and no other file imports a kind by its name.

@@ -1,6 +1,8 @@
-"""What colcon and `ros2 launch` read agrees with the project; building it takes ROS's own tools."""
+"""What colcon and `ros2 launch` read agrees with the project, and setup.py takes all of it."""
 
 import ast
+import subprocess
+import sys
 import xml.etree.ElementTree as ElementTree
 from configparser import ConfigParser
 from pathlib import Path
@@ -9,7 +11,8 @@ from bridges import __version__
 from bridges.kinds import kind_names
 from bridges.messages.definitions import PACKAGES
 
-ROS = Path(__file__).parents[2] / "ros"
+ROOT = Path(__file__).parents[2]
+ROS = ROOT / "ros"
 PACKAGE = ElementTree.parse(ROS / "package.xml").getroot()
 NAME = "rmf_bridges"
 
@@ -29,6 +32,16 @@ def test_ros_finds_the_package_and_its_executable() -> None:
     places = ConfigParser(interpolation=None)
     places.read(ROS / "setup.cfg")
     assert places["install"]["install_scripts"] == f"$base/lib/{NAME}"
+
+
+def test_the_package_has_every_file_of_both_houses_and_of_the_fakes(tmp_path: Path) -> None:
+    build = ["build", "--build-base", str(tmp_path), "--build-lib", str(tmp_path / "lib")]
+    command = [sys.executable, "setup.py", "-q", "egg_info", "-e", str(tmp_path), *build]
+    subprocess.run(command, cwd=ROS, check=True, capture_output=True)
+    built = {str(path.relative_to(tmp_path / "lib")) for path in (tmp_path / "lib").rglob("*.*")}
+    houses = ("bridges", "drivers", "hal_fakes", "workbench")
+    ours = {str(p.relative_to(ROOT)) for house in houses for p in (ROOT / house).rglob("*.*")}
+    assert built == {name for name in ours if "__pycache__" not in name}
 
 
 def test_every_kind_has_a_launch_file_that_starts_that_kind() -> None:

@@ -7,7 +7,7 @@ One thread reads for all subscriptions. It drops and counts an invalid sample, a
 each topic. (Cyclone's C library already refuses samples that do not fit their type, and says so on
 stderr.) If reading itself fails, the node joins again.
 
-Only this file, dds_ends.py, idl.py and graph.py import cyclonedds, and only choose.py imports them.
+Only this folder imports cyclonedds, and only `choose.py` imports this file.
 """
 
 import ctypes

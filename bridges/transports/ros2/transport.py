@@ -5,8 +5,8 @@ sample is dropped and counted, as there. rclpy's executor runs in a thread of th
 machine's addresses change or its wall clock is set back, that thread leaves the graph and joins again,
 with the same ends. (Of the RMWs only Cyclone needs it for the clock; the others lose a moment.)
 
-Source: rclpy 7.1 (ROS 2 Jazzy), its public API. Only this file, ros_stay.py and ros_ends.py import
-rclpy, only ros_types.py the message packages, and only choose.py imports this one.
+Source: rclpy 7.1 (ROS 2 Jazzy), its public API. Only this file, `stay.py` and `ends.py` import
+rclpy, only `types.py` the message packages, and only `choose.py` imports this one.
 """
 
 import atexit

@@ -1,17 +1,24 @@
-"""The import rules name whole folders; a new kind must be among them."""
+"""pyproject.toml's lists: import rules name whole folders, a new kind among them; mutation, files."""
 
 import tomllib
 from pathlib import Path
 
 from bridges.kinds import kind_names
 
-PYPROJECT = Path(__file__).parents[3] / "pyproject.toml"
+ROOT = Path(__file__).parents[3]
+TOOLS = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["tool"]
 
 
 def test_every_kind_is_under_the_purity_contract() -> None:
-    contracts = tomllib.loads(PYPROJECT.read_text("utf-8"))["tool"]["importlinter"]["contracts"]
+    contracts = TOOLS["importlinter"]["contracts"]
     [pure] = [c["source_modules"] for c in contracts if c["name"].startswith("A kind")]
     assert set(pure) == {
         "bridges.kinds.shared.*",
         *(f"bridges.kinds.{kind}.*" for kind in kind_names()),
     }
+
+
+def test_everything_that_make_mutate_breaks_or_runs_exists() -> None:
+    lists = ("source_paths", "only_mutate", "also_copy", "pytest_add_cli_args_test_selection")
+    named = [path for name in lists for path in TOOLS["mutmut"][name]]
+    assert [path for path in named if not (ROOT / path).exists()] == []
