@@ -6,20 +6,19 @@ from typing import Annotated, Protocol
 
 import msgspec
 
+from bridges.kinds.shared.fields import tells
 from drivers.hal import http
 
 
 class Call(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """One command to a controller.
+    """One command to a controller."""
 
-    `path`: below the bus's `api_base`.
-    `method`: the HTTP method.
-    `body`: the JSON body, as a quoted string; no body when absent.
-    """
-
-    path: http.Path
-    method: http.Method = "POST"
-    body: Annotated[str, msgspec.Meta(max_length=1024)] | None = None
+    path: Annotated[http.Path, tells("its path below the bus's `api_base`.")]
+    method: Annotated[http.Method, tells("the HTTP method.")] = "POST"
+    body: Annotated[
+        Annotated[str, msgspec.Meta(max_length=1024)] | None,
+        tells("the JSON body, as a quoted string; no body when absent."),
+    ] = None
 
     def problems(self) -> Iterable[tuple[tuple[str, ...], str]]:
         """A body that is not JSON."""

@@ -10,6 +10,7 @@ from typing import Annotated, Final
 
 import msgspec
 
+from bridges.kinds.shared.fields import tells
 from drivers import DriverError
 
 TEXT_MAX: Final = 200
@@ -31,15 +32,14 @@ Value = bool | int | float | str
 
 
 class Flag(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A yes or no in the answer.
+    """A yes or no in the answer."""
 
-    `field`: the field that holds it: names with dots between them.
-    `when`: the values that mean yes; every other value means no. Without it the field must be true or
-    false.
-    """
-
-    field: Field
-    when: list[Value] = []
+    field: Annotated[Field, tells("the field that holds it: names with dots between them.")]
+    when: Annotated[
+        list[Value],
+        tells("""the values that mean yes; every other value means no. Without it the field must be
+        true or false."""),
+    ] = []
 
 
 def flag(answer: Mapping[str, object], place: Flag) -> bool:

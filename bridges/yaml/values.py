@@ -53,9 +53,12 @@ _LISTS = (ListType, VarTupleType)
 _MAPPINGS = (DictType, StructType)
 
 
+def _bare(wanted: Type) -> Type:
+    return wanted.type if isinstance(wanted, Metadata) else wanted
+
+
 def _node_of(wanted: Type) -> type[Node]:
-    if isinstance(wanted, Metadata):
-        return _node_of(wanted.type)
+    wanted = _bare(wanted)
     if isinstance(wanted, _LISTS):
         return SequenceNode
     return MappingNode if isinstance(wanted, _MAPPINGS) else ScalarNode
@@ -259,10 +262,11 @@ class Values:
 def sections_of(wanted: StructType) -> dict[str, str]:
     """Keys of a struct's sections: key -> its section; "" for the struct's own keys."""
     own = {field.encode_name for field in wanted.fields}
+    types = [(f.encode_name, _bare(f.type)) for f in wanted.fields]
     inner = [
-        (field.encode_name, part)
-        for field in wanted.fields
-        for part in (field.type.types if isinstance(field.type, UnionType) else (field.type,))
+        (name, part)
+        for name, type_ in types
+        for part in (type_.types if isinstance(type_, UnionType) else (type_,))
         if isinstance(part, StructType)
     ]
     return {f.encode_name: name for name, part in inner for f in part.fields} | dict.fromkeys(

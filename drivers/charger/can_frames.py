@@ -21,7 +21,7 @@ from bridges.kinds.charger.signals import (
     FaultSide,
     Measured,
 )
-from bridges.kinds.shared.fields import Name
+from bridges.kinds.shared.fields import Name, tells
 from bridges.kinds.shared.table import Table
 from bridges.yaml.spelling import unknown
 from drivers import DriverError
@@ -37,16 +37,16 @@ Volume = Annotated[float, msgspec.Meta(ge=-100_000, le=100_000)]
 
 
 class Settings(ChargerSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """One charger.
+    """One charger."""
 
-    `profile`: the name of a file in drivers/profiles/ that holds the map.
-    `map`: the map, written here instead of a profile.
-    `setpoints`: name -> value, for what the map leaves to the site: voltages and currents.
-    """
-
-    profile: Name | None = None
-    map: FrameMap | None = None
-    setpoints: dict[Name, Volume] = msgspec.field(default_factory=dict)
+    profile: Annotated[
+        Name | None, tells("the name of a file in drivers/profiles/ that holds the map.")
+    ] = None
+    map: Annotated[FrameMap | None, tells("the map, written here instead of a profile.")] = None
+    setpoints: Annotated[
+        dict[Name, Volume],
+        tells("name -> value, for what the map leaves to the site: voltages and currents."),
+    ] = msgspec.field(default_factory=dict)
 
     def problems(self) -> Problems:
         """Problems that involve more than one field."""

@@ -8,7 +8,7 @@ from typing import Annotated, Final
 
 import msgspec
 
-from bridges.kinds.shared.fields import Name, Period
+from bridges.kinds.shared.fields import Name, Period, tells
 from bridges.kinds.shared.table import Table
 from bridges.yaml.spelling import unknown
 from drivers.charger import dbc
@@ -38,31 +38,29 @@ Frames = dbc.Dbc
 
 
 class State(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The charger's state, as one number.
+    """The charger's state, as one number."""
 
-    `at`: the signal that holds it.
-    `codes`: what its numbers mean.
-    """
-
-    at: Signal
-    codes: Codes
+    at: Annotated[Signal, tells("the signal that holds it.")]
+    codes: Annotated[Codes, tells("what its numbers mean.")]
 
 
 class Sent(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A frame that the driver sends periodically. Give `on`, `off` or both.
+    """A frame that the driver sends periodically. Give `on`, `off` or both."""
 
-    `frame`: its name in the DBC file.
-    `every_s`: its period.
-    `on`: signal -> value while the charger may charge; without it the frame is not sent then.
-    `setpoints`: signal -> the name of the device's setpoint that it carries while it may charge.
-    `off`: signal -> value while the charger must not charge; without it the frame is not sent then.
-    """
-
-    frame: Name
-    every_s: Period
-    on: dict[Name, float] | None = None
-    setpoints: dict[Name, Name] = msgspec.field(default_factory=dict)
-    off: dict[Name, float] | None = None
+    frame: Annotated[Name, tells("its name in the DBC file.")]
+    every_s: Annotated[Period, tells("how often it is sent.")]
+    on: Annotated[
+        dict[Name, float] | None,
+        tells("signal -> value while the charger may charge; not sent then when absent."),
+    ] = None
+    setpoints: Annotated[
+        dict[Name, Name],
+        tells("signal -> the name of the device's setpoint that it carries while it may charge."),
+    ] = msgspec.field(default_factory=dict)
+    off: Annotated[
+        dict[Name, float] | None,
+        tells("signal -> value while the charger must not charge; not sent then when absent."),
+    ] = None
 
     def problems(self) -> Problems:
         """A frame that is never sent."""
@@ -79,58 +77,74 @@ class Sent(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
 
 
 class Wake(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A frame that wakes a charger which is not heard. It must not charge.
+    """A frame that wakes a charger which is not heard. It must not charge."""
 
-    `frame`: its name in the DBC file; none of those in `send`.
-    `every_s`: its period, from the daemon's start until the charger is heard, and while it is silent.
-    `says`: signal -> value.
-    """
-
-    frame: Name
-    every_s: WakeEvery
-    says: dict[Name, float]
+    frame: Annotated[Name, tells("its name in the DBC file; none of those in `send`.")]
+    every_s: Annotated[
+        WakeEvery, tells("how often it is sent, until the charger is heard and while it is silent.")
+    ]
+    says: Annotated[dict[Name, float], tells("signal -> value.")]
 
 
 class FrameMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A make's frames.
+    """A make's frames."""
 
-    `dbc`: the DBC file, in drivers/profiles/ or by its absolute path.
-    `masks`: frame -> the bits of its id that are compared, for ids that contain a node id.
-    `state`: the charger's state as a number; not needed with `rules`.
-    `state_timeout_s`: the state is stale when its frame, or one that a rule tests, has not come for
-    this long.
-    `others_timeout_s`: the same for all other frames.
-    `volts`, `amps`: at the battery.
-    `receiver`: the receiver's id as a number; 0 is none. Without its frame there is no reading.
-    `out_of_range`: not 0 while the robot stands where it cannot be charged. If it is in `errors` too,
-    it counts as an error only in an error state: a robot that has not arrived yet is no error.
-    `range_ok`: not 0 while the robot stands where it can be charged, if the charger says so all the
-    time. `at_height`: not 0 while a pad that the charger moves is where it charges. While one of these
-    is 0 there is no power; without their frames there is no reading.
-    `temperatures`: name -> the signal of a temperature (°C), shown in status and diagnostics.
-    `rules`: derive the state from other signals; tried before its codes.
-    `errors`: signals that mean an error, whatever the state is.
-    `send`: the frames that the driver sends.
-    `wake`: for a charger that says nothing before it is woken: the frames that do it, such as CANopen's
-    NMT start.
-    """
-
-    dbc: Name
-    masks: dict[Name, Mask] = msgspec.field(default_factory=dict)
-    state: State | None = None
-    state_timeout_s: Fresh
-    others_timeout_s: Fresh = 5.0
-    volts: Signal | None = None
-    amps: Signal | None = None
-    receiver: Signal | None = None
-    out_of_range: Signal | None = None
-    range_ok: Signal | None = None
-    at_height: Signal | None = None
-    temperatures: dict[Name, Signal] = msgspec.field(default_factory=dict)
-    rules: list[Rule] = msgspec.field(default_factory=list)
-    errors: Errors = Errors()
-    send: Annotated[list[Sent], msgspec.Meta(min_length=1)]
-    wake: Annotated[list[Wake], msgspec.Meta(max_length=8)] = msgspec.field(default_factory=list)
+    dbc: Annotated[Name, tells("the DBC file, in drivers/profiles/ or by its absolute path.")]
+    masks: Annotated[
+        dict[Name, Mask],
+        tells("frame -> the bits of its id that are compared, for ids that contain a node id."),
+    ] = msgspec.field(default_factory=dict)
+    state: Annotated[
+        State | None, tells("the charger's state as a number; not needed with `rules`.")
+    ] = None
+    state_timeout_s: Annotated[
+        Fresh,
+        tells("after how long without its frame, or one that a rule tests, the state is stale."),
+    ]
+    others_timeout_s: Annotated[
+        Fresh, tells("after how long without its frame any other value is stale.")
+    ] = 5.0
+    volts: Annotated[Signal | None, tells("the voltage at the battery.")] = None
+    amps: Annotated[Signal | None, tells("the current into the battery.")] = None
+    receiver: Annotated[
+        Signal | None,
+        tells("the receiver's id as a number; 0 is none. Without its frame there is no reading."),
+    ] = None
+    out_of_range: Annotated[
+        Signal | None,
+        tells("""not 0 while the robot stands where it cannot be charged. If it is in `errors`
+        too, it counts as an error only in an error state: a robot that has not arrived yet is
+        no error."""),
+    ] = None
+    range_ok: Annotated[
+        Signal | None,
+        tells("""not 0 while the robot stands where it can be charged, if the charger says so all
+        the time. While it is 0 there is no power; without its frame there is no reading."""),
+    ] = None
+    at_height: Annotated[
+        Signal | None,
+        tells("""not 0 while a pad that the charger moves is where it charges. While it is 0 there
+        is no power; without its frame there is no reading."""),
+    ] = None
+    temperatures: Annotated[
+        dict[Name, Signal],
+        tells("name -> the signal of a temperature (°C), shown in status and diagnostics."),
+    ] = msgspec.field(default_factory=dict)
+    rules: Annotated[
+        list[Rule], tells("derive the state from other signals; tried before its codes.")
+    ] = msgspec.field(default_factory=list)
+    errors: Annotated[Errors, tells("signals that mean an error, whatever the state is.")] = (
+        Errors()
+    )
+    send: Annotated[
+        list[Sent], msgspec.Meta(min_length=1), tells("the frames that the driver sends.")
+    ]
+    wake: Annotated[
+        list[Wake],
+        msgspec.Meta(max_length=8),
+        tells("""for a charger that says nothing before it is woken: the frames that do it, such as
+        CANopen's NMT start."""),
+    ] = msgspec.field(default_factory=list)
 
     def problems(self) -> Problems:
         """A DBC file that cannot be read; a frame or signal that it lacks."""

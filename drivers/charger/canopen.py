@@ -10,6 +10,7 @@ from typing import Annotated, Final, Literal
 import msgspec
 
 from bridges.kinds.charger.settings import ChargerSettings
+from bridges.kinds.shared.fields import tells
 from drivers.charger import xnergy
 from drivers.driver_type import DriverType
 from drivers.hal import can
@@ -46,16 +47,17 @@ OBJECTS: Final[Mapping[str, Object]] = {
 
 
 class Settings(ChargerSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """One receiver.
+    """One receiver."""
 
-    `node`: its CANopen node id; the maker's default is 10.
-    `heartbeat`: `none` for a receiver whose old firmware sends none.
-    `heartbeat_timeout_s`: the receiver counts as lost this long after its last heartbeat.
-    """
-
-    node: Annotated[int, msgspec.Meta(ge=1, le=127)]
-    heartbeat: Literal["required", "none"] = "required"
-    heartbeat_timeout_s: BeatTimeout = 0.5
+    node: Annotated[
+        int, msgspec.Meta(ge=1, le=127), tells("its CANopen node id; the maker's default is 10.")
+    ]
+    heartbeat: Annotated[
+        Literal["required", "none"], tells("`none` for a receiver whose old firmware sends none.")
+    ] = "required"
+    heartbeat_timeout_s: Annotated[
+        BeatTimeout, tells("the receiver counts as lost this long after its last heartbeat.")
+    ] = 0.5
 
 
 def claims(settings: Settings) -> Iterable[tuple[str, tuple[str, ...]]]:

@@ -6,7 +6,7 @@ whenever the daemon does not run, so a charge ends with the daemon.
 
 import itertools
 from collections.abc import Iterator, Mapping
-from typing import Final
+from typing import Annotated, Final
 
 import msgspec
 
@@ -18,6 +18,7 @@ from bridges.kinds.charger.signals import (
     FaultSide,
     Measured,
 )
+from bridges.kinds.shared.fields import tells
 from bridges.kinds.shared.table import Table
 from drivers.driver_type import DriverType
 from drivers.hal.points import Input, Output, Points, PointsBus, Wire, input_wires
@@ -36,41 +37,36 @@ Problems = Iterator[tuple[tuple[str, ...], str]]
 
 
 class Inputs(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The contacts that are read.
+    """The contacts that are read."""
 
-    `charging`: current flows, also while it ramps down.
-    `ready`: the station can charge the next robot; without this contact it always counts as ready.
-    `fault`: the station is out of order.
-    `at_height`: the pad, which the station moves, is where it charges. Without it there is no power; it
-    is a fault if it is lost while current flows.
-    `range_ok`: the robot stands where it can be charged. Without it there is no power.
-    """
-
-    charging: Input
-    ready: Input | None = None
-    fault: Input | None = None
-    at_height: Input | None = None
-    range_ok: Input | None = None
+    charging: Annotated[Input, tells("current flows, also while it ramps down.")]
+    ready: Annotated[
+        Input | None,
+        tells("the station can charge the next robot; without this contact it always can."),
+    ] = None
+    fault: Annotated[Input | None, tells("the station is out of order.")] = None
+    at_height: Annotated[
+        Input | None,
+        tells("""the pad, which the station moves, is where it charges. Without it there is no
+        power; it is a fault if it is lost while current flows."""),
+    ] = None
+    range_ok: Annotated[
+        Input | None,
+        tells("the robot stands where it can be charged. Without it there is no power."),
+    ] = None
 
 
 class Outputs(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The command to the station.
+    """The command to the station."""
 
-    `enable`: the station may charge while this relay is on.
-    """
-
-    enable: Output
+    enable: Annotated[Output, tells("the station may charge while this relay is on.")]
 
 
 class Settings(ChargerSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """One station and its wiring.
+    """One station and its wiring."""
 
-    `inputs`: the contacts that are read.
-    `outputs`: the relay that is driven.
-    """
-
-    inputs: Inputs
-    outputs: Outputs
+    inputs: Annotated[Inputs, tells("the contacts that are read.")]
+    outputs: Annotated[Outputs, tells("the relay that is driven.")]
 
     def problems(self) -> Problems:
         """Problems that involve more than one field."""

@@ -11,13 +11,13 @@ states mean; an unlisted state is an error. A maker's state is never passed on a
 """
 
 from collections.abc import Iterable, Iterator
-from typing import Final
+from typing import Annotated, Final
 
 import msgspec
 
 from bridges.kinds.charger.settings import ChargerSettings
 from bridges.kinds.charger.signals import AT_FAULT, Activity, ChargerOutputs, ChargerSample
-from bridges.kinds.shared.fields import Timeout
+from bridges.kinds.shared.fields import Timeout, tells
 from drivers import json_fields
 from drivers.charger import rules
 from drivers.charger.http_fields import Fields, Word
@@ -32,33 +32,38 @@ POWER: Final = "power"
 
 
 class Settings(ChargerSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """One station. The paths follow the bus's `api_base`.
+    """One station. The paths follow the bus's `api_base`."""
 
-    `codes`: what the maker's state numbers mean; not needed with `rules`.
-    `rules`: derive the state from other fields of the answer; tried before `codes`.
-    `errors`: fields that mean an error, whatever the state is.
-    `state_words`: word -> its number in `codes`, for a maker whose states are words.
-    `state_path`: the path that GET reads the station's state from.
-    `fields`: the fields of that answer.
-    `clear_error_path`: the path where POST clears the station's error; `null` where there is none.
-    `start`: switches the power on for the robot on the pad.
-    `switches_off_after_s`: the timer that `start` sets; the power goes off this long after the last
-    `start`, so `start` is sent in every scan while the power is on.
-    `stop`: switches the power off.
-    `range_check`: makes the station check where the robot stands, if it does not do so by itself.
-    """
-
-    codes: Codes | None = None
-    rules: list[Rule] = msgspec.field(default_factory=list)
-    errors: Errors = Errors()
-    state_words: dict[Word, Code] = msgspec.field(default_factory=dict)
-    state_path: http.Path = "/state"
-    fields: Fields = Fields()
-    clear_error_path: http.Path | None = "/clear_error"
-    start: Call | None = None
-    switches_off_after_s: Timeout | None = None
-    stop: Call | None = None
-    range_check: Call | None = None
+    codes: Annotated[
+        Codes | None, tells("what the maker's state numbers mean; not needed with `rules`.")
+    ] = None
+    rules: Annotated[
+        list[Rule], tells("derive the state from other fields of the answer; tried before `codes`.")
+    ] = msgspec.field(default_factory=list)
+    errors: Annotated[Errors, tells("fields that mean an error, whatever the state is.")] = Errors()
+    state_words: Annotated[
+        dict[Word, Code],
+        tells("word -> its number in `codes`, for a maker whose states are words."),
+    ] = msgspec.field(default_factory=dict)
+    state_path: Annotated[http.Path, tells("the path that GET reads the station's state from.")] = (
+        "/state"
+    )
+    fields: Annotated[Fields, tells("the fields of that answer.")] = Fields()
+    clear_error_path: Annotated[
+        http.Path | None,
+        tells("the path where POST clears the station's error; `null` where there is none."),
+    ] = "/clear_error"
+    start: Annotated[Call | None, tells("switches the power on for the robot on the pad.")] = None
+    switches_off_after_s: Annotated[
+        Timeout | None,
+        tells("""the timer that `start` sets; the power goes off this long after the last `start`,
+        so `start` is sent in every scan while the power is on."""),
+    ] = None
+    stop: Annotated[Call | None, tells("switches the power off.")] = None
+    range_check: Annotated[
+        Call | None,
+        tells("makes the station check where the robot stands, if it does not do so by itself."),
+    ] = None
 
     def off_after(self) -> tuple[float, tuple[str, ...]] | None:
         """The power's timer (s) and its path in the YAML; None where it has none."""

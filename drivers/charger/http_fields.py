@@ -7,7 +7,7 @@ from typing import Annotated, Final, Literal
 import msgspec
 
 from bridges.kinds.charger.signals import FaultSide, Measured
-from bridges.kinds.shared.fields import Name
+from bridges.kinds.shared.fields import Name, tells
 from drivers import json_fields
 from drivers.charger.state_codes import CODE_MAX
 from drivers.json_fields import Field, Flag
@@ -21,47 +21,50 @@ WEEK_S: Final = 7 * 86400
 
 
 class Number(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A measurement.
+    """A measurement."""
 
-    `field`: the field of the answer that holds it.
-    `scale`: the factor from the maker's unit to ours (0.001 for mV).
-    """
-
-    field: Field
-    scale: float = 1.0
+    field: Annotated[Field, tells("the field of the answer that holds it.")]
+    scale: Annotated[float, tells("the factor from the maker's unit to ours (0.001 for mV).")] = 1.0
 
 
 class Fields(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The fields of the answer to `state_path`: names with dots between them.
+    """The fields of the answer to `state_path`: names with dots between them."""
 
-    `state`: the station's state; `codes` says what it means.
-    `error_text`: the station's own text for an error: any text means an error, whatever `state` is.
-    `error_texts`: text -> the side of the error, `station` or `robot`; or `none` for a text that means
-    no error (`OK`). For other texts `codes` gives the side, if it can.
-    `receiver_id`: the id of the receiver that it sees; null or "" when it sees none.
-    `in_range`: whether the robot stands where it can be charged.
-    `range_ok`: likewise, where the station says so all the time: without it there is no power.
-    `at_height`: whether a pad that the station moves is where it charges: without it there is no power,
-    and a fault if it is lost while current flows.
-    `volts`: the voltage at the battery.
-    `amps`: the current into the battery.
-    `battery_percent`: the battery's charge, 0 to 100.
-    `time_to_full_s`: the time until the battery is full (s).
-    `temperatures`: name -> a temperature (°C), shown in status and diagnostics.
-    """
-
-    state: Field = "state"
-    error_text: Field = "error_msg"
-    error_texts: dict[Word, TextMeans] = msgspec.field(default_factory=dict)
-    receiver_id: Field | None = None
-    in_range: Flag | None = None
-    range_ok: Flag | None = None
-    at_height: Flag | None = None
-    volts: Number | None = None
-    amps: Number | None = None
-    battery_percent: Number | None = None
-    time_to_full_s: Number | None = None
-    temperatures: dict[Name, Number] = msgspec.field(default_factory=dict)
+    state: Annotated[Field, tells("the station's state; `codes` says what it means.")] = "state"
+    error_text: Annotated[
+        Field,
+        tells("the station's own text for an error: any text means an error, whatever `state` is."),
+    ] = "error_msg"
+    error_texts: Annotated[
+        dict[Word, TextMeans],
+        tells("""text -> the side of the error, `station` or `robot`; or `none` for a text that
+        means no error (`OK`). For other texts `codes` gives the side, if it can."""),
+    ] = msgspec.field(default_factory=dict)
+    receiver_id: Annotated[
+        Field | None, tells('the id of the receiver that it sees; null or "" when it sees none.')
+    ] = None
+    in_range: Annotated[Flag | None, tells("whether the robot stands where it can be charged.")] = (
+        None
+    )
+    range_ok: Annotated[
+        Flag | None,
+        tells("""whether the robot stands where it can be charged, if the station says so all the
+        time: without it there is no power."""),
+    ] = None
+    at_height: Annotated[
+        Flag | None,
+        tells("""whether a pad that the station moves is where it charges: without it there is no
+        power, and a fault if it is lost while current flows."""),
+    ] = None
+    volts: Annotated[Number | None, tells("the voltage at the battery.")] = None
+    amps: Annotated[Number | None, tells("the current into the battery.")] = None
+    battery_percent: Annotated[Number | None, tells("the battery's charge, 0 to 100.")] = None
+    time_to_full_s: Annotated[Number | None, tells("the time until the battery is full (s).")] = (
+        None
+    )
+    temperatures: Annotated[
+        dict[Name, Number], tells("name -> a temperature (°C), shown in status and diagnostics.")
+    ] = msgspec.field(default_factory=dict)
 
     def code(self, answer: Answer, words: Mapping[str, int]) -> int | str:
         """The maker's number for its state, or its word if `words` does not list it.

@@ -5,9 +5,10 @@ registers 0 to 100 in one request.
 """
 
 from collections.abc import Iterable, Iterator, Mapping
-from typing import Final
+from typing import Annotated, Final
 
 from bridges.kinds.charger.settings import ChargerSettings
+from bridges.kinds.shared.fields import tells
 from drivers.charger import xnergy
 from drivers.driver_type import DriverType
 from drivers.hal import modbus
@@ -31,12 +32,9 @@ PLACES: Final[Mapping[str, str]] = {
 
 
 class Settings(ChargerSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """One receiver.
+    """One receiver."""
 
-    `unit`: its Modbus unit id; the maker's default is 16.
-    """
-
-    unit: Unit
+    unit: Annotated[Unit, tells("its Modbus unit id; the maker's default is 16.")]
 
 
 def points(settings: Settings) -> dict[str, Point]:

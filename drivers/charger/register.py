@@ -5,11 +5,11 @@ the daemon starts, so that a restart does not end a charge.
 """
 
 from collections.abc import Iterator, Mapping
-from typing import Final
+from typing import Annotated, Final
 
 from bridges.kinds.charger.settings import ChargerSettings
 from bridges.kinds.charger.signals import ChargerOutputs, ChargerSample, Measured
-from bridges.kinds.shared.fields import Name
+from bridges.kinds.shared.fields import Name, tells
 from bridges.kinds.shared.table import Table
 from drivers import DriverError
 from drivers.charger import rules
@@ -26,16 +26,13 @@ POWER: Final = "power"
 
 
 class Settings(ChargerSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """One station.
+    """One station."""
 
-    `unit`: its Modbus unit id.
-    `profile`: the name of a file in drivers/profiles/ that holds the map.
-    `map`: the map, written here instead of a profile.
-    """
-
-    unit: Unit
-    profile: Name | None = None
-    map: ChargerMap | None = None
+    unit: Annotated[Unit, tells("its Modbus unit id.")]
+    profile: Annotated[
+        Name | None, tells("the name of a file in drivers/profiles/ that holds the map.")
+    ] = None
+    map: Annotated[ChargerMap | None, tells("the map, written here instead of a profile.")] = None
 
     def can_stop(self) -> bool:
         """Can the driver switch the power off? Only if the map has `power`."""

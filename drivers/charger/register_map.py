@@ -5,7 +5,7 @@ from typing import Annotated, Final, Literal
 
 import msgspec
 
-from bridges.kinds.shared.fields import Name
+from bridges.kinds.shared.fields import Name, tells
 from bridges.yaml.spelling import unknown
 from drivers.charger import rules as by_rules
 from drivers.charger.rules import Errors, Rule
@@ -21,22 +21,18 @@ KNOWN: Final = ("state", "receiver", "in_range", "range_ok", "at_height", *MEASU
 
 
 class Number(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """One value of the station.
+    """One value of the station."""
 
-    `at`: `input register N`, `holding register N`, `discrete input N` or `coil N`.
-    `words`: how many registers it takes: 2 for 32 bits.
-    `low_first`: the first of the two registers holds the low word.
-    `signed`: it is signed (two's complement).
-    `bit`: only this bit of it; 0 is the least significant.
-    `scale`: the factor from the maker's unit to ours (0.1 for tenths of an ampere).
-    """
-
-    at: Place
-    words: Literal[1, 2] = 1
-    low_first: bool = False
-    signed: bool = False
-    bit: Bit | None = None
-    scale: float = 1.0
+    at: Annotated[
+        Place, tells("`input register N`, `holding register N`, `discrete input N` or `coil N`.")
+    ]
+    words: Annotated[Literal[1, 2], tells("how many registers it takes: 2 for 32 bits.")] = 1
+    low_first: Annotated[bool, tells("the first of the two registers holds the low word.")] = False
+    signed: Annotated[bool, tells("it is signed (two's complement).")] = False
+    bit: Annotated[Bit | None, tells("only this bit of it; 0 is the least significant.")] = None
+    scale: Annotated[
+        float, tells("the factor from the maker's unit to ours (0.1 for tenths of an ampere).")
+    ] = 1.0
 
     def problems(self) -> Problems:
         """An invalid place; options that do not fit its table or width."""
@@ -80,18 +76,15 @@ class Number(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
 
 
 class Power(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The command that lets the station charge.
+    """The command that lets the station charge."""
 
-    `at`: `coil N` or `holding register N`.
-    `start`: the value that lets it charge.
-    `stop`: the value that does not.
-    `read_back`: false where the command can only be written; then it is written in every scan.
-    """
-
-    at: Place
-    start: Word
-    stop: Word
-    read_back: bool = True
+    at: Annotated[Place, tells("`coil N` or `holding register N`.")]
+    start: Annotated[Word, tells("the value that lets it charge.")]
+    stop: Annotated[Word, tells("the value that does not.")]
+    read_back: Annotated[
+        bool,
+        tells("false where the command can only be written; then it is written in every scan."),
+    ] = True
 
     def problems(self) -> Problems:
         """A place that cannot be written; values that it cannot hold."""
@@ -106,14 +99,10 @@ class Power(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
 
 
 class Order(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A command that is written once.
+    """A command that is written once."""
 
-    `at`: `coil N` or `holding register N`.
-    `write`: the value that is written.
-    """
-
-    at: Place
-    write: Word = 1
+    at: Annotated[Place, tells("`coil N` or `holding register N`.")]
+    write: Annotated[Word, tells("the value that is written.")] = 1
 
     def problems(self) -> Problems:
         """A place that cannot be written."""
@@ -122,31 +111,44 @@ class Order(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
 
 
 class ChargerMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A station's register map. Addresses begin at 0.
+    """A station's register map. Addresses begin at 0."""
 
-    `values`: name -> its place. `state` is the number that `codes` lists; `volts`, `amps`,
-    `battery_percent` and `time_to_full_s` are shown; `receiver` is the id of the receiver that it sees,
-    0 for none; `in_range` is not 0 while a robot stands where it can be charged. `range_ok` is the same
-    where the station needs no check for it, and `at_height` is not 0 while a pad that it moves is where
-    it charges: while one of these is 0 there is no power. Rules and errors may use any name.
-    `temperatures`: name -> the value that is this temperature (°C), shown in status and diagnostics.
-    `codes`: what the numbers of `state` mean; not needed with `rules`.
-    `rules`: derive the state from other values; tried before `codes`. Their places are names of
-    `values`.
-    `errors`: values that mean an error, whatever the state is. Their places are names of `values`.
-    `power`: the command that lets it charge; without it the station is only observed.
-    `clear_error`: the command that clears its error.
-    `range_check`: the command that makes it check where the robot stands, if it does not by itself.
-    """
-
-    values: Annotated[dict[Name, Number], msgspec.Meta(min_length=1)]
-    codes: Codes | None = None
-    rules: list[Rule] = msgspec.field(default_factory=list)
-    temperatures: dict[Name, Name] = msgspec.field(default_factory=dict)
-    errors: Errors = Errors()
-    power: Power | None = None
-    clear_error: Order | None = None
-    range_check: Order | None = None
+    values: Annotated[
+        dict[Name, Number],
+        msgspec.Meta(min_length=1),
+        tells("""name -> its place. `state` is the number that `codes` lists; `volts`, `amps`,
+        `battery_percent` and `time_to_full_s` are shown; `receiver` is the id of the receiver that
+        it sees, 0 for none; `in_range` is not 0 while a robot stands where it can be charged.
+        `range_ok` is the same where the station needs no check for it, and `at_height` is not 0
+        while a pad that it moves is where it charges: while one of these is 0 there is no power.
+        Rules and errors may use any name."""),
+    ]
+    codes: Annotated[
+        Codes | None, tells("what the numbers of `state` mean; not needed with `rules`.")
+    ] = None
+    rules: Annotated[
+        list[Rule],
+        tells("""derive the state from other values; tried before `codes`. Their places are names of
+        `values`."""),
+    ] = msgspec.field(default_factory=list)
+    temperatures: Annotated[
+        dict[Name, Name],
+        tells("name -> the value that is this temperature (°C), shown in status and diagnostics."),
+    ] = msgspec.field(default_factory=dict)
+    errors: Annotated[
+        Errors,
+        tells("""values that mean an error, whatever the state is. Their places are names of
+        `values`."""),
+    ] = Errors()
+    power: Annotated[
+        Power | None,
+        tells("the command that lets it charge; without it the station is only observed."),
+    ] = None
+    clear_error: Annotated[Order | None, tells("the command that clears its error.")] = None
+    range_check: Annotated[
+        Order | None,
+        tells("the command that makes it check where the robot stands, if it does not by itself."),
+    ] = None
 
     def problems(self) -> Problems:
         """Names that are not in `values`, or that nothing uses; a map without a state."""

@@ -10,7 +10,7 @@ from typing import Annotated, Final, NamedTuple, Protocol
 import msgspec
 
 from bridges.kinds.charger.signals import Activity, FaultSide
-from bridges.kinds.shared.fields import Name
+from bridges.kinds.shared.fields import Name, tells
 from drivers.charger.state_codes import ROBOT_ERROR, STATION_ERROR, Codes, first_side
 from drivers.json_fields import Value, same
 
@@ -31,16 +31,11 @@ Bit = Annotated[int, msgspec.Meta(ge=0, le=31)]
 
 
 class Test(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A test of one value; every condition that is given must hold.
+    """A test of one value; every condition that is given must hold."""
 
-    `one_of`: the value is one of these.
-    `above`: the value is greater than this.
-    `below`: the value is less than this.
-    """
-
-    one_of: list[Value] = []
-    above: float | None = None
-    below: float | None = None
+    one_of: Annotated[list[Value], tells("the value is one of these.")] = []
+    above: Annotated[float | None, tells("the value is greater than this.")] = None
+    below: Annotated[float | None, tells("the value is less than this.")] = None
 
     def problems(self) -> Problems:
         """A test without a condition, or one that no value passes."""
@@ -69,16 +64,13 @@ class Test(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
 
 
 class Rule(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """One rule for the station's state.
+    """One rule for the station's state."""
 
-    `means`: the state, by the name of a list of `codes`.
-    `when`: place -> the test of its value; without it the rule always holds.
-    `text`: the error's text, if `means` is an error.
-    """
-
-    means: str
-    when: dict[Name, Test] = msgspec.field(default_factory=dict)
-    text: Name | None = None
+    means: Annotated[str, tells("the state, by the name of a list of `codes`.")]
+    when: Annotated[
+        dict[Name, Test], tells("place -> the test of its value; without it the rule always holds.")
+    ] = msgspec.field(default_factory=dict)
+    text: Annotated[Name | None, tells("the error's text, if `means` is an error.")] = None
 
     def problems(self) -> Problems:
         """An unknown meaning; a text for a state that is not an error."""
@@ -89,18 +81,17 @@ class Rule(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
 
 
 class ErrorNumber(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """An error as one number. An unlisted number is shown as it is.
+    """An error as one number. An unlisted number is shown as it is."""
 
-    `at`: its place.
-    `well`: the numbers that mean no error.
-    `station`: number -> text, for faults of the station.
-    `robot`: number -> text, for faults of the robot, its receiver and its position.
-    """
-
-    at: Name
-    well: tuple[int, ...] = (0,)
-    station: dict[int, Name] = msgspec.field(default_factory=dict)
-    robot: dict[int, Name] = msgspec.field(default_factory=dict)
+    at: Annotated[Name, tells("its place.")]
+    well: Annotated[tuple[int, ...], tells("the numbers that mean no error.")] = (0,)
+    station: Annotated[dict[int, Name], tells("number -> text, for faults of the station.")] = (
+        msgspec.field(default_factory=dict)
+    )
+    robot: Annotated[
+        dict[int, Name],
+        tells("number -> text, for faults of the robot, its receiver and its position."),
+    ] = msgspec.field(default_factory=dict)
 
     def problems(self) -> Problems:
         """A number with two meanings."""
@@ -122,18 +113,18 @@ class ErrorNumber(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
 
 
 class ErrorBits(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Errors as bits of one number: a flag byte or word. An unlisted bit is shown by its number.
+    """Errors as bits of one number: a flag byte or word. An unlisted bit is shown by its number."""
 
-    `at`: its place.
-    `ignore`: bits that mean no error.
-    `station`: bit (0 is the least significant) -> text, for faults of the station.
-    `robot`: bit -> text, for faults of the robot, its receiver and its position.
-    """
-
-    at: Name
-    ignore: list[Bit] = []
-    station: dict[Bit, Name] = msgspec.field(default_factory=dict)
-    robot: dict[Bit, Name] = msgspec.field(default_factory=dict)
+    at: Annotated[Name, tells("its place.")]
+    ignore: Annotated[list[Bit], tells("bits that mean no error.")] = []
+    station: Annotated[
+        dict[Bit, Name],
+        tells("bit (0 is the least significant) -> text, for faults of the station."),
+    ] = msgspec.field(default_factory=dict)
+    robot: Annotated[
+        dict[Bit, Name],
+        tells("bit -> text, for faults of the robot, its receiver and its position."),
+    ] = msgspec.field(default_factory=dict)
 
     def problems(self) -> Problems:
         """A bit with two meanings."""
@@ -152,18 +143,18 @@ class ErrorBits(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
 
 
 class Errors(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Errors of the station or of the robot on it, whatever the state is.
+    """Errors of the station or of the robot on it, whatever the state is."""
 
-    `station`: place -> text; a value other than 0 means that the station has this fault.
-    `robot`: the same for faults of the robot, its receiver and its position.
-    `codes`: errors as one number each.
-    `bits`: errors as the bits of a flag byte or word.
-    """
-
-    station: dict[Name, Name] = msgspec.field(default_factory=dict)
-    robot: dict[Name, Name] = msgspec.field(default_factory=dict)
-    codes: list[ErrorNumber] = []
-    bits: list[ErrorBits] = []
+    station: Annotated[
+        dict[Name, Name],
+        tells("place -> text; a value other than 0 means that the station has this fault."),
+    ] = msgspec.field(default_factory=dict)
+    robot: Annotated[
+        dict[Name, Name],
+        tells("place -> text, for faults of the robot, its receiver and its position."),
+    ] = msgspec.field(default_factory=dict)
+    codes: Annotated[list[ErrorNumber], tells("errors as one number each.")] = []
+    bits: Annotated[list[ErrorBits], tells("errors as the bits of a flag byte or word.")] = []
 
     def found(self, read: Read) -> Found:
         """All errors now, the station's first; a value of None is unknown and means no error."""

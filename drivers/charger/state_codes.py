@@ -9,6 +9,7 @@ from typing import Annotated
 import msgspec
 
 from bridges.kinds.charger.signals import Activity, FaultSide
+from bridges.kinds.shared.fields import tells
 
 CODE_MAX = 65535
 Code = Annotated[int, msgspec.Meta(ge=0, le=CODE_MAX)]
@@ -17,27 +18,32 @@ ROBOT_ERROR: tuple[Activity, FaultSide] = (Activity.ERROR, "robot")
 
 
 class Codes(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """What the maker's state numbers mean. An unlisted number is an error and is shown.
+    """What the maker's state numbers mean. An unlisted number is an error and is shown."""
 
-    `idle`: nothing is on the pad, and a robot may come.
-    `charging`: current flows.
-    `handshake`: a robot is being recognised, no current yet.
-    `stopping`: current still flows, ramping down.
-    `released`: disconnected, and not ready for another robot yet.
-    `error`: out of service, manual operation too; the station's own, if `robot_error` has the others.
-    `station_error`: likewise, where the maker says that it is the station's own; with these, `error`
-    may be either side's.
-    `robot_error`: an error of the robot's side: the station itself is well.
-    """
-
-    idle: Annotated[list[Code], msgspec.Meta(min_length=1)]
-    charging: Annotated[list[Code], msgspec.Meta(min_length=1)]
-    handshake: list[Code] = []
-    stopping: list[Code] = []
-    released: list[Code] = []
-    error: list[Code] = []
-    station_error: list[Code] = []
-    robot_error: list[Code] = []
+    idle: Annotated[
+        list[Code],
+        msgspec.Meta(min_length=1),
+        tells("nothing is on the pad, and a robot may come."),
+    ]
+    charging: Annotated[list[Code], msgspec.Meta(min_length=1), tells("current flows.")]
+    handshake: Annotated[list[Code], tells("a robot is being recognised, no current yet.")] = []
+    stopping: Annotated[list[Code], tells("current still flows, ramping down.")] = []
+    released: Annotated[
+        list[Code], tells("disconnected, and not ready for another robot yet.")
+    ] = []
+    error: Annotated[
+        list[Code],
+        tells("""out of service, manual operation too; the station's own, if `robot_error` has the
+        others."""),
+    ] = []
+    station_error: Annotated[
+        list[Code],
+        tells("""out of service by an error that the maker calls the station's own; with these,
+        `error` may be either side's."""),
+    ] = []
+    robot_error: Annotated[
+        list[Code], tells("an error of the robot's side: the station itself is well.")
+    ] = []
 
     def problems(self) -> Iterable[tuple[tuple[str, ...], str]]:
         """States that are listed twice."""

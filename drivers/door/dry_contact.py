@@ -9,12 +9,13 @@ module ends the pulse; if the hold ends earlier, the driver switches the relay o
 """
 
 from collections.abc import Iterator, Mapping
-from typing import Final
+from typing import Annotated, Final
 
 import msgspec
 
 from bridges.kinds.door.settings import DoorSettings
 from bridges.kinds.door.signals import DoorOutputs, DoorSample
+from bridges.kinds.shared.fields import tells
 from bridges.kinds.shared.table import Table
 from drivers.door.closing import CLOSING
 from drivers.driver_type import DriverType
@@ -32,48 +33,45 @@ CUT_MUST_READ: Final = {
 
 
 class Inputs(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The contacts that are read. With `feedback: estimated` a limit contact may be missing.
+    """The contacts that are read. With `feedback: estimated` a limit contact may be missing."""
 
-    `opened`: the limit contact at the open end, asserted while the door is fully open.
-    `closed`: the limit contact at the closed end, asserted while the door is closed.
-    `obstruction`: somebody is in the doorway; after CLOSE the hold lasts until the doorway is clear.
-    `fire`: the fire alarm; `on_fire` says what it does.
-    """
-
-    opened: Input | None = None
-    closed: Input | None = None
-    obstruction: Input | None = None
-    fire: Input | None = None
+    opened: Annotated[
+        Input | None,
+        tells("the limit contact at the open end, asserted while the door is fully open."),
+    ] = None
+    closed: Annotated[
+        Input | None,
+        tells("the limit contact at the closed end, asserted while the door is closed."),
+    ] = None
+    obstruction: Annotated[
+        Input | None,
+        tells("somebody is in the doorway; after CLOSE the hold lasts until the doorway is clear."),
+    ] = None
+    fire: Annotated[Input | None, tells("the fire alarm; `on_fire` says what it does.")] = None
 
 
 class Hold(Output, frozen=True, forbid_unknown_fields=True):
-    """The relay that holds the door open.
+    """The relay that holds the door open."""
 
-    `flash`: the place of a Modbus module where each `pulse` is requested and timed by the module, in
-    tenths of a second: `unit 1 coil 0x200` for the first relay of a Waveshare Modbus RTU Relay.
-    """
-
-    flash: Point | None = None
+    flash: Annotated[
+        Point | None,
+        tells("""the place of a Modbus module where each `pulse` is requested and timed by the
+        module, in tenths of a second: `unit 1 coil 0x200` for the first relay of a Waveshare Modbus
+        RTU Relay."""),
+    ] = None
 
 
 class Outputs(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The commands to the operator. No relay closes the door.
+    """The commands to the operator. No relay closes the door."""
 
-    `hold_open`: holds the door open while it is on.
-    """
-
-    hold_open: Hold
+    hold_open: Annotated[Hold, tells("holds the door open while it is on.")]
 
 
 class Settings(DoorSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A door and its wiring.
+    """A door and its wiring."""
 
-    `inputs`: the contacts that are read.
-    `outputs`: the relay that is driven.
-    """
-
-    inputs: Inputs = Inputs()
-    outputs: Outputs
+    inputs: Annotated[Inputs, tells("the contacts that are read.")] = Inputs()
+    outputs: Annotated[Outputs, tells("the relay that is driven.")]
 
     def problems(self) -> Iterator[tuple[tuple[str, ...], str]]:
         """Problems that involve more than one field."""

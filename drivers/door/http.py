@@ -6,13 +6,13 @@ fails, only the relay's own timer can release the door. So `hold` sets that time
 """
 
 from collections.abc import Iterator, Mapping
-from typing import Final
+from typing import Annotated, Final
 
 import msgspec
 
 from bridges.kinds.door.settings import DoorSettings
 from bridges.kinds.door.signals import DoorOutputs, DoorSample
-from bridges.kinds.shared.fields import Timeout
+from bridges.kinds.shared.fields import Timeout, tells
 from drivers import DriverError, json_fields
 from drivers.door.closing import CLOSING
 from drivers.driver_type import DriverType
@@ -26,38 +26,34 @@ Problems = Iterator[tuple[tuple[str, ...], str]]
 
 
 class Inputs(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The fields of the answer. With `feedback: estimated` `opened` or `closed` may be missing.
+    """The fields of the answer. With `feedback: estimated` `opened` or `closed` may be missing."""
 
-    `opened`: the door is fully open.
-    `closed`: the door is closed.
-    `obstruction`: somebody is in the doorway; after CLOSE the hold lasts until the doorway is clear.
-    `fire`: the fire alarm; `on_fire` says what it does.
-    """
-
-    opened: Flag | None = None
-    closed: Flag | None = None
-    obstruction: Flag | None = None
-    fire: Flag | None = None
+    opened: Annotated[Flag | None, tells("the door is fully open.")] = None
+    closed: Annotated[Flag | None, tells("the door is closed.")] = None
+    obstruction: Annotated[
+        Flag | None,
+        tells("somebody is in the doorway; after CLOSE the hold lasts until the doorway is clear."),
+    ] = None
+    fire: Annotated[Flag | None, tells("the fire alarm; `on_fire` says what it does.")] = None
 
 
 class Settings(DoorSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A door and its controller. The paths follow the bus's `api_base`.
+    """A door and its controller. The paths follow the bus's `api_base`."""
 
-    `state_path`: the path that GET reads the inputs from.
-    `inputs`: the fields of that answer.
-    `hold`: switches on the relay that holds the door open.
-    `release`: switches it off, so that the door closes by its own rules.
-    `held`: the field that says that the relay is on; without it nothing proves that it is off.
-    `switches_off_after_s`: the relay's own timer, as `hold` sets it (`…&toggle_after=10`): it switches
-    the relay off this long after the last `hold`.
-    """
-
-    state_path: http.Path
-    inputs: Inputs = Inputs()
-    hold: Call
-    release: Call
-    held: Flag | None = None
-    switches_off_after_s: Timeout | None = None
+    state_path: Annotated[http.Path, tells("the path that GET reads the inputs from.")]
+    inputs: Annotated[Inputs, tells("the fields of that answer.")] = Inputs()
+    hold: Annotated[Call, tells("switches on the relay that holds the door open.")]
+    release: Annotated[Call, tells("switches it off, so that the door closes by its own rules.")]
+    held: Annotated[
+        Flag | None,
+        tells("""the field that says that the relay is on; without it nothing proves that it
+        is off."""),
+    ] = None
+    switches_off_after_s: Annotated[
+        Timeout | None,
+        tells("""the relay's own timer, as `hold` sets it (`…&toggle_after=10`): it switches the
+        relay off this long after the last `hold`."""),
+    ] = None
 
     def off_after(self) -> tuple[float, tuple[str, ...]] | None:
         """The relay's timer (s) and its path in the YAML; None where it has none."""

@@ -6,11 +6,11 @@ agree with the status. The command holds the door open or releases it; nothing d
 """
 
 from collections.abc import Iterator, Mapping
-from typing import Final
+from typing import Annotated, Final
 
 from bridges.kinds.door.settings import DoorSettings
 from bridges.kinds.door.signals import DoorOutputs, DoorSample
-from bridges.kinds.shared.fields import Name
+from bridges.kinds.shared.fields import Name, tells
 from bridges.kinds.shared.table import Table
 from drivers.door.closing import CLOSING
 from drivers.door.register_map import DoorMap, Errors, Flag, Parts, Problems, Status
@@ -25,21 +25,23 @@ BITS: Final = 16
 
 
 class Settings(DoorSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A door and its operator's registers.
+    """A door and its operator's registers."""
 
-    `unit`: the operator's Modbus unit id.
-    `profile`: the name of a file in drivers/profiles/ that holds the map.
-    `map`: the register map, written here instead of a profile.
-    `changes`: the parts of the profile's map that differ at this door.
-    `base_address`: added to every address of the map, for a gateway with several operators behind one
-    unit id.
-    """
-
-    unit: Unit
-    profile: Name | None = None
-    map: DoorMap | None = None
-    changes: Parts | None = None
-    base_address: Word = 0
+    unit: Annotated[Unit, tells("the operator's Modbus unit id.")]
+    profile: Annotated[
+        Name | None, tells("the name of a file in drivers/profiles/ that holds the map.")
+    ] = None
+    map: Annotated[
+        DoorMap | None, tells("the register map, written here instead of a profile.")
+    ] = None
+    changes: Annotated[
+        Parts | None, tells("the parts of the profile's map that differ at this door.")
+    ] = None
+    base_address: Annotated[
+        Word,
+        tells("""added to every address of the map, for a gateway with several operators behind one
+        unit id."""),
+    ] = 0
 
     def problems(self) -> Problems:
         """Problems that involve more than one field."""

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import msgspec
 
-from bridges.kinds.shared.fields import Name
+from bridges.kinds.shared.fields import Name, tells
 from drivers.hal.modbus.registers import REGISTERS, WRITABLE, Place, Word, misplaced
 
 Bit = Annotated[int, msgspec.Meta(ge=0, le=15)]
@@ -14,20 +14,23 @@ Problems = Iterator[tuple[tuple[str, ...], str]]
 
 
 class Status(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Where the door is, as one number; an unlisted number is a fault.
+    """Where the door is, as one number; an unlisted number is a fault."""
 
-    `at`: `input register N` or `holding register N`.
-    `open`: the numbers of a fully open door.
-    `closed`: the numbers of a closed door.
-    `moving`: the numbers of a door that is between its end positions and has no fault.
-    `faults`: number -> what is wrong.
-    """
-
-    at: Place
-    open: Annotated[list[Word], msgspec.Meta(min_length=1)]
-    closed: Annotated[list[Word], msgspec.Meta(min_length=1)]
-    moving: Annotated[list[Word], msgspec.Meta(min_length=1)]
-    faults: dict[Word, Name] = msgspec.field(default_factory=dict)
+    at: Annotated[Place, tells("`input register N` or `holding register N`.")]
+    open: Annotated[
+        list[Word], msgspec.Meta(min_length=1), tells("the numbers of a fully open door.")
+    ]
+    closed: Annotated[
+        list[Word], msgspec.Meta(min_length=1), tells("the numbers of a closed door.")
+    ]
+    moving: Annotated[
+        list[Word],
+        msgspec.Meta(min_length=1),
+        tells("the numbers of a door that is between its end positions and has no fault."),
+    ]
+    faults: Annotated[dict[Word, Name], tells("number -> what is wrong.")] = msgspec.field(
+        default_factory=dict
+    )
 
     def problems(self) -> Problems:
         """A place that is not a register; a number with two meanings."""
@@ -42,18 +45,18 @@ class Status(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
 
 
 class Position(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """How far the door is open, from 0 (closed) to 100 (open); any other number is a fault.
+    """How far the door is open, from 0 (closed) to 100 (open); any other number is a fault."""
 
-    `at`: `input register N` or `holding register N`.
-    `unknown`: the number for an unknown position; then only the status counts.
-    `open_from`: below this the door does not count as open, whatever the status.
-    `closed_to`: above this the door does not count as closed, whatever the status.
-    """
-
-    at: Place
-    unknown: Word | None = None
-    open_from: Percent = 95
-    closed_to: Percent = 5
+    at: Annotated[Place, tells("`input register N` or `holding register N`.")]
+    unknown: Annotated[
+        Word | None, tells("the number for an unknown position; then only the status counts.")
+    ] = None
+    open_from: Annotated[
+        Percent, tells("below this the door does not count as open, whatever the status.")
+    ] = 95
+    closed_to: Annotated[
+        Percent, tells("above this the door does not count as closed, whatever the status.")
+    ] = 5
 
     def problems(self) -> Problems:
         """A place that is not a register; thresholds that overlap; `unknown` within 0 to 100."""
@@ -65,14 +68,13 @@ class Position(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
 
 
 class Errors(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The faults that the operator reports. They are shown only; no decision depends on them.
+    """The faults that the operator reports. They are shown only; no decision depends on them."""
 
-    `at`: `input register N` or `holding register N`.
-    `bits`: bit (0: least significant) -> fault; an unlisted bit is shown by its number.
-    """
-
-    at: Place
-    bits: dict[Bit, Name] = msgspec.field(default_factory=dict)
+    at: Annotated[Place, tells("`input register N` or `holding register N`.")]
+    bits: Annotated[
+        dict[Bit, Name],
+        tells("bit (0: least significant) -> fault; an unlisted bit is shown by its number."),
+    ] = msgspec.field(default_factory=dict)
 
     def problems(self) -> Problems:
         """A place that is not a register."""
@@ -80,14 +82,10 @@ class Errors(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
 
 
 class Flag(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """One bit of a register.
+    """One bit of a register."""
 
-    `at`: `input register N` or `holding register N`.
-    `bit`: its number; 0 is the least significant.
-    """
-
-    at: Place
-    bit: Bit
+    at: Annotated[Place, tells("`input register N` or `holding register N`.")]
+    bit: Annotated[Bit, tells("its number; 0 is the least significant.")]
 
     def problems(self) -> Problems:
         """A place that is not a register."""
@@ -95,19 +93,18 @@ class Flag(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
 
 
 class Command(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The command that holds the door open. No value drives it shut.
+    """The command that holds the door open. No value drives it shut."""
 
-    `at`: `coil N` or `holding register N`.
-    `hold`: the value that holds it open.
-    `release`: the value that releases it, so that the operator closes it by its own rules.
-    `read_back`: false where the command can only be written; then it is written in every scan, and
-    nothing proves that the operator took it.
-    """
-
-    at: Place
-    hold: Word
-    release: Word
-    read_back: bool = True
+    at: Annotated[Place, tells("`coil N` or `holding register N`.")]
+    hold: Annotated[Word, tells("the value that holds it open.")]
+    release: Annotated[
+        Word, tells("the value that releases it, so that the operator closes it by its own rules.")
+    ]
+    read_back: Annotated[
+        bool,
+        tells("""false where the command can only be written; then it is written in every scan, and
+        nothing proves that the operator took it."""),
+    ] = True
 
     def problems(self) -> Problems:
         """A place that cannot be written; values that it cannot hold."""
@@ -121,27 +118,23 @@ class Command(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=T
 
 
 class Parts(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Parts that replace those of the profile's map; each is given in full.
+    """Parts that replace those of the profile's map; each is given in full."""
 
-    `status`: where the door is, as one number.
-    `position`: how far it is open.
-    `errors`: the faults that it reports.
-    `obstruction`: somebody is in the doorway; after CLOSE the hold lasts until the doorway is clear.
-    `command`: what holds it open.
-    """
-
-    status: Status | None = None
-    position: Position | None = None
-    errors: Errors | None = None
-    obstruction: Flag | None = None
-    command: Command | None = None
+    status: Annotated[Status | None, tells("where the door is, as one number.")] = None
+    position: Annotated[Position | None, tells("how far it is open.")] = None
+    errors: Annotated[Errors | None, tells("the faults that it reports.")] = None
+    obstruction: Annotated[
+        Flag | None,
+        tells("somebody is in the doorway; after CLOSE the hold lasts until the doorway is clear."),
+    ] = None
+    command: Annotated[Command | None, tells("what holds it open.")] = None
 
 
 class DoorMap(Parts, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """An operator's register map. Addresses begin at 0."""
 
-    status: Status
-    command: Command
+    status: Annotated[Status, tells("where the door is, as one number.")]
+    command: Annotated[Command, tells("what holds it open.")]
 
     def changed(self, parts: Parts | None) -> "DoorMap":
         """This map with `parts` in place of its own."""

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import msgspec
 
 from bridges.host import user_files
-from bridges.kinds.shared.fields import AbsolutePath, Name, Period
+from bridges.kinds.shared.fields import AbsolutePath, Name, Period, tells
 from drivers.hal import Bus, BusType, HalError, Needs, Where
 from drivers.hal.backoff import Backoff
 from drivers.hal.deadline import Dialler, Resolve, tls_socket
@@ -65,23 +65,28 @@ class Settings(
     tag_field="type",
     tag="http",
 ):
-    """A controller's HTTP API.
+    """A controller's HTTP API."""
 
-    `api_base`: host, port and path that every path begins with (`192.168.1.60:8080/api`).
-    `timeout_s`: for a whole call, from the name lookup to the last byte.
-    `scan_s`: how often the controller is read.
-    `token_file`: a file that holds a bearer token or API key, readable by the daemon alone.
-    `token_header`: the header that takes it (`X-API-Key`); `Authorization: Bearer …` when absent.
-    `ca_file`: with https, a PEM file with the certificate of the controller or of its authority; the
-    public authorities when absent.
-    """
-
-    api_base: Name
-    timeout_s: Timeout = 1.0
-    scan_s: Period = 1.0
-    token_file: Name | None = None
-    token_header: Header | None = None
-    ca_file: AbsolutePath | None = None
+    api_base: Annotated[
+        Name, tells("host, port and path that every path begins with (`192.168.1.60:8080/api`).")
+    ]
+    timeout_s: Annotated[
+        Timeout, tells("how long a whole call may take, from the name lookup to the last byte.")
+    ] = 1.0
+    scan_s: Annotated[Period, tells("how often the controller is read.")] = 1.0
+    token_file: Annotated[
+        Name | None,
+        tells("a file that holds a bearer token or API key, readable by the daemon alone."),
+    ] = None
+    token_header: Annotated[
+        Header | None,
+        tells("the header that takes it (`X-API-Key`); `Authorization: Bearer …` when absent."),
+    ] = None
+    ca_file: Annotated[
+        AbsolutePath | None,
+        tells("""with https, a PEM file with the certificate of the controller or of its authority;
+        the public authorities when absent."""),
+    ] = None
 
     def problems(self) -> Iterable[tuple[tuple[str, ...], str]]:
         """An invalid address; settings that have no effect."""

@@ -10,6 +10,7 @@ from typing import Annotated, Literal, Protocol, runtime_checkable
 
 import msgspec
 
+from bridges.kinds.shared.fields import tells
 from drivers import DriverError
 
 Active = Literal["high", "low"]
@@ -20,18 +21,22 @@ DebounceSeconds = Annotated[float, msgspec.Meta(ge=0, le=10, extra={"unit": "s"}
 
 
 class Input(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """One contact that is read.
+    """One contact that is read."""
 
-    `point`: its address: `BCM4` or `J8:7` on GPIO, `unit 1 discrete input 0` on Modbus.
-    `active`: the level at which the signal is asserted (on Modbus `high` is 1).
-    `pull`: the resistor on a GPIO input; required there, and not allowed on other buses.
-    `debounce_s`: how long a change must last; the kind's default when absent.
-    """
-
-    point: Point
-    active: Active
-    pull: Pull | None = None
-    debounce_s: DebounceSeconds | None = None
+    point: Annotated[
+        Point, tells("its address: `BCM4` or `J8:7` on GPIO, `unit 1 discrete input 0` on Modbus.")
+    ]
+    active: Annotated[
+        Active, tells("the level at which the signal is asserted (on Modbus `high` is 1).")
+    ]
+    pull: Annotated[
+        Pull | None,
+        tells("the resistor on a GPIO input; required there, and not allowed on other buses."),
+    ] = None
+    debounce_s: Annotated[
+        DebounceSeconds | None,
+        tells("how long a change must last; the kind's default when absent."),
+    ] = None
 
     def wire(self, signal: str, path: tuple[str, ...], debounce_s: float | None) -> "Wire":
         """Its row of the wiring table; `debounce_s` is the default."""
@@ -40,14 +45,12 @@ class Input(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Output(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """One relay or line that is driven. Its safe level is always not asserted.
+    """One relay or line that is driven. Its safe level is always not asserted."""
 
-    `point`: its address: `BCM18` or `J8:12` on GPIO, `unit 1 coil 0` on Modbus.
-    `active`: the level at which it is asserted.
-    """
-
-    point: Point
-    active: Active
+    point: Annotated[
+        Point, tells("its address: `BCM18` or `J8:12` on GPIO, `unit 1 coil 0` on Modbus.")
+    ]
+    active: Annotated[Active, tells("the level at which it is asserted.")]
 
     def wire(self, signal: str, path: tuple[str, ...], flash: "Flash | None" = None) -> "Wire":
         """Its row of the wiring table."""

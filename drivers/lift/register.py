@@ -5,10 +5,11 @@ number that the map does not list is a fault; it never means a floor, an open do
 """
 
 from collections.abc import Iterable, Iterator, Mapping
-from typing import Final
+from typing import Annotated, Final
 
 from bridges.kinds.lift.settings import LiftSettings
 from bridges.kinds.lift.signals import Door, Hazard, LiftOutputs, LiftSample, Motion, Side
+from bridges.kinds.shared.fields import tells
 from bridges.kinds.shared.table import Table
 from drivers.driver_type import DriverType
 from drivers.hal.modbus import ModbusBus
@@ -33,14 +34,10 @@ HOLD: Final = {Side.FRONT: "door_open", Side.REAR: "rear_door_open"}
 
 
 class Settings(LiftSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A lift and its gateway's registers.
+    """A lift and its gateway's registers."""
 
-    `unit`: the gateway's Modbus unit id.
-    `map`: the gateway's register map.
-    """
-
-    unit: Unit
-    map: LiftMap
+    unit: Annotated[Unit, tells("the gateway's Modbus unit id.")]
+    map: Annotated[LiftMap, tells("the gateway's register map.")]
 
     def problems(self) -> Problems:
         """Problems that involve more than one field."""

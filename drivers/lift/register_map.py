@@ -8,7 +8,7 @@ from typing import Annotated, Literal, TypeAlias
 import msgspec
 
 from bridges.kinds.lift.signals import Hazard
-from bridges.kinds.shared.fields import Name
+from bridges.kinds.shared.fields import Name, tells
 from drivers.hal.modbus.points import BITS
 from drivers.hal.modbus.registers import REGISTERS, TABLES, WRITABLE, Place, Word, misplaced
 from drivers.lift.wiring import ServiceState
@@ -18,16 +18,16 @@ Problems = Iterator[tuple[tuple[str, ...], str]]
 
 
 class Field(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A number in a register.
+    """A number in a register."""
 
-    `at`: `input register N` or `holding register N`.
-    `bits`: the bits that form the number, least significant first; the whole register when absent.
-    `valid_when`: `agv_mode` if it is valid only while AGV mode is on.
-    """
-
-    at: Place
-    bits: list[Bit] = msgspec.field(default_factory=list)
-    valid_when: Literal["agv_mode"] | None = None
+    at: Annotated[Place, tells("`input register N` or `holding register N`.")]
+    bits: Annotated[
+        list[Bit],
+        tells("the bits of the number, least significant first; the whole register when absent."),
+    ] = msgspec.field(default_factory=list)
+    valid_when: Annotated[
+        Literal["agv_mode"] | None, tells("`agv_mode` if it is valid only while AGV mode is on.")
+    ] = None
 
     def number(self, word: int) -> int:
         """The number in a register's value."""
@@ -52,14 +52,12 @@ class Field(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
 
 
 class FloorField(Field, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Where the car is.
+    """Where the car is."""
 
-    `codes`: number -> landing; an unlisted number is a fault.
-    `between_floors`: the numbers for a car between floors.
-    """
-
-    codes: dict[Word, Name]
-    between_floors: list[Word] = msgspec.field(default_factory=list)
+    codes: Annotated[dict[Word, Name], tells("number -> landing; an unlisted number is a fault.")]
+    between_floors: Annotated[list[Word], tells("the numbers for a car between floors.")] = (
+        msgspec.field(default_factory=list)
+    )
 
     def problems(self) -> Problems:
         """What `fits` finds; a number with two meanings."""
@@ -70,12 +68,12 @@ class FloorField(Field, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
 
 class DoorField(Field, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A door.
+    """A door."""
 
-    `codes`: number -> state; an unlisted number is a fault.
-    """
-
-    codes: dict[Word, Literal["open", "closed", "moving"]]
+    codes: Annotated[
+        dict[Word, Literal["open", "closed", "moving"]],
+        tells("number -> state; an unlisted number is a fault."),
+    ]
 
     def problems(self) -> Problems:
         """What `fits` finds; a door without a code for open or for closed."""
@@ -85,12 +83,12 @@ class DoorField(Field, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
 
 class MotionField(Field, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The car's motion.
+    """The car's motion."""
 
-    `codes`: number -> motion; an unlisted number is a fault.
-    """
-
-    codes: dict[Word, Literal["stopped", "up", "down", "moving"]]
+    codes: Annotated[
+        dict[Word, Literal["stopped", "up", "down", "moving"]],
+        tells("number -> motion; an unlisted number is a fault."),
+    ]
 
     def problems(self) -> Problems:
         """What `fits` finds; a car that never stands, or never moves."""
@@ -101,12 +99,12 @@ class MotionField(Field, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
 
 class ServiceField(Field, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The lift's service state.
+    """The lift's service state."""
 
-    `codes`: number -> state; at an unlisted number the lift is out of service.
-    """
-
-    codes: dict[Word, ServiceState]
+    codes: Annotated[
+        dict[Word, ServiceState],
+        tells("number -> state; at an unlisted number the lift is out of service."),
+    ]
 
     def problems(self) -> Problems:
         """What `fits` finds."""
@@ -122,18 +120,20 @@ Number: TypeAlias = FloorField | DoorField | MotionField | ServiceField
 
 
 class Flag(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """One bit.
+    """One bit."""
 
-    `at`: `input register N`, `holding register N`, `coil N` or `discrete input N`.
-    `bit`: its number in a register; 0 is the least significant.
-    `active`: the level at which it is asserted; `high` is 1.
-    `valid_when`: `agv_mode` if it is valid only while AGV mode is on.
-    """
-
-    at: Place
-    bit: Bit | None = None
-    active: Literal["high", "low"]
-    valid_when: Literal["agv_mode"] | None = None
+    at: Annotated[
+        Place, tells("`input register N`, `holding register N`, `coil N` or `discrete input N`.")
+    ]
+    bit: Annotated[Bit | None, tells("its number in a register; 0 is the least significant.")] = (
+        None
+    )
+    active: Annotated[
+        Literal["high", "low"], tells("the level at which it is asserted; `high` is 1.")
+    ]
+    valid_when: Annotated[
+        Literal["agv_mode"] | None, tells("`agv_mode` if it is valid only while AGV mode is on.")
+    ] = None
 
     def asserted(self, word: int) -> bool:
         """Is the flag asserted, by the value of its register or bit?"""
@@ -154,17 +154,15 @@ class Flag(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
 
 
 class Command(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """One thing that is asked of the lift.
+    """One thing that is asked of the lift."""
 
-    `at`: `coil N` or `holding register N`. Commands may share a register: their values are joined,
-    bit by bit.
-    `ask`: the value that asks for it.
-    `release`: the value that does not; its safe value.
-    """
-
-    at: Place
-    ask: Word = 1
-    release: Word = 0
+    at: Annotated[
+        Place,
+        tells("""`coil N` or `holding register N`. Commands may share a register: their values are
+        joined, bit by bit."""),
+    ]
+    ask: Annotated[Word, tells("the value that asks for it.")] = 1
+    release: Annotated[Word, tells("the value that does not; its safe value.")] = 0
 
     def problems(self) -> Problems:
         """A place that cannot be written; values that it cannot hold."""
@@ -177,16 +175,11 @@ class Command(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=T
 
 
 class CallCommand(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Calls as numbers in a register.
+    """Calls as numbers in a register."""
 
-    `at`: `holding register N`.
-    `codes`: number -> landing.
-    `none`: the value for no call.
-    """
-
-    at: Place
-    codes: dict[Word, Name]
-    none: Word = 0
+    at: Annotated[Place, tells("`holding register N`.")]
+    codes: Annotated[dict[Word, Name], tells("number -> landing.")]
+    none: Annotated[Word, tells("the value for no call.")] = 0
 
     def problems(self) -> Problems:
         """A place that cannot be written; a landing whose number means no call."""
@@ -196,22 +189,26 @@ class CallCommand(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
 
 
 class Commands(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The commands to the lift.
+    """The commands to the lift."""
 
-    `agv_mode_request`: requests AGV mode while a robot holds the lift.
-    `door_open`, `rear_door_open`: holds that door open at the landing where the car stands.
-    `calls`: landing -> its command. Give either `calls` or `call`.
-    `call`: calls as numbers in one register.
-    `read_back`: false where commands can only be written; then they are written in every scan, and
-    nothing proves that the gateway took them.
-    """
-
-    agv_mode_request: Command | None = None
-    door_open: Command | None = None
-    rear_door_open: Command | None = None
-    calls: dict[Name, Command] = msgspec.field(default_factory=dict)
-    call: CallCommand | None = None
-    read_back: bool = True
+    agv_mode_request: Annotated[
+        Command | None, tells("requests AGV mode while a robot holds the lift.")
+    ] = None
+    door_open: Annotated[
+        Command | None, tells("holds the door open at the landing where the car stands.")
+    ] = None
+    rear_door_open: Annotated[
+        Command | None, tells("holds the rear door open at the landing where the car stands.")
+    ] = None
+    calls: Annotated[
+        dict[Name, Command], tells("landing -> its command. Give either `calls` or `call`.")
+    ] = msgspec.field(default_factory=dict)
+    call: Annotated[CallCommand | None, tells("calls as numbers in one register.")] = None
+    read_back: Annotated[
+        bool,
+        tells("""false where commands can only be written; then they are written in every scan, and
+        nothing proves that the gateway took them."""),
+    ] = True
 
     def singles(self) -> Iterator[tuple[str, tuple[str, ...], Command]]:
         """Each command except `call`: its signal, its path below this section, and the command."""
@@ -259,34 +256,28 @@ class Commands(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
 
 
 class LiftMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The gateway's register map. Addresses begin at 0.
+    """The gateway's register map. Addresses begin at 0."""
 
-    `floor`: where the car is.
-    `door`, `rear_door`: the car's doors.
-    `motion`: the car's motion.
-    `service`: the lift's service state; it may include hazards and AGV mode.
-    `agv_mode`: AGV mode is on. It may be a state of `service` instead.
-    `fire_alarm`: fire, shown as MODE_FIRE; latched with `fire_reset: manual`.
-    `code_blue`, `earthquake`, `emergency`: shown as MODE_EMERGENCY.
-    `out_of_service`, `manual_mode`: shown as MODE_OFFLINE; `manual_mode` is the key switch.
-    `overload`: only delays the ride.
-    `commands`: the commands to the lift.
-    """
-
-    floor: FloorField
-    door: DoorField
-    rear_door: DoorField | None = None
-    motion: MotionField | None = None
-    service: ServiceField | None = None
-    agv_mode: Flag | None = None
-    fire_alarm: Flag | None = None
-    code_blue: Flag | None = None
-    earthquake: Flag | None = None
-    emergency: Flag | None = None
-    out_of_service: Flag | None = None
-    manual_mode: Flag | None = None
-    overload: Flag | None = None
-    commands: Commands
+    floor: Annotated[FloorField, tells("where the car is.")]
+    door: Annotated[DoorField, tells("the car's door.")]
+    rear_door: Annotated[DoorField | None, tells("the car's rear door.")] = None
+    motion: Annotated[MotionField | None, tells("the car's motion.")] = None
+    service: Annotated[
+        ServiceField | None, tells("the lift's service state; it may include hazards and AGV mode.")
+    ] = None
+    agv_mode: Annotated[
+        Flag | None, tells("AGV mode is on. It may be a state of `service` instead.")
+    ] = None
+    fire_alarm: Annotated[
+        Flag | None, tells("fire, shown as MODE_FIRE; latched with `fire_reset: manual`.")
+    ] = None
+    code_blue: Annotated[Flag | None, tells("shown as MODE_EMERGENCY.")] = None
+    earthquake: Annotated[Flag | None, tells("shown as MODE_EMERGENCY.")] = None
+    emergency: Annotated[Flag | None, tells("shown as MODE_EMERGENCY.")] = None
+    out_of_service: Annotated[Flag | None, tells("shown as MODE_OFFLINE.")] = None
+    manual_mode: Annotated[Flag | None, tells("the key switch; shown as MODE_OFFLINE.")] = None
+    overload: Annotated[Flag | None, tells("only delays the ride.")] = None
+    commands: Annotated[Commands, tells("the commands to the lift.")]
 
     def parts(self) -> dict[str, Number | Flag]:
         """Name -> part, for each part that is read and given."""

@@ -7,7 +7,7 @@ import msgspec
 
 from bridges.kinds.lift.settings import LiftSettings
 from bridges.kinds.lift.signals import Hazard
-from bridges.kinds.shared.fields import Name
+from bridges.kinds.shared.fields import Name, tells
 from drivers.hal.points import Input, Output
 from drivers.lift import codes
 from drivers.lift.codes import Encoding
@@ -17,42 +17,42 @@ Number = Annotated[int, msgspec.Meta(ge=0, le=65535)]
 
 
 class LiftInput(Input, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """One line from the lift.
+    """One line from the lift."""
 
-    `valid_when`: `agv_mode` if the line is valid only while AGV mode is on. Outside AGV mode its floor
-    or motion is unknown, its door is neither open nor closed, and its hazard is clear.
-    """
-
-    valid_when: Literal["agv_mode"] | None = None
+    valid_when: Annotated[
+        Literal["agv_mode"] | None,
+        tells("""`agv_mode` if the line is valid only while AGV mode is on. Outside AGV mode
+        its floor or motion is unknown, its door is neither open nor closed, and its hazard is
+        clear."""),
+    ] = None
 
 
 class DoorInput(LiftInput, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The only contact of a door.
+    """The only contact of a door."""
 
-    `proves`: what the asserted contact proves; the other end is estimated by `door_travel_s`.
-    """
-
-    proves: Literal["open", "closed"]
+    proves: Annotated[
+        Literal["open", "closed"],
+        tells("what the asserted contact proves; the other end is estimated by `door_travel_s`."),
+    ]
 
 
 class ParityInput(LiftInput, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A parity line, which reveals a broken line of the code.
+    """A parity line, which reveals a broken line of the code."""
 
-    `total`: whether the number of asserted lines of the code, this one included, is even or odd.
-    """
-
-    total: Literal["even", "odd"]
+    total: Annotated[
+        Literal["even", "odd"],
+        tells("whether the number of asserted lines, this one included, is even or odd."),
+    ]
 
 
 class MotionCode(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Motion as a number on several lines.
+    """Motion as a number on several lines."""
 
-    `bits`: least significant first.
-    `codes`: number -> motion; an unlisted number is a fault.
-    """
-
-    bits: list[LiftInput]
-    codes: dict[Number, Literal["stopped", "up", "down", "moving"]]
+    bits: Annotated[list[LiftInput], tells("least significant first.")]
+    codes: Annotated[
+        dict[Number, Literal["stopped", "up", "down", "moving"]],
+        tells("number -> motion; an unlisted number is a fault."),
+    ]
 
 
 ServiceState = Literal[
@@ -70,15 +70,14 @@ ServiceState = Literal[
 
 
 class ServiceCode(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The lift's service state as a number on several lines.
+    """The lift's service state as a number on several lines."""
 
-    `bits`: least significant first.
-    `codes`: number -> state; every number must be listed. Write `fault` for a number that the
-    controller never shows: then a line is broken, and the lift is out of service.
-    """
-
-    bits: list[LiftInput]
-    codes: dict[Number, ServiceState]
+    bits: Annotated[list[LiftInput], tells("least significant first.")]
+    codes: Annotated[
+        dict[Number, ServiceState],
+        tells("""number -> state; every number must be listed. Write `fault` for a number that the
+        controller never shows: then a line is broken, and the lift is out of service."""),
+    ]
 
     def means(self, number: int) -> str:
         """The state that a number shows."""
@@ -91,62 +90,72 @@ class Inputs(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
 
     A hazard takes the lift away from RMF at once. A door has one contact or two. Give motion in one
     way: `moving`, `stopped`, `up` with `down`, or a code.
-
-    `fire_alarm`: fire, shown as MODE_FIRE; latched with `fire_reset: manual`.
-    `code_blue`, `earthquake`, `emergency`: shown as MODE_EMERGENCY.
-    `out_of_service`, `manual_mode`: shown as MODE_OFFLINE; `manual_mode` is the key switch.
-    `overload`: only delays the ride.
-    `agv_mode`: AGV mode is on. It may be a state of `service` instead.
-    `service`: the lift's service state as a code.
-    `door`, `rear_door`: the door's only contact.
-    `door_opened`, `rear_door_opened`: the contact at the open end, with one at the closed end.
-    `door_closed`, `rear_door_closed`: the contact at the closed end, with one at the open end.
-    `moving`: the car moves, up or down.
-    `stopped`: the car stands.
-    `up`, `down`: the car moves that way; with neither asserted it stands.
-    `motion`: motion as a code.
     """
 
-    fire_alarm: LiftInput | None = None
-    code_blue: LiftInput | None = None
-    earthquake: LiftInput | None = None
-    emergency: LiftInput | None = None
-    out_of_service: LiftInput | None = None
-    manual_mode: LiftInput | None = None
-    overload: LiftInput | None = None
-    agv_mode: LiftInput | None = None
-    service: ServiceCode | None = None
-    door: DoorInput | None = None
-    door_opened: LiftInput | None = None
-    door_closed: LiftInput | None = None
-    rear_door: DoorInput | None = None
-    rear_door_opened: LiftInput | None = None
-    rear_door_closed: LiftInput | None = None
-    moving: LiftInput | None = None
-    stopped: LiftInput | None = None
-    up: LiftInput | None = None
-    down: LiftInput | None = None
-    motion: MotionCode | None = None
+    fire_alarm: Annotated[
+        LiftInput | None, tells("fire, shown as MODE_FIRE; latched with `fire_reset: manual`.")
+    ] = None
+    code_blue: Annotated[LiftInput | None, tells("shown as MODE_EMERGENCY.")] = None
+    earthquake: Annotated[LiftInput | None, tells("shown as MODE_EMERGENCY.")] = None
+    emergency: Annotated[LiftInput | None, tells("shown as MODE_EMERGENCY.")] = None
+    out_of_service: Annotated[LiftInput | None, tells("shown as MODE_OFFLINE.")] = None
+    manual_mode: Annotated[LiftInput | None, tells("the key switch; shown as MODE_OFFLINE.")] = None
+    overload: Annotated[LiftInput | None, tells("only delays the ride.")] = None
+    agv_mode: Annotated[
+        LiftInput | None, tells("AGV mode is on. It may be a state of `service` instead.")
+    ] = None
+    service: Annotated[ServiceCode | None, tells("the lift's service state as a code.")] = None
+    door: Annotated[DoorInput | None, tells("the door's only contact.")] = None
+    door_opened: Annotated[
+        LiftInput | None, tells("the contact at the open end, with one at the closed end.")
+    ] = None
+    door_closed: Annotated[
+        LiftInput | None, tells("the contact at the closed end, with one at the open end.")
+    ] = None
+    rear_door: Annotated[DoorInput | None, tells("the rear door's only contact.")] = None
+    rear_door_opened: Annotated[
+        LiftInput | None, tells("the contact at its open end, with one at its closed end.")
+    ] = None
+    rear_door_closed: Annotated[
+        LiftInput | None, tells("the contact at its closed end, with one at its open end.")
+    ] = None
+    moving: Annotated[LiftInput | None, tells("the car moves, up or down.")] = None
+    stopped: Annotated[LiftInput | None, tells("the car stands.")] = None
+    up: Annotated[
+        LiftInput | None, tells("the car moves up; with neither `up` nor `down` it stands.")
+    ] = None
+    down: Annotated[
+        LiftInput | None, tells("the car moves down; with neither `up` nor `down` it stands.")
+    ] = None
+    motion: Annotated[MotionCode | None, tells("motion as a code.")] = None
 
 
 class FloorCode(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Where the car is.
+    """Where the car is."""
 
-    `encoding`: how the lines show the landing; `one_hot` is one line for each.
-    `bits`: the lines that show a number, least significant first.
-    `codes`: number -> landing.
-    `parity`: a parity line, which reveals a broken line.
-    `lines`: with `one_hot`, landing -> its line; with no line asserted the car is between floors.
-    `between_floors`: the numbers for a car between floors. A number neither here nor in `codes` is a
-    fault.
-    """
-
-    encoding: Literal["binary", "gray", "bcd", "one_hot"]
-    bits: list[LiftInput] = msgspec.field(default_factory=list)
-    codes: dict[Number, Name] = msgspec.field(default_factory=dict)
-    parity: ParityInput | None = None
-    lines: dict[Name, LiftInput] = msgspec.field(default_factory=dict)
-    between_floors: list[Number] = msgspec.field(default_factory=lambda: [0])
+    encoding: Annotated[
+        Literal["binary", "gray", "bcd", "one_hot"],
+        tells("how the lines show the landing; `one_hot` is one line for each."),
+    ]
+    bits: Annotated[
+        list[LiftInput], tells("the lines that show a number, least significant first.")
+    ] = msgspec.field(default_factory=list)
+    codes: Annotated[dict[Number, Name], tells("number -> landing.")] = msgspec.field(
+        default_factory=dict
+    )
+    parity: Annotated[ParityInput | None, tells("a parity line, which reveals a broken line.")] = (
+        None
+    )
+    lines: Annotated[
+        dict[Name, LiftInput],
+        tells("""with `one_hot`, landing -> its line; with no line asserted the car is between
+        floors."""),
+    ] = msgspec.field(default_factory=dict)
+    between_floors: Annotated[
+        list[Number],
+        tells("""the numbers for a car between floors. A number neither here nor in `codes` is a
+        fault."""),
+    ] = msgspec.field(default_factory=lambda: [0])
 
     def inputs(self) -> Iterator[tuple[str, tuple[str, ...], LiftInput]]:
         """Each line: its signal, its path below this section, and the line."""
@@ -204,14 +213,10 @@ class FloorCode(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
 
 
 class CallCode(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Calls as a binary number on several lines; 0 is no call.
+    """Calls as a binary number on several lines; 0 is no call."""
 
-    `bits`: least significant first.
-    `codes`: number -> landing.
-    """
-
-    bits: list[Output]
-    codes: dict[Number, Name]
+    bits: Annotated[list[Output], tells("least significant first.")]
+    codes: Annotated[dict[Number, Name], tells("number -> landing.")]
 
     def lines(self, level: str | None) -> dict[str, bool]:
         """Signal -> asserted, for a call to this landing (None: no call)."""
@@ -220,29 +225,26 @@ class CallCode(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
 
 
 class Outputs(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The lines to the lift, except calls. Each is a level, and off is its safe state.
+    """The lines to the lift, except calls. Each is a level, and off is its safe state."""
 
-    `agv_mode_request`: requests AGV mode while a robot holds the lift.
-    `door_open`, `rear_door_open`: holds that door open at the landing where the car stands.
-    """
-
-    agv_mode_request: Output | None = None
-    door_open: Output | None = None
-    rear_door_open: Output | None = None
+    agv_mode_request: Annotated[
+        Output | None, tells("requests AGV mode while a robot holds the lift.")
+    ] = None
+    door_open: Annotated[
+        Output | None, tells("holds the door open at the landing where the car stands.")
+    ] = None
+    rear_door_open: Annotated[
+        Output | None, tells("holds the rear door open at the landing where the car stands.")
+    ] = None
 
 
 class LiftWiring(LiftSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A lift on dry contacts, on GPIO pins or a Modbus I/O module.
+    """A lift on dry contacts, on GPIO pins or a Modbus I/O module."""
 
-    `inputs`: the lines from the lift.
-    `floor_code`: where the car is.
-    `outputs`: the lines to the lift, except calls.
-    `calls`: landing -> its line. Give either `calls` or `call_code`.
-    `call_code`: calls as a number on several lines.
-    """
-
-    inputs: Inputs
-    floor_code: FloorCode
-    outputs: Outputs
-    calls: dict[Name, Output] = msgspec.field(default_factory=dict)
-    call_code: CallCode | None = None
+    inputs: Annotated[Inputs, tells("the lines from the lift.")]
+    floor_code: Annotated[FloorCode, tells("where the car is.")]
+    outputs: Annotated[Outputs, tells("the lines to the lift, except calls.")]
+    calls: Annotated[
+        dict[Name, Output], tells("landing -> its line. Give either `calls` or `call_code`.")
+    ] = msgspec.field(default_factory=dict)
+    call_code: Annotated[CallCode | None, tells("calls as a number on several lines.")] = None

@@ -109,11 +109,11 @@ def _collect(value: object, found: Found) -> None:
 
 def _note(found: Found, struct: type, name: str, text: str) -> None:
     for base in struct.__mro__:
-        if len(text) <= LONGEST and name in _names(base):
+        if len(text) <= LONGEST and name in field_names(base):
             found[base, name] = min(found.get((base, name), text), text, key=len)
 
 
-def _names(base: type) -> tuple[str, ...]:
+def field_names(base: type) -> tuple[str, ...]:
     """The fields of a struct; none for msgspec.Struct and its bases."""
     if not issubclass(base, msgspec.Struct) or base is msgspec.Struct:
         return ()
@@ -130,6 +130,8 @@ def flow(value: object) -> str:
 
 def _is_numbered(info: mi.Type) -> bool:
     """Whether it is a mapping whose keys are numbers."""
+    if isinstance(info, mi.Metadata):
+        return _is_numbered(info.type)
     key = info.key_type if isinstance(info, mi.DictType) else None
     return isinstance(key.type if isinstance(key, mi.Metadata) else key, mi.IntType)
 

@@ -1,12 +1,13 @@
 """Generates the configuration reference from the structs of the YAML, as JSON Schema and as a page.
 
-Keys, types, bounds, units and defaults come from the structs. A key's meaning is the part of its
-struct's docstring that begins with that key.
+Keys, types, bounds, units, defaults and meanings come from the fields of the structs, purposes from
+their docstrings.
 """
 
 import inspect
 import re
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Container, Iterator
 
 import msgspec
 from msgspec import inspect as mi
@@ -19,13 +20,20 @@ from bridges.kinds.shared.rmf_section import Rmf
 from bridges.settings import names as named
 from bridges.yaml.leaves import Extra, choices, wanted_text
 from drivers.driver_type import AnyDriver
-from workbench.commissioning.examples import example, flow
+from workbench.commissioning.examples import example, field_names, flow
 
 Schema = dict[str, object]
 """A JSON Schema."""
 
-KEYS = r"(?:^|(?<=[.;]\s))((?:`\w+`(?:,\s)?)+): "
-MEANING = re.compile(rf"{KEYS}(.*?)(?={KEYS}|\Z)", re.M | re.S)
+FILE: dict[str, str] = {
+    "kind": "what the file describes: lifts, doors, chargers, or a node without hardware.",
+    "driver": "the driver of the devices; a device may name its own.",
+    "rmf": "how the daemon reaches Open-RMF.",
+    "recording": "what is recorded of the daemon's work.",
+    "buses": "name -> a bus, by its `type`.",
+    "type": "the sort of a bus; its other keys depend on it.",
+}
+"""What the keys mean that no struct has."""
 
 
 class Shape(msgspec.Struct, frozen=True):
@@ -78,17 +86,23 @@ def schema() -> Schema:
     }
 
 
-def _allow_type(components: dict[str, dict[str, dict[str, object]]], ref: Schema) -> None:
+def _allow_type(components: dict[str, dict[str, dict[str, Schema]]], ref: Schema) -> None:
     """Add `type:` to a bus: it is read before the struct, and is not one of its fields."""
     component = components[str(ref["$ref"]).rsplit("/", 1)[1]]
     component["properties"].setdefault("type", {"type": "string"})
+    component["properties"]["type"]["description"] = FILE["type"]
+
+
+def _key(name: str, schema: Schema) -> Schema:
+    """One of the keys that no struct has."""
+    return {name: {"description": FILE[name], **schema}}
 
 
 def _file(shape: Shape, buses: dict[str, type], by_type: dict[type, Schema]) -> Schema:
     """A file with this driver; a device may name another driver of the kind."""
     of_kind = [other for other in shapes() if other.kind == shape.kind]
     kinds_of_bus = [
-        {"allOf": [by_type[buses[name]], {"properties": {"type": {"const": name}}}]}
+        {"allOf": [by_type[buses[name]], {"properties": _key("type", {"const": name})}]}
         for name in buses
         if any(name in other.type.buses for other in of_kind)
     ]
@@ -101,12 +115,13 @@ def _file(shape: Shape, buses: dict[str, type], by_type: dict[type, Schema]) -> 
         "additionalProperties": False,
         "required": ["kind", "driver", "buses", shape.devices_key],
         "properties": {
-            "kind": {"const": shape.kind},
-            "driver": {"const": shape.driver},
-            "rmf": by_type[Rmf],
-            "recording": by_type[Recording],
-            "buses": {"type": "object", "additionalProperties": {"oneOf": kinds_of_bus}},
+            **_key("kind", {"const": shape.kind}),
+            **_key("driver", {"const": shape.driver}),
+            **_key("rmf", by_type[Rmf]),
+            **_key("recording", by_type[Recording]),
+            **_key("buses", {"type": "object", "additionalProperties": {"oneOf": kinds_of_bus}}),
             shape.devices_key: {
+                "description": f"a {shape.kind}'s name on RMF's graph -> its settings.",
                 "type": "object",
                 "additionalProperties": {"oneOf": devices},
             },
@@ -117,7 +132,7 @@ def _file(shape: Shape, buses: dict[str, type], by_type: dict[type, Schema]) -> 
 def _named_by_device(driver: Shape, of_file: Shape) -> Schema:
     """A device must name its driver, unless it is the file's own."""
     required = [] if driver == of_file else ["driver"]
-    return {"required": required, "properties": {"driver": {"const": driver.driver}}}
+    return {"required": required, "properties": _key("driver", {"const": driver.driver})}
 
 
 def _graph_file(kind: AnyGraphKind, by_type: dict[type, Schema]) -> Schema:
@@ -126,86 +141,155 @@ def _graph_file(kind: AnyGraphKind, by_type: dict[type, Schema]) -> Schema:
         "additionalProperties": False,
         "required": ["kind"],
         "properties": {
-            "kind": {"const": kind.name},
-            "rmf": by_type[Rmf],
-            "recording": by_type[Recording],
-            kind.devices_key: by_type[kind.settings],
+            **_key("kind", {"const": kind.name}),
+            **_key("rmf", by_type[Rmf]),
+            **_key("recording", by_type[Recording]),
+            kind.devices_key: {"description": _purpose(kind.settings), **by_type[kind.settings]},
         },
     }
 
 
 def page() -> str:
-    """`docs/configuration.md`."""
+    """`docs/configuration.md`: each struct once; where several sections have it, at the end."""
+    rows = [f"| `{key}` | {told} |" for key, told in FILE.items()]
     sections = [
         "# Configuration reference",
         "Generated by `rmf-bridge schema --markdown`: do not edit."
         " `rmf-bridge schema` prints the same as JSON Schema, for editors.",
-        "A file has `kind`, `driver`, `rmf`, `recording`, `buses`, and the devices under the key of"
-        " their kind (`lifts`, `doors` or `chargers`). The file of a supervisor or coordinator has"
-        " `kind`, `rmf`, `recording` and one section of its own.",
-        *_sections("`rmf`", Rmf),
-        *_sections("`recording`", Recording),
+        "A file has these keys, and its devices under the key of their kind (`lifts`, `doors` or"
+        " `chargers`). The file of a supervisor or coordinator has `kind`, `rmf`, `recording` and"
+        " one section of its own.",
+        "\n".join(["| key | meaning |", "|---|---|", *rows]),
     ]
-    for name in named.bus_types():
-        sections += _sections(f"Bus of `type: {name}`", named.bus_called(name).settings)
-    for shape in shapes():
-        title = f"`{shape.devices_key}` with `driver: {shape.driver}`"
-        sections += _sections(title, shape.type.settings)
-    for kind in graph_kinds():
-        sections += _sections(f"`{kind.devices_key}` of `kind: {kind.name}`", kind.settings)
+    headings = _headings(_tops())
+    for struct, heading in headings.items():
+        if not _is_of_one(heading) and SHARED not in sections:
+            sections.append(SHARED)
+        sections += _section(struct, headings)
     return "\n\n".join(sections) + "\n"
 
 
-def _sections(title: str, struct: type) -> Iterator[str]:
-    """A struct's table, then those of the structs inside it, each once, by its path from the top."""
-    paths: dict[type, list[str]] = {struct: []}
-    todo = [(struct, "")]
+SHARED = "## What several sections have"
+
+Headings = dict[type, str]
+
+
+def _is_of_one(heading: str) -> bool:
+    return heading.startswith("## ") or ": `" in heading
+
+
+def _tops() -> Headings:
+    """The sections of a file, each with its heading; what several have comes before the first."""
+    found: Headings = {Rmf: "## `rmf`", Recording: "## `recording`"}
+    for name in named.bus_types():
+        found[named.bus_called(name).settings] = f"## Bus of `type: {name}`"
+    last = [
+        (s.devices_key, s.type.settings, f"`{s.devices_key}` with `driver: {s.driver}`")
+        for s in shapes()
+    ] + [
+        (k.devices_key, k.settings, f"`{k.devices_key}` of `kind: {k.name}`") for k in graph_kinds()
+    ]
+    keys: dict[type, list[str]] = {}
+    for key, struct, _ in last:
+        for base in _bases(struct):
+            keys.setdefault(base, []).append(f"`{key}`")
+    for _, struct, title in last:
+        for base in reversed(_bases(struct)):
+            if len(keys[base]) > 1:
+                found[base] = f"## All {', '.join(dict.fromkeys(keys[base]))}"
+        found[struct] = f"## {title}"
+    return found
+
+
+def _headings(tops: Headings) -> Headings:
+    """Every struct of the page with its heading, in the page's order."""
+    everywhere = [struct for top in tops for struct, _ in _inside(top, ())]
+    heirs = Counter(base for struct in {*tops, *everywhere} for base in _bases(struct))
+    printed = {*tops, *everywhere, *(base for base, many in heirs.items() if many > 1)}
+    inside = {top: list(_inside(top, printed)) for top in tops}
+    tops_of = Counter(struct for found in inside.values() for struct in {s for s, _ in found})
+    ordered: Headings = {}
+    for top, heading in tops.items():
+        ordered[top] = heading
+        for struct, path in inside[top]:
+            if tops_of[struct] == 1:
+                ordered.setdefault(struct, f"#{heading}: `{path}`")
+    shared = sorted((_purpose(s).partition(".")[0], s) for s in printed if s not in ordered)
+    return ordered | {struct: f"### {title}" for title, struct in shared}
+
+
+def _inside(top: type, printed: Container[type]) -> Iterator[tuple[type, str]]:
+    """The structs inside a struct, and their paths from there; not those of a base that is printed."""
+    todo, seen = [(top, "")], {top}
     while todo:
-        current, path = todo.pop(0)
-        info = mi.type_info(current)
-        assert isinstance(info, mi.StructType)
-        for field in info.fields:
+        struct, path = todo.pop(0)
+        for field in _own(struct, printed):
             for inner in parts(field.type):
-                inside = f"{path}{field.encode_name}"
-                if inner not in paths:
-                    todo.append((inner, f"{inside}."))
-                paths.setdefault(inner, []).append(inside)
-    for current, places in paths.items():
-        yield f"### {title}: `{places[0]}`" if places else f"## {title}"
-        if places[1:]:
-            yield f"Likewise {', '.join(f'`{place}`' for place in places[1:])}."
-        yield from _struct(current)
+                if inner not in seen:
+                    seen.add(inner)
+                    yield inner, f"{path}{field.encode_name}"
+                    todo.append((inner, f"{path}{field.encode_name}."))
 
 
-def _struct(struct: type) -> Iterator[str]:
-    lead, meanings = _docstring(struct)
-    if lead:
-        yield lead
+def _bases(struct: type) -> list[type]:
+    """The structs that it derives from, and that have fields; the nearest first."""
+    return [base for base in struct.__mro__[1:] if field_names(base)]
+
+
+def _fields(struct: type) -> tuple[mi.Field, ...]:
     info = mi.type_info(struct)
     assert isinstance(info, mi.StructType)
+    return info.fields
+
+
+def _own(struct: type, printed: Container[type]) -> list[mi.Field]:
+    """The fields that its nearest printed base does not have as they are."""
+    base = _printed_base(struct, printed)
+    known = _fields(base) if base else ()
+    return [field for field in _fields(struct) if field not in known]
+
+
+def _printed_base(struct: type, printed: Container[type]) -> type | None:
+    return next((base for base in _bases(struct) if base in printed), None)
+
+
+def _section(struct: type, headings: Headings) -> Iterator[str]:
+    heading, purpose = headings[struct], _purpose(struct)
+    yield heading
+    if not _is_of_one(heading):
+        purpose = purpose.partition(".")[2].strip()
+    base = _printed_base(struct, headings)
+    besides = f"It has the keys of {_link(headings[base])} too." if base else ""
+    if lead := f"{purpose} {besides}".strip():
+        yield lead
     rows = [
-        f"| `{f.encode_name}` | {_type(f.type)} | {_default(f)} | {_example(struct, f)} |"
-        f" {meanings.get(f.name, '')} |"
-        for f in info.fields
+        f"| `{f.encode_name}` | {_type(f.type, headings)} | {_default(f)} | {_example(struct, f)} |"
+        f" {_meaning(f)} |"
+        for f in _own(struct, headings)
     ]
-    heading = ["| key | value | default | example | meaning |", "|---|---|---|---|---|"]
-    yield "\n".join([*heading, *rows])
+    if rows:
+        heads = ["| key | value | default | example | meaning |", "|---|---|---|---|---|"]
+        yield "\n".join([*heads, *rows])
+
+
+def _link(heading: str, text: str = "") -> str:
+    title = heading.lstrip("# ")
+    anchor = re.sub(r"[^\w -]", "", title.lower()).replace(" ", "-")
+    return f"[{text or title}](#{anchor})"
 
 
 def _example(struct: type, field: mi.Field) -> str:
     text = example(struct, field).replace("|", "\\|")
-    return f"`{text}`" if text else "below"
+    return f"`{text}`" if text else "-"
 
 
-def _docstring(struct: type) -> tuple[str, dict[str, str]]:
-    """The purpose of a struct, and the meanings of its fields, including inherited ones."""
-    meanings: dict[str, str] = {}
-    for base in reversed(struct.__mro__):
-        for names, text, _ in MEANING.findall(inspect.cleandoc(base.__dict__.get("__doc__") or "")):
-            told = " ".join(text.split()).replace("|", "\\|")
-            meanings |= dict.fromkeys(re.findall(r"`(\w+)`", names), told)
-    lead = MEANING.sub("", inspect.cleandoc(struct.__doc__ or "")).strip()
-    return lead, meanings
+def _meaning(field: mi.Field) -> str:
+    told = field.type.extra_json_schema if isinstance(field.type, mi.Metadata) else None
+    return str((told or {}).get("description", "")).replace("|", "\\|")
+
+
+def _purpose(struct: type) -> str:
+    return " ".join(inspect.cleandoc(struct.__doc__ or "").split())
 
 
 def parts(info: mi.Type) -> list[type]:
@@ -222,18 +306,19 @@ def parts(info: mi.Type) -> list[type]:
     return []
 
 
-def _type(info: mi.Type, extra: Extra | None = None) -> str:
+def _type(info: mi.Type, headings: Headings, extra: Extra | None = None) -> str:
     match info:
         case mi.Metadata(type=part, extra=more):
-            return _type(part, more)
-        case mi.StructType():
-            return "a mapping, below"
+            return _type(part, headings, more)
+        case mi.StructType(cls=cls):
+            return _link(headings[cls], "a mapping")
         case mi.UnionType(types=types):
-            return " or ".join(_type(part, extra) for part in types if part != mi.NoneType())
+            some = (part for part in types if part != mi.NoneType())
+            return " or ".join(_type(part, headings, extra) for part in some)
         case mi.DictType(value_type=part):
-            return f"name: {_type(part)}"
+            return f"name: {_type(part, headings)}"
         case mi.ListType(item_type=part) | mi.VarTupleType(item_type=part):
-            return f"list of {_type(part)}"
+            return f"list of {_type(part, headings)}"
         case mi.LiteralType() | mi.EnumType():
             return ", ".join(f"`{choice}`" for choice in choices(info))
     return wanted_text(info, extra).removeprefix("a ")

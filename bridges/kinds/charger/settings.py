@@ -6,7 +6,7 @@ from typing import Annotated, Literal, NamedTuple
 import msgspec
 from msgspec import Meta
 
-from bridges.kinds.shared.fields import DeviceSettings, Name, Seconds
+from bridges.kinds.shared.fields import DeviceSettings, Name, Seconds, tells
 
 Misses = Annotated[int, Meta(ge=1, le=100)]
 PerHour = Annotated[int, Meta(ge=0, le=60, extra={"unit": "per hour"})]
@@ -42,44 +42,57 @@ def robot(text: str) -> Robot:
 
 
 class Durations(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Durations and counts of a charger.
+    """Durations and counts of a charger."""
 
-    `misses`: after so many failed polls in a row the charger is shown as unreachable; after so many
-    failed commands in a row, as one that takes no commands.
-    `start_timeout_s`: how long charging may take to start, if the request does not say.
-    `stop_timeout_s`: how long a station may go on charging after it was told to stop. Then it is taken
-    out of service.
-    `released_s`: the least time for which RELEASED is shown. States go out at 1 Hz, so at least 1 s.
-    `full_percent`: the charge at which a robot is released, if the station knows the battery's charge.
-    `clear_errors_per_h`: how often the daemon may clear the station's errors by itself; 0 is never.
-    `peer_internal_timeout_s`: after how long without the daemon the station has certainly switched
-    off by itself. Without it an operator cannot free a station that does not answer.
-    """
-
-    misses: Misses = 3
-    start_timeout_s: StartTimeout = 300.0
-    stop_timeout_s: StopTimeout = 30.0
-    released_s: Released = 2.0
-    full_percent: Percent = 100.0
-    clear_errors_per_h: PerHour = 0
-    peer_internal_timeout_s: Seconds | None = None
+    misses: Annotated[
+        Misses,
+        tells("""after so many failed polls in a row the charger is shown as unreachable; after so
+        many failed commands in a row, as one that takes no commands."""),
+    ] = 3
+    start_timeout_s: Annotated[
+        StartTimeout, tells("how long charging may take to start, if the request does not say.")
+    ] = 300.0
+    stop_timeout_s: Annotated[
+        StopTimeout,
+        tells("""how long a station may go on charging after it was told to stop. Then it is taken
+        out of service."""),
+    ] = 30.0
+    released_s: Annotated[
+        Released,
+        tells("how long RELEASED is shown at least. States go out at 1 Hz, so 1 s or more."),
+    ] = 2.0
+    full_percent: Annotated[
+        Percent, tells("the charge at which a robot is released, if the station knows the charge.")
+    ] = 100.0
+    clear_errors_per_h: Annotated[
+        PerHour, tells("how often the daemon may clear the station's errors by itself; 0 is never.")
+    ] = 0
+    peer_internal_timeout_s: Annotated[
+        Seconds | None,
+        tells("""after how long without the daemon the station has certainly switched off by itself.
+        Without it an operator cannot free a station that does not answer."""),
+    ] = None
 
 
 class ChargerSettings(DeviceSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """What every charger has, whatever its driver.
+    """What every charger has, whatever its driver."""
 
-    `limits`: durations and counts that differ from the defaults.
-    `receivers`: receiver id -> FLEET/ROBOT, the robot that carries it. With this table only the robot
-    that the station is assigned to is charged.
-    `unrequested`: what happens to a robot of `receivers` on the pad without a request. `serve_known`
-    charges it; `refuse` does not, and says which robot it is.
-    `on_death`: `stop` or `keep` a charge under way when the daemon ends.
-    """
-
-    limits: Durations = Durations()
-    receivers: dict[ReceiverId, Name] = msgspec.field(default_factory=dict)
-    unrequested: Unrequested = "refuse"
-    on_death: Literal["stop", "keep"] = "stop"
+    limits: Annotated[Durations, tells("durations and counts that differ from the defaults.")] = (
+        Durations()
+    )
+    receivers: Annotated[
+        dict[ReceiverId, Name],
+        tells("""receiver id -> FLEET/ROBOT, the robot that carries it. With this table only the
+        robot that the station is assigned to is charged."""),
+    ] = msgspec.field(default_factory=dict)
+    unrequested: Annotated[
+        Unrequested,
+        tells("""what happens to a robot of `receivers` on the pad without a request. `serve_known`
+        charges it; `refuse` does not, and says which robot it is."""),
+    ] = "refuse"
+    on_death: Annotated[
+        Literal["stop", "keep"], tells("`stop` or `keep` a charge under way when the daemon ends.")
+    ] = "stop"
 
     def can_stop(self) -> bool:
         """Can this station be told to stop? Drivers of stations that cannot override this."""

@@ -11,7 +11,7 @@ import msgspec
 from msgspec import Meta
 
 from bridges.kinds.charger.settings import Robot
-from bridges.kinds.shared.fields import Name
+from bridges.kinds.shared.fields import Name, tells
 
 Day = Literal["mon", "tue", "wed", "thu", "fri", "sat", "sun"]
 DAYS: Final[tuple[Day, ...]] = ("mon", "tue", "wed", "thu", "fri", "sat", "sun")
@@ -34,19 +34,21 @@ class LocalTime(NamedTuple):
 
 
 class Charging(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """One time of the week at which robots without a task are charged.
+    """One time of the week at which robots without a task are charged."""
 
-    `at`: when it begins. `until`: when it ends. `days`: on which it begins; every day when absent.
-    `fleets`, `robots`: whom it is for, robots as FLEET/ROBOT; everybody when both are absent.
-    `percent`: how far they are charged.
-    """
-
-    at: TimeOfDay
-    until: TimeOfDay
-    days: list[Day] = msgspec.field(default_factory=lambda: list(DAYS))
-    fleets: list[Name] = []
-    robots: list[Name] = []
-    percent: Target = 100.0
+    at: Annotated[TimeOfDay, tells("when it begins.")]
+    until: Annotated[TimeOfDay, tells("when it ends.")]
+    days: Annotated[list[Day], tells("the days on which it begins; every day when absent.")] = (
+        msgspec.field(default_factory=lambda: list(DAYS))
+    )
+    fleets: Annotated[
+        list[Name], tells("the fleets that it is for; everybody when `robots` is absent too.")
+    ] = []
+    robots: Annotated[
+        list[Name],
+        tells("the robots that it is for, as FLEET/ROBOT; everybody when `fleets` is absent too."),
+    ] = []
+    percent: Annotated[Target, tells("how far they are charged.")] = 100.0
 
     def concerns(self, who: Robot) -> bool:
         """Is it for this robot?"""

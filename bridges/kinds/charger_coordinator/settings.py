@@ -14,7 +14,7 @@ from msgspec import Meta
 from bridges.kinds.charger.settings import ReceiverId, Robot, StartTimeout
 from bridges.kinds.charger_coordinator import schedule as times
 from bridges.kinds.charger_coordinator.schedule import Charging
-from bridges.kinds.shared.fields import GraphSettings, Name, Timeout
+from bridges.kinds.shared.fields import GraphSettings, Name, Timeout, tells
 from bridges.kinds.shared.kind import CHARGER, WAYPOINT, Place
 from bridges.kinds.shared.table import Table
 
@@ -26,79 +26,86 @@ Stations = Annotated[list[Name], Meta(min_length=1)]
 
 
 class Waypoint(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A named vertex of the fleet's navigation graph, where the graph has it.
+    """A named vertex of the fleet's navigation graph, where the graph has it."""
 
-    `level`: its level's name.
-    `x`: its x coordinate in the graph.
-    `y`: its y coordinate in the graph.
-    """
-
-    level: Name
-    x: Metres
-    y: Metres
+    level: Annotated[Name, tells("its level's name.")]
+    x: Annotated[Metres, tells("its x coordinate in the graph.")]
+    y: Annotated[Metres, tells("its y coordinate in the graph.")]
 
 
 class Station(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A charger, under the name that its own daemon publishes.
+    """A charger, under the name that its own daemon publishes."""
 
-    `waypoint`: what the navigation graphs call the place; the same name when absent.
-    `waypoints`: fleet -> what that fleet's graph calls it, where it differs.
-    """
-
-    waypoint: Name | None = None
-    waypoints: dict[Name, Name] = msgspec.field(default_factory=dict)
+    waypoint: Annotated[
+        Name | None, tells("what the navigation graphs call the place; the same name when absent.")
+    ] = None
+    waypoints: Annotated[
+        dict[Name, Name], tells("fleet -> what that fleet's graph calls it, where it differs.")
+    ] = msgspec.field(default_factory=dict)
 
 
 class RobotSettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """One robot.
+    """One robot."""
 
-    `stations`: those that suit it, best first. `waits_at`: its own waypoint, where it waits for a
-    station and stays when it needs none. `receivers`: the ids of its receivers. `rcu`: the name under
-    which the daemon of its own receiver publishes, if it has one: a robot's part, and no station.
-    """
-
-    stations: Stations
-    waits_at: Name
-    receivers: list[ReceiverId] = msgspec.field(default_factory=list)
-    rcu: Name | None = None
+    stations: Annotated[Stations, tells("those that suit it, best first.")]
+    waits_at: Annotated[
+        Name, tells("its own waypoint, where it waits for a station and stays when it needs none.")
+    ]
+    receivers: Annotated[list[ReceiverId], tells("the ids of its receivers.")] = msgspec.field(
+        default_factory=list
+    )
+    rcu: Annotated[
+        Name | None,
+        tells("""the name under which the daemon of its own receiver publishes, if it has one: a
+        robot's part, and no station."""),
+    ] = None
 
 
 class Fleet(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A fleet by the name of its adapter.
+    """A fleet by the name of its adapter."""
 
-    `waypoints`: the stations' and waiting places in its navigation graph. RMF's fleet adapter crashes
-    on a name that its graph does not have, so it is sent no other names.
-    `robots`: those that charge here, by the adapter's names.
-    """
-
-    waypoints: dict[Name, Waypoint]
-    robots: dict[Name, RobotSettings]
+    waypoints: Annotated[
+        dict[Name, Waypoint],
+        tells("""the stations' and waiting places in its navigation graph. RMF's fleet adapter
+        crashes on a name that its graph does not have, so it is sent no other names."""),
+    ]
+    robots: Annotated[
+        dict[Name, RobotSettings], tells("those that charge here, by the adapter's names.")
+    ]
 
 
 class Settings(GraphSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Which robots charge where.
+    """Which robots charge where."""
 
-    `stations`: the chargers, by the names under which their daemons publish.
-    `fleets`: the fleets whose robots charge at them.
-    `start_timeout_s`: how long a station stays assigned to a robot that is on its way.
-    `near_m`: a robot stands at the nearest waypoint, if that is no farther away than this.
-    `full_percent`: the charge at which a robot gives up its station.
-    `again_percent`: below this a robot without a task is charged. One that was charged comes back in
-    its task only below this.
-    `leaves_s`: how long a robot may stay on a pad that it no longer needs while another waits for it.
-    `schedule`: times of the week at which robots without a task are charged.
-    `timezone`: that of the schedule's times (Asia/Singapore); this machine's when absent.
-    """
-
-    stations: dict[Name, Station]
-    fleets: dict[Name, Fleet]
-    start_timeout_s: StartTimeout = 300.0
-    near_m: Near = 1.0
-    full_percent: Full = 100.0
-    again_percent: Low = 90.0
-    leaves_s: Timeout = 60.0
-    schedule: list[Charging] = msgspec.field(default_factory=list)
-    timezone: Name | None = None
+    stations: Annotated[
+        dict[Name, Station], tells("the chargers, by the names under which their daemons publish.")
+    ]
+    fleets: Annotated[dict[Name, Fleet], tells("the fleets whose robots charge at them.")]
+    start_timeout_s: Annotated[
+        StartTimeout, tells("how long a station stays assigned to a robot that is on its way.")
+    ] = 300.0
+    near_m: Annotated[
+        Near, tells("a robot stands at the nearest waypoint, if that is no farther away than this.")
+    ] = 1.0
+    full_percent: Annotated[Full, tells("the charge at which a robot gives up its station.")] = (
+        100.0
+    )
+    again_percent: Annotated[
+        Low,
+        tells("""below this a robot without a task is charged. One that was charged comes back in
+        its task only below this."""),
+    ] = 90.0
+    leaves_s: Annotated[
+        Timeout,
+        tells("how long a robot may stay on a pad that it no longer needs and another waits for."),
+    ] = 60.0
+    schedule: Annotated[
+        list[Charging], tells("times of the week at which robots without a task are charged.")
+    ] = msgspec.field(default_factory=list)
+    timezone: Annotated[
+        Name | None,
+        tells("that of the schedule's times (Asia/Singapore); this machine's when absent."),
+    ] = None
 
     def on_map(self) -> Iterator[Place]:
         """The stations' places and each fleet's waypoints, which RMF's map must name too."""

@@ -6,61 +6,74 @@ from typing import Annotated, Literal
 import msgspec
 from msgspec import Meta
 
-from bridges.kinds.shared.fields import DeviceSettings, Patience, Seconds, Timeout
+from bridges.kinds.shared.fields import DeviceSettings, Patience, Seconds, Timeout, tells
 
 StaleAfter = Annotated[float, Meta(ge=0.1, le=60, extra={"unit": "s"})]
 PulseSeconds = Annotated[float, Meta(ge=0.05, le=600, extra={"unit": "s"})]
 
 
 class Durations(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Durations of a door.
+    """Durations of a door."""
 
-    `stale_after_s`: after so long without a good reading the door is OFFLINE and its hold is off.
-    `close_grace_s`: how long after a CLOSE the hold is released; an OPEN before then cancels the CLOSE.
-    `travel_s`: how long the door may be between its end positions; after that its state is UNKNOWN.
-    `open_timeout_s`: how long a held door may take to open; after that a fault is shown.
-    `hazard_clear_s`: how long a fire alarm or an obstruction must be clear before it counts as over.
-    `open_delay_s`: with estimated feedback, how long the door takes to open.
-    `max_hold_s`: how long RMF may hold the door; after that a fault is shown, and the hold stays.
-    `supervisor_lost_s`: how long no node may publish door requests; after that the hold is released.
-    When absent the door stays held, as a robot may stand in the doorway.
-    """
-
-    stale_after_s: StaleAfter = 1.0
-    close_grace_s: Seconds = 3.0
-    travel_s: Timeout = 10.0
-    open_timeout_s: Timeout = 15.0
-    hazard_clear_s: Seconds = 1.0
-    open_delay_s: Seconds | None = None
-    max_hold_s: Seconds | None = None
-    supervisor_lost_s: Patience | None = None
+    stale_after_s: Annotated[
+        StaleAfter,
+        tells("after so long without a good reading the door is OFFLINE and its hold is off."),
+    ] = 1.0
+    close_grace_s: Annotated[
+        Seconds,
+        tells("how long after a CLOSE the hold is released; an OPEN until then cancels it."),
+    ] = 3.0
+    travel_s: Annotated[
+        Timeout,
+        tells("how long the door may be between its ends; after that its state is UNKNOWN."),
+    ] = 10.0
+    open_timeout_s: Annotated[
+        Timeout, tells("how long a held door may take to open; after that a fault is shown.")
+    ] = 15.0
+    hazard_clear_s: Annotated[
+        Seconds,
+        tells("how long a fire alarm or an obstruction must be clear before it counts as over."),
+    ] = 1.0
+    open_delay_s: Annotated[
+        Seconds | None, tells("with estimated feedback, how long the door takes to open.")
+    ] = None
+    max_hold_s: Annotated[
+        Seconds | None,
+        tells("how long RMF may hold the door; after that a fault is shown, and the hold stays."),
+    ] = None
+    supervisor_lost_s: Annotated[
+        Patience | None,
+        tells("""how long no node may publish door requests; after that the hold is released. When
+        absent the door stays held, as a robot may stand in the doorway."""),
+    ] = None
 
 
 class Pulse(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """For a door operator that closes by itself: pulses on the relay while RMF holds the door.
+    """For a door operator that closes by itself: pulses on the relay while RMF holds the door."""
 
-    `on_s`: how long each pulse lasts.
-    `every_s`: the time from the start of one pulse to the start of the next.
-    """
-
-    on_s: PulseSeconds
-    every_s: PulseSeconds
+    on_s: Annotated[PulseSeconds, tells("how long each pulse lasts.")]
+    every_s: Annotated[
+        PulseSeconds, tells("the time from the start of one pulse to the start of the next.")
+    ]
 
 
 class DoorSettings(DeviceSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """One door, apart from its wiring.
+    """One door, apart from its wiring."""
 
-    `limits`: durations that differ from the defaults.
-    `feedback`: `estimated` if a limit contact is missing; the door's state is then estimated by time.
-    Logs and status mark an estimate; RMF cannot see the difference.
-    `on_fire`: a fire alarm holds the door open (`open`) or releases the hold (`release`).
-    `pulse`: pulses for a door operator that closes by itself. When absent, the relay stays on.
-    """
-
-    limits: Durations = Durations()
-    feedback: Literal["sensors", "estimated"] = "sensors"
-    on_fire: Literal["open", "release"] | None = None
-    pulse: Pulse | None = None
+    limits: Annotated[Durations, tells("durations that differ from the defaults.")] = Durations()
+    feedback: Annotated[
+        Literal["sensors", "estimated"],
+        tells("""`estimated` if a limit contact is missing; the door's state is then estimated by
+        time. Logs and status mark an estimate; RMF cannot see the difference."""),
+    ] = "sensors"
+    on_fire: Annotated[
+        Literal["open", "release"] | None,
+        tells("a fire alarm holds the door open (`open`) or releases the hold (`release`)."),
+    ] = None
+    pulse: Annotated[
+        Pulse | None,
+        tells("pulses for a door operator that closes by itself. When absent, the relay stays on."),
+    ] = None
 
     def stale_after(self) -> float:
         """Its limits' `stale_after_s`."""

@@ -1,23 +1,25 @@
 """The door supervisor's section of its YAML."""
 
 from collections.abc import Iterable
+from typing import Annotated
 
-from bridges.kinds.shared.fields import GraphSettings, Name, Patience
+from bridges.kinds.shared.fields import GraphSettings, Name, Patience, tells
 from bridges.kinds.shared.kind import Place
 
 
 class Settings(GraphSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The door supervisor's policy.
+    """The door supervisor's policy."""
 
-    `doors`: the doors that it serves; messages about others are refused. When absent, it serves every
-    door that it hears of, as RMF's own does.
-    `quiet_start_s`: how long it only listens after its start, so that a restart closes no door.
-    `open_alarm_s`: how long one requester may hold a door open before a fault is shown. The door stays
-    open, as the robot may stand in the doorway.
-    """
-
-    doors: list[Name] | None = None
-    open_alarm_s: Patience = 600.0
+    doors: Annotated[
+        list[Name] | None,
+        tells("""the doors that it serves; messages about others are refused. When absent, it serves
+        every door that it hears of, as RMF's own does."""),
+    ] = None
+    open_alarm_s: Annotated[
+        Patience,
+        tells("""how long one requester may hold a door open before a fault is shown. The door stays
+        open, as the robot may stand in the doorway."""),
+    ] = 600.0
 
     def problems(self) -> Iterable[tuple[tuple[str, ...], str]]:
         """An empty list of doors."""

@@ -7,7 +7,7 @@ import msgspec
 from msgspec import Meta
 
 from bridges.kinds.lift.signals import Side, Stop
-from bridges.kinds.shared.fields import DeviceSettings, Name, Period, Seconds, Timeout
+from bridges.kinds.shared.fields import DeviceSettings, Name, Period, Seconds, Timeout, tells
 from bridges.kinds.shared.kind import FLOOR, Place
 
 AlarmOn = Annotated[
@@ -16,73 +16,103 @@ AlarmOn = Annotated[
 
 
 class Floor(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A floor whose landing has another name, or that the car's rear door serves.
+    """A floor whose landing has another name, or that the car's rear door serves."""
 
-    `level`: the landing's name in the floor code table; the floor's own name when absent.
-    `side`: which of the car's doors opens there.
-    """
-
-    level: Name | None = None
-    side: Side = Side.FRONT
+    level: Annotated[
+        Name | None,
+        tells("the landing's name in the floor code table; the floor's own name when absent."),
+    ] = None
+    side: Annotated[Side, tells("which of the car's doors opens there.")] = Side.FRONT
 
 
 class Durations(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Durations and counts of a lift.
+    """Durations and counts of a lift."""
 
-    `stale_after_s`: after so long without a good reading, or without a good write, the lift is OFFLINE
-    and its outputs are off.
-    `release_grace_s`: how long AGV mode and the door's hold stay on after END, for the same session.
-    `agv_timeout_s`, `floor_timeout_s`, `door_timeout_s`: how long AGV mode, the floor and the open
-    door may take. Then the outputs go off and a fault is shown. Retries follow after 10, 30 and 60 s;
-    then the fault latches.
-    `request_timeout_s`: how long RMF may be silent (it repeats requests at 1 Hz). Then a fault is
-    shown, and the outputs go off unless a robot may be inside.
-    `hazard_clear_s`: how long a hazard input must be clear before RMF may use the lift again.
-    `door_travel_s`: with one door contact, how long the door takes to its other end position.
-    `floor_travel_min_s`: the least time from one floor to the next. A faster change of the floor code
-    is not believed.
-    `call_pulse_s`: how long a call is pulsed; held until arrival when absent.
-    `dead_time_s`: the pause between two calls, between the commands of two doors, and between a call
-    and a door command.
-    `min_off_s`, `max_cycles_per_min`: spare the relays. They delay switching on, never off.
-    """
-
-    stale_after_s: Period = 1.0
-    release_grace_s: Seconds = 3.0
-    agv_timeout_s: Timeout = 600.0
-    floor_timeout_s: Timeout = 120.0
-    door_timeout_s: Timeout = 10.0
-    request_timeout_s: Timeout = 30.0
-    hazard_clear_s: Seconds = 1.0
-    door_travel_s: Seconds = 5.0
-    floor_travel_min_s: Seconds = 0.5
-    call_pulse_s: Seconds | None = None
-    dead_time_s: Seconds = 0.3
-    min_off_s: Seconds = 0.5
-    max_cycles_per_min: Annotated[int, Meta(ge=1, le=600)] = 20
+    stale_after_s: Annotated[
+        Period,
+        tells("""after so long without a good reading, or without a good write, the lift is OFFLINE
+        and its outputs are off."""),
+    ] = 1.0
+    release_grace_s: Annotated[
+        Seconds,
+        tells("how long AGV mode and the door's hold stay on after END, for the same session."),
+    ] = 3.0
+    agv_timeout_s: Annotated[
+        Timeout,
+        tells("""how long AGV mode may take. Then the outputs go off and a fault is shown. Retries
+        follow after 10, 30 and 60 s; then the fault latches."""),
+    ] = 600.0
+    floor_timeout_s: Annotated[
+        Timeout, tells("how long a ride to its floor may take; then as with `agv_timeout_s`.")
+    ] = 120.0
+    door_timeout_s: Annotated[
+        Timeout, tells("how long the door may take to open; then as with `agv_timeout_s`.")
+    ] = 10.0
+    request_timeout_s: Annotated[
+        Timeout,
+        tells("""how long RMF may be silent (it repeats requests at 1 Hz). Then a fault is shown,
+        and the outputs go off unless a robot may be inside."""),
+    ] = 30.0
+    hazard_clear_s: Annotated[
+        Seconds, tells("how long a hazard input must be clear before RMF may use the lift again.")
+    ] = 1.0
+    door_travel_s: Annotated[
+        Seconds, tells("with one door contact, how long the door takes to its other end position.")
+    ] = 5.0
+    floor_travel_min_s: Annotated[
+        Seconds,
+        tells("""the least time from one floor to the next. A faster change of the floor code is not
+        believed."""),
+    ] = 0.5
+    call_pulse_s: Annotated[
+        Seconds | None, tells("how long a call is pulsed; held until arrival when absent.")
+    ] = None
+    dead_time_s: Annotated[
+        Seconds,
+        tells("""the pause between two calls, between the commands of two doors, and between a call
+        and a door command."""),
+    ] = 0.3
+    min_off_s: Annotated[
+        Seconds,
+        tells("how long a relay stays off at least, which spares it. Off is never delayed."),
+    ] = 0.5
+    max_cycles_per_min: Annotated[
+        int,
+        Meta(ge=1, le=600),
+        tells("how often a relay may switch on in a minute; the next time is delayed."),
+    ] = 20
 
 
 class LiftSettings(DeviceSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """One lift, apart from its wiring.
+    """One lift, apart from its wiring."""
 
-    `floors`: their names on RMF's map, from the lowest up. Write a mapping if a floor's landing has
-    another name, or if the rear door serves it.
-    `agv_mode`: how AGV mode is switched on. `requested`: by an output that is held. `by_call`: by a
-    call; it stays on while the call is served and the door is held.
-    `limits`: durations and counts that differ from the defaults.
-    `fire_reset`: RMF may use the lift again when the alarm clears (`auto`), or only after
-    `rmf-bridge reset` (`manual`).
-    `alarm`: the topic that tells the fleets of an alarm; `none` if the site does not want that.
-    `alarm_on`: the hazards that are such an alarm. All robots then leave the lifts and stop elsewhere,
-    until `rmf-bridge reset`.
-    """
-
-    floors: list[Name] | dict[Name, Floor]
-    agv_mode: Literal["requested", "by_call"] = "requested"
-    limits: Durations = Durations()
-    fire_reset: Literal["auto", "manual"] = "auto"
-    alarm: Literal["none", "fire_alarm_trigger", "emergency_signal"] = "none"
-    alarm_on: AlarmOn = msgspec.field(default_factory=lambda: ["fire_alarm"])
+    floors: Annotated[
+        list[Name] | dict[Name, Floor],
+        tells("""their names on RMF's map, from the lowest up. Write a mapping if a floor's landing
+        has another name, or if the rear door serves it."""),
+    ]
+    agv_mode: Annotated[
+        Literal["requested", "by_call"],
+        tells("""how AGV mode is switched on. `requested`: by an output that is held. `by_call`: by
+        a call; it stays on while the call is served and the door is held."""),
+    ] = "requested"
+    limits: Annotated[Durations, tells("durations and counts that differ from the defaults.")] = (
+        Durations()
+    )
+    fire_reset: Annotated[
+        Literal["auto", "manual"],
+        tells("""RMF may use the lift again when the alarm clears (`auto`), or only after
+        `rmf-bridge reset` (`manual`)."""),
+    ] = "auto"
+    alarm: Annotated[
+        Literal["none", "fire_alarm_trigger", "emergency_signal"],
+        tells("the topic that tells the fleets of an alarm; `none` if the site does not want it."),
+    ] = "none"
+    alarm_on: Annotated[
+        AlarmOn,
+        tells("""the hazards that are such an alarm. All robots then leave the lifts and stop
+        elsewhere, until `rmf-bridge reset`."""),
+    ] = msgspec.field(default_factory=lambda: ["fire_alarm"])
 
     def stale_after(self) -> float:
         """Its limits' `stale_after_s`."""

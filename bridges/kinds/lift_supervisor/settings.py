@@ -1,34 +1,47 @@
 """The lift supervisor's section of its YAML."""
 
 from collections.abc import Iterable
+from typing import Annotated
 
-from bridges.kinds.shared.fields import GraphSettings, Name, Patience, Seconds
+from bridges.kinds.shared.fields import GraphSettings, Name, Patience, QuietStart, Seconds, tells
 from bridges.kinds.shared.kind import Place
 
 
 class Settings(GraphSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The lift supervisor's policy.
+    """The lift supervisor's policy."""
 
-    `lifts`: the lifts that it serves; messages about others are refused. When absent, it serves every
-    lift that it hears of, as RMF's own does.
-    `quiet_start_s`: how long it only listens after its start, so that a restart ends no ride. Also how
-    long a lift may show a session that nobody requests, before that session is ended.
-    `silent_after_s`: after so long without a request a waiting session leaves the queue. Fleet
-    adapters repeat their requests at every LiftState.
-    `holder_alarm_s`: how long the holder may be silent before a fault is shown.
-    `holder_ttl_s`: how long the holder may be silent before its session is ended. Never when absent,
-    as its robot may be in the car.
-    `clock_synchronised`: this clock and the fleet adapters' clocks agree (NTP), so that the age of a
-    request can be judged. Otherwise only the stamps of one requester are compared.
-    `max_request_age_s`: with `clock_synchronised`, an older request counts only when it is repeated.
-    """
-
-    lifts: list[Name] | None = None
-    silent_after_s: Patience = 10.0
-    holder_alarm_s: Patience = 60.0
-    holder_ttl_s: Patience | None = None
-    clock_synchronised: bool = False
-    max_request_age_s: Seconds = 10.0
+    lifts: Annotated[
+        list[Name] | None,
+        tells("""the lifts that it serves; messages about others are refused. When absent, it serves
+        every lift that it hears of, as RMF's own does."""),
+    ] = None
+    quiet_start_s: Annotated[
+        QuietStart,
+        tells("""how long it only listens after its start, so that a restart ends no ride. Also how
+        long a lift may show a session that nobody requests, before that session is ended."""),
+    ] = 3.0
+    silent_after_s: Annotated[
+        Patience,
+        tells("""after so long without a request a waiting session leaves the queue. Fleet adapters
+        repeat their requests at every LiftState."""),
+    ] = 10.0
+    holder_alarm_s: Annotated[
+        Patience, tells("how long the holder may be silent before a fault is shown.")
+    ] = 60.0
+    holder_ttl_s: Annotated[
+        Patience | None,
+        tells("""how long the holder may be silent before its session is ended. Never when absent,
+        as its robot may be in the car."""),
+    ] = None
+    clock_synchronised: Annotated[
+        bool,
+        tells("""this clock and the fleet adapters' clocks agree (NTP), so that the age of a request
+        can be judged. Otherwise only the stamps of one requester are compared."""),
+    ] = False
+    max_request_age_s: Annotated[
+        Seconds,
+        tells("with `clock_synchronised`, an older request counts only when it is repeated."),
+    ] = 10.0
 
     def problems(self) -> Iterable[tuple[tuple[str, ...], str]]:
         """An alarm after what it warns of, or an empty list of lifts."""

@@ -11,21 +11,25 @@ from typing import Annotated
 import msgspec
 from msgspec import Meta
 
-from bridges.kinds.shared.rmf_section import AbsolutePath, Name
-
-__all__ = [
-    "AbsolutePath",
-    "DeviceSettings",
-    "GraphSettings",
-    "Name",
-    "Patience",
-    "Period",
-    "QuietStart",
-    "Seconds",
-    "Timeout",
-    "quiet_s",
+Name = Annotated[
+    str,
+    Meta(
+        min_length=1,
+        max_length=128,
+        pattern=r"^[^\x00-\x20\x7f-\x9f]([^\x00-\x1f\x7f-\x9f]*[^\x00-\x20\x7f-\x9f])?$(?!\n)",
+        extra={"pattern": "text without control characters, or spaces at its ends"},
+    ),
 ]
-
+"""A name that RMF uses: any text, quoted in YAML where YAML would read something else."""
+AbsolutePath = Annotated[
+    str,
+    Meta(
+        max_length=4096,
+        pattern=r"^/[^\x00-\x1f\x7f]*$(?!\n)",
+        extra={"pattern": "a file's whole path (/opt/ros/jazzy/setup.bash)"},
+    ),
+]
+"""A file by its path from the root."""
 Seconds = Annotated[float, Meta(ge=0, le=86400, extra={"unit": "s"})]
 """A duration that may be zero."""
 Timeout = Annotated[float, Meta(ge=1, le=86400, extra={"unit": "s"})]
@@ -38,17 +42,24 @@ Patience = Annotated[float, Meta(ge=3, le=86400, extra={"unit": "s"})]
 """How long a silence or a state may last before the daemon acts on it."""
 
 
+def tells(text: str) -> Meta:
+    """What a key means, for the schema, the reference and an editor; line breaks count as spaces."""
+    return Meta(description=" ".join(text.split()))
+
+
 class DeviceSettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """What every lift, door and charger has, whatever its driver.
+    """What every lift, door and charger has, whatever its driver."""
 
-    `bus`: the name of its bus; not needed if the file has only one.
-    `driver`: this device's own driver; the file's `driver` when absent.
-    `accept_unsafe`: signal -> why its unsafe wiring is accepted; `check` prints the reason.
-    """
-
-    bus: Name | None = None
-    driver: Name | None = None
-    accept_unsafe: dict[Name, Name] = msgspec.field(default_factory=dict)
+    bus: Annotated[
+        Name | None, tells("the name of its bus; not needed if the file has only one.")
+    ] = None
+    driver: Annotated[
+        Name | None, tells("this device's own driver; the file's `driver` when absent.")
+    ] = None
+    accept_unsafe: Annotated[
+        dict[Name, Name],
+        tells("signal -> why its unsafe wiring is accepted; `check` prints the reason."),
+    ] = msgspec.field(default_factory=dict)
 
     def off_after(self) -> tuple[float, tuple[str, ...]] | None:
         """How long (s) without a command until its outputs go off by themselves, and the path of the
@@ -61,12 +72,12 @@ class DeviceSettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_f
 
 
 class GraphSettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """What every kind without hardware has.
+    """What every kind without hardware has."""
 
-    `quiet_start_s`: how long it only listens after its start.
-    """
-
-    quiet_start_s: QuietStart = 3.0
+    quiet_start_s: Annotated[
+        QuietStart,
+        tells("how long it only listens after its start, so that a restart interrupts nothing."),
+    ] = 3.0
 
 
 def quiet_s(settings: GraphSettings) -> float:

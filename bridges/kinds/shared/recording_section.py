@@ -5,6 +5,8 @@ from typing import Annotated, Literal
 import msgspec
 from msgspec import Meta
 
+from bridges.kinds.shared.fields import tells
+
 Megabytes = Annotated[float, Meta(ge=0.25, le=16, extra={"unit": "MB"})]
 Files = Annotated[int, Meta(ge=1, le=10_000)]
 Space = Annotated[float, Meta(ge=1, le=100_000, extra={"unit": "MB"})]
@@ -12,19 +14,19 @@ Patience = Annotated[float, Meta(ge=10, le=86400, extra={"unit": "s"})]
 
 
 class Recording(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """What is recorded of the daemon's work. Nothing is written to a disk while all is well.
+    """What is recorded of the daemon's work. Nothing is written to a disk while all is well."""
 
-    `keep`: `ring` keeps the last minutes in memory, and the recorder makes a file of them when
-    something goes wrong; `continuous` makes files of everything, the oldest of which go; `nothing`
-    keeps nothing.
-    `ring_mb`: the size of the ring. 1 MB is 10 minutes or more of a lift.
-    `files`, `files_mb`: how many files of this daemon the recorder keeps, and how large they may be
-    together.
-    `waiting_s`: a file is made when somebody has waited this long for what was requested.
-    """
-
-    keep: Literal["nothing", "ring", "continuous"] = "ring"
-    ring_mb: Megabytes = 1.0
-    files: Files = 40
-    files_mb: Space = 100.0
-    waiting_s: Patience = 180.0
+    keep: Annotated[
+        Literal["nothing", "ring", "continuous"],
+        tells("""`ring` keeps the last minutes in memory, and the recorder makes a file of them when
+        something goes wrong; `continuous` makes files of everything, the oldest of which go;
+        `nothing` keeps nothing."""),
+    ] = "ring"
+    ring_mb: Annotated[
+        Megabytes, tells("the size of the ring. 1 MB is 10 minutes or more of a lift.")
+    ] = 1.0
+    files: Annotated[Files, tells("how many files of this daemon the recorder keeps.")] = 40
+    files_mb: Annotated[Space, tells("how large these files may be together.")] = 100.0
+    waiting_s: Annotated[
+        Patience, tells("a file is made when somebody has waited this long for what was requested.")
+    ] = 180.0

@@ -7,25 +7,8 @@ from typing import Annotated, Literal
 import msgspec
 from msgspec import Meta
 
-Name = Annotated[
-    str,
-    Meta(
-        min_length=1,
-        max_length=128,
-        pattern=r"^[^\x00-\x20\x7f-\x9f]([^\x00-\x1f\x7f-\x9f]*[^\x00-\x20\x7f-\x9f])?$(?!\n)",
-        extra={"pattern": "text without control characters, or spaces at its ends"},
-    ),
-]
-"""A name that RMF uses: any text, quoted in YAML where YAML would read something else."""
-AbsolutePath = Annotated[
-    str,
-    Meta(
-        max_length=4096,
-        pattern=r"^/[^\x00-\x1f\x7f]*$(?!\n)",
-        extra={"pattern": "a file's whole path (/opt/ros/jazzy/setup.bash)"},
-    ),
-]
-"""A file by its path from the root."""
+from bridges.kinds.shared.fields import AbsolutePath, Name, tells
+
 Endpoint = Annotated[
     str,
     Meta(
@@ -38,16 +21,19 @@ Endpoint = Annotated[
 
 
 class ZenohTls(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Encryption of `tls/…` and `quic/…` endpoints, from PEM files.
+    """Encryption of `tls/…` and `quic/…` endpoints, from PEM files."""
 
-    `ca`: the authority that has signed the router's certificate; the public ones when absent.
-    `certificate`, `private_key`: the daemon's own, if the router asks for one (mutual TLS). Only the
-    daemon's user may read the key's file.
-    """
-
-    ca: AbsolutePath | None = None
-    certificate: AbsolutePath | None = None
-    private_key: AbsolutePath | None = None
+    ca: Annotated[
+        AbsolutePath | None,
+        tells("the authority that signed the router's certificate; the public ones when absent."),
+    ] = None
+    certificate: Annotated[
+        AbsolutePath | None, tells("the daemon's own, if the router asks for one (mutual TLS).")
+    ] = None
+    private_key: Annotated[
+        AbsolutePath | None,
+        tells("the key of `certificate`. Only the daemon's user may read its file."),
+    ] = None
 
     def problems(self) -> Iterable[tuple[tuple[str, ...], str]]:
         """A certificate and its key go together."""
@@ -56,26 +42,33 @@ class ZenohTls(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
 
 
 class Zenoh(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """How transport `zenoh` reaches the other nodes.
+    """How transport `zenoh` reaches the other nodes."""
 
-    `keys`: `rmw_zenoh` for sites whose RMF runs on rmw_zenoh, `ros2dds` for sites with a
-    zenoh-bridge-ros2dds beside RMF; the two do not understand each other.
-    `connect`: the router (or the bridge). If there are several, one is used and the others stand by.
-    `mode`: `peer` also speaks to other nodes directly, `client` to a router alone. `auto` is `peer`
-    with one router, if it is on this machine or `listen` is open to others; else `client`.
-    `listen`: where other nodes reach this one as a peer; only from this machine when absent.
-    `tls`: certificates, for `tls/…` and `quic/…`.
-    `user`: the daemon's user name at the routers.
-    `password_file`: a file with its password. Only the daemon's user may read it.
-    """
-
-    keys: Literal["rmw_zenoh", "ros2dds"] = "rmw_zenoh"
-    connect: Annotated[tuple[Endpoint, ...], Meta(min_length=1)] = ("tcp/localhost:7447",)
-    mode: Literal["auto", "peer", "client"] = "auto"
-    listen: tuple[Endpoint, ...] = ("tcp/127.0.0.1:0",)
-    tls: ZenohTls | None = None
-    user: Name | None = None
-    password_file: AbsolutePath | None = None
+    keys: Annotated[
+        Literal["rmw_zenoh", "ros2dds"],
+        tells("""`rmw_zenoh` for sites whose RMF runs on rmw_zenoh, `ros2dds` for sites with a
+        zenoh-bridge-ros2dds beside RMF; the two do not understand each other."""),
+    ] = "rmw_zenoh"
+    connect: Annotated[
+        tuple[Endpoint, ...],
+        Meta(min_length=1),
+        tells("the router (or the bridge). Of several, one is used and the others stand by."),
+    ] = ("tcp/localhost:7447",)
+    mode: Annotated[
+        Literal["auto", "peer", "client"],
+        tells("""`peer` also speaks to other nodes directly, `client` to a router alone. `auto` is
+        `peer` with one router, if it is on this machine or `listen` is open to others; else
+        `client`."""),
+    ] = "auto"
+    listen: Annotated[
+        tuple[Endpoint, ...],
+        tells("where other nodes reach this one as a peer; only from this machine when absent."),
+    ] = ("tcp/127.0.0.1:0",)
+    tls: Annotated[ZenohTls | None, tells("certificates, for `tls/…` and `quic/…`.")] = None
+    user: Annotated[Name | None, tells("the daemon's user name at the routers.")] = None
+    password_file: Annotated[
+        AbsolutePath | None, tells("a file with its password. Only the daemon's user may read it.")
+    ] = None
 
     def problems(self) -> Iterable[tuple[tuple[str, ...], str]]:
         """What cannot go together."""
@@ -92,30 +85,42 @@ def _is_encrypted(endpoint: str) -> bool:
 
 
 class Rmf(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """How the daemon reaches Open-RMF.
+    """How the daemon reaches Open-RMF."""
 
-    `transport`: `ros2` (rclpy), `dds` or `zenoh` (both without ROS). `auto` takes ros2 if rclpy can be
-    imported, else dds if cyclonedds can be, else zenoh.
-    `domain_id`: the ROS domain; ROS_DOMAIN_ID, or 0, when absent.
-    `network`: `localhost` keeps all traffic on the loopback interface.
-    `ros_setup`: ROS's setup file, sourced before the daemon starts, as a service has no shell that
-    has done so. Not for `dds` and `zenoh`. If `auto` does not find the file, it logs that.
-    `diagnostics`: publish the health of the daemon and its devices each second on `/diagnostics`.
-    `topics`: RMF's topic name -> the name that the site uses.
-    `zenoh`: routers, keys and credentials of transport `zenoh`.
-    `release`: of which release RMF's messages are: `jazzy` (Humble, Iron and Jazzy) or `kilted`
-    (Kilted, Lyrical and newer). `auto` follows the fleet adapters on the graph, and is `jazzy` without
-    one. Transport `ros2` takes what is installed.
-    """
-
-    transport: Literal["auto", "ros2", "dds", "zenoh"] = "auto"
-    domain_id: Annotated[int, Meta(ge=0, le=232)] | None = None
-    network: Literal["subnet", "localhost"] = "subnet"
-    ros_setup: AbsolutePath | None = None
-    diagnostics: bool = True
-    topics: dict[Name, Name] = msgspec.field(default_factory=dict)
-    zenoh: Zenoh | None = None
-    release: Literal["auto", "jazzy", "kilted"] = "auto"
+    transport: Annotated[
+        Literal["auto", "ros2", "dds", "zenoh"],
+        tells("""`ros2` (rclpy), `dds` or `zenoh` (both without ROS). `auto` takes ros2 if rclpy can
+        be imported, else dds if cyclonedds can be, else zenoh."""),
+    ] = "auto"
+    domain_id: Annotated[
+        Annotated[int, Meta(ge=0, le=232)] | None,
+        tells("the ROS domain; ROS_DOMAIN_ID, or 0, when absent."),
+    ] = None
+    network: Annotated[
+        Literal["subnet", "localhost"],
+        tells("`localhost` keeps all traffic on the loopback interface."),
+    ] = "subnet"
+    ros_setup: Annotated[
+        AbsolutePath | None,
+        tells("""ROS's setup file, sourced before the daemon starts, as a service has no shell that
+        has done so. Not for `dds` and `zenoh`. If `auto` does not find the file, it logs that."""),
+    ] = None
+    diagnostics: Annotated[
+        bool,
+        tells("publish the health of the daemon and its devices each second on `/diagnostics`."),
+    ] = True
+    topics: Annotated[
+        dict[Name, Name], tells("RMF's topic name -> the name that the site uses.")
+    ] = msgspec.field(default_factory=dict)
+    zenoh: Annotated[Zenoh | None, tells("routers, keys and credentials of transport `zenoh`.")] = (
+        None
+    )
+    release: Annotated[
+        Literal["auto", "jazzy", "kilted"],
+        tells("""of which release RMF's messages are: `jazzy` (Humble, Iron and Jazzy) or `kilted`
+        (Kilted, Lyrical and newer). `auto` follows the fleet adapters on the graph, and is `jazzy`
+        without one. Transport `ros2` takes what is installed."""),
+    ] = "auto"
 
     def problems(self) -> Iterable[tuple[tuple[str, ...], str]]:
         """What would have no effect."""

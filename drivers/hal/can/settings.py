@@ -5,7 +5,7 @@ from typing import Annotated, Final
 
 import msgspec
 
-from bridges.kinds.shared.fields import Name, Period
+from bridges.kinds.shared.fields import Name, Period, tells
 from drivers.hal import Needs, Where, serial_port
 
 BITRATES: Final = (
@@ -31,16 +31,19 @@ Timeout = Annotated[float, msgspec.Meta(ge=0.05, le=5, extra={"unit": "s"})]
 
 
 class Slcan(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A serial or USB adapter that speaks slcan (LAWICEL).
+    """A serial or USB adapter that speaks slcan (LAWICEL)."""
 
-    `port`: its path; one in /dev/serial/by-id stays the same.
-    `bitrate`: the bitrate of the CAN bus.
-    `baudrate`: the rate of the serial port; USB adapters take any.
-    """
-
-    port: Name
-    bitrate: Annotated[int, msgspec.Meta(ge=10_000, le=1_000_000, extra={"unit": "bit/s"})]
-    baudrate: Annotated[int, msgspec.Meta(ge=9600, le=3_000_000, extra={"unit": "Bd"})] = 115_200
+    port: Annotated[Name, tells("its path; one in /dev/serial/by-id stays the same.")]
+    bitrate: Annotated[
+        int,
+        msgspec.Meta(ge=10_000, le=1_000_000, extra={"unit": "bit/s"}),
+        tells("the bitrate of the CAN bus."),
+    ]
+    baudrate: Annotated[
+        int,
+        msgspec.Meta(ge=9600, le=3_000_000, extra={"unit": "Bd"}),
+        tells("the rate of the serial port; USB adapters take any."),
+    ] = 115_200
 
 
 class Settings(
@@ -51,19 +54,20 @@ class Settings(
     tag_field="type",
     tag="can",
 ):
-    """One CAN bus: either `socketcan` or `slcan`.
+    """One CAN bus: either `socketcan` or `slcan`."""
 
-    `socketcan`: the kernel's interface (`can0`). `ip link` sets its bitrate. Most adapters and the CAN
-    boards of a Raspberry Pi have one.
-    `slcan`: an adapter on a serial port.
-    `timeout_s`: how long a reply, or an adapter that takes a frame, may take.
-    `scan_s`: how often the devices are read and their frames are sent.
-    """
-
-    socketcan: Interface | None = None
-    slcan: Slcan | None = None
-    timeout_s: Timeout = 0.2
-    scan_s: Period = 0.2
+    socketcan: Annotated[
+        Interface | None,
+        tells("""the kernel's interface (`can0`). `ip link` sets its bitrate. Most adapters and the
+        CAN boards of a Raspberry Pi have one."""),
+    ] = None
+    slcan: Annotated[Slcan | None, tells("an adapter on a serial port.")] = None
+    timeout_s: Annotated[
+        Timeout, tells("how long a reply, or an adapter that takes a frame, may take.")
+    ] = 0.2
+    scan_s: Annotated[
+        Period, tells("how often the devices are read and their frames are sent.")
+    ] = 0.2
 
     def problems(self) -> Iterable[tuple[tuple[str, ...], str]]:
         """Problems that involve more than one field."""

@@ -18,7 +18,7 @@ from typing import Annotated
 
 import msgspec
 
-from bridges.kinds.shared.fields import Period
+from bridges.kinds.shared.fields import Period, tells
 from drivers.hal import BusType, HalError, Needs, Where
 from drivers.hal.gpio.bus import Factory, GpioBus
 from drivers.hal.gpio.header import (
@@ -52,14 +52,13 @@ class Settings(
     tag_field="type",
     tag="gpio",
 ):
-    """The header's pins.
+    """The header's pins."""
 
-    `chip`: the number of `/dev/gpiochipN`; found by its label `pinctrl-…` when absent.
-    `scan_s`: how often every input is read.
-    """
-
-    chip: Annotated[int, msgspec.Meta(ge=0, le=255)] | None = None
-    scan_s: Period = 0.05
+    chip: Annotated[
+        Annotated[int, msgspec.Meta(ge=0, le=255)] | None,
+        tells("the number of `/dev/gpiochipN`; found by its label `pinctrl-…` when absent."),
+    ] = None
+    scan_s: Annotated[Period, tells("how often every input is read.")] = 0.05
 
 
 def where(settings: Settings) -> Where:

@@ -6,7 +6,7 @@ from typing import Annotated, Final, Literal
 
 import msgspec
 
-from bridges.kinds.shared.fields import Name
+from bridges.kinds.shared.fields import Name, tells
 from drivers.hal.hosts import misspelt_address
 
 BAUDRATES: Final = (
@@ -17,14 +17,10 @@ BAUDRATES: Final = (
 
 
 class Tcp(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Where the module or gateway listens.
+    """Where the module or gateway listens."""
 
-    `host`: its address or name.
-    `port`: its TCP port.
-    """
-
-    host: Name
-    port: Annotated[int, msgspec.Meta(ge=1, le=65535)] = 502
+    host: Annotated[Name, tells("its address or name.")]
+    port: Annotated[int, msgspec.Meta(ge=1, le=65535), tells("its TCP port.")] = 502
 
     def problems(self) -> Iterable[tuple[tuple[str, ...], str]]:
         """An invalid address."""
@@ -37,20 +33,15 @@ class Tcp(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
 
 
 class Serial(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A serial line (RS-485). Every unit on it has these settings; a character has 8 data bits.
+    """A serial line (RS-485). Every unit on it has these settings; a character has 8 data bits."""
 
-    `port`: the adapter's path, best its stable one: /dev/serial/by-id/….
-    `baudrate`: bits a second.
-    `parity`: the parity bit of each character.
-    `stopbits`: stop bits of each character.
-    `ignore_echo`: drop the echo of an adapter that hears what it sends.
-    """
-
-    port: Name
-    baudrate: Annotated[int, msgspec.Meta(ge=300, le=1_000_000)]
-    parity: Literal["none", "even", "odd"]
-    stopbits: Literal[1, 2]
-    ignore_echo: bool = False
+    port: Annotated[Name, tells("the adapter's path, best its stable one: /dev/serial/by-id/….")]
+    baudrate: Annotated[int, msgspec.Meta(ge=300, le=1_000_000), tells("bits a second.")]
+    parity: Annotated[Literal["none", "even", "odd"], tells("the parity bit of each character.")]
+    stopbits: Annotated[Literal[1, 2], tells("stop bits of each character.")]
+    ignore_echo: Annotated[bool, tells("drop the echo of an adapter that hears what it sends.")] = (
+        False
+    )
 
     def problems(self) -> Iterable[tuple[tuple[str, ...], str]]:
         """A relative path; a rate that no unit has."""

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import msgspec
 
-from bridges.kinds.shared.fields import Name, Period
+from bridges.kinds.shared.fields import Name, Period, tells
 from drivers.hal import Needs, UnwatchedOutputs, Where, serial_port
 from drivers.hal.modbus.places import Serial, Tcp
 from drivers.hal.modbus.registers import Unit
@@ -22,25 +22,24 @@ class Settings(
     tag_field="type",
     tag="modbus",
 ):
-    """A module, or a gateway or serial line with several units: `tcp` or `serial`, one of the two.
+    """A module, or a gateway or serial line with several units: `tcp` or `serial`, one of the two."""
 
-    `tcp`: where the module or gateway listens.
-    `serial`: the serial line (Modbus RTU).
-    `timeout_s`: for one try of one request.
-    `retries`: how many more tries a request gets after the first.
-    `scan_s`: how often every input is read.
-    `module_watchdog`: the modules' own watchdog for their outputs.
-    `without_watchdog`: unit -> why its outputs may keep their value when the daemon's machine or the
-    network dies, or how the unit drops them (`its web page: all off after 5 s without a master`).
-    """
-
-    tcp: Tcp | None = None
-    serial: Serial | None = None
-    timeout_s: Timeout = 0.3
-    retries: Annotated[int, msgspec.Meta(ge=0, le=5)] = 1
-    scan_s: Period = 0.1
-    module_watchdog: Watchdog | None = None
-    without_watchdog: dict[Unit, Name] = msgspec.field(default_factory=dict)
+    tcp: Annotated[Tcp | None, tells("where the module or gateway listens.")] = None
+    serial: Annotated[Serial | None, tells("the serial line (Modbus RTU).")] = None
+    timeout_s: Annotated[Timeout, tells("how long one try of one request may take.")] = 0.3
+    retries: Annotated[
+        int, msgspec.Meta(ge=0, le=5), tells("how many more tries a request gets after the first.")
+    ] = 1
+    scan_s: Annotated[Period, tells("how often every input is read.")] = 0.1
+    module_watchdog: Annotated[
+        Watchdog | None, tells("the modules' own watchdog for their outputs.")
+    ] = None
+    without_watchdog: Annotated[
+        dict[Unit, Name],
+        tells("""unit -> why its outputs may keep their value when the daemon's machine or the
+        network dies, or how the unit drops them (`its web page: all off after 5 s without a
+        master`)."""),
+    ] = msgspec.field(default_factory=dict)
 
     def problems(self) -> Iterable[tuple[tuple[str, ...], str]]:
         """Problems that involve more than one field."""

@@ -9,7 +9,7 @@ from typing import Annotated, Final
 
 import msgspec
 
-from bridges.kinds.shared.fields import Name, Period
+from bridges.kinds.shared.fields import Name, Period, tells
 from drivers.hal.modbus.registers import TABLES, WRITABLE, Place, Unit, Word, misplaced
 from drivers.profiles import Profile, profile_problems
 
@@ -17,14 +17,10 @@ Problems = Iterator[tuple[tuple[str, ...], str]]
 
 
 class Write(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """One write.
+    """One write."""
 
-    `at`: `holding register N` or `coil N`.
-    `value`: what is written.
-    """
-
-    at: Place
-    value: Word
+    at: Annotated[Place, tells("`holding register N` or `coil N`.")]
+    value: Annotated[Word, tells("what is written.")]
 
     def problems(self) -> Problems:
         """A place that cannot be written."""
@@ -32,14 +28,14 @@ class Write(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
 
 
 class Refresh(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """What keeps the watchdog from tripping.
+    """What keeps the watchdog from tripping."""
 
-    `at`: `holding register N` or `coil N`.
-    `values`: written in turn: some modules only count a value that differs from the last.
-    """
-
-    at: Place
-    values: Annotated[list[Word], msgspec.Meta(min_length=1)]
+    at: Annotated[Place, tells("`holding register N` or `coil N`.")]
+    values: Annotated[
+        list[Word],
+        msgspec.Meta(min_length=1),
+        tells("written in turn: some modules only count a value that differs from the last."),
+    ]
 
     def problems(self) -> Problems:
         """A place that cannot be written."""
@@ -47,14 +43,14 @@ class Refresh(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=T
 
 
 class Shows(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A place, and the values to look for.
+    """A place, and the values to look for."""
 
-    `at`: `holding register N`, `input register N`, `coil N` or `discrete input N`.
-    `values`: any of these.
-    """
-
-    at: Place
-    values: Annotated[list[Word], msgspec.Meta(min_length=1)]
+    at: Annotated[
+        Place, tells("`holding register N`, `input register N`, `coil N` or `discrete input N`.")
+    ]
+    values: Annotated[
+        list[Word], msgspec.Meta(min_length=1), tells("the values, any of which counts.")
+    ]
 
     def problems(self) -> Problems:
         """An invalid place."""
@@ -62,24 +58,25 @@ class Shows(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
 
 
 class Habits(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """How a make's watchdog is used.
+    """How a make's watchdog is used."""
 
-    `time_s`: the time that `arm` gives the module.
-    `arm`: the writes that start it, in order.
-    `armed`: places that all read like this while it is armed.
-    `refresh`: what keeps it from tripping.
-    `refresh_s`: how often; at most half of `time_s`.
-    `tripped`: places of which any reads like this after a trip.
-    `rearm`: the writes that end a trip, before `arm`.
-    """
-
-    time_s: Period
-    arm: Annotated[list[Write], msgspec.Meta(min_length=1)]
-    armed: Annotated[list[Shows], msgspec.Meta(min_length=1)]
-    refresh: Refresh
-    refresh_s: Period
-    tripped: list[Shows] = msgspec.field(default_factory=list)
-    rearm: list[Write] = msgspec.field(default_factory=list)
+    time_s: Annotated[Period, tells("the time that `arm` gives the module.")]
+    arm: Annotated[
+        list[Write], msgspec.Meta(min_length=1), tells("the writes that start it, in order.")
+    ]
+    armed: Annotated[
+        list[Shows],
+        msgspec.Meta(min_length=1),
+        tells("places that all read like this while it is armed."),
+    ]
+    refresh: Annotated[Refresh, tells("what keeps it from tripping.")]
+    refresh_s: Annotated[Period, tells("how often that is done; at most half of `time_s`.")]
+    tripped: Annotated[list[Shows], tells("places of which any reads like this after a trip.")] = (
+        msgspec.field(default_factory=list)
+    )
+    rearm: Annotated[list[Write], tells("the writes that end a trip, before `arm`.")] = (
+        msgspec.field(default_factory=list)
+    )
 
     def problems(self) -> Problems:
         """A refresh that comes too late."""
@@ -91,16 +88,15 @@ class Habits(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
 
 
 class Watchdog(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The modules' own watchdogs.
+    """The modules' own watchdogs."""
 
-    `units`: the units that have one.
-    `profile`: a file of drivers/profiles/ that says how it is used.
-    `habits`: the same, written here.
-    """
-
-    units: Annotated[list[Unit], msgspec.Meta(min_length=1)]
-    profile: Name | None = None
-    habits: Habits | None = None
+    units: Annotated[list[Unit], msgspec.Meta(min_length=1), tells("the units that have one.")]
+    profile: Annotated[
+        Name | None, tells("a file of drivers/profiles/ that says how it is used.")
+    ] = None
+    habits: Annotated[
+        Habits | None, tells("how it is used, written here instead of a profile.")
+    ] = None
 
     def problems(self) -> Problems:
         """Neither or both of profile and habits; a profile with problems."""
