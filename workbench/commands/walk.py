@@ -7,7 +7,6 @@ even after a kill -9.
 
 import argparse
 import getpass
-import importlib.util
 import logging
 import os
 import sys
@@ -52,8 +51,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """0: all off; 1: not verified off; 64: no terminal, device; 69: in use; 73: no record; 78: YAML."""
     log.start("WARNING")
-    if why := _no_screen():
-        print(why, file=sys.stderr)
+    if not (sys.stdin.isatty() and sys.stdout.isatty()):
+        print("walk needs a terminal: it switches outputs by keys", file=sys.stderr)
         return os.EX_USAGE
     try:
         config = load(args.file)
@@ -79,14 +78,6 @@ def run(args: argparse.Namespace) -> int:
         return os.EX_UNAVAILABLE
     finally:
         held.close()
-
-
-def _no_screen() -> str:
-    if not (sys.stdin.isatty() and sys.stdout.isatty()):
-        return "walk needs a terminal: it switches outputs by keys"
-    if importlib.util.find_spec("rich") is None:
-        return "walk needs rich to draw: pip install 'rmf-bridges[laptop]'"
-    return ""
 
 
 def _walk(

@@ -13,7 +13,8 @@ from typing import Final
 from msgspec import Struct
 from msgspec.structs import asdict, replace
 
-from bridges.host.columns import aligned
+from bridges.host.columns import aligned, clipped, width
+from bridges.host.paint import repainted
 from bridges.messages import definitions as d
 from bridges.messages import words
 from bridges.messages.heard import Heard
@@ -326,15 +327,13 @@ def repaint(
     if len(shown) >= lines:
         more = len(shown) - lines + 2
         shown = [*shown[: lines - 2], (f"… and {more} more", False)]
-    text = f"\x1b[{lines_before}A" if lines_before else ""
-    for line, wrong in shown:
-        line = line[: columns - 1]
-        red = coloured and wrong
-        text += f"\r\x1b[K\x1b[31m{line}\x1b[0m\n" if red else f"\r\x1b[K{line}\n"
-    return text + "\x1b[J", len(shown)
+    drawn = (
+        (clipped(line, columns - 1), "31" if coloured and wrong else "") for line, wrong in shown
+    )
+    return repainted(drawn, lines_before), len(shown)
 
 
-def _fitting(rows: list[Row], width: int) -> Iterator[tuple[str, bool]]:
+def _fitting(rows: list[Row], columns: int) -> Iterator[tuple[str, bool]]:
     """Each line of the table, and whether it needs attention. Where it is too long for a terminal, its
     marks and faults follow on a line of their own."""
     heading, *lines = table(rows)
@@ -342,5 +341,5 @@ def _fitting(rows: list[Row], width: int) -> Iterator[tuple[str, bool]]:
     for row, line in zip(rows, lines, strict=True):
         yield line, row.wrong
         told = " ".join(filter(None, row.cells()[-2:]))
-        if told and len(line) > width:
+        if told and width(line) > columns:
             yield f"  {told}", row.wrong

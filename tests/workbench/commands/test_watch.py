@@ -6,6 +6,7 @@ import json
 import pytest
 from msgspec.structs import replace
 
+from bridges.host.columns import width
 from bridges.messages import definitions as d
 from bridges.messages.heard import Heard
 from bridges.messages.stamps import stamp
@@ -207,6 +208,14 @@ def test_a_repaint_goes_back_over_its_own_lines_and_wraps_no_line() -> None:
     again, shown = repaint(rows, shown, columns=80, lines=24)
     assert again.startswith("\x1b[3A\r")
     assert shown == 3
+
+
+def test_a_line_of_wide_letters_wraps_no_more_than_another() -> None:
+    wide = replace(DOOR, door_name="北翼病房自动门")
+    text, _ = repaint(board(wide).rows(100.0, WALL), 0, columns=20, lines=24, coloured=False)
+    lines = text.replace("\r\x1b[K", "").replace("\x1b[J", "").splitlines()
+    assert lines[1] == "door  北翼病房自动"
+    assert max(map(width, lines)) <= 19
 
 
 def test_a_repaint_that_does_not_fit_says_how_much_is_left_out() -> None:

@@ -3,6 +3,7 @@
 import os
 import re
 import select
+import shutil
 import sys
 import termios
 import tty
@@ -10,11 +11,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Final, NamedTuple
 
-from rich.console import Console, Group
-from rich.live import Live
-from rich.table import Table
-from rich.text import Text
-
+from bridges.host.columns import aligned, clipped, width, wrapped
+from bridges.host.paint import coloured, repainted
 from workbench.commissioning.walk.bench import Bench, Input
 from workbench.commissioning.walk.core import ByEye, Switch
 from workbench.commissioning.walk.signed import NOT_TRIED
@@ -23,29 +21,40 @@ HELP: Final = "ENTER on/off   n next   p back   y seen   x not seen   q end"
 WIDE: Final = 60
 """Columns from which the wires are shown too: a phone has about 40."""
 HEADINGS: Final = 2
+BOLD, DIM, ALARM, ON = "1", "2", "1;31", "1;33"
+HIDE_CURSOR, SHOW_CURSOR = "\x1b[?25l", "\x1b[?25h"
 UP, DOWN = "\x1b[A", "\x1b[B"
 KEY: Final = re.compile(r"\x1b\[[A-Z]|.", re.S)
+
+Lines = list[tuple[str, str]]
+"""Each with its style (`bridges/host/paint.py`)."""
 
 
 class Screen:
     """What the person sees and types. `cursor`: the output that ENTER switches."""
 
-    def __init__(self, device: str, bench: Bench, console: Console | None = None) -> None:
+    def __init__(self, device: str, bench: Bench) -> None:
         self._device = device
         self._bench = bench
         self._cursor = 0
-        self._live = Live(console=console or Console(), auto_refresh=False, transient=False)
+        self._above = 0
 
     def __enter__(self) -> "Screen":
-        self._live.start()
+        sys.stdout.write(HIDE_CURSOR)
         return self
 
     def __exit__(self, *error: object) -> None:
-        self._live.stop()
+        sys.stdout.write(f"{SHOW_CURSOR}\n")
+        sys.stdout.flush()
 
     def draw(self, now: float) -> None:
         """Show everything as it is now (monotonic s)."""
-        self._live.update(self.page(now), refresh=True)
+        plain = not coloured(sys.stdout)
+        page = self.page(now, *shutil.get_terminal_size())
+        *above, (last, _) = [(text, "" if plain else style) for text, style in page]
+        sys.stdout.write(f"{repainted(above, self._above)}\r{last}")  # no newline: it would scroll
+        sys.stdout.flush()
+        self._above = len(above)
 
     def obey(self, key: str) -> bool:
         """Act on a key. False for the one that ends the walk."""
@@ -64,29 +73,25 @@ class Screen:
             self._cursor = (self._cursor - 1) % steps
         return True
 
-    def page(self, now: float) -> Group:
+    def page(self, now: float, columns: int, rows: int) -> Lines:
         """Everything as it is now, as far as there is room."""
-        memory, console = self._bench.memory, self._live.console
+        memory = self._bench.memory
         age = "not read yet" if memory.read_at is None else f"read {now - memory.read_at:.1f} s ago"
-        texts = [
-            Text(f"{self._device}: {age}", style="bold"),
-            Text(self._bench.decoded),
-            Text(self._selected()),
-            Text(memory.why_lost or memory.says, style="bold red"),
-            Text(HELP, style="dim"),
-        ]
-        title, decoded, selected, says, keys_ = texts
-        free = console.height - len(console.render_lines(Group(*texts))) - HEADINGS
-        shown = room(free, len(self._bench.inputs), len(self._bench.steps))
-        return Group(
-            title,
-            self._inputs(now, shown.inputs, wires=console.width >= WIDE),
-            decoded,
-            self._outputs(now, shown.outputs),
-            selected,
-            says,
-            keys_,
+        texts = (
+            (f"{self._device}: {age}", BOLD),
+            (self._bench.decoded, ""),
+            (self._selected(), ""),
+            (memory.why_lost or memory.says, ALARM),
+            (HELP, DIM),
         )
+        title, decoded, *below = (
+            [(line, style) for line in wrapped(text, columns)] for text, style in texts
+        )
+        free = rows - sum(map(len, (title, decoded, *below))) - HEADINGS
+        shown = room(free, len(self._bench.inputs), len(self._bench.steps))
+        inputs = self._inputs(now, shown.inputs, columns)
+        outputs = self._outputs(now, shown.outputs, columns)
+        return [*title, *inputs, *decoded, *outputs, *(line for part in below for line in part)]
 
     def _selected(self) -> str:
         """What the output at the cursor does, and what was seen of it."""
@@ -96,33 +101,36 @@ class Screen:
         seen = self._bench.memory.results.get(self._cursor, NOT_TRIED)
         return f"{step.name} {step.does}; should be seen: {step.expects}. So far: {seen}"
 
-    def _inputs(self, now: float, most: int, *, wires: bool) -> Table | Text:
+    def _inputs(self, now: float, most: int, columns: int) -> Lines:
         """Every input; where there is no room, those that have changed last."""
-        if not self._bench.inputs:
-            return Text("no contacts: registers or messages, decoded", style="dim")
-        table = _table("input", *(["wire"] if wires else []), "level", "is", "for", "seen")
         known = self._bench.inputs
+        if not known:
+            nothing = "no contacts: registers or messages, decoded"
+            return [(line, DIM) for line in wrapped(nothing, columns)]
         latest = sorted(known, key=lambda one: -(one.changed_at or 0.0))[:most]
-        for one in (one for one in known if one in latest):
-            name, wire, *told = _row(one, now)
-            cells = (name, wire, *told) if wires else (name, *told)
-            table.add_row(*cells, style="bold" if one.asserted else "")
-        if len(known) > most:
-            table.add_row(f"… {len(known) - most} more")
-        return table
+        shown = [one for one in known if one in latest]
+        rows = [("input", "wire", "level", "is", "for", "seen"), *(_row(one, now) for one in shown)]
+        if columns < WIDE:
+            rows = [(name, *told) for name, _, *told in rows]
+        styles = [DIM, *(BOLD if one.asserted else "" for one in shown)]
+        more = len(known) - most
+        return [
+            *zip(_fitted(rows, 0, columns), styles, strict=True),
+            *([(f"… {more} more", "")] if more > 0 else []),
+        ]
 
-    def _outputs(self, now: float, most: int) -> Table:
+    def _outputs(self, now: float, most: int, columns: int) -> Lines:
         """Every output; where there is no room, those around the cursor."""
         memory, steps = self._bench.memory, self._bench.steps
-        table = _table("", "output", "is", "seen")
+        rows, styles = [("", "output", "is", "seen")], [DIM]
         first = max(0, min(self._cursor - most // 2, len(steps) - most))
         for i, step in list(enumerate(steps))[first : first + most]:
             on = i == memory.on
             is_now = f"ON, {max(0.0, memory.off_at - now):.0f} s" if on else "off"
             mark = ">" if i == self._cursor else ""
-            told = _short(memory.results.get(i, ""))
-            table.add_row(mark, step.name, is_now, told, style="bold yellow" if on else "")
-        return table
+            rows.append((mark, step.name, is_now, _short(memory.results.get(i, ""))))
+            styles.append(ON if on else "")
+        return [*zip(_fitted(rows, 1, columns), styles, strict=True)]
 
 
 class Room(NamedTuple):
@@ -147,12 +155,19 @@ def _short(result: str) -> str:
     return next(known, "nothing yet" if result else "")
 
 
-def _table(*headings: str) -> Table:
-    """Narrow: no frame, and one row for each line."""
-    table = Table(box=None, pad_edge=False, header_style="dim")
-    for heading in headings:
-        table.add_column(heading, no_wrap=True)
-    return table
+def _fitted(rows: list[tuple[str, ...]], names: int, columns: int) -> list[str]:
+    """The rows as lines; where they are too long, the names in this column are cut."""
+    lines = aligned(rows)
+    if (over := max(map(width, lines)) - columns) > 0:
+        longest = max(width(row[names]) for row in rows)
+        most = max(longest - over, 2)
+        rows = [(*row[:names], _cut(row[names], most), *row[names + 1 :]) for row in rows]
+        lines = [clipped(line, columns) for line in aligned(rows)]
+    return lines
+
+
+def _cut(text: str, columns: int) -> str:
+    return text if width(text) <= columns else f"{clipped(text, columns - 1)}…"
 
 
 def _row(one: Input, now: float) -> tuple[str, ...]:

@@ -1,11 +1,11 @@
 """What a walk shows on a terminal: every name is whole, and nothing scrolls away, also on a phone."""
 
-import io
+from dataclasses import replace
 from typing import Any
 
 import pytest
-from rich.console import Console
 
+from bridges.host.columns import width
 from drivers.hal.points import Wire
 from workbench.commissioning.walk.bench import Bench, Input
 from workbench.commissioning.walk.core import Step, Switch, decide
@@ -28,16 +28,18 @@ def inputs(count: int) -> list[Input]:
     return found
 
 
-def shown(columns: int, rows: int, *, keys: str = "", count: int = 12) -> list[str]:
+def screen(keys: str = "", count: int = 12, steps: list[Step] = STEPS) -> Screen:
     nothing: Any = None
-    console = Console(file=io.StringIO(), width=columns, height=rows)
-    bench = Bench(nothing, nothing, inputs(count), STEPS, "")
-    screen = Screen("Lift1", bench, console)
+    bench = Bench(nothing, nothing, inputs(count), steps, "")
+    found = Screen("Lift1", bench)
     for key in keys.split():
-        screen.obey(key)
-    bench.memory = decide(bench.memory, Switch(0), 1.0, STEPS)
-    lines = console.render_lines(screen.page(100.0), pad=False)
-    return ["".join(segment.text for segment in line).rstrip() for line in lines]
+        found.obey(key)
+    bench.memory = decide(bench.memory, Switch(0), 1.0, steps)
+    return found
+
+
+def shown(columns: int, rows: int, *, keys: str = "", count: int = 12) -> list[str]:
+    return [text for text, _ in screen(keys, count).page(100.0, columns, rows)]
 
 
 def test_a_phone_shows_the_last_changes_and_the_outputs_around_the_cursor() -> None:
@@ -97,3 +99,36 @@ def test_a_device_without_contacts_shows_only_what_is_decoded() -> None:
     lines = shown(40, 24, count=0)
     assert lines[1] == "no contacts: registers or messages,"
     assert "input" not in " ".join(lines)
+
+
+def test_an_output_that_is_on_and_an_asserted_input_stand_out() -> None:
+    device = screen()
+    device._bench.memory = replace(device._bench.memory, on=1, off_at=103.0)
+    styles = {text.split("  ")[0].strip("> "): style for text, style in device.page(100.0, 80, 50)}
+    assert [styles[name] for name in ("floor_parity0", "floor_parity1")] == ["", "1"]
+    assert [text for text, style in device.page(100.0, 80, 50) if style == "1;33"] == [
+        "   call L2   ON, 3 s"
+    ]
+
+
+def test_a_name_that_is_too_long_is_cut_before_what_is_known_of_it() -> None:
+    steps = [replace(STEPS[0], name=f"call {'北' * 40}")]
+    lines = [text for text, _ in screen(steps=steps, count=0).page(100.0, 40, 24)]
+    (row,) = (line for line in lines if line.startswith(">"))
+    assert row == f">  call {'北' * 10}…  off"
+    assert max(map(width, lines)) <= 40
+
+
+def test_a_picture_is_drawn_over_the_last_one_and_scrolls_nothing(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "40")
+    monkeypatch.setenv("LINES", "20")
+    with screen() as drawn:
+        drawn.draw(100.0)
+        first = capsys.readouterr().out
+        drawn.draw(101.0)
+        again = capsys.readouterr().out
+    assert first.count("\n") == 19
+    assert again.startswith("\x1b[19A\r\x1b[KLift1: ")
+    assert again.endswith("\x1b[J\rx not seen   q end")
