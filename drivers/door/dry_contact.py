@@ -37,11 +37,11 @@ class Inputs(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
 
     opened: Annotated[
         Input | None,
-        tells("the limit contact at the open end, asserted while the door is fully open."),
+        tells("the door is fully open: its limit contact at that end."),
     ] = None
     closed: Annotated[
         Input | None,
-        tells("the limit contact at the closed end, asserted while the door is closed."),
+        tells("the door is closed: its limit contact at that end."),
     ] = None
     obstruction: Annotated[
         Input | None,

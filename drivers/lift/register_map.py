@@ -266,17 +266,30 @@ class LiftMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=T
         ServiceField | None, tells("the lift's service state; it may include hazards and AGV mode.")
     ] = None
     agv_mode: Annotated[
-        Flag | None, tells("AGV mode is on. It may be a state of `service` instead.")
+        Flag | None, tells("the controller confirms AGV mode; may be a state of `service` instead.")
     ] = None
     fire_alarm: Annotated[
-        Flag | None, tells("fire, shown as MODE_FIRE; latched with `fire_reset: manual`.")
+        Flag | None,
+        tells("the building's fire alarm; shown as MODE_FIRE, latched with `fire_reset: manual`."),
     ] = None
-    code_blue: Annotated[Flag | None, tells("shown as MODE_EMERGENCY.")] = None
-    earthquake: Annotated[Flag | None, tells("shown as MODE_EMERGENCY.")] = None
-    emergency: Annotated[Flag | None, tells("shown as MODE_EMERGENCY.")] = None
-    out_of_service: Annotated[Flag | None, tells("shown as MODE_OFFLINE.")] = None
-    manual_mode: Annotated[Flag | None, tells("the key switch; shown as MODE_OFFLINE.")] = None
-    overload: Annotated[Flag | None, tells("only delays the ride.")] = None
+    code_blue: Annotated[
+        Flag | None, tells("the hospital's code blue; shown as MODE_EMERGENCY.")
+    ] = None
+    earthquake: Annotated[Flag | None, tells("an earthquake sensor; shown as MODE_EMERGENCY.")] = (
+        None
+    )
+    emergency: Annotated[
+        Flag | None, tells("the emergency stop or call in the car; shown as MODE_EMERGENCY.")
+    ] = None
+    out_of_service: Annotated[
+        Flag | None, tells("the lift is switched off or out of order; shown as MODE_OFFLINE.")
+    ] = None
+    manual_mode: Annotated[
+        Flag | None, tells("inspection or manual drive, by a key switch; shown as MODE_OFFLINE.")
+    ] = None
+    overload: Annotated[Flag | None, tells("the car is too heavy; this only delays the ride.")] = (
+        None
+    )
     commands: Annotated[Commands, tells("the commands to the lift.")]
 
     def parts(self) -> dict[str, Number | Flag]:

@@ -93,31 +93,46 @@ class Inputs(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     """
 
     fire_alarm: Annotated[
-        LiftInput | None, tells("fire, shown as MODE_FIRE; latched with `fire_reset: manual`.")
+        LiftInput | None,
+        tells("the building's fire alarm; shown as MODE_FIRE, latched with `fire_reset: manual`."),
     ] = None
-    code_blue: Annotated[LiftInput | None, tells("shown as MODE_EMERGENCY.")] = None
-    earthquake: Annotated[LiftInput | None, tells("shown as MODE_EMERGENCY.")] = None
-    emergency: Annotated[LiftInput | None, tells("shown as MODE_EMERGENCY.")] = None
-    out_of_service: Annotated[LiftInput | None, tells("shown as MODE_OFFLINE.")] = None
-    manual_mode: Annotated[LiftInput | None, tells("the key switch; shown as MODE_OFFLINE.")] = None
-    overload: Annotated[LiftInput | None, tells("only delays the ride.")] = None
+    code_blue: Annotated[
+        LiftInput | None, tells("the hospital's code blue; shown as MODE_EMERGENCY.")
+    ] = None
+    earthquake: Annotated[
+        LiftInput | None, tells("an earthquake sensor; shown as MODE_EMERGENCY.")
+    ] = None
+    emergency: Annotated[
+        LiftInput | None, tells("the emergency stop or call in the car; shown as MODE_EMERGENCY.")
+    ] = None
+    out_of_service: Annotated[
+        LiftInput | None, tells("the lift is switched off or out of order; shown as MODE_OFFLINE.")
+    ] = None
+    manual_mode: Annotated[
+        LiftInput | None,
+        tells("inspection or manual drive, by a key switch; shown as MODE_OFFLINE."),
+    ] = None
+    overload: Annotated[
+        LiftInput | None, tells("the car is too heavy; this only delays the ride.")
+    ] = None
     agv_mode: Annotated[
-        LiftInput | None, tells("AGV mode is on. It may be a state of `service` instead.")
+        LiftInput | None,
+        tells("the controller confirms AGV mode; may be a state of `service` instead."),
     ] = None
     service: Annotated[ServiceCode | None, tells("the lift's service state as a code.")] = None
     door: Annotated[DoorInput | None, tells("the door's only contact.")] = None
     door_opened: Annotated[
-        LiftInput | None, tells("the contact at the open end, with one at the closed end.")
+        LiftInput | None, tells("the car's door is open; with a contact at its closed end too.")
     ] = None
     door_closed: Annotated[
-        LiftInput | None, tells("the contact at the closed end, with one at the open end.")
+        LiftInput | None, tells("the car's door is closed; with a contact at its open end too.")
     ] = None
     rear_door: Annotated[DoorInput | None, tells("the rear door's only contact.")] = None
     rear_door_opened: Annotated[
-        LiftInput | None, tells("the contact at its open end, with one at its closed end.")
+        LiftInput | None, tells("the rear door is open; with a contact at its closed end too.")
     ] = None
     rear_door_closed: Annotated[
-        LiftInput | None, tells("the contact at its closed end, with one at its open end.")
+        LiftInput | None, tells("the rear door is closed; with a contact at its open end too.")
     ] = None
     moving: Annotated[LiftInput | None, tells("the car moves, up or down.")] = None
     stopped: Annotated[LiftInput | None, tells("the car stands.")] = None

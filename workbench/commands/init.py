@@ -85,7 +85,7 @@ QUESTIONS: Final = (
         "signals",
         "Which inputs are wired?",
         lambda given: ",".join(OFFERED),
-        lambda given: tuple(LIFT_INPUTS),
+        lambda given: LIFT_INPUTS,
         needed=_is_lift,
         several=True,
     ),

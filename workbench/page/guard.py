@@ -8,31 +8,27 @@ names that the page was given are answered, and only its own origin may open its
 
 import asyncio
 import ipaddress
-from collections.abc import Awaitable, Callable, Collection, Iterable, MutableMapping
+from collections.abc import Callable, Collection, Iterable
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Final
 
-Scope = MutableMapping[str, Any]
-Receive = Callable[[], Awaitable[MutableMapping[str, Any]]]
-Send = Callable[[MutableMapping[str, Any]], Awaitable[None]]
-App = Callable[[Scope, Receive, Send], Awaitable[None]]
+from starlette.datastructures import Headers, MutableHeaders
+from starlette.responses import PlainTextResponse
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 MOST_BODY: Final = 64 * 1024
 BODY_S: Final = 5.0
 """How long (s) a request may take to come."""
 ANSWER_S: Final = 120.0
 """How long (s) an answer may take to go: a recording of 16 MB in 1 Mbit/s."""
-HEADERS: Final = (
-    (
-        b"content-security-policy",
-        b"default-src 'self'; script-src 'self' 'unsafe-inline' 'unsafe-eval';"
-        b" style-src 'self' 'unsafe-inline'; img-src 'self' data:; font-src 'self' data:;"
-        b" connect-src 'self'; frame-ancestors 'none'; base-uri 'self'; form-action 'self'",
-    ),
-    (b"x-content-type-options", b"nosniff"),
-    (b"x-frame-options", b"DENY"),
-    (b"referrer-policy", b"same-origin"),
-)
+HEADERS: Final = {
+    "content-security-policy": "default-src 'self'; script-src 'self' 'unsafe-inline' 'unsafe-eval';"
+    " style-src 'self' 'unsafe-inline'; img-src 'self' data:; font-src 'self' data:;"
+    " connect-src 'self'; frame-ancestors 'none'; base-uri 'self'; form-action 'self'",
+    "x-content-type-options": "nosniff",
+    "x-frame-options": "DENY",
+    "referrer-policy": "same-origin",
+}
 """NiceGUI's own scripts are inline and evaluated; everything comes from this address."""
 
 
@@ -50,7 +46,7 @@ def refused(scope: Scope, hosts: Collection[str]) -> str:
 
     An address is answered as well: only a name can be made to resolve to another machine.
     """
-    headers = {name.decode("latin-1"): value.decode("latin-1") for name, value in scope["headers"]}
+    headers = Headers(scope=scope)
     host = headers.get("host", "").lower()
     if not _is_address(host) and not any(
         host in (known, host_of(known)) or host_of(host) == known for known in hosts
@@ -86,7 +82,7 @@ class Guard:
     """
 
     def __init__(
-        self, app: App, hosts: Iterable[str], gate: Callable[[Scope], Refusal | None]
+        self, app: ASGIApp, hosts: Iterable[str], gate: Callable[[Scope], Refusal | None]
     ) -> None:
         self._app = app
         self._hosts = frozenset(host.lower() for host in hosts)
@@ -102,12 +98,15 @@ class Guard:
         if refusal is None and scope["type"] == "http":
             receive, refusal = await _whole(receive)
         if refusal is not None:
-            await _refuse(scope, send, refusal)
+            headers = (
+                HEADERS | {"connection": "close"} | ({"location": refusal.to} if refusal.to else {})
+            )
+            await PlainTextResponse(refusal.why, refusal.status, headers)(scope, receive, send)
             return
 
-        async def sending(message: MutableMapping[str, Any]) -> None:
+        async def sending(message: Message) -> None:
             if message["type"] == "http.response.start":
-                message["headers"] = [*message.get("headers", ()), *HEADERS]
+                MutableHeaders(scope=message).update(HEADERS)
             await send(message)
 
         try:
@@ -132,17 +131,7 @@ async def _whole(receive: Receive) -> tuple[Receive, Refusal | None]:
         return receive, Refusal(408, f"a request takes at most {BODY_S:.0f} s")
     parts = [{"type": "http.request", "body": body, "more_body": False}]
 
-    async def whole() -> MutableMapping[str, Any]:
+    async def whole() -> Message:
         return parts.pop() if parts else await receive()
 
     return whole, None
-
-
-async def _refuse(scope: Scope, send: Send, refusal: Refusal) -> None:
-    if scope["type"] == "websocket":
-        await send({"type": "websocket.close", "code": 1008, "reason": refusal.why})
-        return
-    headers = [(b"content-type", b"text/plain; charset=utf-8"), (b"connection", b"close"), *HEADERS]
-    headers += [(b"location", refusal.to.encode())] if refusal.to else []
-    await send({"type": "http.response.start", "status": refusal.status, "headers": headers})
-    await send({"type": "http.response.body", "body": refusal.why.encode()})

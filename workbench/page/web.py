@@ -21,6 +21,7 @@ from urllib.parse import quote
 from fastapi.requests import HTTPConnection
 from nicegui import Client, app, core, ui
 from nicegui.server import Server
+from starlette.types import Scope
 
 from bridges.host.log import pairs
 from bridges.kinds.shared.durations import AGES_AGO
@@ -29,7 +30,7 @@ from workbench.graph.join import interruptible
 from workbench.page.access import Door
 from workbench.page.actions import Deeds
 from workbench.page.gallery import Gallery
-from workbench.page.guard import Guard, Refusal, Scope
+from workbench.page.guard import Guard, Refusal
 from workbench.page.here import Here
 from workbench.page.incident_views import IncidentViews
 from workbench.page.listener import Listener

@@ -3,13 +3,18 @@
 `points.py` gives each signal a pin or an address of its own.
 """
 
+import re
 from collections.abc import Iterator
 from typing import Final
 
 import msgspec
 
+from drivers.charger import dry_contact as charger
+from drivers.door import dry_contact as door
+from drivers.lift import wiring
 from workbench.commissioning.init.answers import LIFT_INPUTS, Answers, Impossible
 from workbench.commissioning.init.points import Points, points_for
+from workbench.commissioning.reference import meaning
 
 DRIVERS: Final = {"http": "http", "can": "canopen"}
 """The driver for a wiring; `dry_contact` for any other."""
@@ -33,7 +38,7 @@ ADDRESSES: Final = {
     "can": "can0",
 }
 """The address that is offered for a wiring; a GPIO header has none."""
-HAZARDS: Final = tuple(LIFT_INPUTS)[:7]
+HAZARDS: Final = LIFT_INPUTS[:7]
 DOOR_ENDS: Final = {"door_opened": "open", "door_closed": "closed"}
 BOOLEANS: Final = ("y", "n", "yes", "no", "on", "off", "true", "false", "null")
 SHELLY: Final = """\
@@ -102,14 +107,14 @@ def _lift(answers: Answers, points: Points) -> Iterator[str]:
     yield f"    floors: [{', '.join(floors)}]        # RMF's names, from below"
     yield "    inputs:"
     yield "      # Alarm loops are closed while all is well: an open contact or a cut wire is an alarm."
-    for signal, meaning in LIFT_INPUTS.items():
+    for signal in LIFT_INPUTS:
         if signal in answers.signals:
-            yield f"      {_input(signal, answers, points)}   # {meaning}"
+            yield f"      {_input(signal, answers, points)}   {_said(wiring.Inputs, signal)}"
     yield from _floor_code(answers, floors, points)
     yield "    outputs:"
     if "agv_mode" in answers.signals:
-        yield f"      agv_mode_request: {{{request}}}   # asks the lift for AGV mode"
-    yield f"      door_open: {{{hold}}}   # holds the door open for a robot"
+        yield f"      agv_mode_request: {{{request}}}   {_said(wiring.Outputs, 'agv_mode_request')}"
+    yield f"      door_open: {{{hold}}}   {_said(wiring.Outputs, 'door_open')}"
     yield "    calls:                     # a car call for each floor"
     yield from calls
 
@@ -145,10 +150,10 @@ def _door(answers: Answers, points: Points) -> Iterator[str]:
         yield from SHELLY.splitlines()
         return
     yield "    inputs:"
-    yield f"      opened: {{{points.contact()}}}   # on while the door is fully open"
-    yield f"      closed: {{{points.contact()}}}   # on while it is fully closed"
+    for end in ("opened", "closed"):
+        yield f"      {end}: {{{points.contact()}}}   {_said(door.Inputs, end)}"
     yield "    outputs:"
-    yield f"      hold_open: {{{points.relay()}}}   # holds the door open while it is on"
+    yield f"      hold_open: {{{points.relay()}}}   {_said(door.Outputs, 'hold_open')}"
 
 
 def _charger(answers: Answers, points: Points) -> Iterator[str]:
@@ -157,11 +162,16 @@ def _charger(answers: Answers, points: Points) -> Iterator[str]:
         yield from (CHARGER_HTTP if answers.wiring == "http" else CHARGER_CANOPEN).splitlines()
         return
     yield "    inputs:"
-    yield f"      charging: {{{points.contact()}}}   # on while current flows"
-    yield f"      ready: {{{points.contact()}}}   # on while it could charge"
+    for signal in ("charging", "ready"):
+        yield f"      {signal}: {{{points.contact()}}}   {_said(charger.Inputs, signal)}"
     yield f"      fault: {{{points.loop()}}}   # opens at a fault, as a cut wire does"
     yield "    outputs:"
-    yield f"      enable: {{{points.relay()}}}   # lets it charge while it is on"
+    yield f"      enable: {{{points.relay()}}}   {_said(charger.Outputs, 'enable')}"
+
+
+def _said(struct: type, key: str) -> str:
+    """What a key means as a comment: the beginning of its description."""
+    return f"# {re.split('[;:.]', meaning(struct, key))[0]}"
 
 
 def quoted(text: str) -> str:

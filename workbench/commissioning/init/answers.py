@@ -9,20 +9,11 @@ Wiring = Literal["gpio", "modbus", "rs485", "http", "can"]
 Encoding = Literal["binary", "gray", "one_hot"]
 Level = Literal["high", "low"]
 
-LIFT_INPUTS: Final = {
-    "fire_alarm": "the building's fire alarm",
-    "code_blue": "the hospital's code blue",
-    "earthquake": "an earthquake sensor",
-    "emergency": "the emergency stop or call in the car",
-    "out_of_service": "the lift is switched off or out of order",
-    "manual_mode": "inspection or manual drive",
-    "overload": "the car is too heavy",
-    "agv_mode": "the controller confirms AGV mode",
-    "door_opened": "the car's door is open",
-    "door_closed": "the car's door is closed",
-    "stopped": "the car stands",
-}
-"""The inputs that a lift may have, and what each says."""
+LIFT_INPUTS: Final = (
+    *("fire_alarm", "code_blue", "earthquake", "emergency", "out_of_service", "manual_mode"),
+    *("overload", "agv_mode", "door_opened", "door_closed", "stopped"),
+)
+"""The inputs that a lift may have."""
 OFFERED: Final = ("fire_alarm", "agv_mode", "door_opened", "door_closed", "stopped")
 
 

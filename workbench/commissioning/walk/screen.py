@@ -7,7 +7,7 @@ import shutil
 import sys
 import termios
 import tty
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Final, NamedTuple
 
@@ -155,7 +155,7 @@ def _short(result: str) -> str:
     return next(known, "nothing yet" if result else "")
 
 
-def _fitted(rows: list[tuple[str, ...]], names: int, columns: int) -> list[str]:
+def _fitted(rows: Sequence[tuple[str, ...]], names: int, columns: int) -> list[str]:
     """The rows as lines; where they are too long, the names in this column are cut."""
     lines = aligned(rows)
     if (over := max(map(width, lines)) - columns) > 0:
