@@ -45,7 +45,7 @@ class Settings(ChargerSettings, frozen=True, kw_only=True, forbid_unknown_fields
     map: Annotated[FrameMap | None, tells("the map, written here instead of a profile.")] = None
     setpoints: Annotated[
         dict[Name, Volume],
-        tells("name -> value, for what the map leaves to the site: voltages and currents."),
+        tells("name -> value, for the voltages and currents that the map leaves open."),
     ] = msgspec.field(default_factory=dict)
 
     def problems(self) -> Problems:

@@ -56,7 +56,7 @@ class Sent(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
     setpoints: Annotated[
         dict[Name, Name],
         tells("signal -> the name of the device's setpoint that it carries while it may charge."),
-    ] = msgspec.field(default_factory=dict)
+    ] = {}
     off: Annotated[
         dict[Name, float] | None,
         tells("signal -> value while the charger must not charge; not sent then when absent."),
@@ -91,15 +91,11 @@ class FrameMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
 
     dbc: Annotated[Name, tells("the DBC file, in drivers/profiles/ or by its absolute path.")]
     masks: Annotated[
-        dict[Name, Mask],
-        tells("frame -> the bits of its id that are compared, for ids that contain a node id."),
-    ] = msgspec.field(default_factory=dict)
-    state: Annotated[
-        State | None, tells("the charger's state as a number; not needed with `rules`.")
-    ] = None
+        dict[Name, Mask], tells("frame -> the compared bits of its id, where that has a node id.")
+    ] = {}
+    state: Annotated[State | None, tells("its state as a number; not needed with `rules`.")] = None
     state_timeout_s: Annotated[
-        Fresh,
-        tells("after how long without its frame, or one that a rule tests, the state is stale."),
+        Fresh, tells("after how long without its frame, or one of a rule, the state is stale.")
     ]
     others_timeout_s: Annotated[
         Fresh, tells("after how long without its frame any other value is stale.")
@@ -107,8 +103,7 @@ class FrameMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     volts: Annotated[Signal | None, tells("the voltage at the battery.")] = None
     amps: Annotated[Signal | None, tells("the current into the battery.")] = None
     receiver: Annotated[
-        Signal | None,
-        tells("the receiver's id as a number; 0 is none. Without its frame there is no reading."),
+        Signal | None, tells("the receiver's id; 0 is none. Without its frame there is no reading.")
     ] = None
     out_of_range: Annotated[
         Signal | None,
@@ -128,23 +123,17 @@ class FrameMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     ] = None
     temperatures: Annotated[
         dict[Name, Signal],
-        tells("name -> the signal of a temperature (°C), shown in status and diagnostics."),
-    ] = msgspec.field(default_factory=dict)
-    rules: Annotated[
-        list[Rule], tells("derive the state from other signals; tried before its codes.")
-    ] = msgspec.field(default_factory=list)
-    errors: Annotated[Errors, tells("signals that mean an error, whatever the state is.")] = (
-        Errors()
-    )
-    send: Annotated[
-        list[Sent], msgspec.Meta(min_length=1), tells("the frames that the driver sends.")
-    ]
+        tells("name -> a temperature's signal (°C), for status and diagnostics."),
+    ] = {}
+    rules: Annotated[list[Rule], tells("derive the state from other signals; before codes.")] = []
+    errors: Annotated[Errors, tells("signals that mean an error in any state.")] = Errors()
+    send: Annotated[list[Sent], msgspec.Meta(min_length=1), tells("the frames to send.")]
     wake: Annotated[
         list[Wake],
         msgspec.Meta(max_length=8),
         tells("""for a charger that says nothing before it is woken: the frames that do it, such as
         CANopen's NMT start."""),
-    ] = msgspec.field(default_factory=list)
+    ] = []
 
     def problems(self) -> Problems:
         """A DBC file that cannot be read; a frame or signal that it lacks."""

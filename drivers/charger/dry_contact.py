@@ -41,8 +41,7 @@ class Inputs(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
 
     charging: Annotated[Input, tells("current flows, also while it ramps down.")]
     ready: Annotated[
-        Input | None,
-        tells("the station can charge the next robot; without this contact it always can."),
+        Input | None, tells("the station can charge the next robot: always, without this contact.")
     ] = None
     fault: Annotated[Input | None, tells("the station is out of order.")] = None
     at_height: Annotated[
@@ -51,8 +50,7 @@ class Inputs(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
         power; it is a fault if it is lost while current flows."""),
     ] = None
     range_ok: Annotated[
-        Input | None,
-        tells("the robot stands where it can be charged. Without it there is no power."),
+        Input | None, tells("the robot stands where it can be charged. If not, there is no power.")
     ] = None
 
 

@@ -42,16 +42,12 @@ class Settings(ChargerSettings, frozen=True, kw_only=True, forbid_unknown_fields
     ] = msgspec.field(default_factory=list)
     errors: Annotated[Errors, tells("fields that mean an error, whatever the state is.")] = Errors()
     state_words: Annotated[
-        dict[Word, Code],
-        tells("word -> its number in `codes`, for a maker whose states are words."),
+        dict[Word, Code], tells("word -> its number in `codes`, where the states are words.")
     ] = msgspec.field(default_factory=dict)
-    state_path: Annotated[http.Path, tells("the path that GET reads the station's state from.")] = (
-        "/state"
-    )
+    state_path: Annotated[http.Path, tells("the path that GET reads the state from.")] = "/state"
     fields: Annotated[Fields, tells("the fields of that answer.")] = Fields()
     clear_error_path: Annotated[
-        http.Path | None,
-        tells("the path where POST clears the station's error; `null` where there is none."),
+        http.Path | None, tells("the path where POST clears the error; `null` where there is none.")
     ] = "/clear_error"
     start: Annotated[Call | None, tells("switches the power on for the robot on the pad.")] = None
     switches_off_after_s: Annotated[
@@ -61,8 +57,7 @@ class Settings(ChargerSettings, frozen=True, kw_only=True, forbid_unknown_fields
     ] = None
     stop: Annotated[Call | None, tells("switches the power off.")] = None
     range_check: Annotated[
-        Call | None,
-        tells("makes the station check where the robot stands, if it does not do so by itself."),
+        Call | None, tells("makes the station check where the robot stands, if it must be told.")
     ] = None
 
     def off_after(self) -> tuple[float, tuple[str, ...]] | None:

@@ -32,20 +32,17 @@ class Fields(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
 
     state: Annotated[Field, tells("the station's state; `codes` says what it means.")] = "state"
     error_text: Annotated[
-        Field,
-        tells("the station's own text for an error: any text means an error, whatever `state` is."),
+        Field, tells("the station's text for an error: any text means one, in any state.")
     ] = "error_msg"
     error_texts: Annotated[
         dict[Word, TextMeans],
         tells("""text -> the side of the error, `station` or `robot`; or `none` for a text that
         means no error (`OK`). For other texts `codes` gives the side, if it can."""),
-    ] = msgspec.field(default_factory=dict)
+    ] = {}
     receiver_id: Annotated[
         Field | None, tells('the id of the receiver that it sees; null or "" when it sees none.')
     ] = None
-    in_range: Annotated[Flag | None, tells("whether the robot stands where it can be charged.")] = (
-        None
-    )
+    in_range: Annotated[Flag | None, tells("the robot stands where it can be charged.")] = None
     range_ok: Annotated[
         Flag | None,
         tells("""whether the robot stands where it can be charged, if the station says so all the
@@ -59,12 +56,10 @@ class Fields(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     volts: Annotated[Number | None, tells("the voltage at the battery.")] = None
     amps: Annotated[Number | None, tells("the current into the battery.")] = None
     battery_percent: Annotated[Number | None, tells("the battery's charge, 0 to 100.")] = None
-    time_to_full_s: Annotated[Number | None, tells("the time until the battery is full (s).")] = (
-        None
-    )
+    time_to_full_s: Annotated[Number | None, tells("the time until it is full (s).")] = None
     temperatures: Annotated[
         dict[Name, Number], tells("name -> a temperature (°C), shown in status and diagnostics.")
-    ] = msgspec.field(default_factory=dict)
+    ] = {}
 
     def code(self, answer: Answer, words: Mapping[str, int]) -> int | str:
         """The maker's number for its state, or its word if `words` does not list it.

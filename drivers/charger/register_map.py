@@ -82,8 +82,7 @@ class Power(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     start: Annotated[Word, tells("the value that lets it charge.")]
     stop: Annotated[Word, tells("the value that does not.")]
     read_back: Annotated[
-        bool,
-        tells("false where the command can only be written; then it is written in every scan."),
+        bool, tells("false where it can only be written; then it is, in every scan.")
     ] = True
 
     def problems(self) -> Problems:
@@ -127,27 +126,21 @@ class ChargerMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
         Codes | None, tells("what the numbers of `state` mean; not needed with `rules`.")
     ] = None
     rules: Annotated[
-        list[Rule],
-        tells("""derive the state from other values; tried before `codes`. Their places are names of
-        `values`."""),
-    ] = msgspec.field(default_factory=list)
+        list[Rule], tells("derive the state from other `values`; tried before `codes`.")
+    ] = []
     temperatures: Annotated[
         dict[Name, Name],
         tells("name -> the value that is this temperature (°C), shown in status and diagnostics."),
-    ] = msgspec.field(default_factory=dict)
-    errors: Annotated[
-        Errors,
-        tells("""values that mean an error, whatever the state is. Their places are names of
-        `values`."""),
-    ] = Errors()
+    ] = {}
+    errors: Annotated[Errors, tells("those of `values` that mean an error in any state.")] = (
+        Errors()
+    )
     power: Annotated[
-        Power | None,
-        tells("the command that lets it charge; without it the station is only observed."),
+        Power | None, tells("lets it charge; without it the station is only observed.")
     ] = None
     clear_error: Annotated[Order | None, tells("the command that clears its error.")] = None
     range_check: Annotated[
-        Order | None,
-        tells("the command that makes it check where the robot stands, if it does not by itself."),
+        Order | None, tells("makes it check where the robot stands, if it must be told.")
     ] = None
 
     def problems(self) -> Problems:

@@ -69,7 +69,7 @@ class Rule(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
     means: Annotated[str, tells("the state, by the name of a list of `codes`.")]
     when: Annotated[
         dict[Name, Test], tells("place -> the test of its value; without it the rule always holds.")
-    ] = msgspec.field(default_factory=dict)
+    ] = {}
     text: Annotated[Name | None, tells("the error's text, if `means` is an error.")] = None
 
     def problems(self) -> Problems:
@@ -85,13 +85,10 @@ class ErrorNumber(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
 
     at: Annotated[Name, tells("its place.")]
     well: Annotated[tuple[int, ...], tells("the numbers that mean no error.")] = (0,)
-    station: Annotated[dict[int, Name], tells("number -> text, for faults of the station.")] = (
-        msgspec.field(default_factory=dict)
-    )
+    station: Annotated[dict[int, Name], tells("number -> text, for faults of the station.")] = {}
     robot: Annotated[
-        dict[int, Name],
-        tells("number -> text, for faults of the robot, its receiver and its position."),
-    ] = msgspec.field(default_factory=dict)
+        dict[int, Name], tells("number -> text, for faults of the robot, its receiver or place.")
+    ] = {}
 
     def problems(self) -> Problems:
         """A number with two meanings."""
@@ -118,13 +115,11 @@ class ErrorBits(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
     at: Annotated[Name, tells("its place.")]
     ignore: Annotated[list[Bit], tells("bits that mean no error.")] = []
     station: Annotated[
-        dict[Bit, Name],
-        tells("bit (0 is the least significant) -> text, for faults of the station."),
-    ] = msgspec.field(default_factory=dict)
+        dict[Bit, Name], tells("bit (0: least significant) -> text, for faults of the station.")
+    ] = {}
     robot: Annotated[
-        dict[Bit, Name],
-        tells("bit -> text, for faults of the robot, its receiver and its position."),
-    ] = msgspec.field(default_factory=dict)
+        dict[Bit, Name], tells("bit -> text, for faults of the robot, its receiver or place.")
+    ] = {}
 
     def problems(self) -> Problems:
         """A bit with two meanings."""
@@ -146,13 +141,11 @@ class Errors(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     """Errors of the station or of the robot on it, whatever the state is."""
 
     station: Annotated[
-        dict[Name, Name],
-        tells("place -> text; a value other than 0 means that the station has this fault."),
-    ] = msgspec.field(default_factory=dict)
+        dict[Name, Name], tells("place -> text: a value other than 0 is this fault of the station.")
+    ] = {}
     robot: Annotated[
-        dict[Name, Name],
-        tells("place -> text, for faults of the robot, its receiver and its position."),
-    ] = msgspec.field(default_factory=dict)
+        dict[Name, Name], tells("place -> text, for faults of the robot, its receiver or place.")
+    ] = {}
     codes: Annotated[list[ErrorNumber], tells("errors as one number each.")] = []
     bits: Annotated[list[ErrorBits], tells("errors as the bits of a flag byte or word.")] = []
 

@@ -21,20 +21,15 @@ class Codes(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     """What the maker's state numbers mean. An unlisted number is an error and is shown."""
 
     idle: Annotated[
-        list[Code],
-        msgspec.Meta(min_length=1),
-        tells("nothing is on the pad, and a robot may come."),
+        list[Code], msgspec.Meta(min_length=1), tells("nothing is on the pad: a robot may come.")
     ]
     charging: Annotated[list[Code], msgspec.Meta(min_length=1), tells("current flows.")]
     handshake: Annotated[list[Code], tells("a robot is being recognised, no current yet.")] = []
     stopping: Annotated[list[Code], tells("current still flows, ramping down.")] = []
-    released: Annotated[
-        list[Code], tells("disconnected, and not ready for another robot yet.")
-    ] = []
+    released: Annotated[list[Code], tells("disconnected, not ready for another robot yet.")] = []
     error: Annotated[
         list[Code],
-        tells("""out of service, manual operation too; the station's own, if `robot_error` has the
-        others."""),
+        tells("out of service, manual too; the station's own, if `robot_error` has others."),
     ] = []
     station_error: Annotated[
         list[Code],

@@ -35,17 +35,10 @@ CUT_MUST_READ: Final = {
 class Inputs(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """The contacts that are read. With `feedback: estimated` a limit contact may be missing."""
 
-    opened: Annotated[
-        Input | None,
-        tells("the door is fully open: its limit contact at that end."),
-    ] = None
-    closed: Annotated[
-        Input | None,
-        tells("the door is closed: its limit contact at that end."),
-    ] = None
+    opened: Annotated[Input | None, tells("the door is fully open, by its limit contact.")] = None
+    closed: Annotated[Input | None, tells("the door is closed, by its limit contact.")] = None
     obstruction: Annotated[
-        Input | None,
-        tells("somebody is in the doorway; after CLOSE the hold lasts until the doorway is clear."),
+        Input | None, tells("somebody is in the doorway: a hold lasts until it is clear.")
     ] = None
     fire: Annotated[Input | None, tells("the fire alarm; `on_fire` says what it does.")] = None
 

@@ -31,8 +31,7 @@ class Inputs(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     opened: Annotated[Flag | None, tells("the door is fully open.")] = None
     closed: Annotated[Flag | None, tells("the door is closed.")] = None
     obstruction: Annotated[
-        Flag | None,
-        tells("somebody is in the doorway; after CLOSE the hold lasts until the doorway is clear."),
+        Flag | None, tells("somebody is in the doorway: a hold lasts until it is clear.")
     ] = None
     fire: Annotated[Flag | None, tells("the fire alarm; `on_fire` says what it does.")] = None
 
@@ -45,9 +44,7 @@ class Settings(DoorSettings, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     hold: Annotated[Call, tells("switches on the relay that holds the door open.")]
     release: Annotated[Call, tells("switches it off, so that the door closes by its own rules.")]
     held: Annotated[
-        Flag | None,
-        tells("""the field that says that the relay is on; without it nothing proves that it
-        is off."""),
+        Flag | None, tells("says that the relay is on; without it nothing proves it off.")
     ] = None
     switches_off_after_s: Annotated[
         Timeout | None,

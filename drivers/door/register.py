@@ -31,16 +31,12 @@ class Settings(DoorSettings, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     profile: Annotated[
         Name | None, tells("the name of a file in drivers/profiles/ that holds the map.")
     ] = None
-    map: Annotated[
-        DoorMap | None, tells("the register map, written here instead of a profile.")
-    ] = None
+    map: Annotated[DoorMap | None, tells("the map, written here instead of a profile.")] = None
     changes: Annotated[
         Parts | None, tells("the parts of the profile's map that differ at this door.")
     ] = None
     base_address: Annotated[
-        Word,
-        tells("""added to every address of the map, for a gateway with several operators behind one
-        unit id."""),
+        Word, tells("added to every address, for several operators behind one unit id.")
     ] = 0
 
     def problems(self) -> Problems:

@@ -17,20 +17,14 @@ class Status(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     """Where the door is, as one number; an unlisted number is a fault."""
 
     at: Annotated[Place, tells("`input register N` or `holding register N`.")]
-    open: Annotated[
-        list[Word], msgspec.Meta(min_length=1), tells("the numbers of a fully open door.")
-    ]
-    closed: Annotated[
-        list[Word], msgspec.Meta(min_length=1), tells("the numbers of a closed door.")
-    ]
+    open: Annotated[list[Word], msgspec.Meta(min_length=1), tells("those of a fully open door.")]
+    closed: Annotated[list[Word], msgspec.Meta(min_length=1), tells("those of a closed door.")]
     moving: Annotated[
         list[Word],
         msgspec.Meta(min_length=1),
-        tells("the numbers of a door that is between its end positions and has no fault."),
+        tells("those of a door between its ends, without a fault."),
     ]
-    faults: Annotated[dict[Word, Name], tells("number -> what is wrong.")] = msgspec.field(
-        default_factory=dict
-    )
+    faults: Annotated[dict[Word, Name], tells("number -> what is wrong.")] = {}
 
     def problems(self) -> Problems:
         """A place that is not a register; a number with two meanings."""
@@ -72,9 +66,8 @@ class Errors(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
 
     at: Annotated[Place, tells("`input register N` or `holding register N`.")]
     bits: Annotated[
-        dict[Bit, Name],
-        tells("bit (0: least significant) -> fault; an unlisted bit is shown by its number."),
-    ] = msgspec.field(default_factory=dict)
+        dict[Bit, Name], tells("bit (0: least significant) -> fault; others are shown by number.")
+    ] = {}
 
     def problems(self) -> Problems:
         """A place that is not a register."""
@@ -124,8 +117,7 @@ class Parts(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     position: Annotated[Position | None, tells("how far it is open.")] = None
     errors: Annotated[Errors | None, tells("the faults that it reports.")] = None
     obstruction: Annotated[
-        Flag | None,
-        tells("somebody is in the doorway; after CLOSE the hold lasts until the doorway is clear."),
+        Flag | None, tells("somebody is in the doorway: a hold lasts until it is clear.")
     ] = None
     command: Annotated[Command | None, tells("what holds it open.")] = None
 

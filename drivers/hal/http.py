@@ -75,12 +75,10 @@ class Settings(
     ] = 1.0
     scan_s: Annotated[Period, tells("how often the controller is read.")] = 1.0
     token_file: Annotated[
-        Name | None,
-        tells("a file that holds a bearer token or API key, readable by the daemon alone."),
+        Name | None, tells("a file with a bearer token or API key, which only the daemon may read.")
     ] = None
     token_header: Annotated[
-        Header | None,
-        tells("the header that takes it (`X-API-Key`); `Authorization: Bearer …` when absent."),
+        Header | None, tells("its header (`X-API-Key`); `Authorization: Bearer …` when absent.")
     ] = None
     ca_file: Annotated[
         AbsolutePath | None,

@@ -26,16 +26,13 @@ class Input(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     point: Annotated[
         Point, tells("its address: `BCM4` or `J8:7` on GPIO, `unit 1 discrete input 0` on Modbus.")
     ]
-    active: Annotated[
-        Active, tells("the level at which the signal is asserted (on Modbus `high` is 1).")
-    ]
+    active: Annotated[Active, tells("the level of an asserted signal (`high` is 1 on Modbus).")]
     pull: Annotated[
-        Pull | None,
-        tells("the resistor on a GPIO input; required there, and not allowed on other buses."),
+        Pull | None, tells("the resistor of a GPIO input; required there, and there alone.")
     ] = None
     debounce_s: Annotated[
         DebounceSeconds | None,
-        tells("how long a change must last; the kind's default when absent."),
+        tells("how long a change must last; as the kind has it when absent."),
     ] = None
 
     def wire(self, signal: str, path: tuple[str, ...], debounce_s: float | None) -> "Wire":

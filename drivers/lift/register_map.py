@@ -22,9 +22,8 @@ class Field(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
 
     at: Annotated[Place, tells("`input register N` or `holding register N`.")]
     bits: Annotated[
-        list[Bit],
-        tells("the bits of the number, least significant first; the whole register when absent."),
-    ] = msgspec.field(default_factory=list)
+        list[Bit], tells("the bits, least significant first; the whole register when absent.")
+    ] = []
     valid_when: Annotated[
         Literal["agv_mode"] | None, tells("`agv_mode` if it is valid only while AGV mode is on.")
     ] = None
@@ -55,9 +54,7 @@ class FloorField(Field, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Where the car is."""
 
     codes: Annotated[dict[Word, Name], tells("number -> landing; an unlisted number is a fault.")]
-    between_floors: Annotated[list[Word], tells("the numbers for a car between floors.")] = (
-        msgspec.field(default_factory=list)
-    )
+    between_floors: Annotated[list[Word], tells("the numbers for a car between floors.")] = []
 
     def problems(self) -> Problems:
         """What `fits` finds; a number with two meanings."""
@@ -125,12 +122,8 @@ class Flag(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
     at: Annotated[
         Place, tells("`input register N`, `holding register N`, `coil N` or `discrete input N`.")
     ]
-    bit: Annotated[Bit | None, tells("its number in a register; 0 is the least significant.")] = (
-        None
-    )
-    active: Annotated[
-        Literal["high", "low"], tells("the level at which it is asserted; `high` is 1.")
-    ]
+    bit: Annotated[Bit | None, tells("its number; 0 is the least significant.")] = None
+    active: Annotated[Literal["high", "low"], tells("the asserted level; `high` is 1.")]
     valid_when: Annotated[
         Literal["agv_mode"] | None, tells("`agv_mode` if it is valid only while AGV mode is on.")
     ] = None
@@ -202,7 +195,7 @@ class Commands(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     ] = None
     calls: Annotated[
         dict[Name, Command], tells("landing -> its command. Give either `calls` or `call`.")
-    ] = msgspec.field(default_factory=dict)
+    ] = {}
     call: Annotated[CallCommand | None, tells("calls as numbers in one register.")] = None
     read_back: Annotated[
         bool,
@@ -266,30 +259,19 @@ class LiftMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=T
         ServiceField | None, tells("the lift's service state; it may include hazards and AGV mode.")
     ] = None
     agv_mode: Annotated[
-        Flag | None, tells("the controller confirms AGV mode; may be a state of `service` instead.")
+        Flag | None, tells("the controller confirms AGV mode; or `service` does.")
     ] = None
     fire_alarm: Annotated[
-        Flag | None,
-        tells("the building's fire alarm; shown as MODE_FIRE, latched with `fire_reset: manual`."),
+        Flag | None, tells("the fire alarm; MODE_FIRE, latched with `fire_reset: manual`.")
     ] = None
-    code_blue: Annotated[
-        Flag | None, tells("the hospital's code blue; shown as MODE_EMERGENCY.")
-    ] = None
-    earthquake: Annotated[Flag | None, tells("an earthquake sensor; shown as MODE_EMERGENCY.")] = (
-        None
-    )
-    emergency: Annotated[
-        Flag | None, tells("the emergency stop or call in the car; shown as MODE_EMERGENCY.")
-    ] = None
-    out_of_service: Annotated[
-        Flag | None, tells("the lift is switched off or out of order; shown as MODE_OFFLINE.")
-    ] = None
+    code_blue: Annotated[Flag | None, tells("the hospital's code blue; MODE_EMERGENCY.")] = None
+    earthquake: Annotated[Flag | None, tells("an earthquake sensor; MODE_EMERGENCY.")] = None
+    emergency: Annotated[Flag | None, tells("the car's emergency stop; MODE_EMERGENCY.")] = None
+    out_of_service: Annotated[Flag | None, tells("it is off or out of order; MODE_OFFLINE.")] = None
     manual_mode: Annotated[
-        Flag | None, tells("inspection or manual drive, by a key switch; shown as MODE_OFFLINE.")
+        Flag | None, tells("inspection or manual drive (key switch); MODE_OFFLINE.")
     ] = None
-    overload: Annotated[Flag | None, tells("the car is too heavy; this only delays the ride.")] = (
-        None
-    )
+    overload: Annotated[Flag | None, tells("the car is too heavy; delays the ride.")] = None
     commands: Annotated[Commands, tells("the commands to the lift.")]
 
     def parts(self) -> dict[str, Number | Flag]:

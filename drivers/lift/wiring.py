@@ -40,8 +40,7 @@ class ParityInput(LiftInput, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     """A parity line, which reveals a broken line of the code."""
 
     total: Annotated[
-        Literal["even", "odd"],
-        tells("whether the number of asserted lines, this one included, is even or odd."),
+        Literal["even", "odd"], tells("what the number of asserted lines is, with this one.")
     ]
 
 
@@ -93,31 +92,24 @@ class Inputs(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     """
 
     fire_alarm: Annotated[
-        LiftInput | None,
-        tells("the building's fire alarm; shown as MODE_FIRE, latched with `fire_reset: manual`."),
+        LiftInput | None, tells("the fire alarm; MODE_FIRE, latched with `fire_reset: manual`.")
     ] = None
-    code_blue: Annotated[
-        LiftInput | None, tells("the hospital's code blue; shown as MODE_EMERGENCY.")
-    ] = None
-    earthquake: Annotated[
-        LiftInput | None, tells("an earthquake sensor; shown as MODE_EMERGENCY.")
-    ] = None
-    emergency: Annotated[
-        LiftInput | None, tells("the emergency stop or call in the car; shown as MODE_EMERGENCY.")
-    ] = None
+    code_blue: Annotated[LiftInput | None, tells("the hospital's code blue; MODE_EMERGENCY.")] = (
+        None
+    )
+    earthquake: Annotated[LiftInput | None, tells("an earthquake sensor; MODE_EMERGENCY.")] = None
+    emergency: Annotated[LiftInput | None, tells("the car's emergency stop; MODE_EMERGENCY.")] = (
+        None
+    )
     out_of_service: Annotated[
-        LiftInput | None, tells("the lift is switched off or out of order; shown as MODE_OFFLINE.")
+        LiftInput | None, tells("it is off or out of order; MODE_OFFLINE.")
     ] = None
     manual_mode: Annotated[
-        LiftInput | None,
-        tells("inspection or manual drive, by a key switch; shown as MODE_OFFLINE."),
+        LiftInput | None, tells("inspection or manual drive (key switch); MODE_OFFLINE.")
     ] = None
-    overload: Annotated[
-        LiftInput | None, tells("the car is too heavy; this only delays the ride.")
-    ] = None
+    overload: Annotated[LiftInput | None, tells("the car is too heavy; delays the ride.")] = None
     agv_mode: Annotated[
-        LiftInput | None,
-        tells("the controller confirms AGV mode; may be a state of `service` instead."),
+        LiftInput | None, tells("the controller confirms AGV mode; or `service` does.")
     ] = None
     service: Annotated[ServiceCode | None, tells("the lift's service state as a code.")] = None
     door: Annotated[DoorInput | None, tells("the door's only contact.")] = None
@@ -152,24 +144,15 @@ class FloorCode(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
         Literal["binary", "gray", "bcd", "one_hot"],
         tells("how the lines show the landing; `one_hot` is one line for each."),
     ]
-    bits: Annotated[
-        list[LiftInput], tells("the lines that show a number, least significant first.")
-    ] = msgspec.field(default_factory=list)
-    codes: Annotated[dict[Number, Name], tells("number -> landing.")] = msgspec.field(
-        default_factory=dict
-    )
-    parity: Annotated[ParityInput | None, tells("a parity line, which reveals a broken line.")] = (
-        None
-    )
+    bits: Annotated[list[LiftInput], tells("the number's lines, least significant first.")] = []
+    codes: Annotated[dict[Number, Name], tells("number -> landing.")] = {}
+    parity: Annotated[ParityInput | None, tells("a line that reveals a broken one.")] = None
     lines: Annotated[
         dict[Name, LiftInput],
-        tells("""with `one_hot`, landing -> its line; with no line asserted the car is between
-        floors."""),
-    ] = msgspec.field(default_factory=dict)
+        tells("with `one_hot`, landing -> its line; between floors none is asserted."),
+    ] = {}
     between_floors: Annotated[
-        list[Number],
-        tells("""the numbers for a car between floors. A number neither here nor in `codes` is a
-        fault."""),
+        list[Number], tells("the numbers for a car between floors; others unlisted are a fault.")
     ] = msgspec.field(default_factory=lambda: [0])
 
     def inputs(self) -> Iterator[tuple[str, tuple[str, ...], LiftInput]]:

@@ -58,8 +58,7 @@ class Durations(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
         out of service."""),
     ] = 30.0
     released_s: Annotated[
-        Released,
-        tells("how long RELEASED is shown at least. States go out at 1 Hz, so 1 s or more."),
+        Released, tells("how long RELEASED is shown at least. States go out at 1 Hz.")
     ] = 2.0
     full_percent: Annotated[
         Percent, tells("the charge at which a robot is released, if the station knows the charge.")
@@ -77,9 +76,7 @@ class Durations(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
 class ChargerSettings(DeviceSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """What every charger has, whatever its driver."""
 
-    limits: Annotated[Durations, tells("durations and counts that differ from the defaults.")] = (
-        Durations()
-    )
+    limits: Annotated[Durations, tells("what differs from the defaults.")] = Durations()
     receivers: Annotated[
         dict[ReceiverId, Name],
         tells("""receiver id -> FLEET/ROBOT, the robot that carries it. With this table only the

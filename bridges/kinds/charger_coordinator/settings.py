@@ -41,7 +41,7 @@ class Station(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=T
     ] = None
     waypoints: Annotated[
         dict[Name, Name], tells("fleet -> what that fleet's graph calls it, where it differs.")
-    ] = msgspec.field(default_factory=dict)
+    ] = {}
 
 
 class RobotSettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -51,9 +51,7 @@ class RobotSettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
     waits_at: Annotated[
         Name, tells("its own waypoint, where it waits for a station and stays when it needs none.")
     ]
-    receivers: Annotated[list[ReceiverId], tells("the ids of its receivers.")] = msgspec.field(
-        default_factory=list
-    )
+    receivers: Annotated[list[ReceiverId], tells("the ids of its receivers.")] = []
     rcu: Annotated[
         Name | None,
         tells("""the name under which the daemon of its own receiver publishes, if it has one: a
@@ -70,7 +68,7 @@ class Fleet(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
         crashes on a name that its graph does not have, so it is sent no other names."""),
     ]
     robots: Annotated[
-        dict[Name, RobotSettings], tells("those that charge here, by the adapter's names.")
+        dict[Name, RobotSettings], tells("those that charge, by the adapter's names.")
     ]
 
 
@@ -87,24 +85,20 @@ class Settings(GraphSettings, frozen=True, kw_only=True, forbid_unknown_fields=T
     near_m: Annotated[
         Near, tells("a robot stands at the nearest waypoint, if that is no farther away than this.")
     ] = 1.0
-    full_percent: Annotated[Full, tells("the charge at which a robot gives up its station.")] = (
-        100.0
-    )
+    full_percent: Annotated[Full, tells("the charge at which a robot leaves its station.")] = 100.0
     again_percent: Annotated[
         Low,
         tells("""below this a robot without a task is charged. One that was charged comes back in
         its task only below this."""),
     ] = 90.0
     leaves_s: Annotated[
-        Timeout,
-        tells("how long a robot may stay on a pad that it no longer needs and another waits for."),
+        Timeout, tells("how long a robot may stay on a pad without need while another waits.")
     ] = 60.0
     schedule: Annotated[
         list[Charging], tells("times of the week at which robots without a task are charged.")
     ] = msgspec.field(default_factory=list)
     timezone: Annotated[
-        Name | None,
-        tells("that of the schedule's times (Asia/Singapore); this machine's when absent."),
+        Name | None, tells("the schedule's (Asia/Singapore); this machine's when absent.")
     ] = None
 
     def on_map(self) -> Iterator[Place]:

@@ -16,30 +16,26 @@ class Durations(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
     """Durations of a door."""
 
     stale_after_s: Annotated[
-        StaleAfter,
-        tells("after so long without a good reading the door is OFFLINE and its hold is off."),
+        StaleAfter, tells("after so long without a good reading: OFFLINE, and the hold is off.")
     ] = 1.0
     close_grace_s: Annotated[
-        Seconds,
-        tells("how long after a CLOSE the hold is released; an OPEN until then cancels it."),
+        Seconds, tells("how long after a CLOSE the hold is released; an OPEN before cancels it.")
     ] = 3.0
     travel_s: Annotated[
-        Timeout,
-        tells("how long the door may be between its ends; after that its state is UNKNOWN."),
+        Timeout, tells("how long the door may be between its ends; then its state is UNKNOWN.")
     ] = 10.0
     open_timeout_s: Annotated[
         Timeout, tells("how long a held door may take to open; after that a fault is shown.")
     ] = 15.0
     hazard_clear_s: Annotated[
-        Seconds,
-        tells("how long a fire alarm or an obstruction must be clear before it counts as over."),
+        Seconds, tells("how long a fire alarm or obstruction must be clear to count as over.")
     ] = 1.0
     open_delay_s: Annotated[
         Seconds | None, tells("with estimated feedback, how long the door takes to open.")
     ] = None
     max_hold_s: Annotated[
         Seconds | None,
-        tells("how long RMF may hold the door; after that a fault is shown, and the hold stays."),
+        tells("how long RMF may hold it; then a fault is shown, and the hold stays."),
     ] = None
     supervisor_lost_s: Annotated[
         Patience | None,
@@ -52,15 +48,13 @@ class Pulse(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     """For a door operator that closes by itself: pulses on the relay while RMF holds the door."""
 
     on_s: Annotated[PulseSeconds, tells("how long each pulse lasts.")]
-    every_s: Annotated[
-        PulseSeconds, tells("the time from the start of one pulse to the start of the next.")
-    ]
+    every_s: Annotated[PulseSeconds, tells("the time from one pulse's start to the next.")]
 
 
 class DoorSettings(DeviceSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """One door, apart from its wiring."""
 
-    limits: Annotated[Durations, tells("durations that differ from the defaults.")] = Durations()
+    limits: Annotated[Durations, tells("what differs from the defaults.")] = Durations()
     feedback: Annotated[
         Literal["sensors", "estimated"],
         tells("""`estimated` if a limit contact is missing; the door's state is then estimated by

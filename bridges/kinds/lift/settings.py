@@ -19,8 +19,7 @@ class Floor(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     """A floor whose landing has another name, or that the car's rear door serves."""
 
     level: Annotated[
-        Name | None,
-        tells("the landing's name in the floor code table; the floor's own name when absent."),
+        Name | None, tells("the landing's name in the floor code; the floor's own when absent.")
     ] = None
     side: Annotated[Side, tells("which of the car's doors opens there.")] = Side.FRONT
 
@@ -34,8 +33,7 @@ class Durations(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
         and its outputs are off."""),
     ] = 1.0
     release_grace_s: Annotated[
-        Seconds,
-        tells("how long AGV mode and the door's hold stay on after END, for the same session."),
+        Seconds, tells("how long AGV mode and the hold stay on after END, for the same session.")
     ] = 3.0
     agv_timeout_s: Annotated[
         Timeout,
@@ -60,9 +58,7 @@ class Durations(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
         Seconds, tells("with one door contact, how long the door takes to its other end position.")
     ] = 5.0
     floor_travel_min_s: Annotated[
-        Seconds,
-        tells("""the least time from one floor to the next. A faster change of the floor code is not
-        believed."""),
+        Seconds, tells("the least time from floor to floor. A faster change is not believed.")
     ] = 0.5
     call_pulse_s: Annotated[
         Seconds | None, tells("how long a call is pulsed; held until arrival when absent.")
@@ -73,13 +69,12 @@ class Durations(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
         and a door command."""),
     ] = 0.3
     min_off_s: Annotated[
-        Seconds,
-        tells("how long a relay stays off at least, which spares it. Off is never delayed."),
+        Seconds, tells("how long a relay stays off at least, to spare it. Off is never delayed.")
     ] = 0.5
     max_cycles_per_min: Annotated[
         int,
         Meta(ge=1, le=600),
-        tells("how often a relay may switch on in a minute; the next time is delayed."),
+        tells("how often a relay may switch on in a minute; then it waits."),
     ] = 20
 
 
@@ -96,9 +91,7 @@ class LiftSettings(DeviceSettings, frozen=True, kw_only=True, forbid_unknown_fie
         tells("""how AGV mode is switched on. `requested`: by an output that is held. `by_call`: by
         a call; it stays on while the call is served and the door is held."""),
     ] = "requested"
-    limits: Annotated[Durations, tells("durations and counts that differ from the defaults.")] = (
-        Durations()
-    )
+    limits: Annotated[Durations, tells("what differs from the defaults.")] = Durations()
     fire_reset: Annotated[
         Literal["auto", "manual"],
         tells("""RMF may use the lift again when the alarm clears (`auto`), or only after

@@ -39,8 +39,7 @@ class Settings(GraphSettings, frozen=True, kw_only=True, forbid_unknown_fields=T
         can be judged. Otherwise only the stamps of one requester are compared."""),
     ] = False
     max_request_age_s: Annotated[
-        Seconds,
-        tells("with `clock_synchronised`, an older request counts only when it is repeated."),
+        Seconds, tells("with `clock_synchronised`, an older request counts only if repeated.")
     ] = 10.0
 
     def problems(self) -> Iterable[tuple[tuple[str, ...], str]]:

@@ -50,16 +50,14 @@ def tells(text: str) -> Meta:
 class DeviceSettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """What every lift, door and charger has, whatever its driver."""
 
-    bus: Annotated[
-        Name | None, tells("the name of its bus; not needed if the file has only one.")
-    ] = None
+    bus: Annotated[Name | None, tells("its bus; not needed if the file has only one.")] = None
     driver: Annotated[
         Name | None, tells("this device's own driver; the file's `driver` when absent.")
     ] = None
     accept_unsafe: Annotated[
         dict[Name, Name],
-        tells("signal -> why its unsafe wiring is accepted; `check` prints the reason."),
-    ] = msgspec.field(default_factory=dict)
+        tells("signal -> why its unsafe wiring is accepted, as `check` prints it."),
+    ] = {}
 
     def off_after(self) -> tuple[float, tuple[str, ...]] | None:
         """How long (s) without a command until its outputs go off by themselves, and the path of the
@@ -76,7 +74,7 @@ class GraphSettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
 
     quiet_start_s: Annotated[
         QuietStart,
-        tells("how long it only listens after its start, so that a restart interrupts nothing."),
+        tells("how long it only listens at first, so that a restart interrupts nothing."),
     ] = 3.0
 
 

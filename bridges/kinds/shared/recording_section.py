@@ -22,9 +22,7 @@ class Recording(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
         something goes wrong; `continuous` makes files of everything, the oldest of which go;
         `nothing` keeps nothing."""),
     ] = "ring"
-    ring_mb: Annotated[
-        Megabytes, tells("the size of the ring. 1 MB is 10 minutes or more of a lift.")
-    ] = 1.0
+    ring_mb: Annotated[Megabytes, tells("its size. 1 MB is 10 minutes or more of a lift.")] = 1.0
     files: Annotated[Files, tells("how many files of this daemon the recorder keeps.")] = 40
     files_mb: Annotated[Space, tells("how large these files may be together.")] = 100.0
     waiting_s: Annotated[

@@ -31,8 +31,7 @@ class ZenohTls(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
         AbsolutePath | None, tells("the daemon's own, if the router asks for one (mutual TLS).")
     ] = None
     private_key: Annotated[
-        AbsolutePath | None,
-        tells("the key of `certificate`. Only the daemon's user may read its file."),
+        AbsolutePath | None, tells("the certificate's key. Only the daemon's user may read it.")
     ] = None
 
     def problems(self) -> Iterable[tuple[tuple[str, ...], str]]:
@@ -106,15 +105,10 @@ class Rmf(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
         has done so. Not for `dds` and `zenoh`. If `auto` does not find the file, it logs that."""),
     ] = None
     diagnostics: Annotated[
-        bool,
-        tells("publish the health of the daemon and its devices each second on `/diagnostics`."),
+        bool, tells("publish the health of daemon and devices each second on `/diagnostics`.")
     ] = True
-    topics: Annotated[
-        dict[Name, Name], tells("RMF's topic name -> the name that the site uses.")
-    ] = msgspec.field(default_factory=dict)
-    zenoh: Annotated[Zenoh | None, tells("routers, keys and credentials of transport `zenoh`.")] = (
-        None
-    )
+    topics: Annotated[dict[Name, Name], tells("RMF's name of a topic -> the site's.")] = {}
+    zenoh: Annotated[Zenoh | None, tells("routers, keys and certificates of `zenoh`.")] = None
     release: Annotated[
         Literal["auto", "jazzy", "kilted"],
         tells("""of which release RMF's messages are: `jazzy` (Humble, Iron and Jazzy) or `kilted`

@@ -35,9 +35,7 @@ class Slcan(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
 
     port: Annotated[Name, tells("its path; one in /dev/serial/by-id stays the same.")]
     bitrate: Annotated[
-        int,
-        msgspec.Meta(ge=10_000, le=1_000_000, extra={"unit": "bit/s"}),
-        tells("the bitrate of the CAN bus."),
+        int, msgspec.Meta(ge=10_000, le=1_000_000, extra={"unit": "bit/s"}), tells("the CAN bus's.")
     ]
     baudrate: Annotated[
         int,
@@ -65,9 +63,7 @@ class Settings(
     timeout_s: Annotated[
         Timeout, tells("how long a reply, or an adapter that takes a frame, may take.")
     ] = 0.2
-    scan_s: Annotated[
-        Period, tells("how often the devices are read and their frames are sent.")
-    ] = 0.2
+    scan_s: Annotated[Period, tells("how often devices are read and frames sent.")] = 0.2
 
     def problems(self) -> Iterable[tuple[tuple[str, ...], str]]:
         """Problems that involve more than one field."""

@@ -39,9 +39,7 @@ class Serial(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     baudrate: Annotated[int, msgspec.Meta(ge=300, le=1_000_000), tells("bits a second.")]
     parity: Annotated[Literal["none", "even", "odd"], tells("the parity bit of each character.")]
     stopbits: Annotated[Literal[1, 2], tells("stop bits of each character.")]
-    ignore_echo: Annotated[bool, tells("drop the echo of an adapter that hears what it sends.")] = (
-        False
-    )
+    ignore_echo: Annotated[bool, tells("for an adapter that hears what it sends.")] = False
 
     def problems(self) -> Iterable[tuple[tuple[str, ...], str]]:
         """A relative path; a rate that no unit has."""

@@ -31,15 +31,15 @@ class Settings(
         int, msgspec.Meta(ge=0, le=5), tells("how many more tries a request gets after the first.")
     ] = 1
     scan_s: Annotated[Period, tells("how often every input is read.")] = 0.1
-    module_watchdog: Annotated[
-        Watchdog | None, tells("the modules' own watchdog for their outputs.")
-    ] = None
+    module_watchdog: Annotated[Watchdog | None, tells("the modules' own, for their outputs.")] = (
+        None
+    )
     without_watchdog: Annotated[
         dict[Unit, Name],
         tells("""unit -> why its outputs may keep their value when the daemon's machine or the
         network dies, or how the unit drops them (`its web page: all off after 5 s without a
         master`)."""),
-    ] = msgspec.field(default_factory=dict)
+    ] = {}
 
     def problems(self) -> Iterable[tuple[tuple[str, ...], str]]:
         """Problems that involve more than one field."""

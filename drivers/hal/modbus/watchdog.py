@@ -48,9 +48,7 @@ class Shows(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     at: Annotated[
         Place, tells("`holding register N`, `input register N`, `coil N` or `discrete input N`.")
     ]
-    values: Annotated[
-        list[Word], msgspec.Meta(min_length=1), tells("the values, any of which counts.")
-    ]
+    values: Annotated[list[Word], msgspec.Meta(min_length=1), tells("any of these counts.")]
 
     def problems(self) -> Problems:
         """An invalid place."""
@@ -61,22 +59,14 @@ class Habits(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     """How a make's watchdog is used."""
 
     time_s: Annotated[Period, tells("the time that `arm` gives the module.")]
-    arm: Annotated[
-        list[Write], msgspec.Meta(min_length=1), tells("the writes that start it, in order.")
-    ]
+    arm: Annotated[list[Write], msgspec.Meta(min_length=1), tells("the writes that start it.")]
     armed: Annotated[
-        list[Shows],
-        msgspec.Meta(min_length=1),
-        tells("places that all read like this while it is armed."),
+        list[Shows], msgspec.Meta(min_length=1), tells("places that all read so while it is armed.")
     ]
     refresh: Annotated[Refresh, tells("what keeps it from tripping.")]
     refresh_s: Annotated[Period, tells("how often that is done; at most half of `time_s`.")]
-    tripped: Annotated[list[Shows], tells("places of which any reads like this after a trip.")] = (
-        msgspec.field(default_factory=list)
-    )
-    rearm: Annotated[list[Write], tells("the writes that end a trip, before `arm`.")] = (
-        msgspec.field(default_factory=list)
-    )
+    tripped: Annotated[list[Shows], tells("places of which any reads like this after a trip.")] = []
+    rearm: Annotated[list[Write], tells("the writes that end a trip, before `arm`.")] = []
 
     def problems(self) -> Problems:
         """A refresh that comes too late."""
@@ -91,12 +81,8 @@ class Watchdog(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     """The modules' own watchdogs."""
 
     units: Annotated[list[Unit], msgspec.Meta(min_length=1), tells("the units that have one.")]
-    profile: Annotated[
-        Name | None, tells("a file of drivers/profiles/ that says how it is used.")
-    ] = None
-    habits: Annotated[
-        Habits | None, tells("how it is used, written here instead of a profile.")
-    ] = None
+    profile: Annotated[Name | None, tells("a file of drivers/profiles/ with its use.")] = None
+    habits: Annotated[Habits | None, tells("its use, written here instead of a profile.")] = None
 
     def problems(self) -> Problems:
         """Neither or both of profile and habits; a profile with problems."""
