@@ -1,29 +1,33 @@
 """The charger's decision core: who has the station, whether it may energise, and what RMF is told.
 
-1. The states are IDLE → ASSIGNED → CHARGING → RELEASED → IDLE, and ERROR from any of them. A request
-   leads to ASSIGNED only; every other state comes from the station's readings. CHARGING lasts as long
-   as current flows, also while it ramps down. In RELEASED the station is disconnected from its robot,
-   and the pad is not clear yet.
-2. A request is granted while the state is IDLE. Its repeats change nothing, and do not start it again
-   once it is over. Other requests are refused until the station is IDLE. There is one exception: the
-   robot on the pad, if the station can tell which robot that is (`pad.py`).
-3. `start_timeout` counts from the grant. A request that has not charged by then ends, through RELEASED
-   to IDLE. The reason is shown as a fault, as RMF's error message is blank unless the state is ERROR.
-4. A cancel ends the request that it names and no other. If current flows, the power is switched off,
-   and the state stays CHARGING until the station has stopped. A full battery ends a request likewise.
-5. The station is energised only for the robot that it is assigned to, once that robot is seen on the
-   pad and in range, and while a pad that moves is at its height. Another robot gets no power: the state
-   is ERROR with its name, and the request goes on waiting.
-6. At a fault the power is switched off before the fault is reported. It comes back only with a new
-   request. A station that is at fault, or that goes on charging when told to stop, is out of service
-   (PROTECTION): the state is ERROR until its errors have been cleared and a good reading follows. A
-   fault of the robot does not take the station out of service.
-7. Failed polls say nothing about the charge. After `misses` of them the state is ERROR, and robot and
-   request stay. Only a good reading ends a request or frees a station. An operator can do so too, once
-   the station must have switched off by itself (`peer_internal_timeout_s`).
-8. If a charge is under way when the daemon starts, or when it reaches the station again, it is shown
-   and not stopped. The next request gets that charge only if its robot is seen on the pad.
-9. Errors are cleared when an operator says so, or at most `clear_errors_per_h` times an hour.
+CHARGER-1. The states are IDLE → ASSIGNED → CHARGING → RELEASED → IDLE, and ERROR from any of them. A
+   request leads to ASSIGNED only; every other state comes from the station's readings. CHARGING lasts
+   as long as current flows, also while it ramps down. In RELEASED the station is disconnected from its
+   robot, and the pad is not clear yet.
+CHARGER-2. A request is granted while the state is IDLE. Its repeats change nothing, and do not start it
+   again once it is over. Other requests are refused until the station is IDLE. There is one exception:
+   the robot on the pad, if the station can tell which robot that is (`pad.py`).
+CHARGER-3. `start_timeout` counts from the grant. A request that has not charged by then ends, through
+   RELEASED to IDLE. The reason is shown as a fault, as RMF's error message is blank unless the state is
+   ERROR.
+CHARGER-4. A cancel ends the request that it names and no other. If current flows, the power is switched
+   off, and the state stays CHARGING until the station has stopped. A full battery ends a request
+   likewise.
+CHARGER-5. The station is energised only for the robot that it is assigned to, once that robot is seen
+   on the pad and in range, and while a pad that moves is at its height. Another robot gets no power:
+   the state is ERROR with its name, and the request goes on waiting.
+CHARGER-6. At a fault the power is switched off before the fault is reported. It comes back only with a
+   new request. A station that is at fault, or that goes on charging when told to stop, is out of
+   service (PROTECTION): the state is ERROR until its errors have been cleared and a good reading
+   follows. A fault of the robot does not take the station out of service.
+CHARGER-7. Failed polls say nothing about the charge. After `misses` of them the state is ERROR, and
+   robot and request stay. Only a good reading ends a request or frees a station. An operator can do so
+   too, once the station must have switched off by itself (`peer_internal_timeout_s`).
+CHARGER-8. If a charge is under way when the daemon starts, or when it reaches the station again, it is
+   shown and not stopped. The next request gets that charge only if its robot is seen on the pad.
+CHARGER-9. Errors are cleared when an operator says so, or at most `clear_errors_per_h` times an hour.
+CHARGER-10. While another node publishes states under this charger's name, the power is off, no error is
+   cleared, and the state is ERROR.
 """
 
 from msgspec.structs import replace

@@ -3,12 +3,15 @@
 RMF's fleet adapter starts a robot's ChargeBattery again when the waypoint or the mode of its charging
 assignment changes (rmf_ros2 9dedd0f, ChargeBattery.cpp, _consider_restart). That moves a robot, but
 only while its ChargeBattery runs: as a task, or as `finishing_request: charge`. Rules:
-1. A robot that is expected at one station and comes to another, or does not leave it for LEAVES_S, is
-   told to wait, and TOLD_S later to charge at its own. Not more than twice for one request.
-2. A robot that has no station, and stands on a pad that another waits for, is told to wait again,
-   by the other mode for TOLD_S. This happens `leaves_s` after it came or the station let it go.
-3. Where we may not assign, or the robot is in another task, nothing is told: RMF would not move it.
-4. If it still stands there OBEYS_S later, or cannot be told, a person is alerted.
+COORDINATOR-ASTRAY-1. A robot that is expected at one station and comes to another, or does not leave it
+   for LEAVES_S, is told to wait, and TOLD_S later to charge at its own. Not more than twice for one
+   request.
+COORDINATOR-ASTRAY-2. A robot that has no station, and stands on a pad that another waits for, is told
+   to wait again, by the other mode for TOLD_S. This happens `leaves_s` after it came or the station let
+   it go.
+COORDINATOR-ASTRAY-3. Where we may not assign, or the robot is in another task, nothing is told: RMF
+   would not move it.
+COORDINATOR-ASTRAY-4. If it still stands there OBEYS_S later, or cannot be told, a person is alerted.
 Who stands where is the fleet's word (FleetState's position), or the station's, if it reads receivers.
 """
 

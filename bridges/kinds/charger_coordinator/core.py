@@ -2,17 +2,20 @@
 
 Its inputs are FleetState, ChargerState and the requests of operators. It sends ChargerRequest and
 ChargerCancel, which no part of RMF does. A wish is a robot's need to be charged. Rules:
-1. Who has a wish is in `wishes.py`. An operator's wish lasts until its request is over or the robot is
-   full.
-2. Wishes are served first come, first served, among the suitable stations (`queue.py`). A station has
-   one robot at a time. It is given to another only after its state shows that it has let the first go.
-3. A request is repeated until the station shows it. A station that does not take it within TAKEN_S is
-   passed over for SHUNNED_S, and the wish goes to the end of the queue.
-4. How a request ends, and who is at fault, is read from the stations' states (`stations.py`).
-5. A robot on a pad that is not its own is told to leave it, or a person is (`astray.py`).
-6. A request for one of our robots counts as that robot's, even if another node has made it.
-7. During the quiet start it only listens. Beside another node that publishes charging assignments
-   (RMF's rmf_charging_schedule) it sends none, and asks for the stations that those dedicate.
+COORDINATOR-1. Who has a wish is in `wishes.py`. An operator's wish lasts until its request is over or
+   the robot is full.
+COORDINATOR-2. Wishes are served first come, first served, among the suitable stations (`queue.py`). A
+   station has one robot at a time. It is given to another only after its state shows that it has let
+   the first go.
+COORDINATOR-3. A request is repeated until the station shows it. A station that does not take it within
+   TAKEN_S is passed over for SHUNNED_S, and the wish goes to the end of the queue.
+COORDINATOR-4. How a request ends, and who is at fault, is read from the stations' states
+   (`stations.py`).
+COORDINATOR-5. A robot on a pad that is not its own is told to leave it, or a person is (`astray.py`).
+COORDINATOR-6. A request for one of our robots counts as that robot's, even if another node has made it.
+COORDINATOR-7. During the quiet start it only listens. Beside another node that publishes charging
+   assignments (RMF's rmf_charging_schedule) it sends none, and asks for the stations that those
+   dedicate.
 """
 
 from msgspec.structs import replace

@@ -1,12 +1,12 @@
 """What is sent to stations, fleet adapters and technicians, and what log and status file show.
 
-1. A request is repeated each second until its station shows it. A cancel is repeated each second while
-   the station still shows the request.
-2. Every robot is assigned one place, and no place has two robots: its station (MODE_CHARGE), else the
-   waypoint where it waits (MODE_WAIT). When a place changes, the assignments of all fleets are
-   published, so that a fleet adapter that starts later finds them retained. RMF drives the robot there
-   if it has a charging task (rmf_ros2 9dedd0f, ChargeBattery.cpp, _consider_restart).
-3. Each fault is sent as an Alert once; rmf-web shows it to a person.
+COORDINATOR-REPORT-1. A request is repeated each second until its station shows it. A cancel is repeated
+   each second while the station still shows the request.
+COORDINATOR-REPORT-2. Every robot is assigned one place, and no place has two robots: its station
+   (MODE_CHARGE), else the waypoint where it waits (MODE_WAIT). When a place changes, the assignments of
+   all fleets are published, so that a fleet adapter that starts later finds them retained. RMF drives
+   the robot there if it has a charging task (rmf_ros2 9dedd0f, ChargeBattery.cpp, _consider_restart).
+COORDINATOR-REPORT-3. Each fault is sent as an Alert once; rmf-web shows it to a person.
 """
 
 from collections.abc import Iterator

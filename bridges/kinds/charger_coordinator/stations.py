@@ -1,21 +1,22 @@
 """What the stations' states say of the requests that were made, and of who is at fault.
 
-1. A station shows how a request ends. Released after charging: the wish is fulfilled. Released without
-   charging: the robot did not come. Then a fleet's wish goes to the end of the queue if its robot
-   stands at one of our waypoints. Any other wish is over. If the robot stands at that very station, it
-   has failed there. A station that no longer shows a request, and has not released it, has forgotten
-   it: its daemon was restarted. The wish stays, and the station is asked again (`_forgot`). The power
-   may have been switched off meanwhile: a charge that ends within PROVEN_S of that was cut short.
-2. After an error of the station, the robot gets another station and keeps its place in the queue. If
-   the robot is at fault, or it is unclear which side is, that also counts as a failure of the
-   robot. After its second failure (at a second station if it has one) it is not tried again, and a
-   technician is told.
-3. A failure no longer counts once the robot has been charged for PROVEN_S, or fully. Nor does it once
-   the station where it failed is found faulty: the error names the station, or it ended only after
-   the robot had been gone for PROVEN_S.
-4. If another robot is on the pad, the assigned one keeps the station for its start_timeout. A station
-   that cannot be reached says nothing about the charge. A robot that was charging there keeps it; one
-   that was on its way gets another station after LOST_S.
+COORDINATOR-STATIONS-1. A station shows how a request ends. Released after charging: the wish is
+   fulfilled. Released without charging: the robot did not come. Then a fleet's wish goes to the end of
+   the queue if its robot stands at one of our waypoints. Any other wish is over. If the robot stands at
+   that very station, it has failed there. A station that no longer shows a request, and has not
+   released it, has forgotten it: its daemon was restarted. The wish stays, and the station is asked
+   again (`_forgot`). The power may have been switched off meanwhile: a charge that ends within PROVEN_S
+   of that was cut short.
+COORDINATOR-STATIONS-2. After an error of the station, the robot gets another station and keeps its
+   place in the queue. If the robot is at fault, or it is unclear which side is, that also counts as a
+   failure of the robot. After its second failure (at a second station if it has one) it is not tried
+   again, and a technician is told.
+COORDINATOR-STATIONS-3. A failure no longer counts once the robot has been charged for PROVEN_S, or
+   fully. Nor does it once the station where it failed is found faulty: the error names the station, or
+   it ended only after the robot had been gone for PROVEN_S.
+COORDINATOR-STATIONS-4. If another robot is on the pad, the assigned one keeps the station for its
+   start_timeout. A station that cannot be reached says nothing about the charge. A robot that was
+   charging there keeps it; one that was on its way gets another station after LOST_S.
 """
 
 from typing import Final

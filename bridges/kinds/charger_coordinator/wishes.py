@@ -4,19 +4,21 @@ RMF's fleet adapter shows the mode CHARGING from the first charge on, in every l
 IDLE in none (rmf_ros2 9dedd0f: TaskManager::robot_mode; RobotContext::current_mode, which WaitForCharge
 and DockRobot alone set). The id of a task that RMF's dispatcher gave says that it is no charge. So, of
 a robot that has stood at one of our waypoints for SETTLES_S:
-1. Below `again_percent` it wants to be charged, if it has no task, or shows CHARGING or DOCKING.
-2. Above that, and below `full_percent`, only a task that shows CHARGING or DOCKING is believed. A robot
-   that was charged in that task is not served again. One that was charged, and has not left our
-   waypoints since, may be waiting for traffic on its pad: it is believed after LINGERS_S.
-3. Without a task, it wants to be charged where a schedule says so; after that, not again in the same
-   time before it has worked.
-4. A wish lasts while this is so, and while the robot drives to its station: in the same task, or
-   without one while a station is assigned to it. A task that begins within COMES_S of
-   the call is that drive: RMF's automatic retreat, or its ChargeBattery started again. A dispatched
-   task is not.
-5. RMF moves no robot without a task under `finishing_request: nothing`, until its battery is very low;
-   nor under `park`, except Jazzy's, which drives to the assigned place. Such a robot keeps its place
-   when it is called. After COMES_S it loses the station, and ABSENT_S later it is called again.
+COORDINATOR-WISHES-1. Below `again_percent` it wants to be charged, if it has no task, or shows CHARGING
+   or DOCKING.
+COORDINATOR-WISHES-2. Above that, and below `full_percent`, only a task that shows CHARGING or DOCKING
+   is believed. A robot that was charged in that task is not served again. One that was charged, and has
+   not left our waypoints since, may be waiting for traffic on its pad: it is believed after LINGERS_S.
+COORDINATOR-WISHES-3. Without a task, it wants to be charged where a schedule says so; after that, not
+   again in the same time before it has worked.
+COORDINATOR-WISHES-4. A wish lasts while this is so, and while the robot drives to its station: in the
+   same task, or without one while a station is assigned to it. A task that begins within COMES_S of the
+   call is that drive: RMF's automatic retreat, or its ChargeBattery started again. A dispatched task is
+   not.
+COORDINATOR-WISHES-5. RMF moves no robot without a task under `finishing_request: nothing`, until its
+   battery is very low; nor under `park`, except Jazzy's, which drives to the assigned place. Such a
+   robot keeps its place when it is called. After COMES_S it loses the station, and ABSENT_S later it is
+   called again.
 """
 
 from typing import Final

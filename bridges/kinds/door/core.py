@@ -1,22 +1,24 @@
 """The door's decision core: one pure decision for each event.
 
 Rules:
-- OPEN latches the hold, from any requester and any number of times. CLOSE releases it after
-  `close_grace_s`. An OPEN in that time cancels the CLOSE; a repeated CLOSE does not prolong it. (The
-  reason: RMF's supervisor, restarted while a robot stands in the doorway, first sends a CLOSE.)
-- Nothing ever drives the door shut. Silence never releases the hold: RMF is silent while a robot
-  passes. If the site has set `supervisor_lost_s`, the hold ends when for so long no node has been there
-  that publishes door requests.
-- After the hold has ended, and until the door is seen closed, an obstruction switches it on again.
-- In a fire alarm the site's `on_fire` decides. `open` holds the door open, and no CLOSE releases it.
-  `release` switches the hold off, clears the latch and refuses OPEN. The state is then UNKNOWN: no
-  robot enters a door that is about to close, and RMF's supervisor stops repeating its request.
-- Without a fresh reading the state is OFFLINE and the hold is off. The latch is kept, and the hold
-  comes on again with the first good reading.
-- The state is OPEN only if the contact of the fully open door says so. If both contacts are closed it
-  is UNKNOWN. If neither is, it is MOVING, and UNKNOWN after `travel_s`. If the controller does not say
-  where the door is, it is UNKNOWN.
-- While another node publishes states under this door's name, the state is OFFLINE and the hold is off.
+DOOR-1. OPEN latches the hold, from any requester and any number of times. CLOSE releases it after
+   `close_grace_s`. An OPEN in that time cancels the CLOSE; a repeated CLOSE does not prolong it. (The
+   reason: RMF's supervisor, restarted while a robot stands in the doorway, first sends a CLOSE.)
+DOOR-2. Nothing ever drives the door shut. Silence never releases the hold: RMF is silent while a robot
+   passes. If the site has set `supervisor_lost_s`, the hold ends when for so long no node has been
+   there that publishes door requests.
+DOOR-3. After the hold has ended, and until the door is seen closed, an obstruction switches it on
+   again.
+DOOR-4. In a fire alarm the site's `on_fire` decides. `open` holds the door open, and no CLOSE releases
+   it. `release` switches the hold off, clears the latch and refuses OPEN. The state is then UNKNOWN: no
+   robot enters a door that is about to close, and RMF's supervisor stops repeating its request.
+DOOR-5. Without a fresh reading the state is OFFLINE and the hold is off. The latch is kept, and the
+   hold comes on again with the first good reading.
+DOOR-6. The state is OPEN only if the contact of the fully open door says so. If both contacts are
+   closed it is UNKNOWN. If neither is, it is MOVING, and UNKNOWN after `travel_s`. If the controller
+   does not say where the door is, it is UNKNOWN.
+DOOR-7. While another node publishes states under this door's name, the state is OFFLINE and the hold is
+   off.
 
 A fault only describes; it changes no output. It lasts as long as its cause, so an operator has nothing
 to reset.

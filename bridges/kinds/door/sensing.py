@@ -1,13 +1,15 @@
 """What to believe of a door's inputs: debounce, age, and estimates where no contact is wired.
 
 Rules:
-- A change counts once it has lasted for its signal's debounce. The end of a fire alarm or an
-  obstruction counts once it has lasted for `hazard_clear_s`. Until such an input has settled for the
-  first time, a single reading of the hazard counts.
-- After `stale_after_s` without a reading, what was believed is forgotten: the door may have moved.
-- A missing limit contact is estimated only if the YAML says so, from how long the relay has been on
-  or off. A failed read or write starts that time again.
-- If a controller does not say where the door is (`lost`), that counts at once, without debounce.
+DOOR-SENSING-1. A change counts once it has lasted for its signal's debounce. The end of a fire alarm or
+   an obstruction counts once it has lasted for `hazard_clear_s`. Until such an input has settled for
+   the first time, a single reading of the hazard counts.
+DOOR-SENSING-2. After `stale_after_s` without a reading, what was believed is forgotten: the door may
+   have moved.
+DOOR-SENSING-3. A missing limit contact is estimated only if the YAML says so, from how long the relay
+   has been on or off. A failed read or write starts that time again.
+DOOR-SENSING-4. If a controller does not say where the door is (`lost`), that counts at once, without
+   debounce.
 """
 
 from collections.abc import Iterator

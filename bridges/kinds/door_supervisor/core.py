@@ -3,22 +3,24 @@
 It replaces RMF's own (rmf_ros2, door_supervisor/Node.cpp). Fleet adapters and web users send their
 requests on `adapter_door_requests`; the supervisor sends its own on `door_requests`, as
 "door_supervisor". Rules:
-1. OPEN adds its requester to the holders, or renews its stamp. CLOSE removes it. A stale request
-   (`bridges/kinds/shared/freshness.py`) does neither.
-2. The first holder causes an OPEN to the door's node, and the last one that goes causes a CLOSE.
+DOOR-SUPERVISOR-1. OPEN adds its requester to the holders, or renews its stamp. CLOSE removes it. A
+   stale request (`bridges/kinds/shared/freshness.py`) does neither.
+DOOR-SUPERVISOR-2. The first holder causes an OPEN to the door's node, and the last one that goes causes
+   a CLOSE.
    - The request is repeated when a requester repeats OPEN, and when the door's state contradicts it:
      held, but CLOSED or MOVING; not held, but OPEN or MOVING.
    - For INSIST_S after a holder has come, OPEN is repeated at every state. The first OPEN may have been
      lost, and an earlier CLOSE may be about to close the door.
    - The states OFFLINE and UNKNOWN cause nothing.
-3. Silence ends no hold: a robot in the doorway is silent. After `open_alarm_s` a fault is shown, and
-   the door stays open.
-4. During the quiet start, and while another supervisor publishes, it only listens. After that it sends
-   OPEN for a door with holders at once. It sends CLOSE only when a new state of the door calls for it.
-   A door that was held before the restart, and that is not seen CLOSED, is held from the start unless
-   another supervisor is there: its own node may have died too, with a robot in the doorway.
-5. Two messages are at least GAP_S apart, and a message is repeated unchanged after REPEAT_S at the
-   earliest.
+DOOR-SUPERVISOR-3. Silence ends no hold: a robot in the doorway is silent. After `open_alarm_s` a fault
+   is shown, and the door stays open.
+DOOR-SUPERVISOR-4. During the quiet start, and while another supervisor publishes, it only listens.
+   After that it sends OPEN for a door with holders at once. It sends CLOSE only when a new state of the
+   door calls for it. A door that was held before the restart, and that is not seen CLOSED, is held from
+   the start unless another supervisor is there: its own node may have died too, with a robot in the
+   doorway.
+DOOR-SUPERVISOR-5. Two messages are at least GAP_S apart, and a message is repeated unchanged after
+   REPEAT_S at the earliest.
 The heartbeat (`report.py`) says who holds the doors, and `keep.py` saves that across a restart.
 """
 

@@ -1,11 +1,11 @@
 """The lift's decision core: who holds the lift, what its relays do, and what RMF is told.
 
 Rules, in the order in which they are applied:
-1. While the lift is free, the first request gets a session, unless an obstacle (rule 4) is present.
-   Requests of the same session refresh it; those of other sessions are refused. Only its own END ends
-   a session: no hazard, fault or timeout does. A session in HUMAN mode has no outputs.
-2. END ends the session at once, unless it is older than the session. AGV mode and the door's hold may
-   stay on for `release_grace_s`. During that time only the same session is granted, even in a fire.
+LIFT-1. While the lift is free, the first request gets a session, unless an obstacle (LIFT-4) is
+   present. Requests of the same session refresh it; those of other sessions are refused. Only its own
+   END ends a session: no hazard, fault or timeout does. A session in HUMAN mode has no outputs.
+LIFT-2. END ends the session at once, unless it is older than the session. AGV mode and the door's hold
+   may stay on for `release_grace_s`. During that time only the same session is granted, even in a fire.
    The reason: a supervisor that restarts sends END for a robot that is still inside, and that robot
    must get out. For the same reason (`bridges/kinds/lift/forgotten.py`):
    - An END on `lift_requests` does not end the session of a robot that may be inside while that robot
@@ -14,13 +14,14 @@ Rules, in the order in which they are applied:
      requests and END of the holder's own robot count as well.
    - After an END in mid-ride, as a new fleet adapter sends it, the lift waits longer for that robot:
      until IN_CAR_S after its last word. Nothing is energised after `release_grace_s`.
-3. A request sets the destination and the mode. While the door is held, another destination may have
-   to wait (`bridges/kinds/lift/replayed.py`). `bridges/kinds/lift/drive.py` says what may be energised.
-4. An obstacle switches every output off and never changes the session. Obstacles are: fire (and its
-   latch, if an operator must reset it), code blue, earthquake, emergency, out of service, manual mode,
-   a second node for this lift, inputs that cannot be believed, outputs that cannot be written. A gap
-   in reading or writing shorter than `stale_after_s` is no obstacle. Overload only delays.
-5. RMF is told OPEN when fresh inputs show that the car stands at a known floor with its door open.
+LIFT-3. A request sets the destination and the mode. While the door is held, another destination may
+   have to wait (`bridges/kinds/lift/replayed.py`). `bridges/kinds/lift/drive.py` says what may be
+   energised.
+LIFT-4. An obstacle switches every output off and never changes the session. Obstacles are: fire (and
+   its latch, if an operator must reset it), code blue, earthquake, emergency, out of service, manual
+   mode, a second node for this lift, inputs that cannot be believed, outputs that cannot be written. A
+   gap in reading or writing shorter than `stale_after_s` is no obstacle. Overload only delays.
+LIFT-5. RMF is told OPEN when fresh inputs show that the car stands at a known floor with its door open.
    - Until OPEN has been published at a session's destination, its robot is outside. Then OPEN also
      needs AGV mode and no fault: a robot looks only at session, floor and door, and must not board a
      lift in a fire.

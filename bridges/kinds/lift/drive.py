@@ -1,25 +1,26 @@
 """Which outputs a session needs, from its request and from what the inputs show.
 
 Rules:
-- Without a session no output is switched on. All outputs are off under an obstacle (`core.py`), for a
-  session in HUMAN mode, while RMF is silent and the robot is outside, and while a fault waits for its
-  next try. For `release_grace_s` after END, AGV mode and the door's hold stay on if they were on; the
-  hold ends `dead_time_s` before AGV mode.
-- The order is: AGV mode, then the call to the destination, then, once the car stands there, the door's
-  hold. With `by_call` a call brings AGV mode, so the call comes first, even if the car stands there.
-- A call is given only in AGV mode (except with `by_call`), away from the destination, and without
-  overload. A door command is given only in AGV mode, while the car stands at the destination's
-  landing. The two are never on together, and neither comes on before both have been off for
-  `dead_time_s`.
-- A call is held until the car stands at its destination, or pulsed. It is given again after every
-  interruption, and when the car had arrived but is then seen at another floor. While the floor code
-  is changing no new call is given: the car may just be arriving.
-- AGV mode, the floor and the open door each have a timeout. When it ends, the outputs go off and a
-  fault is shown. Three more tries follow, 10, 30 and 60 s later; then the fault latches. Losing AGV
-  mode during the ride is such a fault too. With `by_call` AGV mode may end between two destinations,
-  while neither a call nor the hold is on. During an overload no timeout runs.
-- Switching off is immediate. Switching on waits until the relay has been off for `min_off_s`, and is
-  limited to `max_cycles_per_min` (`Channel` in `relays.py`).
+LIFT-DRIVE-1. Without a session no output is switched on. All outputs are off under an obstacle
+   (`core.py`), for a session in HUMAN mode, while RMF is silent and the robot is outside, and while a
+   fault waits for its next try. For `release_grace_s` after END, AGV mode and the door's hold stay on
+   if they were on; the hold ends `dead_time_s` before AGV mode.
+LIFT-DRIVE-2. The order is: AGV mode, then the call to the destination, then, once the car stands there,
+   the door's hold. With `by_call` a call brings AGV mode, so the call comes first, even if the car
+   stands there.
+LIFT-DRIVE-3. A call is given only in AGV mode (except with `by_call`), away from the destination, and
+   without overload. A door command is given only in AGV mode, while the car stands at the destination's
+   landing. The two are never on together, and neither comes on before both have been off for
+   `dead_time_s`.
+LIFT-DRIVE-4. A call is held until the car stands at its destination, or pulsed. It is given again after
+   every interruption, and when the car had arrived but is then seen at another floor. While the floor
+   code is changing no new call is given: the car may just be arriving.
+LIFT-DRIVE-5. AGV mode, the floor and the open door each have a timeout. When it ends, the outputs go
+   off and a fault is shown. Three more tries follow, 10, 30 and 60 s later; then the fault latches.
+   Losing AGV mode during the ride is such a fault too. With `by_call` AGV mode may end between two
+   destinations, while neither a call nor the hold is on. During an overload no timeout runs.
+LIFT-DRIVE-6. Switching off is immediate. Switching on waits until the relay has been off for
+   `min_off_s`, and is limited to `max_cycles_per_min` (`Channel` in `relays.py`).
 """
 
 from msgspec.structs import replace

@@ -5,13 +5,13 @@ that was cut off, it hears them all once more and passes each on with a new stam
 lift_supervisor/Node.cpp). Some are of earlier rides: the door would be let go before the last one is
 heard. The robot's own requests on `adapter_lift_requests` are heard here once, when they are sent.
 Rules:
-1. While the door is held, a request for another destination is doubted if the robot's own last request
-   was for the present one. It does not matter if that request came before the robot got the lift: the
-   robot may have been cut off since.
-2. It counts when the robot itself asks for that destination too, or when nothing else has been asked
-   for during LASTS_S.
-3. An END counts as always. A request within the grace resumes the session as it was; then rule 1
-   decides.
+LIFT-REPLAYED-1. While the door is held, a request for another destination is doubted if the robot's own
+   last request was for the present one. It does not matter if that request came before the robot got
+   the lift: the robot may have been cut off since.
+LIFT-REPLAYED-2. It counts when the robot itself asks for that destination too, or when nothing else has
+   been asked for during LASTS_S.
+LIFT-REPLAYED-3. An END counts as always. A request within the grace resumes the session as it was; then
+   LIFT-REPLAYED-1 decides.
 """
 
 from collections.abc import Mapping

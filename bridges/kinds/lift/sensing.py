@@ -1,21 +1,21 @@
 """What to believe of a lift's inputs: debounce, age, and whether they can be true together.
 
 Rules:
-- A change counts once it has lasted for its signal's debounce. The end of a hazard counts once it has
-  lasted for `hazard_clear_s`. No input is believed before every input has settled once, or while any
-  input has kept changing for longer than `RESTLESS_S`. The time that inputs take to settle after the
-  start is no fault.
-- After `stale_after_s` without a reading, what was believed is forgotten: the car may be anywhere.
-  After a shorter gap the values stay, and a debounce that had begun starts again.
-- A floor code is believed only if the car can have reached that floor. It cannot if the code skips
-  floors faster than a car travels, or (with motion lines) changes while the car stands. Then the
-  position is unknown until the code shows the last trusted floor, or one that the car can have
-  reached, or until an operator resets.
-- While the floor code is not valid (`valid_when`) for longer than its debounce, the car may go
-  anywhere unseen. The next floor that the code shows is believed.
-- A door is open when the contact that proves it says so. With only one contact the other end position
-  is estimated from the door's travel time, and marked as an estimate.
-- A car stands when the motion lines say so. Without motion lines it is taken to stand.
+LIFT-SENSING-1. A change counts once it has lasted for its signal's debounce. The end of a hazard counts
+   once it has lasted for `hazard_clear_s`. No input is believed before every input has settled once, or
+   while any input has kept changing for longer than `RESTLESS_S`. The time that inputs take to settle
+   after the start is no fault.
+LIFT-SENSING-2. After `stale_after_s` without a reading, what was believed is forgotten: the car may be
+   anywhere. After a shorter gap the values stay, and a debounce that had begun starts again.
+LIFT-SENSING-3. A floor code is believed only if the car can have reached that floor. It cannot if the
+   code skips floors faster than a car travels, or (with motion lines) changes while the car stands.
+   Then the position is unknown until the code shows the last trusted floor, or one that the car can
+   have reached, or until an operator resets.
+LIFT-SENSING-4. While the floor code is not valid (`valid_when`) for longer than its debounce, the car
+   may go anywhere unseen. The next floor that the code shows is believed.
+LIFT-SENSING-5. A door is open when the contact that proves it says so. With only one contact the other
+   end position is estimated from the door's travel time, and marked as an estimate.
+LIFT-SENSING-6. A car stands when the motion lines say so. Without motion lines it is taken to stand.
 """
 
 from collections.abc import Iterator, Sequence

@@ -4,25 +4,26 @@ It replaces RMF's own (rmf_ros2, lift_supervisor/Node.cpp). Fleet adapters send 
 `adapter_lift_requests`. The supervisor passes on those of one session at a time to the lift's node,
 on `lift_requests`, until the lift's states show that they were obeyed.
 `bridges/kinds/shared/freshness.py` says which requests count. Rules:
-1. Sessions are served in the order of their first requests. A session leaves the queue by END, or
-   after `silent_after_s` without a request. While the lift is silent this time does not run, as
-   adapters repeat their requests only when the lift's states come.
-2. The lift's states say which session has the lift. That session goes before the queue if its robot
-   still requests it. If nobody has requested it for `orphan_after_s`, the supervisor ends it.
-3. One session at a time has its turn. Its request is sent when it is new or has changed. It is
-   repeated when the lift's state does not show what was requested, and when the adapter has repeated
-   it (else the lift's node would take RMF to be silent). It is never sent while the lift shows another
-   session.
-4. A turn ends by END. Usually the holder sends it, wherever the lift is and in any mode. The
-   supervisor sends it for a silent holder that the lift has never accepted, and after `holder_ttl_s`
-   if the site has set that. END is repeated until a later state shows another session, or none. Only
-   then is the next session served.
-5. While the lift is in fire, emergency or offline mode, no robot is sent to it and the queue waits.
-   END is passed on. So is HUMAN mode, which calls no robot to the lift.
-6. During the quiet start, and while another supervisor publishes, it only listens. Then it starts from
-   the lift's states and from the requests it has heard, so a restart ends no ride.
-7. Two messages are at least GAP_S apart, and a message is repeated unchanged after REPEAT_S at the
-   earliest.
+LIFT-SUPERVISOR-1. Sessions are served in the order of their first requests. A session leaves the queue
+   by END, or after `silent_after_s` without a request. While the lift is silent this time does not run,
+   as adapters repeat their requests only when the lift's states come.
+LIFT-SUPERVISOR-2. The lift's states say which session has the lift. That session goes before the queue
+   if its robot still requests it. If nobody has requested it for `orphan_after_s`, the supervisor ends
+   it.
+LIFT-SUPERVISOR-3. One session at a time has its turn. Its request is sent when it is new or has
+   changed. It is repeated when the lift's state does not show what was requested, and when the adapter
+   has repeated it (else the lift's node would take RMF to be silent). It is never sent while the lift
+   shows another session.
+LIFT-SUPERVISOR-4. A turn ends by END. Usually the holder sends it, wherever the lift is and in any
+   mode. The supervisor sends it for a silent holder that the lift has never accepted, and after
+   `holder_ttl_s` if the site has set that. END is repeated until a later state shows another session,
+   or none. Only then is the next session served.
+LIFT-SUPERVISOR-5. While the lift is in fire, emergency or offline mode, no robot is sent to it and the
+   queue waits. END is passed on. So is HUMAN mode, which calls no robot to the lift.
+LIFT-SUPERVISOR-6. During the quiet start, and while another supervisor publishes, it only listens. Then
+   it starts from the lift's states and from the requests it has heard, so a restart ends no ride.
+LIFT-SUPERVISOR-7. Two messages are at least GAP_S apart, and a message is repeated unchanged after
+   REPEAT_S at the earliest.
 """
 
 import math

@@ -2,22 +2,23 @@
 
 A stamp is by the requester's clock, which need not agree with ours. So a stamp is first compared with
 the earlier stamps of the same requester. Rules:
-1. A request counts if it is newer than every earlier request of its requester that counted. An END is
-   compared with earlier ENDs only: an operator may end a robot's session, by another clock.
-2. A retained topic (`adapter_lift_requests`) replays up to 100 old requests of every adapter to each
-   new subscriber, and again when an adapter's network comes back. There an equal stamp is a replay,
-   and a requester's first request counts only if it was sent after our own start. Once a requester
-   has counted, only its own stamps are compared. With `clock_synchronised` every request's age is
-   judged too.
-3. On a topic that is not retained (`adapter_door_requests`) an old request was late or came twice.
-   There an equal stamp counts, as a requester without a clock always sends 0. A requester's first
-   request counts. A requester that has been silent for FORGOTTEN_S and holds nothing is new again.
-4. During the quiet start on a retained topic a stamp from the future does not count: our clock may
-   not be set yet, and then every replayed request looks new.
-5. A request that does not count may come from a live requester whose clock is wrong or was set back.
-   It counts once it has been repeated for long enough, with stamps that rise or are all 0. Long
-   enough is longer than a replay lasts (REPLAY_S, retained), or than a message can be late (LATE_S).
-   After a pause of BROKEN_OFF_S, or when a stamp does not rise, that time starts again.
+FRESHNESS-1. A request counts if it is newer than every earlier request of its requester that counted.
+   An END is compared with earlier ENDs only: an operator may end a robot's session, by another clock.
+FRESHNESS-2. A retained topic (`adapter_lift_requests`) replays up to 100 old requests of every adapter
+   to each new subscriber, and again when an adapter's network comes back. There an equal stamp is a
+   replay, and a requester's first request counts only if it was sent after our own start. Once a
+   requester has counted, only its own stamps are compared. With `clock_synchronised` every request's
+   age is judged too.
+FRESHNESS-3. On a topic that is not retained (`adapter_door_requests`) an old request was late or came
+   twice. There an equal stamp counts, as a requester without a clock always sends 0. A requester's
+   first request counts. A requester that has been silent for FORGOTTEN_S and holds nothing is new
+   again.
+FRESHNESS-4. During the quiet start on a retained topic a stamp from the future does not count: our
+   clock may not be set yet, and then every replayed request looks new.
+FRESHNESS-5. A request that does not count may come from a live requester whose clock is wrong or was
+   set back. It counts once it has been repeated for long enough, with stamps that rise or are all 0.
+   Long enough is longer than a replay lasts (REPLAY_S, retained), or than a message can be late
+   (LATE_S). After a pause of BROKEN_OFF_S, or when a stamp does not rise, that time starts again.
 """
 
 from collections.abc import Collection, Mapping

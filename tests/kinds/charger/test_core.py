@@ -30,6 +30,8 @@ from tests.kinds.charger.story import (
     observed,
 )
 
+# ---- CHARGER-1: the states
+
 
 def test_a_scheduled_charge_goes_through_every_state_and_ends_idle() -> None:
     story = Story().polls("idle 2").event(AMR1)
@@ -90,7 +92,7 @@ def test_current_still_flowing_while_ramping_down_is_charging() -> None:
     assert story.told[2:] == [(1.0, "CHARGING", "req-1"), (7.0, "RELEASED", "req-1")]
 
 
-# ---- requests
+# ---- CHARGER-2: requests
 
 
 def test_a_repeated_request_changes_nothing() -> None:
@@ -149,7 +151,7 @@ def test_a_station_in_error_or_not_read_yet_takes_no_request(before: str) -> Non
     assert story.memory.holder is None
 
 
-# ---- start timeout and cancel
+# ---- CHARGER-3: the start timeout
 
 
 def test_a_request_that_does_not_charge_in_its_time_is_released_with_a_fault() -> None:
@@ -185,6 +187,9 @@ def test_a_coupling_lost_and_sought_again_gets_its_whole_start_timeout_again() -
         (221.0, "RELEASED", "req-1"),
         (223.0, "IDLE", ""),
     ]
+
+
+# ---- CHARGER-4: cancels
 
 
 def test_a_cancel_before_charging_releases_the_station() -> None:
@@ -255,7 +260,7 @@ def test_released_is_shown_for_its_full_time_after_the_reading_that_shows_it() -
     assert story.told[3:] == [(4.0, "RELEASED", "req-1"), (6.0, "IDLE", "")]
 
 
-# ---- faults
+# ---- CHARGER-6: faults
 
 
 def test_an_error_is_shown_in_the_stations_words_and_the_power_is_off() -> None:
@@ -327,7 +332,7 @@ def test_an_error_without_a_text_names_the_vendors_number() -> None:
     assert story.told == [(0.0, "ERROR", "the charger reports an error (vendor state 238)")]
 
 
-# ---- clearing errors
+# ---- CHARGER-9: clearing errors
 
 
 def test_errors_are_never_cleared_without_an_operator_by_default() -> None:
@@ -379,7 +384,7 @@ def test_an_unknown_state_is_not_cleared() -> None:
     assert story.outputs.clear_errors == 0
 
 
-# ---- not reachable
+# ---- CHARGER-7: not reachable
 
 
 def test_a_station_that_was_never_read_is_in_error_and_nothing_is_driven() -> None:
@@ -446,7 +451,7 @@ def test_a_start_timeout_that_passed_unseen_is_reported_when_the_station_is_back
     assert story.faults[-1] == "START_TIMEOUT: tiny/AMR01 did not start to charge in time"
 
 
-# ---- nobody asked
+# ---- CHARGER-8: nobody asked
 
 
 def test_a_restart_while_charging_adopts_the_charge_and_leaves_the_power_alone() -> None:
@@ -473,7 +478,7 @@ def test_unrequested_charging_is_not_credited_to_the_next_robot_that_asks() -> N
     assert story.report.robot == ""
 
 
-# ---- two nodes
+# ---- CHARGER-10: two nodes
 
 
 def test_a_second_node_for_the_same_charger_stops_everything_until_it_is_silent_for_5_s() -> None:
@@ -505,6 +510,9 @@ def test_the_core_asks_to_be_woken_when_the_rival_is_due_to_be_gone() -> None:
     seen = core.decide(Memory(), RIVAL, 7.0, LIMITS)
     later = core.decide(seen.memory, IDLE, 12.0, LIMITS)
     assert (seen.wake_at, later.wake_at) == (12.0, float("inf"))
+
+
+# ---- CHARGER-1: an error without a request
 
 
 def test_a_station_is_free_again_after_an_error_without_a_request() -> None:

@@ -42,6 +42,12 @@ def test_plain_ids_are_written_as_they_are_and_others_quoted() -> None:
     ]
 
 
+def test_names_of_any_script_are_readable_in_an_error() -> None:
+    assert Misplaced(Robot("Räumer", "Wäsche 1")).text == (
+        'wrong docking: Räumer/"Wäsche 1" is not assigned here'
+    )
+
+
 @pytest.mark.parametrize(
     "text",
     ["", "station: fan", "wrong docking: AMR01", "unknown receiver a b", "unknown receiver 1, 2"],

@@ -4,6 +4,7 @@ side of each, in virtual time, one poll a second."""
 import pytest
 from msgspec.structs import replace
 
+from bridges.kinds.charger.core import CLEARED_WITHIN_S
 from bridges.kinds.charger.memory import ChargerLimits
 from bridges.kinds.charger.report import ChargerReport
 from bridges.kinds.charger.settings import Durations
@@ -29,6 +30,13 @@ from tests.kinds.charger.story import (
     Story,
 )
 
+SERVING = replace(FULL, unrequested="serve_known")
+
+
+def still_charging(it: Story) -> list[str]:
+    return [fault for fault in it.faults if fault.startswith("STILL_CHARGING")]
+
+
 ONE, TWO, NOBODY = "rx-1", "rx-2", ""
 
 
@@ -43,7 +51,7 @@ def docked() -> Story:
     )
 
 
-# ---- scheduled
+# ---- CHARGER-1, CHARGER-5: scheduled
 
 
 def test_a_scheduled_charge_goes_through_every_state_with_its_robot_and_request_filled_in() -> None:
@@ -111,7 +119,7 @@ def test_a_receiver_that_is_lost_from_sight_while_current_flows_keeps_its_power(
     assert it.outputs.power is True
 
 
-# ---- the range
+# ---- CHARGER-5: the range
 
 
 def test_nothing_is_energised_before_a_check_of_the_range_that_was_asked_for_says_yes() -> None:
@@ -151,7 +159,7 @@ def test_a_coupling_that_is_sought_again_is_checked_again() -> None:
     assert it.outputs == ChargerOutputs(power=True, range_checks=2)
 
 
-# ---- ad hoc
+# ---- CHARGER-2, CHARGER-3: ad hoc
 
 
 def test_a_robot_already_on_the_pad_is_charged_when_it_asks() -> None:
@@ -208,7 +216,22 @@ def test_a_station_at_fault_or_a_stranger_is_not_served_without_a_request() -> N
     assert it.memory.holder is None
 
 
-# ---- stacked
+def test_a_robot_served_without_a_request_gets_no_more_power_once_it_has_left() -> None:
+    it = story(SERVING).sees((A.HANDSHAKE, ONE, 1), (A.CHARGING, ONE, 1), (A.IDLE, NOBODY, 1))
+    it.sees((A.CHARGING, ONE, 1))
+    assert it.powered == [False, True, True, False, False]
+    assert still_charging(it) == ["STILL_CHARGING: tiny/AMR01: left"]
+
+
+def test_robots_served_without_a_request_push_no_ended_request_out_of_memory() -> None:
+    it = story(SERVING).event(AMR1).sees((A.HANDSHAKE, ONE, 1), (A.CHARGING, ONE, 1))
+    for _ in range(9):
+        it.sees((A.IDLE, NOBODY, 5), (A.HANDSHAKE, TWO, 1), (A.CHARGING, TWO, 1))
+    it.sees((A.IDLE, NOBODY, 5)).event(AMR1)
+    assert it.refused == [(it.now, "request is over")]
+
+
+# ---- CHARGER-2: stacked
 
 
 def test_a_second_robot_is_not_granted_while_the_first_is_on_the_pad_finished_or_not() -> None:
@@ -229,7 +252,7 @@ def test_the_second_robot_is_not_charged_when_it_arrives_first() -> None:
     assert (it.report.request_id, it.report.robot, it.report.verified) == ("req-1", "AMR01", False)
 
 
-# ---- wrong station
+# ---- CHARGER-5: wrong station
 
 
 def test_a_robot_at_the_wrong_station_is_refused_and_named_until_it_leaves() -> None:
@@ -316,6 +339,27 @@ def test_a_stranger_pauses_the_start_timeout_too_and_ends_a_charge_that_it_repla
     assert charged.told[-1] == (9.0, "IDLE", "")
 
 
+def test_a_robot_that_another_has_displaced_gets_no_more_power_for_that_request() -> None:
+    it = (
+        story().event(AMR1).sees((A.HANDSHAKE, ONE, 1), (A.CHARGING, ONE, 1), (A.HANDSHAKE, TWO, 1))
+    )
+    it.sees((A.CHARGING, ONE, 2))
+    assert it.powered == [False, True, True, False, False, False]
+    assert still_charging(it) == ["STILL_CHARGING: req-1: left"]
+
+
+def test_a_robot_that_left_full_is_still_full_when_another_has_come() -> None:
+    it = (
+        story()
+        .event(AMR1)
+        .sees((A.HANDSHAKE, ONE, 1))
+        .sees((A.CHARGING, ONE, 1), battery_percent=100.0)
+    )
+    it.sees((A.HANDSHAKE, TWO, 1), (A.CHARGING, ONE, 1))
+    assert it.powered == [False, True, False, False, False]
+    assert still_charging(it) == []
+
+
 def test_each_refusal_has_its_own_fault() -> None:
     stranger = story().sees((A.IDLE, "4711", 1))
     other = story().event(AMR1).sees((A.IDLE, TWO, 1))
@@ -333,6 +377,9 @@ def test_each_refusal_has_its_own_fault() -> None:
 def at_fault(text: str, side: str = "", receiver: str = ONE) -> Sampled[ChargerSample]:
     measured = Measured(receiver_id=receiver)
     return Sampled(ChargerSample(A.ERROR, 238, text, measured, side))  # type: ignore[arg-type]
+
+
+# ---- CHARGER-6: failure: the station's side, the robot's side
 
 
 @pytest.mark.parametrize("side", ["station", ""])
@@ -401,6 +448,17 @@ def test_a_clearing_that_failed_does_not_count_later() -> None:
     assert it.told[-1] == (45.0, "ERROR", "out of service after: station: fan stuck")
 
 
+def test_a_good_reading_proves_a_clearing_up_to_its_last_instant() -> None:
+    def shown_after(later_s: float) -> str:
+        it = story().event(Sampled(ChargerSample(A.ERROR, 9, "fan", side="station"))).event(RESET)
+        it.now += later_s
+        it.sees((A.IDLE, NOBODY, 1))
+        return it.told[-1][1]
+
+    assert shown_after(CLEARED_WITHIN_S) == "IDLE"
+    assert shown_after(CLEARED_WITHIN_S + 0.001) == "ERROR"
+
+
 def test_a_clearing_is_not_verified_by_a_station_that_still_charges_or_is_not_known() -> None:
     it = docked().event(at_fault("fan stuck")).sees((A.CHARGING, ONE, 1)).event(RESET)
     it.sees((A.CHARGING, ONE, 1), (A.STOPPING, ONE, 1), (A.UNKNOWN, ONE, 1))
@@ -449,7 +507,7 @@ def test_commands_that_fail_again_and_again_are_an_error() -> None:
     assert it.told[-1] == (9.0, "CHARGING", "req-1")
 
 
-# ---- cancel and unreachable
+# ---- CHARGER-4, CHARGER-7: cancel and unreachable
 
 
 def test_a_cancel_while_the_station_is_lost_takes_the_power_as_soon_as_it_is_heard() -> None:
@@ -472,7 +530,7 @@ def test_an_operator_frees_a_lost_station_only_when_it_must_have_switched_off_by
     assert never.event(RESET).refused == [(1e6, "the charger does not answer")]
 
 
-# ---- restart
+# ---- CHARGER-8: restart
 
 
 def test_a_restart_while_charging_adopts_the_charge_and_its_robot_and_leaves_the_power_alone() -> (
@@ -538,7 +596,15 @@ def test_each_receiver_belongs_to_the_robot_that_the_yaml_names() -> None:
     }
 
 
-# ---- a pad that the station moves
+def test_another_receiver_is_news_and_another_age_is_not() -> None:
+    report = story().event(AMR1).sees((A.HANDSHAKE, ONE, 1)).report
+    assert report is not None
+    assert replace(report, read_at=99.0).news() == report.news()
+    assert replace(report, measured=Measured(receiver_id=TWO)).news() != report.news()
+    assert replace(report, measured=Measured(receiver_id=ONE, volts=48.0)).news() == report.news()
+
+
+# ---- CHARGER-5: a pad that the station moves
 
 
 def test_nothing_is_energised_before_the_pad_is_at_its_height_and_the_robot_in_range() -> None:

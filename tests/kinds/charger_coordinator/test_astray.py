@@ -66,6 +66,9 @@ def found(memory: Memory, *times: float) -> list[list[Astray]]:
 EXPECTED = {A: Grant(ONE, "r1", 10.0, shown=True)}
 
 
+# ---- COORDINATOR-ASTRAY-1: who has a station, and stands at another
+
+
 @pytest.mark.parametrize(("came_at", "since"), [(20.0, 22.0), (10.0, 40.0), (5.0, 40.0)])
 def test_a_robot_that_came_after_its_call_is_astray_soon_and_one_that_was_there_may_drive_off(
     came_at: float, since: float
@@ -109,6 +112,9 @@ def history(memory: Memory, *times: float) -> list[tuple[float, dict[Robot, Nudg
     return lines
 
 
+# ---- COORDINATOR-ASTRAY-1, COORDINATOR-ASTRAY-4: what it is told
+
+
 def test_a_stray_is_told_twice_for_one_request_and_then_a_person_is() -> None:
     memory = site(at(ONE, AT[B], 20.0), grants=EXPECTED)
     first, second = {ONE: Nudge("r1", 1, 22.0)}, {ONE: Nudge("r1", 2, 37.0)}
@@ -132,6 +138,9 @@ def test_a_stray_is_told_again_for_a_new_request_and_the_count_lasts_on_its_way(
     assert astray.nudged(memory, 22.0, SITE).nudges == {ONE: Nudge("r1", 1, 22.0)}
     left = site(at(ONE, None, 50.0), grants=EXPECTED, nudges={ONE: Nudge("r1", 1, 22.0)})
     assert astray.nudged(left, 60.0, SITE).nudges == {ONE: Nudge("r1", 1, 22.0)}
+
+
+# ---- COORDINATOR-ASTRAY-3, COORDINATOR-ASTRAY-4: who cannot be told
 
 
 @pytest.mark.parametrize("why", ["it works", "another node assigns", "we may not speak"])
@@ -168,6 +177,9 @@ def blocks(station: str) -> Astray:
 def blocked(came_at: float = 30.0, **changes: object) -> Memory:
     """TWO stands at charger_a, where nobody charges it, and ONE waits."""
     return site(at(TWO, AT[A], came_at), **{"wishes": WAITS, **changes})
+
+
+# ---- COORDINATOR-ASTRAY-2: who has no station, and stands on a pad that another waits for
 
 
 def test_a_robot_blocks_a_pad_a_while_after_it_came_or_the_station_let_it_go() -> None:

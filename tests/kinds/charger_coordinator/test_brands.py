@@ -1,4 +1,4 @@
-"""Two brands of robots at the same stations: each fleet with its own names for the places."""
+"""COORDINATOR-2: two brands of robots at the same stations, each fleet with its own names for places."""
 
 from typing import Any
 

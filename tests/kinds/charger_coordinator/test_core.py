@@ -1,14 +1,12 @@
 """The coordinator's rules one by one: its core alone, told by hand, in virtual time."""
 
 import dataclasses
-from typing import Any
 
 import pytest
 from msgspec.structs import replace
 
 from bridges.kinds.charger.report import LOST, Diagnosis, diagnosis
 from bridges.kinds.charger.settings import Robot
-from bridges.kinds.charger_coordinator import core, keep
 from bridges.kinds.charger_coordinator.astray import on_pad
 from bridges.kinds.charger_coordinator.memory import (
     ASSIGNED,
@@ -16,71 +14,29 @@ from bridges.kinds.charger_coordinator.memory import (
     ERROR,
     IDLE,
     RELEASED,
-    Memory,
+    Grant,
     Site,
+    Wish,
 )
-from bridges.kinds.charger_coordinator.report import SiteReport
-from bridges.kinds.charger_coordinator.signals import Event, FleetSeen, Sighting, StateHeard, Wanted
+from bridges.kinds.charger_coordinator.signals import (
+    Dedicated,
+    Event,
+    FleetSeen,
+    Sighting,
+    StateHeard,
+    Unwanted,
+    Wanted,
+)
+from bridges.kinds.shared.decision import OperatorReset
 from bridges.kinds.shared.graph_kind import MaySpeak, Woken
 from bridges.messages import definitions as d
-from tests.kinds.charger_coordinator.yard import RECEIVERS, settings
-from tests.kinds.shared import alone
+from tests.kinds.charger_coordinator.alone import ONE, SETTINGS, THREE, TWO, A, Alone, B, busy
+from tests.kinds.charger_coordinator.yard import RECEIVERS
 
-SETTINGS = settings()
-ONE, TWO, THREE = (Robot("tiny", f"AMR0{i}") for i in (1, 2, 3))
-A, B = "charger_a", "charger_b"
+SERVED = [CHARGING, RELEASED]
 
 
-class Alone(alone.Alone[Memory, Event, Site, SiteReport]):
-    """`shows`: what each station does, told once a second; `seen`: the robots that a fleet shows."""
-
-    def __init__(self) -> None:
-        self.shows = {name: StateHeard(name, IDLE) for name in (A, B)}
-        self.seen: dict[Robot, Sighting] = {}
-        super().__init__(core.initial("site", 0.0), core.decide, Site.of(SETTINGS), True)
-
-    def words(self, message: d.Message) -> str:
-        """Words to the stations are noted."""
-        match message:
-            case d.ChargerRequest():
-                return f"{message.charger_name}: {message.robot_name}"
-            case d.ChargerCancel():
-                return f"{message.charger_name}: cancel"
-        return ""
-
-    @property
-    def faults(self) -> list[str]:
-        return [str(fault) for fault in self.report.faults]
-
-    def run(self, seconds: int) -> list[tuple[float, str]]:
-        """Let time pass, a second at a time; what was said meanwhile."""
-        said = len(self.sent)
-        for _ in range(seconds):
-            self.now += 1.0
-            for shown in self.shows.values():
-                self.hears(shown)
-            for sighting in self.seen.values():
-                self.hears(FleetSeen((sighting,)))
-            self.hears(Woken())
-        return self.sent[said:]
-
-    def wants(self, who: Robot, place: str | None = None, percent: float = 40.0) -> None:
-        """Its fleet shows it so from now on."""
-        place = f"wait_{who.name[-1]}" if place is None else place
-        self.seen[who] = Sighting(who, True, place, percent, f"task of {who.name}")
-
-    def does(self, station: str, state: Any, error: str = "") -> None:
-        """The station goes on so with the request that it was sent last."""
-        grant = self.memory.grants[station]
-        self.shows[station] = StateHeard(station, state, grant.request_id, grant.robot, error)
-
-
-def busy(station: str) -> StateHeard:
-    """A station that serves somebody who is none of ours."""
-    return StateHeard(station, CHARGING, "somebody-1", Robot("other", "robot"))
-
-
-# ---- who wants to be charged
+# ---- COORDINATOR-WISHES-1, COORDINATOR-WISHES-2: who wants to be charged
 
 
 def test_a_robot_that_passes_with_the_mode_of_its_last_charge_does_not_ask_for_another() -> None:
@@ -136,36 +92,109 @@ def test_a_full_robot_that_an_operator_asked_for_makes_room() -> None:
     assert site_.memory.wishes == ()
 
 
+def answer(site_: Alone, event: Event) -> str:
+    """Why the event is refused; "" if it counts."""
+    before = len(site_.refused)
+    site_.hears(event)
+    return "".join(why for _, why in site_.refused[before:])
+
+
+def test_an_operator_may_send_a_robot_that_has_a_station_to_another_one() -> None:
+    site_ = Alone()
+    site_.hears(Wanted(ONE, "", "op-1", 0.0))
+    site_.run(1)
+    site_.does(A, ASSIGNED)
+    site_.run(1)
+    assert answer(site_, Wanted(ONE, B, "op-2", 0.0)) == ""
+    site_.run(1)
+    assert site_.sent == [
+        (1.0, "charger_a: AMR01"),
+        (2.0, "charger_a: cancel"),
+        (2.0, "charger_b: AMR01"),
+        (3.0, "charger_b: AMR01"),
+        (3.0, "charger_a: cancel"),
+    ]
+    assert [(w.robot, w.request_id) for w in site_.memory.wishes] == [(ONE, "op-2")]
+
+
+def test_a_newer_request_for_the_station_that_the_robot_has_moves_nothing() -> None:
+    site_ = Alone()
+    site_.shows[B] = busy(B)
+    site_.hears(Wanted(ONE, "", "op-1", 0.0))
+    site_.hears(Wanted(TWO, "", "op-2", 0.0))
+    site_.run(1)
+    site_.does(A, ASSIGNED)
+    for request_id, station in (("op-3", A), ("op-4", "")):
+        site_.hears(Wanted(ONE, station, request_id, 0.0))
+        assert site_.run(5) == []
+    assert [(w.robot, w.request_id) for w in site_.memory.wishes] == [(ONE, "op-4"), (TWO, "op-2")]
+
+
+def test_a_request_that_suits_no_station_of_the_robot_is_refused_by_name() -> None:
+    assert answer(Alone(), Wanted(THREE, A, "op-1", 0.0)) == "station does not suit the robot"
+
+
+def test_a_request_that_has_a_station_is_withdrawn_by_the_id_that_the_station_shows() -> None:
+    site_ = Alone()
+    site_.wants(ONE)
+    site_.hears(Wanted(TWO, "", "op-2", 0.0))
+    site_.run(1)
+    site_.does(A, CHARGING)
+    site_.run(1)
+    charging, other = site_.memory.grants[A].robot, site_.memory.grants[B].robot
+    assert answer(site_, Unwanted(site_.memory.grants[A].request_id)) == ""
+    assert site_.sent[-1] == (2.0, "charger_a: cancel")
+    assert [w.robot for w in site_.memory.wishes] == [other]
+    assert charging != other
+
+
+def test_a_withdrawal_is_refused_unless_the_request_is_known_or_over() -> None:
+    site_ = Alone()
+    site_.hears(Wanted(ONE, "", "op-1", 0.0))
+    assert [answer(site_, Unwanted("op-1")) for _ in range(2)] == ["", ""]
+    site_.wants(TWO)
+    site_.run(1)
+    assert answer(site_, Unwanted("op-9")) == "no such request"
+    assert answer(site_, Unwanted("")) == "no such request"
+
+
+def test_an_operators_reset_tries_faulty_robots_and_stations_that_were_passed_over() -> None:
+    site_ = Alone()
+    site_.shows[B] = busy(B)
+    site_.wants(ONE)
+    site_.run(12)
+    assert site_.run(5) == []
+    assert answer(site_, OperatorReset()) == ""
+    assert site_.run(1)[0] == (18.0, "charger_a: AMR01")
+
+
+def test_no_event_that_counts_is_refused() -> None:
+    site_ = Alone()
+    events: list[Event] = [
+        Dedicated(((ONE, B),)),
+        Woken(),
+        MaySpeak(True),
+        FleetSeen(()),
+        OperatorReset(),
+    ]
+    assert [answer(site_, event) for event in events] == [""] * 5
+
+
+def test_a_robot_that_an_operator_asks_for_again_is_tried_again_in_spite_of_its_failures() -> None:
+    site_ = Alone()
+    site_.wants(ONE)
+    site_.run(1)
+    site_.does(A, ERROR, "over temperature")
+    site_.run(1)
+    assert site_.memory.strikes == {ONE: (A,)}
+    site_.hears(Wanted(ONE, "", "op-1", 0.0))
+    assert site_.memory.strikes == {}
+
+
 # ---- who gets which station
 
 
-def test_the_queue_is_first_come_first_served() -> None:
-    site_ = Alone()
-    site_.shows = {A: busy(A), B: busy(B)}
-    for who in (TWO, ONE, THREE):
-        site_.wants(who)
-        site_.run(1)
-    site_.shows[B] = StateHeard(B, IDLE)
-    assert site_.run(1) == [(4.0, "charger_b: AMR02")]
-
-
-def test_a_station_at_which_another_robot_stands_is_not_free_though_it_says_so() -> None:
-    site_ = Alone()
-    site_.shows[B] = busy(B)
-    site_.seen[TWO] = Sighting(TWO, False, "charger_a", 90.0, "")
-    site_.wants(ONE)
-    assert site_.run(10) == []
-    site_.seen[TWO] = replace(site_.seen[TWO], place=None)
-    assert site_.run(1) == [(11.0, "charger_a: AMR01")]
-
-
-def test_an_old_position_of_a_robot_keeps_no_station() -> None:
-    site_ = Alone()
-    site_.shows[B] = busy(B)
-    site_.hears(FleetSeen((Sighting(TWO, False, "charger_a", 90.0, ""),)))
-    site_.wants(ONE)
-    assert site_.run(29) == []
-    assert site_.run(1) == [(30.0, "charger_a: AMR01")]
+# ---- COORDINATOR-3: a request that no station takes
 
 
 def test_a_station_that_takes_no_request_is_passed_over_and_its_request_is_queued_last() -> None:
@@ -182,15 +211,54 @@ def test_a_station_that_takes_no_request_is_passed_over_and_its_request_is_queue
     assert site_.faults == []
 
 
-def test_a_robot_that_is_charged_unasked_where_it_stands_has_that_station() -> None:
+@pytest.mark.parametrize(
+    ("after_s", "failed", "said"),
+    [
+        (58, {}, [(60.0, "charger_a: AMR01")]),
+        (59, {ONE: (A,)}, [(61.0, "charger_b: AMR01")]),
+    ],
+)
+def test_a_request_that_a_station_drops_is_made_again_until_its_robot_should_have_started(
+    after_s: int, failed: dict[Robot, tuple[str, ...]], said: list[tuple[float, str]]
+) -> None:
     site_ = Alone()
-    site_.shows[A] = StateHeard(A, CHARGING, "unrequested/charger_a")
     site_.wants(ONE, "charger_a")
-    assert site_.run(10) == []
-    assert site_.memory.station_of(ONE) == A
+    site_.run(1)
+    site_.does(A, ASSIGNED)
+    site_.run(after_s)
+    site_.shows[A] = StateHeard(A, IDLE)
+    assert site_.run(1) == said
+    assert site_.memory.strikes == failed
 
 
-# ---- whose fault
+@pytest.mark.parametrize(
+    ("state", "robot", "gone"),
+    [(ERROR, TWO, True), (CHARGING, TWO, True), (CHARGING, ONE, False), (ERROR, ONE, False)],
+)
+def test_a_request_is_given_up_when_the_station_will_not_take_it(
+    state: d.ChargerStateValue, robot: Robot, gone: bool
+) -> None:
+    site_ = Alone()
+    site_.wants(ONE)
+    site_.run(1)
+    text = f"wrong docking: {robot} is not assigned here" if state is ERROR else ""
+    before = site_.memory.grants[A].request_id
+    site_.hears(StateHeard(A, state, "unrequested/charger_a", robot, text))
+    assert (before not in [g.request_id for g in site_.memory.grants.values()]) is gone
+
+
+def test_requests_are_numbered_one_after_the_other() -> None:
+    site_ = Alone()
+    site_.wants(ONE)
+    site_.wants(TWO)
+    site_.run(1)
+    assert [site_.memory.grants[name].request_id for name in (A, B)] == [
+        "charger_coordinator/tiny/AMR01/1",
+        "charger_coordinator/tiny/AMR02/2",
+    ]
+
+
+# ---- COORDINATOR-STATIONS-2, COORDINATOR-STATIONS-3: whose fault
 
 
 def test_an_error_of_an_unknown_side_counts_until_another_station_charges_the_robot() -> None:
@@ -267,6 +335,9 @@ def test_a_failure_is_forgotten_when_its_station_names_itself_or_is_mended_witho
     assert site_.memory.strikes == left
 
 
+# ---- COORDINATOR-5, COORDINATOR-ASTRAY-3: robots astray
+
+
 def test_a_strayed_robot_in_a_task_cannot_be_told_so_a_person_is_at_once() -> None:
     site_ = Alone()
     site_.hears(Wanted(ONE, "", "op-1", 0.0))
@@ -297,6 +368,9 @@ def test_a_robot_on_its_way_from_a_station_where_it_failed_is_not_astray() -> No
     assert [(nudge.count, nudge.at) for nudge in site_.memory.nudges.values()] == [(1, 32.0)]
 
 
+# ---- COORDINATOR-WISHES-4: on its way
+
+
 def test_an_idle_robot_that_is_called_and_begins_a_task_is_on_its_way() -> None:
     site_ = Alone()
     site_.seen[ONE] = Sighting(ONE, False, "wait_1", 40.0, "")
@@ -319,6 +393,25 @@ def test_an_idle_robot_that_is_on_the_road_when_it_has_no_station_does_not_wait_
     assert site_.memory.wishes == ()
 
 
+def test_a_robot_on_its_way_keeps_a_station_that_waits_for_it() -> None:
+    site_ = Alone()
+    site_.wants(ONE)
+    site_.run(1)
+    site_.does(A, ASSIGNED)
+    assert site_.run(200) == []
+
+
+def test_a_charge_beside_it_does_not_keep_a_request_that_nobody_takes() -> None:
+    site_ = Alone()
+    site_.wants(ONE)
+    site_.run(1)
+    site_.does(A, CHARGING)
+    site_.run(1)
+    site_.wants(TWO)
+    site_.run(11)
+    assert site_.faults == ["REQUEST_NOT_TAKEN: charger_b: its daemon's log says why"]
+
+
 def test_a_served_robots_mode_is_believed_again_when_it_has_left_or_stays_long() -> None:
     for leaves, again_at in ((True, 9.0), (False, 304.0)):
         site_ = Alone()
@@ -335,6 +428,44 @@ def test_a_served_robots_mode_is_believed_again_when_it_has_left_or_stays_long()
         site_.seen[ONE] = Sighting(ONE, True, "charger_a", 95.0, "another task")
         site_.run(400)
         assert site_.sent[0] == (again_at, "charger_a: AMR01")
+
+
+def test_a_robot_charged_in_one_task_may_be_charged_again_in_the_next() -> None:
+    site_ = Alone()
+    site_.wants(ONE, "charger_a", 95.0)
+    site_.run(1)
+    for state in SERVED:
+        site_.does(A, state)
+        site_.run(1)
+    site_.shows[A] = StateHeard(A, IDLE)
+    site_.run(1)
+    assert site_.memory.served == {ONE: "task of AMR01"}
+    site_.hears(FleetSeen((Sighting(ONE, False, None, 95.0, "the next task"),)))
+    assert site_.memory.served == {}
+    site_.seen[ONE] = Sighting(ONE, True, "charger_a", 95.0, "the next task")
+    assert site_.run(3) == [(7.0, "charger_a: AMR01")]
+
+
+def test_a_robot_whose_fleet_is_not_heard_is_charged_in_no_task() -> None:
+    site_ = Alone()
+    site_.hears(Wanted(ONE, "", "op-1", 0.0))
+    site_.run(1)
+    for state in SERVED:
+        site_.does(A, state)
+        site_.run(1)
+    assert site_.memory.served == {ONE: ""}
+
+
+def test_a_robot_that_drives_away_before_it_was_charged_has_not_been_charged() -> None:
+    site_ = Alone()
+    site_.wants(ONE)
+    site_.run(1)
+    site_.seen[ONE] = Sighting(ONE, False, None, 40.0, "other work")
+    site_.run(1)
+    assert (site_.memory.wishes, site_.memory.served) == ((), {})
+
+
+# ---- COORDINATOR-4, COORDINATOR-STATIONS-1, COORDINATOR-STATIONS-2: how a request ends
 
 
 def test_a_robot_with_one_station_is_tried_there_twice_and_no_more() -> None:
@@ -394,6 +525,28 @@ def test_a_robot_that_did_not_come_keeps_its_request_only_while_it_stands_at_one
         assert [wish.robot for wish in site_.memory.wishes] == queue
 
 
+@pytest.mark.parametrize(
+    ("place", "said", "served"),
+    [
+        ("charger_a", [(3.0, "charger_a: AMR01"), (4.0, "charger_a: AMR01")], {}),
+        ("wait_1", [], {ONE: "task of AMR01"}),
+    ],
+)
+def test_a_charge_that_an_idle_station_has_not_released_is_over_if_its_robot_has_left(
+    place: str, said: list[tuple[float, str]], served: dict[Robot, str]
+) -> None:
+    site_ = Alone()
+    site_.wants(ONE, "charger_a", 95.0)
+    site_.run(1)
+    site_.does(A, CHARGING)
+    site_.run(1)
+    site_.shows[A] = StateHeard(A, IDLE)
+    site_.wants(ONE, place, 95.0)
+    site_.hears(FleetSeen((site_.seen[ONE],)))
+    assert site_.run(2) == said
+    assert site_.memory.served == served
+
+
 def test_a_robot_that_has_a_station_does_not_get_another_by_a_strangers_request() -> None:
     site_ = Alone()
     site_.wants(ONE)
@@ -403,6 +556,48 @@ def test_a_robot_that_has_a_station_does_not_get_another_by_a_strangers_request(
     assert site_.run(5) == []
     assert site_.memory.station_of(ONE) == A
     assert list(site_.memory.grants) == [A]
+
+
+def test_another_nodes_request_for_our_robot_is_adopted_with_the_charge_that_it_has() -> None:
+    for state, started in ((ASSIGNED, False), (CHARGING, True)):
+        site_ = Alone()
+        site_.shows[A] = StateHeard(A, state, "somebody-1", ONE)
+        assert site_.run(3) == []
+        assert site_.memory.grants == {
+            A: Grant(ONE, "somebody-1", 1.0, shown=True, started=started)
+        }
+        assert site_.memory.wishes == (Wish(ONE, "operator"),)
+
+
+def test_another_nodes_request_gives_a_robot_that_waits_no_second_wish() -> None:
+    site_ = Alone()
+    site_.shows = {A: busy(A), B: busy(B)}
+    site_.wants(ONE)
+    site_.run(1)
+    site_.shows[A] = StateHeard(A, ASSIGNED, "somebody-1", ONE)
+    site_.run(1)
+    assert [(w.robot, w.by) for w in site_.memory.wishes] == [(ONE, "fleet")]
+
+
+def test_a_second_station_that_still_shows_an_earlier_request_of_ours_is_told_to_let_go() -> None:
+    site_ = Alone()
+    site_.wants(ONE)
+    site_.run(1)
+    site_.does(A, ASSIGNED)
+    site_.shows[B] = StateHeard(B, ASSIGNED, "charger_coordinator/tiny/AMR01/0", ONE)
+    site_.run(1)
+    assert site_.sent[-1] == (2.0, "charger_b: cancel")
+    assert (site_.memory.station_of(ONE), len(site_.memory.wishes)) == (A, 1)
+
+
+def test_a_station_that_serves_somebody_else_has_let_our_robot_go() -> None:
+    site_ = Alone()
+    site_.wants(ONE)
+    site_.run(1)
+    site_.does(A, ASSIGNED)
+    site_.run(1)
+    site_.shows[A] = busy(A)
+    assert site_.run(1) == [(3.0, "charger_b: AMR01")]
 
 
 def test_a_station_whose_pad_another_robot_does_not_leave_is_given_up_after_the_start_timeout() -> (
@@ -420,6 +615,9 @@ def test_a_station_whose_pad_another_robot_does_not_leave_is_given_up_after_the_
     assert site_.memory.strikes == {}
 
 
+# ---- COORDINATOR-7: rivals
+
+
 def test_a_request_that_a_rival_held_back_is_sent_afterwards() -> None:
     site_ = Alone()
     site_.wants(ONE)
@@ -433,14 +631,20 @@ def test_a_request_that_a_rival_held_back_is_sent_afterwards() -> None:
     assert site_.faults == []
 
 
-def test_only_a_robot_refused_as_unasked_may_have_the_station_where_it_stands() -> None:
-    for request_id, said in (("unrequested/charger_a", ["charger_a: AMR01"]), ("somebody-1", [])):
-        site_ = Alone()
-        site_.shows[B] = busy(B)
-        text = "wrong docking: tiny/AMR01 is not assigned here"
-        site_.shows[A] = StateHeard(A, ERROR, request_id, ONE, text)
-        site_.wants(ONE, "charger_a")
-        assert [words for _, words in site_.run(1)] == said
+def test_a_request_made_before_a_rival_came_keeps_its_age_once_it_is_shown() -> None:
+    site_ = Alone()
+    site_.wants(ONE)
+    site_.run(1)
+    site_.does(A, ASSIGNED)
+    site_.run(1)
+    before = site_.memory.grants[A]
+    site_.hears(MaySpeak(False))
+    assert site_.memory.grants[A] == before
+    site_.hears(MaySpeak(True))
+    assert site_.memory.grants[A] == before
+
+
+# ---- COORDINATOR-4: what a station says
 
 
 @pytest.mark.parametrize(
@@ -483,40 +687,3 @@ def test_who_stands_on_a_pad_is_read_from_its_error() -> None:
 
 
 # ---- what is kept
-
-
-def test_a_restart_remembers_who_was_charging_and_which_robot_a_station_must_release() -> None:
-    site_ = Alone()
-    site_.wants(ONE)
-    site_.wants(TWO)
-    site_.run(1)
-    site_.does(A, CHARGING)
-    site_.does(B, CHARGING)
-    site_.run(1)
-    site_.seen[TWO] = replace(site_.seen[TWO], charges=False)
-    site_.run(1)
-    kept = keep.persist({"site": site_.memory})
-    restored = keep.restore(kept, SETTINGS, 50.0)["site"].grants
-    assert {name: (g.robot, g.started, g.over) for name, g in restored.items()} == {
-        A: (ONE, True, False),
-        B: (TWO, True, True),
-    }
-
-
-def test_names_that_the_yaml_no_longer_has_are_not_restored() -> None:
-    site_ = Alone()
-    for who in (ONE, TWO, THREE):
-        site_.wants(who)
-    site_.run(1)
-    kept = keep.persist({"site": site_.memory})
-    fleet = SETTINGS.fleets["tiny"]
-    less = {name: robot for name, robot in fleet.robots.items() if name != "AMR01"}
-    changed = settings(
-        fleets={"tiny": type(fleet)(waypoints=fleet.waypoints, robots=less)},
-        stations={"charger_b": SETTINGS.stations["charger_b"]},
-    )
-    restored = keep.restore(kept, changed, 9.0)["site"]
-    assert [wish.robot for wish in restored.wishes] == [TWO, THREE]
-    assert {name: grant.robot for name, grant in restored.grants.items()} == {B: TWO}
-    with pytest.raises(ValueError, match="version 7"):
-        keep.restore(kept.replace(b'"version":1', b'"version":7'), SETTINGS, 0.0)

@@ -64,7 +64,7 @@ def test_a_stations_state_is_remembered_with_since_when_and_how_long_it_will_tak
     assert error.stations == {B: Seen(ERROR, "r9", TWO, "fan", 32.0, 32.0, 0.0)}
 
 
-# ---- how a request ends
+# ---- COORDINATOR-STATIONS-1, COORDINATOR-STATIONS-2: how a request ends
 
 
 def test_a_request_that_the_station_shows_is_taken_and_is_begun_when_it_charges() -> None:
@@ -136,7 +136,7 @@ def test_a_station_that_is_not_reached_or_whose_pad_is_taken_keeps_the_request(e
     assert after(site(), ERROR, error) == site()
 
 
-# ---- requests of other nodes
+# ---- COORDINATOR-6: requests of other nodes
 
 
 @pytest.mark.parametrize(("state", "started"), [(ASSIGNED, False), (CHARGING, True)])
@@ -150,7 +150,7 @@ def test_an_unnamed_charge_is_that_of_a_robot_that_waits_there_without_a_station
     assert stations.adopted(memory, 30.0, SITE).grants == {B: GRANT, A: granted}
 
 
-# ---- time
+# ---- COORDINATOR-3, COORDINATOR-STATIONS-4: time
 
 
 @pytest.mark.parametrize(
@@ -228,7 +228,7 @@ def test_a_charge_under_way_or_over_is_left_alone_and_the_next_request_is_not() 
         assert stations.in_time(memory, 99.0, SITE).grants == {A: first}
 
 
-# ---- whose fault
+# ---- COORDINATOR-STATIONS-2, COORDINATOR-STATIONS-3: whose fault
 
 
 @pytest.mark.parametrize(

@@ -206,7 +206,7 @@ def test_a_robot_that_fails_at_a_second_station_is_not_tried_a_third_time() -> N
     assert site.faults == []
 
 
-# ---- restarts and rivals
+# ---- COORDINATOR-6, COORDINATOR-7, COORDINATOR-STATIONS-1: restarts and rivals
 
 
 def test_a_restart_keeps_the_queue_and_touches_no_charge_under_way() -> None:
@@ -400,7 +400,7 @@ def test_of_two_coordinators_one_serves_and_the_other_only_listens() -> None:
     assert (site.node.status()["passive"], other.status()["passive"]) == (False, True)
 
 
-# ---- what is not reached
+# ---- COORDINATOR-3, COORDINATOR-STATIONS-4: what is not reached
 
 
 def test_a_charge_goes_on_while_its_station_is_not_reached() -> None:
@@ -450,7 +450,7 @@ def test_a_station_whose_daemon_takes_no_request_is_passed_over() -> None:
     ]
 
 
-# ---- operators
+# ---- COORDINATOR-1, COORDINATOR-6: operators
 
 
 def test_an_operators_request_is_withdrawn_by_its_id_and_its_repeats_start_nothing() -> None:

@@ -32,7 +32,7 @@ def after(memory: Memory, sighting: Sighting, now: float, site: Site = SITE) -> 
     return replace(wishes.sighted(memory, sighting, now, site), robots=memory.robots)
 
 
-# ---- an operator's request
+# ---- COORDINATOR-1: an operator's request
 
 
 def test_an_operators_request_counts_once_and_not_again_when_it_is_over() -> None:
@@ -73,7 +73,7 @@ def test_a_withdrawal_is_by_the_operators_id_or_by_the_one_that_the_station_show
     assert wishes.unwanted(left, "r1") == (left, "no such request")
 
 
-# ---- it came when it was called, or not
+# ---- COORDINATOR-WISHES-5: it came when it was called, or not
 
 
 @pytest.mark.parametrize(
@@ -131,6 +131,9 @@ def charged(by: By = "fleet", **changes: object) -> Memory:
         robots={ONE: Standing(seen("charger_a", 99.0, "t1", True), 20.0)},
         **changes,  # type: ignore[arg-type]
     )
+
+
+# ---- COORDINATOR-WISHES-2, COORDINATOR-WISHES-3: it was charged
 
 
 @pytest.mark.parametrize("by", ["fleet", "operator"])
@@ -225,6 +228,9 @@ IDLE_WISH = Wish(ONE, "fleet")
 ON_ITS_WAY = Wish(ONE, "fleet", "t2", called=True)
 
 
+# ---- COORDINATOR-WISHES-4: it begins a task
+
+
 @pytest.mark.parametrize(
     ("wish", "changed", "now", "then"),
     [
@@ -245,7 +251,7 @@ def test_a_task_that_begins_soon_after_the_call_is_the_drive_to_the_station(
     assert found == (two, then) if then else found == (two,)
 
 
-# ---- it wants to be charged
+# ---- COORDINATOR-WISHES-1, COORDINATOR-WISHES-2, COORDINATOR-WISHES-3: it wants to be charged
 
 
 def test_a_wish_begins_once_the_robot_has_stood_there_for_two_seconds() -> None:
@@ -326,7 +332,7 @@ def test_a_served_robots_mode_is_believed_after_five_minutes_in_another_task(
     assert after(memory, sighting, now).wishes == found
 
 
-# ---- it still wants to be charged
+# ---- COORDINATOR-WISHES-4: it still wants to be charged
 
 
 @pytest.mark.parametrize(

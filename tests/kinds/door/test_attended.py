@@ -1,4 +1,4 @@
-"""A door whose supervisor has gone: it stays held, unless the site limits that time."""
+"""DOOR-2: a door whose supervisor has gone stays held, unless the site limits that time."""
 
 from bridges.kinds.shared.decision import Attended
 from tests.kinds.door.virtual import OBSTRUCTION, Door

@@ -1,4 +1,4 @@
-"""The door's core, decision by decision, in virtual time."""
+"""The door's core, rule by rule, in virtual time."""
 
 import math
 
@@ -8,16 +8,30 @@ from msgspec.structs import replace
 from bridges.kinds.door.memory import DoorLimits
 from bridges.kinds.door.report import DoorReport
 from bridges.kinds.door.settings import Durations, Pulse
-from bridges.kinds.door.signals import CloseRequested, DoorOutputs, DoorSample, OpenRequested
-from bridges.kinds.shared.decision import Fault, IoFailed, OperatorReset, RivalSeen
+from bridges.kinds.door.signals import CloseRequested, DoorOutputs, DoorSample, Event, OpenRequested
+from bridges.kinds.shared.decision import (
+    Fault,
+    IoFailed,
+    OperatorReset,
+    RivalSeen,
+    Sampled,
+    Suspended,
+    WriteFailed,
+)
+from bridges.kinds.shared.durations import RIVAL_QUIET_S
 from bridges.messages.definitions import DoorModeValue
 from tests.kinds.door.virtual import BETWEEN, BOTH, CLOSED, DEBOUNCED, OPEN, CoreAlone
 
+ESTIMATED = DoorLimits(t=Durations(open_delay_s=4.0, travel_s=6.0), estimated=True)
+STALE_S = Durations().stale_after_s
 OPENS, CLOSES = OpenRequested("door_supervisor"), CloseRequested("door_supervisor")
 
 
 def limits(**durations: float) -> DoorLimits:
     return DoorLimits(t=Durations(**durations), debounce=DEBOUNCED)
+
+
+# ---- DOOR-5: without a fresh reading
 
 
 def test_before_the_first_reading_a_door_is_offline_and_nothing_is_held() -> None:
@@ -40,10 +54,16 @@ def test_an_open_before_the_first_reading_is_kept_and_held_with_it() -> None:
     assert core.told == [(0.0, "OFFLINE", False), (1.0, "UNKNOWN", True), (1.0625, "CLOSED", True)]
 
 
+# ---- DOOR-6: its contacts
+
+
 def test_a_doors_position_is_unknown_before_its_contacts_have_settled() -> None:
     core = CoreAlone()
     core.sees(OPEN, until=0.3)
     assert core.told == [(0.0, "UNKNOWN", False), (0.0625, "OPEN", False)]
+
+
+# ---- DOOR-1: OPEN, CLOSE and the grace
 
 
 def test_an_open_request_holds_the_door_and_its_contacts_show_how_far_it_is() -> None:
@@ -111,6 +131,9 @@ def test_without_grace_a_close_request_releases_the_hold_at_once() -> None:
     assert core.hears(CLOSES).outputs == DoorOutputs(hold_open=False)
 
 
+# ---- DOOR-3: obstructions
+
+
 def test_an_obstruction_holds_the_door_again_until_it_has_been_away_for_a_second() -> None:
     core = CoreAlone(limits(close_grace_s=1.0))
     clear = replace(OPEN, obstruction=False)
@@ -143,6 +166,24 @@ def test_an_obstruction_at_an_idle_door_does_not_open_it() -> None:
     core.sees(replace(CLOSED, obstruction=True), until=10.0)
     core.sees(replace(OPEN, obstruction=True), until=20.0)
     assert [hold for _, _, hold in core.told] == [False, False, False]
+
+
+def test_a_hold_that_ended_at_once_still_gives_way_to_an_obstruction() -> None:
+    core = CoreAlone(limits(close_grace_s=0.0))
+    core.sees(replace(OPEN, obstruction=False), until=1.0)
+    core.hears(OPENS)
+    core.hears(CLOSES)
+    core.sees(replace(BETWEEN, obstruction=True), until=2.0)
+    assert core.told[-3:] == [(1.0, "OPEN", True), (1.0, "OPEN", False), (1.0625, "MOVING", True)]
+
+
+def test_an_obstruction_at_a_door_that_is_not_held_is_not_a_fault() -> None:
+    core = CoreAlone()
+    core.sees(replace(OPEN, obstruction=True), until=1.0)
+    assert core.faults() == ()
+
+
+# ---- DOOR-6, DOOR-SENSING-4: what is told of its position
 
 
 def test_open_and_closed_at_once_is_unknown_and_a_fault_while_it_lasts() -> None:
@@ -181,6 +222,21 @@ def test_a_door_that_reverses_gets_its_whole_travel_time_again() -> None:
     ]
 
 
+def test_a_door_whose_controller_does_not_say_where_it_is_is_unknown_for_that_reason() -> None:
+    core = CoreAlone()
+    core.sees(OPEN, until=1.0)
+    core.sees(replace(OPEN, lost="status 7 is not listed"), until=2.0)
+    assert core.faults() == ("DOOR_POSITION_UNKNOWN: status 7 is not listed",)
+    core.sees(OPEN, until=3.0)
+    assert core.faults() == ()
+    assert core.told == [
+        (0.0, "UNKNOWN", False),
+        (0.0625, "OPEN", False),
+        (1.0, "UNKNOWN", False),
+        (2.0, "OPEN", False),
+    ]
+
+
 def test_a_door_that_does_not_open_is_a_fault_and_stays_held() -> None:
     core = CoreAlone(limits(open_timeout_s=4.0))
     core.sees(CLOSED, until=1.0)
@@ -195,6 +251,9 @@ def test_a_door_that_does_not_open_is_a_fault_and_stays_held() -> None:
     assert core.faults() == ("DOOR_OPENING_FAULT: held, but not open after 4.0 s",)
     core.sees(OPEN, until=7.0)
     assert core.faults() == ()
+
+
+# ---- DOOR-5, DOOR-SENSING-1, DOOR-SENSING-2: gaps
 
 
 def test_a_door_whose_reading_is_too_old_is_offline_with_the_hold_off_and_remembers_the_request() -> (
@@ -284,6 +343,69 @@ def test_a_missing_scan_is_a_lost_connection() -> None:
     assert core.faults() == ("COMMUNICATION_LOST: no reading for 1.0 s",)
 
 
+def test_after_a_sleep_nothing_is_believed_of_the_inputs() -> None:
+    core = CoreAlone()
+    core.hears(OPENS)
+    core.sees(OPEN, until=0.5)
+    core.hears(Suspended("the machine slept"))
+    assert core.faults() == ("COMMUNICATION_LOST: the machine slept",)
+    core.sees(OPEN, until=1.0)
+    assert core.told == [
+        (0.0, "OFFLINE", False),
+        (0.0, "UNKNOWN", True),
+        (0.0625, "OPEN", True),
+        (0.5, "OFFLINE", False),
+        (0.5, "UNKNOWN", True),
+        (0.5625, "OPEN", True),
+    ]
+
+
+def test_a_failed_write_does_not_start_the_debounce_of_a_contact_again() -> None:
+    core = CoreAlone()
+    core.sees(CLOSED, until=1.0)
+    for now, event in (
+        (1.0, Sampled(OPEN)),
+        (1.03125, WriteFailed("no reply")),
+        (1.0625, Sampled(OPEN)),
+    ):
+        core.now = now
+        core.hears(event)
+    assert core.told[-1] == (1.0625, "OPEN", False)
+
+
+def test_a_silence_has_its_own_reason_and_not_that_of_an_earlier_failure() -> None:
+    def silence_after(failure: Event) -> tuple[str, ...]:
+        core = CoreAlone()
+        core.sees(OPEN, until=1.0)
+        core.hears(failure)
+        core.now = 10.0
+        core.hears(OPENS)
+        return core.faults()
+
+    assert silence_after(WriteFailed("no reply")) == ("COMMUNICATION_LOST: no reply",)
+    core = CoreAlone()
+    core.hears(IoFailed("no reply"))
+    core.hears(Sampled(OPEN))
+    core.now = 10.0
+    core.hears(OPENS)
+    assert core.faults() == (f"COMMUNICATION_LOST: no reading for {STALE_S} s",)
+
+
+def test_a_hazard_half_seen_before_a_gap_is_not_a_hazard() -> None:
+    core = CoreAlone(replace(limits(), on_fire="open"))
+    core.hears(Sampled(replace(OPEN, fire=False, obstruction=False)))
+    decided = core.hears(IoFailed("no reply"))
+    assert (core.faults(), decided.outputs.hold_open) == ((), False)
+
+
+def test_the_core_wakes_when_its_reading_is_too_old() -> None:
+    core = CoreAlone(DoorLimits())
+    assert core.hears(Sampled(CLOSED)).wake_at == STALE_S
+
+
+# ---- DOOR-7: a rival
+
+
 def test_a_rival_takes_the_door_offline_and_the_hold_off_until_five_quiet_seconds() -> None:
     core = CoreAlone()
     core.hears(OPENS)
@@ -302,6 +424,13 @@ def test_a_rival_takes_the_door_offline_and_the_hold_off_until_five_quiet_second
     ]
 
 
+def test_the_core_wakes_when_another_node_has_been_silent_for_long_enough() -> None:
+    assert CoreAlone().hears(RivalSeen()).wake_at == RIVAL_QUIET_S
+
+
+# ---- DOOR-4: fire
+
+
 def test_a_fire_releases_the_door_forgets_the_request_and_refuses_to_open() -> None:
     core = CoreAlone()
     quiet, fire = replace(OPEN, fire=False), replace(OPEN, fire=True)
@@ -318,6 +447,25 @@ def test_a_fire_releases_the_door_forgets_the_request_and_refuses_to_open() -> N
         (3.0, "OPEN", False),
         (4.0, "OPEN", True),
     ]
+
+
+@pytest.mark.parametrize(
+    "event",
+    [
+        Sampled(OPEN),
+        Suspended("slept"),
+        WriteFailed("no reply"),
+        IoFailed("no reply"),
+        RivalSeen(),
+        OPENS,
+        CLOSES,
+        OperatorReset(),
+    ],
+)
+def test_no_event_is_refused_without_a_fire(event: Event) -> None:
+    core = CoreAlone()
+    core.hears(OPENS)
+    assert core.hears(event).refused == ""
 
 
 def test_a_fire_holds_open_against_close_where_the_site_says_so() -> None:
@@ -352,6 +500,9 @@ def test_only_a_fire_lets_a_fire_door_close_on_an_obstruction() -> None:
     assert core.told[-1] == (1.0625, "UNKNOWN", False)
 
 
+# ---- DOOR-1: a hold by pulses
+
+
 def test_an_operator_that_closes_by_itself_is_triggered_at_a_steady_pace() -> None:
     core = CoreAlone(DoorLimits(debounce=DEBOUNCED, pulse=Pulse(on_s=0.5, every_s=3.0)))
     core.sees(CLOSED, until=1.0)
@@ -376,6 +527,22 @@ def test_between_two_pulses_the_door_is_still_held() -> None:
     core.hears(OPENS)
     decided = core.sees(OPEN, until=2.0)
     assert (decided.outputs, decided.report.hold) == (DoorOutputs(between_pulses=True), True)
+
+
+def test_the_core_wakes_at_the_edges_of_each_pulse() -> None:
+    core = CoreAlone(DoorLimits(t=Durations(stale_after_s=9.0), pulse=Pulse(on_s=0.5, every_s=3.0)))
+    core.hears(OPENS)
+    core.hears(Sampled(OPEN))
+    wakes = []
+    for _ in range(4):
+        assert core.last is not None
+        core.now = core.last.wake_at
+        core.hears(OPENS)
+        wakes.append(core.now)
+    assert wakes == [0.5, 3.0, 3.5, 6.0]
+
+
+# ---- DOOR-SENSING-3: estimates
 
 
 def test_without_contacts_a_door_is_estimated_by_its_travel_time_and_marked_so() -> None:
@@ -413,6 +580,39 @@ def test_an_estimate_begins_again_after_a_failed_reading() -> None:
     ]
 
 
+def test_a_failed_write_leaves_the_reading_and_starts_the_estimate_again() -> None:
+    core = CoreAlone(ESTIMATED)
+    core.hears(OPENS)
+    core.sees(DoorSample(), until=5.0)
+    core.hears(WriteFailed("no reply"))
+    core.sees(DoorSample(), until=10.0)
+    assert core.told == [
+        (0.0, "OFFLINE", False),
+        (0.0, "MOVING", True),
+        (4.0, "OPEN", True),
+        (5.0, "MOVING", True),
+        (9.0, "OPEN", True),
+    ]
+
+
+def test_the_core_wakes_when_an_estimated_door_has_arrived_and_then_for_its_next_reading() -> None:
+    core = CoreAlone(replace(ESTIMATED, t=replace(ESTIMATED.t, stale_after_s=20.0)))
+    assert core.hears(Sampled(DoorSample())).wake_at == 6.0
+    assert core.hears(OPENS).wake_at == 4.0
+    core.now = 4.0
+    assert core.hears(OPENS).wake_at == 20.0
+
+
+def test_the_core_wakes_when_a_door_that_was_not_read_for_a_while_is_estimated_closed() -> None:
+    core = CoreAlone(replace(ESTIMATED, t=replace(ESTIMATED.t, stale_after_s=20.0)))
+    core.hears(Sampled(DoorSample()))
+    core.hears(IoFailed("no reply"))
+    core.now = 2.0
+    core.hears(Sampled(DoorSample()))
+    core.now = 6.0
+    assert core.hears(Sampled(DoorSample())).wake_at == 8.0
+
+
 def test_without_open_delay_s_a_door_is_never_estimated_open() -> None:
     core = CoreAlone(DoorLimits(estimated=True))
     core.hears(OPENS)
@@ -441,6 +641,9 @@ def test_a_missing_contact_proves_nothing_unless_estimates_are_allowed() -> None
     assert core.told[1:] == [(0.0, "MOVING", True), (10.0, "UNKNOWN", True)]
 
 
+# ---- faults, which change no output
+
+
 def test_a_door_held_for_very_long_is_reported_and_stays_held() -> None:
     core = CoreAlone(limits(max_hold_s=60.0))
     core.hears(OPENS)
@@ -449,6 +652,36 @@ def test_a_door_held_for_very_long_is_reported_and_stays_held() -> None:
     core.sees(OPEN, until=61.0)
     assert core.faults() == ("DOOR_OPEN_TOO_LONG: held for RMF longer than 60.0 s",)
     assert core.told[-1] == (0.0625, "OPEN", True)
+
+
+def test_the_controllers_own_errors_are_one_fault_that_moves_nothing() -> None:
+    core = CoreAlone()
+    core.hears(OPENS)
+    core.sees(replace(OPEN, errors=("motor too hot", "bit 9")), until=1.0)
+    assert core.faults() == ("DOOR_CONTROLLER_FAULT: motor too hot; bit 9",)
+    core.sees(OPEN, until=2.0)
+    assert core.faults() == ()
+    assert core.told == [(0.0, "OFFLINE", False), (0.0, "UNKNOWN", True), (0.0625, "OPEN", True)]
+
+
+def test_a_repeated_open_does_not_put_off_the_fault_of_a_door_held_too_long() -> None:
+    core = CoreAlone(limits(max_hold_s=60.0))
+    for second in range(61):
+        core.hears(OPENS)
+        core.sees(OPEN, until=float(second))
+    assert core.faults() == ("DOOR_OPEN_TOO_LONG: held for RMF longer than 60.0 s",)
+
+
+def test_a_door_counts_as_held_too_long_at_the_very_instant_for_which_the_core_wakes() -> None:
+    core = CoreAlone(replace(limits(max_hold_s=0.5), debounce={}))
+    core.hears(Sampled(OPEN))
+    core.now = core.hears(OPENS).wake_at
+    core.hears(OPENS)
+    assert (core.now, core.faults()) == (
+        0.5,
+        ("DOOR_OPEN_TOO_LONG: held for RMF longer than 0.5 s",),
+    )
+    assert core.hears(OPENS).wake_at < math.inf
 
 
 def test_a_new_reading_that_says_the_same_is_not_news() -> None:

@@ -43,6 +43,9 @@ class Corridor:
 OPEN, CLOSED = DoorModeValue.MODE_OPEN, DoorModeValue.MODE_CLOSED
 
 
+# ---- DOOR-1, DOOR-2: passages
+
+
 def test_a_robot_passes_a_door() -> None:
     corridor = Corridor()
     corridor.run(1.0)
@@ -149,6 +152,9 @@ def test_a_thousand_opens_cost_the_relay_one_edge() -> None:
     assert door.relay == [(1.0, True)]
 
 
+# ---- DOOR-6: broken parts
+
+
 def test_a_broken_operator_is_a_door_that_does_not_open() -> None:
     door = Door()
     door.plant.fail("operator", "off")
@@ -189,6 +195,9 @@ def test_a_cut_wire_of_each_contact_never_reads_as_open() -> None:
         door.plant.fail(signal, "off")
         door.run(10.0)
         assert "OPEN" not in [mode for _, mode in door.told], signal
+
+
+# ---- DOOR-5: what is lost and comes back
 
 
 def test_a_door_whose_module_is_lost_is_offline_and_is_held_again_when_it_is_back() -> None:
@@ -254,6 +263,9 @@ def test_a_daemon_restarted_under_a_robot_is_told_again_by_the_supervisor() -> N
     assert corridor.door.relay[1] == (10.0, False)
     assert corridor.door.relay[2][1] is True
     assert corridor.door.told[-1][1] == "OPEN"
+
+
+# ---- DOOR-4: fire
 
 
 def test_a_fire_releases_a_door_and_the_latch_is_gone_afterwards() -> None:

@@ -1,4 +1,4 @@
-"""The grace of a CLOSE is a door's limit on switching: it lengthens a hold and refuses none."""
+"""DOOR-1: the grace of a CLOSE is a door's limit on switching: it lengthens a hold and refuses none."""
 
 import pytest
 

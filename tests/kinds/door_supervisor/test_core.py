@@ -3,14 +3,17 @@
 from itertools import pairwise
 
 import pytest
+from msgspec.structs import replace
 
 from bridges.kinds.door_supervisor import core
-from bridges.kinds.door_supervisor.memory import Limits
+from bridges.kinds.door_supervisor.memory import VISIT_S, Holder, Limits
 from bridges.kinds.door_supervisor.report import DoorHoldReport
 from bridges.kinds.door_supervisor.signals import CloseRequested, OpenRequested
 from bridges.kinds.shared.graph_kind import MaySpeak
 from bridges.messages.definitions import DoorModeValue
 from tests.kinds.door_supervisor.alone import Alone
+
+# ---- DOOR-SUPERVISOR-1, DOOR-SUPERVISOR-2: holders, OPEN and CLOSE
 
 
 def test_open_goes_out_for_the_first_holder_and_close_when_the_last_one_goes() -> None:
@@ -26,12 +29,28 @@ def test_open_goes_out_for_the_first_holder_and_close_when_the_last_one_goes() -
     assert desk.sent == [(0.0, "OPEN"), (2.0, "OPEN"), (6.0, "CLOSED")]
 
 
+def test_a_request_that_counts_is_not_refused() -> None:
+    desk = Alone()
+    desk.opens()
+    desk.shows("OPEN")
+    desk.until(0.5)
+    desk.closes()
+    desk.shows("CLOSED")
+    assert (desk.sent, desk.refused) == ([(0.0, "OPEN"), (0.5, "CLOSED")], [])
+
+
+# ---- DOOR-SUPERVISOR-3: silence
+
+
 def test_silence_and_time_close_nothing() -> None:
     desk = Alone(Limits(open_alarm_s=86400.0))
     desk.opens()
     desk.shows("OPEN", until=4000.0)
     assert desk.sent == [(float(s), "OPEN") for s in range(6)]
     assert desk.holders == ["a"]
+
+
+# ---- DOOR-SUPERVISOR-2, DOOR-SUPERVISOR-5: repeats
 
 
 def test_a_requesters_repeats_are_passed_on_at_1_hz_at_the_most() -> None:
@@ -156,7 +175,7 @@ def test_a_close_from_a_requester_that_does_not_hold_the_door_is_ignored() -> No
     assert (desk.sent, desk.holders) == ([(0.0, "OPEN")], ["a"])
 
 
-# --- late, repeated and reordered requests -----------------------------------------------------
+# ---- DOOR-SUPERVISOR-1, FRESHNESS-1, FRESHNESS-3, FRESHNESS-5: late, repeated and reordered requests
 
 
 def test_a_late_close_does_not_end_the_next_visit() -> None:
@@ -282,7 +301,14 @@ def test_many_invented_names_are_refused_and_the_holder_is_still_heard() -> None
     assert "a" not in desk.holders
 
 
-# --- when it may speak -------------------------------------------------------------------------
+def test_a_repeat_belongs_to_the_same_visit_unless_it_comes_late() -> None:
+    holder = Holder("fleet/a", since=1.0, asked_at=5.0, stamp=7, visit=3)
+    late = 5.0 + VISIT_S
+    assert holder.repeats(8, late) == replace(holder, asked_at=late, stamp=8)
+    assert holder.repeats(8, late + 0.1) == replace(holder, asked_at=late + 0.1, stamp=8, visit=8)
+
+
+# ---- DOOR-SUPERVISOR-4: when it may speak
 
 
 def test_after_its_quiet_start_it_first_sends_open_for_each_holder() -> None:
@@ -322,7 +348,7 @@ def test_beside_another_supervisor_it_sends_nothing_and_keeps_its_table() -> Non
     assert (desk.sent, desk.holders) == ([(0.0, "OPEN"), (20.0, "OPEN")], ["b"])
 
 
-# --- what is told ------------------------------------------------------------------------------
+# ---- DOOR-SUPERVISOR-3: what is told
 
 
 def test_a_door_that_one_requester_has_held_for_too_long_is_a_fault_and_nothing_else() -> None:

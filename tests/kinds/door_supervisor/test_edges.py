@@ -183,3 +183,8 @@ def test_after_a_restart_the_holders_are_known_and_older_requests_are_stale() ->
 def test_a_table_that_is_cut_or_damaged_is_refused_as_a_whole(kept: bytes) -> None:
     with pytest.raises(ValueError, match="table"):
         keep.restore(kept, ANY, 0.0)
+
+
+def test_a_file_that_is_not_a_table_is_refused_with_what_it_should_be() -> None:
+    with pytest.raises(ValueError, match=r"^not a table of who holds which door: "):
+        keep.restore(b"[]", Settings(), 0.0)

@@ -55,6 +55,9 @@ class Site:
         return [(at, word) for at, _, word in to_door(self.world)]
 
 
+# ---- DOOR-SUPERVISOR-1, DOOR-SUPERVISOR-2: passages
+
+
 def test_a_robot_passes_a_door() -> None:
     site = Site([(10.0, 8.0)])
     (a,) = site.walkers
@@ -92,6 +95,9 @@ def test_of_two_robots_the_first_to_leave_does_not_close_on_the_other() -> None:
     assert [what for _, what in a.log] == ["asks", "enters", "leaves", "done"]
     assert b.log[1:] == [(13.125, "enters"), (43.125, "leaves"), (43.2, "done")]
     assert [round(at, 3) for at, _ in site.relay] == [10.0, 46.125]
+
+
+# ---- DOOR-SUPERVISOR-4: restarts
 
 
 def test_a_supervisor_restarted_with_a_robot_in_the_doorway_closes_nothing() -> None:
@@ -157,6 +163,9 @@ def test_with_rmfs_own_supervisor_such_a_session_stays_for_ever() -> None:
     assert [on for _, on in site.relay] == [True]
 
 
+# ---- DOOR-SUPERVISOR-2: a door that was away
+
+
 def test_a_door_back_from_offline_with_an_open_session_is_opened_again() -> None:
     site = Site([(10.0, 60.0)])
     (a,) = site.walkers
@@ -177,6 +186,9 @@ def test_a_door_that_loses_power_over_a_robot_is_opened_again_without_being_aske
     assert site.relay[-1][0] <= 21.25
 
 
+# ---- DOOR-SUPERVISOR-3: a door left open
+
+
 def test_a_door_left_open_from_the_web_raises_an_alarm_and_stays_open() -> None:
     site = Site(open_alarm_s=60.0)
     site.world.run(10.0)
@@ -190,6 +202,9 @@ def test_a_door_left_open_from_the_web_raises_an_alarm_and_stays_open() -> None:
     site.world.run(610.0)
     assert site.ours.faults() == {}
     assert [on for _, on in site.relay] == [True, False]
+
+
+# ---- DOOR-SUPERVISOR-4: another supervisor
 
 
 def test_beside_another_supervisor_it_is_passive_and_takes_over_without_a_close() -> None:
@@ -209,6 +224,9 @@ def test_beside_another_supervisor_it_is_passive_and_takes_over_without_a_close(
 
 
 SUPERVISORS = (topics.DOOR_REQUESTS, topics.DOOR_SUPERVISOR_HEARTBEAT)
+
+
+# ---- the heartbeat, and each door by itself
 
 
 def test_the_heartbeat_goes_out_each_second_and_when_the_table_changes() -> None:
@@ -274,6 +292,9 @@ def doorway(*, rival: bool = False, quiet_s: float = 3.0) -> Site:
         site.ours.restart()
     site.world.run(40.0)
     return site
+
+
+# ---- DOOR-SUPERVISOR-4: holders that are restored
 
 
 def test_a_robot_in_the_doorway_keeps_its_door_when_the_door_and_our_supervisor_die_together() -> (

@@ -1,14 +1,23 @@
-"""A lift whose AGV mode is the result of a call: nothing else asks for it."""
+"""LIFT-DRIVE-2, LIFT-DRIVE-5: a lift whose AGV mode comes by a call; nothing else asks for it."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
 from msgspec.structs import replace
 
-from bridges.kinds.lift.signals import Door, LiftOutputs, Motion
+from bridges.kinds.lift.signals import (
+    Door,
+    Hazard,
+    LiftOutputs,
+    LiftSample,
+    Motion,
+    Side,
+)
 from bridges.settings.load import load
 from drivers.lift.dry_contact import Settings
 from tests.depth import depth
+from tests.kinds.lift.alone import ASKED, CLOSED, Alone
 from tests.kinds.lift.invariants import check, nothing_changes_before_wake_at
 from tests.kinds.lift.story import STANDING, Building, Story
 from tests.kinds.lift.walk import limits_of, start, walker
@@ -109,6 +118,68 @@ def test_agv_mode_may_end_between_two_destinations() -> None:
     building.set(agv=False)
     story.run(8.0)
     assert (story.outputs.hold_door, story.outputs.call, story.faults) == (None, "L1", [])
+
+
+def calls_and_holds(
+    alone: Alone, readings: Sequence[tuple[float, LiftSample]]
+) -> list[tuple[float, str | None, Side | None]]:
+    """(s, landing that is called, door that is held) after each reading, while a robot asks."""
+    shown = []
+    for now, reading in readings:
+        outputs = alone(now, reading, ASKED).decision.outputs
+        shown.append((now, outputs.call, outputs.hold_door))
+    return shown
+
+
+def test_a_car_that_a_call_has_brought_is_not_called_again_because_its_floor_is_not_seen() -> None:
+    """With `by_call`, while AGV mode is on: only a car that is seen elsewhere is called again."""
+    alone = Alone(by_call=True)
+    below = replace(CLOSED, level="L2", agv=False)
+    readings = [
+        (0.0, below),
+        (0.5, replace(below, agv=True)),
+        (1.0, CLOSED),
+        (1.5, CLOSED),
+        (2.0, replace(CLOSED, level=None)),
+        (9.0, replace(CLOSED, level=None)),
+    ]
+    alone(0.0, ASKED)
+    assert calls_and_holds(alone, readings) == [
+        (0.0, "L1", None),
+        (0.5, "L1", None),
+        (1.0, None, None),
+        (1.5, None, Side.FRONT),
+        (2.0, None, None),
+        (9.0, None, None),
+    ]
+
+
+def test_a_car_at_its_destination_is_called_again_when_agv_mode_has_ended_by_itself() -> None:
+    """With `by_call`: an overload has ended the call, and the floor was not seen, so nothing was on."""
+    alone = Alone(by_call=True)
+    below, gone = replace(CLOSED, level="L2"), replace(CLOSED, level=None)
+    readings = [
+        (0.0, replace(below, agv=False)),
+        (0.5, below),
+        (1.0, CLOSED),
+        (1.5, CLOSED),
+        (2.0, replace(gone, hazards=frozenset({Hazard.OVERLOAD}))),
+        (3.0, replace(gone, agv=False)),
+        (3.5, replace(CLOSED, agv=False)),
+        (4.0, CLOSED),
+        (4.5, CLOSED),
+    ]
+    assert calls_and_holds(alone, readings) == [
+        (0.0, "L1", None),
+        (0.5, "L1", None),
+        (1.0, None, None),
+        (1.5, None, Side.FRONT),
+        (2.0, None, None),
+        (3.0, "L1", None),
+        (3.5, "L1", None),
+        (4.0, None, None),
+        (4.5, None, Side.FRONT),
+    ]
 
 
 LIMITS = limits_of(agv_mode="by_call")

@@ -1,4 +1,4 @@
-"""A supervisor that has forgotten the robot in the car: by RMF's own rules, and rule by rule.
+"""LIFT-2: a supervisor that has forgotten the robot in the car: by RMF's own rules, and rule by rule.
 
 rmf_ros2, lift_supervisor/Node.cpp: one slot for each lift, adopted from whoever is heard first; what
 any other session asks, its END among it, is dropped.

@@ -5,9 +5,21 @@ from msgspec.structs import replace
 
 from bridges.kinds.lift.messages import alarm_topics
 from bridges.kinds.lift.settings import LiftSettings
-from bridges.kinds.lift.signals import Door, Hazard, LiftOutputs, LiftSample, Motion, Side
+from bridges.kinds.lift.signals import (
+    Door,
+    Hazard,
+    LiftOutputs,
+    LiftSample,
+    Motion,
+    Requested,
+    Side,
+)
+from bridges.kinds.shared.decision import (
+    RivalSeen,
+)
 from bridges.messages.definitions import Bool, EmergencySignal
 from bridges.messages.topics import EMERGENCY_SIGNAL, FIRE_ALARM_TRIGGER, RETAINED
+from tests.kinds.lift.alone import AT_L1, CLOSED, Alone
 from tests.kinds.lift.story import Building, Controller, Story
 
 CLOSED_AT_L1 = LiftSample("L1", Door.CLOSED, motion=Motion.STOPPED, agv=True)
@@ -41,6 +53,9 @@ def inside(**options: object) -> Story:
     story.asks("A", "L1")
     story.run(2.0)
     return story
+
+
+# ---- LIFT-5: whether the open door is shown
 
 
 @pytest.mark.parametrize(("hazard", "mode"), MODES)
@@ -89,6 +104,9 @@ def test_after_boarding_the_true_door_is_shown_so_that_the_robot_gets_out(
     ]
 
 
+# ---- LIFT-4: a hazard that is over
+
+
 @pytest.mark.parametrize(("hazard", "mode"), MODES)
 def test_a_hazard_that_has_cleared_leaves_no_latch(hazard: Hazard, mode: str) -> None:
     story = waiting()
@@ -126,6 +144,19 @@ def test_a_hazard_on_the_way_cancels_the_call_and_the_ride_resumes_afterwards() 
     assert story.state == "AGV, open at L3, A to L3"
 
 
+def test_a_pulsed_call_that_a_hazard_cut_short_is_given_again_when_it_is_over() -> None:
+    alone = Alone(stale_after_s=900.0, call_pulse_s=2.0, hazard_clear_s=1.0)
+    alone(0.0, CLOSED)(1.0, Requested("A", True, "L3"))
+    assert alone.decision.outputs.call == "L3"
+    alone(2.0, replace(CLOSED, hazards=frozenset({Hazard.EMERGENCY})))
+    assert alone.decision.outputs == LiftOutputs()
+    alone(10.0, CLOSED)(11.0, CLOSED)
+    assert alone.decision.outputs.call == "L3"
+
+
+# ---- LIFT-SENSING-1: hazards that flicker
+
+
 def test_a_hazard_that_flickers_on_is_ignored_and_one_that_flickers_off_stays() -> None:
     story = waiting()
     story.building.hazard(Hazard.FIRE)
@@ -161,6 +192,15 @@ def test_a_hazard_clears_after_the_longer_of_its_two_times(
     assert story.faults == []
 
 
+def test_a_hazard_that_clears_wakes_the_core() -> None:
+    burning = replace(AT_L1, hazards=frozenset({Hazard.EMERGENCY}))
+    alone = Alone(hazard_clear_s=0.7)(0.0, burning)(0.5, AT_L1)
+    assert alone.decision.wake_at == 0.5 + 0.7
+
+
+# ---- LIFT-4: which hazard is shown
+
+
 def test_a_reset_while_nothing_can_be_read_does_not_report_a_fire() -> None:
     story = waiting(fire_reset="manual", alarm="fire_alarm_trigger")
     story.building.unreadable = "no answer"
@@ -178,6 +218,9 @@ def test_fire_comes_before_every_other_mode() -> None:
     story.run(3.0)
     assert story.state.startswith("FIRE")
     assert story.faults == [h.name for h in Hazard]
+
+
+# ---- LIFT-4, LIFT-DRIVE-3, LIFT-DRIVE-5: overload only delays
 
 
 def test_an_overload_keeps_the_door_held_and_only_delays_the_ride() -> None:
@@ -263,6 +306,9 @@ def test_agv_mode_that_is_never_confirmed_is_waited_for_through_an_overload() ->
     story.run(10.0)
     assert story.faults == ["OVERLOAD"]
     assert story.outputs == LiftOutputs(agv_request=True)
+
+
+# ---- LIFT-4: latches, and what the fleets are told
 
 
 def test_with_automatic_reset_rmf_gets_the_lift_back_when_the_fire_is_over() -> None:
@@ -436,6 +482,9 @@ def test_a_latched_fire_stays_latched_while_nobody_can_see_whether_it_is_over(ov
     assert story.alarms == [(2.1, Bool(True))]
 
 
+# ---- LIFT-4: a rival
+
+
 def test_a_second_node_for_this_lift_switches_it_off_until_it_is_gone() -> None:
     story = waiting()
     for second in range(3, 8):
@@ -449,3 +498,8 @@ def test_a_second_node_for_this_lift_switches_it_off_until_it_is_gone() -> None:
     assert story.outputs == LiftOutputs()
     story.run(11.0)
     assert (story.outputs.agv_request, story.faults) == (True, [])
+
+
+def test_the_core_wakes_when_another_node_has_gone() -> None:
+    alone = Alone(stale_after_s=60.0)(0.0, AT_L1)(1.0, RivalSeen())
+    assert alone.decision.wake_at == 6.0

@@ -34,6 +34,9 @@ def hold(side: Side = Side.FRONT) -> LiftOutputs:
     return LiftOutputs(agv_request=True, hold_door=side)
 
 
+# ---- LIFT-DRIVE-3: never on together
+
+
 def test_two_calls_are_never_on_together_and_their_relays_rest_between() -> None:
     wishes = [(0.0, call("L1")), (1.0, call("L2")), (1.29, call("L2")), (1.3, call("L2"))]
     assert driven(Relays(), wishes, limits(min_off_s=0)) == ["A L1", "A", "A", "A L2"]
@@ -49,6 +52,9 @@ def test_relays_rest_between_a_call_and_a_door_command() -> None:
 def test_two_doors_are_never_commanded_together_and_their_relays_rest_between() -> None:
     wishes = [(0.0, hold()), (1.0, hold(Side.REAR)), (1.2, hold(Side.REAR)), (1.3, hold(Side.REAR))]
     assert driven(Relays(), wishes, limits(min_off_s=0)) == ["A front", "A", "A", "A rear"]
+
+
+# ---- LIFT-DRIVE-6: a relay rests, and off never waits
 
 
 def test_an_output_that_went_off_stays_off_for_its_time() -> None:
@@ -95,6 +101,9 @@ def test_the_core_wakes_when_relays_have_rested() -> None:
     assert worn.changes_at(call("L1"), 6.0, rules) == 7.0
 
 
+# ---- LIFT-DRIVE-2, LIFT-DRIVE-3: which goes first
+
+
 def test_a_call_goes_before_a_door_command_when_both_are_wanted() -> None:
     both = LiftOutputs(agv_request=True, call="L1", hold_door=Side.FRONT)
     assert driven(Relays(), [(0.0, both), (9.0, both)], limits()) == ["A L1", "A L1"]
@@ -128,6 +137,9 @@ def test_at_the_end_the_door_is_let_go_before_agv_mode_and_in_a_hazard_all_at_on
         story.run(9.0)
         times = [at for at, _, value in story.edges if not value]
         assert times == ([2.1, 2.1] if hazard else [3.5, 4.0])
+
+
+# ---- LIFT-DRIVE-6, LIFT-5: too many changes
 
 
 def test_a_burst_of_changing_requests_does_not_wear_the_relays() -> None:
@@ -180,6 +192,9 @@ def test_a_lift_that_stands_because_a_relay_came_on_too_often_says_so() -> None:
         (5.5, "for the call: its relay must rest", rests),
         (62.0, "for the car at L4"),
     ]
+
+
+# ---- LIFT-DRIVE-4: pulses
 
 
 def test_a_reset_gives_no_second_pulse_where_nothing_was_wrong() -> None:

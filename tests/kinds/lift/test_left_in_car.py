@@ -1,4 +1,4 @@
-"""A session that RMF's supervisor ends while its robot is in the car, and a robot that was left there.
+"""LIFT-2: a session that RMF's supervisor ends while its robot is in the car; a robot left there.
 
 By RMF's own rules first: a supervisor that starts sends END for whatever session the lift shows, and
 takes up whoever is heard first (rmf_ros2, lift_supervisor/Node.cpp). A fleet adapter that starts sends
@@ -192,7 +192,7 @@ def test_a_robot_that_waits_outside_or_was_never_heard_is_ended_as_ever() -> Non
     assert sessions(outside.story) == ["", A, ""]
 
 
-# ---- a fleet adapter that was killed
+# ---- LIFT-2: a fleet adapter that was killed
 
 
 @pytest.mark.parametrize("back_after_s", [1.0, 8.0, 30.0])
@@ -266,7 +266,7 @@ def test_a_person_who_has_looked_into_the_car_gives_the_lift_to_the_next_robot()
     assert sessions(lift.story)[-1] == B
 
 
-# ---- an END that is older than its session
+# ---- LIFT-2: an END that is older than its session
 
 
 def test_an_end_from_before_the_session_counts_once_it_has_been_repeated_for_a_second() -> None:

@@ -28,6 +28,9 @@ def on_its_threshold(rides_before: int) -> tuple[World, Robot]:
     return rmf, robot
 
 
+# ---- LIFT-REPLAYED-1, LIFT-5: by RMF's own rules
+
+
 @pytest.mark.parametrize("rides_before", [1, 2])
 def test_an_earlier_ride_that_rmf_hears_again_lets_no_door_go_while_a_robot_goes_in(
     rides_before: int,
@@ -97,6 +100,9 @@ def test_an_earlier_ride_that_rmf_hears_again_shows_a_robot_no_door_that_was_let
         "AGV, moving at L2, fleet/a to L2",
         OPEN_FOR_A,
     ]
+
+
+# ---- LIFT-REPLAYED-1, LIFT-REPLAYED-2, LIFT-REPLAYED-3: rule by rule
 
 
 def test_a_floor_that_only_the_supervisor_asks_for_counts_after_a_while() -> None:

@@ -20,6 +20,9 @@ def at(level: str | None, door: Door = Door.CLOSED, *, agv: bool = True) -> Lift
     return LiftSample(level, door, motion=Motion.STOPPED, agv=agv)
 
 
+# ---- LIFT-1, LIFT-2, LIFT-3, LIFT-DRIVE-2: a whole ride
+
+
 def test_a_robot_rides_up_and_down_and_releases_the_lift() -> None:
     story = Story(Controller())
     story.run(1.0)
@@ -165,6 +168,9 @@ def test_a_floor_that_is_not_served_is_refused_and_the_session_goes_on_as_it_was
     assert story.node.refused == {"floor not served": 2}
 
 
+# ---- LIFT-1: HUMAN mode
+
+
 def test_human_mode_requested_by_the_holder_gives_the_lift_to_the_public_and_keeps_the_session() -> (
     None
 ):
@@ -217,6 +223,9 @@ def test_floors_have_any_names_and_are_never_read_by_their_last_character() -> N
     assert calls == ["L10", "B1", "8F_r", "G"]
 
 
+# ---- LIFT-3, LIFT-DRIVE-3: another destination
+
+
 def test_of_two_requests_for_two_floors_in_one_scan_the_second_counts() -> None:
     story = Story(Controller())
     story.run(1.0)
@@ -263,6 +272,9 @@ def test_another_destination_while_the_door_is_held_lets_it_go_and_then_calls() 
     ]
 
 
+# ---- LIFT-DRIVE-4: calls
+
+
 def test_a_pulsed_call_is_given_once_and_for_its_time() -> None:
     story = Story(Controller(), call_pulse_s=0.7)
     story.run(1.0)
@@ -292,6 +304,9 @@ def test_a_car_that_has_drifted_from_its_destination_is_called_again(pulse_s: fl
     called = [(at_s, value) for at_s, name, value in story.edges if name == "call"]
     assert called == [(1.0, "L1"), (called[1][0], None), (3.13, "L1")]
     assert story.outputs == LiftOutputs(agv_request=True, call="L1")
+
+
+# ---- LIFT-5, LIFT-SENSING-6: lifts with fewer lines
 
 
 def test_without_an_agv_status_line_agv_mode_counts_as_soon_as_it_is_requested() -> None:
@@ -361,6 +376,9 @@ def test_without_a_session_either_open_door_is_shown() -> None:
     building.set(rear_door=Door.BETWEEN)
     story.run(2.0)
     assert story.state == "AGV, moving at L2"
+
+
+# ---- what is refused, and what a person reads
 
 
 @pytest.mark.parametrize(

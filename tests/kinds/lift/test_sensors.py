@@ -5,10 +5,25 @@ from msgspec.structs import replace
 
 from bridges.kinds.lift.core import decide
 from bridges.kinds.lift.memory import Memory
-from bridges.kinds.lift.signals import Door, Hazard, LiftOutputs, LiftSample, Motion, Requested
-from bridges.kinds.shared.decision import Fault, Sampled
-from bridges.messages.definitions import LiftMotion
+from bridges.kinds.lift.sensing import MOTION_MEMORY_S
+from bridges.kinds.lift.signals import (
+    Door,
+    Hazard,
+    LiftOutputs,
+    LiftSample,
+    Motion,
+    Requested,
+)
+from bridges.kinds.shared.decision import (
+    Fault,
+    IoFailed,
+    OperatorReset,
+    Sampled,
+    Suspended,
+)
+from bridges.messages.definitions import LiftMode, LiftMotion
 from bridges.messages.stamps import in_seconds
+from tests.kinds.lift.alone import AT_L1, DEBOUNCE, Alone
 from tests.kinds.lift.story import WALL, Building, Controller, Story
 
 OPEN_AT_L1 = LiftSample("L1", Door.OPEN, motion=Motion.STOPPED, agv=True)
@@ -21,6 +36,9 @@ def boarding(**inputs: object) -> Story:
     story.asks("A", "L1")
     story.run(2.0)
     return story
+
+
+# ---- LIFT-5: the open door, and what contradicts it
 
 
 def test_an_open_door_is_offered_when_every_input_confirms_it() -> None:
@@ -60,6 +78,9 @@ def test_an_open_door_is_not_offered_when_one_input_contradicts_it(
     assert story.faults == faults
 
 
+# ---- LIFT-SENSING-6: whether the car stands
+
+
 @pytest.mark.parametrize(
     ("motion", "told"),
     [
@@ -72,6 +93,9 @@ def test_an_open_door_is_not_offered_when_one_input_contradicts_it(
 )
 def test_motion_is_read_from_the_motion_lines(motion: Motion, told: LiftMotion) -> None:
     assert boarding(motion=motion).motions[-1] is told
+
+
+# ---- LIFT-SENSING-1: debounce
 
 
 def test_a_door_contact_that_glitches_on_the_way_never_reads_as_open() -> None:
@@ -106,6 +130,9 @@ def test_an_open_contact_while_the_car_moves_reads_as_a_moving_door() -> None:
     story.run(5.0)
     assert story.state == "AGV, moving at L1, A to L1"
     assert story.edges == [(1.0, "agv_request", True), (1.0, "call", "L1")]
+
+
+# ---- LIFT-SENSING-3: a floor that the car cannot have reached
 
 
 def test_passing_a_floor_is_not_an_arrival() -> None:
@@ -167,6 +194,14 @@ def test_a_doubted_floor_is_believed_once_the_car_really_goes_there() -> None:
     assert (story.faults, story.state) == ([], "AGV, open at L3, A to L1")
 
 
+def test_a_floor_that_was_not_believed_is_believed_when_the_car_really_goes_there() -> None:
+    alone = Alone(stale_after_s=60.0)(0.0, AT_L1)(0.1, replace(AT_L1, level="L3"))(0.2, AT_L1)
+    moving = replace(AT_L1, motion=Motion.UP)
+    for now, level in ((1.0, None), (2.0, "L2"), (3.0, None), (4.0, "L3")):
+        alone(now, replace(moving, level=level))
+    assert (alone.decision.report.floor, alone.faults) == ("L3", ())
+
+
 def test_a_floor_code_that_changes_long_after_the_car_stopped_is_not_believed() -> None:
     story = boarding()
     story.building.set(motion=Motion.UP)
@@ -189,6 +224,19 @@ def test_a_slowly_debounced_floor_code_still_belongs_to_the_last_movement() -> N
     assert (story.faults, story.state) == ([], "AGV, open at L2")
 
 
+def test_a_floor_may_change_up_to_its_debounce_after_the_cars_last_movement() -> None:
+    moving = replace(AT_L1, motion=Motion.UP)
+    alone = Alone({"floor": 0.5}, stale_after_s=60.0)(0.0, moving)(1.0, moving)
+    alone(1.1, AT_L1)(2.9, replace(AT_L1, level="L2"))(3.45, replace(AT_L1, level="L2"))
+    assert (alone.decision.report.floor, alone.faults) == ("L2", ())
+
+
+def test_the_next_floor_is_believed_in_the_last_instant_in_which_a_movement_is_remembered() -> None:
+    alone = Alone(stale_after_s=60.0)(0.0, AT_L1)(1.0, replace(AT_L1, motion=Motion.UP))
+    alone(1.0 + MOTION_MEMORY_S, replace(AT_L1, level="L2"))
+    assert (alone.decision.report.floor, alone.faults) == ("L2", ())
+
+
 def test_an_operators_reset_confirms_the_floor_code() -> None:
     story = boarding()
     story.building.set(level="L3")
@@ -198,6 +246,14 @@ def test_an_operators_reset_confirms_the_floor_code() -> None:
     assert story.faults == []
     assert story.state == "AGV, open at L3, A to L1"
     assert story.outputs == LiftOutputs(agv_request=True, call="L1")
+
+
+def test_after_a_reset_the_shown_floor_is_believed_at_once() -> None:
+    alone = Alone()(0.0, AT_L1)(0.1, replace(AT_L1, level="L3"))
+    assert (alone.decision.report.floor, alone(0.1, OperatorReset()).decision.report.floor) == (
+        "",
+        "L3",
+    )
 
 
 def test_a_reset_moves_nothing_where_nothing_is_wrong() -> None:
@@ -225,6 +281,16 @@ def test_a_fast_car_may_skip_the_code_of_a_floor_that_it_has_had_time_to_pass() 
     story.building.set(level="L3", motion=Motion.STOPPED)
     story.run(4.0)
     assert (story.faults, story.state) == ([], "AGV, closed at L3, A to L1")
+
+
+def test_a_car_may_pass_a_floor_unseen_in_exactly_its_least_travel_time() -> None:
+    moving = replace(AT_L1, motion=Motion.UP)
+    alone = Alone(stale_after_s=60.0, floor_travel_min_s=2.0)(0.0, moving)
+    alone(2.0, replace(moving, level="L3"))
+    assert (alone.decision.report.floor, alone.faults) == ("L3", ())
+
+
+# ---- LIFT-SENSING-4: lines without a meaning outside AGV mode
 
 
 def test_lines_that_have_a_meaning_only_in_agv_mode_are_believed_there() -> None:
@@ -263,6 +329,9 @@ def test_a_movement_counts_at_once_when_the_motion_lines_had_no_meaning_before()
     assert story.state == "AGV, moving at L1"
 
 
+# ---- LIFT-SENSING-2, LIFT-4: gaps
+
+
 def test_one_missed_reading_changes_nothing() -> None:
     for inputs in ({}, {"motion": None, "agv": None}):
         story = boarding(**inputs)
@@ -286,6 +355,29 @@ def test_without_readings_the_lift_is_offline_with_outputs_off_and_still_publish
     assert story.node.status()["faults"] == [
         {"code": "INPUTS_NOT_FRESH", "detail": "no answer from 10.0.0.7"}
     ]
+
+
+def test_a_reading_no_longer_counts_at_the_very_instant_at_which_it_is_too_old() -> None:
+    burning = replace(AT_L1, door=Door.BOTH, hazards=frozenset({Hazard.EMERGENCY}))
+    alone = Alone(stale_after_s=2.0)(0.0, burning)(2.0, IoFailed("timeout"))
+    assert alone.faults == (Fault("INPUTS_NOT_FRESH", "timeout"),)
+
+
+def test_a_reading_in_the_instant_in_which_the_last_one_expires_starts_afresh() -> None:
+    alone = Alone(DEBOUNCE)(0.0, AT_L1)(0.5, AT_L1)(1.5, AT_L1)
+    shown = alone.decision.report
+    assert (shown.mode, shown.floor, alone.faults) == (LiftMode.MODE_OFFLINE, "", ())
+    alone(1.6, AT_L1)
+    assert alone.decision.report.floor == "L1"
+
+
+def test_after_a_sleep_everything_is_forgotten_but_the_last_landing() -> None:
+    alone = Alone()(0.0, AT_L1)(1.0, AT_L1)(2.0, Suspended("the machine slept"))
+    assert alone.decision.refused == ""
+    assert alone.faults == (Fault("INPUTS_NOT_FRESH", "the machine slept"),)
+    position = alone.memory.senses.position
+    assert (position.trusted, position.moved_at) == ("L1", 2.0)
+    assert alone.memory.senses == type(alone.memory.senses)(position=position)
 
 
 def test_the_lift_comes_back_by_itself_when_its_readings_come_back() -> None:
@@ -358,6 +450,9 @@ def test_a_glitch_that_a_gap_cuts_in_half_changes_nothing() -> None:
     assert [state for _, state in story.states if "open" in state] == []
 
 
+# ---- LIFT-SENSING-1: restless inputs
+
+
 def test_an_input_that_never_settles_is_not_believed() -> None:
     story = boarding()
     story.building.unreadable = "timeout"
@@ -399,6 +494,9 @@ def test_without_any_debounce_the_first_reading_counts() -> None:
     assert story.states == [(0.0, "AGV, open at L1")]
     story.asks("A", "L1")
     assert story.edges == [(0.0, "agv_request", True), (0.0, "hold_door", "front")]
+
+
+# ---- LIFT-SENSING-5: doors with one contact
 
 
 def test_a_contact_for_open_proves_nothing_about_closed() -> None:
@@ -456,6 +554,13 @@ def test_an_estimated_door_that_is_not_offered_is_shown_as_moving() -> None:
     assert story.node.status()["door"] == "moving"
 
 
+def test_a_door_that_is_not_shown_open_is_not_marked_as_estimated() -> None:
+    sample = replace(AT_L1, door=Door.NOT_CLOSED, motion=Motion.UP)
+    alone = Alone(door_travel_s=1.0, stale_after_s=60.0)(0.0, sample)(2.0, sample)
+    shown = alone.decision.report
+    assert (shown.door.name, shown.estimated) == ("DOOR_MOVING", False)
+
+
 def test_an_estimated_door_that_starts_to_move_is_no_longer_at_its_end() -> None:
     story = Story(Building(replace(OPEN_AT_L1, door=Door.NOT_CLOSED)), door_travel_s=4.0)
     story.run(6.0)
@@ -463,6 +568,9 @@ def test_an_estimated_door_that_starts_to_move_is_no_longer_at_its_end() -> None
     story.building.set(door=Door.CLOSED)
     story._scan()
     assert story.node.status()["door"] == "moving"
+
+
+# ---- LIFT-SENSING-1, LIFT-SENSING-5: when it wakes
 
 
 def test_the_core_wakes_when_an_input_seen_for_the_first_time_has_settled() -> None:
@@ -473,11 +581,38 @@ def test_the_core_wakes_when_an_input_seen_for_the_first_time_has_settled() -> N
     assert first.wake_at == 10.0 + rules.debounce_s("door")
 
 
+def test_each_input_has_its_own_debounce_and_the_core_wakes_when_it_is_over() -> None:
+    settled = replace(AT_L1, rear_door=Door.CLOSED)
+    for change, due_s in (
+        ({"level": "L2"}, 0.08),
+        ({"door": Door.CLOSED}, 0.03),
+        ({"rear_door": Door.OPEN}, 0.04),
+        ({"agv": False}, 0.05),
+        ({"hazards": frozenset({Hazard.FIRE})}, 0.06),
+    ):
+        alone = Alone(DEBOUNCE)(0.0, settled)(1.0 - 0.5, settled)(1.0, replace(settled, **change))
+        assert alone.decision.wake_at == 1.0 + due_s
+
+
+def test_the_core_wakes_when_its_first_reading_has_settled() -> None:
+    assert Alone(DEBOUNCE)(1.0, AT_L1).decision.wake_at == 1.03
+
+
 def test_the_core_wakes_when_either_door_is_estimated_to_have_arrived() -> None:
     rules = Story(Building(OPEN_AT_L1), debounce={}, door_travel_s=0.7).limits
     for front, rear in ((Door.NOT_OPEN, Door.OPEN), (Door.OPEN, Door.NOT_CLOSED)):
         sample = LiftSample("L1", front, rear_door=rear)
         assert decide(Memory(), Sampled(sample), 10.0, rules).wake_at == 10.7
+
+
+@pytest.mark.parametrize("where", ["door", "rear_door"])
+def test_a_door_with_one_contact_wakes_the_core_when_it_has_come_to_its_other_end(
+    where: str,
+) -> None:
+    sample = replace(AT_L1, door=Door.CLOSED, rear_door=Door.CLOSED)
+    alone = Alone(door_travel_s=3.0, stale_after_s=60.0)(0.0, sample)
+    alone(1.0, replace(sample, **{where: Door.NOT_CLOSED}))
+    assert alone.decision.wake_at == 4.0
 
 
 def test_a_new_fault_is_news_but_a_change_of_its_words_is_not() -> None:
@@ -486,6 +621,9 @@ def test_a_new_fault_is_news_but_a_change_of_its_words_is_not() -> None:
     lost = [replace(first, faults=(Fault("INPUTS_NOT_FRESH", f"timeout {i}"),)) for i in (1, 2)]
     assert lost[0].news() == lost[1].news() != first.news()
     assert replace(first, read_at=9.0).news() == first.news()
+
+
+# ---- LIFT-SENSING-4: a floor code without a meaning outside AGV mode
 
 
 class FloorsInAgvMode(Controller):

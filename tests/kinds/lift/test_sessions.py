@@ -1,11 +1,29 @@
 """Who holds the lift: grant, refresh, refuse, END and the grace after it."""
 
+from typing import Any
+
 import pytest
 
 from bridges.kinds.lift import KIND
 from bridges.kinds.lift.core import decide
-from bridges.kinds.lift.signals import Door, Hazard, LiftOutputs, LiftSample, Motion, Requested
+from bridges.kinds.lift.signals import (
+    Door,
+    Ended,
+    Hazard,
+    LiftOutputs,
+    LiftSample,
+    Motion,
+    Requested,
+    Side,
+)
+from bridges.kinds.shared.decision import (
+    IoFailed,
+    OperatorReset,
+    RivalSeen,
+    WriteFailed,
+)
 from bridges.messages.definitions import LiftRequest, LiftState
+from tests.kinds.lift.alone import ASKED, AT_L1, Alone
 from tests.kinds.lift.story import HUMAN, Building, Controller, Story
 
 OPEN_AT_L1 = LiftSample("L1", Door.OPEN, motion=Motion.STOPPED, agv=True)
@@ -19,6 +37,9 @@ def boarded() -> Story:
     story.run(4.0)
     assert story.state == "AGV, open at L1, A to L1"
     return story
+
+
+# ---- LIFT-1: one session at a time
 
 
 def test_requests_of_others_change_nothing_while_a_session_is_held() -> None:
@@ -40,6 +61,14 @@ def test_requests_of_others_change_nothing_while_a_session_is_held() -> None:
 def test_a_message_names_the_lift_that_it_is_for() -> None:
     assert KIND.device_name(LiftRequest(lift_name="Lift2", session_id="A")) == "Lift2"
     assert KIND.device_name(LiftState(lift_name="Lift3")) == "Lift3"
+
+
+@pytest.mark.parametrize("event", [Ended("A"), IoFailed("timeout"), OperatorReset(), RivalSeen()])
+def test_an_event_that_is_not_a_request_is_not_refused(event: Any) -> None:
+    assert Alone()(0.0, AT_L1, event).decision.refused == ""
+
+
+# ---- LIFT-2: END and the grace after it
 
 
 def test_an_end_frees_the_lift_at_once_and_releases_outputs_in_order_after_the_grace() -> None:
@@ -67,6 +96,13 @@ def test_the_same_session_back_within_the_grace_finds_everything_as_it_was() -> 
     assert story.state == "AGV, open at L1, A to L1"
 
 
+def test_an_event_that_is_only_noted_is_not_refused() -> None:
+    alone = Alone(release_grace_s=2.0)(0.0, AT_L1)(0.1, WriteFailed("timeout"))
+    assert alone.decision.refused == ""
+    alone(0.2, AT_L1, ASKED)(1.0, AT_L1, Ended("A"))(1.5, ASKED)
+    assert (alone.decision.refused, alone.decision.report.session) == ("", "A")
+
+
 def test_nobody_else_is_granted_a_session_within_the_grace_and_anybody_afterwards() -> None:
     story = boarded()
     story.ends("A")
@@ -85,6 +121,14 @@ def test_nobody_else_is_granted_a_session_within_the_grace_and_anybody_afterward
     ]
 
 
+def test_anybody_may_have_the_lift_in_the_instant_in_which_the_grace_ends() -> None:
+    alone = Alone(release_grace_s=2.0)(0.0, AT_L1)(0.1, ASKED)(1.0, Ended("A"))
+    alone(2.9, AT_L1)
+    alone(3.0, Requested("B", True, "L1"))
+    assert alone.decision.refused == ""
+    assert alone.decision.report.session == "B"
+
+
 def test_the_grace_ends_at_its_time_even_for_a_request_that_comes_before_the_scan() -> None:
     story = boarded()
     story.ends("A")
@@ -93,6 +137,12 @@ def test_the_grace_ends_at_its_time_even_for_a_request_that_comes_before_the_sca
     assert decide(memory, Requested("B", True, "L2"), 6.99, rules).refused
     granted = decide(memory, Requested("B", True, "L2"), 7.0, rules)
     assert (granted.report.session, granted.memory.grace) == ("B", None)
+
+
+def test_even_a_short_grace_lasts_its_time() -> None:
+    alone = Alone(release_grace_s=0.5)(0.0, AT_L1)(0.1, ASKED)(1.0, AT_L1, Ended("A"))
+    assert alone.decision.outputs == LiftOutputs(agv_request=True, hold_door=Side.FRONT)
+    assert alone(1.5, AT_L1).decision.outputs == LiftOutputs()
 
 
 def test_a_second_end_does_not_prolong_the_grace() -> None:
@@ -114,6 +164,9 @@ def test_nothing_that_was_off_is_energised_during_the_grace() -> None:
     assert story.edges == [(1.0, "agv_request", True), (4.3, "agv_request", False)]
 
 
+# ---- LIFT-DRIVE-1: nothing without a session
+
+
 def test_a_call_is_never_energised_without_a_session() -> None:
     story = Story(Controller())
     story.run(1.0)
@@ -125,6 +178,9 @@ def test_a_call_is_never_energised_without_a_session() -> None:
     story.asks("A", "L4")
     story.run(5.0)
     assert story.edges[2:] == [(3.0, "call", None), (4.0, "call", "L4")]
+
+
+# ---- LIFT-2, LIFT-DRIVE-1: what may stay on in the grace
 
 
 def test_a_pulse_cut_short_by_an_end_is_given_again_to_the_session_that_comes_back() -> None:
@@ -206,6 +262,9 @@ def test_a_session_that_never_had_agv_mode_leaves_no_grace() -> None:
     story.asks("B", "L2")
     story.run(3.0)
     assert story.state == "HUMAN, closed at L1, B to L2"
+
+
+# ---- LIFT-1, LIFT-4: when nobody gets it
 
 
 @pytest.mark.parametrize(

@@ -3,9 +3,21 @@
 from itertools import pairwise
 
 import pytest
+from msgspec.structs import replace
 
-from bridges.kinds.lift.signals import Door, LiftOutputs, LiftSample, Motion, Side
+from bridges.kinds.lift.signals import (
+    Door,
+    LiftOutputs,
+    LiftSample,
+    Motion,
+    Side,
+)
+from bridges.kinds.shared.decision import (
+    OperatorReset,
+    WriteFailed,
+)
 from bridges.messages.stamps import in_seconds
+from tests.kinds.lift.alone import ASKED, AT_L1, CLOSED, Alone
 from tests.kinds.lift.story import WALL, Building, Controller, Story
 
 HELD = LiftOutputs(agv_request=True, hold_door=Side.FRONT)
@@ -38,6 +50,9 @@ CASES = [
     ("RUNTIME_LIMIT_EXCEEDED", ("L2", Door.CLOSED, True), "floor_timeout_s", 120.0, "call"),
     ("DOOR_OPENING_FAULT", ("L1", Door.CLOSED, True), "door_timeout_s", 10.0, "hold_door"),
 ]
+
+
+# ---- LIFT-DRIVE-5: AGV mode, the floor and the open door
 
 
 @pytest.mark.parametrize(("fault", "inputs", "limit", "default_s", "output"), CASES)
@@ -112,6 +127,26 @@ def test_a_latched_fault_ends_with_an_operators_reset() -> None:
     assert tries(story, "hold_door")[-2:] == [200.0, 214.0]
 
 
+def test_a_reset_during_a_retry_lets_the_request_wait_for_agv_mode_again() -> None:
+    def history(reset_at: float) -> list[tuple[float, bool, list[str]]]:
+        """(s, AGV request, faults) at each change, scanned twice a second."""
+        alone = Alone(agv_timeout_s=5.0)
+        alone(0.0, replace(CLOSED, agv=False), ASKED)
+        shown: list[tuple[float, bool, list[str]]] = []
+        for n in range(1, 60):
+            now = n / 2
+            alone(now, replace(CLOSED, agv=False), *[OperatorReset()] * (now == reset_at))
+            line = (alone.decision.outputs.agv_request, [fault.code for fault in alone.faults])
+            if not shown or shown[-1][1:] != line:
+                shown.append((now, *line))
+        return shown
+
+    failed = "AGV_MODE_NOT_GRANTED"
+    before = [(0.5, True, []), (5.0, False, [failed]), (15.0, True, [failed])]
+    assert history(reset_at=99.0) == [*before, (20.0, False, [failed])]
+    assert history(reset_at=17.0) == [*before, (17.0, True, []), (22.0, False, [failed])]
+
+
 def test_in_a_fault_an_open_door_is_not_offered() -> None:
     story = latched()
     story.building.set(door=Door.OPEN)
@@ -130,6 +165,13 @@ def test_a_later_try_that_succeeds_ends_the_fault_and_resets_the_count() -> None
     keep_asking(story, 200.0)
     starts = tries(story, "hold_door")
     assert [round(b - a, 1) for a, b in pairwise(starts[2:])] == [34.0, 64.0]
+
+
+def test_the_end_of_a_wait_for_the_lift_wakes_the_core() -> None:
+    alone = Alone(stale_after_s=900.0, request_timeout_s=30.0, door_timeout_s=4.0)
+    alone(0.0, CLOSED)(1.0, ASKED)
+    assert alone.decision.outputs == LiftOutputs(agv_request=True, hold_door=Side.FRONT)
+    assert alone.decision.wake_at == 5.0
 
 
 def test_agv_mode_lost_on_the_way_switches_outputs_off_and_is_requested_again() -> None:
@@ -188,6 +230,9 @@ def test_the_call_stays_on_while_people_take_the_car_first() -> None:
     assert story.faults == []
 
 
+# ---- LIFT-DRIVE-1: RMF is silent
+
+
 def test_rmf_silent_with_the_robot_outside_lets_the_lift_go_and_keeps_the_session() -> None:
     story = lift("L1", Door.CLOSED, agv=True, door_timeout_s=600)
     story.run(30.5)
@@ -212,6 +257,18 @@ def test_rmf_silent_with_a_robot_inside_holds_and_warns() -> None:
     assert story.state == "AGV, open at L1, A to L1"
     story.asks("A", "L1")
     assert story.faults == []
+
+
+def test_the_core_wakes_for_rmfs_silence_and_for_the_next_try() -> None:
+    alone = Alone(stale_after_s=900.0, request_timeout_s=30.0)(0.0, AT_L1)(1.0, ASKED)
+    assert alone.decision.wake_at == 31.0
+    alone = Alone(stale_after_s=900.0, request_timeout_s=30.0, door_timeout_s=4.0)
+    alone(0.0, CLOSED)(1.0, ASKED)(5.0, CLOSED)
+    assert alone.decision.outputs == LiftOutputs()
+    assert alone.decision.wake_at == 15.0
+
+
+# ---- LIFT-4: outputs that cannot be written
 
 
 def test_outputs_that_cannot_be_written_soon_become_a_fault_with_all_outputs_off() -> None:
@@ -257,6 +314,14 @@ def test_inputs_are_believed_though_outputs_cannot_be_written() -> None:
     story.building.driven = OFF  # the module's own watchdog has let go
     story.run(story.now + 5.0)
     assert story.state == "OFFLINE, closed at L1, A to L1"
+
+
+def test_unwritten_outputs_are_judged_by_their_age_when_a_request_comes() -> None:
+    alone = Alone(stale_after_s=2.0)(0.0, AT_L1, WriteFailed("timeout"))
+    assert alone(1.0, ASKED).decision.refused == ""
+    alone = Alone(stale_after_s=2.0)(0.0, AT_L1, WriteFailed("timeout"))
+    alone(1.9, AT_L1, WriteFailed("timeout"))
+    assert alone(2.0, ASKED).decision.refused == "OUTPUTS_NOT_WRITTEN"
 
 
 @pytest.mark.parametrize("step_s", [3600.0, -3600.0])

@@ -1,4 +1,4 @@
-"""The node under RMF's own rules: its lift supervisor and fleet adapters, with losses and restarts."""
+"""LIFT-1, LIFT-2: the node under RMF's lift supervisor and fleet adapters, with losses and restarts."""
 
 import pytest
 

@@ -1,17 +1,23 @@
 """The lift supervisor's rules, one sentence each; what it sends to the lift's node, whole."""
 
+import math
+
 import pytest
 
 from bridges.kinds.lift_supervisor import core
-from bridges.kinds.lift_supervisor.memory import Limits
+from bridges.kinds.lift_supervisor.memory import Limits, Memory
 from bridges.kinds.lift_supervisor.signals import StateHeard, Target
+from bridges.kinds.shared.decision import Fault
+from bridges.kinds.shared.durations import FORGOTTEN_S, REPEAT_S, SILENT_S
 from bridges.kinds.shared.freshness import MAX_REQUESTERS
+from bridges.kinds.shared.graph_kind import MaySpeak
+from bridges.messages.definitions import LiftRequest
 from tests.kinds.lift_supervisor.alone import Alone
 
 TO_L3 = Target(1, "L3", 2)
 
 
-# --- one robot ---------------------------------------------------------------------------------
+# ---- LIFT-SUPERVISOR-3, LIFT-SUPERVISOR-7: one robot
 
 
 def test_a_first_request_is_sent_at_once_and_without_a_state_only_once() -> None:
@@ -19,6 +25,14 @@ def test_a_first_request_is_sent_at_once_and_without_a_state_only_once() -> None
     desk.asks("a")
     desk.until(9.0)
     assert desk.sent == [(0.0, "AGV a L3")]
+
+
+def test_a_request_goes_to_the_node_with_every_field_that_the_adapter_filled_in() -> None:
+    desk = Alone()
+    desk.asks("a")
+    assert core.wanted(desk.memory) == LiftRequest(
+        lift_name="Lift1", session_id="a", request_type=1, destination_floor="L3", door_state=2
+    )
 
 
 def test_each_state_that_does_not_show_the_request_causes_a_repeat_at_1_hz_at_most() -> None:
@@ -69,6 +83,18 @@ def test_the_holders_repeats_are_passed_on_at_1_hz_so_that_the_node_hears_that_r
     assert desk.sent == [(0.0, "AGV a L3"), (1.0, "AGV a L3"), (2.0, "AGV a L3")]
 
 
+def test_a_request_that_was_sent_in_an_earlier_turn_is_repeated_a_second_later_and_no_sooner() -> (
+    None
+):
+    desk = Alone()
+    desk.asks("a")
+    desk.until(0.3)
+    desk.hears(MaySpeak(False))
+    desk.hears(MaySpeak(True))
+    desk.until(3.0)
+    assert desk.sent == [(0.0, "AGV a L3"), (REPEAT_S, "AGV a L3")]
+
+
 def test_another_destination_goes_out_at_once_but_never_faster_than_10_hz() -> None:
     desk = Alone()
     for number in range(9):
@@ -116,7 +142,7 @@ def test_a_holder_that_asks_for_an_unserved_floor_keeps_its_request_and_counts_a
     assert desk.faults == []
 
 
-# --- END ---------------------------------------------------------------------------------------
+# ---- LIFT-SUPERVISOR-4: END
 
 
 def test_the_holders_end_is_sent_at_once_with_the_cars_floor() -> None:
@@ -126,6 +152,14 @@ def test_the_holders_end_is_sent_at_once_with_the_cars_floor() -> None:
     desk.until(0.5)
     desk.ends("a")
     assert desk.sent == [(0.0, "AGV a L3"), (0.5, "END a L2")]
+
+
+def test_an_end_that_counts_is_not_refused() -> None:
+    desk = Alone()
+    desk.asks("a")
+    desk.until(1.0)
+    desk.ends("a")
+    assert (desk.sent[-1], desk.refused) == ((1.0, "END a"), [])
 
 
 def test_an_end_is_repeated_for_each_state_that_still_shows_the_session_at_1_hz_at_the_most() -> (
@@ -243,7 +277,7 @@ def test_a_robot_that_asks_again_after_its_end_is_served_again_in_its_turn() -> 
     ]
 
 
-# --- the queue ---------------------------------------------------------------------------------
+# ---- LIFT-SUPERVISOR-1: the queue
 
 
 def test_robots_are_served_in_the_order_of_their_first_requests() -> None:
@@ -262,6 +296,16 @@ def test_robots_are_served_in_the_order_of_their_first_requests() -> None:
         desk.shows("")
     order = [text for _, text in desk.sent if text.startswith("AGV")]
     assert list(dict.fromkeys(order)) == ["AGV a to-a", "AGV b to-b", "AGV c to-c"]
+
+
+def test_a_place_in_the_queue_dates_from_the_first_request() -> None:
+    desk = Alone()
+    desk.asks("a")
+    desk.until(1.0)
+    desk.asks("b")
+    desk.until(2.0)
+    desk.asks("b")
+    assert desk.report.waiting == (("b", 1.0),)
 
 
 def test_a_robot_that_waits_in_silence_for_10_s_leaves_the_queue_and_comes_back_at_its_end() -> (
@@ -308,6 +352,22 @@ def test_a_lift_that_falls_silent_is_a_fault_to_those_who_wait_and_to_nobody_els
     assert (desk.waiting, desk.faults) == (["a"], ["LIFT_SILENT"])
 
 
+def test_the_core_wakes_when_the_lift_counts_as_silent_and_says_so() -> None:
+    desk = Alone()
+    desk.asks("a")
+    desk.ride()
+    late = math.nextafter(SILENT_S, math.inf)
+    assert desk.wake_at == late
+    desk.until(late)
+    assert desk.report.faults == (Fault("LIFT_SILENT", "no LiftState comes"),)
+
+
+def test_states_count_as_flowing_until_exactly_three_seconds_after_the_last() -> None:
+    state = StateHeard("", "L1", "", 0, 2)
+    memory = Memory("Lift1", 0.0, shown=state, shown_at=10.0)
+    assert [memory.flows(now) for now in (13.0, 13.1)] == [True, False]
+
+
 def test_a_lift_that_was_never_heard_is_not_waited_for() -> None:
     desk = Alone()
     desk.asks("a")
@@ -326,6 +386,25 @@ def test_a_lift_whose_states_have_stopped_is_forgotten_unless_somebody_wants_it(
     desk.shows("a")
     desk.until(1000.0)
     assert not core.idle(desk.memory, 1000.0)
+
+
+def test_a_silent_lift_that_shows_a_session_is_not_forgotten_while_robots_want_it() -> None:
+    shown = Alone()
+    shown.shows("a")
+    shown.asks("b")
+    assert not core.idle(shown.memory, 1000 * FORGOTTEN_S)
+    taken = Alone()
+    taken.asks("a")
+    taken.shows("a")
+    taken.shows("")
+    assert not core.idle(taken.memory, 1000 * FORGOTTEN_S)
+
+
+def test_a_robot_that_only_waits_for_a_silent_lift_is_forgotten_after_ten_minutes() -> None:
+    desk = Alone()
+    desk.asks("a")
+    assert not core.idle(desk.memory, math.nextafter(10 * FORGOTTEN_S, 0.0))
+    assert core.idle(desk.memory, 10 * FORGOTTEN_S)
 
 
 def test_a_robot_that_ends_while_it_waits_leaves_the_queue() -> None:
@@ -354,7 +433,16 @@ def test_requesters_beyond_the_bound_are_forgotten_oldest_first() -> None:
     assert "robot 0" not in desk.memory.requesters
 
 
-# --- who really has the lift -------------------------------------------------------------------
+def test_a_robot_that_waits_is_known_however_many_names_are_heard_after_it() -> None:
+    desk = Alone()
+    desk.asks("a")
+    desk.asks("b")
+    for number in range(MAX_REQUESTERS):
+        desk.ends(f"invented {number}")
+    assert {"a", "b"} < set(desk.memory.requesters)
+
+
+# ---- LIFT-SUPERVISOR-2: who really has the lift
 
 
 def test_a_session_that_the_lift_shows_goes_before_the_queue_if_its_robot_asks() -> None:
@@ -415,6 +503,20 @@ def test_a_strangers_session_gets_its_3_s_again_after_the_lift_was_silent() -> N
     assert desk.sent == [(63.0, "END a L1")]
 
 
+def test_a_state_in_the_last_instant_before_the_lift_counts_as_silent_continues_those_before() -> (
+    None
+):
+    def session_since(seconds: float) -> float:
+        desk = Alone()
+        desk.shows("a", "L2")
+        desk.until(seconds)
+        desk.shows("a", "L2")
+        return desk.memory.session_since
+
+    late = math.nextafter(SILENT_S, math.inf)
+    assert (session_since(SILENT_S), session_since(late)) == (0.0, late)
+
+
 def test_a_holder_whose_session_the_node_has_lost_in_a_restart_is_asked_for_again() -> None:
     desk = Alone()
     desk.asks("a")
@@ -424,7 +526,7 @@ def test_a_holder_whose_session_the_node_has_lost_in_a_restart_is_asked_for_agai
     assert desk.sent == [(0.0, "AGV a L3"), (5.0, "AGV a L3")]
 
 
-# --- who has gone ------------------------------------------------------------------------------
+# ---- LIFT-SUPERVISOR-4: who has gone
 
 
 def test_a_holder_that_the_lift_never_took_and_that_is_silent_for_10_s_is_ended() -> None:
@@ -462,6 +564,15 @@ def test_where_the_site_wants_it_a_silent_holder_is_ended_after_its_time() -> No
     assert desk.sent == [(0.0, "AGV a L3"), (120.0, "END a L3"), (121.0, "END a L3")]
 
 
+def test_a_silent_holder_whose_turn_is_ended_does_not_wait_in_the_queue() -> None:
+    desk = Alone(Limits(holder_ttl_s=5.0, holder_alarm_s=2.0))
+    desk.asks("a")
+    for second in range(6):
+        desk.until(float(second))
+        desk.shows("a", "L1", to="L3")
+    assert (desk.report.holder, desk.report.ending, desk.waiting) == ("a", True, [])
+
+
 def test_a_lift_that_does_not_take_the_holder_or_does_not_release_it_raises_an_alarm() -> None:
     desk = Alone()
     for second in range(31):
@@ -474,3 +585,26 @@ def test_a_lift_that_does_not_take_the_holder_or_does_not_release_it_raises_an_a
         desk.until(float(second))
         desk.shows("a")
         assert desk.faults == (["END_NOT_OBEYED"] if second >= 60 else [])
+
+
+def shown_each_second(desk: Alone, session: str, until: int) -> tuple[Fault, ...]:
+    """The faults after states that show this session from now until then."""
+    for second in range(int(desk.now), until + 1):
+        desk.until(float(second))
+        desk.shows(session, "L1", to="L3")
+    return desk.report.faults
+
+
+def test_each_alarm_says_which_session_it_is_about() -> None:
+    never_taken = Alone(Limits(silent_after_s=60.0))
+    never_taken.asks("a")
+    assert shown_each_second(never_taken, "", 30) == (
+        Fault("NOT_GRANTED", "the lift does not take a"),
+    )
+    desk = Alone(Limits(holder_alarm_s=20.0))
+    desk.asks("a")
+    assert shown_each_second(desk, "a", 20) == (Fault("HOLDER_SILENT", "no request from a"),)
+    desk.ends("a")
+    assert shown_each_second(desk, "a", 50) == (
+        Fault("END_NOT_OBEYED", "the lift does not release a"),
+    )

@@ -4,16 +4,18 @@ import pytest
 from msgspec.structs import replace
 
 from bridges.kinds.lift_supervisor import core
-from bridges.kinds.lift_supervisor.memory import Claim, Limits
+from bridges.kinds.lift_supervisor.memory import Claim, Limits, Memory
 from bridges.kinds.lift_supervisor.report import SupervisorReport
 from bridges.kinds.lift_supervisor.signals import Requested, Target
+from bridges.kinds.shared.durations import NEVER
+from bridges.kinds.shared.freshness import FUTURE_S, Rules
 from bridges.kinds.shared.graph_kind import MaySpeak
 from tests.kinds.lift_supervisor.alone import Alone
 
 TO_L3 = Target(1, "L3", 2)
 
 
-# --- hazards -----------------------------------------------------------------------------------
+# ---- LIFT-SUPERVISOR-5: hazards
 
 
 @pytest.mark.parametrize("mode", ["FIRE", "OFFLINE"])
@@ -67,7 +69,7 @@ def test_a_holders_human_mode_is_passed_on_in_a_hazard() -> None:
     assert desk.sent == [(0.0, "AGV a L3"), (1.0, "HUMAN a L1")]
 
 
-# --- while it may not speak --------------------------------------------------------------------
+# ---- LIFT-SUPERVISOR-6: while it may not speak
 
 
 def test_after_its_quiet_start_it_continues_the_ride_that_it_finds() -> None:
@@ -128,7 +130,7 @@ def test_nothing_is_sent_before_sending_is_allowed() -> None:
     assert not core.initial("Lift1", 0.0).may_speak
 
 
-# --- stale requests ----------------------------------------------------------------------------
+# ---- FRESHNESS-1, FRESHNESS-2, FRESHNESS-4: stale requests
 
 
 def test_requests_from_before_our_start_count_once_they_are_repeated() -> None:
@@ -160,6 +162,15 @@ def test_with_synchronised_clocks_a_young_request_from_before_our_start_counts_a
     desk.asks("a", "L1", aged=11.0)
     assert [text for _, text in desk.sent] == ["AGV a L3", "END a"]
     assert desk.refused == [(0.0, "stale request"), (60.0, "stale request")]
+
+
+def test_a_request_may_be_as_old_as_our_uptime_or_as_the_yaml_says_if_clocks_agree() -> None:
+    memory = Memory("Lift1", started_at=100.0)
+    assert memory.rules(130.0, Limits()) == Rules(30.0, future_s=FUTURE_S)
+    speaks = Memory("Lift1", started_at=100.0, may_speak=True)
+    assert speaks.rules(130.0, Limits()) == Rules(30.0, future_s=NEVER)
+    agreed = Limits(clock_synchronised=True, max_request_age_s=7.0)
+    assert memory.rules(130.0, agreed) == Rules(7.0, known_clocks=False)
 
 
 def test_a_request_from_the_future_is_not_believed_in_the_quiet_time() -> None:

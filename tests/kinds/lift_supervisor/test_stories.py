@@ -148,7 +148,7 @@ def test_a_queue_is_served_in_order_and_a_robot_that_falls_silent_in_it_is_skipp
     assert shown(world) == [A, "", C, "", "fleet/d", ""]
 
 
-# --- restarts ----------------------------------------------------------------------------------
+# ---- LIFT-SUPERVISOR-6: restarts
 
 
 def test_a_lift_node_that_restarts_in_mid_ride_gets_the_session_again_and_the_ride_ends() -> None:
@@ -229,7 +229,7 @@ def test_an_adapter_that_restarts_releases_a_lift_that_it_knows_nothing_of() -> 
     assert shown(world) == [A, "", B, "", A, ""]
 
 
-# --- another supervisor ------------------------------------------------------------------------
+# ---- LIFT-SUPERVISOR-6: another supervisor
 
 
 def test_beside_rmfs_own_supervisor_it_is_silent_and_takes_over_in_mid_ride_when_that_is_gone() -> (
@@ -266,7 +266,7 @@ def test_a_second_supervisor_of_ours_stands_by_and_takes_over() -> None:
     assert robot.done
 
 
-# --- operators and hazards ---------------------------------------------------------------------
+# ---- LIFT-SUPERVISOR-4, LIFT-SUPERVISOR-5: operators and hazards
 
 
 def test_an_operator_releases_the_lift_of_a_dead_robot_for_those_who_wait() -> None:

@@ -30,6 +30,9 @@ class Clocked:
         return counts
 
 
+# ---- FRESHNESS-1, FRESHNESS-2, FRESHNESS-4: stamps
+
+
 def test_a_request_sent_after_our_start_counts_at_once() -> None:
     requester = Clocked()
     assert [requester.at(0.0), requester.at(0.0, sent=0.1), requester.at(9.0, sent=1.0)] == [
@@ -72,6 +75,9 @@ def test_a_request_from_the_future_counts_unless_a_limit_is_set() -> None:
     assert not Clocked(Rules(5.0, future_s=2.0), skew=2.1).at(0.0)
 
 
+# ---- FRESHNESS-1: END
+
+
 def test_an_end_is_compared_with_earlier_ends_only() -> None:
     """An operator ends a robot's session by another clock than the robot's."""
     requester = Clocked()
@@ -86,6 +92,9 @@ def test_an_end_makes_earlier_requests_stale() -> None:
     requester = Clocked()
     assert requester.at(10.0, ends=True)
     assert not requester.at(10.1, sent=9.0)
+
+
+# ---- FRESHNESS-5: wrong clocks
 
 
 def test_a_requester_whose_clock_is_set_back_is_believed_after_a_second() -> None:

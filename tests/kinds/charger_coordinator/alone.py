@@ -1,0 +1,75 @@
+"""The coordinator's core alone, with two stations, in virtual time: told by hand, its words noted."""
+
+from typing import Any
+
+from bridges.kinds.charger.settings import Robot
+from bridges.kinds.charger_coordinator import core
+from bridges.kinds.charger_coordinator.memory import (
+    CHARGING,
+    IDLE,
+    Memory,
+    Site,
+)
+from bridges.kinds.charger_coordinator.report import SiteReport
+from bridges.kinds.charger_coordinator.signals import Event, FleetSeen, Sighting, StateHeard
+from bridges.kinds.shared.graph_kind import Woken
+from bridges.messages import definitions as d
+from tests.kinds.charger_coordinator.yard import settings
+from tests.kinds.shared import alone
+
+SETTINGS = settings()
+
+
+ONE, TWO, THREE = (Robot("tiny", f"AMR0{i}") for i in (1, 2, 3))
+
+
+A, B = "charger_a", "charger_b"
+
+
+class Alone(alone.Alone[Memory, Event, Site, SiteReport]):
+    """`shows`: what each station does, told once a second; `seen`: the robots that a fleet shows."""
+
+    def __init__(self) -> None:
+        self.shows = {name: StateHeard(name, IDLE) for name in (A, B)}
+        self.seen: dict[Robot, Sighting] = {}
+        super().__init__(core.initial("site", 0.0), core.decide, Site.of(SETTINGS), True)
+
+    def words(self, message: d.Message) -> str:
+        """Words to the stations are noted."""
+        match message:
+            case d.ChargerRequest():
+                return f"{message.charger_name}: {message.robot_name}"
+            case d.ChargerCancel():
+                return f"{message.charger_name}: cancel"
+        return ""
+
+    @property
+    def faults(self) -> list[str]:
+        return [str(fault) for fault in self.report.faults]
+
+    def run(self, seconds: int) -> list[tuple[float, str]]:
+        """Let time pass, a second at a time; what was said meanwhile."""
+        said = len(self.sent)
+        for _ in range(seconds):
+            self.now += 1.0
+            for shown in self.shows.values():
+                self.hears(shown)
+            for sighting in self.seen.values():
+                self.hears(FleetSeen((sighting,)))
+            self.hears(Woken())
+        return self.sent[said:]
+
+    def wants(self, who: Robot, place: str | None = None, percent: float = 40.0) -> None:
+        """Its fleet shows it so from now on."""
+        place = f"wait_{who.name[-1]}" if place is None else place
+        self.seen[who] = Sighting(who, True, place, percent, f"task of {who.name}")
+
+    def does(self, station: str, state: Any, error: str = "") -> None:
+        """The station goes on so with the request that it was sent last."""
+        grant = self.memory.grants[station]
+        self.shows[station] = StateHeard(station, state, grant.request_id, grant.robot, error)
+
+
+def busy(station: str) -> StateHeard:
+    """A station that serves somebody who is none of ours."""
+    return StateHeard(station, CHARGING, "somebody-1", Robot("other", "robot"))

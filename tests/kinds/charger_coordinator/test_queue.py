@@ -1,0 +1,100 @@
+"""COORDINATOR-2: who gets which station, first come, first served; and who may have one."""
+
+from msgspec.structs import replace
+
+from bridges.kinds.charger_coordinator.memory import (
+    CHARGING,
+    ERROR,
+    IDLE,
+)
+from bridges.kinds.charger_coordinator.signals import (
+    Dedicated,
+    FleetSeen,
+    Sighting,
+    StateHeard,
+)
+from tests.kinds.charger_coordinator.alone import ONE, THREE, TWO, A, Alone, B, busy
+
+
+def test_the_queue_is_first_come_first_served() -> None:
+    site_ = Alone()
+    site_.shows = {A: busy(A), B: busy(B)}
+    for who in (TWO, ONE, THREE):
+        site_.wants(who)
+        site_.run(1)
+    site_.shows[B] = StateHeard(B, IDLE)
+    assert site_.run(1) == [(4.0, "charger_b: AMR02")]
+
+
+def test_a_station_at_which_another_robot_stands_is_not_free_though_it_says_so() -> None:
+    site_ = Alone()
+    site_.shows[B] = busy(B)
+    site_.seen[TWO] = Sighting(TWO, False, "charger_a", 90.0, "")
+    site_.wants(ONE)
+    assert site_.run(10) == []
+    site_.seen[TWO] = replace(site_.seen[TWO], place=None)
+    assert site_.run(1) == [(11.0, "charger_a: AMR01")]
+
+
+def test_an_old_position_of_a_robot_keeps_no_station() -> None:
+    site_ = Alone()
+    site_.shows[B] = busy(B)
+    site_.hears(FleetSeen((Sighting(TWO, False, "charger_a", 90.0, ""),)))
+    site_.wants(ONE)
+    assert site_.run(29) == []
+    assert site_.run(1) == [(30.0, "charger_a: AMR01")]
+
+
+def test_a_robot_that_stands_at_a_station_gets_that_one() -> None:
+    site_ = Alone()
+    site_.wants(ONE, "dock_b")
+    assert site_.run(1) == [(1.0, "charger_b: AMR01")]
+
+
+def test_a_dedicated_station_comes_before_the_yamls_first_and_after_where_the_robot_stands() -> (
+    None
+):
+    for place, station in (("wait_1", "charger_b"), ("charger_a", "charger_a")):
+        site_ = Alone()
+        site_.hears(Dedicated(((ONE, B),)))
+        site_.wants(ONE, place)
+        assert site_.run(1) == [(1.0, f"{station}: AMR01")]
+
+
+def test_a_robot_that_is_charged_unasked_where_it_stands_has_that_station() -> None:
+    site_ = Alone()
+    site_.shows[A] = StateHeard(A, CHARGING, "unrequested/charger_a")
+    site_.wants(ONE, "charger_a")
+    assert site_.run(10) == []
+    assert site_.memory.station_of(ONE) == A
+
+
+def test_only_a_robot_refused_as_unasked_may_have_the_station_where_it_stands() -> None:
+    for request_id, said in (("unrequested/charger_a", ["charger_a: AMR01"]), ("somebody-1", [])):
+        site_ = Alone()
+        site_.shows[B] = busy(B)
+        text = "wrong docking: tiny/AMR01 is not assigned here"
+        site_.shows[A] = StateHeard(A, ERROR, request_id, ONE, text)
+        site_.wants(ONE, "charger_a")
+        assert [words for _, words in site_.run(1)] == said
+
+
+def test_only_the_robot_that_stands_there_may_have_a_station_in_error() -> None:
+    site_ = Alone()
+    text = "wrong docking: tiny/AMR02 is not assigned here"
+    site_.shows = {A: StateHeard(A, ERROR, "unrequested/charger_a", TWO, text), B: busy(B)}
+    site_.wants(ONE)
+    assert site_.run(5) == []
+
+
+def test_a_robot_waits_for_a_station_where_it_has_not_failed() -> None:
+    site_ = Alone()
+    site_.shows[B] = busy(B)
+    site_.wants(ONE)
+    site_.run(1)
+    site_.does(A, ERROR, "robot: handshake timeout")
+    site_.run(1)
+    site_.shows[A] = StateHeard(A, IDLE)
+    assert site_.run(5) == []
+    site_.shows[B] = StateHeard(B, IDLE)
+    assert site_.run(1) == [(8.0, "charger_b: AMR01")]

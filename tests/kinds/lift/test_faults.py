@@ -1,0 +1,100 @@
+"""LIFT-4, LIFT-DRIVE-5, LIFT-SENSING-3: the words of each fault."""
+
+from typing import Any
+
+import pytest
+from msgspec.structs import replace
+
+from bridges.kinds.lift.signals import (
+    Door,
+    Hazard,
+    Motion,
+    Requested,
+)
+from bridges.kinds.shared.decision import (
+    Fault,
+    RivalSeen,
+)
+from tests.kinds.lift.alone import ASKED, AT_L1, CLOSED, Alone
+
+FAULTS: dict[str, tuple[list[tuple[float, Any]], Fault]] = {
+    "a fire that was": (
+        [(0.0, replace(AT_L1, hazards=frozenset({Hazard.FIRE}))), (0.5, AT_L1), (1.6, AT_L1)],
+        Fault("FIRE_LATCHED", "rmf-bridge reset when it is safe"),
+    ),
+    "another node": (
+        [(0.0, AT_L1), (0.1, RivalSeen())],
+        Fault("TWO_NODES_FOR_ONE_DEVICE", "another node publishes this lift's states"),
+    ),
+    "a floor too far": (
+        [(0.0, AT_L1), (0.1, replace(AT_L1, level="L3"))],
+        Fault("POSITION_LOST", "L3 cannot follow L1 like this"),
+    ),
+    "a floor code that cannot be": (
+        [(0.0, replace(AT_L1, level=None, code_fault="two lines at once"))],
+        Fault("FLOOR_CODE_ILLEGAL", "two lines at once"),
+    ),
+    "a door that is both": (
+        [(0.0, replace(AT_L1, door=Door.BOTH))],
+        Fault("DOOR_CONTACTS_CONTRADICT", "door reads open and closed"),
+    ),
+    "a rear door that is both": (
+        [(0.0, replace(AT_L1, rear_door=Door.BOTH))],
+        Fault("DOOR_CONTACTS_CONTRADICT", "rear door reads open and closed"),
+    ),
+    "a door whose number means nothing": (
+        [(0.0, replace(AT_L1, door=Door.UNKNOWN))],
+        Fault("DOOR_CODE_ILLEGAL", "the door's number means nothing"),
+    ),
+    "a rear door whose number means nothing": (
+        [(0.0, replace(AT_L1, rear_door=Door.UNKNOWN))],
+        Fault("DOOR_CODE_ILLEGAL", "the rear door's number means nothing"),
+    ),
+    "up and down at once": (
+        [(0.0, replace(AT_L1, motion=Motion.CONTRADICTORY))],
+        Fault("MOTION_CONTRADICTORY", "the motion lines cannot all be true"),
+    ),
+    "AGV mode that ends": (
+        [(0.0, AT_L1), (0.1, ASKED), (0.2, AT_L1), (0.3, replace(AT_L1, agv=False))],
+        Fault("AGV_MODE_LOST", "AGV mode ended during the ride"),
+    ),
+    "AGV mode that does not come": (
+        [(0.0, replace(AT_L1, agv=False)), (0.1, ASKED), (0.7, replace(AT_L1, agv=False))],
+        Fault("AGV_MODE_NOT_GRANTED", "no AGV mode status after 0.5 s"),
+    ),
+    "a car that does not come": (
+        [(0.0, AT_L1), (0.1, Requested("A", True, "L3")), (0.8, AT_L1)],
+        Fault("RUNTIME_LIMIT_EXCEEDED", "not at L3 after 0.6 s"),
+    ),
+    "a door that does not open": (
+        [(0.0, CLOSED), (0.1, ASKED), (0.9, CLOSED)],
+        Fault("DOOR_OPENING_FAULT", "not open at L1 after 0.7 s"),
+    ),
+    "too much in the car": (
+        [(0.0, replace(AT_L1, hazards=frozenset({Hazard.OVERLOAD})))],
+        Fault("OVERLOAD", "waits until the car is lighter"),
+    ),
+    "RMF that is silent": (
+        [(0.0, AT_L1), (0.1, ASKED), (30.2, AT_L1)],
+        Fault("RMF_SILENT", "no request from A"),
+    ),
+    "nothing read yet": ([(0.0, ASKED)], Fault("INPUTS_NOT_FRESH", "not read yet")),
+    "inputs that never keep still": (
+        [(0.1 * i, replace(AT_L1, agv=bool(i % 2), rear_door=(Door.OPEN, Door.CLOSED)[i % 2]))
+         for i in range(2, 30)],
+        Fault("INPUTS_NOT_FRESH", "not steady: rear_door, agv_mode"),
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("what", FAULTS)
+def test_a_fault_says_what_is_wrong(what: str) -> None:
+    happenings, fault = FAULTS[what]
+    debounce = {"rear_door": 0.5, "agv_mode": 0.5} if "still" in what else {}
+    alone = Alone(debounce, agv_timeout_s=0.5, floor_timeout_s=0.6, door_timeout_s=0.7)
+    if debounce:
+        settled = replace(AT_L1, rear_door=Door.CLOSED)
+        alone(-0.5, settled)(0.0, settled)
+    for now, event in happenings:
+        alone(now, event)
+    assert alone.faults == (fault,)

@@ -1,0 +1,32 @@
+"""One search finds a rule and its stories: every rule is cited, and what is cited is a rule."""
+
+import ast
+import re
+from pathlib import Path
+
+from bridges import kinds
+
+KINDS, STORIES = Path(kinds.__path__[0]), Path(__file__).parents[1]
+
+
+def named(module: Path) -> list[str]:
+    """The rules in a module's docstring, which are named after its path: LIFT-1, LIFT-DRIVE-1, …"""
+    words = [
+        w for w in module.relative_to(KINDS).with_suffix("").parts if w not in ("core", "shared")
+    ]
+    prefix = "-".join(words).upper().replace("_", "-").replace("CHARGER-COORDINATOR", "COORDINATOR")
+    text = ast.get_docstring(ast.parse(module.read_text("utf-8"))) or ""
+    found = re.findall(r"^([A-Z-]+-\d+)\. ", text, re.MULTILINE)
+    assert found == [f"{prefix}-{number}" for number in range(1, len(found) + 1)]
+    return found
+
+
+def test_every_rule_has_a_story_that_cites_it_and_no_story_cites_another() -> None:
+    of_cores = [named(core) for core in KINDS.glob("*/core.py")]
+    assert all(of_cores)
+    rules = {rule for module in KINDS.rglob("*.py") for rule in named(module)}
+    prefixes = "|".join(sorted({rule.rpartition("-")[0] for rule in rules}))
+    texts = [story.read_text("utf-8") for story in STORIES.rglob("test_*.py")]
+    assert {
+        cited for text in texts for cited in re.findall(rf"\b(?:{prefixes})-\d+\b", text)
+    } == rules
