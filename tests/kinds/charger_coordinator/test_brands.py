@@ -1,4 +1,4 @@
-"""COORDINATOR-2: two brands of robots at the same stations, each fleet with its own names for places."""
+"""COORDINATOR-2: two brands of robots at the same stations, each with its own names for the places."""
 
 from typing import Any
 
