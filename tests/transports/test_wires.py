@@ -1,6 +1,5 @@
-"""What every transport with a wire does: `dds` everywhere, `ros2` where ROS is (make test-ros)."""
+"""What every transport whose wire is DDS does: `dds` everywhere, `ros2` where ROS is (make test-ros)."""
 
-from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,136 +9,18 @@ from cyclonedds.idl.types import float32, uint32
 from cyclonedds.pub import DataWriter
 from cyclonedds.qos import Policy, Qos
 from cyclonedds.topic import Topic as DdsTopic
-from hypothesis import given
 
 from bridges.messages import definitions as d
 from bridges.messages.rihs01 import type_hash
-from bridges.messages.topics import LIFT_REQUESTS, LIFT_STATES, Topic
+from bridges.messages.topics import LIFT_REQUESTS, Topic
 from tests.transports import golden_qos, peer
-from tests.transports.conftest import ROS2
 from tests.transports.domains import domain_of_this_run
 from tests.transports.golden_qos import GOLDEN
-from tests.transports.joining import RELEASE, Join, joining, on_fast_dds
+from tests.transports.joining import RELEASE, Join, on_fast_dds
 from tests.transports.observing import PUBLICATION, SUBSCRIPTION, seen
-from tests.transports.values import repeatable, values
-from tests.waiting import LEASE_S, wait_until
+from tests.waiting import wait_until
 
 ALL_TOPICS = pytest.mark.parametrize("topic", peer.TOPICS.values(), ids=peer.TOPICS.keys())
-OURS = pytest.mark.parametrize("ours", ["dds", ROS2])
-RETAINED = [
-    name
-    for name in ("EMERGENCY_SIGNAL", "FIRE_ALARM_TRIGGER", "ADAPTER_LIFT_REQUESTS")
-    if name in peer.TOPICS
-]
-THEIRS = pytest.mark.parametrize("theirs", ["dds", ROS2])
-
-
-@pytest.fixture(scope="module", params=["dds", ROS2])
-def echo(request: pytest.FixtureRequest) -> Iterator[None]:
-    """A second process that sends everything back, on each wire in turn."""
-    with peer.running("echo", domain_of_this_run(), request.param):
-        yield
-
-
-# --- to another process ------------------------------------------------------------------------
-
-
-@ALL_TOPICS
-def test_every_message_survives_the_wire_to_another_process_and_back(
-    echo: None, join_wire: Join, topic: Topic[Any]
-) -> None:
-    received: list[Any] = []
-    node = join_wire("here")
-    subscription = node.subscribe(topic.named(f"pong_{topic.name}"), received.append)
-    publisher = node.publisher(topic.named(f"ping_{topic.name}"))
-    wait_until(lambda: publisher.matched() and subscription.matched(), "the echo matches")
-
-    @repeatable
-    @given(values(topic.type, RELEASE))
-    def comes_back(message: Any) -> None:
-        publisher.publish(message)
-        wait_until(lambda: received[-1] == message, f"{message} comes back")
-
-    wait_until(lambda: received or peer.sent(publisher, topic.type()), "a first echo comes back")
-    comes_back()
-
-
-@OURS
-@THEIRS
-@pytest.mark.parametrize("name", RETAINED)
-def test_retained_messages_reach_a_process_that_starts_later(
-    domain: int, ours: str, theirs: str, name: str
-) -> None:
-    topic = peer.TOPICS[name]
-    numbered: dict[Any, Callable[[int], d.Message]] = {
-        d.EmergencySignal: lambda number: d.EmergencySignal((str(number),), True),
-        d.Bool: lambda number: d.Bool(number % 3 == 0),
-        d.LiftRequest: lambda number: d.LiftRequest(destination_floor=str(number)),
-    }
-    received: list[Any] = []
-    sent = [numbered[topic.type](number) for number in range(130)]
-    node = joining(ours, domain)("here")
-    try:
-        publisher = node.publisher(topic.named(f"ping_{topic.name}"))
-        node.subscribe(topic.named(f"pong_{topic.name}"), received.append)
-        for message in sent:
-            publisher.publish(message)
-        with peer.running("echo", domain, theirs):
-            wait_until(lambda: len(received) == 100, "the hundred newest come back")
-    finally:
-        node.close()
-    assert received == sent[30:]
-
-
-@OURS
-@THEIRS
-def test_what_a_supervisor_retained_is_not_replayed_to_a_lift_that_starts_later(
-    domain: int, ours: str, theirs: str
-) -> None:
-    received: list[d.LiftRequest] = []
-    before, after = d.LiftRequest("before"), d.LiftRequest("after")
-    node = joining(ours, domain)("supervisor")
-    try:
-        publisher = node.publisher(LIFT_REQUESTS.named("ping_lift_requests"))
-        node.subscribe(LIFT_REQUESTS.named("pong_lift_requests"), received.append)
-        publisher.publish(before)
-        with peer.running("echo", domain, theirs):
-            wait_until(
-                lambda: after in received or peer.sent(publisher, after), "a new one comes back"
-            )
-    finally:
-        node.close()
-    # Fast DDS asks Cyclone for what was before, and gets it: docs/ros.md.
-    asked_for = {before} if theirs == "ros2" and ours == "dds" and on_fast_dds() else set()
-    assert set(received) - asked_for == {after}
-
-
-@OURS
-@THEIRS
-def test_a_process_that_leaves_is_gone_at_once_for_the_others(
-    domain: int, ours: str, theirs: str
-) -> None:
-    node = joining(ours, domain)("stays")
-    try:
-        publisher = node.publisher(LIFT_STATES.named("ping_lift_states"))
-        subscription = node.subscribe(LIFT_STATES.named("pong_lift_states"), print)
-        with peer.running("echo", domain, theirs):
-            wait_until(lambda: publisher.matched() and subscription.matched(), "it is found")
-        # Without a farewell it would be missed only when its lease runs out. Fast DDS misses Cyclone's.
-        unheard = theirs == "dds" and ours == "ros2" and on_fast_dds()
-        wait_until(
-            lambda: not publisher.matched() and not subscription.matched(),
-            "it is gone",
-            LEASE_S * (2 if unheard else 1),
-        )
-    finally:
-        node.close()
-
-
-# --- on our own thread -------------------------------------------------------------------------
-
-
-# --- bad input ---------------------------------------------------------------------------------
 
 
 def test_forged_samples_are_dropped_and_the_good_ones_after_them_arrive(
