@@ -1,6 +1,5 @@
-"""The real driver and bus against the fake gateway: a door that moves, and each way of failing."""
+"""The real driver and bus against the fake gateway or line: each way of failing, and the door after it."""
 
-import queue
 from collections.abc import Iterator
 
 import msgspec
@@ -14,11 +13,11 @@ from drivers.hal.points import HalError
 from hal_fakes.modbus import ModbusServer
 from hal_fakes.modbus.rtu import RtuLine
 from hal_fakes.plants.door import DoorPlant
-from hal_fakes.plants.plant import FAILURE_MODES, Edge, FailureMode
+from hal_fakes.plants.plant import FAILURE_MODES, FailureMode
 from hal_fakes.realtime import RealTime
 from hal_fakes.wiring import Wiring
 from tests.drivers.hal.modbus.module import Time
-from tests.waiting import PATIENCE_S, at_last, wait_until
+from tests.waiting import at_last, wait_until
 
 TIMEOUT_S = 0.2
 CLOSED = DoorSample(opened=False, closed=True)
@@ -113,39 +112,6 @@ def site(request: pytest.FixtureRequest) -> Iterator[Site]:
         at_last(door.open, "opened", built.a_moment)
     yield built
     built.close()
-
-
-def test_a_held_door_opens_and_a_released_one_closes_by_itself(site: Site) -> None:
-    edges: queue.SimpleQueue[Edge] = queue.SimpleQueue()
-    site.plants["front"].on_edge = edges.put
-    assert site.reads("front") == CLOSED
-    site.write("front", HOLD)
-    seen = [edges.get(timeout=PATIENCE_S) for _ in range(3)]
-    assert site.reads("front") == OPEN
-    site.write("front", RELEASE)
-    seen += [edges.get(timeout=PATIENCE_S) for _ in range(3)]
-    assert site.reads("front") == CLOSED
-    assert [(edge.what, edge.signal, edge.value) for edge in seen] == [
-        ("relay", "hold_open", True),
-        ("sensor", "closed", False),
-        ("sensor", "opened", True),
-        ("relay", "hold_open", False),
-        ("sensor", "opened", False),
-        ("sensor", "closed", True),
-    ]
-    assert site.reads("ward") == CLOSED
-
-
-def test_make_safe_and_close_leave_every_relay_off(site: Site) -> None:
-    for door in site.doors.values():
-        door.write(HOLD)
-    site.doors["front"].make_safe()
-    site.doors["ward"].close()
-    relays = {
-        name: [e.value for e in plant.edges if e.what == "relay"]
-        for name, plant in site.plants.items()
-    }
-    assert relays == {"front": [True, False], "ward": [True, False]}
 
 
 def test_an_unknown_address_is_refused_and_an_unknown_unit_by_a_gateway_only(site: Site) -> None:
@@ -244,18 +210,6 @@ def test_the_inputs_of_a_stuck_unit_stay_as_they_were(site: Site) -> None:
     assert at_last(front.read, "a reading", site.a_moment) == CLOSED
     plant.fail("unit", None)
     assert at_last(front.read, "a reading", site.a_moment) == OPEN
-
-
-def test_a_hold_survives_a_server_that_was_away_without_an_edge(site: Site) -> None:
-    plant = site.plants["front"]
-    site.write("front", HOLD)
-    wait_until(lambda: site.patiently("front") == OPEN, "the door is open")
-    plant.fail("server", "off")
-    wait_until(lambda: isinstance(site.patiently("front"), str), "the server is off")
-    plant.fail("server", None)
-    wait_until(lambda: site.patiently("front") == OPEN, "the server is back")
-    site.write("front", HOLD)
-    assert [e.value for e in plant.edges if e.what == "relay"] == [True]
 
 
 def _sample_or_none(door: DryContactDoor) -> DoorSample | None:
