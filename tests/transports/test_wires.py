@@ -1,4 +1,4 @@
-"""What every transport whose wire is DDS does: `dds` everywhere, `ros2` where ROS is (make test-ros)."""
+"""What transports whose wire is DDS do: `dds` everywhere, `ros2` where ROS is (make test-ros)."""
 
 from dataclasses import dataclass
 from typing import Any

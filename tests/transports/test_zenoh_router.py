@@ -159,7 +159,7 @@ class Machine:
         self.addresses: addresses.Addresses = frozenset({(2, "10.0.0.7")})
 
 
-def test_another_address_is_joined_with_all_ends_and_what_was_retained_goes_out_again(
+def test_a_node_on_zenoh_joins_another_address_and_what_was_retained_goes_out_again(
     site: Site, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     caplog.set_level(logging.INFO)

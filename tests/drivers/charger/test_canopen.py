@@ -76,7 +76,7 @@ def receiver() -> Iterator[Receiver]:
     made.bus.close()
 
 
-def test_the_driver_stands_on_can_and_has_no_wires() -> None:
+def test_the_canopen_driver_stands_on_can_and_has_no_wires() -> None:
     assert DRIVER.buses == ("can",)
     assert list(DRIVER.wires(Settings(node=10))) == []
 
@@ -181,7 +181,7 @@ def test_letting_go_of_a_receiver_that_does_not_answer_raises_nothing(receiver: 
 # ---- settings
 
 
-def test_the_example_is_right_and_says_what_is_untried() -> None:
+def test_the_canopen_example_is_right_and_says_what_is_untried() -> None:
     [no_station, untried] = load(EXAMPLE).warnings
     assert "is no station" in str(no_station)
     assert "not tried on hardware" in str(untried)

@@ -88,7 +88,7 @@ def test_an_error_that_has_gone_is_named_by_the_latched_words_while_the_state_is
     ("low", "high", "side"), [(0x4000, 0, "robot"), (0, 1, "station"), (0x0400, 0, "")]
 )
 @pytest.mark.parametrize("state", sorted(xnergy.CODES))
-def test_an_error_bit_is_an_error_whatever_the_state_says(
+def test_an_error_bit_of_the_receiver_is_an_error_whatever_its_state_says(
     state: int, low: int, high: int, side: str
 ) -> None:
     made = xnergy.sample(words(state=state, error_low=low, error_high=high))

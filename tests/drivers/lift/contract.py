@@ -53,7 +53,7 @@ class Bench(benches.Bench[LiftSample, LiftOutputs]):
 class LiftContract(Contract[Bench]):
     """On any bus. A bench begins with an idle lift."""
 
-    def test_opening_the_driver_moves_nothing(self, bench: Bench) -> None:
+    def test_opening_a_lift_switches_no_output(self, bench: Bench) -> None:
         bench.open()
         assert (bench.read(), bench.relays()) == (IDLE, [])
 
@@ -93,7 +93,7 @@ class LiftContract(Contract[Bench]):
             ("call_B1", True),
         ]
 
-    def test_writing_the_same_again_sends_no_command(self, bench: Bench) -> None:
+    def test_the_same_outputs_of_a_lift_are_written_once(self, bench: Bench) -> None:
         bench.open()
         for _ in range(3):
             bench.write(CALL)

@@ -58,7 +58,7 @@ def test_each_stage_of_a_charge_is_what_its_name_says() -> None:
 
 
 @pytest.mark.parametrize("site", SITES)
-def test_the_rules_hold_within_some_steps_of_the_start(site: str) -> None:
+def test_a_chargers_rules_hold_within_some_steps_of_the_start(site: str) -> None:
     found = walker(SITES[site]).walk([World()], depth(3, 4), check)
     assert len(found) > depth(1000, 5000)
 

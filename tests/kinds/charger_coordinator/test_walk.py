@@ -339,7 +339,7 @@ def test_in_every_history_no_two_robots_share_a_station_and_requests_go_out_in_t
 
 @hypothesis_settings(max_examples=examples(200))
 @given(st.binary(max_size=60))
-def test_a_damaged_file_is_refused_as_a_whole(kept: bytes) -> None:
+def test_a_damaged_memory_of_the_coordinator_is_refused_as_a_whole(kept: bytes) -> None:
     try:
         keep.restore(kept, SETTINGS, 0.0)
     except ValueError:

@@ -87,7 +87,7 @@ def check_rules_within(steps: int, roots: list[World], limits: DoorLimits) -> in
 
 
 @pytest.mark.parametrize("site", SITES)
-def test_the_rules_hold_within_some_steps_of_the_start(site: str) -> None:
+def test_a_doors_rules_hold_within_some_steps_of_the_start(site: str) -> None:
     limits = SITES[site]
     assert check_rules_within(depth(2, 3), [start(limits)], limits) > depth(80, 500)
 

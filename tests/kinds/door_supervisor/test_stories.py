@@ -58,7 +58,7 @@ class Site:
 # ---- DOOR-SUPERVISOR-1, DOOR-SUPERVISOR-2: passages
 
 
-def test_a_robot_passes_a_door() -> None:
+def test_a_robot_passes_a_door_through_the_supervisor() -> None:
     site = Site([(10.0, 8.0)])
     (a,) = site.walkers
     site.world.run(60.0)
@@ -88,7 +88,7 @@ def test_a_robot_is_let_in_by_the_open_door_and_a_heartbeat_that_lists_it_and_by
     assert a.log[1:] == [(23.0, "enters")]
 
 
-def test_of_two_robots_the_first_to_leave_does_not_close_on_the_other() -> None:
+def test_a_close_goes_out_only_when_the_second_of_two_robots_has_left() -> None:
     site = Site([(10.0, 3.0)], [(13.0, 30.0)])
     a, b = site.walkers
     site.world.run(80.0)

@@ -202,7 +202,7 @@ def test_after_every_history_a_restart_knows_exactly_who_holds_the_door(
 
 @settings(max_examples=examples(200))
 @given(st.binary(max_size=60))
-def test_a_damaged_file_is_refused_as_a_whole(kept: bytes) -> None:
+def test_a_damaged_table_of_holders_is_refused_as_a_whole(kept: bytes) -> None:
     try:
         restored = keep.restore(kept, Settings(), 0.0)
     except ValueError:

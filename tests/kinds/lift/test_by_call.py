@@ -199,7 +199,7 @@ ROOTS = {
 
 
 @pytest.mark.parametrize("root", ROOTS)
-def test_the_rules_hold_within_some_steps_of_each_stage_of_a_ride(root: str) -> None:
+def test_by_call_the_rules_hold_within_some_steps_of_each_stage_of_a_ride(root: str) -> None:
     stage = WALKER.path(start(LIMITS), *ROOTS[root])
     found = WALKER.walk([stage], depth(2, 3), check)
     for world in found:

@@ -269,7 +269,7 @@ def parsed(line: str) -> argparse.Namespace:
         "",
     ],
 )
-def test_a_command_line_that_contradicts_itself_exits_2(line: str) -> None:
+def test_send_and_watch_refuse_a_command_line_that_contradicts_itself(line: str) -> None:
     with pytest.raises(SystemExit) as left:
         send.request_of(parsed(line))
     assert left.value.code == 2

@@ -76,7 +76,7 @@ def test_an_address_that_is_missing_itself_is_refused_each_time(either: Module) 
 
 
 @pytest.mark.parametrize("code", [*range(13), 255])
-def test_an_exception_is_named(either: Module, code: int) -> None:
+def test_an_exception_is_named_on_tcp_and_on_a_line(either: Module, code: int) -> None:
     either.reply = lambda request: frame(request, bytes((0x82, code)))
     text = fails(bus_to(either.port), IN0)
     named = EXCEPTIONS.get(code, UNDEFINED)

@@ -1,4 +1,4 @@
-"""The real driver and bus against the fake gateway or line: each way of failing, and the door after it."""
+"""The real driver and bus against the fake gateway or line: each way of failing, and the door then."""
 
 from collections.abc import Iterator
 

@@ -114,7 +114,7 @@ def held(module: Module, *, lost_at: float | None = None) -> list[tuple[float, s
 @pytest.mark.parametrize(
     ("relay", "on_s", "told"), [(0, 0.7, "0105020000078db0"), (1, 0.8, "0105020100089c74")]
 )
-def test_the_frames_are_those_of_the_makers_manual(
+def test_a_flash_has_the_frames_of_the_makers_manual(
     line: SerialModule, relay: int, on_s: float, told: str
 ) -> None:
     """Waveshare Modbus RTU Relay, "flash on": relay 0 for 700 ms, relay 1 for 800 ms."""
