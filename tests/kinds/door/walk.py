@@ -260,7 +260,8 @@ def _asked(
     if isinstance(event, OpenRequested) and not refused:
         return True, None
     if isinstance(event, CloseRequested) and wanted and ends_at is None:
-        return True, now + limits.t.close_grace_s
+        ends_at = now + limits.t.close_grace_s
+        return ends_at > now, ends_at
     return wanted, ends_at
 
 
