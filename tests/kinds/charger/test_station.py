@@ -371,15 +371,12 @@ def test_each_refusal_has_its_own_fault() -> None:
     ]
 
 
-# ---- failure: the station's side, the robot's side
+# ---- CHARGER-6: failure: the station's side, the robot's side
 
 
 def at_fault(text: str, side: str = "", receiver: str = ONE) -> Sampled[ChargerSample]:
     measured = Measured(receiver_id=receiver)
     return Sampled(ChargerSample(A.ERROR, 238, text, measured, side))  # type: ignore[arg-type]
-
-
-# ---- CHARGER-6: failure: the station's side, the robot's side
 
 
 @pytest.mark.parametrize("side", ["station", ""])

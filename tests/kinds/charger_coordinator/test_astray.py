@@ -61,12 +61,9 @@ def found(memory: Memory, *times: float) -> list[list[Astray]]:
     return [list(astray.found(memory, now, SITE).values()) for now in times]
 
 
-# ---- who has a station, and stands at another
+# ---- COORDINATOR-ASTRAY-1: who has a station, and stands at another
 
 EXPECTED = {A: Grant(ONE, "r1", 10.0, shown=True)}
-
-
-# ---- COORDINATOR-ASTRAY-1: who has a station, and stands at another
 
 
 @pytest.mark.parametrize(("came_at", "since"), [(20.0, 22.0), (10.0, 40.0), (5.0, 40.0)])
@@ -163,7 +160,7 @@ def test_the_core_wakes_for_every_step_with_a_robot_astray() -> None:
     assert dues == [[22.0, 22.0, NEVER], [22.0, 23.0, 37.0, NEVER], [22.0, 38.0, 52.0, NEVER]]
 
 
-# ---- who has no station, and stands on a pad that another waits for
+# ---- COORDINATOR-ASTRAY-2: who has no station, and stands on a pad that another waits for
 
 WAITS = (Wish(ONE, "fleet"),)
 BLOCKS = Astray(TWO, A, 90.0, A, 1, waiter=ONE)
@@ -177,9 +174,6 @@ def blocks(station: str) -> Astray:
 def blocked(came_at: float = 30.0, **changes: object) -> Memory:
     """TWO stands at charger_a, where nobody charges it, and ONE waits."""
     return site(at(TWO, AT[A], came_at), **{"wishes": WAITS, **changes})
-
-
-# ---- COORDINATOR-ASTRAY-2: who has no station, and stands on a pad that another waits for
 
 
 def test_a_robot_blocks_a_pad_a_while_after_it_came_or_the_station_let_it_go() -> None:

@@ -191,9 +191,6 @@ def test_a_robot_that_an_operator_asks_for_again_is_tried_again_in_spite_of_its_
     assert site_.memory.strikes == {}
 
 
-# ---- who gets which station
-
-
 # ---- COORDINATOR-3: a request that no station takes
 
 
@@ -684,6 +681,3 @@ def test_who_stands_on_a_pad_is_read_from_its_error() -> None:
         "wrong docking: a text of another node": None,
     }
     assert {text: on_pad(text, ours) for text in texts} == texts
-
-
-# ---- what is kept

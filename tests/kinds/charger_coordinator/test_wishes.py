@@ -119,7 +119,7 @@ def test_a_robot_that_did_not_come_loses_station_and_wish_and_is_not_called_for_
     )
 
 
-# ---- it was charged
+# ---- COORDINATOR-WISHES-2, COORDINATOR-WISHES-3: it was charged
 
 
 def charged(by: By = "fleet", **changes: object) -> Memory:
@@ -131,9 +131,6 @@ def charged(by: By = "fleet", **changes: object) -> Memory:
         robots={ONE: Standing(seen("charger_a", 99.0, "t1", True), 20.0)},
         **changes,  # type: ignore[arg-type]
     )
-
-
-# ---- COORDINATOR-WISHES-2, COORDINATOR-WISHES-3: it was charged
 
 
 @pytest.mark.parametrize("by", ["fleet", "operator"])
@@ -222,13 +219,10 @@ def test_a_robot_that_has_left_in_another_task_was_served_long_ago(
     assert after(memory, sighting, 30.0).served == served
 
 
-# ---- it begins a task
+# ---- COORDINATOR-WISHES-4: it begins a task
 
 IDLE_WISH = Wish(ONE, "fleet")
 ON_ITS_WAY = Wish(ONE, "fleet", "t2", called=True)
-
-
-# ---- COORDINATOR-WISHES-4: it begins a task
 
 
 @pytest.mark.parametrize(
