@@ -24,7 +24,6 @@ from bridges.kinds.charger_coordinator.signals import (
     FleetSeen,
     Sighting,
     StateHeard,
-    Unwanted,
     Wanted,
 )
 from bridges.kinds.shared.decision import OperatorReset
@@ -81,6 +80,9 @@ def test_a_station_that_ends_a_charge_early_is_not_asked_again_until_the_battery
     assert site_.run(1) == [(34.0, "charger_a: AMR01")]
 
 
+# ---- COORDINATOR-1: operators
+
+
 def test_a_full_robot_that_an_operator_asked_for_makes_room() -> None:
     site_ = Alone()
     site_.hears(Wanted(ONE, "", "op-1", 0.0))
@@ -117,47 +119,6 @@ def test_an_operator_may_send_a_robot_that_has_a_station_to_another_one() -> Non
     assert [(w.robot, w.request_id) for w in site_.memory.wishes] == [(ONE, "op-2")]
 
 
-def test_a_newer_request_for_the_station_that_the_robot_has_moves_nothing() -> None:
-    site_ = Alone()
-    site_.shows[B] = busy(B)
-    site_.hears(Wanted(ONE, "", "op-1", 0.0))
-    site_.hears(Wanted(TWO, "", "op-2", 0.0))
-    site_.run(1)
-    site_.does(A, ASSIGNED)
-    for request_id, station in (("op-3", A), ("op-4", "")):
-        site_.hears(Wanted(ONE, station, request_id, 0.0))
-        assert site_.run(5) == []
-    assert [(w.robot, w.request_id) for w in site_.memory.wishes] == [(ONE, "op-4"), (TWO, "op-2")]
-
-
-def test_a_request_that_suits_no_station_of_the_robot_is_refused_by_name() -> None:
-    assert answer(Alone(), Wanted(THREE, A, "op-1", 0.0)) == "station does not suit the robot"
-
-
-def test_a_request_that_has_a_station_is_withdrawn_by_the_id_that_the_station_shows() -> None:
-    site_ = Alone()
-    site_.wants(ONE)
-    site_.hears(Wanted(TWO, "", "op-2", 0.0))
-    site_.run(1)
-    site_.does(A, CHARGING)
-    site_.run(1)
-    charging, other = site_.memory.grants[A].robot, site_.memory.grants[B].robot
-    assert answer(site_, Unwanted(site_.memory.grants[A].request_id)) == ""
-    assert site_.sent[-1] == (2.0, "charger_a: cancel")
-    assert [w.robot for w in site_.memory.wishes] == [other]
-    assert charging != other
-
-
-def test_a_withdrawal_is_refused_unless_the_request_is_known_or_over() -> None:
-    site_ = Alone()
-    site_.hears(Wanted(ONE, "", "op-1", 0.0))
-    assert [answer(site_, Unwanted("op-1")) for _ in range(2)] == ["", ""]
-    site_.wants(TWO)
-    site_.run(1)
-    assert answer(site_, Unwanted("op-9")) == "no such request"
-    assert answer(site_, Unwanted("")) == "no such request"
-
-
 def test_an_operators_reset_tries_faulty_robots_and_stations_that_were_passed_over() -> None:
     site_ = Alone()
     site_.shows[B] = busy(B)
@@ -178,17 +139,6 @@ def test_no_event_that_counts_is_refused() -> None:
         OperatorReset(),
     ]
     assert [answer(site_, event) for event in events] == [""] * 5
-
-
-def test_a_robot_that_an_operator_asks_for_again_is_tried_again_in_spite_of_its_failures() -> None:
-    site_ = Alone()
-    site_.wants(ONE)
-    site_.run(1)
-    site_.does(A, ERROR, "over temperature")
-    site_.run(1)
-    assert site_.memory.strikes == {ONE: (A,)}
-    site_.hears(Wanted(ONE, "", "op-1", 0.0))
-    assert site_.memory.strikes == {}
 
 
 # ---- COORDINATOR-3: a request that no station takes
@@ -272,21 +222,6 @@ def test_an_error_of_an_unknown_side_counts_until_another_station_charges_the_ro
     assert site_.memory.strikes == {}
 
 
-def test_a_failure_is_forgotten_once_the_robot_has_been_charged_for_a_while() -> None:
-    site_ = Alone()
-    site_.wants(ONE, "charger_a")
-    site_.run(1)
-    site_.does(A, ERROR, "over temperature")
-    site_.run(1)
-    site_.wants(ONE, "dock_b")
-    site_.shows[A] = StateHeard(A, IDLE)
-    site_.does(B, CHARGING)
-    site_.run(10)
-    assert site_.memory.strikes == {ONE: (A,)}
-    site_.run(1)
-    assert site_.memory.strikes == {}
-
-
 def test_a_robot_that_fails_at_both_stations_a_moment_after_the_charge_begins_is_faulty() -> None:
     site_ = Alone()
     site_.wants(ONE)
@@ -300,36 +235,6 @@ def test_a_robot_that_fails_at_both_stations_a_moment_after_the_charge_begins_is
     assert site_.faults == [
         "ROBOT_FAULTY: tiny/AMR01 failed at charger_a and at charger_b: not tried again"
     ]
-
-
-@pytest.mark.parametrize(
-    ("error", "left"),
-    [
-        ("station: over temperature", {}),
-        ("out of service after: station: over temperature", {}),
-        ("over temperature", {}),
-        ("out of service after: over temperature", {}),
-        ("robot: handshake timeout", {ONE: (A,)}),
-        ("Charger unreachable", {ONE: (A,)}),
-        ("unknown receiver RX-9", {ONE: (A,)}),
-    ],
-)
-def test_a_failure_is_forgotten_when_its_station_names_itself_or_is_mended_without_the_robot(
-    error: str, left: dict[Robot, tuple[str, ...]]
-) -> None:
-    site_ = Alone()
-    site_.shows[B] = busy(B)
-    site_.wants(ONE, "charger_a")
-    site_.run(1)
-    site_.does(A, ERROR, "over temperature")
-    site_.run(60)
-    assert site_.memory.strikes == {ONE: (A,)}, "it stands there still: either may be at fault"
-    site_.shows[A] = StateHeard(A, ERROR, "unrequested/charger_a", None, error)
-    site_.wants(ONE)
-    site_.run(12)
-    site_.shows[A] = busy(A)
-    site_.run(1)
-    assert site_.memory.strikes == left
 
 
 # ---- COORDINATOR-5, COORDINATOR-ASTRAY-3: robots astray
@@ -409,40 +314,6 @@ def test_a_charge_beside_it_does_not_keep_a_request_that_nobody_takes() -> None:
     assert site_.faults == ["REQUEST_NOT_TAKEN: charger_b: its daemon's log says why"]
 
 
-def test_a_served_robots_mode_is_believed_again_when_it_has_left_or_stays_long() -> None:
-    for leaves, again_at in ((True, 9.0), (False, 304.0)):
-        site_ = Alone()
-        site_.wants(ONE, "charger_a", 95.0)
-        site_.run(1)
-        for state in (CHARGING, RELEASED):
-            site_.does(A, state)
-            site_.run(1)
-        site_.shows[A] = StateHeard(A, IDLE)
-        if leaves:
-            site_.seen[ONE] = Sighting(ONE, True, None, 95.0, "work")
-            site_.run(3)
-        site_.sent.clear()
-        site_.seen[ONE] = Sighting(ONE, True, "charger_a", 95.0, "another task")
-        site_.run(400)
-        assert site_.sent[0] == (again_at, "charger_a: AMR01")
-
-
-def test_a_robot_charged_in_one_task_may_be_charged_again_in_the_next() -> None:
-    site_ = Alone()
-    site_.wants(ONE, "charger_a", 95.0)
-    site_.run(1)
-    for state in SERVED:
-        site_.does(A, state)
-        site_.run(1)
-    site_.shows[A] = StateHeard(A, IDLE)
-    site_.run(1)
-    assert site_.memory.served == {ONE: "task of AMR01"}
-    site_.hears(FleetSeen((Sighting(ONE, False, None, 95.0, "the next task"),)))
-    assert site_.memory.served == {}
-    site_.seen[ONE] = Sighting(ONE, True, "charger_a", 95.0, "the next task")
-    assert site_.run(3) == [(7.0, "charger_a: AMR01")]
-
-
 def test_a_robot_whose_fleet_is_not_heard_is_charged_in_no_task() -> None:
     site_ = Alone()
     site_.hears(Wanted(ONE, "", "op-1", 0.0))
@@ -451,15 +322,6 @@ def test_a_robot_whose_fleet_is_not_heard_is_charged_in_no_task() -> None:
         site_.does(A, state)
         site_.run(1)
     assert site_.memory.served == {ONE: ""}
-
-
-def test_a_robot_that_drives_away_before_it_was_charged_has_not_been_charged() -> None:
-    site_ = Alone()
-    site_.wants(ONE)
-    site_.run(1)
-    site_.seen[ONE] = Sighting(ONE, False, None, 40.0, "other work")
-    site_.run(1)
-    assert (site_.memory.wishes, site_.memory.served) == ((), {})
 
 
 # ---- COORDINATOR-4, COORDINATOR-STATIONS-1, COORDINATOR-STATIONS-2: how a request ends
@@ -480,46 +342,6 @@ def test_a_robot_with_one_station_is_tried_there_twice_and_no_more() -> None:
     ]
     site_.hears(Wanted(THREE, "", "op-1", 0.0))
     assert site_.run(1) != []
-
-
-def test_a_robot_that_did_not_come_has_not_failed_but_one_that_stood_there_has() -> None:
-    for place, strikes in ((None, {}), ("charger_a", {ONE: (A,)})):
-        site_ = Alone()
-        site_.wants(ONE)
-        site_.run(1)
-        site_.does(A, ASSIGNED)
-        site_.seen[ONE] = replace(site_.seen[ONE], place=place)
-        site_.run(1)
-        site_.does(A, RELEASED)
-        site_.run(1)
-        assert site_.memory.strikes == strikes
-
-
-def test_a_fault_of_the_stations_side_does_not_count_against_the_robot() -> None:
-    site_ = Alone()
-    site_.wants(ONE)
-    site_.run(1)
-    site_.does(A, ERROR, "station: fan")
-    assert site_.run(1) == [(2.0, "charger_a: cancel"), (2.0, "charger_b: AMR01")]
-    assert site_.memory.strikes == {}
-    assert site_.faults == ["STATION_OUT_OF_SERVICE: charger_a: station: fan"]
-
-
-def test_a_robot_that_did_not_come_keeps_its_request_only_while_it_stands_at_one_of_our_places() -> (
-    None
-):
-    for place, queue in ((None, [TWO]), ("wait_1", [TWO, ONE])):
-        site_ = Alone()
-        site_.shows[B] = busy(B)
-        site_.wants(ONE)
-        site_.run(1)
-        site_.wants(TWO)
-        site_.does(A, ASSIGNED)
-        site_.seen[ONE] = replace(site_.seen[ONE], place=place)
-        site_.run(1)
-        site_.does(A, RELEASED)
-        site_.run(1)
-        assert [wish.robot for wish in site_.memory.wishes] == queue
 
 
 @pytest.mark.parametrize(
