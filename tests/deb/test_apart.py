@@ -67,6 +67,7 @@ def ask(made: System, *words: str | Path, **also: str) -> subprocess.CompletedPr
     """What the installed `rmf-bridge` says."""
     command = [made.root / "usr/lib/rmf-bridges/bin/rmf-bridge", *words]
     env = {**os.environ, "HOME": str(made.root), **also}
+    env.pop("PYTHONPATH", None)
     return subprocess.run(command, env=env, capture_output=True, text=True, timeout=60)
 
 
