@@ -14,7 +14,7 @@ from msgspec import Meta
 from bridges.blackbox.trees import Tree
 from bridges.kinds.shared.recording_section import Recording
 from bridges.messages.releases import RELEASES
-from bridges.messages.texts import MESSAGES
+from bridges.messages.rihs01 import MESSAGES
 
 LATEST_S: Final = 4e9
 """Within this time, before and after zero, every sum of three is a date, and fits into an MCAP file."""

@@ -20,8 +20,8 @@ from bridges.blackbox.incident import LIBRARY, OWN_TOPICS, Incident, readable, t
 from bridges.blackbox.trees import Tree
 from bridges.messages import cdr, topics
 from bridges.messages.releases import RELEASES
-from bridges.messages.rihs01 import type_hash
-from bridges.messages.texts import MESSAGES, text
+from bridges.messages.rihs01 import MESSAGES, type_hash
+from bridges.messages.texts import text
 
 ENTRIES: Final = f"{OWN_TOPICS}entries"
 NOTES: Final = f"{OWN_TOPICS}notes"

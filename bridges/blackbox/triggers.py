@@ -29,7 +29,7 @@ from bridges.messages.definitions import (
     Message,
 )
 from bridges.messages.releases import RELEASES
-from bridges.messages.texts import MESSAGES
+from bridges.messages.rihs01 import MESSAGES
 
 AGAIN_S: Final = 600.0
 GONE_S: Final = 10.0

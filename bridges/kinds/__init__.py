@@ -5,9 +5,8 @@ edit, and no other file imports a kind by its name.
 """
 
 import importlib
-import pkgutil
 import re
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from functools import cache
 from pathlib import Path
 from types import ModuleType
@@ -49,13 +48,6 @@ def recorded(kind: str) -> "Recorded":
     """The names of a kind's values in recordings; none if its values are those of another kind."""
     found: Recorded = getattr(_package(kind), "RECORDED", {})
     return found
-
-
-def kind_files(name: str) -> Iterator[ModuleType]:
-    """Every file of a kind. Raises ImportError if one cannot be imported."""
-    package = _package(name)
-    for file in pkgutil.iter_modules(package.__path__, f"{package.__name__}."):
-        yield importlib.import_module(file.name)
 
 
 def _package(kind: str) -> ModuleType:

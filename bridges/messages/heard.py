@@ -11,8 +11,8 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from bridges.messages.definitions import Message
+from bridges.messages.words import LONGEST_NAME
 
-LONGEST_NAME: Final = 256
 FREE_TEXTS: Final = frozenset(
     {"error_message", "message", "title", "subtitle", "value", "performing_action", "model"}
 )

@@ -12,8 +12,9 @@ import json
 import typing
 from collections.abc import Hashable
 from functools import cache
+from typing import Final
 
-from bridges.messages.definitions import PACKAGES
+from bridges.messages.definitions import PACKAGES, Message
 from bridges.messages.releases import NEWEST, RELEASES, Release
 
 NESTED = 1
@@ -63,6 +64,12 @@ def _by_hash() -> dict[str, list[Release]]:
 def type_name(message_type: type) -> str:
     """As ROS writes it: package/msg/Name."""
     return f"{PACKAGES[message_type]}/msg/{message_type.__name__}"
+
+
+MESSAGES: Final[dict[str, type[Message]]] = {
+    type_name(message_type): message_type for message_type in typing.get_args(Message)
+}
+"""By the ROS type's name, as `rmf_lift_msgs/msg/LiftState`."""
 
 
 def _description(message_type: type, release: Release) -> dict[str, object]:

@@ -9,7 +9,7 @@ import typing
 from functools import cache
 from typing import Final
 
-from bridges.messages.definitions import PACKAGES, Message
+from bridges.messages.definitions import PACKAGES
 from bridges.messages.releases import NEWEST, RELEASES, Release
 from bridges.messages.rihs01 import type_name
 
@@ -17,10 +17,6 @@ RULE: Final = "=" * 80
 LONGEST: Final = 1 << 20
 DEEPEST: Final = 8
 """Types below types; a definition that names itself would go on forever."""
-MESSAGES: Final[dict[str, type[Message]]] = {
-    type_name(message_type): message_type for message_type in typing.get_args(Message)
-}
-"""By the ROS type's name, as `rmf_lift_msgs/msg/LiftState`."""
 
 Shape = tuple[tuple[str, object], ...]
 """(field, its type's name or Shape); a sequence's type ends with `[]`, or is a tuple of one Shape."""

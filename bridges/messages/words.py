@@ -6,12 +6,15 @@ network, so control characters are escaped.
 """
 
 from enum import IntEnum
+from typing import Final
 
 from bridges.messages import definitions as d
 from bridges.messages.stamps import in_seconds
 
 Stated = d.LiftState | d.DoorState | d.ChargerState
 Requested = d.LiftRequest | d.DoorRequest | d.ChargerRequest | d.ChargerCancel
+LONGEST_NAME: Final = 256
+"""What is kept and shown of a name: anybody can send one of a megabyte."""
 
 
 def printable(text: str) -> str:

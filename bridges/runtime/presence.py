@@ -14,9 +14,8 @@ from bridges.kinds.shared.decision import Fault
 from bridges.kinds.shared.durations import AGES_AGO, NEVER
 from bridges.kinds.shared.graph_kind import LISTENS
 from bridges.messages.definitions import Message
-from bridges.messages.heard import LONGEST_NAME
 from bridges.messages.topics import Topic
-from bridges.messages.words import printable
+from bridges.messages.words import LONGEST_NAME, printable
 from bridges.transports.transport import Subscription, Transport
 
 log = logging.getLogger(__name__)

@@ -15,8 +15,8 @@ from bridges.kinds.shared.decision import Attended, OperatorReset, RequestRefuse
 from bridges.kinds.shared.graph_kind import GraphKind
 from bridges.kinds.shared.kind import AnyDeviceKind
 from bridges.messages.definitions import Message
-from bridges.messages.heard import LONGEST_NAME
 from bridges.messages.topics import M_co, Topic
+from bridges.messages.words import LONGEST_NAME
 from bridges.runtime.clock import Clock, machine_s
 from bridges.runtime.device import AnyNode, Node
 from bridges.runtime.graph import AnyGraphNode, GraphNode

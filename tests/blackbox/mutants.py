@@ -29,8 +29,8 @@ from bridges.blackbox.shelf import Shelf
 from bridges.messages import cdr
 from bridges.messages.definitions import Message
 from bridges.messages.releases import RELEASES
-from bridges.messages.rihs01 import type_name
-from bridges.messages.texts import MESSAGES, text
+from bridges.messages.rihs01 import MESSAGES, type_name
+from bridges.messages.texts import text
 from workbench.page.incidents import read
 from workbench.page.levels import Levels
 from workbench.replay.bags import heard_in

@@ -9,10 +9,12 @@ be the same. Comments of the YAML go; the addresses of its buses become `192.0.2
 
 import enum
 import inspect
+import pkgutil
 import re
 import typing
 from collections.abc import Callable, Iterator
 from functools import cache
+from importlib import import_module
 from types import ModuleType
 from typing import Any, Final
 
@@ -23,13 +25,13 @@ from msgspec.structs import replace
 from bridges.blackbox.entries import AnyEntry, Clocks, Died, Ended, Head, Known, Lost, Spoken, Step
 from bridges.blackbox.incident import Incident
 from bridges.blackbox.trees import HOLDS, TYPE, Tree
-from bridges.kinds import kind_called, kind_files, kind_names
+from bridges.kinds import kind_called, kind_names
 from bridges.kinds.shared.graph_kind import GraphKind
 from bridges.messages import cdr
 from bridges.messages.definitions import Message
 from bridges.messages.heard import FREE_TEXTS
 from bridges.messages.releases import RELEASES
-from bridges.messages.texts import MESSAGES
+from bridges.messages.rihs01 import MESSAGES
 from bridges.settings.config import Config
 from workbench.commissioning.reference import schema
 from workbench.replay.replayed import of_head
@@ -151,8 +153,9 @@ def our_words() -> frozenset[str]:
     found = {"site", *TOPICS}
     _schema_words(schema(), found)
     for kind in kind_names():
-        for module in kind_files(kind):
-            found |= set(_module_words(module))
+        package = f"bridges.kinds.{kind}"
+        for file in pkgutil.iter_modules(import_module(package).__path__, f"{package}."):
+            found |= set(_module_words(import_module(file.name)))
     return frozenset(found)
 
 

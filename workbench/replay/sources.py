@@ -7,10 +7,11 @@ from typing import Final, NamedTuple
 
 from bridges.messages import cdr, topics
 from bridges.messages.definitions import Message
-from bridges.messages.heard import LONGEST_NAME
 from bridges.messages.releases import NEWEST, RELEASES, Release
+from bridges.messages.rihs01 import MESSAGES
 from bridges.messages.rihs01 import releases_of as releases_of_hash
-from bridges.messages.texts import MESSAGES, releases_of
+from bridges.messages.texts import releases_of
+from bridges.messages.words import LONGEST_NAME
 
 TOPICS: Final = frozenset(topic.name for topic in topics.every())
 

@@ -15,8 +15,8 @@ from bridges.kinds.charger.settings import Robot
 from bridges.kinds.charger.signals import Requested
 from bridges.kinds.shared.kind import Answer
 from bridges.messages.definitions import ChargerRequest, DiagnosticLevel, DiagnosticStatus, KeyValue
-from bridges.messages.heard import LONGEST_NAME
 from bridges.messages.topics import CHARGER_REFUSALS
+from bridges.messages.words import LONGEST_NAME
 
 NAME = "ChargerRequest refused"
 OCCUPIED = "charger occupied"

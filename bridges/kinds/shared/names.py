@@ -4,7 +4,7 @@ from collections.abc import Collection
 from typing import Final
 
 from bridges.kinds.shared.decision import RequestRefused
-from bridges.messages.heard import LONGEST_NAME
+from bridges.messages.words import LONGEST_NAME
 
 LONGEST_TEXT: Final = 10_000
 """The longest error_message of a ChargerState."""

@@ -19,8 +19,8 @@ from bridges.messages.definitions import (
 )
 from bridges.messages.heard import Heard
 from bridges.messages.releases import JAZZY, KILTED, RELEASES, Release
-from bridges.messages.rihs01 import type_name
-from bridges.messages.texts import MESSAGES, releases_of, text
+from bridges.messages.rihs01 import MESSAGES, type_name
+from bridges.messages.texts import releases_of, text
 from tests.workbench.replay.written import MCAP, SQLITE, store, write
 from workbench.replay.bags import BagError, Notes, heard_in
 from workbench.replay.sources import releases
