@@ -25,16 +25,15 @@ umask 022
 mkdir -p "$root/DEBIAN" "$bench/DEBIAN" "$page/DEBIAN" "$root/$lib/bin" "$root/usr/bin" "$tree/bin" "$work/wheel" "$wheels"
 
 # The libraries: the workbench's are those that the daemons have not, the page's those that neither has. Left out is what
-# only Cyclone's own commands import, what colorzero was built with, and how rich would colour sources and Markdown: half
-# of the byte code that an installation would have to make.
+# only Cyclone's own commands import, and what colorzero was built with: half of the byte code that an installation would
+# have to make.
 [ "$python" != 3.13 ] || "$here/deb/lgpio.sh" "$arch" "$wheels"
 "$bin/pip" wheel --quiet --disable-pip-version-check --no-deps --wheel-dir "$work/wheel" "$here"
 version=$(basename "$work"/wheel/*.whl | cut -d- -f2)+$release # it has the commit: setup.py
 fill() {
   into=$1; shift
   "$bin/python" "$here/deb/wheels.py" "$work"/wheel/*.whl --arch "$arch" --python "$python" \
-    --find-links "$wheels" --without cyclonedds:rich-click --without colorzero:setuptools \
-    --without rich:pygments --without rich:markdown-it-py --target "$into" "$@"
+    --find-links "$wheels" --without cyclonedds:rich-click --without colorzero:setuptools --target "$into" "$@"
 }
 # without PLACE OTHER: leaves in PLACE what OTHER has not.
 without() { (cd "$2" && find . ! -type d -print0) | (cd "$1" && xargs -0 rm -f); }
