@@ -6,7 +6,7 @@ network, so control characters are escaped.
 """
 
 from enum import IntEnum
-from typing import Final
+from typing import Final, Literal
 
 from bridges.messages import definitions as d
 from bridges.messages.stamps import in_seconds
@@ -15,6 +15,8 @@ Stated = d.LiftState | d.DoorState | d.ChargerState
 Requested = d.LiftRequest | d.DoorRequest | d.ChargerRequest | d.ChargerCancel
 LONGEST_NAME: Final = 256
 """What is kept and shown of a name: anybody can send one of a megabyte."""
+Kind = Literal["lift", "door", "charger"]
+KINDS: Final[tuple[Kind, ...]] = ("lift", "door", "charger")
 
 
 def printable(text: str) -> str:
@@ -43,14 +45,14 @@ def device(message: Stated | Requested) -> str:
             return message.charger_name
 
 
-def kind(state: Stated) -> str:
-    """The kind of device that a state is of: `lift`, `door` or `charger`."""
-    match state:
-        case d.LiftState():
+def kind(message: Stated | Requested) -> Kind:
+    """The kind of device that a state or request is about."""
+    match message:
+        case d.LiftState() | d.LiftRequest():
             return "lift"
-        case d.DoorState():
+        case d.DoorState() | d.DoorRequest():
             return "door"
-        case d.ChargerState():
+        case _:
             return "charger"
 
 

@@ -1,0 +1,61 @@
+"""What is remembered of a charger: who asked for it, who has it, and whether it charges."""
+
+from collections.abc import Iterator
+from typing import Final
+
+from bridges.messages import definitions as d
+from bridges.messages import words
+from bridges.observe.device import News, ObservedDevice, Wait
+from bridges.observe.requesters import Fact, Moment
+
+NOBODY: Final = "nobody"
+
+
+class ObservedCharger(ObservedDevice[d.ChargerState]):
+    """`condition`: RMF's word for its state. `robot`: the robot that has it. `request`: the id that it
+    serves. Its requesters are known by the ids of their requests, and want a robot charged."""
+
+    kind = "charger"
+
+    def __init__(self, name: str, began: Moment) -> None:
+        super().__init__(name, began)
+        self.condition = Fact("", began)
+        self.robot = Fact(NOBODY, began)
+        self.request = Fact("", began)
+        self.error = Fact("", began)
+
+    def facts(self, state: d.ChargerState) -> dict[str, str]:
+        """Condition, robot, error and request."""
+        robot = f"{state.robot_fleet}/{state.robot_name}" if state.robot_name else NOBODY
+        return {
+            "condition": words.plain(d.ChargerStateValue, state.state),
+            "robot": self.text(robot),
+            "error": self.text(state.error_message),
+            "request": self.text(state.request_id),
+        }
+
+    def waits(self, now: Moment) -> Iterator[Wait]:
+        """Whoever it is assigned to; its request comes once."""
+        if self.condition.value == "assigned":
+            since = max(self.condition.since, self.request.since, key=lambda one: one.at)
+            yield Wait(self.request.value, "CHARGING", since)
+
+    def _hear_other(self, moment: Moment, topic: str, message: d.Message) -> Iterator[News]:
+        match message:
+            case d.ChargerRequest():
+                robot = self.text(f"{message.fleet_name}/{message.robot_name}")
+                who = self.text(message.request_id)
+                one, new = self.requesters.ask(who, robot, moment, stands=True)
+                if new and one.times == 1:
+                    yield News("asks", moment, one.who, requester=one)
+            case d.ChargerCancel():
+                found = self.requesters.get(self.text(message.request_id))
+                if found is not None and found.ended is None:
+                    found.ended = moment
+                    yield News("ends", moment, found.who, requester=found)
+
+    def _settle(self, moment: Moment) -> Iterator[News]:
+        if self.changed and self.before is not None:
+            yield News("changed", moment)
+        if found := self.requesters.get(self.request.value):
+            found.granted = found.granted or moment

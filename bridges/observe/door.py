@@ -1,0 +1,134 @@
+"""What is remembered of a door: who asks for it, who holds it by the supervisor's heartbeat, what was
+asked of it, and what RMF's DoorOpen and DoorClose still miss."""
+
+from collections.abc import Iterator
+from typing import Final
+
+from bridges.messages import definitions as d
+from bridges.messages import words
+from bridges.observe.device import Check, News, ObservedDevice, Wait
+from bridges.observe.limits import ASKS_WITHIN_S, MOST_HOLDERS
+from bridges.observe.requesters import Fact, Moment, Requester
+
+OPEN: Final = "open"
+CLOSED: Final = "closed"
+LISTS: Final = "lists it"
+LISTS_NOT: Final = "does not list it"
+SUPERVISOR: Final = "door_supervisor"
+"""The requester_id that RMF's own uses on `door_requests` (door_supervisor/Node.hpp), and ours."""
+
+
+def listed(heartbeat: d.SupervisorHeartbeat, door: str) -> list[str]:
+    """Who holds the door, by the supervisor's heartbeat (rmf_ros2, SupervisorHasSession.cpp)."""
+    return [
+        session.requester_id
+        for sessions in heartbeat.all_sessions
+        if sessions.door_name == door
+        for session in sessions.sessions
+    ]
+
+
+def door_open(mode: str, heartbeat: str) -> tuple[Check, ...]:
+    """What DoorOpen waits for (rmf_ros2, DoorOpen.cpp). `heartbeat`: LISTS, or anything else."""
+    return (
+        Check("door", mode, OPEN, mode == OPEN),
+        Check("heartbeat", heartbeat, LISTS, heartbeat == LISTS),
+    )
+
+
+def door_close(heartbeat: str) -> tuple[Check, ...]:
+    """What DoorClose waits for (rmf_ros2, DoorClose.cpp): not for the door."""
+    return (Check("heartbeat", heartbeat, LISTS_NOT, heartbeat != LISTS),)
+
+
+class ObservedDoor(ObservedDevice[d.DoorState]):
+    """`holders`: who the heartbeat lists, and since when. `asked`: what was asked last on
+    `door_requests`, by `sender`, at `asked_last` at last.
+    """
+
+    kind = "door"
+
+    def __init__(self, name: str, began: Moment) -> None:
+        super().__init__(name, began)
+        self.mode = Fact("", began)
+        self.holders: dict[str, Moment] = {}
+        self.last_heartbeat: Moment | None = None
+        self.asked: Fact | None = None
+        self.asked_last = began
+        self.sender = ""
+
+    def facts(self, state: d.DoorState) -> dict[str, str]:
+        """The mode."""
+        return {"mode": words.plain(d.DoorModeValue, state.current_mode.value)}
+
+    def checks(self, one: Requester) -> tuple[Check, ...]:
+        """What DoorOpen or DoorClose of this requester looks at."""
+        heartbeat = LISTS if one.who in self.holders else LISTS_NOT
+        if self.last_heartbeat is None:
+            heartbeat = "not heard"
+        return door_open(self.mode.value, heartbeat) if one.wants == OPEN else door_close(heartbeat)
+
+    def matches(self, one: Requester) -> bool:
+        """Is its DoorOpen or DoorClose done?"""
+        return all(check.met for check in self.checks(one))
+
+    def asking(self, now: Moment) -> list[Requester]:
+        """Those who repeat their request now and still wait, the earliest first."""
+        asks = [one for one in self.requesters if one.asks(now) and not self.matches(one)]
+        return sorted(asks, key=lambda one: one.since.at)
+
+    def waits(self, now: Moment) -> Iterator[Wait]:
+        """Whoever waits for OPEN; the supervisor too. A daemon that hears no heartbeat knows only of
+        the door."""
+        opened = self.mode.value == OPEN
+        for one in self.asking(now):
+            if one.wants == OPEN and not (opened and self.last_heartbeat is None):
+                yield Wait(one.who, "OPEN", one.since)
+        asked = self.asked is not None and self.asked.value == OPEN
+        if self.asked and asked and not opened and now.at - self.asked_last.at <= ASKS_WITHIN_S:
+            yield Wait(self.sender, "OPEN", self.asked.since)
+
+    def _hear_other(self, moment: Moment, topic: str, message: d.Message) -> Iterator[News]:
+        match message:
+            case d.DoorRequest():
+                yield from self._hear_request(moment, topic, message)
+            case d.SupervisorHeartbeat():
+                yield from self._hear_heartbeat(moment, message)
+
+    def _hear_request(self, moment: Moment, topic: str, request: d.DoorRequest) -> Iterator[News]:
+        wants = words.plain(d.DoorModeValue, request.requested_mode.value)
+        who = self.text(request.requester_id)
+        if topic == "door_requests":
+            self.sender, self.asked_last = who, moment
+            if self.asked is None:
+                self.asked = Fact(wants, moment)
+            elif self.asked.say(wants, moment):
+                yield News("passed on", moment, who, wants)
+            return
+        one, new = self.requesters.ask(who, wants, moment, stands=self.is_silent(moment))
+        one.stamp(moment, request.request_time)
+        if new:
+            yield News("asks", moment, who, requester=one)
+
+    def _hear_heartbeat(self, moment: Moment, heartbeat: d.SupervisorHeartbeat) -> Iterator[News]:
+        first, self.last_heartbeat = self.last_heartbeat is None, moment
+        found = [self.text(who) for who in listed(heartbeat, self.id)[:MOST_HOLDERS]]
+        seen = not first or moment.at - self.began.at > ASKS_WITHIN_S
+        since = Moment(moment.at, moment.wall, seen)
+        for who in [who for who in self.holders if who not in found]:
+            yield News("lost", moment, who, gap_s=moment.at - self.holders.pop(who).at)
+        for who in found:
+            if who not in self.holders:
+                self.holders[who] = since
+                if seen:
+                    yield News("has", moment, who)
+
+    def _settle(self, moment: Moment) -> Iterator[News]:
+        if self.changed and self.before is not None:
+            yield News("changed", moment)
+        for one in self.requesters:
+            if one.wants == OPEN and one.met is None and self.matches(one):
+                one.met = moment
+                yield News("met", moment, one.who, requester=one)
+            if not one.asks(moment) and one.who not in self.holders:
+                self.requesters.drop(one.who)

@@ -1,0 +1,118 @@
+"""All devices that were heard, in bounds, whatever names are made up."""
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from bridges.messages import definitions as d
+from bridges.messages import words
+from bridges.messages.heard import Heard, Own
+from bridges.observe.charger import ObservedCharger
+from bridges.observe.device import News, ObservedDevice
+from bridges.observe.door import ObservedDoor
+from bridges.observe.lift import ObservedLift
+from bridges.observe.limits import FORGOTTEN_S, MOST_DEVICES, SILENT_S, STEP_S
+from bridges.observe.requesters import Moment
+
+AnyDevice = ObservedDevice[Any]
+Key = tuple[words.Kind, str]
+"""A device's kind, and its name on the graph."""
+
+
+class ObservedGraph:
+    """Every device, by kind and name; at most `most` of each kind.
+
+    Where there is no room, one that was only asked for gives way to one that has states, and one whose
+    states stopped FORGOTTEN_S ago to a new one; otherwise those heard first stay. `crowded`: the kinds
+    of which some had no room. `steps`: when the listener's clock was stepped, and by how much (s).
+    """
+
+    makes: Mapping[words.Kind, type[AnyDevice]] = {
+        "lift": ObservedLift,
+        "door": ObservedDoor,
+        "charger": ObservedCharger,
+    }
+
+    def __init__(self, most: int = MOST_DEVICES) -> None:
+        self.devices: dict[Key, AnyDevice] = {}
+        self.began: Moment | None = None
+        self.now = Moment(0.0, 0.0)
+        self.steps: list[tuple[Moment, float]] = []
+        self.crowded: set[words.Kind] = set()
+        self._most = most
+        self._offset: float | None = None
+        self._full_until: dict[tuple[words.Kind, bool], float] = {}
+
+    def hear(self, heard: Heard) -> list[tuple[AnyDevice, list[News]]]:
+        """Take a message. Returns the devices that it is about, and what it changed of each."""
+        moment, message = self.moment(heard), heard.message
+        topic = heard.topic.rpartition("/")[2]
+        about = [*self._about(message, moment)]
+        return [(device, device.hear(moment, topic, message)) for device in about]
+
+    def moment(self, heard: Heard | Own) -> Moment:
+        """Its time. One that a recording has in the wrong order counts as of now."""
+        at = heard.at if self.began is None else max(heard.at, self.now.at)
+        offset = heard.wall - heard.at
+        if self.began is None:
+            self.began = Moment(at, heard.wall, seen=False)
+        by_s = offset - (offset if self._offset is None else self._offset)
+        if abs(by_s) > STEP_S and len(self.steps) < 3:
+            self.steps.append((Moment(at, heard.wall), by_s))
+        self._offset = offset
+        self.now = Moment(at, heard.wall)
+        return self.now
+
+    def pass_time(self, at: float, wall: float) -> None:
+        """Note that time has passed and nothing was heard."""
+        self.now = Moment(max(at, self.now.at), wall)
+        self.began = self.began or Moment(at, wall, seen=False)
+
+    def stated(self, kind: words.Kind) -> list[AnyDevice]:
+        """The devices of this kind that have published a state, in the order in which they came."""
+        every = self.devices.values()
+        return [one for one in every if one.kind == kind and one.state is not None]
+
+    def make(self, kind: words.Kind, name: str) -> AnyDevice:
+        """A device of which nothing was heard yet."""
+        return self.makes[kind](name, self.began or self.now)
+
+    def _about(self, message: d.Message, moment: Moment) -> Iterator[AnyDevice]:
+        if isinstance(message, d.SupervisorHeartbeat):
+            yield from (one for one in self.devices.values() if one.kind == "door")
+        elif isinstance(message, words.Stated | words.Requested):
+            stated = isinstance(message, words.Stated)
+            found = self.device(words.kind(message), words.device(message), moment, stated=stated)
+            if found is not None:
+                yield found
+
+    def device(
+        self, kind: words.Kind, name: str, moment: Moment, *, stated: bool = False
+    ) -> AnyDevice | None:
+        """The device of this name. A new one is made if there is room for it."""
+        found = self.devices.get((kind, name))
+        if found is not None or not name:
+            return found
+        if not self._makes_room(kind, moment.at, stated=stated):
+            self.crowded |= {kind} if stated else set()
+            return None
+        made = self.devices[kind, name] = self.make(kind, name)
+        return made
+
+    def _makes_room(self, kind: words.Kind, now: float, *, stated: bool) -> bool:
+        if now <= self._full_until.get((kind, stated), float("-inf")):
+            return False
+        of_kind = [one for one in self.devices.values() if one.kind == kind]
+        if len(of_kind) < self._most:
+            return True
+        oldest = min(of_kind, key=_heard_at)
+        until = _heard_at(oldest) + FORGOTTEN_S if stated else now + SILENT_S
+        if now <= until:
+            self._full_until[kind, stated] = until
+            return False
+        del self.devices[oldest.kind, oldest.id]
+        return True
+
+
+def _heard_at(device: AnyDevice) -> float:
+    """When its last state came (s)."""
+    return device.last_state.at if device.last_state else float("-inf")

@@ -1,0 +1,176 @@
+"""What is remembered of a lift: who asks for it, who has it, what the supervisor asks for, and what
+RMF's RequestLift still misses."""
+
+from collections.abc import Iterator
+from typing import Final
+
+from bridges.messages import definitions as d
+from bridges.messages import words
+from bridges.observe.device import Check, News, ObservedDevice, Wait
+from bridges.observe.limits import ASKS_WITHIN_S
+from bridges.observe.requesters import Fact, Moment, Requester
+
+END: Final = d.LiftRequestType.REQUEST_END_SESSION
+NOBODY: Final = "nobody"
+NO_FLOOR: Final = "no known floor"
+OPEN: Final = "open"
+
+
+def request_lift(session: str, floor: str, door: str, who: str, wants: str) -> tuple[Check, ...]:
+    """What RequestLift looks at, and nothing else, to let `who` drive at the floor that it `wants`
+    (rmf_ros2, RequestLift.cpp:322-326); the lift's name is what was heard."""
+    fields = (("session", session, who), ("floor", floor, wants), ("door", door, OPEN))
+    return tuple(Check(*field, field[1] == field[2]) for field in fields)
+
+
+class ObservedLift(ObservedDevice[d.LiftState]):
+    """`adapters_heard`: a fleet adapter was. `supervisor`: the session that it asks for ("" after an
+    END), as far as it was heard on `lift_requests`, at `supervisor_last` at last."""
+
+    kind = "lift"
+
+    def __init__(self, name: str, began: Moment) -> None:
+        super().__init__(name, began)
+        self.floor = Fact(NO_FLOOR, began)
+        self.door = Fact("", began)
+        self.motion = Fact("", began)
+        self.mode = Fact("", began)
+        self.session = Fact(NOBODY, began)
+        self.destination = Fact("", began)
+        self.adapters_heard = False
+        self.supervisor: Fact | None = None
+        self.supervisor_last: Moment | None = None
+
+    def facts(self, state: d.LiftState) -> dict[str, str]:
+        """Session, mode, floor, motion, destination and door."""
+        return {
+            "session": self.text(state.session_id) or NOBODY,
+            "mode": words.word(d.LiftMode, state.current_mode),
+            "floor": self.text(state.current_floor) or NO_FLOOR,
+            "motion": words.plain(d.LiftMotion, state.motion_state),
+            "destination": self.text(state.destination_floor),
+            "door": words.plain(d.LiftDoor, state.door_state),
+        }
+
+    def checks(self, one: Requester) -> tuple[Check, ...]:
+        """What RequestLift of this requester looks at."""
+        wants = one.wants or "no floor"
+        return request_lift(self.session.value, self.floor.value, self.door.value, one.who, wants)
+
+    def matches(self, one: Requester) -> bool:
+        """Is RequestLift of this requester done?"""
+        return all(check.met for check in self.checks(one))
+
+    def asking(self, now: Moment) -> list[Requester]:
+        """Those who ask now, the earliest first. While no state comes nobody repeats itself, and all
+        wait."""
+        stands = self.last_state is None or self.is_silent(now)
+        asks = [
+            one
+            for one in self.requesters
+            if one.ended is None and (one.asks(now) or (stands and not one.gone))
+        ]
+        return sorted(asks, key=lambda one: one.first.at)
+
+    def waits(self, now: Moment) -> Iterator[Wait]:
+        """Whoever asks, and is not shown what it asks for."""
+        for one in self.asking(now):
+            if self.is_silent(now) or not self.matches(one):
+                yield Wait(one.who, one.wants, one.lacks)
+
+    # ---- requests
+
+    def _hear_other(self, moment: Moment, topic: str, message: d.Message) -> Iterator[News]:
+        if not isinstance(message, d.LiftRequest):
+            return
+        who, ends = self.text(message.session_id), message.request_type == END
+        passed_on = topic == "lift_requests"
+        if passed_on:
+            yield from self._passed_on(moment, "" if ends else who)
+        else:
+            self.adapters_heard = True
+        if ends:
+            yield from self._end(moment, who, passed_on)
+            return
+        if passed_on and self.adapters_heard:
+            if found := self.requesters.get(who):
+                found.passed_on = moment
+            return
+        wants, stands = self.text(message.destination_floor), self.is_silent(moment)
+        one, new = self.requesters.ask(who, wants, moment, keep=self.session.value, stands=stands)
+        one.own = one.own or not passed_on
+        one.passed_on = moment if passed_on else one.passed_on
+        one.stamp(moment, message.request_time)
+        if new:
+            if who == self.session.value:
+                one.granted = one.granted or self.session.since
+            yield News("asks", moment, who, requester=one)
+
+    def _passed_on(self, moment: Moment, asks: str) -> Iterator[News]:
+        self.supervisor_last = moment
+        if self.supervisor is None:
+            self.supervisor = Fact(asks, moment)
+        elif self.supervisor.say(asks, moment):
+            yield News("passed on", moment, asks)
+
+    def _end(self, moment: Moment, who: str, passed_on: bool) -> Iterator[News]:
+        one, holds = self.requesters.get(who), who == self.session.value
+        if one is None and who and holds:  # it was not heard asking
+            one, _ = self.requesters.ask(who, "", moment)
+            one.granted, one.ended, one.own = self.session.since, moment, not passed_on
+            one.end_passed_on = passed_on
+            yield News("ends", moment, who, passed_on=passed_on)
+            return
+        if one is None:
+            return
+        one.end_passed_on = one.end_passed_on or passed_on
+        if one.ended is not None:
+            return
+        yield News("ends", moment, who, requester=one, passed_on=passed_on)
+        if passed_on and one.own and not holds:
+            return  # only its fleet adapter knows whether it still waits
+        one.ended = moment
+        if not holds:
+            yield self._over(moment, one)
+
+    # ---- states
+
+    def _settle(self, moment: Moment) -> Iterator[News]:
+        if self.before is None:
+            self.session.since = moment
+        if "session" in self.changed or self.before is None:
+            yield from self._changed_hands(moment)
+        if self.changed and self.before is not None:
+            yield News("changed", moment)
+        for one in self.requesters:
+            if one.ended is None and self.matches(one):
+                one.lacks = moment
+                if one.met is None:
+                    one.met = moment
+                    yield News("met", moment, one.who, requester=one)
+            elif one.ended is None:
+                one.met = None
+            silent = moment.at - one.last.at > ASKS_WITHIN_S
+            if silent and one.ended is None and not one.gone:
+                one.gone = True
+                yield News("gone", moment, one.who, requester=one)
+            elif silent and one.who != self.session.value:
+                self.requesters.drop(one.who)
+
+    def _changed_hands(self, moment: Moment) -> Iterator[News]:
+        first, holder = self.before is None, self.session.value
+        before = self.changed.get("session", NOBODY)
+        old, new = self.requesters.get(before), self.requesters.get(holder)
+        if before != NOBODY and not first:
+            yield News("lost", moment, before, requester=old)
+            if old is not None:
+                yield self._over(moment, old)
+        if holder != NOBODY and not first:
+            yield News("has", moment, holder, requester=new)
+        if new is not None and holder != NOBODY:
+            new.granted = moment
+
+    def _over(self, moment: Moment, one: Requester) -> News:
+        if one.ended is not None:
+            self.requesters.drop(one.who)
+        return News("over", moment, one.who, requester=one)
