@@ -19,7 +19,7 @@ from bridges.messages import cdr
 from bridges.messages.heard import Heard
 from bridges.messages.releases import RELEASES
 from bridges.messages.rihs01 import MESSAGES
-from bridges.observe.graph import ObservedGraph
+from bridges.observe.graph import PlainGraph
 
 AGAIN_S: Final = 600.0
 MOST_NOTED: Final = 1000
@@ -34,7 +34,7 @@ class Triggers:
         self._faults: dict[str, set[str]] = {}
         self._noted: dict[tuple[str, str, str], float] = {}
         self._waiting_s = waiting_s
-        self._graph = ObservedGraph()
+        self._graph = PlainGraph()
 
     def take(self, entry: AnyEntry) -> list[Note]:
         """Why a recording is to be made now; empty if nothing is new."""

@@ -18,7 +18,7 @@ What = Literal[
     "states again",  # `gap_s` after the one before
     "read",  # the age of its readings is another now: `text`
     "changed",  # facts in `changed` are others than in the state before
-    "asks",  # for something new
+    "asks",  # for something new; of a lift: in the mode `text`
     "passed on",  # the supervisor asks for something new
     "ends",  # a requester; `passed_on` by the supervisor
     "has",  # a requester has it now

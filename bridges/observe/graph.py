@@ -1,7 +1,7 @@
 """All devices that were heard, in bounds, whatever names are made up."""
 
-from collections.abc import Iterator, Mapping
-from typing import Any
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any, ClassVar, Generic, TypeVar
 
 from bridges.messages import definitions as d
 from bridges.messages import words
@@ -14,26 +14,23 @@ from bridges.observe.limits import FORGOTTEN_S, MOST_DEVICES, SILENT_S, STEP_S
 from bridges.observe.requesters import Moment
 
 AnyDevice = ObservedDevice[Any]
+D = TypeVar("D", bound=AnyDevice)
 Key = tuple[words.Kind, str]
 """A device's kind, and its name on the graph."""
 
 
-class ObservedGraph:
-    """Every device, by kind and name; at most `most` of each kind.
+class ObservedGraph(Generic[D]):
+    """`known`: every device, by kind and name; at most `most` of each kind.
 
     Where there is no room, one that was only asked for gives way to one that has states, and one whose
     states stopped FORGOTTEN_S ago to a new one; otherwise those heard first stay. `crowded`: the kinds
     of which some had no room. `steps`: when the listener's clock was stepped, and by how much (s).
     """
 
-    makes: Mapping[words.Kind, type[AnyDevice]] = {
-        "lift": ObservedLift,
-        "door": ObservedDoor,
-        "charger": ObservedCharger,
-    }
+    makes: ClassVar[Mapping[words.Kind, Callable[[str, Moment], Any]]]
 
     def __init__(self, most: int = MOST_DEVICES) -> None:
-        self.devices: dict[Key, AnyDevice] = {}
+        self.known: dict[Key, D] = {}
         self.began: Moment | None = None
         self.now = Moment(0.0, 0.0)
         self.steps: list[tuple[Moment, float]] = []
@@ -42,7 +39,7 @@ class ObservedGraph:
         self._offset: float | None = None
         self._full_until: dict[tuple[words.Kind, bool], float] = {}
 
-    def hear(self, heard: Heard) -> list[tuple[AnyDevice, list[News]]]:
+    def hear(self, heard: Heard) -> list[tuple[D, list[News]]]:
         """Take a message. Returns the devices that it is about, and what it changed of each."""
         moment, message = self.moment(heard), heard.message
         topic = heard.topic.rpartition("/")[2]
@@ -67,18 +64,19 @@ class ObservedGraph:
         self.now = Moment(max(at, self.now.at), wall)
         self.began = self.began or Moment(at, wall, seen=False)
 
-    def stated(self, kind: words.Kind) -> list[AnyDevice]:
+    def stated(self, kind: words.Kind) -> list[D]:
         """The devices of this kind that have published a state, in the order in which they came."""
-        every = self.devices.values()
+        every = self.known.values()
         return [one for one in every if one.kind == kind and one.state is not None]
 
-    def make(self, kind: words.Kind, name: str) -> AnyDevice:
+    def make(self, kind: words.Kind, name: str) -> D:
         """A device of which nothing was heard yet."""
-        return self.makes[kind](name, self.began or self.now)
+        made: D = self.makes[kind](name, self.began or self.now)
+        return made
 
-    def _about(self, message: d.Message, moment: Moment) -> Iterator[AnyDevice]:
+    def _about(self, message: d.Message, moment: Moment) -> Iterator[D]:
         if isinstance(message, d.SupervisorHeartbeat):
-            yield from (one for one in self.devices.values() if one.kind == "door")
+            yield from (one for one in self.known.values() if one.kind == "door")
         elif isinstance(message, words.Stated | words.Requested):
             stated = isinstance(message, words.Stated)
             found = self.device(words.kind(message), words.device(message), moment, stated=stated)
@@ -87,21 +85,21 @@ class ObservedGraph:
 
     def device(
         self, kind: words.Kind, name: str, moment: Moment, *, stated: bool = False
-    ) -> AnyDevice | None:
+    ) -> D | None:
         """The device of this name. A new one is made if there is room for it."""
-        found = self.devices.get((kind, name))
+        found = self.known.get((kind, name))
         if found is not None or not name:
             return found
         if not self._makes_room(kind, moment.at, stated=stated):
             self.crowded |= {kind} if stated else set()
             return None
-        made = self.devices[kind, name] = self.make(kind, name)
+        made = self.known[kind, name] = self.make(kind, name)
         return made
 
     def _makes_room(self, kind: words.Kind, now: float, *, stated: bool) -> bool:
         if now <= self._full_until.get((kind, stated), float("-inf")):
             return False
-        of_kind = [one for one in self.devices.values() if one.kind == kind]
+        of_kind = [one for one in self.known.values() if one.kind == kind]
         if len(of_kind) < self._most:
             return True
         oldest = min(of_kind, key=_heard_at)
@@ -109,10 +107,16 @@ class ObservedGraph:
         if now <= until:
             self._full_until[kind, stated] = until
             return False
-        del self.devices[oldest.kind, oldest.id]
+        del self.known[oldest.kind, oldest.id]
         return True
 
 
 def _heard_at(device: AnyDevice) -> float:
     """When its last state came (s)."""
     return device.last_state.at if device.last_state else float("-inf")
+
+
+class PlainGraph(ObservedGraph[AnyDevice]):
+    """Every device, and nothing but what was heard of it."""
+
+    makes: ClassVar = {"lift": ObservedLift, "door": ObservedDoor, "charger": ObservedCharger}

@@ -104,7 +104,8 @@ class ObservedLift(ObservedDevice[d.LiftState]):
         if new:
             if who == self.session.value:
                 one.granted = one.granted or self.session.since
-            yield News("asks", moment, who, requester=one)
+            mode = words.word(d.LiftRequestType, message.request_type).removesuffix("_MODE")
+            yield News("asks", moment, who, mode, one)
 
     def _passed_on(self, moment: Moment, asks: str) -> Iterator[News]:
         self.supervisor_last = moment

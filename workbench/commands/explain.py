@@ -13,12 +13,12 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Final
 
+from bridges.messages.words import KINDS, Kind
 from bridges.runtime import faults
 from bridges.transports.transport import TransportError
 from workbench.explain.explanation import Explanation
 from workbench.explain.site import Site
 from workbench.explain.text import SCREEN_LINES, lines
-from workbench.explain.timeline import KINDS, Kind
 from workbench.graph.board import SECONDS
 from workbench.graph.join import (
     add_graph_arguments,
@@ -156,11 +156,11 @@ def _live(args: argparse.Namespace) -> int:
 def _listen(ear: Ear, site: Site, for_s: float) -> None:
     """Listen for this long (s)."""
     until = time.monotonic() + for_s
-    site.passed(time.monotonic(), time.time())
+    site.pass_time(time.monotonic(), time.time())
     while (left_s := until - time.monotonic()) > 0:
         for heard in ear.listen(left_s):
             site.take(heard)
-    site.passed(time.monotonic(), time.time())
+    site.pass_time(time.monotonic(), time.time())
 
 
 def _follow(ear: Ear, site: Site, args: argparse.Namespace) -> None:

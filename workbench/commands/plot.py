@@ -11,13 +11,14 @@ from html import escape
 from pathlib import Path
 from typing import Final
 
+from bridges.messages.words import KINDS
 from bridges.runtime import faults
 from workbench.explain.lanes import Drawing
 from workbench.explain.palette import PAPER, Theme
 from workbench.explain.picture import svg
 from workbench.explain.site import Site
 from workbench.explain.text import lines
-from workbench.explain.timeline import KINDS, Timeline
+from workbench.explain.timeline import Timeline
 from workbench.graph.join import complain
 from workbench.replay.recordings import Span, add_span_arguments, told_between, unreadable
 from workbench.replay.sources import BagError

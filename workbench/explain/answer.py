@@ -5,8 +5,10 @@ from dataclasses import dataclass, field
 from difflib import get_close_matches
 from typing import Final
 
-from workbench.explain.claims import Claim
-from workbench.explain.device import CLOCKS_DIFFER_S, OLD_S, SILENT_S, Device
+from bridges.messages.words import Kind
+from bridges.observe.limits import CLOCKS_DIFFER_S
+from bridges.observe.requesters import Requester
+from workbench.explain.device import Device
 from workbench.explain.explanation import FaultTold, Field, Step
 from workbench.explain.phrases import Clock, lasted, listed
 
@@ -39,7 +41,7 @@ class Answer:
 class Heard:
     """What else was heard: the names of each kind, and the number of messages."""
 
-    names: Mapping[str, tuple[str, ...]]
+    names: Mapping[Kind, tuple[str, ...]]
     messages: int
 
 
@@ -78,7 +80,7 @@ def _others(around: Heard) -> str:
 def silent(device: Device, clock: Clock) -> Answer | None:
     """Its states have stopped."""
     last = device.last_state
-    if last is None or device.silent_s(clock.now) <= SILENT_S:
+    if last is None or not device.is_silent(clock.now):
         return None
     for_s = lasted(clock.now.at - last.at)
     answer = Answer(since=last.at - 60.0)
@@ -99,19 +101,21 @@ def silent(device: Device, clock: Clock) -> Answer | None:
 
 def old_reading(device: Device, clock: Clock) -> str:
     """What is wrong with the age of its states; "" if nothing is."""
-    if not device.stamped:
-        return f"States of {device.name} come, but its inputs were never read."
-    if device.stamp_age_s > OLD_S:
-        return (
-            f"States of {device.name} come, but by their stamps the inputs were read"
-            f" {lasted(device.stamp_age_s)} earlier: the device cannot be read, or the clocks differ."
-        )
+    match device.reading.value:
+        case "was never read":
+            return f"States of {device.name} come, but its inputs were never read."
+        case "is old":
+            return (
+                f"States of {device.name} come, but by their stamps the inputs were read"
+                f" {lasted(device.stamp_age_s)} earlier: the device cannot be read, or the clocks"
+                " differ."
+            )
     return ""
 
 
 def say_waits(found: Answer, device: Device, clock: Clock) -> None:
     """What our daemons say that a request waits for."""
-    for kind, text in device.waits(clock.now).items():
+    for kind, text in device.waits_said(clock.now).items():
         whose = "daemon" if kind == device.kind else "supervisor"
         found.say(f"Its {whose} says that the request waits {text}.")
 
@@ -119,7 +123,7 @@ def say_waits(found: Answer, device: Device, clock: Clock) -> None:
 def notes(device: Device, clock: Clock) -> tuple[str, ...]:
     """What may mislead the reader."""
     found = []
-    if device.stamp_age_s < -CLOCKS_DIFFER_S and device.stamped:
+    if device.reading.value == "is from the future":
         ahead = lasted(-device.stamp_age_s)
         found.append(
             f"The states' stamps are {ahead} ahead of this clock: the two machines' clocks differ."
@@ -129,7 +133,7 @@ def notes(device: Device, clock: Clock) -> tuple[str, ...]:
             f"The stamps of {device.name}'s states go back and forth: two nodes seem to publish them."
         )
     listened = clock.now.at - device.began.at > LISTENS_S
-    speaks = device.last_state is not None and device.silent_s(clock.now) <= SILENT_S
+    speaks = device.last_state is not None and not device.is_silent(clock.now)
     if speaks and device.own(clock.now) is None and listened:
         found.append(
             f"No daemon of rmf-bridges reports on {device.name} (`/diagnostics`), so its faults, relays"
@@ -138,7 +142,7 @@ def notes(device: Device, clock: Clock) -> tuple[str, ...]:
     return tuple(found)
 
 
-def clock_of(claim: Claim) -> tuple[str, ...]:
+def clock_of(claim: Requester) -> tuple[str, ...]:
     """Note that a requester's clock differs, which makes its requests look old or new."""
     age_s = claim.stamp_age_s
     if abs(age_s) < CLOCKS_DIFFER_S or not claim.stamped:

@@ -9,9 +9,10 @@ from typing import Final
 
 from bridges.kinds.charger.pad import misplaced_in
 from bridges.kinds.charger.report import Diagnosis, diagnosis
+from bridges.observe.charger import NOBODY
 from workbench.explain import answer as common
 from workbench.explain.answer import Answer
-from workbench.explain.charger_facts import NOBODY, ChargerFacts
+from workbench.explain.charger_facts import ChargerFacts
 from workbench.explain.explanation import Step
 from workbench.explain.phrases import Clock, lasted
 from workbench.explain.rows import label
@@ -33,7 +34,7 @@ def answer(
     stopped = common.silent(charger, clock)
     if stopped is not None:
         return stopped
-    found = Answer(since=min([one.first.at for one in charger.claims], default=float("-inf")))
+    found = Answer(since=min([one.first.at for one in charger.requesters], default=float("-inf")))
     _state(found, charger, clock)
     if old := common.old_reading(charger, clock):
         found.say(old)
@@ -45,16 +46,18 @@ def answer(
 
 def _state(found: Answer, charger: ChargerFacts, clock: Clock) -> None:
     who, request = charger.robot.value, charger.request.value
-    assigned = charger.state.value == "assigned"
+    assigned = charger.condition.value == "assigned"
     whose = "" if who == NOBODY else f" {'to' if assigned else 'for'} {who}"
     asked = f" (request {request})" if request else ""
-    state = {"error": "in error"}.get(charger.state.value, charger.state.value)
-    found.say(f"{charger.name} has been {state}{whose}{asked} {clock.since(charger.state.since)}.")
+    state = {"error": "in error"}.get(charger.condition.value, charger.condition.value)
+    found.say(
+        f"{charger.name} has been {state}{whose}{asked} {clock.since(charger.condition.since)}."
+    )
 
 
 def _next(found: Answer, charger: ChargerFacts, clock: Clock) -> None:
     who = charger.robot.value
-    match charger.state.value:
+    match charger.condition.value:
         case "idle":
             _idle(found, charger, clock)
         case "assigned":
@@ -85,7 +88,7 @@ def _next(found: Answer, charger: ChargerFacts, clock: Clock) -> None:
 def _idle(found: Answer, charger: ChargerFacts, clock: Clock) -> None:
     asking = [
         one
-        for one in charger.claims
+        for one in charger.requesters
         if one.ended is None and one.granted is None and one.asks(clock.now)
     ]
     if not asking:

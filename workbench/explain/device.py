@@ -1,26 +1,25 @@
 """What is known of every kind of device: its states and their age, its daemons' faults, its story."""
 
 import sys
+from abc import abstractmethod
 from collections import deque
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import Final
+from typing import Any, Final
 
 from bridges.messages import definitions as d
+from bridges.observe.device import News, ObservedDevice
+from bridges.observe.limits import SILENT_S
+from bridges.observe.requesters import Moment
 from bridges.runtime import diagnostics
 from workbench.explain.explanation import Line
 from workbench.explain.noted import Noted
-from workbench.explain.phrases import Moment, lasted
+from workbench.explain.phrases import lasted
 from workbench.explain.rows import label
-from workbench.explain.timeline import Kind
 
 MOST_LINES: Final = 600
 MOST_NODES: Final = 8
 MOST_CODES: Final = 20
-SILENT_S: Final = 3.0
-"""States and diagnostics come at 1 Hz: after three missed ones a node is silent."""
-OLD_S: Final = 3.0
-CLOCKS_DIFFER_S: Final = 5.0
 BACK_S: Final = 0.2
 BACK_TIMES: Final = 3
 BACK_WITHIN_S: Final = 15.0
@@ -28,21 +27,6 @@ BACK_WITHIN_S: Final = 15.0
 REFUSED: Final = "refused "
 QUIET_S: Final = 60.0
 """A refusal that comes again within this time is not reported again."""
-
-
-@dataclass(slots=True)
-class Fact:
-    """Something that is so, and since when."""
-
-    value: str
-    since: Moment
-
-    def say(self, value: str, moment: Moment) -> bool:
-        """Set its present value. True if that is a change."""
-        if value == self.value:
-            return False
-        self.value, self.since = value, moment
-        return True
 
 
 @dataclass(slots=True)
@@ -64,32 +48,56 @@ class Diagnosis:
     refused: dict[str, Refused] = field(default_factory=dict)
 
 
-class Device:
-    """One device as it was heard. `id`: its name on the graph. `name`: the same as a text that can be
-    shown. `began`: when anything was heard first.
-    """
-
-    kind: Kind
+class Device(ObservedDevice[Any]):
+    """One device as it was heard, and its story. `name`: its name as a text that can be shown. `focus`:
+    a session whose last ride's story is kept whole, even if others ride after it."""
 
     def __init__(self, name: str, began: Moment) -> None:
-        self.id = name
+        super().__init__(name, began)
         self.name = label(name)
-        self.began = began
+        self.focus = ""
         self.lines: deque[Line] = deque(maxlen=MOST_LINES)
         self.told = 0
         self.diagnoses: dict[str, Diagnosis] = {}
         self.noted: Diagnosis | None = None
         self.notes_faults = False
-        self.first_state: Moment | None = None
-        self.last_state: Moment | None = None
-        self.stamp_age_s = 0.0
-        self.stamped = False
-        self.old: Fact = Fact("", began)
-        self._newest_stamp = 0.0
-        self._stamps_back: deque[float] = deque(maxlen=BACK_TIMES)
+
+    def hear(self, moment: Moment, topic: str, message: d.Message) -> list[News]:
+        """Take a message about it, and tell what it changed."""
+        news = super().hear(moment, topic, message)
+        for one in news:
+            self.tell(one.at, self._reads(one) or self.says(one))
+            self.notice(one)
+        return news
+
+    def text(self, name: str) -> str:
+        """A name from the network, as it can be shown."""
+        return label(name)
+
+    @abstractmethod
+    def says(self, one: News) -> str:
+        """A line of the story; "" for none."""
+
+    def notice(self, one: News) -> None:
+        """Count what has been told."""
+
+    def _reads(self, one: News) -> str:
+        """What is told of every kind's states."""
+        match one.what:
+            case "first state":
+                return f"the first state of {self.name} comes"
+            case "states again":
+                return f"states of {self.name} come again, after {lasted(one.gap_s)} without one"
+            case "read" if one.text:
+                return f"the reading behind the states {one.text}"
+            case "read":
+                return "the readings are fresh again"
+        return ""
 
     def tell(self, moment: Moment, text: str) -> None:
-        """A line of the story."""
+        """A line of the story; none for ""."""
+        if not text:
+            return
         self.told += 1
         self.lines.append(Line(moment.at, moment.wall, sys.intern(label(text, 200))))
 
@@ -97,35 +105,9 @@ class Device:
         """The story from this time on."""
         return tuple(line for line in self.lines if line.at >= at)
 
-    def state_came(self, moment: Moment, stamped_at: float) -> Moment:
-        """A state of it has come. Returns since when its content is known."""
-        last = self.last_state
-        if last is None:
-            self.first_state = moment
-            near = moment.at - self.began.at <= SILENT_S
-            moment = Moment(moment.at, moment.wall, seen=not near)
-            if moment.seen:
-                self.tell(moment, f"the first state of {self.name} comes")
-        elif moment.at - last.at > SILENT_S:
-            gap = lasted(moment.at - last.at)
-            self.tell(moment, f"states of {self.name} come again, after {gap} without one")
-        self.last_state = moment
-        if stamped_at < self._newest_stamp - BACK_S:
-            self._stamps_back.append(moment.at)
-        self._newest_stamp = stamped_at
-        self.stamped = stamped_at > 0
-        self.stamp_age_s = moment.wall - stamped_at
-        self._age(moment)
-        return moment
-
     def two_nodes(self, now: Moment) -> bool:
         """Do the stamps go back and forth, as those of two nodes do?"""
-        back = self._stamps_back
-        return len(back) == BACK_TIMES and now.at - back[0] < BACK_WITHIN_S
-
-    def silent_s(self, now: Moment) -> float:
-        """How long ago its last state came (s)."""
-        return 0.0 if self.last_state is None else now.at - self.last_state.at
+        return self.steps_back(now.at, BACK_S, BACK_WITHIN_S) >= BACK_TIMES
 
     def diagnose(self, moment: Moment, status: d.DiagnosticStatus, kind: str) -> None:
         """What a daemon of ours says of it."""
@@ -189,7 +171,7 @@ class Device:
                 found.setdefault(code, fault)
         return found
 
-    def waits(self, now: Moment) -> dict[str, str]:
+    def waits_said(self, now: Moment) -> dict[str, str]:
         """What those wait for that ask our daemons for it, by the daemon's kind."""
         said = ((one.kind, one.values.get("waits")) for one in self.heard_from(now))
         return {kind: label(text, 200) for kind, text in said if text}
@@ -203,21 +185,6 @@ class Device:
             if refused.last.seen and refused.last.at >= since
         ]
         return [reason for _, reason in sorted(found, reverse=True)]
-
-    def _age(self, moment: Moment) -> None:
-        """Add to the story when the readings behind the states get old."""
-        text = ""
-        if not self.stamped:
-            text = "was never read"
-        elif self.stamp_age_s > OLD_S:
-            text = "is old"
-        elif self.stamp_age_s < -CLOCKS_DIFFER_S:
-            text = "is from the future"
-        if self.old.say(text, moment):
-            told = (
-                f"the reading behind the states {text}" if text else "the readings are fresh again"
-            )
-            self.tell(moment, told)
 
     def _faults(self, found: Diagnosis, moment: Moment, status: d.DiagnosticStatus) -> None:
         codes = {

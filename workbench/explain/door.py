@@ -8,12 +8,13 @@ DoorClose.cpp). A robot that drives through says nothing meanwhile.
 from shlex import quote
 from typing import Final
 
+from bridges.observe.door import CLOSED, OPEN
+from bridges.observe.requesters import Moment, Requester
 from workbench.explain import answer as common
 from workbench.explain.answer import Answer
-from workbench.explain.claims import Claim
-from workbench.explain.door_facts import CLOSED, OPEN, DoorFacts
+from workbench.explain.door_facts import DoorFacts
 from workbench.explain.explanation import Field, Step
-from workbench.explain.phrases import Clock, Moment
+from workbench.explain.phrases import Clock
 
 SETTLES_S: Final = 2.0
 LONG_S: Final = 60.0
@@ -57,51 +58,33 @@ def answer(door: DoorFacts, clock: Clock, around: common.Heard, focus: str = "")
     return found
 
 
-def waiters(door: DoorFacts, clock: Clock) -> list[Claim]:
-    """Those who repeat their request now and still wait; the earliest first."""
-    asks = [one for one in door.claims if one.asks(clock.now) and not _met(door, one)]
-    return sorted(asks, key=lambda one: one.since.at)
-
-
-def _met(door: DoorFacts, claim: Claim) -> bool:
-    held = claim.who in door.holders
-    return (held and door.mode.value == OPEN) if claim.wants == OPEN else not held
-
-
-def _in_question(door: DoorFacts, clock: Clock, focus: str) -> Claim | None:
-    waiting = waiters(door, clock)
+def _in_question(door: DoorFacts, clock: Clock, focus: str) -> Requester | None:
+    waiting = door.asking(clock.now)
     if focus:
         return next((one for one in waiting if one.who == focus), None)
     return waiting[0] if waiting else None
 
 
-def _begins(door: DoorFacts, claim: Claim | None) -> float:
+def _begins(door: DoorFacts, claim: Requester | None) -> float:
     starts = [claim.since.at] if claim else []
     starts += [since.at - SETTLES_S for since in door.holders.values()]
     return min(starts, default=float("-inf"))
 
 
 def _with_askers(found: Answer, door: DoorFacts, clock: Clock) -> Answer:
-    for claim in [one for one in door.claims if one.wants == OPEN and one.asks(clock.now)][:3]:
+    for claim in [one for one in door.requesters if one.wants == OPEN and one.asks(clock.now)][:3]:
         found.say(f"{claim.who} has waited for it to be open {clock.since(claim.since)}.")
         found.since = min(found.since, claim.since.at)
     return found
 
 
-def _fields(door: DoorFacts, claim: Claim, clock: Clock) -> tuple[Field, ...]:
+def _fields(door: DoorFacts, claim: Requester, clock: Clock) -> tuple[Field, ...]:
     """What DoorOpen or DoorClose checks, as this requester's fleet adapter sees it."""
-    held = door.holders.get(claim.who)
-    listed = "lists it" if held else "does not list it"
-    if door.last_heartbeat is None:
-        listed = "not heard"
-    since = clock.since(held or claim.since)
-    if claim.wants != OPEN:
-        return (Field("heartbeat", listed, "does not list it", held is None, since),)
-    opened = door.mode.value == OPEN
-    return (
-        Field("door", door.mode.value, OPEN, opened, clock.since(door.mode.since)),
-        Field("heartbeat", listed, "lists it", held is not None, since),
-    )
+    told = {
+        "door": door.mode.since,
+        "heartbeat": door.holders.get(claim.who) or claim.since,
+    }
+    return tuple(Field(*check, clock.since(told[check.name])) for check in door.checks(claim))
 
 
 # ---- somebody waits
@@ -116,7 +99,7 @@ def _away(found: Answer, door: DoorFacts, clock: Clock) -> None:
     )
 
 
-def _opens(found: Answer, door: DoorFacts, claim: Claim, clock: Clock) -> None:
+def _opens(found: Answer, door: DoorFacts, claim: Requester, clock: Clock) -> None:
     """It waits for the door to be open."""
     if claim.who not in door.holders:
         _not_listed(found, door, claim, clock)
@@ -140,7 +123,7 @@ def _opens(found: Answer, door: DoorFacts, claim: Claim, clock: Clock) -> None:
         found.say("That is long: an obstacle, a locked door, or a contact that shows nothing.")
 
 
-def _not_listed(found: Answer, door: DoorFacts, claim: Claim, clock: Clock) -> None:
+def _not_listed(found: Answer, door: DoorFacts, claim: Requester, clock: Clock) -> None:
     if clock.now.at - claim.since.at < SETTLES_S and claim.since.seen:
         found.say("It was asked for a moment ago.", Step("the supervisor", f"list {claim.who}"))
     elif door.last_heartbeat is None:
@@ -158,7 +141,7 @@ def _not_listed(found: Answer, door: DoorFacts, claim: Claim, clock: Clock) -> N
         )
 
 
-def _not_let_go(found: Answer, door: DoorFacts, claim: Claim, clock: Clock) -> None:
+def _not_let_go(found: Answer, door: DoorFacts, claim: Requester, clock: Clock) -> None:
     found.say(
         f"It asks for CLOSE, and the supervisor's heartbeat has listed it"
         f" {clock.since(door.holders[claim.who])}.",
@@ -191,7 +174,9 @@ def _asked_open(found: Answer, door: DoorFacts, clock: Clock) -> None:
     """Only the supervisor was heard, or a person with `send --direct`, as the door's own daemon hears
     them."""
     assert door.asked is not None
-    found.say(f"On door_requests {door.sender} has asked for OPEN {clock.since(door.asked.since)}.")
+    found.say(
+        f"On door_requests {door.asked_by} has asked for OPEN {clock.since(door.asked.since)}."
+    )
     opened = Step("the robot", "drive through; then its fleet adapter sends CLOSE")
     opens = Step("the controller", f"open {door.name} fully, and show it by its contact")
     found.next.append(opened if door.mode.value == OPEN else opens)
@@ -201,7 +186,7 @@ def _held_open(found: Answer, door: DoorFacts, clock: Clock) -> None:
     """Who holds it, and whether they are alive. A robot in a doorway is silent, so silence is
     normal."""
     who, since = min(door.holders.items(), key=lambda one: one[1].at)
-    claim = door.claims.get(who)
+    claim = door.requesters.get(who)
     last: Moment | None = claim.last if claim else None
     said = f"It last asked at {clock.time(last.wall)}." if last else "It was not heard asking."
     if clock.now.at - since.at <= LONG_S:

@@ -6,7 +6,7 @@ Every text is one printable line; what comes from the network in it is escaped.
 from dataclasses import dataclass
 from typing import Literal
 
-from workbench.explain.timeline import Kind
+from bridges.messages.words import Kind
 
 Who = Literal[
     "nobody",

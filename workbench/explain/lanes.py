@@ -15,11 +15,12 @@ from bridges.kinds.charger import refusals
 from bridges.messages import definitions as d
 from bridges.messages import words
 from bridges.messages.heard import Heard, Own
+from bridges.messages.words import Kind
 from bridges.runtime import diagnostics
 from workbench.explain import tones
 from workbench.explain.noted import levels, noted
 from workbench.explain.rows import Row, label
-from workbench.explain.timeline import LANES, Kind, Lane, LaneName, Level, Timeline, Tone
+from workbench.explain.timeline import LANES, Lane, LaneName, Level, Timeline, Tone
 
 MOST_ROWS: Final = 12
 """The most rows of a lane: a flood of made-up requesters or faults must not fill a page."""

@@ -8,12 +8,12 @@ why, and who has to do the next thing.
 from shlex import quote
 from typing import Final
 
+from bridges.observe.lift import NO_FLOOR, NOBODY
+from bridges.observe.requesters import Requester
 from workbench.explain import answer as common
 from workbench.explain.answer import Answer
-from workbench.explain.claims import Claim
-from workbench.explain.device import SILENT_S
 from workbench.explain.explanation import Field, Step, Who
-from workbench.explain.lift_facts import DIRECT, NO_FLOOR, NOBODY, LiftFacts
+from workbench.explain.lift_facts import DIRECT, LiftFacts
 from workbench.explain.lift_ungranted import SETTLES_S, not_granted
 from workbench.explain.phrases import Clock, lasted
 from workbench.explain.rows import label
@@ -58,31 +58,19 @@ def answer(lift: LiftFacts, clock: Clock, around: common.Heard, focus: str = "")
     return found
 
 
-def _in_question(lift: LiftFacts, clock: Clock, focus: str) -> Claim | None:
+def _in_question(lift: LiftFacts, clock: Clock, focus: str) -> Requester | None:
     """The claim in question: that of `focus`, or of whoever waits longest, else the holder's."""
     if focus:
-        return lift.claims.get(focus)
-    waiting = [one for one in waiters(lift, clock) if not lift.matches(one)]
+        return lift.requesters.get(focus)
+    waiting = [one for one in lift.asking(clock.now) if not lift.matches(one)]
     if waiting:
         return min(waiting, key=lambda one: one.since.at)
-    return lift.claims.get(lift.session.value)
+    return lift.requesters.get(lift.session.value)
 
 
-def waiters(lift: LiftFacts, clock: Clock) -> list[Claim]:
-    """Those who ask now, the earliest first. While no state comes nobody repeats itself, and all
-    wait."""
-    stands = lift.last_state is None or lift.silent_s(clock.now) > SILENT_S
-    asks = [
-        one
-        for one in lift.claims
-        if one.ended is None and (one.asks(clock.now) or (stands and not one.gone))
-    ]
-    return sorted(asks, key=lambda one: one.first.at)
-
-
-def _begins(lift: LiftFacts, claim: Claim | None) -> float:
+def _begins(lift: LiftFacts, claim: Requester | None) -> float:
     """When the story in question begins (s): when the one that waits asked, or the holder got it."""
-    holder = lift.claims.get(lift.session.value)
+    holder = lift.requesters.get(lift.session.value)
     starts = [claim.first.at] if claim else []
     if holder is not None:
         starts.append(holder.first.at)
@@ -94,7 +82,7 @@ def _begins(lift: LiftFacts, claim: Claim | None) -> float:
 
 
 def _with_askers(found: Answer, lift: LiftFacts, clock: Clock) -> Answer:
-    for claim in [one for one in waiters(lift, clock) if one.met is None][:3]:
+    for claim in [one for one in lift.asking(clock.now) if one.met is None][:3]:
         since = clock.since(claim.since)
         found.say(f"{claim.who} has waited for it at {claim.wants or 'no floor'} {since}.")
         found.since = min(found.since, claim.first.at)
@@ -117,16 +105,12 @@ def _motion(motion: str) -> str:
     return f"going {motion}" if motion in ("up", "down") else motion
 
 
-def _fields(lift: LiftFacts, claim: Claim, clock: Clock) -> tuple[Field, ...]:
+def _fields(lift: LiftFacts, claim: Requester, clock: Clock) -> tuple[Field, ...]:
     """RequestLift's fields, as this requester's fleet adapter sees them; the name is what was heard."""
-    shown = (
-        ("session", lift.session, claim.who),
-        ("floor", lift.floor, claim.wants or "no floor"),
-        ("door", lift.door, "open"),
-    )
+    since = (lift.session.since, lift.floor.since, lift.door.since)
     return tuple(
-        Field(name, fact.value, wanted, fact.value == wanted, clock.since(fact.since))
-        for name, fact, wanted in shown
+        Field(*check, clock.since(moment))
+        for check, moment in zip(lift.checks(claim), since, strict=True)
     )
 
 
@@ -138,10 +122,10 @@ def _nobody_asks(found: Answer, lift: LiftFacts, clock: Clock) -> None:
         _without_word(found, lift, holder, clock)
 
 
-def _others_wait(found: Answer, lift: LiftFacts, claim: Claim | None, clock: Clock) -> None:
+def _others_wait(found: Answer, lift: LiftFacts, claim: Requester | None, clock: Clock) -> None:
     others = [
         one
-        for one in waiters(lift, clock)
+        for one in lift.asking(clock.now)
         if one is not claim and one.who != lift.session.value and not lift.matches(one)
     ]
     texts = [f"{one.who} at {one.wants} {clock.since(one.since)}" for one in others[:4]]
@@ -153,7 +137,7 @@ def _others_wait(found: Answer, lift: LiftFacts, claim: Claim | None, clock: Clo
 # ---- why it waits
 
 
-def _why(found: Answer, lift: LiftFacts, claim: Claim, clock: Clock) -> None:
+def _why(found: Answer, lift: LiftFacts, claim: Requester, clock: Clock) -> None:
     """Why this claim is not met; if it is, who has to act next."""
     holder = lift.session.value
     if lift.matches(claim) and claim.asks(clock.now):
@@ -190,9 +174,9 @@ def _hazard(found: Answer, lift: LiftFacts, clock: Clock) -> None:
     found.say(f"{holder} keeps the session meanwhile: only its END ends one.{door}")
 
 
-def _held(found: Answer, lift: LiftFacts, claim: Claim, holder: str, clock: Clock) -> None:
+def _held(found: Answer, lift: LiftFacts, claim: Requester, holder: str, clock: Clock) -> None:
     """Another session has it."""
-    theirs = lift.claims.get(holder)
+    theirs = lift.requesters.get(holder)
     if theirs is not None and theirs.ended is not None:
         _end_not_obeyed(found, lift, theirs, clock)
     elif theirs is None or not theirs.asks(clock.now):
@@ -225,7 +209,7 @@ def _forgotten(found: Answer, lift: LiftFacts, holder: str, clock: Clock) -> Non
 
 def _without_word(found: Answer, lift: LiftFacts, holder: str, clock: Clock) -> None:
     """The holder of the lift is silent."""
-    theirs = lift.claims.get(holder)
+    theirs = lift.requesters.get(holder)
     heard_s = clock.now.at - max(lift.began.at, lift.session.since.at)
     if theirs is None and heard_s < common.LISTENS_S:
         found.say(
@@ -253,11 +237,11 @@ def _release(lift: LiftFacts) -> str:
     return f"`rmf-bridge release {quote(lift.name)}`"
 
 
-def _once(claim: Claim | None) -> bool:
+def _once(claim: Requester | None) -> bool:
     return claim is not None and claim.times == 1
 
 
-def _end_not_obeyed(found: Answer, lift: LiftFacts, claim: Claim, clock: Clock) -> None:
+def _end_not_obeyed(found: Answer, lift: LiftFacts, claim: Requester, clock: Clock) -> None:
     assert claim.ended is not None
     if clock.now.at - claim.ended.at < SETTLES_S:
         found.say(
@@ -285,7 +269,7 @@ def _end_not_obeyed(found: Answer, lift: LiftFacts, claim: Claim, clock: Clock) 
     )
 
 
-def _drives(found: Answer, lift: LiftFacts, claim: Claim, clock: Clock) -> None:
+def _drives(found: Answer, lift: LiftFacts, claim: Requester, clock: Clock) -> None:
     """It has what it waits for."""
     met = claim.met or claim.since
     found.say(
@@ -300,7 +284,7 @@ def _drives(found: Answer, lift: LiftFacts, claim: Claim, clock: Clock) -> None:
         found.say("That is long: the robot may be blocked or lost, or its adapter hangs.")
 
 
-def _missing(found: Answer, lift: LiftFacts, claim: Claim, clock: Clock) -> None:
+def _missing(found: Answer, lift: LiftFacts, claim: Requester, clock: Clock) -> None:
     """The session is given; the mode, the floor or the door is not there yet."""
     on = common.relays(lift, clock)
     if lift.mode.value in HAZARDS:

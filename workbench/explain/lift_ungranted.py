@@ -2,8 +2,8 @@
 
 from typing import Final
 
+from bridges.observe.requesters import Requester
 from workbench.explain.answer import Answer
-from workbench.explain.claims import Claim
 from workbench.explain.explanation import Step
 from workbench.explain.lift_facts import LiftFacts
 from workbench.explain.phrases import Clock
@@ -12,7 +12,7 @@ SETTLES_S: Final = 2.0
 """This much time between a request and its grant, or a supervisor's change of mind, is normal."""
 
 
-def not_granted(found: Answer, lift: LiftFacts, claim: Claim, clock: Clock) -> None:
+def not_granted(found: Answer, lift: LiftFacts, claim: Requester, clock: Clock) -> None:
     """The lift is free, and yet it is not given to the requester."""
     if lift.floors and claim.wants not in lift.floors:
         found.say(
@@ -42,12 +42,12 @@ def not_granted(found: Answer, lift: LiftFacts, claim: Claim, clock: Clock) -> N
         )
 
 
-def _not_passed_on(found: Answer, lift: LiftFacts, claim: Claim, clock: Clock) -> bool:
+def _not_passed_on(found: Answer, lift: LiftFacts, claim: Requester, clock: Clock) -> bool:
     """Does the supervisor keep the request to itself?"""
     passed = claim.passed_on
     if not claim.own or (passed is not None and clock.now.at - passed.at < 5.0):
         return False
-    if "lift_supervisor" in lift.waits(clock.now):
+    if "lift_supervisor" in lift.waits_said(clock.now):
         found.say(
             "Its supervisor does not pass the request on.",
             Step("a person", "end what it waits for; `rmf-bridge status` on its machine says how"),

@@ -7,20 +7,11 @@ from dataclasses import dataclass
 from datetime import datetime, tzinfo
 from typing import Final
 
+from bridges.observe.requesters import Moment
+
 DAY_S = 86400.0
 JOINS: Final = re.compile(r"`(rmf-bridge (doctor|explain|judge|page|release|send|watch)\b[^`]*)`")
 """A command in a sentence that joins RMF's graph."""
-
-
-@dataclass(frozen=True, slots=True)
-class Moment:
-    """When something began. `at`: s on `Heard.at`'s clock. `wall`: s since the epoch. `seen`: False if
-    it was so already when the first message came.
-    """
-
-    at: float
-    wall: float
-    seen: bool = True
 
 
 def lasted(seconds: float) -> str:

@@ -10,8 +10,9 @@ from datetime import datetime, tzinfo
 from typing import Final
 from xml.etree.ElementTree import Element, SubElement, tostring
 
+from bridges.observe.requesters import Moment
 from workbench.explain.palette import MEANING, TONES, Theme, style
-from workbench.explain.phrases import Clock, Moment, lasted
+from workbench.explain.phrases import Clock, lasted
 from workbench.explain.timeline import Lane, Mark, Span, Timeline, Tone
 
 LEAST_WIDE: Final = 480

@@ -8,131 +8,99 @@ from collections import deque
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from datetime import tzinfo
-from typing import Final
+from typing import ClassVar, Final
 
 from bridges.kinds.charger import refusals
 from bridges.messages import definitions as d
-from bridges.messages import words
 from bridges.messages.heard import Heard, Own
+from bridges.messages.words import KINDS, Kind
+from bridges.observe.graph import Key, ObservedGraph
+from bridges.observe.limits import MOST_DEVICES, SILENT_S
+from bridges.observe.requesters import Moment
 from workbench.explain import answer as common
 from workbench.explain import charger, door, lift
 from workbench.explain.answer import Answer, Remedies
 from workbench.explain.charger_facts import ChargerFacts
-from workbench.explain.device import MOST_LINES, SILENT_S, Device
+from workbench.explain.device import MOST_LINES, Device
 from workbench.explain.door_facts import DoorFacts
 from workbench.explain.explanation import Explanation, Line, Step
 from workbench.explain.lift_facts import LiftFacts
 from workbench.explain.noted import noted
-from workbench.explain.phrases import Clock, Moment, lasted, on_graph
+from workbench.explain.phrases import Clock, lasted, on_graph
 from workbench.explain.rows import label
-from workbench.explain.timeline import Kind
 
-MOST_DEVICES: Final = 100
-"""The most devices of each kind; those heard first stay."""
 STORY_LINES: Final = 40
-STEP_S: Final = 2.0
-MAKES: Final[Mapping[Kind, type[LiftFacts] | type[DoorFacts] | type[ChargerFacts]]] = {
-    "lift": LiftFacts,
-    "door": DoorFacts,
-    "charger": ChargerFacts,
-}
 
 
-class Site:
+class Site(ObservedGraph[Device]):
     """All devices that were heard, or only those of this `name`.
 
     `session`: whose last ride's story is kept, even if others ride after it.
     """
 
+    makes: ClassVar = {"lift": LiftFacts, "door": DoorFacts, "charger": ChargerFacts}
+
     def __init__(
         self,
         name: str = "",
         session: str = "",
-        most: int = MOST_DEVICES,
         most_lines: int = MOST_LINES,
         graph: Sequence[str] = (),
     ) -> None:
-        """`most`: how many devices of each kind are remembered, and `most_lines` of what each did.
-        `graph`: the options that name this graph, for commands."""
-        self._most = most
+        """`most_lines`: how many are remembered of what each device did. `graph`: the options that name
+        this graph, for commands."""
+        super().__init__()
         self._most_lines = most_lines
         self._graph = graph
         self.messages = 0
         self._story_from = float("-inf")
         self._name = name
         self._session = session
-        self._devices: dict[tuple[Kind, str], Device] = {}
-        self._names: dict[Kind, dict[str, None]] = {"lift": {}, "door": {}, "charger": {}}
-        self._began: Moment | None = None
-        self._now = Moment(0.0, 0.0)
-        self._offset: float | None = None
-        self._steps: list[tuple[Moment, float]] = []
+        self._others: dict[Kind, dict[str, None]] = {kind: {} for kind in KINDS}
         self._coordinator: tuple[Moment, Mapping[str, str]] | None = None
 
     def take(self, heard: Heard | Own) -> None:
         """The next message, or the next text of our own recorder's."""
-        moment = self._moment(heard)
         if isinstance(heard, Own):
-            self._note(moment, heard)
+            self._note(self.moment(heard), heard)
             return
         self.messages += 1
-        topic, message = heard.topic.rpartition("/")[2], heard.message
-        match message:
-            case d.LiftState() | d.DoorState() | d.ChargerState():
-                self._state(moment, message)
-            case d.LiftRequest():
-                found = self._device("lift", message.lift_name, moment)
-                if isinstance(found, LiftFacts):
-                    found.requested(moment, message, passed_on=topic == "lift_requests")
-            case d.DoorRequest():
-                found = self._device("door", message.door_name, moment)
-                if isinstance(found, DoorFacts):
-                    found.requested(moment, message, passed_on=topic == "door_requests")
-            case d.SupervisorHeartbeat():
-                self._heartbeat(moment, message)
-            case d.ChargerRequest() | d.ChargerCancel():
-                self._charger(moment, message)
+        self.hear(heard)
+        match heard.message:
             case d.DiagnosticStatus():
-                self._refusal(moment, message)
+                self._refusal(self.now, heard.message)
             case d.DiagnosticArray():
-                for status in message.status:
-                    self._diagnose(moment, status)
+                for status in heard.message.status:
+                    self._diagnose(self.now, status)
 
     def story_from(self, at: float) -> None:
         """Leave everything before this time (s) out of the stories."""
         self._story_from = at
 
-    def passed(self, at: float, wall: float) -> None:
-        """Note that time has passed and nothing was heard."""
-        self._now = Moment(max(at, self._now.at), wall)
-        self._began = self._began or Moment(at, wall, seen=False)
-
-    def devices(self) -> list[tuple[Kind, str]]:
+    def devices(self) -> list[Key]:
         """The devices that have published a state, in the order of kinds and names."""
-        shown = [key for key, one in self._devices.items() if one.last_state is not None]
-        return sorted(shown, key=lambda key: (list(MAKES).index(key[0]), key[1]))
+        return [(kind, one) for kind in KINDS for one in sorted(d.id for d in self.stated(kind))]
 
     def kinds(self, name: str) -> list[Kind]:
         """The kinds of a device of this name: by its states, or else by the requests for it."""
-        found = [one for one in self._devices.values() if one.id == name]
-        shown = [one.kind for one in found if one.last_state is not None]
-        return shown or [one.kind for one in found]
+        found = [kind for kind in KINDS if (kind, name) in self.known]
+        return [kind for kind in found if self.known[kind, name].state is not None] or found
 
     def explain(
         self, kind: Kind, name: str, zone: tzinfo | None, remedies: Remedies | None = None
     ) -> Explanation:
         """The device at the end of what was heard. `zone`: of the times; None: this machine's."""
-        clock = Clock(self._now, zone)
-        began = self._began or self._now
-        device = self._devices.get((kind, name)) or MAKES[kind](name, began)
+        clock = Clock(self.now, zone)
+        began = self.began or self.now
+        device = self.known.get((kind, name)) or self.make(kind, name)
         answer = self._answer(device, clock)
         common.say_waits(answer, device, clock)
         story = self._story(device, answer)
-        for_s = lasted(self._now.at - began.at)
+        for_s = lasted(self.now.at - began.at)
         return Explanation(
             kind=kind,
             device=label(name),
-            heard=f"{clock.date(began.wall)} to {clock.time(self._now.wall)} ({for_s})",
+            heard=f"{clock.date(began.wall)} to {clock.time(self.now.wall)} ({for_s})",
             now=tuple(answer.now),
             next=tuple(
                 Step(step.who, on_graph(step.what, self._graph))
@@ -151,9 +119,11 @@ class Site:
         )
 
     def _answer(self, device: Device, clock: Clock) -> Answer:
-        around = common.Heard(
-            {kind: (*names,) for kind, names in self._names.items()}, self.messages
-        )
+        names = {
+            kind: (*self._others[kind], *(label(one.id) for one in self.stated(kind)))
+            for kind in KINDS
+        }
+        around = common.Heard(names, self.messages)
         match device:
             case LiftFacts():
                 return lift.answer(device, clock, around, self._session)
@@ -171,62 +141,26 @@ class Site:
 
     # ---- who hears what
 
-    def _moment(self, heard: Heard | Own) -> Moment:
-        at = max(heard.at, self._now.at) if self._began else heard.at
-        offset = heard.wall - heard.at
-        if self._began is None:
-            self._began = Moment(at, heard.wall, seen=False)
-        before = offset if self._offset is None else self._offset
-        if abs(offset - before) > STEP_S and len(self._steps) < 3:
-            self._steps.append((Moment(at, heard.wall), offset - before))
-        self._offset = offset
-        self._now = Moment(at, heard.wall)
-        return self._now
+    def make(self, kind: Kind, name: str) -> Device:
+        """A device of which nothing was heard yet."""
+        made = super().make(kind, name)
+        made.focus = self._session
+        made.lines = deque(maxlen=self._most_lines)
+        return made
 
-    def _device(self, kind: Kind, name: str, moment: Moment) -> Device | None:
-        if self._name and name != self._name:
-            return None
-        found = self._devices.get((kind, name))
-        if found is not None or not name:
-            return found
-        if len(self._devices) >= 3 * self._most:
-            return None
-        assert self._began is not None
-        made = LiftFacts(name, self._began, self._session) if kind == "lift" else None
-        found = self._devices[kind, name] = made or MAKES[kind](name, self._began)
-        found.lines = deque(maxlen=self._most_lines)
-        return found
-
-    def _state(self, moment: Moment, state: words.Stated) -> None:
-        kind: Kind = "charger"
-        if not isinstance(state, d.ChargerState):
-            kind = "lift" if isinstance(state, d.LiftState) else "door"
-        name = words.device(state)
-        if name and len(self._names[kind]) < self._most:
-            self._names[kind][label(name)] = None
-        match self._device(kind, name, moment), state:
-            case LiftFacts() as found, d.LiftState():
-                found.stated(moment, state)
-            case DoorFacts() as found, d.DoorState():
-                found.stated(moment, state)
-            case ChargerFacts() as found, d.ChargerState():
-                found.stated(moment, state)
-
-    def _heartbeat(self, moment: Moment, heartbeat: d.SupervisorHeartbeat) -> None:
-        for device in self._devices.values():
-            if isinstance(device, DoorFacts):
-                device.listed(moment, heartbeat)
-
-    def _charger(self, moment: Moment, message: d.ChargerRequest | d.ChargerCancel) -> None:
-        found = self._device("charger", message.charger_name, moment)
-        if isinstance(found, ChargerFacts) and isinstance(message, d.ChargerRequest):
-            found.requested(moment, message)
-        elif isinstance(found, ChargerFacts) and isinstance(message, d.ChargerCancel):
-            found.cancelled(moment, message)
+    def device(
+        self, kind: Kind, name: str, moment: Moment, *, stated: bool = False
+    ) -> Device | None:
+        """The device of this name, if we explain it."""
+        if self._name in ("", name):
+            return super().device(kind, name, moment, stated=stated)
+        if stated and name and len(self._others[kind]) < MOST_DEVICES:
+            self._others[kind][label(name)] = None
+        return None
 
     def _refusal(self, moment: Moment, status: d.DiagnosticStatus) -> None:
         refusal = refusals.read(status)
-        found = self._device("charger", refusal.charger, moment) if refusal else None
+        found = self.device("charger", refusal.charger, moment) if refusal else None
         if refusal is not None and isinstance(found, ChargerFacts):
             found.refused(moment, refusal)
 
@@ -238,27 +172,27 @@ class Site:
             self._coordinator = moment, values
             return
         device = kind.removesuffix("_supervisor")
-        for known in MAKES:
-            found = self._devices.get((known, status.hardware_id)) if known == device else None
+        for known in KINDS:
+            found = self.known.get((known, status.hardware_id)) if known == device else None
             if found is not None:
                 found.diagnose(moment, status, kind)
 
     def _note(self, moment: Moment, own: Own) -> None:
         note = noted(own.topic.rpartition("/")[2], own.text)
-        for kind in MAKES:
-            found = self._devices.get((kind, note.subject)) if note else None
+        for kind in KINDS:
+            found = self.known.get((kind, note.subject)) if note else None
             if found is not None and note is not None:
                 found.note(moment, note)
 
     def _coordinates(self) -> Mapping[str, str]:
-        if self._coordinator is None or self._now.at - self._coordinator[0].at > SILENT_S:
+        if self._coordinator is None or self.now.at - self._coordinator[0].at > SILENT_S:
             return {}
         return self._coordinator[1]
 
     def _stepped(self, clock: Clock) -> tuple[str, ...]:
         return tuple(
             f"At {clock.time(moment.wall)} the listener's clock was stepped by {by_s:+.0f} s."
-            for moment, by_s in self._steps
+            for moment, by_s in self.steps
         )
 
 

@@ -5,8 +5,9 @@ from collections.abc import Iterator
 from datetime import tzinfo
 from typing import Final
 
+from bridges.observe.requesters import Moment
 from workbench.explain.explanation import Explanation, Field
-from workbench.explain.phrases import Clock, Moment
+from workbench.explain.phrases import Clock
 
 MOST_WIDE: Final = 100
 

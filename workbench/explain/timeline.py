@@ -7,8 +7,8 @@ network: it is text, never markup.
 from dataclasses import dataclass
 from typing import Final, Literal
 
-Kind = Literal["lift", "door", "charger"]
-KINDS: Final[tuple[Kind, ...]] = ("lift", "door", "charger")
+from bridges.messages.words import Kind
+
 LaneName = Literal[
     "sessions", "floors", "door", "motion", "mode", "relays", "inputs", "requests", "faults"
 ]

@@ -3,9 +3,11 @@
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import Any, Final, Literal
+from typing import Any, Final
 
 from bridges.messages.heard import Heard
+from bridges.messages.words import KINDS as KINDS
+from bridges.messages.words import Kind as Kind
 from workbench.judge import charger_laws, door_laws, lift_laws
 from workbench.judge.charger_scene import ChargerScene
 from workbench.judge.door_scene import DoorScene
@@ -13,8 +15,6 @@ from workbench.judge.law import Doubt, Evidence, Judged, Law, Verdict
 from workbench.judge.lift_scene import LiftScene
 from workbench.judge.scene import Scene
 
-Kind = Literal["lift", "door", "charger"]
-KINDS: Final[tuple[Kind, ...]] = ("lift", "door", "charger")
 LAWS: Final[Mapping[Kind, tuple[Law[Any], ...]]] = MappingProxyType(
     {"lift": lift_laws.LAWS, "door": door_laws.LAWS, "charger": charger_laws.LAWS}
 )

@@ -14,13 +14,13 @@ from bridges.messages import definitions as d
 from bridges.messages import topics, words
 from bridges.messages.heard import Heard
 from bridges.messages.topics import AnyTopic
-from bridges.messages.words import Requested, Stated
+from bridges.messages.words import KINDS, Kind, Requested, Stated
 from bridges.runtime import diagnostics
 from workbench.explain import site
 from workbench.explain.answer import Remedies
 from workbench.explain.explanation import Explanation
 from workbench.explain.lanes import Drawing
-from workbench.explain.timeline import KINDS, Kind, Timeline
+from workbench.explain.timeline import Timeline
 from workbench.graph.board import KINDS as KIND_OF
 from workbench.graph.board import Board, Device, Row
 
@@ -99,7 +99,7 @@ class Site:
         self._changed: set[Device] = set()
         self._since: dict[str, tuple[str, float, bool]] = {}
         self._robots: dict[tuple[str, str], Robot] = {}
-        self._story = site.Site(most=MOST_DEVICES, most_lines=MOST_LINES, graph=graph)
+        self._story = site.Site(most_lines=MOST_LINES, graph=graph)
         self.crowded: set[str] = set()
         self._full_until: dict[str, float] = {}
         self.heard_at: float | None = None
@@ -152,7 +152,7 @@ class Site:
         device = self._found(kind, name)
         if device is None:
             return None
-        self._story.passed(now, wall)
+        self._story.pass_time(now, wall)
         return self._story.explain(_kind(device[0]), device[1], None, remedies)
 
     def timeline(self, kind: str, name: str, now: float) -> Timeline | None:

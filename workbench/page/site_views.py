@@ -9,10 +9,10 @@ from typing import Final
 from fastapi import Request
 from nicegui import Client, ui
 
+from bridges.messages.words import KINDS
 from bridges.runtime import faults
 from workbench.explain.explanation import Explanation
 from workbench.explain.picture import svg
-from workbench.explain.timeline import KINDS
 from workbench.page import tables
 from workbench.page.actions import Deeds
 from workbench.page.buttons import Buttons

@@ -3,8 +3,9 @@
 from collections.abc import Iterator
 from html import escape
 
+from bridges.observe.requesters import Moment
 from workbench.explain.explanation import Explanation
-from workbench.explain.phrases import Clock, Moment
+from workbench.explain.phrases import Clock
 from workbench.page.tables import table
 
 

@@ -164,8 +164,8 @@ def test_a_live_graph_is_heard_by_topic(heard: list[Heard]) -> None:
 
 def test_explain_says_that_nothing_was_heard_live() -> None:
     site = Site("Lift1")
-    site.passed(100.0, 1_800_000_000.0)
-    site.passed(105.0, 1_800_000_005.0)
+    site.pass_time(100.0, 1_800_000_000.0)
+    site.pass_time(105.0, 1_800_000_005.0)
     assert site.explain("lift", "Lift1", None).now == ("Nothing at all was heard.",)
 
 

@@ -14,10 +14,10 @@ from bridges.messages import definitions as d
 from bridges.messages import topics
 from bridges.messages.heard import Heard
 from bridges.messages.stamps import stamp
+from bridges.messages.words import Kind
 from tests.site.network import Place
 from tests.site.timeline import EPOCH
 from tests.workbench.explain.scene import Guest, Scene
-from workbench.explain.timeline import Kind
 
 Case = tuple[list[Heard], Kind, str]
 

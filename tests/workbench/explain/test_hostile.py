@@ -6,12 +6,12 @@ from msgspec.structs import replace
 from bridges.messages import definitions as d
 from bridges.messages.heard import Heard
 from bridges.messages.stamps import stamp
-from workbench.explain.claims import MOST_CLAIMS
+from bridges.messages.words import KINDS
+from bridges.observe.limits import MOST_DEVICES, MOST_REQUESTERS
 from workbench.explain.device import MOST_LINES
 from workbench.explain.lift_facts import LiftFacts
-from workbench.explain.site import MOST_DEVICES, Site
+from workbench.explain.site import Site
 from workbench.explain.text import lines
-from workbench.explain.timeline import KINDS
 
 WALL = 1_800_000_000.0
 STATE = d.LiftState(
@@ -28,17 +28,17 @@ def test_a_flood_of_requesters_displaces_no_holder() -> None:
     site = Site()
     ask = d.LiftRequest("Lift1", stamp(WALL), "fleet/red", 1, "L2", 2)
     site.take(heard(0, "adapter_lift_requests", ask))
-    for n in range(10 * MOST_CLAIMS):
+    for n in range(10 * MOST_REQUESTERS):
         state = replace(STATE, lift_time=stamp(WALL + n), session_id="fleet/red")
         site.take(heard(n / 100, "lift_states", state))
         made = replace(ask, session_id=f"made/up{n}")
         site.take(heard(n / 100, "adapter_lift_requests", made))
     told = site.explain("lift", "Lift1", None)
     assert any("fleet/red has had it" in sentence for sentence in told.now)
-    lift = site._devices["lift", "Lift1"]
+    lift = site.known["lift", "Lift1"]
     assert isinstance(lift, LiftFacts)
-    assert len([*lift.claims]) == MOST_CLAIMS
-    assert lift.claims.get("fleet/red") is not None
+    assert len([*lift.requesters]) == MOST_REQUESTERS
+    assert lift.requesters.get("fleet/red") is not None
     assert len(lift.lines) <= MOST_LINES
     assert len(lines(told)) <= 40
 
@@ -47,7 +47,7 @@ def test_a_flood_of_devices_is_bounded_and_the_first_ones_stay() -> None:
     site = Site()
     for n in range(20 * MOST_DEVICES):
         site.take(heard(0, "lift_states", replace(STATE, lift_name=f"made up {n}")))
-    assert len(site.devices()) == 3 * MOST_DEVICES
+    assert len(site.devices()) == MOST_DEVICES
     assert ("lift", "made up 0") in site.devices()
 
 

@@ -72,7 +72,7 @@ def test_each_faults_remedy_names_the_graph() -> None:
 
 def test_nothing_heard_is_looked_into_on_that_graph() -> None:
     site = Site("Lift1", graph=GRAPH)
-    site.passed(100.0, 1_800_000_000.0)
+    site.pass_time(100.0, 1_800_000_000.0)
     texts = texts_of(site.explain("lift", "Lift1", UTC, {}))
     assert [*proposed(texts)] == [["doctor", "FILE", *GRAPH[2:]]]
 
