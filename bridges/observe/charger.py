@@ -6,14 +6,16 @@ from typing import Final
 from bridges.messages import definitions as d
 from bridges.messages import words
 from bridges.observe.device import News, ObservedDevice, Wait
+from bridges.observe.limits import UNSEEN_S
 from bridges.observe.requesters import Fact, Moment
 
 NOBODY: Final = "nobody"
 
 
 class ObservedCharger(ObservedDevice[d.ChargerState]):
-    """`condition`: RMF's word for its state. `robot`: the robot that has it. `request`: the id that it
-    serves. Its requesters are known by the ids of their requests, and want a robot charged."""
+    """`condition`: RMF's word for its state. `robot`: the robot that has it; before the first state and
+    in a silence that is unknown. `request`: the id that it serves. Its requesters are known by
+    the ids of their requests, and want a robot charged."""
 
     kind = "charger"
 
@@ -57,5 +59,7 @@ class ObservedCharger(ObservedDevice[d.ChargerState]):
     def _settle(self, moment: Moment) -> Iterator[News]:
         if self.changed and self.before is not None:
             yield News("changed", moment)
+        if self.before is None or self.gap_s > UNSEEN_S:
+            self.robot.since = Moment(moment.at, moment.wall, seen=False)
         if found := self.requesters.get(self.request.value):
             found.granted = found.granted or moment

@@ -8,7 +8,7 @@ from typing import ClassVar, Generic, Literal, NamedTuple, TypeVar
 
 from bridges.messages import definitions as d
 from bridges.messages import words
-from bridges.observe.limits import CLOCKS_DIFFER_S, OLD_S, SILENT_S
+from bridges.observe.limits import OLD_S, SILENT_S
 from bridges.observe.requesters import Fact, Moment, Requester, Requesters
 
 T = TypeVar("T", d.LiftState, d.DoorState, d.ChargerState)
@@ -66,7 +66,7 @@ def reading_age(stamped_at: float, wall: float) -> str:
         return "was never read"
     if wall - stamped_at > OLD_S:
         return "is old"
-    return "is from the future" if wall - stamped_at < -CLOCKS_DIFFER_S else ""
+    return "is from the future" if wall - stamped_at < -OLD_S else ""
 
 
 class ObservedDevice(ABC, Generic[T]):

@@ -37,12 +37,15 @@ class ObservedGraph(Generic[D]):
         self.crowded: set[words.Kind] = set()
         self._most = most
         self._offset: float | None = None
+        self._heartbeat: Heard | None = None
         self._full_until: dict[tuple[words.Kind, bool], float] = {}
 
     def hear(self, heard: Heard) -> list[tuple[D, list[News]]]:
         """Take a message. Returns the devices that it is about, and what it changed of each."""
         moment, message = self.moment(heard), heard.message
         topic = heard.topic.rpartition("/")[2]
+        if isinstance(message, d.SupervisorHeartbeat):
+            self._heartbeat = heard
         about = [*self._about(message, moment)]
         return [(device, device.hear(moment, topic, message)) for device in about]
 
@@ -64,10 +67,10 @@ class ObservedGraph(Generic[D]):
         self.now = Moment(max(at, self.now.at), wall)
         self.began = self.began or Moment(at, wall, seen=False)
 
-    def stated(self, kind: words.Kind) -> list[D]:
-        """The devices of this kind that have published a state, in the order in which they came."""
+    def stated(self, kind: words.Kind | None = None) -> list[D]:
+        """The devices that have published a state, of this kind, in the order in which they came."""
         every = self.known.values()
-        return [one for one in every if one.kind == kind and one.state is not None]
+        return [one for one in every if kind in (None, one.kind) and one.state is not None]
 
     def make(self, kind: words.Kind, name: str) -> D:
         """A device of which nothing was heard yet."""
@@ -94,6 +97,9 @@ class ObservedGraph(Generic[D]):
             self.crowded |= {kind} if stated else set()
             return None
         made = self.known[kind, name] = self.make(kind, name)
+        if self._heartbeat is not None:  # RMF's own supervisor sends one after requests only
+            at, wall = self._heartbeat.at, self._heartbeat.wall
+            made.hear(Moment(at, wall, seen=False), "", self._heartbeat.message)
         return made
 
     def _makes_room(self, kind: words.Kind, now: float, *, stated: bool) -> bool:

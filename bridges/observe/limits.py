@@ -2,9 +2,10 @@
 
 from typing import Final
 
-from bridges.kinds.shared.durations import SILENT_S as SILENT_S
+from bridges.kinds.shared import durations
 
-# SILENT_S, 3.0: states, heartbeats and diagnostics come at 1 Hz; after three missed ones it is silent.
+SILENT_S: Final = durations.SILENT_S
+"""States, heartbeats and diagnostics come at 1 Hz: after three missed ones their sender is silent."""
 SLOWEST_S: Final = 5.0
 """The slowest pace that RMF's contract permits is a state every 2 s (docs/judge.md, RATE): after this
 long two are missing, whoever made the node."""
@@ -17,12 +18,12 @@ GIVEN_UP_S: Final = 10.0
 """A request that was not repeated for this long, though states came, begins anew."""
 UNSEEN_S: Final = 10.0
 """After a longer silence it is unknown who was there meanwhile."""
-FORGOTTEN_S: Final = 60.0
+FORGOTTEN_S: Final = durations.FORGOTTEN_S
 """Where there is no room, a device that was silent for this long gives way to another."""
 OLD_S: Final = 3.0
-"""A reading of this age is old: three polls were missed."""
+"""A reading of this age is old: three polls were missed. One this far ahead is of another clock."""
 CLOCKS_DIFFER_S: Final = 5.0
-"""Stamps this far off come from another clock."""
+"""A request whose stamp is this far off comes from another clock."""
 STEP_S: Final = 2.0
 """A wall clock that moves this much against the steady one was stepped."""
 

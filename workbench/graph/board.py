@@ -8,7 +8,7 @@ import json
 import re
 import time
 from collections.abc import Iterable, Iterator, Sequence
-from typing import Final
+from typing import Any, Final
 
 from msgspec import Struct
 from msgspec.structs import asdict, replace
@@ -18,10 +18,11 @@ from bridges.host.paint import repainted
 from bridges.messages import definitions as d
 from bridges.messages import words
 from bridges.messages.heard import Heard
+from bridges.observe.door import ObservedDoor
+from bridges.observe.graph import AnyDevice, ObservedGraph, PlainGraph
+from bridges.observe.limits import SILENT_S
 from bridges.runtime import diagnostics
-from workbench.graph.join import SILENT_AFTER_S
 
-KINDS: Final = {d.LiftState: "lift", d.DoorState: "door", d.ChargerState: "charger"}
 SETTLES_S: Final = 1.5
 """A daemon's diagnostics come at 1 Hz."""
 COORDINATOR: Final = "charger_coordinator"
@@ -34,7 +35,7 @@ MOST_PLACES: Final = 500
 SECONDS: Final = re.compile(r"\d+(\.\d+)? (s|min)\b")
 
 Device = tuple[str, str]
-"""Its kind and its name on RMF's graph."""
+"""Its kind and its name, as they are shown."""
 
 
 class Row(Struct, frozen=True):
@@ -88,7 +89,7 @@ class Diagnosis(Struct, frozen=True):
 
     def is_current(self, now: float) -> bool:
         """Whether it was said so lately that it counts."""
-        return now - self.at <= SILENT_AFTER_S
+        return now - self.at <= SILENT_S
 
     def waiting(self) -> str:
         """Who waits, and for what: `fleet/b (12 s): for END of fleet/a`."""
@@ -114,23 +115,21 @@ class Diagnosis(Struct, frozen=True):
 class Board:
     """The latest state and diagnosis of each device."""
 
-    def __init__(self) -> None:
-        self._latest: dict[Device, words.Stated] = {}
-        self._heard_at: dict[Device, float] = {}
-        self._first_at: dict[Device, float] = {}
-        self._requesters: dict[str, str] = {}
+    def __init__(self, graph: ObservedGraph[Any] | None = None) -> None:
+        """`graph`: what is remembered of the devices, if others fill it."""
+        self._graph = graph or PlainGraph()
         self._places: dict[str, str] = {}
         self._diagnoses: dict[str, Diagnosis] = {}
         self._full_until = float("-inf")
 
     def take(self, heard: Heard) -> None:
         """Take one message that was heard."""
+        self._graph.hear(heard)
+        self.note(heard)
+
+    def note(self, heard: Heard) -> None:
+        """Take one message, but for what it says of a device's state."""
         match heard.message:
-            case d.SupervisorHeartbeat():
-                self._requesters = {
-                    door.door_name: " ".join(s.requester_id for s in door.sessions)
-                    for door in heard.message.all_sessions
-                }
             case d.ChargingAssignments(fleet_name=fleet):
                 for one in heard.message.assignments:
                     place = f"{words.plain(d.ChargingMode, one.mode)} at {one.waypoint_name}"
@@ -140,36 +139,30 @@ class Board:
             case d.DiagnosticArray():
                 for status in heard.message.status:
                     self._diagnose(status, heard.at)
-            case d.LiftState() | d.DoorState() | d.ChargerState() as state:
-                key = (KINDS[type(state)], words.device(state))
-                self._latest[key], self._heard_at[key] = state, heard.at
-                self._first_at.setdefault(key, heard.at)
 
     def unsettled(self, now: float) -> set[Device]:
         """Kind and name of devices heard only just now, whose daemon may yet say that it simulates."""
         known = {(one.kind, one.status.hardware_id) for one in self._current(now)}
-        young = {key for key, at in self._first_at.items() if now - at < SETTLES_S}
-        return {(kind, words.printable(name)) for kind, name in young - known}
+        return {
+            (one.kind, words.printable(one.id))
+            for one in self._graph.stated()
+            if one.first_state
+            and now - one.first_state.at < SETTLES_S
+            and (one.kind, one.id) not in known
+        }
 
-    def forget(self, kind: str, name: str) -> None:
-        """A device that is silent gives way to another."""
-        self._latest.pop((kind, name), None)
-
-    def rows_of(self, devices: Iterable[Device], now: float, wall: float) -> list[Row]:
-        """The rows of these devices, in their order; none of one that has published no state."""
+    def rows_of(self, devices: Iterable[AnyDevice], now: float, wall: float) -> list[Row]:
+        """The rows of these devices, in their order; each has published a state."""
         about: dict[Device, list[Diagnosis]] = {}
         for one in self._current(now):
             if not one.of_daemon:
                 about.setdefault(one.device, []).append(one)
-        return [
-            self._device(key, self._latest[key], about.get(key, ()), now, wall)
-            for key in devices
-            if key in self._latest
-        ]
+        return [self._device(one, about.get((one.kind, one.id), ()), now, wall) for one in devices]
 
     def rows(self, now: float, wall: float) -> list[Row]:
         """The rows, sorted by kind and name. `now`: monotonic s; `wall`: the clock of the stamps."""
-        devices = self.rows_of(sorted(self._latest, key=_order), now, wall)
+        every = [one for kind in words.KINDS for one in sorted(self._graph.stated(kind), key=_name)]
+        devices = self.rows_of(every, now, wall)
         return [*devices, *self._coordinators(now), *self._robots()]
 
     def _diagnose(self, status: d.DiagnosticStatus, at: float) -> None:
@@ -177,7 +170,7 @@ class Board:
         kind = next((pair.value for pair in status.values if pair.key == "kind"), "")
         diagnosis = Diagnosis(at, kind, status)
         of_daemon = bool(kind) and diagnosis.of_daemon
-        ours = of_daemon or kind == COORDINATOR or diagnosis.device in self._latest
+        ours = of_daemon or kind == COORDINATOR or diagnosis.device in self._graph.known
         if ours and (status.name in self._diagnoses or self._room(at)):
             kept = replace(status, values=status.values[:MOST_VALUES])
             self._diagnoses[status.name] = Diagnosis(at, kind, kept)
@@ -186,30 +179,23 @@ class Board:
         """For one more diagnosis: anybody can make names up, and a silent one gives way."""
         if len(self._diagnoses) >= MOST_DIAGNOSES and now > self._full_until:
             self._diagnoses = {one.status.name: one for one in self._current(now)}
-            self._full_until = now + SILENT_AFTER_S
+            self._full_until = now + SILENT_S
         return len(self._diagnoses) < MOST_DIAGNOSES
 
-    def _device(
-        self,
-        key: Device,
-        state: words.Stated,
-        found: Sequence[Diagnosis],
-        now: float,
-        wall: float,
-    ) -> Row:
-        kind, name = key
+    def _device(self, one: AnyDevice, found: Sequence[Diagnosis], now: float, wall: float) -> Row:
+        state: words.Stated = one.state  # type: ignore[assignment]
         held_by = words.holder(state)
-        if isinstance(state, d.DoorState):
-            held_by = words.printable(self._requesters.get(state.door_name, ""))
+        if isinstance(one, ObservedDoor):
+            held_by = words.printable(" ".join(one.holders))
         return Row(
-            kind,
-            words.printable(name),
+            one.kind,
+            words.printable(one.id),
             words.condition(state),
             held_by or "-",
             words.printable(", ".join(filter(None, (one.waiting() for one in found)))),
-            _age(words.stamped_at(state), wall),
-            _mark(state, now - self._heard_at[key], wall),
-            any(one.kind == kind and self._simulated(one, now) for one in found),
+            _age(one.stamped_at, wall),
+            _mark(one, now),
+            any(said.kind == one.kind and self._simulated(said, now) for said in found),
             _faults(found),
         )
 
@@ -259,9 +245,8 @@ def _faults(found: Iterable[Diagnosis]) -> str:
     return words.printable("; ".join(dict.fromkeys(texts)))
 
 
-def _order(device: Device) -> tuple[int, str]:
-    kind, name = device
-    return list(KINDS.values()).index(kind), name
+def _name(device: AnyDevice) -> str:
+    return device.id
 
 
 def _age(stamped_at: float, wall: float) -> str:
@@ -273,13 +258,13 @@ def _age(stamped_at: float, wall: float) -> str:
     return f"{age / 60:.0f} min" if age < 7200 else f"{age / 3600:.0f} h"
 
 
-def _mark(state: words.Stated, silent_s: float, wall: float) -> str:
-    age = wall - words.stamped_at(state)
-    if silent_s > SILENT_AFTER_S:
+def _mark(device: AnyDevice, now: float) -> str:
+    silent_s = now - device.last_state.at if device.last_state else 0.0
+    if silent_s > SILENT_S:
         return f"SILENT {silent_s:.0f} s"
-    if age < -SILENT_AFTER_S:
+    if device.reading.value == "is from the future":
         return "CLOCK AHEAD"
-    return "STALE" if age - silent_s > SILENT_AFTER_S else ""
+    return "STALE" if device.reading.value else ""
 
 
 def table(rows: Iterable[Row]) -> list[str]:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from bridges.messages import words
-from workbench.graph.join import SILENT_AFTER_S
+from bridges.observe.limits import SILENT_S
 from workbench.graph.requests import Done, Failed, Obstacle, Request, Seen
 
 REPEAT_S: Final = 1.0
@@ -71,7 +71,7 @@ def _reason(request: Request, seen: Seen, now: float) -> str:
     if missed := _missed(request, seen):
         return _given_up("", seen) if _said(missed) in seen.hinted else _said(missed)
     silent_s = now - seen.stated_at
-    if silent_s > SILENT_AFTER_S:
+    if silent_s > SILENT_S:
         return f"{request.name} fell silent {silent_s:.0f} s ago: is its daemon still running?"
     obstacle = _first(request.obstacles(seen))
     state = words.described(seen.states[-1])

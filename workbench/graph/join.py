@@ -17,9 +17,6 @@ from bridges.messages.releases import Release
 from bridges.messages.topics import Topic
 from bridges.transports.transport import M, Publisher, Subscription, Transport, TransportError
 
-SILENT_AFTER_S = 3.0
-"""States come at 1 Hz: three missed ones, or a reading three seconds old, get a mark."""
-
 
 def add_graph_arguments(parser: argparse.ArgumentParser) -> None:
     """The options that say which graph: `--config`, `--domain-id`, `--transport`, `--localhost`."""

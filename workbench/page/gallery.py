@@ -10,13 +10,13 @@ from collections.abc import Callable, Iterable, Mapping
 from html import escape
 from typing import Final, Protocol
 
+from bridges.observe.limits import MOST_DEVICES, SILENT_S
 from workbench.page import drawing
 from workbench.page.listener import Listener
-from workbench.page.site import MOST_DEVICES, DeviceView, Site
+from workbench.page.site import DeviceView, Site
 
 AGES_S: Final = 1.0
 """How often (s) ages and silences, which change by themselves, are drawn again."""
-SILENT_S: Final = 3.0
 Key = tuple[str, str]
 """A device's kind, and its name as it is shown."""
 

@@ -7,8 +7,9 @@ from bridges.messages import topics
 from bridges.messages.heard import Heard
 from bridges.messages.stamps import stamp
 from bridges.messages.topics import AnyTopic
+from bridges.observe.limits import FORGOTTEN_S, MOST_DEVICES
 from bridges.runtime.diagnostics import diagnosis
-from workbench.page.site import GONE_AFTER_S, KEPT_S, MOST_DEVICES, MOST_ROBOTS, Site, Stands
+from workbench.page.site import KEPT_S, MOST_ROBOTS, Site, Stands
 
 WALL = 1_700_000_000.0
 LIFT = d.LiftState(
@@ -86,7 +87,7 @@ def test_a_device_that_went_silent_gives_way_to_a_new_one() -> None:
     site = Site()
     for number in range(MOST_DEVICES):
         site.take(lift(0.0, f"old {number}"))
-    later = GONE_AFTER_S + 1.0
+    later = FORGOTTEN_S + 1.0
     site.take(lift(later, "new"))
     found = names(site, later)
     assert len(found) == MOST_DEVICES
