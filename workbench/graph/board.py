@@ -143,13 +143,12 @@ class Board:
     def unsettled(self, now: float) -> set[Device]:
         """Kind and name of devices heard only just now, whose daemon may yet say that it simulates."""
         known = {(one.kind, one.status.hardware_id) for one in self._current(now)}
-        return {
-            (one.kind, words.printable(one.id))
+        young = [
+            one
             for one in self._graph.stated()
-            if one.first_state
-            and now - one.first_state.at < SETTLES_S
-            and (one.kind, one.id) not in known
-        }
+            if one.first_state and now - one.first_state.at < SETTLES_S
+        ]
+        return {(o.kind, words.printable(o.id)) for o in young if (o.kind, o.id) not in known}
 
     def rows_of(self, devices: Iterable[AnyDevice], now: float, wall: float) -> list[Row]:
         """The rows of these devices, in their order; each has published a state."""

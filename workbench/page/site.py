@@ -122,11 +122,9 @@ class Site:
 
     def devices(self, now: float, wall: float) -> list[DeviceView]:
         """All devices, coordinators and scheduled robots. `now`: monotonic s; `wall`: stamps' clock."""
-        shown: dict[tuple[str, str], Device] = {
-            (one.kind, words.printable(one.id)): one for one in self._story.stated()
-        }
-        rows = self._board.rows(now, wall)
-        return [_view(row, shown.get((row.kind, row.name))) for row in rows]
+        every, rows = self._story.stated(), self._board.rows(now, wall)
+        shown = {f"{one.kind} {words.printable(one.id)}": one for one in every}
+        return [_view(row, shown.get(f"{row.kind} {row.name}")) for row in rows]
 
     def changed(self, now: float, wall: float) -> list[DeviceView]:
         """The devices that were heard of since this was asked last."""

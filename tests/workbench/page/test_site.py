@@ -95,6 +95,21 @@ def test_a_device_that_went_silent_gives_way_to_a_new_one() -> None:
     assert not site.knows("lift", "old 0")
 
 
+def test_a_lift_that_comes_after_made_up_ones_is_explained_and_they_leave_nothing() -> None:
+    site = Site()
+    for number in range(2 * MOST_DEVICES):
+        site.take(lift(number * FORGOTTEN_S, f"made up {number}"))
+    later = 2 * MOST_DEVICES * FORGOTTEN_S
+    site.take(lift(later))
+    told = site.explain("lift", "Lift1", later, WALL + later, {})
+    assert told is not None
+    assert told.now[0].startswith("Nobody has had it since")
+    assert len(names(site, later)) == MOST_DEVICES
+    assert [site.timeline("lift", f"made up {n}", later) for n in range(MOST_DEVICES)] == [
+        None for _ in range(MOST_DEVICES)
+    ]
+
+
 def test_requests_for_devices_that_nobody_has_seen_are_not_kept() -> None:
     site = Site()
     asked = heard(0.0, topics.LIFT_REQUESTS, d.LiftRequest("nowhere", session_id="a/b"))
