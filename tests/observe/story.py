@@ -1,0 +1,93 @@
+"""Messages in virtual time, and what they change of what is remembered of one device."""
+
+from dataclasses import dataclass, field
+
+from msgspec.structs import replace
+
+from bridges.messages import definitions as d
+from bridges.messages.heard import Heard
+from bridges.messages.stamps import stamp
+from bridges.messages.words import Kind
+from bridges.observe.graph import AnyDevice, PlainGraph
+from bridges.observe.requesters import Moment
+
+WALL = 1_800_000_000.0
+RED, BLUE = "fleet/red", "fleet/blue"
+LIFT = d.LiftState(lift_name="Lift1", available_floors=("L1", "L2"), current_floor="L1")
+DOOR = d.DoorState(door_name="ward")
+CHARGER = d.ChargerState(charger_name="bay", state=1)
+END, AGV = 0, 1
+OPEN, CLOSED = 2, 0
+
+
+@dataclass
+class Story:
+    """What happens, second by second; `news` is what each message changed, as one line each."""
+
+    graph: PlainGraph = field(default_factory=PlainGraph)
+    now: float = 0.0
+    news: list[str] = field(default_factory=list)
+
+    def hear(self, topic: str, message: d.Message) -> "Story":
+        """A message comes now."""
+        heard = Heard(self.now, WALL + self.now, topic, message)
+        for _, news in self.graph.hear(heard):
+            for one in news:
+                said = one.what, one.who, one.text, "passed on" if one.passed_on else ""
+                self.news.append(f"{self.now:g} {' '.join(filter(None, said))}")
+        return self
+
+    def passes(self, seconds: float) -> "Story":
+        """Time passes."""
+        self.now += seconds
+        return self
+
+    def told(self) -> list[str]:
+        """The news since this was asked last."""
+        told, self.news = self.news, []
+        return told
+
+    def device(self, kind: Kind, name: str) -> AnyDevice:
+        """The device of this name."""
+        return self.graph.known[kind, name]
+
+    def waits(self, kind: Kind, name: str) -> list[tuple[str, str, float]]:
+        """Who waits now, for what, since when."""
+        now = Moment(self.now, WALL + self.now)
+        return [(one.who, one.wants, one.since.at) for one in self.device(kind, name).waits(now)]
+
+    # ---- what is said
+
+    def lift(self, session: str = "", floor: str = "L1", door: int = CLOSED) -> "Story":
+        """A LiftState."""
+        said = replace(LIFT, session_id=session, current_floor=floor, door_state=door)
+        return self.hear("lift_states", replace(said, lift_time=stamp(WALL + self.now)))
+
+    def asks(
+        self, who: str, floor: str = "L2", kind: int = AGV, *, passed: bool = False
+    ) -> "Story":
+        """A fleet adapter's LiftRequest, or the supervisor's."""
+        topic = "lift_requests" if passed else "adapter_lift_requests"
+        floor = "" if kind == END else floor
+        return self.hear(topic, d.LiftRequest("Lift1", stamp(WALL + self.now), who, kind, floor))
+
+    def ends(self, who: str, *, passed: bool = False) -> "Story":
+        """END_SESSION."""
+        return self.asks(who, kind=END, passed=passed)
+
+    def door(self, mode: int) -> "Story":
+        """A DoorState."""
+        said = replace(DOOR, door_time=stamp(WALL + self.now), current_mode=d.DoorMode(mode))
+        return self.hear("door_states", said)
+
+    def asks_door(
+        self, who: str, mode: int = OPEN, topic: str = "adapter_door_requests"
+    ) -> "Story":
+        """A DoorRequest."""
+        return self.hear(topic, d.DoorRequest(stamp(WALL), who, "ward", d.DoorMode(mode)))
+
+    def lists(self, *holders: str) -> "Story":
+        """The door supervisor's heartbeat."""
+        sessions = tuple(d.Session(requester_id=who) for who in holders)
+        listed = (d.DoorSessions("ward", sessions),) if sessions else ()
+        return self.hear("door_supervisor_heartbeat", d.SupervisorHeartbeat(listed))

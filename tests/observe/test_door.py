@@ -1,0 +1,92 @@
+"""What is remembered of a door and a charger: who asks, who holds, who waits."""
+
+from msgspec.structs import replace
+
+from bridges.messages import definitions as d
+from bridges.observe.door import ObservedDoor
+from bridges.observe.limits import MOST_HOLDERS, UNSEEN_S
+from tests.observe.story import BLUE, CHARGER, CLOSED, OPEN, RED, Story
+
+
+def test_a_passage_from_open_to_the_heartbeat_that_lists_nobody() -> None:
+    story = Story().door(CLOSED).passes(4).asks_door(RED).lists(RED).passes(1)
+    story.asks_door("door_supervisor", topic="door_requests").door(1).passes(1).asks_door(RED)
+    story.door(OPEN).passes(1).asks_door(RED, CLOSED).lists()
+    assert story.told() == [
+        "4 asks fleet/red",
+        "4 has fleet/red",
+        "5 states again",
+        "5 changed",
+        "6 changed",
+        "6 met fleet/red",
+        "7 asks fleet/red",
+        "7 lost fleet/red",
+    ]
+
+
+def test_door_open_misses_the_door_then_the_heartbeat() -> None:
+    story, missing = Story().door(CLOSED).asks_door(RED), []
+    door = story.device("door", "ward")
+    assert isinstance(door, ObservedDoor)
+    for step in (lambda: story, lambda: story.door(OPEN), lambda: story.lists(BLUE)):
+        step()
+        (one,) = door.requesters
+        missing.append([f"{c.name}: {c.shown}" for c in door.checks(one) if not c.met])
+    story.lists(RED, BLUE)
+    assert door.matches(one)
+    assert missing == [
+        ["door: closed", "heartbeat: not heard"],
+        ["heartbeat: not heard"],
+        ["heartbeat: does not list it"],
+    ]
+
+
+def test_a_heartbeat_from_before_the_doors_first_word_counts() -> None:
+    story = Story().lists(RED).passes(5).door(OPEN)
+    door = story.device("door", "ward")
+    assert isinstance(door, ObservedDoor)
+    assert {who: since.at for who, since in door.holders.items()} == {RED: 0}
+
+
+def test_where_no_heartbeat_is_heard_an_open_door_is_what_was_waited_for() -> None:
+    story = Story().door(CLOSED).asks_door(RED).asks_door(BLUE, topic="door_requests")
+    assert story.waits("door", "ward") == [(RED, "OPEN", 0), (BLUE, "OPEN", 0)]
+    assert story.door(OPEN).waits("door", "ward") == []
+    assert story.lists().waits("door", "ward") == [(RED, "OPEN", 0)]
+
+
+def test_a_heartbeats_made_up_holders_are_bounded() -> None:
+    story = Story().door(CLOSED).lists(*(f"made/up{n}" for n in range(10 * MOST_HOLDERS)))
+    door = story.device("door", "ward")
+    assert isinstance(door, ObservedDoor)
+    assert len(door.holders) == MOST_HOLDERS
+
+
+def charger(story: Story, state: int, robot: str = "", request: str = "") -> Story:
+    fleet = "fleet" if robot else ""
+    said = replace(CHARGER, state=state, robot_fleet=fleet, robot_name=robot, request_id=request)
+    return story.hear("charger_states", said)
+
+
+def test_a_robot_waits_at_a_charger_from_its_assignment_until_it_charges() -> None:
+    story = charger(Story(), 1).passes(1)
+    story.hear("charger_requests", d.ChargerRequest("bay", "fleet", "red", d.Duration(), "r1"))
+    charger(story.passes(1), 2, "red", "r1").passes(9)
+    assert story.waits("charger", "bay") == [("r1", "CHARGING", 2)]
+    assert charger(story, 3, "red", "r1").waits("charger", "bay") == []
+    story.hear("charger_cancels", d.ChargerCancel("bay", "r1"))
+    assert [one for one in story.told() if "read" not in one and "again" not in one] == [
+        "1 asks r1",
+        "2 changed",
+        "11 changed",
+        "11 ends r1",
+    ]
+
+
+def test_who_has_a_charger_is_known_since_it_was_seen_without_a_silence() -> None:
+    story, since = Story(), []
+    for seconds in (0.0, 1.0, 2.0, UNSEEN_S + 1.0, 1.0):
+        charger(story.passes(seconds), 3, "red" if story.now < 3 else "blue", "r1")
+        moment = story.device("charger", "bay").robot.since  # type: ignore[attr-defined]
+        since.append((moment.at, moment.seen))
+    assert since == [(0, False), (0, False), (3, True), (14, False), (14, False)]

@@ -1,0 +1,125 @@
+"""What is remembered of a lift: who asks, who has it, who waits, and what RequestLift misses."""
+
+import pytest
+
+from bridges.observe.lift import ObservedLift, request_lift
+from bridges.observe.limits import ASKS_WITHIN_S, GIVEN_UP_S, MOST_REQUESTERS, SILENT_S
+from tests.observe.story import BLUE, CLOSED, OPEN, RED, Story
+
+
+def test_a_ride_from_its_request_to_its_end() -> None:
+    story = Story().lift().passes(1)
+    story.asks(RED).asks(RED, passed=True).passes(1).lift(RED).passes(1)
+    story.lift(RED, "L2", OPEN).passes(1).ends(RED).ends(RED, passed=True).lift()
+    assert story.told() == [
+        "1 asks fleet/red AGV",
+        "2 has fleet/red",
+        "2 changed",
+        "3 changed",
+        "3 met fleet/red",
+        "4 ends fleet/red",
+        "4 passed on",
+        "4 lost fleet/red",
+        "4 over fleet/red",
+        "4 changed",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("session", "floor", "door", "missing"),
+    [
+        (RED, "L2", "open", []),
+        ("nobody", "L2", "open", ["session"]),
+        (BLUE, "L1", "moving", ["session", "floor", "door"]),
+    ],
+)
+def test_request_lift_misses_the_session_the_floor_or_the_door_and_looks_at_nothing_else(
+    session: str, floor: str, door: str, missing: list[str]
+) -> None:
+    checks = request_lift(session, floor, door, RED, "L2")
+    assert [check.name for check in checks if not check.met] == missing
+
+
+def test_a_requester_waits_until_it_is_shown_what_it_asks_for_and_again_when_that_is_over() -> None:
+    story = Story().lift().asks(RED)
+    assert story.waits("lift", "Lift1") == [(RED, "L2", 0)]
+    story.passes(2).asks(RED).lift(RED, "L2", OPEN)
+    assert story.waits("lift", "Lift1") == []
+    story.passes(2).asks(RED).lift(RED, "L2", CLOSED)
+    assert story.waits("lift", "Lift1") == [(RED, "L2", 2)]
+    story.passes(1).ends(RED)
+    assert story.waits("lift", "Lift1") == []
+
+
+def test_whoever_stops_asking_while_states_come_is_gone_and_waits_no_longer() -> None:
+    story = Story().lift().asks(RED)
+    for _ in range(5):
+        story.passes(1).lift()
+    assert story.told() == ["0 asks fleet/red AGV", "4 gone fleet/red"]
+    assert story.waits("lift", "Lift1") == []
+    assert [*story.device("lift", "Lift1").requesters] == []
+
+
+def test_while_no_state_comes_nobody_repeats_itself_and_all_wait_on() -> None:
+    story = Story().lift().asks(RED).passes(100)
+    assert story.waits("lift", "Lift1") == [(RED, "L2", 0)]
+    story.asks(RED)
+    assert story.waits("lift", "Lift1") == [(RED, "L2", 0)]
+
+
+def test_a_request_that_pauses_before_any_state_came_begins_anew() -> None:
+    story = Story().asks(RED).passes(GIVEN_UP_S).asks(RED)
+    assert story.waits("lift", "Lift1") == [(RED, "L2", 0)]
+    story.passes(GIVEN_UP_S + 1).asks(RED)
+    assert story.waits("lift", "Lift1") == [(RED, "L2", 2 * GIVEN_UP_S + 1)]
+
+
+def test_a_session_lost_without_an_end_is_over_and_its_robot_still_waits() -> None:
+    story = Story().lift().passes(1).asks(RED).lift(RED).passes(1).asks(RED).lift(BLUE)
+    assert story.told()[-4:] == [
+        "2 lost fleet/red",
+        "2 over fleet/red",
+        "2 has fleet/blue",
+        "2 changed",
+    ]
+    assert story.waits("lift", "Lift1") == [(RED, "L2", 1)]
+
+
+@pytest.mark.parametrize("passed", [True, False])
+def test_the_end_of_a_holder_that_was_not_heard_asking_is_remembered(passed: bool) -> None:
+    story = Story().lift(RED).passes(1).ends(RED, passed=passed)
+    lift = story.device("lift", "Lift1")
+    one = lift.requesters.get(RED)
+    assert one is not None
+    assert one.ended is not None
+    assert (one.ended.at, one.end_passed_on, one.own) == (1, passed, not passed)
+
+
+def test_the_supervisor_asks_for_whom_it_asked_last_and_no_stranger_becomes_a_requester() -> None:
+    story = Story().lift().asks(RED).asks(BLUE, passed=True).passes(1).asks(RED, passed=True)
+    lift = story.device("lift", "Lift1")
+    assert isinstance(lift, ObservedLift)
+    assert lift.supervisor is not None
+    assert (lift.supervisor.value, lift.supervisor.since.at) == (RED, 1)
+    assert [(one.who, one.passed_on) for one in lift.requesters] == [(RED, lift.supervisor_last)]
+
+
+def test_a_flood_of_names_is_bounded_and_displaces_no_holder() -> None:
+    story = Story().lift().asks(RED).lift(RED)
+    for number in range(10 * MOST_REQUESTERS):
+        story.asks(f"made/up{number}")
+    names = [one.who for one in story.device("lift", "Lift1").requesters]
+    assert len(names) == MOST_REQUESTERS
+    assert names[0] == RED
+    assert names[-1] == f"made/up{10 * MOST_REQUESTERS - 1}"
+
+
+def test_silence_is_told_by_states_and_ends_with_the_next() -> None:
+    story = Story().lift().passes(SILENT_S)
+    lift = story.device("lift", "Lift1")
+    assert not lift.is_silent(story.graph.now)
+    story.passes(0.5).asks(RED)
+    assert lift.is_silent(story.graph.now)
+    story.lift()
+    assert story.told() == ["3.5 asks fleet/red AGV", "3.5 states again"]
+    assert ASKS_WITHIN_S > SILENT_S
