@@ -14,6 +14,8 @@ END: Final = d.LiftRequestType.REQUEST_END_SESSION
 NOBODY: Final = "nobody"
 NO_FLOOR: Final = "no known floor"
 OPEN: Final = "open"
+HAZARDS: Final = (d.LiftMode.MODE_FIRE, d.LiftMode.MODE_OFFLINE, d.LiftMode.MODE_EMERGENCY)
+"""The modes in which no robot is let in."""
 
 
 def request_lift(session: str, floor: str, door: str, who: str, wants: str) -> tuple[Check, ...]:

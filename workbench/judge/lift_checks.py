@@ -4,8 +4,9 @@ from typing import Final
 
 from bridges.messages import definitions as d
 from bridges.messages import words
+from bridges.observe.lift import HAZARDS
 from workbench.judge.law import KEPT, Doubt, Finding, shown
-from workbench.judge.lift_scene import GRACE_S, HAZARDS, LATE_S, LiftScene
+from workbench.judge.lift_scene import GRACE_S, LATE_S, LiftScene
 from workbench.judge.scene import NOT_YET
 
 ENDS_WITHIN_S: Final = 3.0

@@ -7,9 +7,9 @@ from typing import Final
 from bridges.messages import definitions as d
 from bridges.messages import topics
 from bridges.messages.heard import Heard
+from bridges.observe.lift import HAZARDS
 from workbench.judge.scene import NOT_YET, SILENT_S, Scene, keep
 
-HAZARDS: Final = (d.LiftMode.MODE_FIRE, d.LiftMode.MODE_OFFLINE, d.LiftMode.MODE_EMERGENCY)
 GRACE_S: Final = 65.0
 """Until then the same session may resume: its robot may have been left in the car."""
 LATE_S: Final = 5.0

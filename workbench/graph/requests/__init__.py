@@ -19,6 +19,7 @@ from bridges.messages import words
 from bridges.messages.definitions import DiagnosticStatus, SupervisorHeartbeat
 from bridges.messages.heard import Heard
 from bridges.messages.topics import AnyTopic
+from bridges.observe.door import listed
 from workbench.graph.join import CommandLine
 
 State = TypeVar("State", bound=words.Stated)
@@ -91,12 +92,7 @@ class Seen(Struct, frozen=True):
         sent_at = self.first_sent_at
         if self.heartbeat is None or sent_at is None or self.heartbeat_at < sent_at:
             return None
-        return [
-            session.requester_id
-            for sessions in self.heartbeat.all_sessions
-            if sessions.door_name == door
-            for session in sessions.sessions
-        ]
+        return listed(self.heartbeat, door)
 
 
 WHERE: Final = (

@@ -7,11 +7,11 @@ from typing import Final
 from bridges.messages import definitions as d
 from bridges.messages import topics, words
 from bridges.messages.topics import AnyTopic
+from bridges.observe.lift import HAZARDS, request_lift
 from workbench.graph.requests import Done, Failed, Obstacle, Request, Seen, nearest
 
 OBEYS_WITHIN_S: Final = 5.0
 """A supervisor that obeys ends a session within a few states."""
-SHUT_OUT: Final = (d.LiftMode.MODE_FIRE, d.LiftMode.MODE_OFFLINE, d.LiftMode.MODE_EMERGENCY)
 
 
 class _Lift(Request):
@@ -69,8 +69,9 @@ class LiftRide(_Lift):
     def _fulfilled(self, state: d.LiftState | None) -> bool:
         if state is None or state.session_id != self.session:
             return False
-        arrived = (state.current_floor, state.door_state) == (self.floor, d.LiftDoor.DOOR_OPEN)
-        return self.granted_only or arrived
+        door = words.plain(d.LiftDoor, state.door_state)
+        checks = request_lift(state.session_id, state.current_floor, door, self.session, self.floor)
+        return self.granted_only or all(check.met for check in checks)
 
     def obstacles(self, seen: Seen) -> Iterable[Obstacle]:
         """The session, the mode, or the floor or door that the car has not reached."""
@@ -83,7 +84,7 @@ class LiftRide(_Lift):
                 f"{name} is held by {session}",
                 self._remedy(seen),
             ),
-            Obstacle(mode in SHUT_OUT, f"{name} serves no robot while its mode is {word}"),
+            Obstacle(mode in HAZARDS, f"{name} serves no robot while its mode is {word}"),
             Obstacle(not session, f"{name} did not grant the session: its daemon's log says why"),
             Obstacle(
                 mode != d.LiftMode.MODE_AGV,
