@@ -16,6 +16,8 @@ from bridges.messages import definitions as d
 from bridges.messages import words
 from bridges.messages.heard import Heard, Own
 from bridges.messages.words import Kind
+from bridges.observe.door import listed
+from bridges.observe.limits import ASKS_WITHIN_S, OLD_S, STEP_S
 from bridges.runtime import diagnostics
 from workbench.explain import tones
 from workbench.explain.noted import levels, noted
@@ -24,15 +26,10 @@ from workbench.explain.timeline import LANES, Lane, LaneName, Level, Timeline, T
 
 MOST_ROWS: Final = 12
 """The most rows of a lane: a flood of made-up requesters or faults must not fill a page."""
-STATES_LAST_S: Final = 3.5
-"""States, requests, heartbeats and diagnostics come at 1 Hz: after three missed ones nothing is
-known."""
 STAMP: Final = "stamp"
 """The row of `faults` for states that are too old."""
 SUPERVISOR: Final = "supervisor"
 """The row of `requests` for what the supervisor passes on to the device's own daemon."""
-STEP_S: Final = 2.0
-"""A wall clock that moves this much against the steady one was stepped."""
 
 
 def lanes(
@@ -115,7 +112,7 @@ class Drawing:
         self._wall = offset
 
     def _row(
-        self, lane: LaneName, part: str = "", keeps_s: float = STATES_LAST_S, *, fills: bool = False
+        self, lane: LaneName, part: str = "", keeps_s: float = ASKS_WITHIN_S, *, fills: bool = False
     ) -> Row:
         """The row of this name. If there is no room, the row that was silent the longest goes."""
         rows, part = self._rows[lane], label(part)
@@ -159,8 +156,7 @@ class Drawing:
                     self._diagnosis(status)
 
     def _is_it(self, message: words.Stated | words.Requested) -> bool:
-        kind = message.__class__.__name__.lower()
-        return kind.startswith(self._kind) and words.device(message) == self._device
+        return (words.kind(message), words.device(message)) == (self._kind, self._device)
 
     def _state(self, state: words.Stated, wall: float) -> None:
         self._age(words.stamped_at(state), wall)
@@ -179,9 +175,9 @@ class Drawing:
     def _age(self, stamped_at: float, wall: float) -> None:
         """A state whose reading is old, or from another clock, is shown as a fault of its own."""
         text = "" if stamped_at else "never read"
-        if stamped_at and wall - stamped_at > STATES_LAST_S:
+        if stamped_at and wall - stamped_at > OLD_S:
             text = "the reading is old"
-        elif wall - stamped_at < -STATES_LAST_S:
+        elif wall - stamped_at < -OLD_S:
             text = "the stamp is in the future"
         if text or STAMP in self._rows["faults"]:
             self._row("faults", STAMP).say(self._now, text, "wrong")
@@ -232,10 +228,7 @@ class Drawing:
 
     def _heartbeat(self, message: d.SupervisorHeartbeat) -> None:
         """RMF's own supervisor sends it after requests only: a session lasts until one without it."""
-        sessions = next(
-            (one.sessions for one in message.all_sessions if one.door_name == self._device), ()
-        )
-        holders = {label(session.requester_id) for session in sessions}
+        holders = set(map(label, listed(message, self._device)))
         for who in holders:
             self._row("sessions", who, keeps_s=float("inf")).say(self._now, who, "held")
         for who, row in self._rows["sessions"].items():
