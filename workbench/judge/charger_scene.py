@@ -4,6 +4,7 @@ from typing import Final
 
 from bridges.messages import definitions as d
 from bridges.messages.heard import Heard
+from bridges.observe.charger import ObservedCharger
 from workbench.judge.scene import NOT_YET, Scene, keep
 
 IDLE: Final = d.ChargerStateValue.CHARGER_IDLE
@@ -17,16 +18,22 @@ UNREQUESTED: Final = "unrequested/"
 
 class ChargerScene(Scene[d.ChargerState]):
     """`requests`: by id, the latest. `cancels`: id -> when it was first cancelled; the cancel of a
-    charge that nobody requested is forgotten with it. `same_since`: since when state and request have
-    been as they are. `foreign_at`: the last cancel of an id that the station does not show."""
+    charge that nobody requested is forgotten with it. `foreign_at`: the last cancel of an id that the
+    station does not show."""
 
-    kind = d.ChargerState
+    seen: ObservedCharger
+    observes = ObservedCharger
 
     def __init__(self, name: str) -> None:
         super().__init__(name)
         self.requests: dict[str, d.ChargerRequest] = {}
         self.cancels: dict[str, float] = {}
-        self.same_since = self.foreign_at = NOT_YET
+        self.foreign_at = NOT_YET
+
+    @property
+    def same_since(self) -> float:
+        """Since when state and request have been as they are."""
+        return max(self.since, self.seen.condition.since.at, self.seen.request.since.at)
 
     def take_other(self, heard: Heard) -> bool:
         """Requests to this charger and their cancels."""
@@ -43,14 +50,10 @@ class ChargerScene(Scene[d.ChargerState]):
 
     def forget(self) -> None:
         """Forget what a silence may have ended."""
-        self.same_since = self.now
         self.cancels.pop(UNREQUESTED + self.name, None)
 
     def settle(self, state: d.ChargerState) -> None:
-        """Note since when it has shown this."""
-        before = self.before
-        if before is None or (before.state, before.request_id) != (state.state, state.request_id):
-            self.same_since = self.now
+        """Forget the cancel of what is over."""
         if state.state in (IDLE, RELEASED):
             self.cancels.pop(UNREQUESTED + self.name, None)
 

@@ -6,6 +6,7 @@ from typing import Final
 from bridges.messages import definitions as d
 from bridges.messages import topics
 from bridges.messages.heard import Heard
+from bridges.observe.door import ObservedDoor
 from workbench.judge.scene import NOT_YET, Scene
 
 CLOSED: Final = d.DoorModeValue.MODE_CLOSED
@@ -30,7 +31,7 @@ class DoorScene(Scene[d.DoorState]):
     the first OPEN of this latch. `shut`: how many times in a row a door that people had
     opened closed at RMF's CLOSE; `left`: the latest state ends such an opening."""
 
-    kind = d.DoorState
+    observes = ObservedDoor
 
     def __init__(self, name: str) -> None:
         super().__init__(name)

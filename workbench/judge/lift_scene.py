@@ -7,8 +7,9 @@ from typing import Final
 from bridges.messages import definitions as d
 from bridges.messages import topics
 from bridges.messages.heard import Heard
-from bridges.observe.lift import HAZARDS
-from workbench.judge.scene import NOT_YET, SILENT_S, Scene, keep
+from bridges.observe.lift import HAZARDS, ObservedLift
+from bridges.observe.limits import SLOWEST_S
+from workbench.judge.scene import NOT_YET, Scene, keep
 
 GRACE_S: Final = 65.0
 """Until then the same session may resume: its robot may have been left in the car."""
@@ -61,7 +62,7 @@ class LiftScene(Scene[d.LiftState]):
     retains nothing, None if that is not known.
     """
 
-    kind = d.LiftState
+    observes = ObservedLift
 
     def __init__(self, name: str) -> None:
         super().__init__(name)
@@ -197,7 +198,7 @@ class LiftScene(Scene[d.LiftState]):
     def _ask(self, message: d.LiftRequest, direct: bool) -> None:
         session = message.session_id
         ask = self.asks.get(session) or Ask(self.now, self.now)
-        if direct and (not ask.times or self.now - ask.direct_at > SILENT_S):
+        if direct and (not ask.times or self.now - ask.direct_at > SLOWEST_S):
             ask.since = self.now
         ask.direct_at = self.now if direct else ask.direct_at
         ask.at, ask.direct = self.now, ask.direct or direct

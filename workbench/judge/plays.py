@@ -9,8 +9,8 @@ from bridges.messages import definitions as d
 from bridges.messages import topics, words
 from bridges.messages.stamps import duration, stamp
 from bridges.messages.topics import AnyTopic
+from bridges.observe.lift import HAZARDS
 from workbench.judge.law import shown
-from workbench.judge.lift_scene import HAZARDS
 from workbench.judge.play import Play, Step, Traveller
 from workbench.rmf_model import NEVER, Said, door_request
 from workbench.rmf_model.phases import DoorClose, DoorOpen, EndLiftSession, RequestLift

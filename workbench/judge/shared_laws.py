@@ -5,8 +5,9 @@ from dataclasses import replace
 from typing import Any, Final
 
 from bridges.messages import words
+from bridges.observe.limits import SLOWEST_S
 from workbench.judge.law import KEPT, Finding, Law
-from workbench.judge.scene import BURST, SILENT_S, Scene
+from workbench.judge.scene import BURST, Scene
 
 AnyScene = Scene[Any]
 
@@ -14,6 +15,7 @@ STALE_S: Final = 5.0
 """No site may call a reading of this age fresh."""
 BURST_WITHIN_S: Final = 1.0
 ANSWERS: Final = 5
+BACK_S: Final = 0.5
 STEPS_BACK: Final = 4
 STEPS_WITHIN_S: Final = 30.0
 
@@ -22,10 +24,11 @@ def rate(scene: AnyScene) -> Finding:
     """States keep coming."""
     if scene.news is None:
         silent_s = scene.now - scene.heard_at
-        return f"silent since then, for {silent_s:.1f} s" if silent_s > SILENT_S else None
+        return f"silent since then, for {silent_s:.1f} s" if silent_s > SLOWEST_S else None
     if scene.new is None or scene.states == 1:
         return None
-    return KEPT if scene.gap_s <= SILENT_S else f"no state for {scene.gap_s:.1f} s before this one"
+    gap_s = scene.seen.gap_s
+    return KEPT if gap_s <= SLOWEST_S else f"no state for {gap_s:.1f} s before this one"
 
 
 def answers(scene: AnyScene) -> Finding:
@@ -43,7 +46,7 @@ def one_node(scene: AnyScene) -> Finding:
     """Stamps of one node go forwards; a clock steps back once, not again and again."""
     if scene.new is None:
         return None
-    again = len(scene.back) == STEPS_BACK and scene.now - scene.back[0] < STEPS_WITHIN_S
+    again = scene.seen.steps_back(scene.now, BACK_S, STEPS_WITHIN_S) >= STEPS_BACK
     return f"stamps go back and forth: {STEPS_BACK} times in 30 s" if again else KEPT
 
 
