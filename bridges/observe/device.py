@@ -114,6 +114,14 @@ class ObservedDevice(ABC, Generic[T]):
         """How often the stamps went back by more than this lately, as those of two nodes do."""
         return sum(by > by_s and now - at < within_s for at, by in self._back)
 
+    def checks(self, one: Requester) -> tuple[Check, ...]:
+        """What RMF's phase of this requester looks at; nothing where RMF has none."""
+        return ()
+
+    def matches(self, one: Requester) -> bool:
+        """Does RMF see what this requester waits for?"""
+        return all(check.met for check in self.checks(one))
+
     @abstractmethod
     def waits(self, now: Moment) -> Iterator[Wait]:
         """Who waits, for what, since when."""

@@ -68,10 +68,6 @@ class ObservedDoor(ObservedDevice[d.DoorState]):
             heartbeat = "not heard"
         return door_open(self.mode.value, heartbeat) if one.wants == OPEN else door_close(heartbeat)
 
-    def matches(self, one: Requester) -> bool:
-        """Is its DoorOpen or DoorClose done?"""
-        return all(check.met for check in self.checks(one))
-
     def asking(self, now: Moment) -> list[Requester]:
         """Those who repeat their request now and still wait, the earliest first."""
         asks = [one for one in self.requesters if one.asks(now) and not self.matches(one)]

@@ -59,10 +59,6 @@ class ObservedLift(ObservedDevice[d.LiftState]):
         wants = one.wants or "no floor"
         return request_lift(self.session.value, self.floor.value, self.door.value, one.who, wants)
 
-    def matches(self, one: Requester) -> bool:
-        """Is RequestLift of this requester done?"""
-        return all(check.met for check in self.checks(one))
-
     def asking(self, now: Moment) -> list[Requester]:
         """Those who ask now, the earliest first. While no state comes nobody repeats itself, and all
         wait."""

@@ -236,10 +236,9 @@ class Drawing:
                 row.say(self._now, "", "held")
 
     def _diagnosis(self, status: d.DiagnosticStatus) -> None:
-        values = {pair.key: pair.value for pair in status.values}
-        kind = values.get("kind", "").removesuffix("_supervisor")
-        if (kind, status.hardware_id) != (self._kind, self._device):
+        if diagnostics.about(status) != (self._kind, self._device):
             return
+        values = {pair.key: pair.value for pair in status.values}
         if "faults" not in self._noted:
             self._faults(status, values)
         if "relays" not in self._noted and "outputs" in values:

@@ -17,6 +17,7 @@ from bridges.messages.words import KINDS, Kind
 from bridges.observe.graph import Key, ObservedGraph
 from bridges.observe.limits import MOST_DEVICES, SILENT_S
 from bridges.observe.requesters import Moment
+from bridges.runtime import diagnostics
 from workbench.explain import answer as common
 from workbench.explain import charger, door, lift
 from workbench.explain.answer import Answer, Remedies
@@ -165,24 +166,21 @@ class Site(ObservedGraph[Device]):
             found.refused(moment, refusal)
 
     def _diagnose(self, moment: Moment, status: d.DiagnosticStatus) -> None:
-        kind = next((pair.value for pair in status.values if pair.key == "kind"), "")
+        kind = diagnostics.kind_in(status)
         of_daemon = status.name == f"{status.hardware_id}: daemon"
         if kind == "charger_coordinator" and not of_daemon:
             values = {pair.key: pair.value for pair in status.values}
             self._coordinator = moment, values
             return
-        device = kind.removesuffix("_supervisor")
-        for known in KINDS:
-            found = self.known.get((known, status.hardware_id)) if known == device else None
-            if found is not None:
-                found.diagnose(moment, status, kind)
+        about = diagnostics.about(status)
+        if about in self.known:
+            self.known[about].diagnose(moment, status, kind)
 
     def _note(self, moment: Moment, own: Own) -> None:
         note = noted(own.topic.rpartition("/")[2], own.text)
         for kind in KINDS:
-            found = self.known.get((kind, note.subject)) if note else None
-            if found is not None and note is not None:
-                found.note(moment, note)
+            if note is not None and (kind, note.subject) in self.known:
+                self.known[kind, note.subject].note(moment, note)
 
     def _coordinates(self) -> Mapping[str, str]:
         if self._coordinator is None or self.now.at - self._coordinator[0].at > SILENT_S:

@@ -166,7 +166,7 @@ class Board:
 
     def _diagnose(self, status: d.DiagnosticStatus, at: float) -> None:
         """Keep a status of our daemons under `<node>: <device>`. Other nodes' have no `kind`."""
-        kind = next((pair.value for pair in status.values if pair.key == "kind"), "")
+        kind = diagnostics.kind_in(status)
         diagnosis = Diagnosis(at, kind, status)
         of_daemon = bool(kind) and diagnosis.of_daemon
         ours = of_daemon or kind == COORDINATOR or diagnosis.device in self._graph.known

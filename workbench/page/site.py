@@ -198,8 +198,7 @@ class Site:
         self._board.note(kept)
         self._story.take(kept)
         for status in ours:
-            device = _about(status)
-            if device:
+            if device := diagnostics.about(status):
                 alone = replace(message, status=(status,))
                 self._remember(device, replace(heard, message=alone))
 
@@ -228,14 +227,4 @@ def _view(row: Row, device: Device | None) -> DeviceView:
 
 
 def _is_graph(status: d.DiagnosticStatus) -> bool:
-    return _kind_in(status).endswith(("supervisor", "coordinator"))
-
-
-def _about(status: d.DiagnosticStatus) -> Key | None:
-    kind = _kind_in(status).removesuffix("_supervisor")
-    found = next((known for known in KINDS if known == kind), None)
-    return (found, status.hardware_id) if found else None
-
-
-def _kind_in(status: d.DiagnosticStatus) -> str:
-    return next((pair.value for pair in status.values if pair.key == "kind"), "")
+    return diagnostics.kind_in(status).endswith(("supervisor", "coordinator"))
