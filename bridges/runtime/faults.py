@@ -1,6 +1,6 @@
-"""What each fault means and what to do: faults.yaml, for `status` and for docs/faults.md.
+"""What each fault means and what to do: faults.yaml, for `status` and for docs/reference/faults.md.
 
-`python -m bridges.runtime.faults > docs/faults.md` writes the page.
+`python -m bridges.runtime.faults > docs/reference/faults.md` writes the page.
 """
 
 import re
@@ -19,7 +19,7 @@ HEAD: Final = """\
 
 What `rmf-bridge status`, `watch`, the log and ROS's `/diagnostics` call a fault, its likely cause
 and what to do. `rmf-bridge status` prints the same for the faults that are there now. Other symptoms:
-[troubleshooting.md](troubleshooting.md).
+[Troubleshoot](../how-to/troubleshoot.md).
 
 | fault | likely cause | do |
 |---|---|---|
@@ -77,7 +77,7 @@ def for_explain() -> dict[str, tuple[str, str]]:
 
 
 def page() -> str:
-    """docs/faults.md."""
+    """docs/reference/faults.md."""
     rows = (f"| `{code}` | {one.cause} | {one.do} |" for code, one in remedies().items())
     return HEAD + "\n".join(rows) + "\n"
 

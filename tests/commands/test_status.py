@@ -234,8 +234,8 @@ def test_each_fault_of_the_source_has_a_remedy_and_each_remedy_a_fault() -> None
 
 
 def test_the_page_of_faults_is_the_table_itself() -> None:
-    """`python -m bridges.runtime.faults > docs/faults.md` brings it up to date."""
-    assert (ROOT / "docs" / "faults.md").read_text() == faults.page()
+    """`python -m bridges.runtime.faults > docs/reference/faults.md` brings it up to date."""
+    assert (ROOT / "docs" / "reference" / "faults.md").read_text() == faults.page()
 
 
 def test_an_unknown_name_is_answered_with_the_known_ones(

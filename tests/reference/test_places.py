@@ -1,4 +1,4 @@
-"""What docs/architecture.md, CONTRIBUTING.md and the README say of files: they are there."""
+"""Files named in docs/explanation/architecture.md, CONTRIBUTING.md and the README are there."""
 
 import re
 from pathlib import Path, PurePath
@@ -33,7 +33,7 @@ def named(text: str) -> list[str]:
     return [found for found in PATH.findall(text) if found != "plant.sock"]
 
 
-@pytest.mark.parametrize("page", ["docs/architecture.md", "CONTRIBUTING.md"])
+@pytest.mark.parametrize("page", ["docs/explanation/architecture.md", "CONTRIBUTING.md"])
 def test_every_file_that_is_named_exists(page: str) -> None:
     found = named((ROOT / page).read_text())
     assert len(found) > 10
@@ -42,7 +42,7 @@ def test_every_file_that_is_named_exists(page: str) -> None:
 
 @pytest.mark.parametrize("way", WAYS)
 def test_each_of_the_five_paths_is_described_file_by_file(way: str) -> None:
-    page = (ROOT / "docs" / "architecture.md").read_text()
+    page = (ROOT / "docs" / "explanation" / "architecture.md").read_text()
     section = page.partition(f"\n## The path of {way}\n")[2].partition("\n## ")[0]
     steps = re.split(r"\n\d\. ", section)[1:]
     assert len(steps) >= 6

@@ -1,1 +1,1 @@
-"""What docs/reliability.md shows: real daemons, hurt from outside, on loopback (`make torture`)."""
+"""docs/explanation/reliability.md: real daemons, hurt from outside, on loopback (`make torture`)."""

@@ -1,4 +1,4 @@
-"""`python -m tests.torture --seed 7`: the table of docs/reliability.md, in ten minutes, on loopback.
+"""`python -m tests.torture --seed 7`: the table of reliability.md in ten minutes, on loopback.
 
 Exit code 1, and what happened, when a relay stayed on or a daemon died of what may not end one.
 """

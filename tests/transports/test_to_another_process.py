@@ -99,7 +99,7 @@ def test_what_a_supervisor_retained_is_not_replayed_to_a_lift_that_starts_later(
     publisher.publish(before)
     with peer.running("echo", here.domain, here.theirs):
         wait_until(lambda: after in received or peer.sent(publisher, after), "a new one comes back")
-    # Fast DDS asks Cyclone for what was before, and gets it: docs/ros.md.
+    # Fast DDS asks Cyclone for what was before, and gets it: docs/how-to/ros.md.
     replays = (here.ours, here.theirs) == ("dds", "ros2") and on_fast_dds()
     assert set(received) - ({before} if replays else set()) == {after}
 

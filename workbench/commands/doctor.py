@@ -44,7 +44,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--form",
         type=Path,
         metavar="OUT",
-        help="also write the form of docs/hardware.md, for a person",
+        help="also write the form of docs/how-to/hardware.md, for a person",
     )
     parser.add_argument(
         "--scan", action="store_true", help="ask every unit or node of a bus, not only 1 to 16"

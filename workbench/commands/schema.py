@@ -9,7 +9,9 @@ from workbench.commissioning import reference
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The options of `schema`."""
     parser.add_argument(
-        "--markdown", action="store_true", help="print docs/configuration.md, not JSON Schema"
+        "--markdown",
+        action="store_true",
+        help="print docs/reference/configuration.md, not JSON Schema",
     )
 
 

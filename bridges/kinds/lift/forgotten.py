@@ -42,7 +42,7 @@ ASKS_S: Final = 5.0
 """A fleet adapter asks once for each LiftState that it hears (RobotContext.cpp, _check_lift_state), and
 states go out each second: five of its repeats are missing."""
 IN_CAR_S: Final = 60.0
-"""A fleet adapter that was killed has its robot on a task again 20 s after the kill (docs/ros.md)."""
+"""A killed fleet adapter has its robot on a task again 20 s after the kill (docs/how-to/ros.md)."""
 FORWARDED_S: Final = 3.0
 """A supervisor passes END on at once; no topic is later than the other by more."""
 CLOSE_S: Final = 1e-6

@@ -28,7 +28,7 @@ MODE, HOLD = {18}, set(HELD)
 ODD = 5
 """The floor code's lowest bit: it falls when the car comes by L2."""
 KILLED_S, STOPPED_S = 1.0, 4.0
-"""What docs/reliability.md promises of a core of 1,000 MIPS."""
+"""What docs/explanation/reliability.md promises of a core of 1,000 MIPS."""
 
 
 def phases() -> str:

@@ -25,7 +25,7 @@ from tests.vm.guest.wires import tell
 
 SERVICES = ("lift", "door", "charger", "lift_supervisor", "door_supervisor", "low")
 OFF_S, READY_S = 12.0, 20.0
-"""What docs/reliability.md promises after a power cut, from the kernel's start."""
+"""What docs/explanation/reliability.md promises after a power cut, from the kernel's start."""
 YAML = Path("/etc/rmf-bridges/lift.yaml")
 CURRENT = Path("/usr/lib/rmf-bridges/current")
 NOT_OURS = ("/var/cache/", "/run/systemd/", "/var/tmp/systemd-private-")

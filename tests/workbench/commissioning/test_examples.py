@@ -64,7 +64,7 @@ def test_an_example_is_of_a_shipped_file_where_there_is_one() -> None:
 
 
 def test_no_heading_appears_twice() -> None:
-    page = Path(__file__).parents[3] / "docs" / "configuration.md"
+    page = Path(__file__).parents[3] / "docs" / "reference" / "configuration.md"
     headings = Counter(line for line in page.read_text().splitlines() if line.startswith("#"))
     assert [heading for heading, many in headings.items() if many > 1] == []
     assert len(headings) > 40

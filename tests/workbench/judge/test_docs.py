@@ -1,4 +1,4 @@
-"""docs/judge.md has the laws as the code has them."""
+"""docs/how-to/judge.md has the laws as the code has them."""
 
 from pathlib import Path
 
@@ -8,7 +8,7 @@ from bridges.cli import main
 from workbench.judge.judge import KINDS, LAWS, Kind
 from workbench.judge.report import markdown
 
-PAGE = Path(__file__).parents[3] / "docs" / "judge.md"
+PAGE = Path(__file__).parents[3] / "docs" / "how-to" / "judge.md"
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -24,11 +24,11 @@ UNITS_MOST: Final = {"modbus": 247, "can": 127}
 """Modbus over Serial Line V1.02, 2.2; CiA 301."""
 SOME: Final = 16
 LOOK_AT: Final = {
-    "modbus": 'supply and cable; docs/wiring.md, "RS-485"',
-    "can": 'supply and cable; docs/wiring.md, "CAN"',
+    "modbus": 'supply and cable; docs/how-to/wire.md, "RS-485"',
+    "can": 'supply and cable; docs/how-to/wire.md, "CAN"',
     "http": "curl with the same address",
 }
-TEXTS: Final = "docs/troubleshooting.md"
+TEXTS: Final = "docs/how-to/troubleshoot.md"
 NO_PATH: Final = (10, 11)
 """Exceptions of a gateway whose unit is silent (Modbus Application Protocol V1.1b3, section 7)."""
 DEVICE_TYPE: Final = (0x1000, 0, 4)

@@ -13,7 +13,7 @@ ARPHRD_CAN: Final = "280"
 """linux/if_arp.h."""
 IFF_UP: Final = 1
 DEAF: Final = "no station on this bus is heard"
-HOW: Final = 'docs/wiring.md, "CAN": sudo ip link set {} up type can bitrate {} restart-ms 100'
+HOW: Final = 'docs/how-to/wire.md, "CAN": sudo ip link set {} up type can bitrate {} restart-ms 100'
 
 
 def interface(machine: Machine, name: str, bitrate: int | None) -> Iterator[Finding]:

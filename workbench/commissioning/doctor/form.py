@@ -1,5 +1,5 @@
-"""The form for an afternoon with real hardware (docs/hardware.md): the machine and what was found are
-filled in, what a person has to see is not.
+"""The form for an afternoon with real hardware (docs/how-to/hardware.md): the machine and its findings
+are filled in; what a person has to see is not.
 """
 
 import platform
@@ -19,7 +19,7 @@ ALL: Final = frozenset({"gpio", "modbus", "http", "can"})
 
 
 class Step(msgspec.Struct, frozen=True):
-    """One step of docs/hardware.md. `buses`: those that it is for. `seen`: what must be seen."""
+    """One step of docs/how-to/hardware.md. `buses`: those that it is for. `seen`: what must be seen."""
 
     number: str
     buses: frozenset[str]
@@ -76,7 +76,7 @@ def form(config: Config, found: Iterable[Finding], machine: Machine) -> str:
         "|---|---|---|",
         *(f"| {_cell(one.subject)} | {one.level} | {_cell(one.found)} |" for one in found),
         "",
-        "Steps of docs/hardware.md, each three times. An empty cell: not measured.",
+        "Steps of docs/how-to/hardware.md, each three times. An empty cell: not measured.",
         "",
         "| step | must be seen | seen | figures of three times | with which parts | who, when |",
         "|---|---|---|---|---|---|",

@@ -54,7 +54,9 @@ class Look:
     @property
     def alone(self) -> str:
         """What to do where nobody is heard."""
-        return f"docs/ros.md: domain, multicast, interfaces; {self.watch} shows what is heard"
+        return (
+            f"docs/how-to/ros.md: domain, multicast, interfaces; {self.watch} shows what is heard"
+        )
 
 
 def graph(config: Config, look: Look) -> Iterator[Finding]:
@@ -87,7 +89,9 @@ def _interface(domain: int, loopback: bool) -> Finding:
         return wrong(NETWORK, "no interface with a link has an IPv4 address", means, "ip addr")
     text = f"domain {domain}, by {' and '.join(found)}"
     if len(found) > 1 and not os.environ.get("CYCLONEDDS_URI"):
-        return note(NETWORK, text, "DDS takes one of them", 'docs/ros.md, "Two network interfaces"')
+        return note(
+            NETWORK, text, "DDS takes one of them", 'docs/how-to/ros.md, "Two network interfaces"'
+        )
     return ok(NETWORK, text)
 
 

@@ -92,7 +92,7 @@ def _listeners(status: Status) -> Iterator[Finding]:
         if nodes:
             yield ok(DAEMON, f"{topic}: heard by {nodes} node{'s' if nodes > 1 else ''}")
         elif topic.endswith("_states"):
-            do = "docs/ros.md: domain, multicast, interfaces"
+            do = "docs/how-to/ros.md: domain, multicast, interfaces"
             yield warning(DAEMON, f"{topic}: nobody listens", "RMF does not see the device", do)
 
 

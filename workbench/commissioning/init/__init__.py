@@ -77,7 +77,7 @@ def draft(answers: Answers) -> str:
     address = answers.address or ADDRESSES.get(answers.wiring, "")
     lines = [
         f"# {answers.name}: compare every point with the wires, then `rmf-bridge check` this file.",
-        "# docs/configuration.md lists every key, docs/wiring.md says how wires fail.",
+        "# docs/reference/configuration.md lists every key, docs/how-to/wire.md says how wires fail.",
         f"kind: {answers.kind}",
         f"driver: {DRIVERS.get(answers.wiring, 'dry_contact')}",
         "",

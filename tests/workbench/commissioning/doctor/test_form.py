@@ -10,7 +10,7 @@ from workbench.commissioning.doctor.form import STEPS, Step, form
 from workbench.commissioning.doctor.machine import Machine
 
 CONFIG = Path(__file__).parents[4] / "config"
-PAGE = Path(__file__).parents[4] / "docs" / "hardware.md"
+PAGE = Path(__file__).parents[4] / "docs" / "how-to" / "hardware.md"
 
 
 def test_the_form_has_the_machine_the_findings_and_empty_steps_of_the_files_buses(
