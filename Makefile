@@ -6,13 +6,13 @@ BIN := .venv/bin
 # compiles every file again.
 export PYTHONDONTWRITEBYTECODE :=
 
-.PHONY: help demo demo-charging demo-page test test-page suite deep test-ros lint style types man deb format bench flood soak torture test-vm mutate clean
+.PHONY: help demo demo-charging demo-page test test-page suite deep test-ros lint style types docs reference man deb format bench flood soak torture test-vm mutate clean
 help:
 	@echo "make demo    a robot goes through a door, rides a lift and charges, on fake hardware"
 	@echo "             (TRANSPORT=zenoh make demo: on zenoh, as without being asked on a Raspberry Pi)"
 	@echo "make demo-charging  two fleets, two chargers and their coordinator: the scenarios by number, 100 s"
 	@echo "make demo-page  a site with lifts, doors, chargers and robots that ride for ever, and the web page of it"
-	@echo "make test    lint, format, types, import contracts and all tests: what CI runs"
+	@echo "make test    lint, format, types, import contracts, links of docs/ and all tests: what CI runs"
 	@echo "make test-page  the web page in a real browser (Chromium)"
 	@echo "make deep    all tests, every walk to its full depth: some minutes more"
 	@echo "make test-ros  the tests that need ROS 2, in a shell that has sourced its setup file"
@@ -24,6 +24,8 @@ help:
 	@echo "make test-vm  boot Debian 13 in QEMU, install our packages, and kill and hang it there (ARCH=arm64)"
 	@echo "             (one of its machines: ONLY=lift, site or upgrade)"
 	@echo "make mutate  break the cores in every small way, and list what no test noticed (docs/explanation/mutation.md)"
+	@echo "make docs    the documentation as a site, build/site/index.html; a broken link is an error"
+	@echo "make reference  write the pages of docs/ that are made from the program"
 	@echo "make man     the manual page, build/rmf-bridge.1"
 	@echo "make deb     Debian packages in dist/, for Debian 12 and 13 and Ubuntu 24.04, amd64 and arm64"
 	@echo "             (one of them: make deb ARCHS=arm64 PYTHONS=3.11)"
@@ -51,7 +53,7 @@ demo-page: .venv/ready
 # Each test goes with all its parameters to the next free worker, in the mixed order of conftest.py.
 SIDE_BY_SIDE := -n 8 --dist loadscope --no-loadscope-reorder
 # mypy uses one core only, so it runs beside the tests.
-test: .venv/ready style
+test: .venv/ready style docs
 	@$(MAKE) --no-print-directory -j 2 types suite
 
 suite: .venv/compiled
@@ -93,6 +95,13 @@ style: .venv/ready
 
 types: .venv/ready
 	$(BIN)/mypy
+
+# Links, anchors and files that no page names are checked. What is built needs no network.
+docs: .venv/ready
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --clean
+
+reference: .venv/ready
+	$(BIN)/python -m tests.reference.pages
 
 man: .venv/ready
 	@mkdir -p build

@@ -12,7 +12,7 @@ import sys
 from collections.abc import Iterable, Sequence
 from typing import NoReturn
 
-from bridges import VERSION
+from bridges import VERSION, exit_codes
 from bridges.host.installed import NotInstalled, is_there, of_workbench
 
 EX_PIPE = 141
@@ -183,7 +183,7 @@ def _parser(names: Iterable[str], whole: bool) -> argparse.ArgumentParser:
         subparser = subparsers.add_parser(
             name,
             help=text,
-            description=text[0].upper() + text[1:] + ".",
+            description=f"{text[0].upper()}{text[1:]}. Exit codes: {exit_codes.told(name)}.",
             epilog=f"example: rmf-bridge {example}",
         )
         subparser.set_defaults(usage=subparser.error)

@@ -21,19 +21,12 @@ from bridges.settings.sheets.findings import Findings, findings, wrong
 if TYPE_CHECKING:
     from bridges.settings.building_map import BuildingMap
 
-EXIT_CODES = (
-    "Exit codes: 0 every file is right (warnings do not count); 78 a file, or the files together,"
-    " cannot be right; 73 the sheet cannot be written; 2 the command line cannot be read"
-)
-
-
 COORDINATOR = "charger_coordinator"
 NO_COORDINATOR = "this is compared with a charger coordinator's YAML, and no FILE is one"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of `check`."""
-    parser.description = f"{parser.description} {EXIT_CODES}."
     parser.add_argument("files", nargs="+", metavar="FILE", help="a device YAML")
     parser.add_argument(
         "-q", "--quiet", action="store_true", help="print problems only: no table, no warning"
@@ -65,7 +58,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Check every file. Returns one of EXIT_CODES."""
+    """Check every file."""
     try:
         building = _building(args.building_map)
     except SettingsError as error:

@@ -233,11 +233,6 @@ def test_each_fault_of_the_source_has_a_remedy_and_each_remedy_a_fault() -> None
     assert known - named - constants - hazards == set()
 
 
-def test_the_page_of_faults_is_the_table_itself() -> None:
-    """`python -m bridges.runtime.faults > docs/reference/faults.md` brings it up to date."""
-    assert (ROOT / "docs" / "reference" / "faults.md").read_text() == faults.page()
-
-
 def test_an_unknown_name_is_answered_with_the_known_ones(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

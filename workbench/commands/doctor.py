@@ -34,10 +34,6 @@ LISTEN_S: Final = 3.0
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The options of `doctor`."""
-    parser.description = (
-        f"{parser.description} Exit codes: 0 all well; 1 warnings; 2 something is wrong; 64 the kill"
-        " test was not confirmed; 78 the YAML has an error."
-    )
     parser.add_argument("file", type=Path, metavar="FILE", help="the device YAML")
     parser.add_argument("--json", action="store_true", help="for programs")
     parser.add_argument(

@@ -173,7 +173,7 @@ def _case(suite: ElementTree.Element, report: Report, judged: Judged) -> None:
 
 
 def markdown(kind: Kind) -> str:
-    """A kind's laws as the table of docs/how-to/judge.md; * marks those that a wire can break too."""
+    """A kind's laws as the table of docs/reference/laws.md; * marks those that a wire can break too."""
     rows = [
         f"| `{law.id}`{'*' if law.sensed else ''} | {law.sentence} | {law.reason} | {law.source} |"
         for law in LAWS[kind]

@@ -1,8 +1,8 @@
 """How ROS's topics and nodes are named on zenoh: data keys, liveliness tokens, attachments. Pure.
 
 There are two ways to name them, and nodes of one do not hear those of the other:
-- rmw_zenoh's, where each ROS context is a zenoh session. Source: ros2/rmw_zenoh, jazzy,
-  docs/design.md; rmw_zenoh_cpp/src/detail/liveliness_utils.cpp and attachment_helpers.cpp.
+- rmw_zenoh's, where each ROS context is a zenoh session. Source: ros2/rmw_zenoh, jazzy:
+  its design.md; rmw_zenoh_cpp/src/detail/liveliness_utils.cpp and attachment_helpers.cpp.
 - zenoh-bridge-ros2dds's, which routes a DDS domain. Source: eclipse-zenoh/zenoh-plugin-ros2dds,
   liveliness_mgt.rs and ros2_utils.rs.
 

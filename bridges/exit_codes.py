@@ -1,0 +1,146 @@
+"""The exit codes of each subcommand: for `--help`, the manual page and docs/reference/exit-codes.md.
+
+From 64 on they are those of sysexits.h.
+"""
+
+from typing import Final
+
+ALWAYS: Final = {
+    2: "wrong command line",
+    69: "the package that has this command is not installed",
+    141: "the reader of its output has gone",
+}
+"""What every subcommand may return besides its own."""
+YAML: Final = {78: "the YAML has an error"}
+ROOT: Final = {
+    66: "the folder of `--root` is missing",
+    74: "a file was not written",
+    77: "not root",
+}
+GRAPH: Final = "nothing was heard, or the graph cannot be joined"
+RECORDING: Final = {66: "the recording cannot be read"}
+SIMULATION: Final = {
+    0: "done",
+    1: "the simulation refused it",
+    64: "no such device",
+    69: "no simulation of this file runs",
+    **YAML,
+}
+SENT: Final = {
+    0: "the effect was seen",
+    1: "no effect was seen (the reason is told), or the graph cannot be joined",
+    130: "Ctrl-C",
+}
+
+EXIT_CODES: Final[dict[str, dict[int, str]]] = {
+    "init": {
+        0: "the file is written",
+        64: "answers are missing, or do not fit together",
+        66: "the map cannot be read",
+        73: "the file exists, or cannot be written",
+        130: "Ctrl-C",
+    },
+    "run": {
+        0: "ended by a signal, every output verified off",
+        1: "ended by a signal, an output not verified off",
+        64: "invalid combination of options, or `--simulate` in a service",
+        69: "another process serves these devices, or the transport or hardware is not there",
+        70: "ended by a defect",
+        78: "the YAML has an error, or no longer fits the service's drop-in",
+    },
+    "check": {
+        0: "no error (there may be warnings)",
+        73: "the sheet cannot be written",
+        78: "a file has an error, or the files contradict each other",
+    },
+    "enable": {
+        0: "the service runs",
+        69: "an output is not verified off",
+        **ROOT,
+        78: "the YAML has an error, or contradicts another service's",
+    },
+    "disable": {
+        0: "the service has ended",
+        64: "no service can have this name",
+        69: "an output is not verified off",
+        **ROOT,
+    },
+    "schema": {0: "printed"},
+    "watch": {0: "Ctrl-C, or `--once` heard something", 1: GRAPH},
+    "page": {
+        0: "Ctrl-C or SIGTERM",
+        64: "it would show the site to strangers; or the password was not repeated",
+        **RECORDING,
+        69: "the port is taken, or NiceGUI is not installed",
+        78: "the password file has an error",
+    },
+    "status": {
+        0: "all is well",
+        1: "a daemon has a fault",
+        2: "a daemon died or is silent",
+        3: "there is no daemon",
+    },
+    "doctor": {
+        0: "all is well",
+        1: "warnings",
+        2: "something is wrong",
+        64: "the kill test was not confirmed",
+        73: "the form cannot be written",
+        **YAML,
+        130: "Ctrl-C",
+    },
+    "explain": {0: "explained", 1: "the device was not heard, or the graph cannot be joined"}
+    | RECORDING,
+    "plot": {0: "drawn", 1: "nothing to draw, or the picture cannot be written"} | RECORDING,
+    "send": SENT,
+    "judge": {
+        0: "every law that was seen is kept",
+        1: "a law is broken",
+        **RECORDING,
+        69: f"{GRAPH}; or not all was played",
+        73: "the JUnit file cannot be written",
+    },
+    "release": SENT,
+    "reset": {
+        0: "the daemon was told",
+        1: "no daemon runs",
+        69: "this user may not see or signal it",
+    },
+    "walk": {
+        0: "every output is off",
+        1: "an output is not verified off",
+        64: "no terminal, or no such device",
+        69: "the device is in use, or does not answer",
+        73: "the record cannot be written",
+        **YAML,
+    },
+    "press": SIMULATION,
+    "fail": SIMULATION,
+    "log": {0: "journalctl's own codes", 69: "no journal, or the daemon does not log to it"},
+    "incident": {
+        0: "the recording is written",
+        65: "its YAML cannot be made anonymous",
+        69: "no ring can be read, or the library is missing",
+        73: "the recording cannot be written",
+    },
+    "recorder": {0: "SIGTERM or Ctrl-C", 69: "the library is missing"},
+    "replay": {
+        0: "every decision is the same",
+        1: "a decision differs",
+        65: "the recording cannot be decided again",
+        **RECORDING,
+        **YAML,
+    },
+    "completion": {0: "printed"},
+    "outputs-off": {
+        0: "every output is verified off",
+        1: "an output is not verified off",
+        69: "the daemon still runs, or may",
+        **YAML,
+    },
+}
+
+
+def told(command: str) -> str:
+    """One line for `--help`."""
+    return "; ".join(f"{code} {text}" for code, text in EXIT_CODES[command].items())

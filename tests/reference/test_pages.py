@@ -1,0 +1,55 @@
+"""What the program makes of itself in docs/ is up to date."""
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from bridges import cli
+from bridges.exit_codes import EXIT_CODES
+from tests.reference.pages import DOCS, PAGES
+
+ROOT = DOCS.parent
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_a_generated_page_is_what_the_program_makes(page: str) -> None:
+    """`make reference` brings it up to date."""
+    assert (DOCS / page).read_text() == PAGES[page]()
+
+
+def test_each_command_has_its_exit_codes() -> None:
+    assert EXIT_CODES.keys() == cli.COMMANDS.keys()
+
+
+@pytest.mark.parametrize("command", cli.COMMANDS)
+def test_each_exit_code_that_a_command_names_is_told(command: str) -> None:
+    import os
+
+    source = Path(cli._module(command).__file__).read_text()
+    named = {getattr(os, name) for name in re.findall(r"os\.(EX_[A-Z]+)", source)}
+    named |= {int(code) for code in re.findall(r"return (\d+)$", source, re.M)}
+    assert named - {2} <= EXIT_CODES[command].keys()
+
+
+def tracked(pattern: str) -> Iterator[Path]:
+    """Files of the repository, without what is built."""
+    for path in sorted(ROOT.rglob(pattern)):
+        if not {".venv", ".venv-ros", "build", "dist"} & set(path.relative_to(ROOT).parts):
+            yield path
+
+
+PAGE = re.compile(r"\bdocs/[\w./-]+\.(?:md|svg|png)\b")
+
+
+@pytest.mark.parametrize("pattern", ["*.py", "*.md", "*.yaml", "*.service", "*.toml", "*.xml"])
+def test_each_page_of_docs_that_a_text_names_is_there(pattern: str) -> None:
+    """Links within docs/ are checked by `make docs`."""
+    wrong = {
+        f"{path.relative_to(ROOT)}: {page}"
+        for path in tracked(pattern)
+        for page in PAGE.findall(path.read_text())
+        if not (ROOT / page).is_file()
+    }
+    assert sorted(wrong) == []
