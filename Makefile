@@ -98,7 +98,9 @@ types: .venv/ready
 
 # Links, anchors and files that no page names are checked. What is built needs no network.
 docs: .venv/ready
-	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --clean
+	@NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --clean
+	@rm -r build/site/assets/javascripts/lunr  # languages that no page is written in
+	@find build/site/assets -name "*.map" -delete
 
 reference: .venv/ready
 	$(BIN)/python -m tests.reference.pages

@@ -77,7 +77,7 @@ def readable(step: Step) -> Iterator[tuple[str, Tree]]:
 OWN_TOPICS: Final = "rmf_bridge/"
 
 
-INSTALL: Final = "pip install 'rmf-bridges[recording,sqlite]'"
+INSTALL: Final = "in the clone, .venv/bin/pip install '.[recording,sqlite]'"
 
 
 LIBRARY: Final = "rmf-bridges"

@@ -24,7 +24,7 @@ from workbench.replay.recordings import Span, add_span_arguments, told_between, 
 from workbench.replay.sources import BagError
 
 SUFFIXES: Final = (".html", ".svg", ".png")
-INSTALL: Final = "pip install 'rmf-bridges[plot]'"
+INSTALL: Final = "in the clone, .venv/bin/pip install '.[plot]'"
 NARROWEST, WIDEST = 480, 8000
 
 

@@ -100,8 +100,8 @@ def _with_lgpio() -> Iterator[None]:
         yield
     except ImportError as error:
         raise HalError(
-            f"GPIO needs lgpio ({error}): apt install python3-lgpio, or pip install"
-            " 'rmf-bridges[gpio]'; or run with --simulate"
+            f"GPIO needs lgpio ({error}): apt install python3-lgpio, or in the"
+            " clone .venv/bin/pip install '.[gpio]'; or run with --simulate"
         ) from error
     except OSError as error:  # lgpio makes a FIFO in the working directory when it is imported
         raise HalError(f"lgpio cannot write in the working directory: {error}") from error

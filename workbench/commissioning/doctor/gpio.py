@@ -35,7 +35,7 @@ KILL_TEST: Final = "rmf-bridge doctor FILE --kill-test shows it with one output"
 def gpio(machine: Machine, chip: int | None, who: User) -> Iterator[Finding]:
     """The subject `gpio`: is the header's chip there, and may the daemon use it? `chip`: the YAML's."""
     if not machine.installed("lgpio"):
-        do = "sudo apt install python3-lgpio, or pip install 'rmf-bridges[gpio]'"
+        do = "sudo apt install python3-lgpio, or in the clone .venv/bin/pip install '.[gpio]'"
         yield wrong(GPIO, "this Python has no lgpio", "no pin can be claimed", do)
     if not devices(machine):
         do = "run this on the Raspberry Pi; in a container, give it /dev/gpiochip0"

@@ -66,7 +66,7 @@ def users(machine: Machine) -> Iterator[Finding]:
             subject,
             f"the unit {UNIT} is not installed; what follows is checked for {name}",
             "the daemon does not start at boot, and nobody restarts it",
-            'docs/how-to/install.md',
+            "docs/how-to/install.md",
         )
         return
     if SERVICE_USER not in _passwd(machine):
