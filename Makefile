@@ -114,7 +114,7 @@ man: .venv/ready
 # Built here for every machine; nothing of it runs here.
 ARCHS ?= amd64 arm64
 PYTHONS ?= 3.11 3.12 3.13
-deb: man
+deb: man docs
 	@for arch in $(ARCHS); do for python in $(PYTHONS); do \
 	  deb/build.sh $$arch $$python || exit 1; done; done
 

@@ -96,6 +96,9 @@ gzip -9nc "$here/build/rmf-bridge.1" > "$root/usr/share/man/man1/rmf-bridge.1.gz
 "$bin/rmf-bridge" completion zsh > "$root/usr/share/zsh/vendor-completions/_rmf-bridge"
 "$bin/rmf-bridge" completion fish > "$root/usr/share/fish/vendor_completions.d/rmf-bridge.fish"
 
+mkdir -p "$bench/usr/share/doc/rmf-bridges-workbench"
+cp -R "$here/build/site" "$bench/usr/share/doc/rmf-bridges-workbench/html" # `make docs`
+
 # package NAME ROOT DEPENDS SUMMARY [TREE]: its control files, changelog, copyright and lintian's overrides; description
 # on stdin. TREE is what its postinst unpacks.
 package() {

@@ -36,8 +36,8 @@ def how_to_install(part: str, site: Path = SITE) -> str:
     try:
         place = Path((site / f"{package}.pth").read_text().strip())
     except OSError:
-        by_pip = {"workbench": "by pip it is part of rmf-bridges: install that again"}
-        return by_pip.get(part, f"pip install 'rmf-bridges[{part}]'")
+        wanted = "." if part == "workbench" else f"'.[{part}]'"
+        return f"in the clone, .venv/bin/pip install {wanted}"
     command = f"sudo apt install ./{package}_{place.name}_*.deb"
     for other in sorted(place.parent.glob("[0-9]*")):
         if other != place:

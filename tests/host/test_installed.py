@@ -11,7 +11,7 @@ import pytest
 ALONE = (
     "import sys; sys.modules['workbench'] = None; from bridges.cli import main; sys.exit(main())"
 )
-LACKS = "not installed: by pip it is part of rmf-bridges: install that again\n"
+LACKS = "not installed: in the clone, .venv/bin/pip install .\n"
 
 
 def alone(*words: str) -> subprocess.CompletedProcess[str]:
