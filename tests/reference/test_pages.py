@@ -1,5 +1,6 @@
 """What the program makes of itself in docs/ is up to date."""
 
+import os
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -25,8 +26,6 @@ def test_each_command_has_its_exit_codes() -> None:
 
 @pytest.mark.parametrize("command", cli.COMMANDS)
 def test_each_exit_code_that_a_command_names_is_told(command: str) -> None:
-    import os
-
     source = Path(cli._module(command).__file__).read_text()
     named = {getattr(os, name) for name in re.findall(r"os\.(EX_[A-Z]+)", source)}
     named |= {int(code) for code in re.findall(r"return (\d+)$", source, re.M)}
@@ -53,3 +52,15 @@ def test_each_page_of_docs_that_a_text_names_is_there(pattern: str) -> None:
         if not (ROOT / page).is_file()
     }
     assert sorted(wrong) == []
+
+
+LIST = re.compile(r"^(?![ |#-]|\d+\. |<!--|```).*\S\n(?:- |1\. |\| )", re.M)
+
+
+def test_a_list_or_table_begins_after_an_empty_line() -> None:
+    """Without it the site has one paragraph, as Python-Markdown reads it."""
+    texts = {
+        page.name: re.sub(r"^ *```.*?^ *```$", "", page.read_text(), flags=re.M | re.S)
+        for page in DOCS.rglob("*.md")
+    }
+    assert {name: found for name, text in texts.items() if (found := LIST.findall(text))} == {}
