@@ -163,7 +163,7 @@ def _graph_file(kind: AnyGraphKind, by_type: dict[type, Schema]) -> Schema:
 
 
 def page() -> str:
-    """`docs/reference/configuration.md`: each struct once; where several sections have it, at the end."""
+    """docs/reference/configuration.md: each struct once, at the end where several sections have it."""
     rows = [f"| `{key}` | {told} |" for key, told in FILE.items()]
     sections = [
         "# Configuration reference",
