@@ -2,19 +2,21 @@
 
 import pytest
 
-from tests.workbench.judge.nodes.any_cancel_cancels import AnyCancelCancels
-from tests.workbench.judge.nodes.charger_answers import ChargerAnswers
-from tests.workbench.judge.nodes.charger_falls_silent import ChargerFallsSilent
-from tests.workbench.judge.nodes.charger_idle_from_memory import ChargerIdleFromMemory
-from tests.workbench.judge.nodes.charger_ignores_cancels import ChargerIgnoresCancels
-from tests.workbench.judge.nodes.charger_is_taken_over import ChargerIsTakenOver
-from tests.workbench.judge.nodes.charger_names_another_robot import ChargerNamesAnotherRobot
-from tests.workbench.judge.nodes.charger_talks_always import ChargerTalksAlways
-from tests.workbench.judge.nodes.charger_vendor_codes import ChargerVendorCodes
-from tests.workbench.judge.nodes.charger_waits_for_ever import ChargerWaitsForEver
-from tests.workbench.judge.nodes.charger_without_ids import ChargerWithoutIds
-from tests.workbench.judge.nodes.charger_without_stamps import ChargerWithoutStamps
 from tests.workbench.judge.nodes.right_charger import RightCharger
+from tests.workbench.judge.nodes.wrong_charger import (
+    AnyCancelCancels,
+    ChargerAnswers,
+    ChargerFallsSilent,
+    ChargerIdleFromMemory,
+    ChargerIgnoresCancels,
+    ChargerIsTakenOver,
+    ChargerNamesAnotherRobot,
+    ChargerTalksAlways,
+    ChargerVendorCodes,
+    ChargerWaitsForEver,
+    ChargerWithoutIds,
+    ChargerWithoutStamps,
+)
 from tests.workbench.judge.script import charge
 from tests.workbench.judge.world import charges, watched
 

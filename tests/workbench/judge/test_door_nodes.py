@@ -3,18 +3,20 @@
 import pytest
 
 from bridges.messages import topics
-from tests.workbench.judge.nodes.close_drives_shut import CloseDrivesShut
-from tests.workbench.judge.nodes.door_answers import DoorAnswers
-from tests.workbench.judge.nodes.door_falls_silent import DoorFallsSilent
-from tests.workbench.judge.nodes.door_flaps import DoorFlaps
-from tests.workbench.judge.nodes.door_hears_adapters import DoorHearsAdapters
-from tests.workbench.judge.nodes.door_numbers_mixed import DoorNumbersMixed
-from tests.workbench.judge.nodes.door_stale_open import DoorStaleOpen
-from tests.workbench.judge.nodes.door_vendor_codes import DoorVendorCodes
-from tests.workbench.judge.nodes.door_without_stamps import DoorWithoutStamps
-from tests.workbench.judge.nodes.open_as_asked import OpenAsAsked
 from tests.workbench.judge.nodes.right_door import RightDoor
-from tests.workbench.judge.nodes.silence_closes import SilenceCloses
+from tests.workbench.judge.nodes.wrong_door import (
+    CloseDrivesShut,
+    DoorAnswers,
+    DoorFallsSilent,
+    DoorFlaps,
+    DoorHearsAdapters,
+    DoorNumbersMixed,
+    DoorStaleOpen,
+    DoorVendorCodes,
+    DoorWithoutStamps,
+    OpenAsAsked,
+    SilenceCloses,
+)
 from tests.workbench.judge.script import Script, door
 from tests.workbench.judge.world import passes, watched
 from workbench.rmf_model import Party

@@ -4,33 +4,36 @@ import pytest
 
 from bridges.messages import definitions as d
 from bridges.messages import topics
-from tests.workbench.judge.nodes.any_end_ends import AnyEndEnds
-from tests.workbench.judge.nodes.end_needs_a_floor import EndNeedsAFloor
-from tests.workbench.judge.nodes.fire_boards import FireBoards
-from tests.workbench.judge.nodes.fire_frees import FireFrees
-from tests.workbench.judge.nodes.fire_grants import FireGrants
-from tests.workbench.judge.nodes.fire_is_volatile import ALARM, FireIsVolatile
-from tests.workbench.judge.nodes.fire_says_false import FireSaysFalse
-from tests.workbench.judge.nodes.floor_by_last_character import FloorByLastCharacter
-from tests.workbench.judge.nodes.floor_flickers import FloorFlickers
-from tests.workbench.judge.nodes.goes_to_the_default_floor import GoesToTheDefaultFloor
-from tests.workbench.judge.nodes.hears_adapters import HearsAdapters
-from tests.workbench.judge.nodes.last_one_wins import LastOneWins
-from tests.workbench.judge.nodes.lift_answers import LiftAnswers
-from tests.workbench.judge.nodes.lift_blocks import LiftBlocks
-from tests.workbench.judge.nodes.lift_flaps import LiftFlaps
-from tests.workbench.judge.nodes.lift_mode_mixed import LiftModeMixed
-from tests.workbench.judge.nodes.lift_numbers_mixed import LiftNumbersMixed
-from tests.workbench.judge.nodes.lift_stale_open import LiftStaleOpen
-from tests.workbench.judge.nodes.lift_vendor_codes import LiftVendorCodes
-from tests.workbench.judge.nodes.lift_without_stamps import LiftWithoutStamps
-from tests.workbench.judge.nodes.open_nowhere import OpenNowhere
-from tests.workbench.judge.nodes.open_while_moving import OpenWhileMoving
-from tests.workbench.judge.nodes.other_lifts_request import OtherLiftsRequest
-from tests.workbench.judge.nodes.own_session_name import OwnSessionName
 from tests.workbench.judge.nodes.right_lift import RightLift
-from tests.workbench.judge.nodes.session_times_out import SessionTimesOut
-from tests.workbench.judge.nodes.shows_what_it_was_asked import ShowsWhatItWasAsked
+from tests.workbench.judge.nodes.wrong_lift import (
+    ALARM,
+    AnyEndEnds,
+    EndNeedsAFloor,
+    FireBoards,
+    FireFrees,
+    FireGrants,
+    FireIsVolatile,
+    FireSaysFalse,
+    FloorByLastCharacter,
+    FloorFlickers,
+    GoesToTheDefaultFloor,
+    HearsAdapters,
+    LastOneWins,
+    LiftAnswers,
+    LiftBlocks,
+    LiftFlaps,
+    LiftModeMixed,
+    LiftNumbersMixed,
+    LiftStaleOpen,
+    LiftVendorCodes,
+    LiftWithoutStamps,
+    OpenNowhere,
+    OpenWhileMoving,
+    OtherLiftsRequest,
+    OwnSessionName,
+    SessionTimesOut,
+    ShowsWhatItWasAsked,
+)
 from tests.workbench.judge.script import Script, asks, lift
 from tests.workbench.judge.world import rides, watched
 from workbench.rmf_model import Party

@@ -21,9 +21,8 @@ from bridges.transports.choose import open_transport
 from bridges.transports.transport import Publisher
 from hal_fakes.wire import Wire, runs_here
 from tests.waiting import PATIENCE_S, wait_until
-from tests.workbench.judge.nodes.fire_is_volatile import FireIsVolatile
-from tests.workbench.judge.nodes.lift_answers import LiftAnswers
 from tests.workbench.judge.nodes.right_lift import RightLift
+from tests.workbench.judge.nodes.wrong_lift import FireIsVolatile, LiftAnswers
 from workbench.rmf_model import Party
 
 CONFIG = Path(__file__).parents[3] / "config"

@@ -1,0 +1,106 @@
+"""Nodes of doors with one defect each that the field knows: its docstring says which."""
+
+from msgspec.structs import replace
+
+from bridges.messages import definitions as d
+from bridges.messages import topics
+from tests.workbench.judge.nodes.right_door import LOOP_S, RightDoor
+from workbench.rmf_model import Said
+
+
+class CloseDrivesShut(RightDoor):
+    """CLOSE starts the motor: the door shuts on the people who have opened it."""
+
+    shut = False
+
+    def asked(self, mode: int) -> None:
+        super().asked(mode)
+        self.shut = mode == 0
+
+    def pushed(self, age_s: float) -> bool:
+        pushed = super().pushed(age_s)
+        self.shut = self.shut and pushed
+        return pushed and not self.shut
+
+
+class DoorAnswers(RightDoor):
+    """A state for each request."""
+
+    def hear(self, message: d.Message, now: float) -> list[Said]:
+        super().hear(message, now)
+        mine = isinstance(message, d.DoorRequest) and message.door_name == self.name
+        return [(topics.DOOR_STATES, self.state(now))] if mine else []
+
+
+class DoorFallsSilent(RightDoor):
+    """When its module does not answer, no state comes."""
+
+    def tick(self, now: float) -> list[Said]:
+        said = super().tick(now)
+        return [] if 10.0 < now - self.began_at < 18.0 else said
+
+
+class DoorFlaps(RightDoor):
+    """The contact of the open door is not debounced."""
+
+    def mode(self) -> int:
+        return 1 if self.leaf == 1.0 and int(self.due_at / LOOP_S) % 3 == 0 else super().mode()
+
+
+class DoorHearsAdapters(RightDoor):
+    """It hears adapter_door_requests: one robot's CLOSE closes on another."""
+
+    subscribes = (topics.ADAPTER_DOOR_REQUESTS,)
+
+
+class DoorNumbersMixed(RightDoor):
+    """OPEN is taken to be 1, which is MOVING."""
+
+    def asked(self, mode: int) -> None:
+        super().asked({1: 2, 0: 0}.get(mode, -1))
+
+
+class DoorStaleOpen(RightDoor):
+    """The module is lost while the door is open; the last reading is said for ever."""
+
+    frozen: d.DoorState | None = None
+
+    def state(self, now: float) -> d.DoorState:
+        if self.frozen is None and self.leaf == 1.0:
+            self.frozen = super().state(now)
+        return self.frozen or super().state(now)
+
+
+class DoorVendorCodes(RightDoor):
+    """The operator's status word as it came: 5 is locked."""
+
+    def mode(self) -> int:
+        return 5 if self.leaf == 0.0 else super().mode()
+
+
+class DoorWithoutStamps(RightDoor):
+    """door_time is never filled."""
+
+    def state(self, now: float) -> d.DoorState:
+        return replace(super().state(now), door_time=d.Time())
+
+
+class OpenAsAsked(RightDoor):
+    """OPEN because it was asked for; no sensor says so."""
+
+    def mode(self) -> int:
+        return 2 if self.held else 0
+
+    def hear(self, message: d.Message, now: float) -> list[Said]:
+        super().hear(message, now)
+        return self.tick(now) if self.mode() != self._told else []
+
+
+class SilenceCloses(RightDoor):
+    """No request for 10 s closes the door (lci-rmf-adapter)."""
+
+    on_change = False
+
+    def moves(self, now: float, age_s: float) -> None:
+        self.held = self.held and now - self.heard_at < 10.0
+        super().moves(now, age_s)
