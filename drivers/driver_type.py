@@ -9,9 +9,9 @@ from typing import Any, Generic, TypeAlias, TypeVar
 
 import msgspec
 
+from bridges.kinds.shared.remarks import Remarks
 from bridges.kinds.shared.table import Table
 from drivers import Driver
-from drivers.hal import Remark
 from drivers.hal.points import Wire
 
 Settings = TypeVar("Settings", bound=msgspec.Struct)
@@ -48,8 +48,8 @@ class DriverType(msgspec.Struct, Generic[Settings, Sample, Outputs], frozen=True
     describe: Callable[[Settings, Any], Iterable[tuple[str, str]]] = lambda settings, bus: ()
     tables: Callable[[Settings], Iterable[Table]] = lambda settings: ()
     claims: Callable[[Settings], Iterable[tuple[str, tuple[str, ...]]]] = lambda settings: ()
-    warnings: Callable[[Settings], Iterable[Remark]] = lambda settings: ()
-    notes: Callable[[Settings], Iterable[Remark]] = lambda settings: ()
+    warnings: Callable[[Settings], Remarks] = lambda settings: ()
+    notes: Callable[[Settings], Remarks] = lambda settings: ()
     unwired: Callable[[Settings], Iterable[str]] = lambda settings: ()
     fake: str = ""
 

@@ -1,12 +1,12 @@
 """Commands over HTTP: their settings in the YAML, and how a driver sends them."""
 
 import re
-from collections.abc import Iterable
 from typing import Annotated, Protocol
 
 import msgspec
 
 from bridges.kinds.shared.fields import tells
+from bridges.kinds.shared.remarks import Remarks
 from drivers.hal import http
 
 
@@ -20,7 +20,7 @@ class Call(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
         tells("the JSON body, as a quoted string; no body when absent."),
     ] = None
 
-    def problems(self) -> Iterable[tuple[tuple[str, ...], str]]:
+    def problems(self) -> Remarks:
         """A body that is not JSON."""
         try:
             msgspec.json.decode(self.body or "{}")

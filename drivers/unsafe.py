@@ -6,6 +6,7 @@ The daemon does not start with an unsafe choice unless `accept_unsafe: {signal: 
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Final
 
+from bridges.kinds.shared.remarks import Remarks
 from drivers.hal import gpio
 from drivers.hal.points import Wire
 
@@ -52,7 +53,7 @@ def unsafe_wires(wires: list[Wire], must_read: Mapping[str, tuple[bool, str]]) -
     yield from energised_at_boot(wires)
 
 
-def slow_alarms(wires: Iterable[Wire]) -> Iterator[tuple[tuple[str, ...], str]]:
+def slow_alarms(wires: Iterable[Wire]) -> Remarks:
     """Alarms with a long debounce, as (path, text)."""
     for wire in wires:
         if wire.debounce_s is not None and wire.debounce_s > ALARM_WITHIN_S:
@@ -60,17 +61,13 @@ def slow_alarms(wires: Iterable[Wire]) -> Iterator[tuple[tuple[str, ...], str]]:
             yield (*wire.path, "debounce_s"), f"{text}: contacts bounce for 0.05 s"
 
 
-def needlessly_accepted(
-    found: Iterable[Unsafe], accepted: Mapping[str, str]
-) -> Iterator[tuple[tuple[str, ...], str]]:
+def needlessly_accepted(found: Iterable[Unsafe], accepted: Mapping[str, str]) -> Remarks:
     """What `accept_unsafe` names though nothing is unsafe about it, as (path, text)."""
     for signal in accepted.keys() - {signal for signal, _, _ in found}:
         yield ("accept_unsafe", signal), f"nothing is unsafe about {signal}: delete this"
 
 
-def unaccepted(
-    found: Iterable[Unsafe], accepted: Mapping[str, str]
-) -> Iterator[tuple[tuple[str, ...], str]]:
+def unaccepted(found: Iterable[Unsafe], accepted: Mapping[str, str]) -> Remarks:
     """The unsafe choices that `accept_unsafe` does not name, each with the two ways to resolve it."""
     for signal, path, text in found:
         if signal not in accepted:

@@ -1,17 +1,16 @@
 """Reads one bus of a device YAML: its `type`, and the settings of that type."""
 
-from collections.abc import Iterable
-
 from msgspec import Struct
 from yaml import MappingNode, ScalarNode
 
+from bridges.kinds.shared.remarks import Remarks
 from bridges.settings import names as named
 from bridges.settings.top import word
 from bridges.yaml.nodes import Page
 from bridges.yaml.spelling import either, nearest, unknown
 from bridges.yaml.spots import Entry, below
 from bridges.yaml.values import BROKEN, Values
-from drivers.hal import AnyBus, Remark
+from drivers.hal import AnyBus
 
 
 class BusRead(Struct, frozen=True):
@@ -25,7 +24,7 @@ class BusRead(Struct, frozen=True):
     hal: AnyBus | None = None
     settings: object = BROKEN
 
-    def remarks(self) -> Iterable[Remark]:
+    def remarks(self) -> Remarks:
         """What is legal about its settings but may be a mistake."""
         return self.hal.warnings(self.settings) if self.hal and self.settings is not BROKEN else ()
 

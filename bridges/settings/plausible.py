@@ -1,13 +1,13 @@
 """Finds implausible settings: durations in milliseconds, readings that are always stale."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from typing import Final
 
 from msgspec.inspect import StructType
 
 from bridges.kinds.shared.fields import DeviceSettings
+from bridges.kinds.shared.remarks import Remarks
 from bridges.yaml.values import described
-from drivers.hal import Remark
 
 RENEWED: Final = 3
 """An output that switches off by itself must be renewed once in this many scans."""
@@ -15,7 +15,7 @@ LONG_S: Final = 1000.0
 """A duration (s) this long was often meant in milliseconds."""
 
 
-def milliseconds(structs: Iterable[tuple[tuple[str, ...], object]]) -> Iterator[Remark]:
+def milliseconds(structs: Iterable[tuple[tuple[str, ...], object]]) -> Remarks:
     """A remark (path, text) on each suspiciously long duration that is not a default."""
     for path, struct in structs:
         cls: object = type(struct)
@@ -27,7 +27,7 @@ def milliseconds(structs: Iterable[tuple[tuple[str, ...], object]]) -> Iterator[
                 yield from _long((*path, field.encode_name), value)
 
 
-def _long(path: tuple[str, ...], value: float) -> Iterator[Remark]:
+def _long(path: tuple[str, ...], value: float) -> Remarks:
     if value >= LONG_S:
         text = f"{path[-1]} is {value:g} s, {_clock(value)}: if milliseconds are meant, write"
         yield path, f"{text} {value / 1000:g}"
@@ -38,7 +38,7 @@ def _clock(seconds: float) -> str:
     return f"{hours:.1f} hours" if hours >= 1 else f"{seconds / 60:.0f} minutes"
 
 
-def out_of_step(device: DeviceSettings, bus: object) -> Iterator[Remark]:
+def out_of_step(device: DeviceSettings, bus: object) -> Remarks:
     """Problems with a bus that is too slow for its device: readings and commands that come too late."""
     scan_s = getattr(bus, "scan_s", 0.0)
     yield from _stale_readings(device, scan_s)
@@ -53,7 +53,7 @@ def out_of_step(device: DeviceSettings, bus: object) -> Iterator[Remark]:
             )
 
 
-def _stale_readings(device: DeviceSettings, scan_s: float) -> Iterator[Remark]:
+def _stale_readings(device: DeviceSettings, scan_s: float) -> Remarks:
     """A problem if a reading becomes stale before the next one."""
     stale_s = device.stale_after()
     if stale_s is not None and scan_s >= stale_s:

@@ -22,11 +22,12 @@ from bridges.kinds.charger.signals import (
     Measured,
 )
 from bridges.kinds.shared.fields import Name, tells
+from bridges.kinds.shared.remarks import Remarks
 from bridges.kinds.shared.table import Table
 from bridges.yaml.spelling import unknown
 from drivers import DriverError
 from drivers.charger import dbc
-from drivers.charger.can_map import NMT, PROFILE, FrameMap, Problems, Sent, rows, tables
+from drivers.charger.can_map import NMT, PROFILE, FrameMap, Sent, rows, tables
 from drivers.charger.rules import Meant, meaning, with_errors
 from drivers.driver_type import DriverType
 from drivers.hal import HalError, can
@@ -48,7 +49,7 @@ class Settings(ChargerSettings, frozen=True, kw_only=True, forbid_unknown_fields
         tells("name -> value, for the voltages and currents that the map leaves open."),
     ] = msgspec.field(default_factory=dict)
 
-    def problems(self) -> Problems:
+    def problems(self) -> Remarks:
         """Problems that involve more than one field."""
         yield from super().problems()
         if self.on_death == "keep":
@@ -71,7 +72,7 @@ def frame_map(settings: Settings) -> FrameMap:
     return settings.map or PROFILE.load(settings.profile or "")
 
 
-def _setpoint_problems(settings: Settings) -> Problems:
+def _setpoint_problems(settings: Settings) -> Remarks:
     found = frame_map(settings)
     wanted, given = found.wanted_setpoints(), set(settings.setpoints)
     for name in sorted(wanted - given):
@@ -89,7 +90,7 @@ def _setpoint_problems(settings: Settings) -> Problems:
                 yield from _encoding_problems(settings, sent, on)
 
 
-def _beyond(setpoints: Mapping[str, float]) -> Problems:
+def _beyond(setpoints: Mapping[str, float]) -> Remarks:
     """A setpoint above its own limit, as volts above max_volts."""
     for name, value in setpoints.items():
         most = setpoints.get(f"max_{name}", value)
@@ -97,7 +98,7 @@ def _beyond(setpoints: Mapping[str, float]) -> Problems:
             yield ("setpoints", name), f"is {value:g}, above max_{name}, which is {most:g}"
 
 
-def _impossible(settings: Settings, found: FrameMap) -> Problems:
+def _impossible(settings: Settings, found: FrameMap) -> Remarks:
     """A setpoint that its signal cannot hold."""
     frames = dbc.load(found.dbc)
     for sent in found.send:
@@ -109,7 +110,7 @@ def _impossible(settings: Settings, found: FrameMap) -> Problems:
                 yield ("setpoints", name), f"is {value:g}: {sent.frame}.{signal} takes {allowed}"
 
 
-def _encoding_problems(settings: Settings, sent: Sent, on: bool) -> Problems:
+def _encoding_problems(settings: Settings, sent: Sent, on: bool) -> Remarks:
     values = sent.values(on, settings.setpoints)
     if values is not None:
         try:
@@ -153,7 +154,7 @@ def frame_tables(settings: Settings) -> Iterator[Table]:
     return tables(frame_map(settings), settings.setpoints)
 
 
-def warnings(settings: Settings) -> Problems:
+def warnings(settings: Settings) -> Remarks:
     """Valid settings that deserve a second look: (path, text)."""
     if settings.profile and PROFILE.untried(settings.profile):
         text = (

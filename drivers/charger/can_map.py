@@ -9,6 +9,7 @@ from typing import Annotated, Final
 import msgspec
 
 from bridges.kinds.shared.fields import Name, Period, tells
+from bridges.kinds.shared.remarks import Remarks
 from bridges.kinds.shared.table import Table
 from bridges.yaml.spelling import unknown
 from drivers.charger import dbc
@@ -19,7 +20,6 @@ from drivers.hal.can import named
 from drivers.profiles import Profile
 
 STATE_IS_NEEDED: Final = "needs state (its number, and what that means), or rules"
-Problems = Iterator[tuple[tuple[str, ...], str]]
 Signal = Annotated[
     str,
     msgspec.Meta(
@@ -62,7 +62,7 @@ class Sent(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
         tells("signal -> value while the charger must not charge; not sent then when absent."),
     ] = None
 
-    def problems(self) -> Problems:
+    def problems(self) -> Remarks:
         """A frame that is never sent."""
         if self.on is None and self.off is None:
             yield (), "is never sent: give on, or off, or both"
@@ -135,7 +135,7 @@ class FrameMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
         CANopen's NMT start."""),
     ] = []
 
-    def problems(self) -> Problems:
+    def problems(self) -> Remarks:
         """A DBC file that cannot be read; a frame or signal that it lacks."""
         try:
             found = dbc.load(self.dbc)
@@ -157,7 +157,7 @@ class FrameMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
         for n, wake in enumerate(self.wake):
             yield from self._wake_problems(found, ("wake", str(n)), wake)
 
-    def _wake_problems(self, found: Frames, path: tuple[str, ...], wake: Wake) -> Problems:
+    def _wake_problems(self, found: Frames, path: tuple[str, ...], wake: Wake) -> Remarks:
         """A frame that may charge, or that cannot be made."""
         if wake.frame in (sent.frame for sent in self.send):
             yield (*path, "frame"), f"{wake.frame} is in send: what wakes a charger must not charge"
@@ -207,7 +207,7 @@ class FrameMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
 PROFILE: Final = Profile("charger_can_frames", "map", FrameMap)
 
 
-def _lacks(found: dbc.Dbc, path: tuple[str, ...], frame: str, signal: str = "") -> Problems:
+def _lacks(found: dbc.Dbc, path: tuple[str, ...], frame: str, signal: str = "") -> Remarks:
     if frame not in found.frames():
         yield path, unknown("frame", frame, found.frames())
     elif signal and signal not in found.signals(frame):

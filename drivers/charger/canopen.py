@@ -11,6 +11,7 @@ import msgspec
 
 from bridges.kinds.charger.settings import ChargerSettings
 from bridges.kinds.shared.fields import tells
+from bridges.kinds.shared.remarks import Remarks
 from drivers.charger import xnergy
 from drivers.driver_type import DriverType
 from drivers.hal import can
@@ -74,7 +75,7 @@ def describe(settings: Settings, bus_settings: can.Settings) -> list[tuple[str, 
     return rows + xnergy.rows(settings, {name: str(found) for name, found in OBJECTS.items()})
 
 
-def warnings(settings: Settings) -> Iterable[tuple[tuple[str, ...], str]]:
+def warnings(settings: Settings) -> Remarks:
     """Valid settings that deserve a second look: (path, text)."""
     found = list(xnergy.warnings(settings, "CAN"))
     if settings.heartbeat == "none":

@@ -19,6 +19,7 @@ from bridges.kinds.charger.signals import (
     Measured,
 )
 from bridges.kinds.shared.fields import tells
+from bridges.kinds.shared.remarks import Remarks
 from bridges.kinds.shared.table import Table
 from drivers.driver_type import DriverType
 from drivers.hal.points import Input, Output, Points, PointsBus, Wire, input_wires
@@ -33,7 +34,6 @@ CUT_MUST_READ: Final = {
 }
 """Signal -> (the level that a cut wire must read as, what goes wrong if it does not)."""
 ENABLE: Final = "enable"
-Problems = Iterator[tuple[tuple[str, ...], str]]
 
 
 class Inputs(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -66,7 +66,7 @@ class Settings(ChargerSettings, frozen=True, kw_only=True, forbid_unknown_fields
     inputs: Annotated[Inputs, tells("the contacts that are read.")]
     outputs: Annotated[Outputs, tells("the relay that is driven.")]
 
-    def problems(self) -> Problems:
+    def problems(self) -> Remarks:
         """Problems that involve more than one field."""
         yield from super().problems()
         if self.on_death == "keep":
@@ -107,7 +107,7 @@ def _means(shown: Mapping[str, bool]) -> str:
     return off if off == on else f"{off} ({on} while enabled)"
 
 
-def warnings(settings: Settings) -> Problems:
+def warnings(settings: Settings) -> Remarks:
     """Valid settings to review before the station goes into service: (path, text)."""
     for wire in wires(settings):
         if wire.debounce_s:

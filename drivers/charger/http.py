@@ -10,7 +10,7 @@ which robot it charges. For other makes the YAML gives paths and fields. `codes`
 states mean; an unlisted state is an error. A maker's state is never passed on as an RMF state.
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from typing import Annotated, Final
 
 import msgspec
@@ -18,6 +18,7 @@ import msgspec
 from bridges.kinds.charger.settings import ChargerSettings
 from bridges.kinds.charger.signals import AT_FAULT, Activity, ChargerOutputs, ChargerSample
 from bridges.kinds.shared.fields import Timeout, tells
+from bridges.kinds.shared.remarks import Remarks
 from drivers import json_fields
 from drivers.charger import rules
 from drivers.charger.http_fields import Fields, Word
@@ -69,7 +70,7 @@ class Settings(ChargerSettings, frozen=True, kw_only=True, forbid_unknown_fields
         """Can the driver switch the power off? Only if the YAML has `stop`."""
         return self.stop is not None
 
-    def problems(self) -> Iterator[tuple[tuple[str, ...], str]]:
+    def problems(self) -> Remarks:
         """Problems that involve more than one field."""
         yield from super().problems()
         yield from rules.problems(self.rules, self.codes is not None)
@@ -86,7 +87,7 @@ class Settings(ChargerSettings, frozen=True, kw_only=True, forbid_unknown_fields
             yield ("on_death",), "this station cannot be stopped: leave this out"
 
 
-def _place_problems(settings: Settings) -> Iterator[tuple[tuple[str, ...], str]]:
+def _place_problems(settings: Settings) -> Remarks:
     looked_at = [(("rules", *path), at) for path, at in rules.places(settings.rules)]
     looked_at += [(("errors", *path), at) for path, at in settings.errors.places()]
     for path, at in looked_at:
@@ -94,7 +95,7 @@ def _place_problems(settings: Settings) -> Iterator[tuple[tuple[str, ...], str]]
             yield path, f"{at!r} is not a field: write names with dots between them (status.code)"
 
 
-def _timer_problems(settings: Settings) -> Iterator[tuple[tuple[str, ...], str]]:
+def _timer_problems(settings: Settings) -> Remarks:
     """What has no state of its own is a relay: nothing but its timer knows that the network is gone."""
     timer = settings.switches_off_after_s
     if timer and not settings.start:
@@ -146,7 +147,7 @@ def describe(settings: Settings, bus_settings: http.Settings) -> list[tuple[str,
     return rows
 
 
-def warnings(settings: Settings) -> Iterable[tuple[tuple[str, ...], str]]:
+def warnings(settings: Settings) -> Remarks:
     """What the station cannot do with these settings, and what deserves a second look: (path, text)."""
     missing = [name for name in ("receiver_id", "stop") if _lacks(settings, name)]
     consequences = {

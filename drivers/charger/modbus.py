@@ -9,6 +9,7 @@ from typing import Annotated, Final
 
 from bridges.kinds.charger.settings import ChargerSettings
 from bridges.kinds.shared.fields import tells
+from bridges.kinds.shared.remarks import Remarks
 from drivers.charger import xnergy
 from drivers.driver_type import DriverType
 from drivers.hal import modbus
@@ -53,7 +54,7 @@ def describe(settings: Settings, bus_settings: modbus.Settings) -> list[tuple[st
     return xnergy.rows(settings, {name: str(point) for name, point in points(settings).items()})
 
 
-def warnings(settings: Settings) -> Iterable[tuple[tuple[str, ...], str]]:
+def warnings(settings: Settings) -> Remarks:
     """Valid settings that deserve a second look: (path, text)."""
     return xnergy.warnings(settings, "bus")
 

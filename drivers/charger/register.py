@@ -10,10 +10,11 @@ from typing import Annotated, Final
 from bridges.kinds.charger.settings import ChargerSettings
 from bridges.kinds.charger.signals import ChargerOutputs, ChargerSample, Measured
 from bridges.kinds.shared.fields import Name, tells
+from bridges.kinds.shared.remarks import Remarks
 from bridges.kinds.shared.table import Table
 from drivers import DriverError
 from drivers.charger import rules
-from drivers.charger.register_map import PROFILE, ChargerMap, Number, Problems
+from drivers.charger.register_map import PROFILE, ChargerMap, Number
 from drivers.charger.register_tables import samples
 from drivers.charger.rules import judged
 from drivers.driver_type import DriverType
@@ -38,7 +39,7 @@ class Settings(ChargerSettings, frozen=True, kw_only=True, forbid_unknown_fields
         """Can the driver switch the power off? Only if the map has `power`."""
         return charger_map(self).power is not None
 
-    def problems(self) -> Problems:
+    def problems(self) -> Remarks:
         """Problems that involve more than one field."""
         yield from super().problems()
         before = list(profile_problems(PROFILE, self.profile, self.map))
@@ -105,7 +106,7 @@ def tables(settings: Settings) -> Iterator[Table]:
     yield samples(charger_map(settings), cells(settings))
 
 
-def warnings(settings: Settings) -> Problems:
+def warnings(settings: Settings) -> Remarks:
     """Valid settings that deserve a second look: (path, text)."""
     if settings.profile and PROFILE.untried(settings.profile):
         text = f"nobody has tried the profile {settings.profile} on hardware"

@@ -1,11 +1,12 @@
 """The register map of a charger, from a YAML or a profile: places and what the numbers mean."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import Annotated, Final, Literal
 
 import msgspec
 
 from bridges.kinds.shared.fields import Name, tells
+from bridges.kinds.shared.remarks import Remarks
 from bridges.yaml.spelling import unknown
 from drivers.charger import rules as by_rules
 from drivers.charger.rules import Errors, Rule
@@ -13,7 +14,6 @@ from drivers.charger.state_codes import Codes
 from drivers.hal.modbus.registers import REGISTERS, TABLES, WRITABLE, Place, Word, misplaced, place
 from drivers.profiles import Profile
 
-Problems = Iterator[tuple[tuple[str, ...], str]]
 Bit = Annotated[int, msgspec.Meta(ge=0, le=31)]
 MEASURED: Final = ("volts", "amps", "battery_percent", "time_to_full_s")
 KNOWN: Final = ("state", "receiver", "in_range", "range_ok", "at_height", *MEASURED)
@@ -34,7 +34,7 @@ class Number(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
         float, tells("the factor from the maker's unit to ours (0.1 for tenths of an ampere).")
     ] = 1.0
 
-    def problems(self) -> Problems:
+    def problems(self) -> Remarks:
         """An invalid place; options that do not fit its table or width."""
         if reason := misplaced(self.at, tuple(TABLES)):
             yield ("at",), reason
@@ -85,7 +85,7 @@ class Power(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
         bool, tells("false where it can only be written; then it is, in every scan.")
     ] = True
 
-    def problems(self) -> Problems:
+    def problems(self) -> Remarks:
         """A place that cannot be written; values that it cannot hold."""
         if reason := misplaced(self.at, WRITABLE):
             yield ("at",), reason
@@ -103,7 +103,7 @@ class Order(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     at: Annotated[Place, tells("`coil N` or `holding register N`.")]
     write: Annotated[Word, tells("the value that is written.")] = 1
 
-    def problems(self) -> Problems:
+    def problems(self) -> Remarks:
         """A place that cannot be written."""
         if reason := misplaced(self.at, WRITABLE):
             yield ("at",), reason
@@ -143,7 +143,7 @@ class ChargerMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
         Order | None, tells("makes it check where the robot stands, if it must be told.")
     ] = None
 
-    def problems(self) -> Problems:
+    def problems(self) -> Remarks:
         """Names that are not in `values`, or that nothing uses; a map without a state."""
         yield from by_rules.problems(self.rules, self.codes is not None)
         if self.codes and "state" not in self.values:

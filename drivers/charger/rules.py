@@ -11,10 +11,10 @@ import msgspec
 
 from bridges.kinds.charger.signals import Activity, FaultSide
 from bridges.kinds.shared.fields import Name, tells
+from bridges.kinds.shared.remarks import Remarks
 from drivers.charger.state_codes import ROBOT_ERROR, STATION_ERROR, Codes, first_side
 from drivers.json_fields import Value, same
 
-Problems = Iterator[tuple[tuple[str, ...], str]]
 Read = Callable[[str], object]
 """Returns the value at a place; raises DriverError if there is none."""
 Meaning = tuple[Activity, FaultSide]
@@ -37,7 +37,7 @@ class Test(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
     above: Annotated[float | None, tells("the value is greater than this.")] = None
     below: Annotated[float | None, tells("the value is less than this.")] = None
 
-    def problems(self) -> Problems:
+    def problems(self) -> Remarks:
         """A test without a condition, or one that no value passes."""
         if not self.one_of and self.above is None and self.below is None:
             yield (), "tests nothing: give one_of, above or below"
@@ -72,7 +72,7 @@ class Rule(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
     ] = {}
     text: Annotated[Name | None, tells("the error's text, if `means` is an error.")] = None
 
-    def problems(self) -> Problems:
+    def problems(self) -> Remarks:
         """An unknown meaning; a text for a state that is not an error."""
         if self.means not in MEANINGS:
             yield ("means",), f"is '{self.means}': write one of {', '.join(MEANINGS)}"
@@ -90,7 +90,7 @@ class ErrorNumber(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
         dict[int, Name], tells("number -> text, for faults of the robot, its receiver or place.")
     ] = {}
 
-    def problems(self) -> Problems:
+    def problems(self) -> Remarks:
         """A number with two meanings."""
         for number in self.station.keys() & self.robot.keys():
             yield ("robot", str(number)), f"{number} is a fault of the station already"
@@ -121,7 +121,7 @@ class ErrorBits(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
         dict[Bit, Name], tells("bit -> text, for faults of the robot, its receiver or place.")
     ] = {}
 
-    def problems(self) -> Problems:
+    def problems(self) -> Remarks:
         """A bit with two meanings."""
         for bit in self.station.keys() & self.robot.keys():
             yield ("robot", str(bit)), f"bit {bit} is a fault of the station already"
@@ -276,7 +276,7 @@ def rows(rules: list[Rule], errors: Errors) -> Iterator[tuple[str, str]]:
                     yield f"{side}'s error", f"{number.at} {kind}{value}: {text}"
 
 
-def problems(rules: list[Rule], has_codes: bool) -> Problems:
+def problems(rules: list[Rule], has_codes: bool) -> Remarks:
     """Rules that are never reached; a station without a state. Paths are below the station."""
     if not rules and not has_codes:
         yield ("codes",), "needs codes (what the maker's state numbers mean), or rules"

@@ -3,13 +3,14 @@
 An unlisted number is an error and is shown. A maker's number is never passed on as an RMF state.
 """
 
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Mapping
 from typing import Annotated
 
 import msgspec
 
 from bridges.kinds.charger.signals import Activity, FaultSide
 from bridges.kinds.shared.fields import tells
+from bridges.kinds.shared.remarks import Remarks
 
 CODE_MAX = 65535
 Code = Annotated[int, msgspec.Meta(ge=0, le=CODE_MAX)]
@@ -40,7 +41,7 @@ class Codes(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
         list[Code], tells("an error of the robot's side: the station itself is well.")
     ] = []
 
-    def problems(self) -> Iterable[tuple[tuple[str, ...], str]]:
+    def problems(self) -> Remarks:
         """States that are listed twice."""
         seen: dict[int, str] = {}
         for name in self.__struct_fields__:

@@ -26,6 +26,7 @@ from bridges.kinds.charger.signals import (
     FaultSide,
     Measured,
 )
+from bridges.kinds.shared.remarks import Remarks
 from drivers import DriverError
 
 ALWAYS: Final = ("state", "error_low", "error_high", "volts", "amps", "range")
@@ -322,7 +323,7 @@ def _state_rows() -> Iterator[tuple[str, str]]:
     yield "any other state", "error, with its number"
 
 
-def warnings(settings: ChargerSettings, wire: str) -> Iterator[tuple[tuple[str, ...], str]]:
+def warnings(settings: ChargerSettings, wire: str) -> Remarks:
     """Valid settings that deserve a second look: (path, text). `wire`: the plug to pull in the test."""
     text = (
         "the maker's published numbers are not tried on hardware: watch the first charge, and pull"

@@ -16,6 +16,7 @@ import msgspec
 from bridges.kinds.door.settings import DoorSettings
 from bridges.kinds.door.signals import DoorOutputs, DoorSample
 from bridges.kinds.shared.fields import tells
+from bridges.kinds.shared.remarks import Remarks
 from bridges.kinds.shared.table import Table
 from drivers.door.closing import CLOSING
 from drivers.driver_type import DriverType
@@ -66,7 +67,7 @@ class Settings(DoorSettings, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     inputs: Annotated[Inputs, tells("the contacts that are read.")] = Inputs()
     outputs: Annotated[Outputs, tells("the relay that is driven.")]
 
-    def problems(self) -> Iterator[tuple[tuple[str, ...], str]]:
+    def problems(self) -> Remarks:
         """Problems that involve more than one field."""
         yield from super().problems()
         yield from self._feedback_problems()
@@ -80,7 +81,7 @@ class Settings(DoorSettings, frozen=True, kw_only=True, forbid_unknown_fields=Tr
         yield from self._flash_problems()
         yield from unaccepted(_unsafe(self), self.accept_unsafe)
 
-    def _flash_problems(self) -> Iterator[tuple[tuple[str, ...], str]]:
+    def _flash_problems(self) -> Remarks:
         if self.outputs.hold_open.flash is None:
             return
         if self.pulse is None:
@@ -90,7 +91,7 @@ class Settings(DoorSettings, frozen=True, kw_only=True, forbid_unknown_fields=Tr
             text = f"with flash the module counts tenths of a second: not {self.pulse.on_s:g}"
             yield ("pulse", "on_s"), text
 
-    def _feedback_problems(self) -> Iterator[tuple[tuple[str, ...], str]]:
+    def _feedback_problems(self) -> Remarks:
         missing = [s for s in ("opened", "closed") if getattr(self.inputs, s) is None]
         if self.feedback == "sensors":
             for signal in missing:
@@ -126,7 +127,7 @@ def tables(settings: Settings) -> Iterator[Table]:
     yield Table("outputs", ("output", "how long"), rows)
 
 
-def warnings(settings: Settings) -> Iterator[tuple[tuple[str, ...], str]]:
+def warnings(settings: Settings) -> Remarks:
     """Valid settings to review before the door goes into service: (path, text)."""
     for wire in wires(settings):
         if wire.signal == "closed" and wire.broken_reads() is not False:

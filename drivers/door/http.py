@@ -13,6 +13,7 @@ import msgspec
 from bridges.kinds.door.settings import DoorSettings
 from bridges.kinds.door.signals import DoorOutputs, DoorSample
 from bridges.kinds.shared.fields import Timeout, tells
+from bridges.kinds.shared.remarks import Remarks
 from drivers import DriverError, json_fields
 from drivers.door.closing import CLOSING
 from drivers.driver_type import DriverType
@@ -22,7 +23,6 @@ from drivers.json_fields import Flag
 from drivers.unsafe import Unsafe, needlessly_accepted, unaccepted
 
 HOLD: Final = "hold_open"
-Problems = Iterator[tuple[tuple[str, ...], str]]
 
 
 class Inputs(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -57,7 +57,7 @@ class Settings(DoorSettings, frozen=True, kw_only=True, forbid_unknown_fields=Tr
         path = ("switches_off_after_s",)
         return None if self.switches_off_after_s is None else (self.switches_off_after_s, path)
 
-    def problems(self) -> Problems:
+    def problems(self) -> Remarks:
         """Problems that involve more than one field."""
         yield from super().problems()
         missing = [
@@ -113,7 +113,7 @@ def _renewed(settings: Settings, bus: http.Settings) -> str:
     return f", again every {bus.scan_s:g} s while the door is held: {after}"
 
 
-def warnings(settings: Settings) -> Problems:
+def warnings(settings: Settings) -> Remarks:
     """Valid settings to review before the door goes into service: (path, text)."""
     if settings.switches_off_after_s is not None:
         text = (

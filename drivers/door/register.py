@@ -11,9 +11,10 @@ from typing import Annotated, Final
 from bridges.kinds.door.settings import DoorSettings
 from bridges.kinds.door.signals import DoorOutputs, DoorSample
 from bridges.kinds.shared.fields import Name, tells
+from bridges.kinds.shared.remarks import Remarks
 from bridges.kinds.shared.table import Table
 from drivers.door.closing import CLOSING
-from drivers.door.register_map import DoorMap, Errors, Flag, Parts, Problems, Status
+from drivers.door.register_map import DoorMap, Errors, Flag, Parts, Status
 from drivers.driver_type import DriverType
 from drivers.hal.modbus import ModbusBus
 from drivers.hal.modbus.lines import Lines
@@ -39,7 +40,7 @@ class Settings(DoorSettings, frozen=True, kw_only=True, forbid_unknown_fields=Tr
         Word, tells("added to every address, for several operators behind one unit id.")
     ] = 0
 
-    def problems(self) -> Problems:
+    def problems(self) -> Remarks:
         """Problems that involve more than one field."""
         yield from super().problems()
         before = list(profile_problems(PROFILE, self.profile, self.map))
@@ -113,7 +114,7 @@ def tables(settings: Settings) -> Iterator[Table]:
         )
 
 
-def warnings(settings: Settings) -> Problems:
+def warnings(settings: Settings) -> Remarks:
     """Valid settings to review before the door goes into service: (path, text)."""
     if settings.profile and PROFILE.untried(settings.profile):
         text = f"nobody has tried the profile {settings.profile} on hardware: watch the door move"

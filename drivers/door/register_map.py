@@ -1,16 +1,15 @@
 """The register map of a door operator, from a YAML or a profile: places and what the numbers mean."""
 
-from collections.abc import Iterator
 from typing import Annotated
 
 import msgspec
 
 from bridges.kinds.shared.fields import Name, tells
+from bridges.kinds.shared.remarks import Remarks
 from drivers.hal.modbus.registers import REGISTERS, WRITABLE, Place, Word, misplaced
 
 Bit = Annotated[int, msgspec.Meta(ge=0, le=15)]
 Percent = Annotated[int, msgspec.Meta(ge=0, le=100)]
-Problems = Iterator[tuple[tuple[str, ...], str]]
 
 
 class Status(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -26,7 +25,7 @@ class Status(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     ]
     faults: Annotated[dict[Word, Name], tells("number -> what is wrong.")] = {}
 
-    def problems(self) -> Problems:
+    def problems(self) -> Remarks:
         """A place that is not a register; a number with two meanings."""
         yield from _place_problems(self.at, REGISTERS)
         first: dict[int, str] = {}
@@ -52,7 +51,7 @@ class Position(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
         Percent, tells("above this the door does not count as closed, whatever the status.")
     ] = 5
 
-    def problems(self) -> Problems:
+    def problems(self) -> Remarks:
         """A place that is not a register; thresholds that overlap; `unknown` within 0 to 100."""
         yield from _place_problems(self.at, REGISTERS)
         if self.unknown is not None and self.unknown <= 100:
@@ -69,7 +68,7 @@ class Errors(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
         dict[Bit, Name], tells("bit (0: least significant) -> fault; others are shown by number.")
     ] = {}
 
-    def problems(self) -> Problems:
+    def problems(self) -> Remarks:
         """A place that is not a register."""
         yield from _place_problems(self.at, REGISTERS)
 
@@ -80,7 +79,7 @@ class Flag(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
     at: Annotated[Place, tells("`input register N` or `holding register N`.")]
     bit: Annotated[Bit, tells("its number; 0 is the least significant.")]
 
-    def problems(self) -> Problems:
+    def problems(self) -> Remarks:
         """A place that is not a register."""
         yield from _place_problems(self.at, REGISTERS)
 
@@ -99,7 +98,7 @@ class Command(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=T
         nothing proves that the operator took it."""),
     ] = True
 
-    def problems(self) -> Problems:
+    def problems(self) -> Remarks:
         """A place that cannot be written; values that it cannot hold."""
         yield from _place_problems(self.at, WRITABLE)
         if self.hold == self.release:
@@ -139,6 +138,6 @@ class DoorMap(Parts, frozen=True, kw_only=True, forbid_unknown_fields=True):
         return {name: part.at for name, part in parts.items() if part is not None}
 
 
-def _place_problems(text: str, tables: tuple[str, ...]) -> Problems:
+def _place_problems(text: str, tables: tuple[str, ...]) -> Remarks:
     if reason := misplaced(text, tables):
         yield ("at",), reason

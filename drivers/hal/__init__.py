@@ -11,14 +11,12 @@ from typing import Any, Generic, Literal, NamedTuple, TypeAlias, TypeVar
 
 import msgspec
 
+from bridges.kinds.shared.remarks import Remark, Remarks
 from drivers.hal.points import HalError, Wire
 
-__all__ = ["AnyBus", "Bus", "BusType", "HalError", "Needs", "Remark", "UnwatchedOutputs", "Where"]
+__all__ = ["AnyBus", "Bus", "BusType", "HalError", "Needs", "UnwatchedOutputs", "Where"]
 
 Settings = TypeVar("Settings", bound=msgspec.Struct)
-
-Remark = tuple[tuple[str, ...], str]
-"""A remark on a setting: its path below the struct, and the text."""
 
 
 class Where(NamedTuple):
@@ -104,7 +102,7 @@ class BusType(msgspec.Struct, Generic[Settings], frozen=True):
     open_to_switch_off: Callable[[Settings], Bus] | None = None
     where: Callable[[Settings], Where | None] = lambda settings: None
     needs: Callable[[Settings], Needs] = lambda settings: Needs()
-    warnings: Callable[[Settings], Iterable[Remark]] = lambda settings: ()
+    warnings: Callable[[Settings], Remarks] = lambda settings: ()
     unwatched: Callable[[Settings, Iterable[str]], UnwatchedOutputs] = lambda settings, places: (
         UnwatchedOutputs()
     )

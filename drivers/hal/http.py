@@ -9,7 +9,7 @@ second reply would be taken for the reply to the next request. A call is sent on
 import os
 import socket
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -17,6 +17,7 @@ import msgspec
 
 from bridges.host import user_files
 from bridges.kinds.shared.fields import AbsolutePath, Name, Period, tells
+from bridges.kinds.shared.remarks import Remarks
 from drivers.hal import Bus, BusType, HalError, Needs, Where
 from drivers.hal.backoff import Backoff
 from drivers.hal.deadline import Dialler, Resolve, tls_socket
@@ -86,7 +87,7 @@ class Settings(
         the public authorities when absent."""),
     ] = None
 
-    def problems(self) -> Iterable[tuple[tuple[str, ...], str]]:
+    def problems(self) -> Remarks:
         """An invalid address; settings that have no effect."""
         try:
             tls = base(self.api_base).scheme == "https"
@@ -99,7 +100,7 @@ class Settings(
             yield ("token_header",), "needs token_file: the file with what the header says"
 
 
-def warnings(settings: Settings) -> Iterable[tuple[tuple[str, ...], str]]:
+def warnings(settings: Settings) -> Remarks:
     """Valid settings that deserve a second look: (path, text)."""
     if settings.token_file and base(settings.api_base).scheme == "http":
         text = (

@@ -5,6 +5,7 @@ from functools import partial
 
 from bridges.kinds.lift.settings import LiftSettings
 from bridges.kinds.lift.signals import Hazard, Side
+from bridges.kinds.shared.remarks import Remarks
 from drivers.hal.points import Wire
 from drivers.lift import codes
 from drivers.lift.broken_lines import floor_warnings, unsafe_codes
@@ -19,14 +20,11 @@ from drivers.unsafe import (
     unaccepted,
 )
 
-Problem = tuple[tuple[str, ...], str]
-"""Where it is (path below the device), and what is wrong and how to fix it."""
-
 ALARMED = (Hazard.FIRE, Hazard.CODE_BLUE, Hazard.EARTHQUAKE, Hazard.EMERGENCY)
 """Those that `alarm_on` may name."""
 
 
-def problems(wiring: LiftWiring) -> Iterator[Problem]:
+def problems(wiring: LiftWiring) -> Remarks:
     """The problems that keep the daemon from starting, unaccepted unsafe choices included."""
     yield from floors(wiring)
     yield from alarm(wiring)
@@ -39,7 +37,7 @@ def problems(wiring: LiftWiring) -> Iterator[Problem]:
     yield from unaccepted(unsafe(wiring), wiring.accept_unsafe)
 
 
-def warnings(wiring: LiftWiring) -> Iterator[Problem]:
+def warnings(wiring: LiftWiring) -> Remarks:
     """Valid wiring that deserves a second look."""
     table = {w.signal: w for w in wires(wiring)}
     told = wiring.inputs.agv_mode is not None or _in_service(wiring, "agv_mode")
@@ -63,7 +61,7 @@ def warnings(wiring: LiftWiring) -> Iterator[Problem]:
 
 def missing(
     settings: LiftSettings, path: tuple[str, ...], told: bool, asks: bool, fire: bool, holds: bool
-) -> Iterator[Problem]:
+) -> Remarks:
     """Optional signals whose absence deserves a warning.
 
     `told`: the lift reports AGV mode. `asks`: an output requests AGV mode. `fire`: the lift reports a
@@ -88,7 +86,7 @@ Sees = Callable[[str], bool]
 """Does the lift report this hazard, by a line or by a code?"""
 
 
-def notes(settings: LiftSettings, sees: Sees) -> Iterator[Problem]:
+def notes(settings: LiftSettings, sees: Sees) -> Remarks:
     """Choices that the site makes and should know of."""
     if sees(Hazard.FIRE) and settings.alarm == "none":
         text = (
@@ -102,13 +100,13 @@ def notes(settings: LiftSettings, sees: Sees) -> Iterator[Problem]:
         yield ("alarm_on",), text
 
 
-def alarm(settings: LiftSettings) -> Iterator[Problem]:
+def alarm(settings: LiftSettings) -> Remarks:
     """`alarm_on` without a topic to tell it on."""
     if settings.alarm == "none" and settings.alarm_on != [Hazard.FIRE]:
         yield ("alarm_on",), "nothing is told with alarm: none; write alarm: emergency_signal"
 
 
-def unseen(settings: LiftSettings, sees: Sees) -> Iterator[Problem]:
+def unseen(settings: LiftSettings, sees: Sees) -> Remarks:
     """Hazards of `alarm_on` that the lift does not report."""
     for n, hazard in enumerate(settings.alarm_on if settings.alarm != "none" else ()):
         if not sees(hazard):
@@ -116,9 +114,7 @@ def unseen(settings: LiftSettings, sees: Sees) -> Iterator[Problem]:
             yield path, f"no {hazard}: this lift does not report it, so nobody is told"
 
 
-def by_call(
-    settings: LiftSettings, told: bool, asks: bool, request: tuple[str, ...]
-) -> Iterator[Problem]:
+def by_call(settings: LiftSettings, told: bool, asks: bool, request: tuple[str, ...]) -> Remarks:
     """`by_call`: the lift must report AGV mode, and no output may request it. `request`: its path."""
     if settings.agv_mode == "by_call" and not told:
         text = "by_call needs an agv_mode input: nothing else tells that a call was taken"
@@ -148,7 +144,7 @@ def _cut(table: Mapping[str, Wire], signal: str, asserted: bool, meaning: str) -
     return cut_must_read(table[signal], asserted, meaning) if signal in table else ()
 
 
-def floors(wiring: LiftSettings) -> Iterator[Problem]:
+def floors(wiring: LiftSettings) -> Remarks:
     """A lift without floors; a floor, or one door of a landing, that is named twice."""
     stops = wiring.stops()
     if not stops:
@@ -167,7 +163,7 @@ def floors(wiring: LiftSettings) -> Iterator[Problem]:
 
 def named(
     what: str, section: tuple[str, ...], given: Collection[str], levels: Collection[str]
-) -> Iterator[Problem]:
+) -> Remarks:
     """Every landing must be in `given`, and nothing else. `what`: the missing entry, for the text."""
     for level in given:
         if level not in levels:
@@ -177,7 +173,7 @@ def named(
             yield section, f"no {what} for {level}"
 
 
-def _floor_code(code: FloorCode, levels: list[str]) -> Iterator[Problem]:
+def _floor_code(code: FloorCode, levels: list[str]) -> Remarks:
     if code.encoding == "one_hot":
         yield from named("line", ("floor_code", "lines"), code.lines, levels)
         if code.bits or code.codes or code.parity:
@@ -203,7 +199,7 @@ def _floor_code(code: FloorCode, levels: list[str]) -> Iterator[Problem]:
             )
 
 
-def _calls(wiring: LiftWiring) -> Iterator[Problem]:
+def _calls(wiring: LiftWiring) -> Remarks:
     code = wiring.call_code
     if code is None:
         yield from named("call", ("calls",), wiring.calls, wiring.levels())
@@ -217,7 +213,7 @@ def _calls(wiring: LiftWiring) -> Iterator[Problem]:
             yield ("call_code", "codes", str(number)), why
 
 
-def _doors(wiring: LiftWiring) -> Iterator[Problem]:
+def _doors(wiring: LiftWiring) -> Remarks:
     inputs, outputs = wiring.inputs, wiring.outputs
     rear = any(stop.side is Side.REAR for stop in wiring.stops().values())
     for prefix, needed in (("door", True), ("rear_door", rear)):
@@ -237,7 +233,7 @@ def _doors(wiring: LiftWiring) -> Iterator[Problem]:
         yield ("outputs",), "no rear_door_open, and some floors have side: rear"
 
 
-def _motion(wiring: LiftWiring) -> Iterator[Problem]:
+def _motion(wiring: LiftWiring) -> Remarks:
     have = [name for name in MOTION if getattr(wiring.inputs, name) is not None]
     if have not in ([], ["moving"], ["stopped"], ["up", "down"], ["motion"]):
         yield (
@@ -258,7 +254,7 @@ def _motion(wiring: LiftWiring) -> Iterator[Problem]:
             yield ("inputs", "motion", "codes", str(number)), f"{number} does not fit on the bits"
 
 
-def _agv(wiring: LiftWiring) -> Iterator[Problem]:
+def _agv(wiring: LiftWiring) -> Remarks:
     by_line, by_code = wiring.inputs.agv_mode, _in_service(wiring, "agv_mode")
     told, asks = bool(by_line) or by_code, bool(wiring.outputs.agv_mode_request)
     yield from by_call(wiring, told, asks, ("outputs", "agv_mode_request"))
@@ -273,7 +269,7 @@ def _agv(wiring: LiftWiring) -> Iterator[Problem]:
             yield path, f"{signal} itself tells AGV mode: delete valid_when"
 
 
-def _service(wiring: LiftWiring) -> Iterator[Problem]:
+def _service(wiring: LiftWiring) -> Remarks:
     service = wiring.inputs.service
     if service is None:
         return

@@ -3,10 +3,11 @@
 The lines are GPIO pins, or coils and discrete inputs of a Modbus I/O module.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from functools import partial
 
 from bridges.kinds.lift.signals import Door, Hazard, LiftOutputs, LiftSample, Motion, Side
+from bridges.kinds.shared.remarks import Remarks
 from drivers.driver_type import DriverType
 from drivers.hal.points import Points, PointsBus, Wire
 from drivers.lift import checks as lift_checks
@@ -34,7 +35,7 @@ UP_DOWN = {
 class Settings(LiftWiring, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """A lift on dry contacts."""
 
-    def problems(self) -> Iterable[tuple[tuple[str, ...], str]]:
+    def problems(self) -> Remarks:
         """Wiring that cannot work, and unsafe choices that `accept_unsafe` does not name."""
         return lift_checks.problems(self)
 
@@ -44,12 +45,12 @@ def wires(settings: Settings) -> list[Wire]:
     return lift_table.wires(settings)
 
 
-def warnings(settings: Settings) -> Iterable[tuple[tuple[str, ...], str]]:
+def warnings(settings: Settings) -> Remarks:
     """Valid settings that deserve a second look: (path below the device, text)."""
     return lift_checks.warnings(settings)
 
 
-def notes(settings: Settings) -> Iterable[tuple[tuple[str, ...], str]]:
+def notes(settings: Settings) -> Remarks:
     """Choices that the site makes and should know of: (path below the device, text)."""
     return lift_checks.notes(settings, partial(lift_checks.sees, settings))
 

@@ -10,6 +10,7 @@ from typing import Annotated, Final
 from bridges.kinds.lift.settings import LiftSettings
 from bridges.kinds.lift.signals import Door, Hazard, LiftOutputs, LiftSample, Motion, Side
 from bridges.kinds.shared.fields import tells
+from bridges.kinds.shared.remarks import Remarks
 from bridges.kinds.shared.table import Table
 from drivers.driver_type import DriverType
 from drivers.hal.modbus import ModbusBus
@@ -23,7 +24,6 @@ from drivers.lift.register_map import (
     LiftMap,
     MotionField,
     Number,
-    Problems,
 )
 from drivers.lift.table import DEBOUNCE_S, HAZARD_DEBOUNCE_S
 from drivers.lift.tables import BETWEEN, FAULT, floors, how_long
@@ -39,7 +39,7 @@ class Settings(LiftSettings, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     unit: Annotated[Unit, tells("the gateway's Modbus unit id.")]
     map: Annotated[LiftMap, tells("the gateway's register map.")]
 
-    def problems(self) -> Problems:
+    def problems(self) -> Remarks:
         """Problems that involve more than one field."""
         levels, commands = self.levels(), self.map.commands
         yield from checks.floors(self)
@@ -63,7 +63,7 @@ class Settings(LiftSettings, frozen=True, kw_only=True, forbid_unknown_fields=Tr
             yield ("accept_unsafe",), "a map has no wires that could be unsafe: delete this"
 
 
-def _rear_door(settings: Settings) -> Problems:
+def _rear_door(settings: Settings) -> Remarks:
     rear = any(stop.side is Side.REAR for stop in settings.stops().values())
     found = settings.map
     if rear and not found.rear_door:
@@ -74,7 +74,7 @@ def _rear_door(settings: Settings) -> Problems:
         yield ("map", "commands"), "no rear_door_open, and some floors have side: rear"
 
 
-def warnings(settings: Settings) -> Problems:
+def warnings(settings: Settings) -> Remarks:
     """Valid settings that deserve a second look: (path below the device, text)."""
     found, commands = settings.map, settings.map.commands
     fire, told = found.shows(Hazard.FIRE), found.shows("agv_mode")
@@ -86,7 +86,7 @@ def warnings(settings: Settings) -> Problems:
         yield ("map", "commands", "read_back"), text
 
 
-def notes(settings: Settings) -> Problems:
+def notes(settings: Settings) -> Remarks:
     """Choices that the site makes and should know of: (path below the device, text)."""
     return checks.notes(settings, settings.map.shows)
 

@@ -9,12 +9,12 @@ import msgspec
 
 from bridges.kinds.lift.signals import Hazard
 from bridges.kinds.shared.fields import Name, tells
+from bridges.kinds.shared.remarks import Remarks
 from drivers.hal.modbus.points import BITS
 from drivers.hal.modbus.registers import REGISTERS, TABLES, WRITABLE, Place, Word, misplaced
 from drivers.lift.wiring import ServiceState
 
 Bit = Annotated[int, msgspec.Meta(ge=0, le=BITS - 1)]
-Problems = Iterator[tuple[tuple[str, ...], str]]
 
 
 class Field(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -40,7 +40,7 @@ class Field(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
             return number
         return sum((number >> i & 1) << bit for i, bit in enumerate(self.bits))
 
-    def fits(self, numbers: Collection[int], key: str) -> Problems:
+    def fits(self, numbers: Collection[int], key: str) -> Remarks:
         """A place that is not a register, a bit that is listed twice, numbers that do not fit."""
         yield from _misplaced(self.at, REGISTERS)
         if len(set(self.bits)) < len(self.bits):
@@ -56,7 +56,7 @@ class FloorField(Field, frozen=True, kw_only=True, forbid_unknown_fields=True):
     codes: Annotated[dict[Word, Name], tells("number -> landing; an unlisted number is a fault.")]
     between_floors: Annotated[list[Word], tells("the numbers for a car between floors.")] = []
 
-    def problems(self) -> Problems:
+    def problems(self) -> Remarks:
         """What `fits` finds; a number with two meanings."""
         yield from self.fits([*self.codes, *self.between_floors], "codes")
         for number in self.codes:
@@ -72,7 +72,7 @@ class DoorField(Field, frozen=True, kw_only=True, forbid_unknown_fields=True):
         tells("number -> state; an unlisted number is a fault."),
     ]
 
-    def problems(self) -> Problems:
+    def problems(self) -> Remarks:
         """What `fits` finds; a door without a code for open or for closed."""
         yield from self.fits(self.codes, "codes")
         if not {"open", "closed"} <= set(self.codes.values()):
@@ -87,7 +87,7 @@ class MotionField(Field, frozen=True, kw_only=True, forbid_unknown_fields=True):
         tells("number -> motion; an unlisted number is a fault."),
     ]
 
-    def problems(self) -> Problems:
+    def problems(self) -> Remarks:
         """What `fits` finds; a car that never stands, or never moves."""
         yield from self.fits(self.codes, "codes")
         shown = set(self.codes.values())
@@ -103,7 +103,7 @@ class ServiceField(Field, frozen=True, kw_only=True, forbid_unknown_fields=True)
         tells("number -> state; at an unlisted number the lift is out of service."),
     ]
 
-    def problems(self) -> Problems:
+    def problems(self) -> Remarks:
         """What `fits` finds."""
         yield from self.fits(self.codes, "codes")
 
@@ -136,7 +136,7 @@ class Flag(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
         """The value of its register or bit that shows this."""
         return (asserted == (self.active == "high")) << (self.bit or 0)
 
-    def problems(self) -> Problems:
+    def problems(self) -> Remarks:
         """An invalid place; a register without its bit, or a coil with one."""
         yield from _misplaced(self.at, tuple(TABLES))
         register = misplaced(self.at, REGISTERS) is None
@@ -157,7 +157,7 @@ class Command(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=T
     ask: Annotated[Word, tells("the value that asks for it.")] = 1
     release: Annotated[Word, tells("the value that does not; its safe value.")] = 0
 
-    def problems(self) -> Problems:
+    def problems(self) -> Remarks:
         """A place that cannot be written; values that it cannot hold."""
         yield from _misplaced(self.at, WRITABLE)
         if self.ask == self.release:
@@ -174,7 +174,7 @@ class CallCommand(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     codes: Annotated[dict[Word, Name], tells("number -> landing.")]
     none: Annotated[Word, tells("the value for no call.")] = 0
 
-    def problems(self) -> Problems:
+    def problems(self) -> Remarks:
         """A place that cannot be written; a landing whose number means no call."""
         yield from _misplaced(self.at, ("holding register",))
         if self.none in self.codes:
@@ -232,7 +232,7 @@ class Commands(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
             found[self.call.at] = found.get(self.call.at, 0) | value
         return found
 
-    def problems(self) -> Problems:
+    def problems(self) -> Remarks:
         """Both `calls` and `call`; commands that use the same bit of a register."""
         if self.calls and self.call:
             yield ("calls",), "calls and call are two ways of calling: keep one"
@@ -286,6 +286,6 @@ class LiftMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=T
         return in_service or getattr(self, state) is not None
 
 
-def _misplaced(text: str, tables: tuple[str, ...]) -> Problems:
+def _misplaced(text: str, tables: tuple[str, ...]) -> Remarks:
     if reason := misplaced(text, tables):
         yield ("at",), reason

@@ -10,7 +10,6 @@ imported then: who switches off by a record on contacts needs none of it.
 """
 
 import functools
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Generic, TypeVar
 
@@ -18,6 +17,7 @@ import msgspec
 from msgspec.inspect import LiteralType
 
 from bridges.kinds.shared.fields import Name
+from bridges.kinds.shared.remarks import Remarks
 from bridges.yaml.problems import SettingsError
 from bridges.yaml.spelling import either, unknown
 from drivers.profiles import texts
@@ -85,9 +85,7 @@ def _understood(
     return made
 
 
-def profile_problems(
-    sort: Profile[msgspec.Struct], name: str | None, inline: object
-) -> Iterator[tuple[tuple[str, ...], str]]:
+def profile_problems(sort: Profile[msgspec.Struct], name: str | None, inline: object) -> Remarks:
     """Problems of `profile:` and of the key that may replace it (`map`)."""
     if name is None and inline is None:
         text = f"needs '{sort.key}', or a profile: {either(sort.names())}"
@@ -98,7 +96,7 @@ def profile_problems(
         yield from _named(sort, name)
 
 
-def _named(sort: Profile[msgspec.Struct], name: str) -> Iterator[tuple[tuple[str, ...], str]]:
+def _named(sort: Profile[msgspec.Struct], name: str) -> Remarks:
     if name not in sort.names():
         yield ("profile",), unknown("profile", name, sort.names())
         return

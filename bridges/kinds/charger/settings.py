@@ -1,12 +1,12 @@
 """The part of a charger's YAML that does not depend on its driver."""
 
-from collections.abc import Iterator
 from typing import Annotated, Literal, NamedTuple
 
 import msgspec
 from msgspec import Meta
 
 from bridges.kinds.shared.fields import DeviceSettings, Name, Seconds, tells
+from bridges.kinds.shared.remarks import Remarks
 
 Misses = Annotated[int, Meta(ge=1, le=100)]
 PerHour = Annotated[int, Meta(ge=0, le=60, extra={"unit": "per hour"})]
@@ -95,7 +95,7 @@ class ChargerSettings(DeviceSettings, frozen=True, kw_only=True, forbid_unknown_
         """Can this station be told to stop? Drivers of stations that cannot override this."""
         return True
 
-    def problems(self) -> Iterator[tuple[tuple[str, ...], str]]:
+    def problems(self) -> Remarks:
         """Names that are not FLEET/ROBOT. A robot may have two receivers: one may be a spare."""
         for receiver, text in self.receivers.items():
             try:

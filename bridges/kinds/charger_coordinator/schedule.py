@@ -4,7 +4,7 @@ Pure: the local time of day and the day of the week are inputs. A time that ends
 beginning ends on the next day, and belongs to the day on which it begins.
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from typing import Annotated, Final, Literal, NamedTuple
 
 import msgspec
@@ -12,6 +12,7 @@ from msgspec import Meta
 
 from bridges.kinds.charger.settings import Robot
 from bridges.kinds.shared.fields import Name, tells
+from bridges.kinds.shared.remarks import Remarks
 
 Day = Literal["mon", "tue", "wed", "thu", "fri", "sat", "sun"]
 DAYS: Final[tuple[Day, ...]] = ("mon", "tue", "wed", "thu", "fri", "sat", "sun")
@@ -88,7 +89,7 @@ def problems(
     robots: Iterable[Robot],
     least: float,
     most: float,
-) -> Iterator[tuple[tuple[str, ...], str]]:
+) -> Remarks:
     """Unknown names, and targets that mean nothing between `again_percent` and `full_percent`."""
     known = {"fleets": set(fleets), "robots": set(map(str, robots))}
     for i, one in enumerate(schedule):

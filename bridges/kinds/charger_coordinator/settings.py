@@ -16,6 +16,7 @@ from bridges.kinds.charger_coordinator import schedule as times
 from bridges.kinds.charger_coordinator.schedule import Charging
 from bridges.kinds.shared.fields import GraphSettings, Name, Timeout, tells
 from bridges.kinds.shared.kind import CHARGER, WAYPOINT, Place
+from bridges.kinds.shared.remarks import Remarks
 from bridges.kinds.shared.table import Table
 
 Metres = Annotated[float, Meta(ge=-100_000, le=100_000, extra={"unit": "m"})]
@@ -113,7 +114,7 @@ class Settings(GraphSettings, frozen=True, kw_only=True, forbid_unknown_fields=T
             for name in settings.waypoints:
                 yield ("fleets", fleet, "waypoints", name), WAYPOINT, name
 
-    def problems(self) -> Iterator[tuple[tuple[str, ...], str]]:
+    def problems(self) -> Remarks:
         """Unknown names, places given twice, contradictory percentages."""
         for key in ("stations", "fleets"):
             if not getattr(self, key):
@@ -129,7 +130,7 @@ class Settings(GraphSettings, frozen=True, kw_only=True, forbid_unknown_fields=T
         yield from self._doubles()
         yield from self._of_schedule()
 
-    def _of_station(self, name: str, station: Station) -> Iterator[tuple[tuple[str, ...], str]]:
+    def _of_station(self, name: str, station: Station) -> Remarks:
         places = self.places()[name]
         if not self._graphs_with(name):
             text = (
@@ -147,7 +148,7 @@ class Settings(GraphSettings, frozen=True, kw_only=True, forbid_unknown_fields=T
         places = self.places()[station]
         return [name for name, fleet in self.fleets.items() if places[name] in fleet.waypoints]
 
-    def _of_fleet(self, fleet_name: str, fleet: Fleet) -> Iterator[tuple[tuple[str, ...], str]]:
+    def _of_fleet(self, fleet_name: str, fleet: Fleet) -> Remarks:
         known = ", ".join(fleet.waypoints) or "none"
         chargers = {places[fleet_name] for places in self.places().values()}
         for name, robot in fleet.robots.items():
@@ -166,7 +167,7 @@ class Settings(GraphSettings, frozen=True, kw_only=True, forbid_unknown_fields=T
                         continue
                     yield path, f"'{station}' is at '{place}', not in this fleet's list ({known})"
 
-    def _doubles(self) -> Iterator[tuple[tuple[str, ...], str]]:
+    def _doubles(self) -> Remarks:
         """One place, one robot; one receiver, one robot; one name, one station or receiver."""
         taken: dict[tuple[str, str], str] = {}
         for station, places in self.places().items():
@@ -188,7 +189,7 @@ class Settings(GraphSettings, frozen=True, kw_only=True, forbid_unknown_fields=T
                         f"'{thing}' already belongs to {owner}: only one robot can have it",
                     )
 
-    def _of_schedule(self) -> Iterator[tuple[tuple[str, ...], str]]:
+    def _of_schedule(self) -> Remarks:
         least, most = self.again_percent, self.full_percent
         for path, text in times.problems(self.schedule, self.fleets, self.robots(), least, most):
             yield ("schedule", *path), text
@@ -251,7 +252,7 @@ def speaks_of(settings: Settings) -> Iterator[Place]:
         yield ("stations", name), CHARGER, name
 
 
-def warnings(settings: Settings) -> Iterator[tuple[tuple[str, ...], str]]:
+def warnings(settings: Settings) -> Remarks:
     """What is legal but may be a mistake."""
     used = {name for robot in settings.robots().values() for name in robot.stations}
     for name in settings.stations:
@@ -268,7 +269,7 @@ def warnings(settings: Settings) -> Iterator[tuple[tuple[str, ...], str]]:
     yield from _near(settings)
 
 
-def _near(settings: Settings) -> Iterator[tuple[tuple[str, ...], str]]:
+def _near(settings: Settings) -> Remarks:
     """Places so close together that a robot's position cannot tell them apart."""
     for fleet_name, fleet in settings.fleets.items():
         names = list(fleet.waypoints)

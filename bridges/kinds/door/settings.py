@@ -1,12 +1,12 @@
 """The part of a door's YAML that does not depend on its wiring."""
 
-from collections.abc import Iterator
 from typing import Annotated, Literal
 
 import msgspec
 from msgspec import Meta
 
 from bridges.kinds.shared.fields import DeviceSettings, Patience, Seconds, Timeout, tells
+from bridges.kinds.shared.remarks import Remarks
 
 StaleAfter = Annotated[float, Meta(ge=0.1, le=60, extra={"unit": "s"})]
 PulseSeconds = Annotated[float, Meta(ge=0.05, le=600, extra={"unit": "s"})]
@@ -73,7 +73,7 @@ class DoorSettings(DeviceSettings, frozen=True, kw_only=True, forbid_unknown_fie
         """Its limits' `stale_after_s`."""
         return self.limits.stale_after_s
 
-    def problems(self) -> Iterator[tuple[tuple[str, ...], str]]:
+    def problems(self) -> Remarks:
         """Fields that contradict each other."""
         if self.pulse and self.pulse.on_s >= self.pulse.every_s:
             yield (

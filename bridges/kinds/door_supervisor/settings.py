@@ -5,6 +5,7 @@ from typing import Annotated
 
 from bridges.kinds.shared.fields import GraphSettings, Name, Patience, tells
 from bridges.kinds.shared.kind import Place
+from bridges.kinds.shared.remarks import Remarks
 
 
 class Settings(GraphSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -21,7 +22,7 @@ class Settings(GraphSettings, frozen=True, kw_only=True, forbid_unknown_fields=T
         open, as the robot may stand in the doorway."""),
     ] = 600.0
 
-    def problems(self) -> Iterable[tuple[tuple[str, ...], str]]:
+    def problems(self) -> Remarks:
         """An empty list of doors."""
         if self.doors == []:
             yield ("doors",), "is empty: name the doors, or leave it out to serve every door"

@@ -5,6 +5,7 @@ from typing import Annotated
 
 from bridges.kinds.shared.fields import GraphSettings, Name, Patience, QuietStart, Seconds, tells
 from bridges.kinds.shared.kind import Place
+from bridges.kinds.shared.remarks import Remarks
 
 
 class Settings(GraphSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -42,7 +43,7 @@ class Settings(GraphSettings, frozen=True, kw_only=True, forbid_unknown_fields=T
         Seconds, tells("with `clock_synchronised`, an older request counts only if repeated.")
     ] = 10.0
 
-    def problems(self) -> Iterable[tuple[tuple[str, ...], str]]:
+    def problems(self) -> Remarks:
         """An alarm after what it warns of, or an empty list of lifts."""
         if self.holder_ttl_s is not None and self.holder_ttl_s <= self.holder_alarm_s:
             text = f"must be more than 'holder_alarm_s' ({self.holder_alarm_s:g} s): alarm first"

@@ -1,7 +1,7 @@
 """The building blocks of every device YAML: numbers with units, names, common structs.
 
 `bridges/settings/load.py` reads a file into these; the kinds and drivers derive their own from them.
-A struct may have `problems() -> Iterable[tuple[tuple[str, ...], str]]`. It checks what no field can
+A struct may have `problems() -> Remarks`. It checks what no field can
 check alone, and gives (path below the struct, text with the fix). It is called once every field is
 present and of the right type, even if a struct below has problems of its own.
 """

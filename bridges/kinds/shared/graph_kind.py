@@ -12,6 +12,7 @@ from msgspec import Struct
 
 from bridges.kinds.shared.decision import Decision, M, OperatorReset, R
 from bridges.kinds.shared.kind import Answer, AnyDeviceKind, E, L, Place, S
+from bridges.kinds.shared.remarks import Remarks
 from bridges.kinds.shared.table import Table
 from bridges.messages.definitions import Message, Time
 from bridges.messages.topics import Topic
@@ -94,7 +95,7 @@ class GraphKind(Struct, Generic[S, L, M, E, R], frozen=True):
     restore: Callable[[bytes, S, float], Mapping[str, M]] | None = None
     urgent: Callable[[M], bool] = lambda memory: False
     tables: Callable[[S], Iterable[Table]] = lambda settings: ()
-    warnings: Callable[[S], Iterable[tuple[tuple[str, ...], str]]] | None = None
+    warnings: Callable[[S], Remarks] | None = None
     on_map: Callable[[S], Iterable[Place]] = lambda settings: ()
     speaks_of: Callable[[S], Iterable[Place]] = lambda settings: ()
     yields: tuple[Topic[Message], ...] = ()

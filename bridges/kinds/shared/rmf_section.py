@@ -1,13 +1,13 @@
 """The `rmf:` section of a YAML: which transport reaches Open-RMF, and how."""
 
 import argparse
-from collections.abc import Iterable
 from typing import Annotated, Literal
 
 import msgspec
 from msgspec import Meta
 
 from bridges.kinds.shared.fields import AbsolutePath, Name, tells
+from bridges.kinds.shared.remarks import Remarks
 
 Endpoint = Annotated[
     str,
@@ -34,7 +34,7 @@ class ZenohTls(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
         AbsolutePath | None, tells("the certificate's key. Only the daemon's user may read it.")
     ] = None
 
-    def problems(self) -> Iterable[tuple[tuple[str, ...], str]]:
+    def problems(self) -> Remarks:
         """A certificate and its key go together."""
         if (self.certificate is None) != (self.private_key is None):
             yield (), "certificate and private_key go together: give both, or none"
@@ -69,7 +69,7 @@ class Zenoh(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
         AbsolutePath | None, tells("a file with its password. Only the daemon's user may read it.")
     ] = None
 
-    def problems(self) -> Iterable[tuple[tuple[str, ...], str]]:
+    def problems(self) -> Remarks:
         """What cannot go together."""
         if (self.user is None) != (self.password_file is None):
             yield (), "user and password_file go together: give both, or none"
@@ -116,7 +116,7 @@ class Rmf(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
         without one. Transport `ros2` takes what is installed."""),
     ] = "auto"
 
-    def problems(self) -> Iterable[tuple[tuple[str, ...], str]]:
+    def problems(self) -> Remarks:
         """What would have no effect."""
         if self.release != "auto" and self.transport == "ros2":
             yield ("release",), "transport ros2 takes what is installed: leave it out"

@@ -1,11 +1,11 @@
 """`type: can` of a device YAML: which bus, and how long it may take."""
 
-from collections.abc import Iterable
 from typing import Annotated, Final
 
 import msgspec
 
 from bridges.kinds.shared.fields import Name, Period, tells
+from bridges.kinds.shared.remarks import Remarks
 from drivers.hal import Needs, Where, serial_port
 
 BITRATES: Final = (
@@ -65,7 +65,7 @@ class Settings(
     ] = 0.2
     scan_s: Annotated[Period, tells("how often devices are read and frames sent.")] = 0.2
 
-    def problems(self) -> Iterable[tuple[tuple[str, ...], str]]:
+    def problems(self) -> Remarks:
         """Problems that involve more than one field."""
         if self.socketcan is None and self.slcan is None:
             yield (), "needs an interface: write socketcan: can0, or slcan: {port: …, bitrate: …}"
@@ -79,7 +79,7 @@ class Settings(
             yield ("slcan", "bitrate"), f"slcan adapters know {known}"
 
 
-def warnings(settings: Settings) -> Iterable[tuple[tuple[str, ...], str]]:
+def warnings(settings: Settings) -> Remarks:
     """Valid settings that deserve a second look: (path, text)."""
     if settings.slcan and not settings.slcan.port.startswith("/dev/serial/by-"):
         port = settings.slcan.port

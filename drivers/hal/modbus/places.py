@@ -1,12 +1,12 @@
 """Where Modbus units are: behind a TCP address, or on a serial line."""
 
 import re
-from collections.abc import Iterable
 from typing import Annotated, Final, Literal
 
 import msgspec
 
 from bridges.kinds.shared.fields import Name, tells
+from bridges.kinds.shared.remarks import Remarks
 from drivers.hal.hosts import misspelt_address
 
 BAUDRATES: Final = (
@@ -22,7 +22,7 @@ class Tcp(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     host: Annotated[Name, tells("its address or name.")]
     port: Annotated[int, msgspec.Meta(ge=1, le=65535), tells("its TCP port.")] = 502
 
-    def problems(self) -> Iterable[tuple[tuple[str, ...], str]]:
+    def problems(self) -> Remarks:
         """An invalid address."""
         if re.fullmatch(r"[^:]*:[0-9]+", self.host):
             yield ("host",), "write the host alone; its port goes into port"
@@ -41,7 +41,7 @@ class Serial(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     stopbits: Annotated[Literal[1, 2], tells("stop bits of each character.")]
     ignore_echo: Annotated[bool, tells("for an adapter that hears what it sends.")] = False
 
-    def problems(self) -> Iterable[tuple[tuple[str, ...], str]]:
+    def problems(self) -> Remarks:
         """A relative path; a rate that no unit has."""
         if not self.port.startswith("/"):
             text = "write the whole path, as `ls /dev/serial/by-id/*` prints it"
@@ -52,7 +52,7 @@ class Serial(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
             )
             yield ("baudrate",), text
 
-    def warnings(self) -> Iterable[tuple[tuple[str, ...], str]]:
+    def warnings(self) -> Remarks:
         """A path that may change after a reboot."""
         if re.match(r"/dev/tty(USB|ACM)", self.port):
             text = "may be another adapter after the next start: write its /dev/serial/by-id path"

@@ -6,6 +6,7 @@ from typing import Annotated
 import msgspec
 
 from bridges.kinds.shared.fields import Name, Period, tells
+from bridges.kinds.shared.remarks import Remarks
 from drivers.hal import Needs, UnwatchedOutputs, Where, serial_port
 from drivers.hal.modbus.places import Serial, Tcp
 from drivers.hal.modbus.registers import Unit
@@ -41,7 +42,7 @@ class Settings(
         master`)."""),
     ] = {}
 
-    def problems(self) -> Iterable[tuple[tuple[str, ...], str]]:
+    def problems(self) -> Remarks:
         """Problems that involve more than one field."""
         if self.tcp is None and self.serial is None:
             yield (), "needs a connection: write tcp: {host: …} or serial: {port: …}"
@@ -59,7 +60,7 @@ class Settings(
         return self.module_watchdog.units if self.module_watchdog else ()
 
 
-def warnings(settings: Settings) -> Iterable[tuple[tuple[str, ...], str]]:
+def warnings(settings: Settings) -> Remarks:
     """Valid settings that deserve a second look: (path, text)."""
     for path, text in settings.serial.warnings() if settings.serial else ():
         yield ("serial", *path), text

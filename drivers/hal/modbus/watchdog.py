@@ -4,16 +4,15 @@ A module that is not written to in time drops its outputs by itself. Each make h
 arming, refreshing and showing this, so they are in the YAML or a profile. `dead_man.py` uses them.
 """
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection
 from typing import Annotated, Final
 
 import msgspec
 
 from bridges.kinds.shared.fields import Name, Period, tells
+from bridges.kinds.shared.remarks import Remarks
 from drivers.hal.modbus.registers import TABLES, WRITABLE, Place, Unit, Word, misplaced
 from drivers.profiles import Profile, profile_problems
-
-Problems = Iterator[tuple[tuple[str, ...], str]]
 
 
 class Write(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -22,7 +21,7 @@ class Write(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     at: Annotated[Place, tells("`holding register N` or `coil N`.")]
     value: Annotated[Word, tells("what is written.")]
 
-    def problems(self) -> Problems:
+    def problems(self) -> Remarks:
         """A place that cannot be written."""
         yield from _place_problems(self.at, WRITABLE)
 
@@ -37,7 +36,7 @@ class Refresh(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=T
         tells("written in turn: some modules only count a value that differs from the last."),
     ]
 
-    def problems(self) -> Problems:
+    def problems(self) -> Remarks:
         """A place that cannot be written."""
         yield from _place_problems(self.at, WRITABLE)
 
@@ -50,7 +49,7 @@ class Shows(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     ]
     values: Annotated[list[Word], msgspec.Meta(min_length=1), tells("any of these counts.")]
 
-    def problems(self) -> Problems:
+    def problems(self) -> Remarks:
         """An invalid place."""
         yield from _place_problems(self.at, tuple(TABLES))
 
@@ -68,7 +67,7 @@ class Habits(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     tripped: Annotated[list[Shows], tells("places of which any reads like this after a trip.")] = []
     rearm: Annotated[list[Write], tells("the writes that end a trip, before `arm`.")] = []
 
-    def problems(self) -> Problems:
+    def problems(self) -> Remarks:
         """A refresh that comes too late."""
         if self.refresh_s > self.time_s / 2:
             text = (
@@ -84,7 +83,7 @@ class Watchdog(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     profile: Annotated[Name | None, tells("a file of drivers/profiles/ with its use.")] = None
     habits: Annotated[Habits | None, tells("its use, written here instead of a profile.")] = None
 
-    def problems(self) -> Problems:
+    def problems(self) -> Remarks:
         """Neither or both of profile and habits; a profile with problems."""
         if len(set(self.units)) < len(self.units):
             yield ("units",), "names a unit twice"
@@ -94,7 +93,7 @@ class Watchdog(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
         """The habits: those in the YAML, or the profile's."""
         return self.habits or PROFILE.load(self.profile or "")
 
-    def warnings(self) -> Problems:
+    def warnings(self) -> Remarks:
         """A profile that nobody has tried."""
         if any(profile_problems(PROFILE, self.profile, self.habits)):
             return
@@ -108,6 +107,6 @@ class Watchdog(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
 PROFILE: Final = Profile("module_watchdog", "habits", Habits)
 
 
-def _place_problems(text: str, tables: Collection[str]) -> Problems:
+def _place_problems(text: str, tables: Collection[str]) -> Remarks:
     if reason := misplaced(text, tables):
         yield ("at",), reason

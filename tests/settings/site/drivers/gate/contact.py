@@ -1,6 +1,5 @@
 """A driver with wires, and with a field of every sort that a struct may have."""
 
-from collections.abc import Iterable
 from enum import Enum
 from typing import Annotated, Literal
 
@@ -8,6 +7,7 @@ import msgspec
 from msgspec import Meta
 
 from bridges.kinds.shared.fields import DeviceSettings, Name, Seconds
+from bridges.kinds.shared.remarks import Remarks
 from drivers import Driver
 from drivers.driver_type import DriverType
 from drivers.hal.points import Input, Output, Wire
@@ -41,7 +41,7 @@ class Limits(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     baud: Literal[9600, 19200] = 9600
     label: Annotated[str, Meta(pattern="^[a-z]+$", extra={"pattern": "a small word"})] | int = 0
 
-    def problems(self) -> Iterable[tuple[tuple[str, ...], str]]:
+    def problems(self) -> Remarks:
         """What the fields cannot say one by one."""
         if self.close_s is not None and self.close_s > self.open_s:
             yield ("close_s",), "'close_s' may not be longer than 'open_s'"
@@ -57,7 +57,7 @@ class Settings(DeviceSettings, frozen=True, kw_only=True, forbid_unknown_fields=
     codes: dict[Code, Name] = msgspec.field(default_factory=dict)
     limits: Limits = Limits()
 
-    def problems(self) -> Iterable[tuple[tuple[str, ...], str]]:
+    def problems(self) -> Remarks:
         """Codes name lanes."""
         for code, lane in self.codes.items():
             if lane not in self.lanes:
@@ -80,7 +80,7 @@ def _input(name: str, i: Input, path: tuple[str, ...]) -> Wire:
     return Wire(name, "in", i.point, i.active, i.pull, i.debounce_s, path)
 
 
-def warnings(settings: Settings) -> Iterable[tuple[tuple[str, ...], str]]:
+def warnings(settings: Settings) -> Remarks:
     """Legal, but worth a look."""
     if settings.limits.loud:
         yield ("limits", "loud"), "it will be loud"
