@@ -11,43 +11,36 @@ from bridges.yaml.spelling import unknown
 from drivers.charger import rules as by_rules
 from drivers.charger.rules import Errors, Rule
 from drivers.charger.state_codes import Codes
-from drivers.hal.modbus.registers import REGISTERS, TABLES, WRITABLE, Place, Word, misplaced, place
+from drivers.hal.modbus.map_parts import Levels, Placed, Written
+from drivers.hal.modbus.registers import Word, place
+from drivers.numbers import BITS, LongBit
 from drivers.profiles import Profile
 
-Bit = Annotated[int, msgspec.Meta(ge=0, le=31)]
 MEASURED: Final = ("volts", "amps", "battery_percent", "time_to_full_s")
 KNOWN: Final = ("state", "receiver", "in_range", "range_ok", "at_height", *MEASURED)
 """The values whose names have a meaning of their own."""
 
 
-class Number(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class Number(Placed, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """One value of the station."""
 
-    at: Annotated[
-        Place, tells("`input register N`, `holding register N`, `discrete input N` or `coil N`.")
-    ]
     words: Annotated[Literal[1, 2], tells("how many registers it takes: 2 for 32 bits.")] = 1
     low_first: Annotated[bool, tells("the first of the two registers holds the low word.")] = False
     signed: Annotated[bool, tells("it is signed (two's complement).")] = False
-    bit: Annotated[Bit | None, tells("only this bit of it; 0 is the least significant.")] = None
+    bit: Annotated[LongBit | None, tells("only this bit of it; 0 is the least significant.")] = None
     scale: Annotated[
         float, tells("the factor from the maker's unit to ours (0.1 for tenths of an ampere).")
     ] = 1.0
 
     def problems(self) -> Remarks:
         """An invalid place; options that do not fit its table or width."""
-        if reason := misplaced(self.at, tuple(TABLES)):
-            yield ("at",), reason
-            return
-        if misplaced(self.at, REGISTERS) and (self.words, self.signed, self.bit) != (
-            1,
-            False,
-            None,
-        ):
+        yield from super().problems()
+        of_registers = (self.words, self.signed, self.bit) != (1, False, None)
+        if of_registers and self.is_in("coil", "discrete input"):
             yield ("at",), "is one bit: leave words, signed and bit out"
-        if self.bit is not None and self.bit >= 16 * self.words:
+        if self.bit is not None and self.bit >= BITS * self.words:
             have = "two registers have" if self.words == 2 else "a register has"
-            yield ("bit",), f"{have} bits 0 to {16 * self.words - 1}"
+            yield ("bit",), f"{have} bits 0 to {BITS * self.words - 1}"
         if self.low_first and self.words == 1:
             yield ("low_first",), "is for two registers: words: 2"
 
@@ -59,9 +52,9 @@ class Number(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
 
     def value(self, words: list[int]) -> float:
         """The value of these words, which have the order of `places`."""
-        raw, bits = 0, 16 * self.words
+        raw, bits = 0, BITS * self.words
         for word in words:
-            raw = raw << 16 | word
+            raw = raw << BITS | word
         if self.bit is not None:
             return raw >> self.bit & 1
         if self.signed and raw >> (bits - 1):
@@ -71,42 +64,27 @@ class Number(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     def encoded(self, value: float) -> list[int]:
         """The words that hold this value, for a fake station."""
         raw = int(value) << self.bit if self.bit is not None else round(value / self.scale)
-        raw &= (1 << 16 * self.words) - 1
-        return [raw >> 16 * n & 0xFFFF for n in reversed(range(self.words))]
+        raw &= (1 << BITS * self.words) - 1
+        return [raw >> BITS * n & 0xFFFF for n in reversed(range(self.words))]
 
 
-class Power(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class Power(Levels, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """The command that lets the station charge."""
 
-    at: Annotated[Place, tells("`coil N` or `holding register N`.")]
+    ON = "start"
+    OFF = "stop"
+
     start: Annotated[Word, tells("the value that lets it charge.")]
     stop: Annotated[Word, tells("the value that does not.")]
     read_back: Annotated[
         bool, tells("false where it can only be written; then it is, in every scan.")
     ] = True
 
-    def problems(self) -> Remarks:
-        """A place that cannot be written; values that it cannot hold."""
-        if reason := misplaced(self.at, WRITABLE):
-            yield ("at",), reason
-        elif misplaced(self.at, ("coil",)) is None:
-            for key in ("start", "stop"):
-                if getattr(self, key) > 1:
-                    yield (key,), "a coil is 0 or 1"
-        if self.start == self.stop:
-            yield ("stop",), "is the value of start"
 
-
-class Order(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class Order(Written, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """A command that is written once."""
 
-    at: Annotated[Place, tells("`coil N` or `holding register N`.")]
     write: Annotated[Word, tells("the value that is written.")] = 1
-
-    def problems(self) -> Remarks:
-        """A place that cannot be written."""
-        if reason := misplaced(self.at, WRITABLE):
-            yield ("at",), reason
 
 
 class ChargerMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

@@ -14,6 +14,7 @@ from bridges.kinds.shared.fields import Name, tells
 from bridges.kinds.shared.remarks import Remarks
 from drivers.charger.state_codes import ROBOT_ERROR, STATION_ERROR, Codes, first_side
 from drivers.json_fields import Value, same
+from drivers.numbers import LongBit, bits_on
 
 Read = Callable[[str], object]
 """Returns the value at a place; raises DriverError if there is none."""
@@ -27,7 +28,6 @@ MEANINGS: Final[Mapping[str, Meaning]] = {
     "robot_error": ROBOT_ERROR,
 }
 UNKNOWN: Final[Meaning] = (Activity.UNKNOWN, "")
-Bit = Annotated[int, msgspec.Meta(ge=0, le=31)]
 
 
 class Test(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -113,12 +113,12 @@ class ErrorBits(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
     """Errors as bits of one number: a flag byte or word. An unlisted bit is shown by its number."""
 
     at: Annotated[Name, tells("its place.")]
-    ignore: Annotated[list[Bit], tells("bits that mean no error.")] = []
+    ignore: Annotated[list[LongBit], tells("bits that mean no error.")] = []
     station: Annotated[
-        dict[Bit, Name], tells("bit (0: least significant) -> text, for faults of the station.")
+        dict[LongBit, Name], tells("bit (0: least significant) -> text, for faults of the station.")
     ] = {}
     robot: Annotated[
-        dict[Bit, Name], tells("bit -> text, for faults of the robot, its receiver or place.")
+        dict[LongBit, Name], tells("bit -> text, for faults of the robot, its receiver or place.")
     ] = {}
 
     def problems(self) -> Remarks:
@@ -130,8 +130,7 @@ class ErrorBits(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
         """Each bit that is set: the station's first, the robot's last."""
         if not isinstance(value, int | float) or value != int(value) or value < 0:
             return [("", f"error flags {value}")]
-        number = int(value)
-        on = [b for b in range(number.bit_length()) if number >> b & 1 and b not in self.ignore]
+        on = [bit for bit in bits_on(int(value)) if bit not in self.ignore]
         known: Found = [("station", self.station[bit]) for bit in on if bit in self.station]
         known += [("", f"error bit {b}") for b in on if b not in {*self.station, *self.robot}]
         return known + [("robot", self.robot[bit]) for bit in on if bit in self.robot]

@@ -11,6 +11,7 @@ import msgspec
 from bridges.kinds.charger.signals import Activity, FaultSide
 from bridges.kinds.shared.fields import tells
 from bridges.kinds.shared.remarks import Remarks
+from drivers.numbers import listed_twice
 
 CODE_MAX = 65535
 Code = Annotated[int, msgspec.Meta(ge=0, le=CODE_MAX)]
@@ -43,12 +44,7 @@ class Codes(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
 
     def problems(self) -> Remarks:
         """States that are listed twice."""
-        seen: dict[int, str] = {}
-        for name in self.__struct_fields__:
-            for n, code in enumerate(getattr(self, name)):
-                if code in seen:
-                    yield (name, str(n)), f"state {code} is already {seen[code]}: give it once"
-                seen[code] = name
+        return listed_twice({name: getattr(self, name) for name in self.__struct_fields__})
 
     def meanings(self) -> dict[int | str, tuple[Activity, FaultSide]]:
         """The maker's state -> (activity, the side of an error)."""

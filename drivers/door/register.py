@@ -14,15 +14,14 @@ from bridges.kinds.shared.fields import Name, tells
 from bridges.kinds.shared.remarks import Remarks
 from bridges.kinds.shared.table import Table
 from drivers.door.closing import CLOSING
-from drivers.door.register_map import DoorMap, Errors, Flag, Parts, Status
+from drivers.door.register_map import DoorMap, Errors, Parts, Status
 from drivers.driver_type import DriverType
 from drivers.hal.modbus import ModbusBus
 from drivers.hal.modbus.lines import Lines
 from drivers.hal.modbus.points import Point
 from drivers.hal.modbus.registers import WRITABLE, Unit, Word, at, misplaced, place
+from drivers.numbers import bits_on
 from drivers.profiles import Profile, profile_problems
-
-BITS: Final = 16
 
 
 class Settings(DoorSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -159,8 +158,7 @@ class RegisterDoor:
     def write(self, outputs: DoorOutputs) -> None:
         """Hold the door, or release it."""
         command = self._map.command
-        value = command.hold if outputs.hold_open else command.release
-        self._lines.bring({"command": value})
+        self._lines.bring({"command": command.value(outputs.hold_open)})
 
     def make_safe(self) -> None:
         """Release the door, and read the command back where possible."""
@@ -178,7 +176,7 @@ def decode(found: DoorMap, words: Mapping[str, int]) -> DoorSample:
     return DoorSample(
         opened=not lost and status in found.status.open,
         closed=not lost and status in found.status.closed,
-        obstruction=_flag(found.obstruction, words),
+        obstruction=found.obstruction and found.obstruction.is_on(words["obstruction"]),
         lost=lost,
         errors=_errors(found.errors, words),
     )
@@ -203,15 +201,10 @@ def _lost(found: DoorMap, words: Mapping[str, int]) -> str:
     return ""
 
 
-def _flag(flag: Flag | None, words: Mapping[str, int]) -> bool | None:
-    return None if flag is None else bool(words["obstruction"] >> flag.bit & 1)
-
-
 def _errors(errors: Errors | None, words: Mapping[str, int]) -> tuple[str, ...]:
     if errors is None:
         return ()
-    on = (bit for bit in range(BITS) if words["errors"] >> bit & 1)
-    return tuple(errors.bits.get(bit, f"error bit {bit}") for bit in on)
+    return tuple(errors.bits.get(bit, f"error bit {bit}") for bit in bits_on(words["errors"]))
 
 
 def _address(text: str) -> int:

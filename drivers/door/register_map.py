@@ -6,16 +6,16 @@ import msgspec
 
 from bridges.kinds.shared.fields import Name, tells
 from bridges.kinds.shared.remarks import Remarks
-from drivers.hal.modbus.registers import REGISTERS, WRITABLE, Place, Word, misplaced
+from drivers.hal.modbus.map_parts import InRegister, Levels, RegisterBit
+from drivers.hal.modbus.registers import Word
+from drivers.numbers import Bit, listed_twice
 
-Bit = Annotated[int, msgspec.Meta(ge=0, le=15)]
 Percent = Annotated[int, msgspec.Meta(ge=0, le=100)]
 
 
-class Status(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class Status(InRegister, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Where the door is, as one number; an unlisted number is a fault."""
 
-    at: Annotated[Place, tells("`input register N` or `holding register N`.")]
     open: Annotated[list[Word], msgspec.Meta(min_length=1), tells("those of a fully open door.")]
     closed: Annotated[list[Word], msgspec.Meta(min_length=1), tells("those of a closed door.")]
     moving: Annotated[
@@ -23,24 +23,21 @@ class Status(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
         msgspec.Meta(min_length=1),
         tells("those of a door between its ends, without a fault."),
     ]
-    faults: Annotated[dict[Word, Name], tells("number -> what is wrong.")] = {}
+    faults: Annotated[dict[Word, Name], tells("number -> what is wrong.")] = msgspec.field(
+        default_factory=dict
+    )
 
     def problems(self) -> Remarks:
         """A place that is not a register; a number with two meanings."""
-        yield from _place_problems(self.at, REGISTERS)
-        first: dict[int, str] = {}
-        for key in ("open", "closed", "moving", "faults"):
-            for i, value in enumerate(getattr(self, key)):
-                if value in first:
-                    path = (key, str(value if key == "faults" else i))
-                    yield path, f"{value} is listed under {first[value]} already"
-                first.setdefault(value, key)
+        yield from super().problems()
+        yield from listed_twice(
+            {key: getattr(self, key) for key in ("open", "closed", "moving", "faults")}
+        )
 
 
-class Position(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class Position(InRegister, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """How far the door is open, from 0 (closed) to 100 (open); any other number is a fault."""
 
-    at: Annotated[Place, tells("`input register N` or `holding register N`.")]
     unknown: Annotated[
         Word | None, tells("the number for an unknown position; then only the status counts.")
     ] = None
@@ -53,41 +50,27 @@ class Position(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
 
     def problems(self) -> Remarks:
         """A place that is not a register; thresholds that overlap; `unknown` within 0 to 100."""
-        yield from _place_problems(self.at, REGISTERS)
+        yield from super().problems()
         if self.unknown is not None and self.unknown <= 100:
             yield ("unknown",), "0 to 100 are positions"
         if self.open_from <= self.closed_to:
             yield ("open_from",), "must be greater than closed_to"
 
 
-class Errors(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class Errors(InRegister, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """The faults that the operator reports. They are shown only; no decision depends on them."""
 
-    at: Annotated[Place, tells("`input register N` or `holding register N`.")]
     bits: Annotated[
         dict[Bit, Name], tells("bit (0: least significant) -> fault; others are shown by number.")
-    ] = {}
-
-    def problems(self) -> Remarks:
-        """A place that is not a register."""
-        yield from _place_problems(self.at, REGISTERS)
+    ] = msgspec.field(default_factory=dict)
 
 
-class Flag(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """One bit of a register."""
-
-    at: Annotated[Place, tells("`input register N` or `holding register N`.")]
-    bit: Annotated[Bit, tells("its number; 0 is the least significant.")]
-
-    def problems(self) -> Remarks:
-        """A place that is not a register."""
-        yield from _place_problems(self.at, REGISTERS)
-
-
-class Command(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class Command(Levels, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """The command that holds the door open. No value drives it shut."""
 
-    at: Annotated[Place, tells("`coil N` or `holding register N`.")]
+    ON = "hold"
+    OFF = "release"
+
     hold: Annotated[Word, tells("the value that holds it open.")]
     release: Annotated[
         Word, tells("the value that releases it, so that the operator closes it by its own rules.")
@@ -98,16 +81,6 @@ class Command(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=T
         nothing proves that the operator took it."""),
     ] = True
 
-    def problems(self) -> Remarks:
-        """A place that cannot be written; values that it cannot hold."""
-        yield from _place_problems(self.at, WRITABLE)
-        if self.hold == self.release:
-            yield ("release",), "is the value of hold"
-        if misplaced(self.at, ("coil",)) is None:
-            for key in ("hold", "release"):
-                if getattr(self, key) > 1:
-                    yield (key,), "a coil is 0 or 1"
-
 
 class Parts(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Parts that replace those of the profile's map; each is given in full."""
@@ -116,7 +89,7 @@ class Parts(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     position: Annotated[Position | None, tells("how far it is open.")] = None
     errors: Annotated[Errors | None, tells("the faults that it reports.")] = None
     obstruction: Annotated[
-        Flag | None, tells("somebody is in the doorway: a hold lasts until it is clear.")
+        RegisterBit | None, tells("somebody is in the doorway: a hold lasts until it is clear.")
     ] = None
     command: Annotated[Command | None, tells("what holds it open.")] = None
 
@@ -136,8 +109,3 @@ class DoorMap(Parts, frozen=True, kw_only=True, forbid_unknown_fields=True):
         """Part -> its place, for each part that is given."""
         parts = {name: getattr(self, name) for name in Parts.__struct_fields__}
         return {name: part.at for name, part in parts.items() if part is not None}
-
-
-def _place_problems(text: str, tables: tuple[str, ...]) -> Remarks:
-    if reason := misplaced(text, tables):
-        yield ("at",), reason

@@ -19,8 +19,8 @@ from drivers.hal.modbus.registers import WRITABLE, Unit, at, misplaced
 from drivers.lift import checks
 from drivers.lift.register_map import (
     DoorField,
-    Flag,
     FloorField,
+    LiftFlag,
     LiftMap,
     MotionField,
     Number,
@@ -163,9 +163,9 @@ def _outputs(settings: Settings) -> Table:
     return Table("outputs", ("output", "writes", "off", "how long"), told)
 
 
-def _meaning(part: Number | Flag) -> str:
+def _meaning(part: Number | LiftFlag) -> str:
     text = ", only in AGV mode" if part.valid_when else ""
-    if isinstance(part, Flag):
+    if isinstance(part, LiftFlag):
         bit = "" if part.bit is None else f" bit {part.bit}"
         return f"{bit}: asserted at {int(part.active == 'high')}{text}"
     return (f" bits {', '.join(map(str, part.bits))}" if part.bits else "") + text
@@ -220,7 +220,7 @@ def encode(found: LiftMap, outputs: LiftOutputs) -> dict[str, int]:
 
 def decode(found: LiftMap, words: Mapping[str, int]) -> LiftSample:
     """Decode the registers, given by part of the map. Never raises."""
-    flags = {n: p.asserted(words[n]) for n, p in found.parts().items() if isinstance(p, Flag)}
+    flags = {n: p.asserted(words[n]) for n, p in found.parts().items() if isinstance(p, LiftFlag)}
     service = _service(found, words)
     agv = _agv(found, flags, service)
     unknown = {n for n, part in found.parts().items() if part.valid_when and not agv}

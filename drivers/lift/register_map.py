@@ -10,20 +10,18 @@ import msgspec
 from bridges.kinds.lift.signals import Hazard
 from bridges.kinds.shared.fields import Name, tells
 from bridges.kinds.shared.remarks import Remarks
-from drivers.hal.modbus.points import BITS
-from drivers.hal.modbus.registers import REGISTERS, TABLES, WRITABLE, Place, Word, misplaced
+from drivers.hal.modbus.map_parts import InRegister, Levels, Placed, Written
+from drivers.hal.modbus.registers import REGISTERS, Place, Word
 from drivers.lift.wiring import ServiceState
+from drivers.numbers import Bit
 
-Bit = Annotated[int, msgspec.Meta(ge=0, le=BITS - 1)]
 
-
-class Field(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class Field(InRegister, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """A number in a register."""
 
-    at: Annotated[Place, tells("`input register N` or `holding register N`.")]
     bits: Annotated[
         list[Bit], tells("the bits, least significant first; the whole register when absent.")
-    ] = []
+    ] = msgspec.field(default_factory=list)
     valid_when: Annotated[
         Literal["agv_mode"] | None, tells("`agv_mode` if it is valid only while AGV mode is on.")
     ] = None
@@ -41,8 +39,8 @@ class Field(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
         return sum((number >> i & 1) << bit for i, bit in enumerate(self.bits))
 
     def fits(self, numbers: Collection[int], key: str) -> Remarks:
-        """A place that is not a register, a bit that is listed twice, numbers that do not fit."""
-        yield from _misplaced(self.at, REGISTERS)
+        """An invalid place, a bit that is listed twice, numbers of `key` that do not fit."""
+        yield from InRegister.problems(self)
         if len(set(self.bits)) < len(self.bits):
             yield ("bits",), "a bit stands here twice"
         for number in numbers:
@@ -54,7 +52,9 @@ class FloorField(Field, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Where the car is."""
 
     codes: Annotated[dict[Word, Name], tells("number -> landing; an unlisted number is a fault.")]
-    between_floors: Annotated[list[Word], tells("the numbers for a car between floors.")] = []
+    between_floors: Annotated[list[Word], tells("the numbers for a car between floors.")] = (
+        msgspec.field(default_factory=list)
+    )
 
     def problems(self) -> Remarks:
         """What `fits` finds; a number with two meanings."""
@@ -116,12 +116,9 @@ class ServiceField(Field, frozen=True, kw_only=True, forbid_unknown_fields=True)
 Number: TypeAlias = FloorField | DoorField | MotionField | ServiceField
 
 
-class Flag(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class LiftFlag(Placed, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """One bit."""
 
-    at: Annotated[
-        Place, tells("`input register N`, `holding register N`, `coil N` or `discrete input N`.")
-    ]
     bit: Annotated[Bit | None, tells("its number; 0 is the least significant.")] = None
     active: Annotated[Literal["high", "low"], tells("the asserted level; `high` is 1.")]
     valid_when: Annotated[
@@ -138,16 +135,18 @@ class Flag(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
 
     def problems(self) -> Remarks:
         """An invalid place; a register without its bit, or a coil with one."""
-        yield from _misplaced(self.at, tuple(TABLES))
-        register = misplaced(self.at, REGISTERS) is None
-        if register and self.bit is None:
+        yield from super().problems()
+        if self.is_in(*REGISTERS) and self.bit is None:
             yield ("bit",), "a flag is one bit of a register: say which"
-        if self.bit is not None and misplaced(self.at, ("coil", "discrete input")) is None:
+        if self.is_in("coil", "discrete input") and self.bit is not None:
             yield ("bit",), "is for registers: a coil or discrete input is one bit already"
 
 
-class Command(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class Command(Levels, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """One thing that is asked of the lift."""
+
+    ON = "ask"
+    OFF = "release"
 
     at: Annotated[
         Place,
@@ -157,18 +156,11 @@ class Command(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=T
     ask: Annotated[Word, tells("the value that asks for it.")] = 1
     release: Annotated[Word, tells("the value that does not; its safe value.")] = 0
 
-    def problems(self) -> Remarks:
-        """A place that cannot be written; values that it cannot hold."""
-        yield from _misplaced(self.at, WRITABLE)
-        if self.ask == self.release:
-            yield ("release",), "is the value of ask"
-        for key in ("ask", "release"):
-            if getattr(self, key) > 1 and misplaced(self.at, ("coil",)) is None:
-                yield (key,), "a coil is 0 or 1"
 
-
-class CallCommand(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class CallCommand(Written, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Calls as numbers in a register."""
+
+    TABLES = ("holding register",)
 
     at: Annotated[Place, tells("`holding register N`.")]
     codes: Annotated[dict[Word, Name], tells("number -> landing.")]
@@ -176,7 +168,7 @@ class CallCommand(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
 
     def problems(self) -> Remarks:
         """A place that cannot be written; a landing whose number means no call."""
-        yield from _misplaced(self.at, ("holding register",))
+        yield from super().problems()
         if self.none in self.codes:
             yield ("codes", str(self.none)), f"{self.none} is no call, as none says"
 
@@ -224,8 +216,7 @@ class Commands(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
         """Place -> value, with these signals asserted and a call to this landing (None: no call)."""
         found: dict[str, int] = {}
         for signal, _, command in self.singles():
-            value = command.ask if signal in asserted else command.release
-            found[command.at] = found.get(command.at, 0) | value
+            found[command.at] = found.get(command.at, 0) | command.value(signal in asserted)
         if self.call:
             codes = {level: number for number, level in self.call.codes.items()}
             value = self.call.none if call is None else codes[call]
@@ -259,22 +250,24 @@ class LiftMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=T
         ServiceField | None, tells("the lift's service state; it may include hazards and AGV mode.")
     ] = None
     agv_mode: Annotated[
-        Flag | None, tells("the controller confirms AGV mode; or `service` does.")
+        LiftFlag | None, tells("the controller confirms AGV mode; or `service` does.")
     ] = None
     fire_alarm: Annotated[
-        Flag | None, tells("the fire alarm; MODE_FIRE, latched with `fire_reset: manual`.")
+        LiftFlag | None, tells("the fire alarm; MODE_FIRE, latched with `fire_reset: manual`.")
     ] = None
-    code_blue: Annotated[Flag | None, tells("the hospital's code blue; MODE_EMERGENCY.")] = None
-    earthquake: Annotated[Flag | None, tells("an earthquake sensor; MODE_EMERGENCY.")] = None
-    emergency: Annotated[Flag | None, tells("the car's emergency stop; MODE_EMERGENCY.")] = None
-    out_of_service: Annotated[Flag | None, tells("it is off or out of order; MODE_OFFLINE.")] = None
+    code_blue: Annotated[LiftFlag | None, tells("the hospital's code blue; MODE_EMERGENCY.")] = None
+    earthquake: Annotated[LiftFlag | None, tells("an earthquake sensor; MODE_EMERGENCY.")] = None
+    emergency: Annotated[LiftFlag | None, tells("the car's emergency stop; MODE_EMERGENCY.")] = None
+    out_of_service: Annotated[
+        LiftFlag | None, tells("it is off or out of order; MODE_OFFLINE.")
+    ] = None
     manual_mode: Annotated[
-        Flag | None, tells("inspection or manual drive (key switch); MODE_OFFLINE.")
+        LiftFlag | None, tells("inspection or manual drive (key switch); MODE_OFFLINE.")
     ] = None
-    overload: Annotated[Flag | None, tells("the car is too heavy; delays the ride.")] = None
+    overload: Annotated[LiftFlag | None, tells("the car is too heavy; delays the ride.")] = None
     commands: Annotated[Commands, tells("the commands to the lift.")]
 
-    def parts(self) -> dict[str, Number | Flag]:
+    def parts(self) -> dict[str, Number | LiftFlag]:
         """Name -> part, for each part that is read and given."""
         read = [name for name in self.__struct_fields__ if name != "commands"]
         found = {name: getattr(self, name) for name in read}
@@ -284,8 +277,3 @@ class LiftMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=T
         """Does the map have this state, as a flag or as a state of `service`?"""
         in_service = self.service is not None and state in self.service.codes.values()
         return in_service or getattr(self, state) is not None
-
-
-def _misplaced(text: str, tables: tuple[str, ...]) -> Remarks:
-    if reason := misplaced(text, tables):
-        yield ("at",), reason

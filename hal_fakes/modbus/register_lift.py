@@ -15,7 +15,7 @@ from drivers.hal.modbus.points import Point
 from drivers.hal.modbus.registers import at
 from drivers.lift import dry_contact
 from drivers.lift.register import Settings
-from drivers.lift.register_map import DoorField, Field, Flag, LiftMap, MotionField, ServiceField
+from drivers.lift.register_map import DoorField, Field, LiftFlag, LiftMap, MotionField, ServiceField
 from hal_fakes.fake import Fake
 from hal_fakes.plants.lift import LiftPlant, Pace
 from hal_fakes.plants.plant import Plant
@@ -28,7 +28,7 @@ def contacts(settings: Settings) -> dry_contact.Settings:
     """The lift behind the gateway, as the wiring of its contacts."""
     found, inputs, coils = settings.map, count(), count()
 
-    def line(part: Field | Flag | None = None, active: str = "high") -> dict[str, str]:
+    def line(part: Field | LiftFlag | None = None, active: str = "high") -> dict[str, str]:
         when = {"valid_when": part.valid_when} if part and part.valid_when else {}
         point = f"unit {settings.unit} discrete input {next(inputs)}"
         return {"point": point, "active": active, **when}
@@ -104,7 +104,7 @@ class RegisterLift:
 
     def _word(self, name: str) -> int:
         part = getattr(self._map, name)
-        if isinstance(part, Flag):
+        if isinstance(part, LiftFlag):
             return part.word(self.plant.sense(name))
         if isinstance(part, DoorField):
             return part.word(self._door(name, part))

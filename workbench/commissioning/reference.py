@@ -222,7 +222,8 @@ def _headings(tops: Headings) -> Headings:
     """Every struct of the page with its heading, in the page's order."""
     everywhere = [struct for top in tops for struct, _ in _inside(top, ())]
     heirs = Counter(base for struct in {*tops, *everywhere} for base in _bases(struct))
-    printed = {*tops, *everywhere, *(base for base, many in heirs.items() if many > 1)}
+    shared = (base for base, many in heirs.items() if many > 1 and len(_fields(base)) > 1)
+    printed = {*tops, *everywhere, *shared}  # one key alone is no section: each has it
     inside = {top: list(_inside(top, printed)) for top in tops}
     tops_of = Counter(struct for found in inside.values() for struct in {s for s, _ in found})
     ordered: Headings = {}
@@ -231,8 +232,8 @@ def _headings(tops: Headings) -> Headings:
         for struct, path in inside[top]:
             if tops_of[struct] == 1:
                 ordered.setdefault(struct, f"#{heading}: `{path}`")
-    shared = sorted((_purpose(s).partition(".")[0], s) for s in printed if s not in ordered)
-    return ordered | {struct: f"### {title}" for title, struct in shared}
+    rest = sorted((_purpose(s).partition(".")[0], s) for s in printed if s not in ordered)
+    return ordered | {struct: f"### {title}" for title, struct in rest}
 
 
 def _inside(top: type, printed: Container[type]) -> Iterator[tuple[type, str]]:

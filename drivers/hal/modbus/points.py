@@ -13,6 +13,7 @@ from typing import Final, Literal
 from msgspec import Struct
 
 from drivers.hal.points import Wire
+from drivers.numbers import BITS
 
 Table = Literal["coil", "discrete input", "holding register", "input register"]
 """`registers.py` spells places: points without a unit, and whole registers."""
@@ -33,9 +34,6 @@ COUNT_MAX: Final[dict[Table, int]] = {
     "input register": 125,
 }
 """The most that one reply can carry (Modbus Application Protocol V1.1b3, 6.1 to 6.4)."""
-
-BITS: Final = 16
-"""The bits of a register; bit 0 is the least significant."""
 
 _MODEL_DIGIT: Final[dict[Table, int]] = {
     "coil": 0,

@@ -4,54 +4,37 @@ A module that is not written to in time drops its outputs by itself. Each make h
 arming, refreshing and showing this, so they are in the YAML or a profile. `dead_man.py` uses them.
 """
 
-from collections.abc import Collection
 from typing import Annotated, Final
 
 import msgspec
 
 from bridges.kinds.shared.fields import Name, Period, tells
 from bridges.kinds.shared.remarks import Remarks
-from drivers.hal.modbus.registers import TABLES, WRITABLE, Place, Unit, Word, misplaced
+from drivers.hal.modbus.map_parts import Placed, Written
+from drivers.hal.modbus.registers import Unit, Word
 from drivers.profiles import Profile, profile_problems
 
 
-class Write(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class Write(Written, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """One write."""
 
-    at: Annotated[Place, tells("`holding register N` or `coil N`.")]
     value: Annotated[Word, tells("what is written.")]
 
-    def problems(self) -> Remarks:
-        """A place that cannot be written."""
-        yield from _place_problems(self.at, WRITABLE)
 
-
-class Refresh(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class Refresh(Written, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """What keeps the watchdog from tripping."""
 
-    at: Annotated[Place, tells("`holding register N` or `coil N`.")]
     values: Annotated[
         list[Word],
         msgspec.Meta(min_length=1),
         tells("written in turn: some modules only count a value that differs from the last."),
     ]
 
-    def problems(self) -> Remarks:
-        """A place that cannot be written."""
-        yield from _place_problems(self.at, WRITABLE)
 
-
-class Shows(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class Shows(Placed, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """A place, and the values to look for."""
 
-    at: Annotated[
-        Place, tells("`holding register N`, `input register N`, `coil N` or `discrete input N`.")
-    ]
     values: Annotated[list[Word], msgspec.Meta(min_length=1), tells("any of these counts.")]
-
-    def problems(self) -> Remarks:
-        """An invalid place."""
-        yield from _place_problems(self.at, tuple(TABLES))
 
 
 class Habits(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -105,8 +88,3 @@ class Watchdog(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
 
 
 PROFILE: Final = Profile("module_watchdog", "habits", Habits)
-
-
-def _place_problems(text: str, tables: Collection[str]) -> Remarks:
-    if reason := misplaced(text, tables):
-        yield ("at",), reason

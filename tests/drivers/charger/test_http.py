@@ -289,8 +289,8 @@ def test_the_example_is_right_and_says_that_it_can_only_observe() -> None:
 def test_a_code_with_two_meanings_or_twice_is_a_problem_at_its_place() -> None:
     codes = Codes(idle=[0, 1], charging=[5, 5], error=[238, 0])
     assert list(codes.problems()) == [
-        (("charging", "1"), "state 5 is already charging: give it once"),
-        (("error", "1"), "state 0 is already idle: give it once"),
+        (("charging", "1"), "5 is listed under charging already"),
+        (("error", "1"), "0 is listed under idle already"),
     ]
 
 
@@ -301,7 +301,7 @@ def test_a_code_with_two_meanings_or_twice_is_a_problem_at_its_place() -> None:
         ("idle: []\n      charging: [5]", "", "at least 1"),
         ("idle: [0]\n      charging: [65536]", "22:18", "65535"),
         ("idle: [0]\n      charging: [-1]", "22:18", "0"),
-        ("idle: [0]\n      charging: [5, 0]", "22:21", "state 0 is already idle"),
+        ("idle: [0]\n      charging: [5, 0]", "22:21", "0 is listed under idle already"),
         ("idle: [0]\n      charging: [5]\n      manual: [12]", "23:7", "unknown key 'manual'"),
     ],
 )

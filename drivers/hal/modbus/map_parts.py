@@ -1,0 +1,80 @@
+"""The parts of a register map, as a YAML or a profile gives them: a place, a bit, a command.
+
+The maps of lifts, doors and chargers, and of modules' watchdogs, are made of these.
+"""
+
+from collections.abc import Collection
+from typing import Annotated, ClassVar
+
+import msgspec
+
+from bridges.kinds.shared.fields import tells
+from bridges.kinds.shared.remarks import Remarks
+from drivers.hal.modbus.registers import REGISTERS, TABLES, WRITABLE, Place, Word, misplaced
+from drivers.numbers import Bit
+
+
+class Placed(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """What has a place. `TABLES`: the tables that it may be in."""
+
+    TABLES: ClassVar[Collection[str]] = tuple(TABLES)
+
+    at: Annotated[
+        Place, tells("`input register N`, `holding register N`, `coil N` or `discrete input N`.")
+    ]
+
+    def problems(self) -> Remarks:
+        """An invalid place."""
+        if reason := misplaced(self.at, self.TABLES):
+            yield ("at",), reason
+
+    def is_in(self, *tables: str) -> bool:
+        """Is its place in one of these tables?"""
+        return misplaced(self.at, tables) is None
+
+
+class InRegister(Placed, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """What is read from a register."""
+
+    TABLES = REGISTERS
+
+    at: Annotated[Place, tells("`input register N` or `holding register N`.")]
+
+
+class Written(Placed, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """What is written."""
+
+    TABLES = WRITABLE
+
+    at: Annotated[Place, tells("`coil N` or `holding register N`.")]
+
+
+class RegisterBit(InRegister, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """One bit of a register."""
+
+    bit: Annotated[Bit, tells("its number; 0 is the least significant.")]
+
+    def is_on(self, word: int) -> bool:
+        """Is the bit set in a register's value?"""
+        return bool(word >> self.bit & 1)
+
+
+class Levels(Written, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A command that is on or off. `ON`, `OFF`: the keys of the two values."""
+
+    ON: ClassVar[str]
+    OFF: ClassVar[str]
+
+    def value(self, on: bool) -> int:
+        """The value that is written for on or off."""
+        value: Word = getattr(self, self.ON if on else self.OFF)
+        return value
+
+    def problems(self) -> Remarks:
+        """A place that cannot be written; values that it cannot hold."""
+        yield from super().problems()
+        if self.value(True) == self.value(False):
+            yield (self.OFF,), f"is the value of {self.ON}"
+        for key in (self.ON, self.OFF):
+            if getattr(self, key) > 1 and self.is_in("coil"):
+                yield (key,), "a coil is 0 or 1"
