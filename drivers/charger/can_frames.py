@@ -14,13 +14,7 @@ from typing import Annotated
 import msgspec
 
 from bridges.kinds.charger.settings import ChargerSettings
-from bridges.kinds.charger.signals import (
-    Activity,
-    ChargerOutputs,
-    ChargerSample,
-    FaultSide,
-    Measured,
-)
+from bridges.kinds.charger.signals import Activity, ChargerOutputs, ChargerSample, Measured
 from bridges.kinds.shared.fields import Name, tells
 from bridges.kinds.shared.remarks import Remarks
 from bridges.kinds.shared.table import Table
@@ -28,11 +22,10 @@ from bridges.yaml.spelling import unknown
 from drivers import DriverError
 from drivers.charger import dbc
 from drivers.charger.can_map import NMT, PROFILE, FrameMap, Sent, rows, tables
-from drivers.charger.rules import Meant, meaning, with_errors
+from drivers.charger.rules import Found, Meant, meaning, receiver_text, with_errors
 from drivers.driver_type import DriverType
 from drivers.hal import HalError, can
-from drivers.hal.can.broadcasts import Broadcasts, Said
-from drivers.profiles import profile_problems
+from drivers.hal.can.broadcasts import Broadcasts, Said, Sequel, Values
 
 Volume = Annotated[float, msgspec.Meta(ge=-100_000, le=100_000)]
 
@@ -57,7 +50,7 @@ class Settings(ChargerSettings, frozen=True, kw_only=True, forbid_unknown_fields
                 ("on_death",),
                 "it stops when our frames cease, so it cannot be kept: leave this out",
             )
-        before = list(profile_problems(PROFILE, self.profile, self.map))
+        before = list(PROFILE.problems(self.profile, self.map))
         yield from before
         if not before and not any(self.map.problems() if self.map else ()):
             yield from _setpoint_problems(self)
@@ -69,7 +62,7 @@ class Settings(ChargerSettings, frozen=True, kw_only=True, forbid_unknown_fields
 
 def frame_map(settings: Settings) -> FrameMap:
     """The map: the one in the YAML, or the profile's."""
-    return settings.map or PROFILE.load(settings.profile or "")
+    return PROFILE.chosen(settings.profile, settings.map)
 
 
 def _setpoint_problems(settings: Settings) -> Remarks:
@@ -124,7 +117,7 @@ def claims(settings: Settings) -> Iterator[tuple[str, tuple[str, ...]]]:
 
     CANopen's NMT frame is everybody's.
     """
-    if any(profile_problems(PROFILE, settings.profile, settings.map)):
+    if any(PROFILE.problems(settings.profile, settings.map)):
         return
     found = frame_map(settings)
     if any(found.problems()):
@@ -156,11 +149,7 @@ def frame_tables(settings: Settings) -> Iterator[Table]:
 
 def warnings(settings: Settings) -> Remarks:
     """Valid settings that deserve a second look: (path, text)."""
-    if settings.profile and PROFILE.untried(settings.profile):
-        text = (
-            f"nobody has tried the profile {settings.profile} on hardware: watch the first charge"
-        )
-        yield ("profile",), text
+    yield from PROFILE.warnings(settings.profile, "watch the first charge")
     found = frame_map(settings)
     if found.receiver is None and settings.receivers:
         yield ("receivers",), "the map has no receiver: it will charge nobody"
@@ -181,8 +170,8 @@ class FrameDriver:
         self._setpoints = settings.setpoints
         self._map = frame_map(settings)
         self._dbc = dbc.load(self._map.dbc)
-        self._frames = Broadcasts(bus, _said(self._map, self._dbc))
-        self._in_error = False
+        said, sequel = _said(self._map, self._dbc), _sequel(self._map)
+        self._frames = Broadcasts(bus, said, self._dbc.decode, sequel)
         self._power: bool | None = None
         self._sent_on: bool | None = None
         self._seen = False
@@ -190,35 +179,15 @@ class FrameDriver:
 
     def open(self) -> None:
         """Check that scans are frequent enough for each period; send nothing. Raises DriverError."""
-        for sent in self._map.send:
-            self._frames.check_pace(sent.frame, sent.every_s)
-        for wake in self._map.wake:
-            self._frames.check_pace(wake.frame, wake.every_s)
+        for ours in (*self._map.send, *self._map.wake):
+            self._frames.check_pace(ours.frame, ours.every_s)
 
     def read(self) -> ChargerSample:
         """Read and decode the charger's fresh frames. Raises DriverError."""
         self._seen = False
-        values = self._values(self._read())
-        meant = self._meant(values)
-        if self._undiagnosed(meant.activity, values):
-            state, *_ = self._map.state_frames()
-            values = self._values(self._frames.read_after(state, self._map.error_frames()))
-        codes = self._map.state.codes if self._map.state else None
-        found = with_errors(meant, self._errors(values, meant.activity), codes)
+        sample = decode(self._map, self._dbc, self._read())
         self._seen = True
-        return ChargerSample(
-            found.activity,
-            found.code,
-            found.text,
-            self._measured(values),
-            side=found.side,
-            charges=found.charges,
-        )
-
-    def _meant(self, values: Mapping[str, float]) -> Meant:
-        state = self._map.state
-        codes, code = (state.codes, int(values.get(state.at, -1))) if state else (None, None)
-        return meaning(self._map.rules, codes, lambda at: _heard(values, at), code)
+        return sample
 
     def write(self, outputs: ChargerOutputs) -> None:
         """Send each frame that is due, for power on or off. Raises DriverError.
@@ -244,8 +213,8 @@ class FrameDriver:
             except DriverError:
                 return  # its frames cease, so it stops by itself
 
-    def _read(self) -> dict[str, bytes]:
-        """Its fresh frames. Without them, send what wakes it, if it is due. Raises HalError."""
+    def _read(self) -> Values:
+        """The values of its fresh frames. Without them, wake it if that is due. Raises HalError."""
         try:
             return self._frames.read()
         except HalError:
@@ -267,54 +236,71 @@ class FrameDriver:
             self._touched = self._touched or on
             self._frames.feed(self._dbc.id(sent.frame), sent.every_s, payload)
 
-    def _undiagnosed(self, activity: Activity, values: dict[str, float]) -> bool:
-        """Has an error just begun whose signals have not come yet? They may follow the state's frame.
 
-        `read` then waits for them, once for each error: an error without a side would count as the
-        station's and take it out of service.
-        """
-        before, self._in_error = self._in_error, activity is Activity.ERROR
-        return self._in_error and not before and not self._errors(values, activity)
+def decode(found: FrameMap, frames: dbc.Dbc, values: Values) -> ChargerSample:
+    """Decode the charger's fresh signals. Raises DriverError."""
+    meant = _meant(found, values)
+    codes = found.state.codes if found.state else None
+    shown = with_errors(meant, _errors(found, values, meant.activity), codes)
+    return ChargerSample(
+        shown.activity,
+        shown.code,
+        shown.text,
+        _measured(found, frames, values),
+        side=shown.side,
+        charges=shown.charges,
+    )
 
-    def _values(self, frames: Mapping[str, bytes]) -> dict[str, float]:
-        """Every signal of these frames, by Frame.Signal. Raises DriverError."""
-        return {
-            f"{frame}.{signal}": value
-            for frame, payload in frames.items()
-            for signal, value in self._dbc.decode(frame, payload).items()
-        }
 
-    def _errors(self, values: dict[str, float], activity: Activity) -> list[tuple[FaultSide, str]]:
-        """The errors in the frames that have come, whatever the state is.
+def _meant(found: FrameMap, values: Values) -> Meant:
+    state = found.state
+    codes, code = (state.codes, int(values.get(state.at, -1))) if state else (None, None)
+    return meaning(found.rules, codes, lambda at: _heard(values, at), code)
 
-        The signal of `out_of_range` is an error only in an error state; otherwise it tells where the
-        robot is.
-        """
-        position = "" if activity is Activity.ERROR else self._map.out_of_range
-        return self._map.errors.found(lambda at: 0 if at == position else values.get(at))
 
-    def _valid(self, signal: str, value: float) -> bool:
+def _errors(found: FrameMap, values: Values, activity: Activity) -> Found:
+    """The errors in the frames that have come, whatever the state is.
+
+    The signal of `out_of_range` is an error only in an error state; otherwise it tells where the robot
+    is.
+    """
+    position = "" if activity is Activity.ERROR else found.out_of_range
+    return found.errors.found(lambda at: 0 if at == position else values.get(at))
+
+
+def _measured(found: FrameMap, frames: dbc.Dbc, values: Values) -> Measured:
+    def is_valid(signal: str) -> bool:
         """The DBC file's [min|max]: a value outside is no reading."""
-        low, high = self._dbc.bounds(*signal.split("."))
-        return low <= value <= high
+        low, high = frames.bounds(*signal.split("."))
+        return low <= values[signal] <= high
 
-    def _measured(self, values: dict[str, float]) -> Measured:
-        found = self._map
-        receiver = values.get(found.receiver or "")
-        out = values.get(found.out_of_range or "")
-        return Measured(
-            receiver_id=_receiver(receiver),
-            in_range=None if out is None else not out,
-            range_ok=_flag(values, found.range_ok),
-            at_height=_flag(values, found.at_height),
-            volts=_rounded(values.get(found.volts or "")),
-            amps=_rounded(values.get(found.amps or "")),
-            temperatures=tuple(
-                (name, round(values[signal], 3))
-                for name, signal in found.temperatures.items()
-                if signal in values and self._valid(signal, values[signal])
-            ),
-        )
+    out = values.get(found.out_of_range or "")
+    return Measured(
+        receiver_id=receiver_text(values.get(found.receiver or "")),
+        in_range=None if out is None else not out,
+        range_ok=_flag(values, found.range_ok),
+        at_height=_flag(values, found.at_height),
+        volts=_rounded(values.get(found.volts or "")),
+        amps=_rounded(values.get(found.amps or "")),
+        temperatures=tuple(
+            (name, round(values[signal], 3))
+            for name, signal in found.temperatures.items()
+            if signal in values and is_valid(signal)
+        ),
+    )
+
+
+def _sequel(found: FrameMap) -> Sequel:
+    """The signals of an error may follow the frame of the state.
+
+    An error without a side would count as the station's and take it out of service.
+    """
+    return Sequel(
+        first=found.state_frames()[0],
+        others=found.error_frames(),
+        begins=lambda values: _meant(found, values).activity is Activity.ERROR,
+        is_told=lambda values: bool(_errors(found, values, Activity.ERROR)),
+    )
 
 
 def _said(found: FrameMap, frames: dbc.Dbc) -> dict[str, Said]:
@@ -334,20 +320,15 @@ def _said(found: FrameMap, frames: dbc.Dbc) -> dict[str, Said]:
     }
 
 
-def _heard(values: Mapping[str, float], signal: str) -> float:
+def _heard(values: Values, signal: str) -> float:
     if signal not in values:
         raise DriverError(f"{signal} is not heard, and a rule looks at it")
     return values[signal]
 
 
-def _flag(values: Mapping[str, float], signal: str | None) -> bool | None:
+def _flag(values: Values, signal: str | None) -> bool | None:
     """None where the map has no such signal."""
     return None if signal is None else bool(values[signal])
-
-
-def _receiver(number: float | None) -> str | None:
-    """The receiver's id as text: "" for 0, no receiver; None where the map has no such signal."""
-    return None if number is None else str(int(number)) if number else ""
 
 
 def _rounded(value: float | None) -> float | None:

@@ -16,12 +16,11 @@ from drivers import DriverError
 from drivers.charger import rules
 from drivers.charger.register_map import PROFILE, ChargerMap, Number
 from drivers.charger.register_tables import samples
-from drivers.charger.rules import judged
+from drivers.charger.rules import judged, receiver_text
 from drivers.driver_type import DriverType
 from drivers.hal.modbus import ModbusBus
 from drivers.hal.modbus.points import Point
 from drivers.hal.modbus.registers import WRITABLE, Unit, at, misplaced
-from drivers.profiles import profile_problems
 
 POWER: Final = "power"
 
@@ -42,7 +41,7 @@ class Settings(ChargerSettings, frozen=True, kw_only=True, forbid_unknown_fields
     def problems(self) -> Remarks:
         """Problems that involve more than one field."""
         yield from super().problems()
-        before = list(profile_problems(PROFILE, self.profile, self.map))
+        before = list(PROFILE.problems(self.profile, self.map))
         yield from before
         if before:
             return
@@ -55,7 +54,7 @@ class Settings(ChargerSettings, frozen=True, kw_only=True, forbid_unknown_fields
 
 def charger_map(settings: Settings) -> ChargerMap:
     """The map: the one in the YAML, or the profile's."""
-    return settings.map or PROFILE.load(settings.profile or "")
+    return PROFILE.chosen(settings.profile, settings.map)
 
 
 def cells(settings: Settings) -> dict[str, list[Point]]:
@@ -71,7 +70,7 @@ def orders(settings: Settings) -> dict[str, Point]:
 
 def claims(settings: Settings) -> Iterator[tuple[str, tuple[str, ...]]]:
     """(place, path) of each place that is written; nothing while the map has problems."""
-    if any(profile_problems(PROFILE, settings.profile, settings.map)):
+    if any(PROFILE.problems(settings.profile, settings.map)):
         return
     for name, text in charger_map(settings).orders().items():
         if misplaced(text, WRITABLE) is None:
@@ -108,9 +107,7 @@ def tables(settings: Settings) -> Iterator[Table]:
 
 def warnings(settings: Settings) -> Remarks:
     """Valid settings that deserve a second look: (path, text)."""
-    if settings.profile and PROFILE.untried(settings.profile):
-        text = f"nobody has tried the profile {settings.profile} on hardware"
-        yield ("profile",), f"{text}: watch the first charge"
+    yield from PROFILE.warnings(settings.profile, "watch the first charge")
     found = charger_map(settings)
     if found.power is None:
         yield (), "observe-only: the map has no power, so it is not switched off after a fault"
@@ -212,7 +209,7 @@ def decode(found: ChargerMap, values: Mapping[str, float]) -> ChargerSample:
         said.code,
         said.text,
         Measured(
-            receiver_id=_receiver(values.get("receiver")),
+            receiver_id=receiver_text(values.get("receiver")),
             in_range=_flag(values.get("in_range")),
             volts=values.get("volts"),
             amps=values.get("amps"),
@@ -225,11 +222,6 @@ def decode(found: ChargerMap, values: Mapping[str, float]) -> ChargerSample:
         said.side,
         said.charges,
     )
-
-
-def _receiver(number: float | None) -> str | None:
-    """ "" for 0, no receiver; None where the map has no such value."""
-    return None if number is None else f"{number:g}" if number else ""
 
 
 def _flag(value: float | None) -> bool | None:

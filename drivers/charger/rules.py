@@ -294,3 +294,8 @@ def problems(rules: list[Rule], has_codes: bool) -> Remarks:
 def said(found: Found) -> str:
     """The texts of all errors, in one line."""
     return "; ".join(text for _, text in found)
+
+
+def receiver_text(number: float | None) -> str | None:
+    """A receiver's id as text: "" for 0, no receiver; None where the map has no such value."""
+    return None if number is None else str(int(number)) if number else ""

@@ -21,7 +21,7 @@ from drivers.hal.modbus.lines import Lines
 from drivers.hal.modbus.points import Point
 from drivers.hal.modbus.registers import WRITABLE, Unit, Word, at, misplaced, place
 from drivers.numbers import bits_on
-from drivers.profiles import Profile, profile_problems
+from drivers.profiles import Profile
 
 
 class Settings(DoorSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -42,7 +42,7 @@ class Settings(DoorSettings, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     def problems(self) -> Remarks:
         """Problems that involve more than one field."""
         yield from super().problems()
-        before = list(profile_problems(PROFILE, self.profile, self.map))
+        before = list(PROFILE.problems(self.profile, self.map))
         yield from before
         if self.map and self.changes:
             yield ("changes",), "is for a profile: change the map that is written here"
@@ -61,8 +61,7 @@ PROFILE: Final = Profile("door_register", "map", DoorMap)
 
 def door_map(settings: Settings) -> DoorMap:
     """The map: the one in the YAML, or the profile's."""
-    found: DoorMap = settings.map or PROFILE.load(settings.profile or "")
-    return found.changed(settings.changes)
+    return PROFILE.chosen(settings.profile, settings.map).changed(settings.changes)
 
 
 def points(settings: Settings) -> dict[str, Point]:
@@ -75,7 +74,7 @@ def points(settings: Settings) -> dict[str, Point]:
 
 def claims(settings: Settings) -> Iterator[tuple[str, tuple[str, ...]]]:
     """(place, path) of the command, for this device alone; nothing while the map has problems."""
-    if any(profile_problems(PROFILE, settings.profile, settings.map)):
+    if any(PROFILE.problems(settings.profile, settings.map)):
         return
     place_of_command = door_map(settings).command.at
     if misplaced(place_of_command, WRITABLE) is None:
@@ -115,9 +114,7 @@ def tables(settings: Settings) -> Iterator[Table]:
 
 def warnings(settings: Settings) -> Remarks:
     """Valid settings to review before the door goes into service: (path, text)."""
-    if settings.profile and PROFILE.untried(settings.profile):
-        text = f"nobody has tried the profile {settings.profile} on hardware: watch the door move"
-        yield ("profile",), text
+    yield from PROFILE.warnings(settings.profile, "watch the door move")
     if not door_map(settings).command.read_back:
         written = _command_in(settings)
         path = (*written, "read_back") if written else ("profile",)
@@ -176,7 +173,7 @@ def decode(found: DoorMap, words: Mapping[str, int]) -> DoorSample:
     return DoorSample(
         opened=not lost and status in found.status.open,
         closed=not lost and status in found.status.closed,
-        obstruction=found.obstruction and found.obstruction.is_on(words["obstruction"]),
+        obstruction=found.obstruction.is_on(words["obstruction"]) if found.obstruction else None,
         lost=lost,
         errors=_errors(found.errors, words),
     )

@@ -17,14 +17,7 @@ from drivers.hal.modbus import ModbusBus
 from drivers.hal.modbus.lines import Lines
 from drivers.hal.modbus.registers import WRITABLE, Unit, at, misplaced
 from drivers.lift import checks
-from drivers.lift.register_map import (
-    DoorField,
-    FloorField,
-    LiftFlag,
-    LiftMap,
-    MotionField,
-    Number,
-)
+from drivers.lift.register_map import DoorField, FloorField, LiftFlag, LiftMap, MotionField, Number
 from drivers.lift.table import DEBOUNCE_S, HAZARD_DEBOUNCE_S
 from drivers.lift.tables import BETWEEN, FAULT, floors, how_long
 

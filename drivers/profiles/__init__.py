@@ -46,9 +46,31 @@ class Profile(Generic[Content]):
         assert isinstance(found, self._content)
         return found
 
-    def untried(self, name: str) -> bool:
-        """Is it for a real make, and not yet tried on its hardware?"""
-        return self._read(FOLDER / f"{name}.yaml")["hardware"] == "untried"
+    def chosen(self, name: str | None, inline: Content | None) -> Content:
+        """The content: the one in the YAML, or the profile's. Raises SettingsError."""
+        return inline or self.load(name or "")
+
+    def problems(self, name: str | None, inline: object) -> Remarks:
+        """Problems of `profile:` and of the key that may replace it (`map`)."""
+        if name is None and inline is None:
+            text = f"needs '{self.key}', or a profile: {either(self.names())}"
+            yield ("profile",), text
+        elif name is not None and inline is not None:
+            yield ("profile",), f"'{self.key}' is written out as well: delete one of the two"
+        elif name is not None and name not in self.names():
+            yield ("profile",), unknown("profile", name, self.names())
+        elif name is not None:
+            try:
+                self.load(name)
+            except SettingsError as error:
+                for problem in error.problems:
+                    yield ("profile",), f"the profile is not right: {problem}"
+
+    def warnings(self, name: str | None, advice: str) -> Remarks:
+        """A profile of a real make that nobody has tried on its hardware; `advice`: how to try it."""
+        if name and self._read(FOLDER / f"{name}.yaml")["hardware"] == "untried":
+            text = f"nobody has tried the profile {name} on hardware: {advice}"
+            yield ("profile",), text
 
     def _read(self, file: Path) -> dict[str, object]:
         from bridges.yaml.nodes import read
@@ -83,25 +105,3 @@ def _understood(
     page.check()
     assert BROKEN not in made.values()
     return made
-
-
-def profile_problems(sort: Profile[msgspec.Struct], name: str | None, inline: object) -> Remarks:
-    """Problems of `profile:` and of the key that may replace it (`map`)."""
-    if name is None and inline is None:
-        text = f"needs '{sort.key}', or a profile: {either(sort.names())}"
-        yield ("profile",), text
-    elif name is not None and inline is not None:
-        yield ("profile",), f"'{sort.key}' is written out as well: delete one of the two"
-    elif name is not None:
-        yield from _named(sort, name)
-
-
-def _named(sort: Profile[msgspec.Struct], name: str) -> Remarks:
-    if name not in sort.names():
-        yield ("profile",), unknown("profile", name, sort.names())
-        return
-    try:
-        sort.load(name)
-    except SettingsError as error:
-        for problem in error.problems:
-            yield ("profile",), f"the profile is not right: {problem}"

@@ -4,7 +4,7 @@ A broadcast is valid while it is fresh. The periodic frames are sent from the sc
 sender: when the daemon hangs, they cease.
 """
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from typing import NamedTuple
 
 from drivers.hal import HalError
@@ -27,12 +27,38 @@ class Said(NamedTuple):
     needed: bool
 
 
-class Broadcasts:
-    """The frames of one device by their names."""
+Values = Mapping[str, float]
+"""Frame.Signal -> its value."""
 
-    def __init__(self, bus: CanBus, frames: Mapping[str, Said]) -> None:
+
+class Sequel(NamedTuple):
+    """Frames that explain what another frame says, and may come after it.
+
+    `first`, `others`: that frame and these. `begins(values)`: does the first say what they explain?
+    `is_told(values)`: have they explained it?
+    """
+
+    first: str
+    others: Collection[str]
+    begins: Callable[[Values], bool]
+    is_told: Callable[[Values], bool]
+
+
+class Broadcasts:
+    """The frames of one device by their names. `decode(frame, payload)`: the values of its signals."""
+
+    def __init__(
+        self,
+        bus: CanBus,
+        frames: Mapping[str, Said],
+        decode: Callable[[str, bytes], Values],
+        sequel: Sequel,
+    ) -> None:
         self._bus = bus
         self._frames = frames
+        self._decode = decode
+        self._sequel = sequel
+        self._begun = False
         self._pause = bus.backoff()
         self._heard: dict[str, tuple[bytes, float]] = {}
         self._odd: dict[str, str] = {}
@@ -40,8 +66,12 @@ class Broadcasts:
         for name, said in frames.items():
             bus.listen([Wanted(said.id, said.mask | EXTENDED)], self._hearer(name, said.length))
 
-    def read(self) -> dict[str, bytes]:
-        """Every fresh frame by name: its payload. Waits for one that is needed. Raises HalError."""
+    def read(self) -> dict[str, float]:
+        """The values of every fresh frame, by Frame.Signal. Raises HalError, and what `decode` raises.
+
+        It waits for a frame that is needed, and when the sequel's first frame begins to say what the
+        others explain, once for these.
+        """
         self._bus.take()
         if self._missing():
             self._pause.check()
@@ -50,16 +80,19 @@ class Broadcasts:
         else:
             self._odd.clear()
         self._pause.mended()
-        return self._fresh()
+        values = self._values()
+        before, self._begun = self._begun, self._sequel.begins(values)
+        if self._begun and not before and not self._sequel.is_told(values):
+            self._wait_for_sequel()
+            values = self._values()
+        return values
 
-    def read_after(self, first: str, others: Iterable[str]) -> dict[str, bytes]:
-        """The same, after `others` have followed `first` or `timeout_s` is over. Raises HalError."""
-        since = self._at(first)
+    def _wait_for_sequel(self) -> None:
+        since = self._at(self._sequel.first)
         self._bus.wait(
-            lambda: all(self._at(name, since) > since for name in others),
+            lambda: all(self._at(name, since) > since for name in self._sequel.others),
             self._bus.settings.timeout_s,
         )
-        return self._fresh()
 
     def check_pace(self, frame: str, every_s: float) -> None:
         """Raises HalError if scans are too far apart to send this frame on time."""
@@ -99,8 +132,13 @@ class Broadcasts:
     def _is_fresh(self, name: str) -> bool:
         return self._bus.now() - self._at(name) < self._frames[name].fresh_s
 
-    def _fresh(self) -> dict[str, bytes]:
-        return {name: payload for name, (payload, _) in self._heard.items() if self._is_fresh(name)}
+    def _values(self) -> dict[str, float]:
+        fresh = ((name, said) for name, (said, _) in self._heard.items() if self._is_fresh(name))
+        return {
+            f"{name}.{signal}": value
+            for name, payload in fresh
+            for signal, value in self._decode(name, payload).items()
+        }
 
     def _missing(self) -> str:
         """The first frame that is needed and not fresh; "" if there is none."""

@@ -36,7 +36,7 @@ class Placed(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
 class InRegister(Placed, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """What is read from a register."""
 
-    TABLES = REGISTERS
+    TABLES: ClassVar[Collection[str]] = REGISTERS
 
     at: Annotated[Place, tells("`input register N` or `holding register N`.")]
 
@@ -44,7 +44,7 @@ class InRegister(Placed, frozen=True, kw_only=True, forbid_unknown_fields=True):
 class Written(Placed, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """What is written."""
 
-    TABLES = WRITABLE
+    TABLES: ClassVar[Collection[str]] = WRITABLE
 
     at: Annotated[Place, tells("`coil N` or `holding register N`.")]
 

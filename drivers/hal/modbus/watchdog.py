@@ -12,7 +12,7 @@ from bridges.kinds.shared.fields import Name, Period, tells
 from bridges.kinds.shared.remarks import Remarks
 from drivers.hal.modbus.map_parts import Placed, Written
 from drivers.hal.modbus.registers import Unit, Word
-from drivers.profiles import Profile, profile_problems
+from drivers.profiles import Profile
 
 
 class Write(Written, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -70,21 +70,17 @@ class Watchdog(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
         """Neither or both of profile and habits; a profile with problems."""
         if len(set(self.units)) < len(self.units):
             yield ("units",), "names a unit twice"
-        yield from profile_problems(PROFILE, self.profile, self.habits)
+        yield from PROFILE.problems(self.profile, self.habits)
 
     def chosen(self) -> Habits:
         """The habits: those in the YAML, or the profile's."""
-        return self.habits or PROFILE.load(self.profile or "")
+        return PROFILE.chosen(self.profile, self.habits)
 
     def warnings(self) -> Remarks:
         """A profile that nobody has tried."""
-        if any(profile_problems(PROFILE, self.profile, self.habits)):
-            return
-        if self.profile and PROFILE.untried(self.profile):
-            text = (
-                f"nobody has tried the profile {self.profile} on hardware: pull the network cable,"
-            )
-            yield ("profile",), f"{text} and see that the relays drop"
+        if not any(PROFILE.problems(self.profile, self.habits)):
+            advice = "pull the network cable, and see that the relays drop"
+            yield from PROFILE.warnings(self.profile, advice)
 
 
 PROFILE: Final = Profile("module_watchdog", "habits", Habits)

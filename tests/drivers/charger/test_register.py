@@ -82,6 +82,12 @@ def test_receiver_range_voltage_and_current_are_read_by_the_map() -> None:
     assert decode(SETTINGS.map, {**WELL, "receiver": 0}).measured.receiver_id == ""
 
 
+def test_two_receivers_with_long_ids_are_two() -> None:
+    assert SETTINGS.map
+    read = [decode(SETTINGS.map, {**WELL, "receiver": id}) for id in (12_345_678, 12_345_679)]
+    assert [sample.measured.receiver_id for sample in read] == ["12345678", "12345679"]
+
+
 WRONG: dict[str, tuple[str, str]] = {
     "state: {at: input register 0}": (
         "stat: {at: input register 0}",
