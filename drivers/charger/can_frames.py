@@ -179,8 +179,10 @@ class FrameDriver:
 
     def open(self) -> None:
         """Check that scans are frequent enough for each period; send nothing. Raises DriverError."""
-        for ours in (*self._map.send, *self._map.wake):
-            self._frames.check_pace(ours.frame, ours.every_s)
+        for sent in self._map.send:
+            self._frames.check_pace(sent.frame, sent.every_s)
+        for wake in self._map.wake:
+            self._frames.check_pace(wake.frame, wake.every_s)
 
     def read(self) -> ChargerSample:
         """Read and decode the charger's fresh frames. Raises DriverError."""
