@@ -1,4 +1,4 @@
-"""The interface of every transport: `ros2`, `dds`, `zenoh`, `memory`.
+"""The interface of every transport: `ros2`, `dds`, `zenoh`.
 
 Each has a file beside this one; `bridges/transports/choose.py` opens the one that the YAML names.
 """

@@ -12,12 +12,12 @@ from bridges.messages import definitions as d
 from bridges.messages.releases import JAZZY, KILTED, Release
 from bridges.messages.rihs01 import type_hash
 from bridges.runtime.outlet import Outlet
-from bridges.transports.memory import MemoryNetwork, MemoryTransport
 from bridges.transports.peers import Announced, Peers
 from bridges.transports.transport import Transport
 from tests.transports.conftest import DDS
 from tests.transports.domains import domain_of_this_run
 from tests.transports.joining import joining
+from tests.transports.memory import MemoryNetwork, MemoryTransport
 from tests.waiting import wait_until
 
 CLEANING = d.RobotMode(9, 7, "sweeping")

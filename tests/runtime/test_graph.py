@@ -17,10 +17,10 @@ from bridges.runtime.clock import Clock
 from bridges.runtime.graph import GraphNode
 from bridges.runtime.presence import SPREAD_MOST_S
 from bridges.runtime.serving import Serving, stop
-from bridges.transports.memory import MemoryNetwork, MemoryTransport
 from bridges.transports.transport import Transport
 from hal_fakes import wire
 from tests.transports.domains import domain_of_this_run
+from tests.transports.memory import MemoryNetwork, MemoryTransport
 from tests.waiting import wait_until
 
 WALL = 1_800_000_000.0

@@ -9,11 +9,11 @@ import pytest
 from bridges.runtime.service import service
 from bridges.runtime.serving import stop
 from bridges.settings.load import load
-from bridges.transports.memory import MemoryNetwork, MemoryTransport
 from tests.depth import depth
 from tests.drivers.hal.modbus.line import SerialModule
 from tests.drivers.hal.modbus.module import Module, door
 from tests.runtime.corridor import SCAN_S, Corridor
+from tests.transports.memory import MemoryNetwork, MemoryTransport
 from tests.waiting import wait_until
 
 TIMEOUT_S = 0.3

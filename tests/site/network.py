@@ -16,8 +16,8 @@ from typing import Any
 from bridges.messages.definitions import Message
 from bridges.messages.releases import NEWEST
 from bridges.messages.topics import DOOR_STATES, LIFT_STATES, Topic
-from bridges.transports.memory import MemoryNetwork, MemoryTransport
 from tests.site.timeline import NEVER, Timeline
+from tests.transports.memory import MemoryNetwork, MemoryTransport
 
 LEASE_S = 10.0
 STATES = (LIFT_STATES.name, DOOR_STATES.name)

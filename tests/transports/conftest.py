@@ -5,10 +5,10 @@ from typing import Any
 import pytest
 
 from bridges.transports.choose import missing_of_dds
-from bridges.transports.memory import MemoryNetwork, MemoryTransport
 from bridges.transports.transport import Transport
 from tests.transports.domains import domain_of_this_run
 from tests.transports.joining import Join, joining
+from tests.transports.memory import MemoryNetwork, MemoryTransport
 
 if missing_of_dds():
     collect_ignore = [

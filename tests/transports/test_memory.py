@@ -2,7 +2,7 @@ from msgspec.structs import replace
 
 from bridges.messages import definitions as d
 from bridges.messages.topics import FIRE_ALARM_TRIGGER, LIFT_STATES, Qos
-from bridges.transports.memory import MemoryNetwork, MemoryTransport
+from tests.transports.memory import MemoryNetwork, MemoryTransport
 
 
 def test_a_message_is_there_when_publish_returns() -> None:

@@ -7,8 +7,8 @@ import pytest
 from bridges.messages import definitions as d
 from bridges.messages import topics
 from bridges.messages.topics import Topic
-from bridges.transports.memory import MemoryNetwork, MemoryTransport
 from tests.transports.golden_qos import GOLDEN, PLAIN, RETAINED, Qos
+from tests.transports.memory import MemoryNetwork, MemoryTransport
 
 TOPICS = {topic.name: topic for topic in vars(topics).values() if isinstance(topic, Topic)}
 

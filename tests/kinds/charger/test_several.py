@@ -12,8 +12,8 @@ from bridges.messages.topics import CHARGER_STATES
 from bridges.runtime.service import service
 from bridges.runtime.serving import stop
 from bridges.settings.load import load
-from bridges.transports.memory import MemoryNetwork, MemoryTransport
 from tests.drivers.hal.http.far_end import Caller, Conversation, FarEnd, always, answer
+from tests.transports.memory import MemoryNetwork, MemoryTransport
 from tests.waiting import wait_until
 
 TIMEOUT_S = 0.5

@@ -12,7 +12,7 @@ from bridges.messages.definitions import ChargerRequest, Duration
 from bridges.runtime.clock import Clock
 from bridges.runtime.graph import GraphNode
 from bridges.settings.load import load
-from bridges.transports.memory import MemoryNetwork, MemoryTransport
+from tests.transports.memory import MemoryNetwork, MemoryTransport
 
 SITE = load(Path("config/charger_coordinator.yaml")).section
 WISH = ChargerRequest("charger_a", "tiny", "AMR03", Duration(60), "wish-1")

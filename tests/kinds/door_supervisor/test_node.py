@@ -12,8 +12,8 @@ from bridges.messages.stamps import stamp
 from bridges.runtime import graph as graph_node
 from bridges.runtime.clock import Clock
 from bridges.runtime.graph import GraphNode
-from bridges.transports.memory import MemoryNetwork, MemoryTransport
 from tests.runtime.virtual_graph import Disk
+from tests.transports.memory import MemoryNetwork, MemoryTransport
 
 OPEN, CLOSE = d.DoorModeValue.MODE_OPEN, d.DoorModeValue.MODE_CLOSED
 HEARTBEAT = topics.DOOR_SUPERVISOR_HEARTBEAT

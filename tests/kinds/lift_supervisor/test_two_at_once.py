@@ -9,8 +9,8 @@ from bridges.kinds.lift_supervisor.settings import Settings
 from bridges.messages.topics import Topic
 from bridges.runtime.clock import Clock
 from bridges.runtime.graph import GraphNode
-from bridges.transports.memory import MemoryNetwork, MemoryTransport
 from bridges.transports.transport import Subscription
+from tests.transports.memory import MemoryNetwork, MemoryTransport
 
 DISCOVERY_S = 0.3
 STEP_S = 0.05

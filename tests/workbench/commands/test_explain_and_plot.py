@@ -11,8 +11,8 @@ from bridges.messages import topics
 from bridges.messages.definitions import LiftState
 from bridges.messages.heard import Heard
 from bridges.messages.releases import NEWEST
-from bridges.transports.memory import MemoryNetwork, MemoryTransport
 from hal_fakes.wire import wire
+from tests.transports.memory import MemoryNetwork, MemoryTransport
 from tests.workbench.explain.scenes import fire, held_by_another
 from tests.workbench.replay.written import MCAP, SQLITE, write
 from workbench.explain.site import Site

@@ -11,7 +11,7 @@ from msgspec.structs import replace
 from bridges.messages import definitions as d
 from bridges.messages import topics
 from bridges.messages.heard import Heard
-from bridges.transports.memory import MemoryNetwork, MemoryTransport
+from tests.transports.memory import MemoryNetwork, MemoryTransport
 from tests.workbench.graph.test_exchange import GRANTED, LIFT, ME
 from workbench.commands import send
 from workbench.graph.exchange import step

@@ -23,9 +23,9 @@ from bridges.messages import topics
 from bridges.messages.topics import Topic
 from bridges.settings.load import load
 from bridges.transports.choose import open_transport
-from bridges.transports.memory import MemoryNetwork, MemoryTransport
 from bridges.transports.transport import Transport
 from hal_fakes.wire import Wire, runs_here
+from tests.transports.memory import MemoryNetwork, MemoryTransport
 from tests.transports.zenoh_programs import Router
 from tests.waiting import LEASE_S, PATIENCE_S, wait_until
 from workbench.commands import send, watch
