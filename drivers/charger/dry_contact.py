@@ -23,6 +23,7 @@ from bridges.kinds.shared.remarks import Remarks
 from bridges.kinds.shared.table import Table
 from drivers.driver_type import DriverType
 from drivers.hal.points import Input, Output, Points, PointsBus, Wire, input_wires
+from drivers.on_points import OnPoints
 from drivers.tables import lines_on, one_cut, told_of_cuts
 from drivers.unsafe import Unsafe, needlessly_accepted, unaccepted, unsafe_wires
 
@@ -126,16 +127,12 @@ def create(name: str, settings: Settings, bus: PointsBus) -> "DryContactCharger"
     return DryContactCharger(Points(wires(settings), bus))
 
 
-class DryContactCharger:
+class DryContactCharger(OnPoints):
     """`drivers.Driver` for one station."""
 
     def __init__(self, points: Points) -> None:
-        self._points = points
+        super().__init__(points)
         self._enabled = False
-
-    def open(self) -> None:
-        """Claim every contact, and the relay, off; after a failure the relay may stay as it was."""
-        self._points.open()
 
     def read(self) -> ChargerSample:
         """Every contact, read now."""
@@ -147,19 +144,10 @@ class DryContactCharger:
             self._enabled = outputs.power
         self._points.write({ENABLE: self._enabled})
 
-    def contacts(self) -> Mapping[str, bool]:
-        """Each contact and relay as it was read or written last."""
-        return self._points.last_known()
-
     def make_safe(self) -> None:
         """Switch the relay off and verify it."""
         self._enabled = False
-        self._points.make_safe()
-
-    def close(self) -> None:
-        """Switch the relay off and release the lines."""
-        self._enabled = False
-        self._points.close()
+        super().make_safe()
 
 
 def decode(shown: Mapping[str, bool], enabled: bool) -> ChargerSample:

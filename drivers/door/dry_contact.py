@@ -21,6 +21,7 @@ from bridges.kinds.shared.table import Table
 from drivers.door.closing import CLOSING
 from drivers.driver_type import DriverType
 from drivers.hal.points import Flash, Input, Output, Point, Points, PointsBus, Wire, input_wires
+from drivers.on_points import OnPoints
 from drivers.unsafe import Unsafe, needlessly_accepted, slow_alarms, unaccepted, unsafe_wires
 
 DEBOUNCE_S: Final = 0.05
@@ -148,17 +149,13 @@ def create(name: str, settings: Settings, bus: PointsBus) -> "DryContactDoor":
     )
 
 
-class DryContactDoor:
+class DryContactDoor(OnPoints):
     """`drivers.Driver` for one door. `flashes`: the module times the pulses of the hold."""
 
     def __init__(self, points: Points, flashes: bool = False) -> None:
-        self._points = points
+        super().__init__(points)
         self._flashes = flashes
         self._asked = False
-
-    def open(self) -> None:
-        """Claim the relay, switched off, and the contacts."""
-        self._points.open()
 
     def read(self) -> DoorSample:
         """Every contact, read now."""
@@ -173,18 +170,10 @@ class DryContactDoor:
         elif outputs.hold_open and not asked:
             self._points.flash("hold_open")
 
-    def contacts(self) -> Mapping[str, bool]:
-        """Each contact and relay as it was read or written last."""
-        return self._points.last_known()
-
     def make_safe(self) -> None:
         """Switch the hold relay off and verify it."""
         self._asked = False
-        self._points.make_safe()
-
-    def close(self) -> None:
-        """Switch the relay off and release the lines."""
-        self._points.close()
+        super().make_safe()
 
 
 def _unsafe(settings: Settings) -> Iterator[Unsafe]:

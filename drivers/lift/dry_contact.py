@@ -15,6 +15,7 @@ from drivers.lift import codes
 from drivers.lift import table as lift_table
 from drivers.lift import tables as lift_tables
 from drivers.lift.wiring import Inputs, LiftWiring
+from drivers.on_points import OnPoints
 
 DOOR = {
     (True, False): Door.OPEN,
@@ -65,17 +66,13 @@ def create(name: str, settings: Settings, bus: PointsBus) -> "LiftDryContact":
     return LiftDryContact(settings, bus)
 
 
-class LiftDryContact:
+class LiftDryContact(OnPoints):
     """`drivers.Driver[LiftSample, LiftOutputs]` for one lift."""
 
     def __init__(self, settings: Settings, bus: PointsBus) -> None:
+        super().__init__(Points(wires(settings), bus))
         self._settings = settings
         self._conditional = lift_table.conditional(settings)
-        self._points = Points(wires(settings), bus)
-
-    def open(self) -> None:
-        """Claim every output, switched off, and every input."""
-        self._points.open()
 
     def read(self) -> LiftSample:
         """Every input, read now and decoded."""
@@ -84,18 +81,6 @@ class LiftDryContact:
     def write(self, outputs: LiftOutputs) -> None:
         """Set every output to this level, those that go off first."""
         self._points.write(encode(self._settings, outputs))
-
-    def contacts(self) -> Mapping[str, bool]:
-        """Each contact and relay as it was read or written last."""
-        return self._points.last_known()
-
-    def make_safe(self) -> None:
-        """Switch every output off and verify it where possible."""
-        self._points.make_safe()
-
-    def close(self) -> None:
-        """Switch every output off and release the lines."""
-        self._points.close()
 
 
 def encode(settings: Settings, outputs: LiftOutputs) -> dict[str, bool]:

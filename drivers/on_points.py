@@ -1,0 +1,28 @@
+"""What every driver on contacts does alike; `read` and `write` are its own."""
+
+from collections.abc import Mapping
+
+from drivers.hal.points import Points
+
+
+class OnPoints:
+    """A device's contacts and relays."""
+
+    def __init__(self, points: Points) -> None:
+        self._points = points
+
+    def open(self) -> None:
+        """Claim every relay, switched off, and every contact."""
+        self._points.open()
+
+    def contacts(self) -> Mapping[str, bool]:
+        """Each contact and relay as it was read or written last."""
+        return self._points.last_known()
+
+    def make_safe(self) -> None:
+        """Switch every relay off and verify it where possible."""
+        self._points.make_safe()
+
+    def close(self) -> None:
+        """Switch every relay off and release the lines."""
+        self._points.close()
