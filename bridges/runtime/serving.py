@@ -4,27 +4,17 @@ import logging
 import threading
 import time
 from collections.abc import Sequence
-from typing import Protocol
+from typing import Any, Protocol
 
 from bridges.host.log import pairs
 from bridges.runtime.clock import Clock
 from bridges.runtime.contained import LeftOn
+from bridges.runtime.inbox import Inbox
 
 log = logging.getLogger(__name__)
 
 LEAST_GAP_S = 0.001
 """The least time between rounds that no event has caused."""
-
-
-class Bell(Protocol):
-    """What wakes a thread (`bridges.runtime.inbox.Inbox`)."""
-
-    def wait(self, timeout_s: float) -> bool: ...
-
-    def close(self) -> None: ...
-
-    @property
-    def closed(self) -> bool: ...
 
 
 class Rounds(Protocol):
@@ -38,7 +28,7 @@ class Rounds(Protocol):
         """The thread's name."""
 
     @property
-    def inbox(self) -> Bell:
+    def inbox(self) -> Inbox[Any]:
         """What wakes it before `wake_at`."""
 
     @property

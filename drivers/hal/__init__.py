@@ -14,7 +14,16 @@ import msgspec
 from bridges.kinds.shared.remarks import Remark, Remarks
 from drivers.hal.points import HalError, Wire
 
-__all__ = ["AnyBus", "Bus", "BusType", "HalError", "Needs", "UnwatchedOutputs", "Where"]
+__all__ = [
+    "AnyBus",
+    "Bus",
+    "BusSettings",
+    "BusType",
+    "HalError",
+    "Needs",
+    "UnwatchedOutputs",
+    "Where",
+]
 
 Settings = TypeVar("Settings", bound=msgspec.Struct)
 
@@ -72,6 +81,12 @@ class Bus:
 
     def close(self) -> None:
         """Release the bus. Does not raise; may be called twice."""
+
+
+class BusSettings(
+    msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, tag_field="type"
+):
+    """What the section of every bus derives from; its `tag` is the YAML's `type:`."""
 
 
 class BusType(msgspec.Struct, Generic[Settings], frozen=True):

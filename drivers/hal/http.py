@@ -18,7 +18,7 @@ import msgspec
 from bridges.host import user_files
 from bridges.kinds.shared.fields import AbsolutePath, Name, Period, tells
 from bridges.kinds.shared.remarks import Remarks
-from drivers.hal import Bus, BusType, HalError, Needs, Where
+from drivers.hal import Bus, BusSettings, BusType, HalError, Needs, Where
 from drivers.hal.backoff import Backoff
 from drivers.hal.deadline import Dialler, Resolve, tls_socket
 from drivers.hal.http_address import Base, Path, base
@@ -58,14 +58,7 @@ _HINTS = {
 }
 
 
-class Settings(
-    msgspec.Struct,
-    frozen=True,
-    kw_only=True,
-    forbid_unknown_fields=True,
-    tag_field="type",
-    tag="http",
-):
+class Settings(BusSettings, frozen=True, kw_only=True, forbid_unknown_fields=True, tag="http"):
     """A controller's HTTP API."""
 
     api_base: Annotated[

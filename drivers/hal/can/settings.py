@@ -6,7 +6,7 @@ import msgspec
 
 from bridges.kinds.shared.fields import Name, Period, tells
 from bridges.kinds.shared.remarks import Remarks
-from drivers.hal import Needs, Where, serial_port
+from drivers.hal import BusSettings, Needs, Where, serial_port
 
 BITRATES: Final = (
     10_000,
@@ -44,14 +44,7 @@ class Slcan(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     ] = 115_200
 
 
-class Settings(
-    msgspec.Struct,
-    frozen=True,
-    kw_only=True,
-    forbid_unknown_fields=True,
-    tag_field="type",
-    tag="can",
-):
+class Settings(BusSettings, frozen=True, kw_only=True, forbid_unknown_fields=True, tag="can"):
     """One CAN bus: either `socketcan` or `slcan`."""
 
     socketcan: Annotated[

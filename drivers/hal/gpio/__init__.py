@@ -19,7 +19,7 @@ from typing import Annotated
 import msgspec
 
 from bridges.kinds.shared.fields import Period, tells
-from drivers.hal import BusType, HalError, Needs, Where
+from drivers.hal import BusSettings, BusType, HalError, Needs, Where
 from drivers.hal.gpio.bus import Factory, GpioBus
 from drivers.hal.gpio.header import (
     J8,
@@ -44,14 +44,7 @@ __all__ = [
 ]
 
 
-class Settings(
-    msgspec.Struct,
-    frozen=True,
-    kw_only=True,
-    forbid_unknown_fields=True,
-    tag_field="type",
-    tag="gpio",
-):
+class Settings(BusSettings, frozen=True, kw_only=True, forbid_unknown_fields=True, tag="gpio"):
     """The header's pins."""
 
     chip: Annotated[

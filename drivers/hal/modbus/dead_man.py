@@ -12,31 +12,23 @@ When the daemon stops, the watchdog stays armed: the outputs are off by then, an
 import itertools
 import math
 from collections.abc import Callable, Iterable, Mapping
-from typing import Final, Protocol
+from typing import TYPE_CHECKING, Final
 
 from drivers.hal import HalError
-from drivers.hal.modbus.points import Point
 from drivers.hal.modbus.registers import at
 from drivers.hal.modbus.watchdog import Habits, Shows, Watchdog, Write
+
+if TYPE_CHECKING:
+    from drivers.hal.modbus.bus import ModbusBus
 
 DEVICE_FAILURE: Final = 4
 """The exception by which modules refuse outputs after their watchdog has tripped."""
 
 
-class Cells(Protocol):
-    """What the watchdogs need of a bus."""
-
-    def cells(self, points: Iterable[Point]) -> dict[Point, int]:
-        """These bits and registers, read now. Raises HalError."""
-
-    def write(self, point: Point, value: int) -> None:
-        """Set one. Raises HalError."""
-
-
 class UnitWatchdog:
     """The watchdog of one unit. `trips` counts the trips that were noticed."""
 
-    def __init__(self, bus: Cells, unit: int, habits: Habits) -> None:
+    def __init__(self, bus: "ModbusBus", unit: int, habits: Habits) -> None:
         self._bus = bus
         self._unit = unit
         self._habits = habits
@@ -111,7 +103,9 @@ class Guard:
 class Watchdogs:
     """The watchdogs of one bus, by unit; none if the YAML has none."""
 
-    def __init__(self, bus: Cells, settings: Watchdog | None, clock: Callable[[], float]) -> None:
+    def __init__(
+        self, bus: "ModbusBus", settings: Watchdog | None, clock: Callable[[], float]
+    ) -> None:
         self._clock = clock
         self._units: Mapping[int, UnitWatchdog] = {}
         if settings is not None:

@@ -9,14 +9,16 @@ output, an input or the unit's watchdog fails.
 import math
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import AbstractContextManager, nullcontext
-from typing import Final, Protocol
+from typing import TYPE_CHECKING, Final
 
 from drivers.hal import HalError
 from drivers.hal.every import Every
-from drivers.hal.modbus.dead_man import Guard
 from drivers.hal.modbus.points import Point, Range, parse, pieces, ranges
 from drivers.hal.modbus.wire import ILLEGAL_ADDRESS, Refused
 from drivers.hal.points import Flash
+
+if TYPE_CHECKING:
+    from drivers.hal.modbus.bus import ModbusBus
 
 AGAIN_S: Final = 5.0
 """A contradiction later than this (s) after a pause counts as a first one."""
@@ -25,32 +27,10 @@ LONGEST_S: Final = 30.0
 """An output that another master writes is left alone for so long (s), at first and at most."""
 
 
-class Units(Protocol):
-    """What lines need of a bus. `safe`: it switches an output off, so it ignores the unit's backoff."""
-
-    def read(self, asked: Range, safe: bool = False) -> dict[Point, int]:
-        """One request. Raises HalError."""
-
-    def write(self, point: Point, value: int, safe: bool = False) -> None:
-        """Set a coil or register. Raises HalError; then it may be set or not."""
-
-    def flash(self, place: Point, on_s: float) -> None:
-        """Have the module time a pulse. Raises HalError; then it may pulse."""
-
-    def guard(self, units: Iterable[int]) -> Guard:
-        """The modules' own watchdogs."""
-
-    def insist(self) -> None:
-        """Send the next request at once, without waiting for the backoff."""
-
-    def now(self) -> float:
-        """Monotonic seconds."""
-
-
 class Image:
     """Points that are read together, in as few requests as possible."""
 
-    def __init__(self, units: Units, points: Iterable[Point]) -> None:
+    def __init__(self, units: "ModbusBus", points: Iterable[Point]) -> None:
         self._units = units
         self._points = set(points)
         self._ranges = ranges(self._points)
@@ -123,7 +103,7 @@ class Lines:
 
     def __init__(
         self,
-        units: Units,
+        units: "ModbusBus",
         inputs: Mapping[str, Point],
         outputs: Mapping[str, Point],
         safe: Mapping[str, int],

@@ -7,7 +7,7 @@ import msgspec
 
 from bridges.kinds.shared.fields import Name, Period, tells
 from bridges.kinds.shared.remarks import Remarks
-from drivers.hal import Needs, UnwatchedOutputs, Where, serial_port
+from drivers.hal import BusSettings, Needs, UnwatchedOutputs, Where, serial_port
 from drivers.hal.modbus.places import Serial, Tcp
 from drivers.hal.modbus.registers import Unit
 from drivers.hal.modbus.watchdog import Watchdog
@@ -15,14 +15,7 @@ from drivers.hal.modbus.watchdog import Watchdog
 Timeout = Annotated[float, msgspec.Meta(ge=0.05, le=5, extra={"unit": "s"})]
 
 
-class Settings(
-    msgspec.Struct,
-    frozen=True,
-    kw_only=True,
-    forbid_unknown_fields=True,
-    tag_field="type",
-    tag="modbus",
-):
+class Settings(BusSettings, frozen=True, kw_only=True, forbid_unknown_fields=True, tag="modbus"):
     """A module, or a gateway or serial line with several units: `tcp` or `serial`, one of the two."""
 
     tcp: Annotated[Tcp | None, tells("where the module or gateway listens.")] = None
@@ -40,7 +33,7 @@ class Settings(
         tells("""unit -> why its outputs may keep their value when the daemon's machine or the
         network dies, or how the unit drops them (`its web page: all off after 5 s without a
         master`)."""),
-    ] = {}
+    ] = msgspec.field(default_factory=dict)
 
     def problems(self) -> Remarks:
         """Problems that involve more than one field."""
