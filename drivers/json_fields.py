@@ -54,31 +54,15 @@ def flag(answer: Mapping[str, object], place: Flag) -> bool:
     return value
 
 
+def flag_if(answer: Mapping[str, object], place: Flag | None) -> bool | None:
+    """The same; None without a place."""
+    return None if place is None else flag(answer, place)
+
+
 def place_text(place: Flag) -> str:
     """The flag as `check` prints it: its field, and the values that mean yes."""
     values = (str(yes).lower() if isinstance(yes, bool) else str(yes) for yes in place.when)
     return f"{place.field} is {', '.join(values) or 'true'}"
-
-
-def value_of(place: Flag, yes: bool) -> Value:
-    """The value that means yes or no, for a fake controller that writes the answer."""
-    if not place.when:
-        return yes
-    if yes:
-        return place.when[0]
-    others: list[Value] = [not place.when[0], *range(len(place.when) + 1)]
-    return next(no for no in others if not any(same(no, when) for when in place.when))
-
-
-def put(answer: dict[str, object], field: str, value: object) -> None:
-    """Put a value at its field, for a fake controller; list items are not supported."""
-    first, _, below = field.partition(".")
-    if below:
-        inner = answer.setdefault(first, {})
-        assert isinstance(inner, dict)
-        put(inner, below, value)
-    else:
-        answer[first] = value
 
 
 def same(value: object, given: Value) -> bool:

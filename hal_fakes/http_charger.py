@@ -12,9 +12,10 @@ from bridges.kinds.charger.signals import Activity
 from drivers.charger.http import Settings
 from drivers.charger.rules import places
 from drivers.charger.state_codes import ROBOT_ERROR
-from drivers.json_fields import Value, found, put, value_of
+from drivers.json_fields import Value, found
 from hal_fakes.charger_values import NEAREST, values
 from hal_fakes.fake import Fake
+from hal_fakes.json_answers import put, value_of
 from hal_fakes.plants.charger import ChargerPlant, Reading
 from hal_fakes.plants.plant import Plant
 

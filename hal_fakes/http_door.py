@@ -11,8 +11,8 @@ from typing import Final
 
 from drivers.door.http import HOLD, Settings
 from drivers.hal.points import Wire
-from drivers.json_fields import put, value_of
 from hal_fakes.fake import Fake
+from hal_fakes.json_answers import put, value_of
 from hal_fakes.plants import door
 from hal_fakes.plants.plant import Plant
 

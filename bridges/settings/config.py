@@ -68,19 +68,3 @@ class Config(Struct, frozen=True):
         """The same for a process that only switches off. Raises HalError."""
         hal = self.bus_type(name)
         return (hal.open_to_switch_off or hal.open_bus)(self.buses[name])
-
-
-class NoDevice(Exception):
-    """No device of the file is meant; the text says what to write."""
-
-
-def device_of(config: Config, name: str | None) -> str:
-    """The device that is meant: the only one if none is named. Raises NoDevice."""
-    names = list(config.devices)
-    if not names:
-        raise NoDevice(f"a {config.kind} has no wires")
-    if name is None and len(names) > 1:
-        raise NoDevice(f"--device is needed: the file has {', '.join(names)}")
-    if name not in (None, *names):
-        raise NoDevice(f"the file has no device '{name}'; it has {', '.join(names)}")
-    return name or names[0]

@@ -87,13 +87,13 @@ class Fields(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
         celsius = ((name, _number(answer, at)) for name, at in self.temperatures.items())
         return Measured(
             receiver_id=self.receiver_id and json_fields.name(answer, self.receiver_id),
-            in_range=_flag(answer, self.in_range),
+            in_range=json_fields.flag_if(answer, self.in_range),
             volts=_number(answer, self.volts),
             amps=_number(answer, self.amps),
             battery_percent=_number(answer, self.battery_percent, 100, "0 to 100"),
             time_to_full_s=_number(answer, self.time_to_full_s, WEEK_S, "0 s to a week"),
-            range_ok=_flag(answer, self.range_ok),
-            at_height=_flag(answer, self.at_height),
+            range_ok=json_fields.flag_if(answer, self.range_ok),
+            at_height=json_fields.flag_if(answer, self.at_height),
             temperatures=tuple((name, value) for name, value in celsius if value is not None),
         )
 
@@ -117,10 +117,6 @@ def _number(
     if number and value is not None and bounds and not 0 <= value <= most:
         raise json_fields.wrong(number.field, value, bounds)
     return value
-
-
-def _flag(answer: Answer, place: Flag | None) -> bool | None:
-    return None if place is None else json_fields.flag(answer, place)
 
 
 def _place(place: str | Number | Flag) -> str:

@@ -6,6 +6,7 @@ fails, only the relay's own timer can release the door. So `hold` sets that time
 """
 
 from collections.abc import Iterator, Mapping
+from functools import partial
 from typing import Annotated, Final
 
 import msgspec
@@ -193,17 +194,12 @@ class HttpDoor:
         self._told = on
 
     def _held(self, answer: Mapping[str, object]) -> bool | None:
-        place = self._settings.held
-        return None if place is None else json_fields.flag(answer, place)
+        return json_fields.flag_if(answer, self._settings.held)
 
 
 def decode(settings: Settings, answer: Mapping[str, object]) -> DoorSample:
     """Decode the answer. Raises DriverError that names the field it cannot decode."""
-
-    def said(place: Flag | None) -> bool | None:
-        return None if place is None else json_fields.flag(answer, place)
-
-    found = settings.inputs
+    found, said = settings.inputs, partial(json_fields.flag_if, answer)
     return DoorSample(
         said(found.opened), said(found.closed), said(found.obstruction), said(found.fire)
     )

@@ -9,7 +9,7 @@ from functools import partial
 from bridges.kinds.lift.signals import Door, Hazard, LiftOutputs, LiftSample, Motion, Side
 from bridges.kinds.shared.remarks import Remarks
 from drivers.driver_type import DriverType
-from drivers.hal.points import Points, PointsBus, Wire
+from drivers.hal.points import Points, PointsBus
 from drivers.lift import checks as lift_checks
 from drivers.lift import codes
 from drivers.lift import table as lift_table
@@ -41,24 +41,12 @@ class Settings(LiftWiring, frozen=True, kw_only=True, forbid_unknown_fields=True
         return lift_checks.problems(self)
 
 
-def wires(settings: Settings) -> list[Wire]:
-    """The wiring table."""
-    return lift_table.wires(settings)
-
-
-def warnings(settings: Settings) -> Remarks:
-    """Valid settings that deserve a second look: (path below the device, text)."""
-    return lift_checks.warnings(settings)
+wires, debounce, warnings = lift_table.wires, lift_table.debounce, lift_checks.warnings
 
 
 def notes(settings: Settings) -> Remarks:
     """Choices that the site makes and should know of: (path below the device, text)."""
     return lift_checks.notes(settings, partial(lift_checks.sees, settings))
-
-
-def debounce(settings: Settings) -> Mapping[str, float]:
-    """How long a change must last (s): `floor`, `door`, `rear_door`, `motion`, `agv_mode`, hazards."""
-    return lift_table.debounce(settings)
 
 
 def create(name: str, settings: Settings, bus: PointsBus) -> "LiftDryContact":

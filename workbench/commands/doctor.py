@@ -20,10 +20,10 @@ from bridges.host.paint import bold, red
 from bridges.kinds.shared.rmf_section import TRANSPORTS, overridden
 from bridges.messages.words import printable
 from bridges.runtime.completers import completed_by, device_names
-from bridges.settings.config import NoDevice, device_of
 from bridges.settings.load import Config, SettingsError, load
 from workbench.commissioning.doctor.finding import Finding, exit_code
 from workbench.graph.join import command_line, interruptible, seconds
+from workbench.graph.which_device import NoDevice, device_of
 
 if TYPE_CHECKING:
     from bridges.settings.building_map import BuildingMap

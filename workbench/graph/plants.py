@@ -70,8 +70,8 @@ def obey(args: argparse.Namespace, verb: str, *words: str) -> int:
 
     0; 1 if it is refused; 69 without a simulation; 64 for no such device; 78 for a wrong YAML.
     """
-    from bridges.settings.config import NoDevice, device_of
     from bridges.settings.load import SettingsError, load
+    from workbench.graph.which_device import NoDevice, device_of
 
     try:
         device = args.device or device_of(load(args.file), None)

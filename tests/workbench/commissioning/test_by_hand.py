@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 
 from bridges import cli
-from bridges.settings.config import NoDevice, device_of
 from bridges.settings.load import load
+from workbench.graph.which_device import NoDevice, device_of
 
 CONFIG = Path(__file__).parents[3] / "config"
 

@@ -1,0 +1,24 @@
+"""The other side of `drivers/json_fields.py`: writes the answer in which a driver finds its fields."""
+
+from drivers.json_fields import Flag, Value, same
+
+
+def value_of(place: Flag, yes: bool) -> Value:
+    """The value that means yes or no."""
+    if not place.when:
+        return yes
+    if yes:
+        return place.when[0]
+    others: list[Value] = [not place.when[0], *range(len(place.when) + 1)]
+    return next(no for no in others if not any(same(no, when) for when in place.when))
+
+
+def put(answer: dict[str, object], field: str, value: object) -> None:
+    """Put a value at its field; list items are not supported."""
+    first, _, below = field.partition(".")
+    if below:
+        inner = answer.setdefault(first, {})
+        assert isinstance(inner, dict)
+        put(inner, below, value)
+    else:
+        answer[first] = value
