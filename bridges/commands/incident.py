@@ -16,8 +16,6 @@ from bridges.runtime.clock import machine_s
 from bridges.runtime.directory import find
 from bridges.settings.load import SettingsError
 
-EX_UNAVAILABLE = 69
-
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The options of `incident`."""
@@ -48,7 +46,7 @@ def run(args: argparse.Namespace) -> int:
         from bridges.blackbox import mcap_write
     except ImportError as error:
         print(f"to write a recording, {error.name} is needed: {INSTALL}", file=sys.stderr)
-        return EX_UNAVAILABLE
+        return os.EX_UNAVAILABLE
     if args.anonymous:
         of_workbench("workbench.replay.anonymous")  # before the wait
     path = args.output or Path(f"{args.file.stem}_{datetime.now():%Y-%m-%d_%H-%M-%S}.mcap")
@@ -60,7 +58,7 @@ def run(args: argparse.Namespace) -> int:
         incident = _incident(places.runtime / (DIED if args.died else NAME), args, follows)
     except (PermissionError, RingError) as error:
         print(f"{error}. {_hint(died=args.died)}", file=sys.stderr)
-        return EX_UNAVAILABLE
+        return os.EX_UNAVAILABLE
     try:
         if args.anonymous:
             incident = _anonymous(incident)

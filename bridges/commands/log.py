@@ -14,7 +14,6 @@ from bridges.runtime.completers import completed_by, device_names, service_names
 from bridges.runtime.daemons import daemons, units
 from bridges.runtime.services import CONFIG
 
-EX_UNAVAILABLE = 69
 ETC = Path("/") / CONFIG
 
 
@@ -43,12 +42,12 @@ def run(args: argparse.Namespace) -> int:
             f" `rmf-bridge run {args.file} 2> LOG` sends it",
             file=sys.stderr,
         )
-        return EX_UNAVAILABLE
+        return os.EX_UNAVAILABLE
     if shutil.which("journalctl") is None:
         print(
             "no journalctl here: a daemon without systemd logs to its own terminal", file=sys.stderr
         )
-        return EX_UNAVAILABLE
+        return os.EX_UNAVAILABLE
     if name not in known:
         there = ", ".join(sorted(known)) or "none"
         print(

@@ -14,7 +14,6 @@ from bridges.runtime import signals
 from bridges.runtime.clock import machine_s
 from bridges.runtime.notify import notify
 
-EX_UNAVAILABLE = 69
 EVERY_S = 1.0
 
 
@@ -32,7 +31,7 @@ def run(args: argparse.Namespace) -> int:
         from bridges.blackbox import mcap_write  # noqa: F401 - later would be too late
     except ImportError as error:
         print(f"the recorder needs {error.name}: {INSTALL}", file=sys.stderr)
-        return EX_UNAVAILABLE
+        return os.EX_UNAVAILABLE
     end = signals.End()
     shelf = Shelf(args.output or _folder())
     shelf.tidy()

@@ -15,9 +15,10 @@ lift.py, building.py), and rmf_ros2's parse_graph.cpp, which reads the graph.
 
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
+from typing import Any
 
 from msgspec import Struct, field
-from yaml import MappingNode, Node, ScalarNode, SequenceNode
+from yaml import CollectionNode, MappingNode, Node, ScalarNode, SequenceNode
 
 from bridges.kinds.shared.kind import CHARGER, DOOR, FLOOR, LIFT, WAYPOINT
 from bridges.yaml.nodes import Page, Sort, compose, read
@@ -110,13 +111,7 @@ class _Reading:
 
     def _entries(self, node: Node, key: str) -> Iterator[tuple[ScalarNode, Node]]:
         """The entries of the mapping below `key`; none if it is missing or empty."""
-        section = _below(node, key)
-        if section is None or _is_empty(section):
-            return
-        if not isinstance(section, MappingNode):
-            self._page.note(section, f"'{key}' must be a mapping (name: ...), as RMF has it")
-            return
-        for name, value in section.value:
+        for name, value in self._section(node, key, MappingNode, "a mapping (name: ...)"):
             if isinstance(name, ScalarNode):
                 yield name, value
             else:
@@ -124,17 +119,21 @@ class _Reading:
 
     def _items(self, node: Node, key: str, what: str) -> Iterator[SequenceNode]:
         """The lists in the list below `key`; none if it is missing or empty."""
-        section = _below(node, key)
-        if section is None or _is_empty(section):
-            return
-        if not isinstance(section, SequenceNode):
-            self._page.note(section, f"'{key}' must be a list, as RMF has it")
-            return
-        for item in section.value:
+        for item in self._section(node, key, SequenceNode, "a list"):
             if isinstance(item, SequenceNode):
                 yield item
             else:
                 self._page.note(item, f"{what} must be a list ([x, y, ...]), as RMF has it")
+
+    def _section(self, node: Node, key: str, kind: type[CollectionNode], what: str) -> list[Any]:
+        """What the section below `key` holds; nothing if it is missing or empty."""
+        section = _below(node, key)
+        if section is None or _is_empty(section):
+            return []
+        if not isinstance(section, kind):
+            self._page.note(section, f"'{key}' must be {what}, as RMF has it")
+            return []
+        return list(section.value)
 
 
 def _below(node: Node, key: str) -> Node | None:
