@@ -87,7 +87,7 @@ def _heard(second: int, part: float, topic: str, message: d.Message) -> Heard:
 
 def main(bag: Path) -> None:
     """Explain, and print figures as JSON."""
-    from workbench.explain.site import Site
+    from workbench.explain.heard_devices import Site
     from workbench.replay.recordings import Span, told_between
 
     began, site = time.process_time(), Site("Lift1")

@@ -13,8 +13,8 @@ from bench.latency import daemon_paths
 from bridges import __version__
 from bridges.blackbox.entries import Head
 from bridges.blackbox.recorder import Recorder
+from bridges.blackbox.recordings import Shelf
 from bridges.blackbox.ring import Ring
-from bridges.blackbox.shelf import Shelf
 from bridges.kinds.lift import KIND
 from bridges.kinds.lift.messages import state_message
 from bridges.kinds.lift.signals import Door, Ended, LiftSample, Requested
@@ -24,8 +24,8 @@ from bridges.messages.definitions import LiftRequest, Time
 from bridges.messages.releases import JAZZY
 from bridges.runtime.clock import Clock
 from bridges.runtime.refusals import Refusals
+from bridges.runtime.ring_writer import Witness
 from bridges.runtime.subject import Core, Subject
-from bridges.runtime.witness import Witness
 from bridges.settings.load import load
 from workbench.replay.bags import heard_in
 from workbench.replay.files import opened

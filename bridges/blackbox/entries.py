@@ -11,7 +11,7 @@ from typing import Annotated, Final, TypeVar
 import msgspec
 from msgspec import Meta
 
-from bridges.blackbox.trees import Tree
+from bridges.blackbox.value_codec import Tree
 from bridges.kinds.shared.recording_section import Recording
 from bridges.messages.releases import RELEASES
 from bridges.messages.rihs01 import MESSAGES

@@ -7,7 +7,7 @@ from typing import Final
 import msgspec
 
 from bridges.blackbox.entries import AnyEntry, Clocks, Head, Known, Step
-from bridges.blackbox.trees import Tree, name_of
+from bridges.blackbox.value_codec import Tree, name_of
 from bridges.kinds.shared.decision import IoFailed, Sampled, Suspended, WriteFailed
 
 BEFORE_S: Final = 120.0

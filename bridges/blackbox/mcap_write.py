@@ -17,7 +17,7 @@ from bridges import __version__
 from bridges.blackbox import entries
 from bridges.blackbox.entries import AnyEntry, Spoken, Step
 from bridges.blackbox.incident import LIBRARY, OWN_TOPICS, Incident, readable, timed
-from bridges.blackbox.trees import Tree
+from bridges.blackbox.value_codec import Tree
 from bridges.messages import cdr, topics
 from bridges.messages.releases import RELEASES
 from bridges.messages.rihs01 import MESSAGES, type_hash

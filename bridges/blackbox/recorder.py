@@ -13,9 +13,9 @@ from typing import Final
 
 from bridges.blackbox.entries import AnyEntry, Clocks, Died, Ended, Head, Known, Step
 from bridges.blackbox.incident import AFTER_S, BEFORE_S, Incident, Note, part
+from bridges.blackbox.recordings import CONTINUOUS, Shelf
 from bridges.blackbox.ring import DIED as DIED_NAME
 from bridges.blackbox.ring import NAME, Read, RingError, Tail
-from bridges.blackbox.shelf import CONTINUOUS, Shelf
 from bridges.blackbox.triggers import AGAIN_S, DIED, Triggers
 from bridges.host.log import pairs
 from bridges.kinds.shared.durations import AGES_AGO

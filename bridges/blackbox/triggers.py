@@ -12,14 +12,14 @@ from typing import Final
 
 from bridges.blackbox.entries import AnyEntry, Died, Forgotten, Known, Spoken, Step
 from bridges.blackbox.incident import Note
-from bridges.blackbox.trees import Tree
+from bridges.blackbox.value_codec import Tree
 from bridges.kinds.shared.decision import EXPECTED
 from bridges.kinds.shared.durations import AGES_AGO
 from bridges.messages import cdr
 from bridges.messages.heard import Heard
 from bridges.messages.releases import RELEASES
 from bridges.messages.rihs01 import MESSAGES
-from bridges.observe.graph import PlainGraph
+from bridges.observe.all_devices import PlainGraph
 
 AGAIN_S: Final = 600.0
 MOST_NOTED: Final = 1000

@@ -1,7 +1,8 @@
 """`rmf-bridge check FILE...`: what is wrong with device YAMLs, or all that an electrician signs.
 
-Each file is read and checked, then all of them together (`bridges/settings/across.py`). The findings
-about a file are gathered once (`sheets/findings.py` there), and printed as text, as JSON or as a sheet.
+Each file is read and checked, then all of them together (`bridges/settings/cross_file_checks.py`).
+The findings about a file are gathered once (`sheets/findings.py` there), and printed as text, as
+JSON or as a sheet.
 """
 
 import argparse
@@ -13,7 +14,7 @@ from typing import TYPE_CHECKING
 import msgspec
 
 from bridges.host.written import not_written
-from bridges.settings.across import Found, across
+from bridges.settings.cross_file_checks import Found, across
 from bridges.settings.load import Config, Problem, SettingsError, load
 from bridges.settings.sheets import text
 from bridges.settings.sheets.findings import Findings, findings, wrong

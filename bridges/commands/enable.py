@@ -13,7 +13,7 @@ from collections.abc import Collection, Iterable, Iterator
 from contextlib import suppress
 from pathlib import Path
 
-from bridges.host.places import GROUPS
+from bridges.host.directories import GROUPS
 from bridges.runtime import drop_in
 from bridges.runtime.services import (
     CONFIG,
@@ -28,7 +28,7 @@ from bridges.runtime.services import (
     switch_off,
     unit,
 )
-from bridges.settings.across import taken
+from bridges.settings.cross_file_checks import taken
 from bridges.settings.load import Config, Problem, SettingsError, load
 
 

@@ -13,7 +13,7 @@ from bridges.host.installed import of_workbench
 from bridges.host.written import no_folder, not_written
 from bridges.runtime import holder
 from bridges.runtime.clock import machine_s
-from bridges.runtime.directory import find
+from bridges.runtime.runtime_directory import find
 from bridges.settings.load import SettingsError
 
 

@@ -8,8 +8,8 @@ import time
 from pathlib import Path
 from typing import NoReturn
 
+from bridges.host.directories import runtimes
 from bridges.host.log import pairs
-from bridges.host.places import runtimes
 from bridges.runtime.completers import completed_by, device_names, service_names
 from bridges.runtime.daemons import daemons, units
 from bridges.runtime.services import CONFIG

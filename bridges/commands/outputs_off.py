@@ -35,6 +35,6 @@ def run(args: argparse.Namespace) -> int:
         return switch_off_all()
     if args.file is None:
         args.usage("name a device YAML, or --all-records")
-    from bridges.runtime.dead import switch_off
+    from bridges.runtime.dead_daemon import switch_off
 
     return switch_off(args)

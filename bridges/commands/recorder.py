@@ -8,8 +8,8 @@ from pathlib import Path
 
 from bridges.blackbox.incident import INSTALL
 from bridges.blackbox.recorder import Recorder
-from bridges.blackbox.shelf import Shelf
-from bridges.host import log, places
+from bridges.blackbox.recordings import Shelf
+from bridges.host import directories, log
 from bridges.runtime import signals
 from bridges.runtime.clock import machine_s
 from bridges.runtime.notify import notify
@@ -35,7 +35,7 @@ def run(args: argparse.Namespace) -> int:
     end = signals.End()
     shelf = Shelf(args.output or _folder())
     shelf.tidy()
-    recorder = Recorder(places.runtimes, shelf, machine_s)
+    recorder = Recorder(directories.runtimes, shelf, machine_s)
     recorder.look()
     _notify("READY=1")
     while not end.wait(EVERY_S):
@@ -49,7 +49,7 @@ def run(args: argparse.Namespace) -> int:
 def _folder() -> Path:
     """Where recordings lie: in the unit's state directory, else in the user's."""
     given = os.environ.get("STATE_DIRECTORY", "").split(":")[0]
-    return Path(given) if given else places.state_base() / "recordings"
+    return Path(given) if given else directories.state_base() / "recordings"
 
 
 def _notify(state: str) -> None:

@@ -5,9 +5,9 @@ import os
 import sys
 from pathlib import Path
 
-from bridges.host.places import Places, act_as_owner
+from bridges.host.directories import Places, act_as_owner
 from bridges.runtime import holder
-from bridges.runtime.directory import find
+from bridges.runtime.runtime_directory import find
 from bridges.runtime.signals import RESET
 
 

@@ -8,11 +8,11 @@ from pathlib import Path
 
 from msgspec.structs import replace
 
-from bridges.host import log, places
+from bridges.host import directories, log
 from bridges.host.installed import of_workbench
 from bridges.kinds.shared.rmf_section import TRANSPORTS, overridden
-from bridges.runtime import directory as runtime
 from bridges.runtime import drop_in, guard, signals
+from bridges.runtime import runtime_directory as runtime
 from bridges.runtime.notify import watchdog_s
 from bridges.settings.load import Config, SettingsError, load
 from bridges.transports.ros2 import setup as ros_setup
@@ -104,7 +104,7 @@ def _serve(
         from bridges.runtime.daemon import Daemon
 
         outputs_off = guard.command(args.file, args.runtime_dir)
-        places.work_somewhere(held.places)  # lgpio leaves a FIFO in the working directory
+        directories.work_somewhere(held.places)  # lgpio leaves a FIFO in the working directory
         return Daemon(config, held, end, ros_args=args.ros_args, outputs_off=outputs_off).serve()
     simulate = of_workbench("hal_fakes.simulate")
     logging.warning("SIMULATED: no hardware moves, and RMF is told simulated states")

@@ -14,8 +14,8 @@ from typing import Final, TextIO
 
 import msgspec
 
+from bridges.host.directories import runtimes
 from bridges.host.paint import bold, red
-from bridges.host.places import runtimes
 from bridges.messages.words import printable
 from bridges.runtime.daemons import NONE, Daemon, daemons, units
 from bridges.runtime.faults import Remedy, here, remedies, values

@@ -8,7 +8,7 @@ here: the recorder's triggers, `send`, `watch`, `explain`, `judge` and the page.
     requesters.py   who asks for one device, and whether they still do
     device.py       what all kinds share: states, their pace and age, since when a fact is so
     lift.py door.py charger.py      each kind's requests and holders, and RMF's phases
-    graph.py        all devices
+    all_devices.py  all devices
 
 Each message gives `News`: what it changed, as values. Durations are in `limits.py`.
 """

@@ -7,8 +7,8 @@ from bridges.kinds.shared import durations
 SILENT_S: Final = durations.SILENT_S
 """States, heartbeats and diagnostics come at 1 Hz: after three missed ones their sender is silent."""
 SLOWEST_S: Final = 5.0
-"""The slowest pace that RMF's contract permits is a state every 2 s (docs/how-to/judge.md, RATE): after this
-long two are missing, whoever made the node."""
+"""The slowest pace that RMF's contract permits is a state every 2 s (docs/how-to/judge.md, RATE):
+after this long two are missing, whoever made the node."""
 ASKS_WITHIN_S: Final = 3.5
 """A waiting requester repeats itself at each state or each second (rmf_ros2, RobotContext.cpp:1732 and
 DoorOpen.cpp). After three missed repeats it has stopped."""

@@ -17,9 +17,9 @@ from contextlib import suppress
 from pathlib import Path
 
 from bridges.host import log
+from bridges.host.directories import SERVICE_STATE
 from bridges.host.log import pairs
-from bridges.host.places import SERVICE_STATE
-from bridges.runtime import dead
+from bridges.runtime import dead_daemon
 from bridges.runtime.record import PATTERN, read
 from bridges.yaml.problems import SettingsError
 from drivers.profiles import texts
@@ -73,6 +73,6 @@ def _forked(file: Path) -> int:
         return pid
     code = 1
     try:
-        code = dead.switch_off(argparse.Namespace(file=file, runtime_dir=None, record=[]))
+        code = dead_daemon.switch_off(argparse.Namespace(file=file, runtime_dir=None, record=[]))
     finally:
         os._exit(code)

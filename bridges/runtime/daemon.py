@@ -23,14 +23,14 @@ from bridges.messages.stamps import ClockError, stamp
 from bridges.messages.topics import DIAGNOSTICS
 from bridges.runtime import guard, last_mark, record, signals
 from bridges.runtime.diagnostics import diagnosis
-from bridges.runtime.directory import KEPT, MemoryFile, Once, RuntimeDirectory, state_file
 from bridges.runtime.guard import Guard
 from bridges.runtime.notify import notify, watchdog_s
 from bridges.runtime.predecessor import Predecessor
 from bridges.runtime.record import Record
+from bridges.runtime.ring_writer import NOBODY, Nobody, Witness
+from bridges.runtime.runtime_directory import KEPT, MemoryFile, Once, RuntimeDirectory, state_file
 from bridges.runtime.service import OpenBus, clock_of, named_by, service
 from bridges.runtime.serving import stop
-from bridges.runtime.witness import NOBODY, Nobody, Witness
 from bridges.settings.load import Config
 from bridges.transports.choose import open_transport
 from bridges.transports.transport import Publisher, TransportError

@@ -11,7 +11,7 @@ from typing import Any, Final, cast
 import msgspec
 
 from bridges.host import files
-from bridges.host.places import SERVICE_RUN, SERVICE_STATE, Places, owner_of, state_base
+from bridges.host.directories import SERVICE_RUN, SERVICE_STATE, Places, owner_of, state_base
 from bridges.runtime import holder
 from bridges.runtime.record import paths, read
 from bridges.runtime.subject import Status

@@ -32,8 +32,8 @@ from bridges.runtime.answers import Answers
 from bridges.runtime.clock import Clock, Pace
 from bridges.runtime.contained import Contained
 from bridges.runtime.refusals import Refusals
+from bridges.runtime.ring_writer import NOBODY, Nobody
 from bridges.runtime.subject import Core, Publish, Status, Subject
-from bridges.runtime.witness import NOBODY, Nobody
 from drivers import Driver, DriverError
 
 NotSent = Callable[[Topic[Message], Exception], None]

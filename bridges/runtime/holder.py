@@ -1,6 +1,7 @@
 """Who has a daemon's directory: the process that `holder.json` names, while it is that process.
 
-A look takes no lock, so it hinders nobody; and it permits nothing. Only the lock does (`directory.py`).
+A look takes no lock, so it hinders nobody; and it permits nothing. Only the lock does
+(`runtime_directory.py`).
 """
 
 import os
@@ -11,8 +12,8 @@ from typing import Final
 
 import msgspec
 
+from bridges.host.directories import Distrusted, Places, cannot_be_seen, named, opened
 from bridges.host.files import read
-from bridges.host.places import Distrusted, Places, cannot_be_seen, named, opened
 
 HOLDER: Final = "holder.json"
 STATUS: Final = "status.json"

@@ -17,8 +17,8 @@ from bridges.kinds.shared.durations import AGES_AGO, NEVER
 from bridges.runtime.clock import Clock
 from bridges.runtime.device import AnyNode
 from bridges.runtime.inbox import Inbox
+from bridges.runtime.ring_writer import NOBODY, Nobody
 from bridges.runtime.serving import LEAST_GAP_S
-from bridges.runtime.witness import NOBODY, Nobody
 from drivers.hal import Bus
 
 log = logging.getLogger(__name__)

@@ -7,10 +7,10 @@ from collections.abc import Callable, Iterable
 from bridges.host.log import pairs
 from bridges.kinds.shared.decision import Fault
 from bridges.messages.definitions import Alert, Message
-from bridges.messages.instead import INSTEAD, converted
+from bridges.messages.fallbacks import INSTEAD, converted
 from bridges.messages.topics import Topic
-from bridges.runtime.directory import Once
-from bridges.runtime.witness import NOBODY, Nobody
+from bridges.runtime.ring_writer import NOBODY, Nobody
+from bridges.runtime.runtime_directory import Once
 from bridges.transports.transport import Publisher, Transport, TransportError
 
 log = logging.getLogger(__name__)
@@ -22,7 +22,7 @@ Named = Callable[[Topic[Message]], Topic[Message]]
 class Outlet:
     """Publishers that are declared while their node may speak.
 
-    Where RMF's release lacks a topic's message, `bridges/messages/instead.py` says what is sent.
+    Where RMF's release lacks a topic's message, `bridges/messages/fallbacks.py` says what is sent.
     An alarm and its end take the same way, even if the release changes in between.
     """
 

@@ -19,8 +19,8 @@ import msgspec
 
 from bridges import BUILD, VERSION
 from bridges.host import files
+from bridges.host.directories import Places, named, opened
 from bridges.host.log import pairs
-from bridges.host.places import Places, named, opened
 from bridges.kinds.shared.rmf_section import Rmf
 from bridges.settings import names
 from bridges.settings.config import Config

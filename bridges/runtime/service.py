@@ -19,14 +19,14 @@ from bridges.messages.topics import M_co, Topic
 from bridges.messages.words import LONGEST_NAME
 from bridges.runtime.clock import Clock, machine_s
 from bridges.runtime.device import AnyNode, Node
-from bridges.runtime.graph import AnyGraphNode, GraphNode
+from bridges.runtime.graph_node import AnyGraphNode, GraphNode
 from bridges.runtime.keeper import MemoryStore
 from bridges.runtime.loop import Loop
 from bridges.runtime.outlet import Named, Outlet
 from bridges.runtime.predecessor import SafeFirst
+from bridges.runtime.ring_writer import NOBODY, Nobody
 from bridges.runtime.serving import Serving
 from bridges.runtime.subject import Status
-from bridges.runtime.witness import NOBODY, Nobody
 from bridges.settings.load import Config
 from bridges.transports.transport import Subscription, Transport
 from drivers.hal import Bus

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
+from bridges.host.directories import SERVICE_STATE
 from bridges.host.files import replace
-from bridges.host.places import SERVICE_STATE
 from bridges.runtime.record import PATTERN
 
 CONFIG: Final = Path("etc/rmf-bridges")

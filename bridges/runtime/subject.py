@@ -14,7 +14,7 @@ from bridges.messages.definitions import Message
 from bridges.messages.topics import Topic
 from bridges.runtime.clock import Clock
 from bridges.runtime.refusals import Refusals
-from bridges.runtime.witness import NOBODY, Nobody
+from bridges.runtime.ring_writer import NOBODY, Nobody
 
 log = logging.getLogger(__name__)
 

@@ -7,8 +7,8 @@ from bridges.kinds.shared.remarks import Remarks
 from bridges.settings import names as named
 from bridges.settings.top import word
 from bridges.yaml.nodes import Page
+from bridges.yaml.positions import Entry, below
 from bridges.yaml.spelling import either, nearest, unknown
-from bridges.yaml.spots import Entry, below
 from bridges.yaml.values import BROKEN, Values
 from drivers.hal import AnyBus
 

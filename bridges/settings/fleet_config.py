@@ -23,7 +23,7 @@ from yaml.constructor import SafeConstructor
 
 from bridges.settings.similarity import Point
 from bridges.yaml.nodes import Page, Problem, SettingsError, Sort, compose, read
-from bridges.yaml.spots import Spot, locate
+from bridges.yaml.positions import Spot, locate
 
 FLEET = Sort("fleet configuration", "rmf_fleet: ...", 256 * 1024, 20_000)
 EVERY_LEVEL = ""

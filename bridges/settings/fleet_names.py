@@ -18,8 +18,8 @@ from bridges.settings.config import Config
 from bridges.settings.fleet_config import EVERY_LEVEL, FleetFile
 from bridges.settings.similarity import Point, Similarity, estimate
 from bridges.yaml.nodes import Page, Problem, compose
+from bridges.yaml.positions import Spot, locate
 from bridges.yaml.spelling import unknown
-from bridges.yaml.spots import Spot, locate
 
 Transforms = Mapping[str, Similarity]
 """Level -> RMF's map to the robot's; EVERY_LEVEL for all."""

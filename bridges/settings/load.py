@@ -32,8 +32,8 @@ from bridges.settings.plausible import milliseconds, out_of_step
 from bridges.settings.top import MAPPING, keys_below, top_keys, word
 from bridges.settings.wiring import Use, Wiring, note_conflicts, note_unknown_signals
 from bridges.yaml.nodes import Page, Problem, SettingsError, compose, read
+from bridges.yaml.positions import Entry, Spot, below, is_none, locate
 from bridges.yaml.spelling import either, unknown
-from bridges.yaml.spots import Entry, Spot, below, is_none, locate
 from bridges.yaml.values import BROKEN, Broken, Values
 from drivers.driver_type import AnyDriver
 from drivers.hal.points import Wire

@@ -13,8 +13,8 @@ from bridges.kinds.shared.kind import CHARGER, DOOR, FLOOR, LIFT, WAYPOINT, Plac
 from bridges.settings.building_map import BuildingMap
 from bridges.settings.load import Config
 from bridges.yaml.nodes import Page, Problem, compose
+from bridges.yaml.positions import Spot, locate
 from bridges.yaml.spelling import nearest, short
-from bridges.yaml.spots import Spot, locate
 
 
 def places(config: Config) -> list[Place]:

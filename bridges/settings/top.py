@@ -10,8 +10,8 @@ from bridges.kinds.shared.graph_kind import AnyKind, GraphKind
 from bridges.kinds.shared.recording_section import Recording
 from bridges.kinds.shared.rmf_section import Rmf
 from bridges.settings import names as named
+from bridges.yaml.positions import Entry
 from bridges.yaml.spelling import either
-from bridges.yaml.spots import Entry
 from bridges.yaml.values import BROKEN, Values
 from drivers.driver_type import AnyDriver
 

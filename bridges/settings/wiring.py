@@ -10,8 +10,8 @@ from msgspec import Struct
 from yaml import Node
 
 from bridges.yaml.nodes import Page
+from bridges.yaml.positions import Spot, below, locate
 from bridges.yaml.spelling import unknown
-from bridges.yaml.spots import Spot, below, locate
 from bridges.yaml.values import BROKEN, Check
 from drivers.hal import AnyBus
 from drivers.hal.points import Input, Output, Wire

@@ -16,7 +16,7 @@ from yaml.reader import ReaderError
 
 from bridges.host import user_files
 from bridges.messages.words import printable
-from bridges.yaml import slips
+from bridges.yaml import typo_hints
 from bridges.yaml.problems import Problem as Problem
 from bridges.yaml.problems import SettingsError as SettingsError
 
@@ -96,9 +96,13 @@ class _Composer(yaml.SafeLoader):
             raise _Refused(
                 mark, "holds half a character (\\ud800 to \\udfff): write the whole character"
             )
-        if isinstance(node, ScalarNode) and is_plain(node) and (odd := slips.odd_space(node.value)):
+        if (
+            isinstance(node, ScalarNode)
+            and is_plain(node)
+            and (odd := typo_hints.odd_space(node.value))
+        ):
             self._page.note(node, odd)
-            node.value = slips.cleaned(node.value)
+            node.value = typo_hints.cleaned(node.value)
         return node
 
     def _refuse_more_than_most(self, mark: Mark, values: int) -> None:
@@ -166,7 +170,7 @@ def _root(page: Page, text: str, sort: Sort) -> Node | None:
         raise SettingsError([_problem_after(page, text[: error.position], reason)]) from None
     except MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
-        told = str(error.problem) if isinstance(error, _Refused) else slips.reason(error, text)
+        told = str(error.problem) if isinstance(error, _Refused) else typo_hints.reason(error, text)
         raise SettingsError([*page.problems, page.problem(mark, told)]) from None
     except (ValueError, OverflowError):
         # PyYAML raises these for numbers that no character or version has, as in "\U00110000".

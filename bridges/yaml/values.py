@@ -23,11 +23,11 @@ from msgspec.inspect import (
 )
 from yaml import MappingNode, Node, ScalarNode, SequenceNode
 
-from bridges.yaml.leaves import Extra, Wrong, leaf, looks, wanted_text
 from bridges.yaml.nodes import Page, is_plain
+from bridges.yaml.positions import Entry, Spot, is_none, locate
+from bridges.yaml.scalar_types import Extra, Wrong, leaf, looks, wanted_text
 from bridges.yaml.scalars import is_null
 from bridges.yaml.spelling import either, nearest, short, unknown
-from bridges.yaml.spots import Entry, Spot, is_none, locate
 
 VERBS = ("is", "has", "needs", "must", "says")
 """A problem that begins with one of these words gets its key as the subject."""

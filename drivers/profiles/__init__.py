@@ -88,7 +88,7 @@ def _understood(
     file: str, text: bytes, reader: str, key: str, content: type[msgspec.Struct]
 ) -> dict[str, object]:
     from bridges.yaml.nodes import Page, compose
-    from bridges.yaml.spots import Spot
+    from bridges.yaml.positions import Spot
     from bridges.yaml.values import BROKEN, Values
 
     page = Page(file)

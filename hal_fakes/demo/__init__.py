@@ -5,7 +5,7 @@ door, rides a lift and charges (`ride`), or three robots share two chargers (`ch
 
     daemons.py   the daemons' processes, and the control sockets of their plants
     journal.py   what happened, and how it is printed
-    stage.py     starts the daemons, plays the day, and stops everything however it ends
+    demo_run.py  starts the daemons, plays the day, and stops everything however it ends
     world.py     RMF on the graph: what is heard, said and awaited
     ride.py      the robot's day, and whether it went right
     charging.py  the chargers' day, and whether it went right

@@ -5,10 +5,10 @@ import argparse
 import sys
 from collections.abc import Sequence
 
-from hal_fakes.demo import charging, ride, site
-from hal_fakes.demo.stage import Stage
+from hal_fakes.demo import building, charging, ride
+from hal_fakes.demo.demo_run import Stage
 
-DEMOS = {"ride": ride.DEMO, "charging": charging.DEMO, "page": site.DEMO}
+DEMOS = {"ride": ride.DEMO, "charging": charging.DEMO, "page": building.DEMO}
 
 
 def main(argv: Sequence[str] | None = None) -> int:

@@ -16,10 +16,10 @@ from bridges.messages import definitions as d
 from bridges.messages import topics, words
 from bridges.messages.stamps import duration
 from bridges.settings.load import load
+from hal_fakes.demo.demo_run import Demo
+from hal_fakes.demo.fleets import Yard
 from hal_fakes.demo.journal import Journal
-from hal_fakes.demo.stage import Demo
 from hal_fakes.demo.world import World
-from hal_fakes.demo.yard import Yard
 
 ONE, TWO, PORTER = "AMR01", "AMR02", "P01"
 A, B = "charger_a", "charger_b"

@@ -9,8 +9,8 @@ from typing import Final
 from bridges.messages import definitions as d
 from bridges.messages import topics, words
 from bridges.messages.stamps import duration
+from hal_fakes.demo.demo_run import Demo
 from hal_fakes.demo.journal import Journal
-from hal_fakes.demo.stage import Demo
 from hal_fakes.demo.world import World
 from workbench.rmf_model.phases import DoorClose, DoorOpen, EndLiftSession, RequestLift
 from workbench.rmf_model.robot import Phase, Robot

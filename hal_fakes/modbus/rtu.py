@@ -35,7 +35,7 @@ from pymodbus.exceptions import NoSuchIdException
 from pymodbus.framer import FramerRTU
 from pymodbus.pdu import DecodePDU
 
-from drivers.hal.modbus.places import Serial
+from drivers.hal.modbus.connections import Serial
 from hal_fakes.modbus.flash import CoilRequest
 from hal_fakes.modbus.units import FarSide, Units
 from hal_fakes.plants.plant import FailureMode

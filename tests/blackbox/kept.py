@@ -14,7 +14,7 @@ from bridges.blackbox.ring import Ring
 from bridges.kinds.shared.graph_kind import AnyGraphKind
 from bridges.kinds.shared.recording_section import Recording
 from bridges.runtime.clock import Clock
-from bridges.runtime.witness import Witness
+from bridges.runtime.ring_writer import Witness
 from tests.site.building import Device
 from tests.site.daemons import DeviceDaemon, GraphDaemon
 from tests.site.day import Site

@@ -24,8 +24,8 @@ from bridges.blackbox import entries
 from bridges.blackbox.entries import Spoken
 from bridges.blackbox.mcap_write import ENTRIES, HEAD, NOTES, String
 from bridges.blackbox.recorder import Recorder
+from bridges.blackbox.recordings import Shelf
 from bridges.blackbox.ring import FRAME, MAGIC, MARK, PAGE, SEGMENTS, TOP
-from bridges.blackbox.shelf import Shelf
 from bridges.messages import cdr
 from bridges.messages.definitions import Message
 from bridges.messages.releases import RELEASES

@@ -13,7 +13,7 @@ import msgspec
 import pytest
 
 from bridges.blackbox.entries import AnyEntry, Head, Known, Step
-from bridges.blackbox.trees import TYPE, UnknownValue, name_of, tree, value
+from bridges.blackbox.value_codec import TYPE, UnknownValue, name_of, tree, value
 from bridges.kinds import kind_called, kind_names, recorded
 from bridges.kinds.shared.graph_kind import GraphKind
 from bridges.kinds.shared.recorded import SHARED
@@ -160,7 +160,7 @@ def test_a_record_of_an_earlier_version_says_what_is_to_be_switched_off(file: Pa
 def test_names_load_no_other_kind_than_the_one_that_is_recorded() -> None:
     script = (
         "import sys; from bridges.kinds.lift import memory;"
-        "from bridges.blackbox.trees import tree, value;"
+        "from bridges.blackbox.value_codec import tree, value;"
         "assert value(tree(memory.Memory())) == memory.Memory();"
         "print([name for name in ('door', 'charger', 'lift_supervisor', 'door_supervisor',"
         " 'charger_coordinator') if sys.modules.keys() & {memory.__name__.replace('lift', name)}])"

@@ -8,7 +8,7 @@ import pytest
 
 from bridges.blackbox import entries
 from bridges.blackbox.entries import DEEPEST, Clocks, Invalid, Known, Spoken
-from bridges.blackbox.trees import UnknownValue, tree
+from bridges.blackbox.value_codec import UnknownValue, tree
 from bridges.kinds.door.core import decide as decide_door
 from bridges.kinds.lift.core import decide as decide_lift
 from bridges.kinds.lift.signals import Door

@@ -8,11 +8,11 @@ from pathlib import Path
 import pytest
 from msgspec.structs import replace
 
-from bridges.blackbox import shelf as shelves
+from bridges.blackbox import recordings as shelves
 from bridges.blackbox.entries import Head, Step
 from bridges.blackbox.recorder import Recorder
+from bridges.blackbox.recordings import Shelf
 from bridges.blackbox.ring import DIED, Read, Ring
-from bridges.blackbox.shelf import Shelf
 from bridges.kinds.lift.report import LiftReport
 from bridges.kinds.lift.signals import Door, LiftOutputs, LiftSample, Requested
 from bridges.kinds.shared.decision import Decision, Fault, IoFailed, Sampled
@@ -28,7 +28,7 @@ from bridges.messages.definitions import (
 )
 from bridges.messages.releases import KILTED
 from bridges.runtime.clock import Clock
-from bridges.runtime.witness import Witness
+from bridges.runtime.ring_writer import Witness
 from workbench.replay.bags import Notes, heard_in
 from workbench.replay.incidents import entries_in, head_of, notes_in
 

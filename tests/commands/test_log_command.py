@@ -12,9 +12,9 @@ import pytest
 
 from bridges import cli
 from bridges.commands import log
+from bridges.host.directories import by_hand
 from bridges.host.log import pairs
-from bridges.host.places import by_hand
-from bridges.runtime.directory import RuntimeDirectory
+from bridges.runtime.runtime_directory import RuntimeDirectory
 
 LINES = [
     pairs("state", device="Lift1", mode="AGV"),

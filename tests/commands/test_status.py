@@ -10,7 +10,7 @@ import pytest
 
 from bridges import cli
 from bridges.commands.status import show
-from bridges.host.places import Places
+from bridges.host.directories import Places
 from bridges.runtime import daemons as on_machine
 from bridges.runtime import faults
 from bridges.runtime.daemons import DOWN, FAULTY, NONE, WELL, Daemon, daemons

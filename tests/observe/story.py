@@ -8,7 +8,7 @@ from bridges.messages import definitions as d
 from bridges.messages.heard import Heard
 from bridges.messages.stamps import stamp
 from bridges.messages.words import Kind
-from bridges.observe.graph import AnyDevice, PlainGraph
+from bridges.observe.all_devices import AnyDevice, PlainGraph
 from bridges.observe.requesters import Moment
 
 WALL = 1_800_000_000.0

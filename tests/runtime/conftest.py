@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from bridges.host import places
+from bridges.host import directories
 from tests.runtime.site import Graph, Module
 
 
@@ -28,10 +28,10 @@ def machine(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A machine with services and users, none of whom is told by systemd where things are."""
     for name in ("RUNTIME_DIRECTORY", "STATE_DIRECTORY"):
         monkeypatch.delenv(name, raising=False)
-    monkeypatch.setattr(places, "SERVICE_RUN", tmp_path / "run")
-    monkeypatch.setattr(places, "SERVICE_STATE", tmp_path / "var")
-    monkeypatch.setattr(places, "USERS_RUN", tmp_path / "user")
-    monkeypatch.setattr(places, "TMP", tmp_path / "tmp")
+    monkeypatch.setattr(directories, "SERVICE_RUN", tmp_path / "run")
+    monkeypatch.setattr(directories, "SERVICE_STATE", tmp_path / "var")
+    monkeypatch.setattr(directories, "USERS_RUN", tmp_path / "user")
+    monkeypatch.setattr(directories, "TMP", tmp_path / "tmp")
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path / "user" / "7"))
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "home"))
     return tmp_path

@@ -92,7 +92,7 @@ def test_settings_of_an_unknown_build_are_made_from_the_yaml(
 def test_nothing_that_takes_long_to_import_is_imported_to_switch_off() -> None:
     _, written, _ = of_file(next(file for file in DEVICES if file.stem == "lift_dry_contact"))
     code = (
-        f"import sys, msgspec, bridges; bridges.BUILD = {BUILD!r}; import bridges.runtime.dead;"
+        f"import sys, msgspec, bridges; bridges.BUILD = {BUILD!r}; import bridges.runtime.dead_daemon;"
         "from bridges.runtime.record import Record;"
         "config = msgspec.json.decode(sys.stdin.buffer.read(), type=Record).config();"
         "[config.driver_type(name) for name in config.devices];"

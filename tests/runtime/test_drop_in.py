@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from bridges.commands.run import too_slow
-from bridges.host.places import GROUPS
+from bridges.host.directories import GROUPS
 from bridges.runtime.drop_in import FITS, fits, misfit, text, watchdog_s
 from bridges.settings.load import Config, load, understood
 from workbench.commissioning.examples import device_yamls

@@ -11,7 +11,7 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from bridges.host.places import Places
+from bridges.host.directories import Places
 from bridges.kinds.charger_coordinator import keep as coordinator
 from bridges.kinds.door_supervisor import keep as doors
 from bridges.kinds.door_supervisor.settings import Settings as DoorSupervisor

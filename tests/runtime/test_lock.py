@@ -11,10 +11,10 @@ from pathlib import Path
 
 import pytest
 
-from bridges.host.places import Places
+from bridges.host.directories import Places
 from bridges.runtime import record
-from bridges.runtime.directory import LOCK, RuntimeDirectory
 from bridges.runtime.holder import HOLDER
+from bridges.runtime.runtime_directory import LOCK, RuntimeDirectory
 from bridges.settings.load import load
 from tests.runtime.hostile import NOBODY, group_member, unit
 from tests.runtime.site import Graph, Module, command, daemon, environment, hold_open

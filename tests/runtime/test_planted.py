@@ -9,12 +9,12 @@ from pathlib import Path
 import pytest
 
 from bridges import cli
-from bridges.host import places
-from bridges.host.places import Distrusted, Places, opened
+from bridges.host import directories
+from bridges.host.directories import Distrusted, Places, opened
 from bridges.runtime import daemons as status
-from bridges.runtime import directory, holder
-from bridges.runtime.directory import KEPT, MemoryFile, RuntimeDirectory, state_file
+from bridges.runtime import holder, runtime_directory
 from bridges.runtime.record import Record
+from bridges.runtime.runtime_directory import KEPT, MemoryFile, RuntimeDirectory, state_file
 
 NOBODY = 65534
 FILE = Path("/etc/rmf-bridges/lift.yaml")
@@ -82,7 +82,7 @@ def victim(machine: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     (machine / "tmp").chmod(0o1777)
     folder = machine / "victim" / "rmf-bridge" / "lift"
     folder.mkdir(parents=True)
-    for name in ("lock", directory.LOCK, holder.HOLDER, holder.STATUS, KEPT):
+    for name in ("lock", runtime_directory.LOCK, holder.HOLDER, holder.STATUS, KEPT):
         (folder / name).write_text("precious")
     return folder
 
@@ -101,10 +101,10 @@ def test_what_anybody_plants_below_tmp_is_neither_read_nor_written(
     before = files(victim)
     plant(victim.parents[1], machine / "tmp" / where)
     with pytest.raises(Distrusted):
-        directory.held(FILE, None, serves=True)
+        runtime_directory.held(FILE, None, serves=True)
     with pytest.raises(PermissionError):
-        places.act_as_owner(places.by_hand(FILE))
-    kept = places.by_hand(FILE).runtime / KEPT if where == "rmf-bridge-0" else state_file(FILE)
+        directories.act_as_owner(directories.by_hand(FILE))
+    kept = directories.by_hand(FILE).runtime / KEPT if where == "rmf-bridge-0" else state_file(FILE)
     with pytest.raises(PermissionError):
         MemoryFile(kept).read()
     with pytest.raises(PermissionError):
@@ -118,7 +118,7 @@ def test_a_directory_that_is_replaced_under_a_daemon_is_not_written(
     victim: Path, machine: Path, plant: Callable[[Path, Path], None]
 ) -> None:
     before = files(victim)
-    serving = directory.held(FILE, None, serves=True)
+    serving = runtime_directory.held(FILE, None, serves=True)
     serving.claim(CLAIMED)
     shutil.rmtree(machine / "tmp" / "rmf-bridge-0")
     plant(victim.parents[1], machine / "tmp" / "rmf-bridge-0")
@@ -145,7 +145,7 @@ def test_a_look_of_root_believes_nothing_that_a_user_has_linked_and_waits_for_no
     for path in (base, *base.rglob("*")):
         os.lchown(path, NOBODY, NOBODY)
     (machine / "tmp" / "rmf-bridge-1").symlink_to(machine)
-    found = {one.name: one.state for one in status.daemons(places.runtimes(), {}, 0.0)}
+    found = {one.name: one.state for one in status.daemons(directories.runtimes(), {}, 0.0)}
     assert found == {"fifo": "stopped", "linked": "stopped"}
     assert cli.main(["status"]) == status.NONE
     assert "secret" not in capsys.readouterr().out

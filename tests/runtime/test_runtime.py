@@ -11,8 +11,10 @@ import msgspec
 import pytest
 from msgspec.structs import replace
 
-from bridges.host.places import Places
-from bridges.runtime.directory import (
+from bridges.host.directories import Places
+from bridges.runtime.holder import HOLDER, LockHolder, look, ourselves
+from bridges.runtime.record import Record
+from bridges.runtime.runtime_directory import (
     LOCK,
     AlreadyRunning,
     MemoryFile,
@@ -20,8 +22,6 @@ from bridges.runtime.directory import (
     find,
     state_file,
 )
-from bridges.runtime.holder import HOLDER, LockHolder, look, ourselves
-from bridges.runtime.record import Record
 from tests.depth import depth
 
 FILE = Path("/etc/rmf-bridges/lift.yaml")
@@ -183,8 +183,8 @@ def test_a_directory_that_was_removed_is_made_again_with_its_lock_and_its_record
 
 def test_a_start_waits_while_outputs_are_being_switched_off(tmp_path: Path) -> None:
     text = (
-        "import sys; from pathlib import Path; from bridges.runtime.directory import *;"
-        "from bridges.host.places import Places; p = Path(sys.argv[1]);"
+        "import sys; from pathlib import Path; from bridges.runtime.runtime_directory import *;"
+        "from bridges.host.directories import Places; p = Path(sys.argv[1]);"
         "d = RuntimeDirectory(Places(p, p), Path('x'), serves=False);"
         "print('held', flush=True); sys.stdin.read()"
     )

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from bridges.host.places import Places
-from bridges.runtime.dead import ages
+from bridges.host.directories import Places
+from bridges.runtime.dead_daemon import ages
 from bridges.runtime.switch_off import outputs_off
 from bridges.settings.load import load
 from tests.drivers.hal.modbus.module import Module, door

@@ -10,9 +10,9 @@ from pathlib import Path
 import pytest
 from msgspec.structs import replace
 
-from bridges.host.places import Places
+from bridges.host.directories import Places
 from bridges.messages.definitions import DoorModeValue
-from bridges.runtime import dead, record
+from bridges.runtime import dead_daemon, record
 from bridges.runtime.record import Records
 from bridges.settings.load import Config, load
 from tests.depth import depth
@@ -96,7 +96,7 @@ def test_what_several_dead_daemons_left_on_shares_the_time_of_one(
         given.append(timeout_s)
         return set()
 
-    monkeypatch.setattr(dead, "outputs_off", silent)
-    assert dead._off_by_records(claims, {}) == 1
+    monkeypatch.setattr(dead_daemon, "outputs_off", silent)
+    assert dead_daemon._off_by_records(claims, {}) == 1
     assert len(given) == 3
-    assert sum(given) == pytest.approx(dead.TIMEOUT_S)
+    assert sum(given) == pytest.approx(dead_daemon.TIMEOUT_S)

@@ -16,7 +16,7 @@ from bridges.messages.definitions import Message
 from bridges.messages.releases import NEWEST
 from bridges.messages.topics import Topic
 from bridges.runtime.clock import Clock
-from bridges.runtime.graph import GraphNode
+from bridges.runtime.graph_node import GraphNode
 from bridges.transports.transport import Publisher, Subscription
 from workbench.rmf_model import Party as RmfParty
 from workbench.rmf_model import Said

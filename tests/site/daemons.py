@@ -17,9 +17,9 @@ from bridges.messages.definitions import Message
 from bridges.messages.topics import DOOR_REQUESTS, DOOR_SUPERVISOR_HEARTBEAT, LIFT_REQUESTS, Topic
 from bridges.runtime.clock import Clock
 from bridges.runtime.device import AnyNode, Node
-from bridges.runtime.graph import AnyGraphNode, GraphNode
+from bridges.runtime.graph_node import AnyGraphNode, GraphNode
+from bridges.runtime.ring_writer import NOBODY, Nobody
 from bridges.runtime.subject import Status
-from bridges.runtime.witness import NOBODY, Nobody
 from bridges.transports.transport import Publisher
 from hal_fakes.plants.plant import Edge
 from tests.accepted import accepted

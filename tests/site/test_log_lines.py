@@ -16,7 +16,7 @@ from bridges.messages import topics
 from bridges.transports.transport import TransportError
 from tests.site.daemons import GraphDaemon
 from tests.site.network import Place
-from tests.workbench.explain.scene import Scene
+from tests.workbench.explain.story import Scene
 
 SERVED = ("Lift1", "Lift2", "ward", "gate", "bay1")
 MOST = 3

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from bridges.host.places import GROUPS
+from bridges.host.directories import GROUPS
 from bridges.runtime.drop_in import text
 from bridges.settings.load import load
 from workbench.commissioning.examples import device_yamls

@@ -8,9 +8,9 @@ import tempfile
 import threading
 from pathlib import Path
 
-from bridges.host.places import Distrusted, Places
+from bridges.host.directories import Distrusted, Places
 from bridges.runtime import holder
-from bridges.runtime.directory import RuntimeDirectory
+from bridges.runtime.runtime_directory import RuntimeDirectory
 from tests.runtime.hostile import (
     NOBODY,
     group_member,

@@ -14,7 +14,7 @@ from cyclonedds.topic import Topic as DdsTopic
 from bridges.messages import definitions as d
 from bridges.messages.topics import LIFT_REQUESTS, LIFT_STATES, Topic
 from bridges.transports.cyclone import LOOPBACK
-from bridges.transports.dds import graph
+from bridges.transports.dds import discovery
 from bridges.transports.dds.peers import BuiltinReader
 from bridges.transports.dds.transport import DdsTransport
 from bridges.transports.transport import TransportError
@@ -78,7 +78,7 @@ def test_the_node_and_its_ends_stand_on_the_ros_graph(join_dds: Join, observer: 
     as_ros_reads = Qos(
         Policy.Reliability.Reliable(0), Policy.Durability.TransientLocal, Policy.History.KeepAll
     )
-    topic = DdsTopic(observer, "ros_discovery_info", graph.ParticipantEntitiesInfo)
+    topic = DdsTopic(observer, "ros_discovery_info", discovery.ParticipantEntitiesInfo)
     reader = DataReader(observer, topic, qos=as_ros_reads)
     announced: dict[str, tuple[bytes, Any]] = {}
 

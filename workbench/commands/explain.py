@@ -17,7 +17,7 @@ from bridges.messages.words import KINDS, Kind
 from bridges.runtime import faults
 from bridges.transports.transport import TransportError
 from workbench.explain.explanation import Explanation
-from workbench.explain.site import Site
+from workbench.explain.heard_devices import Site
 from workbench.explain.text import SCREEN_LINES, lines
 from workbench.graph.board import SECONDS
 from workbench.graph.join import (

@@ -30,10 +30,10 @@ from workbench.graph.join import (
 )
 from workbench.graph.live import OF_DEVICES, Ear
 from workbench.judge.judge import KINDS, Judge, Kind
+from workbench.judge.judge_run import Stage
 from workbench.judge.law import Verdict, shown
-from workbench.judge.plays import FLEET, Charge, Passages, Performance, Ride
 from workbench.judge.report import Report, as_json, junit, markdown, report, text, verdict
-from workbench.judge.stage import Stage
+from workbench.judge.scenarios import FLEET, Charge, Passages, Performance, Ride
 from workbench.replay.recordings import Span, add_span_arguments, unreadable, within
 from workbench.replay.sources import BagError
 from workbench.rmf_model import NEVER, Said

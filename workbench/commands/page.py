@@ -14,7 +14,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Final
 
-from bridges.host import log, places
+from bridges.host import directories, log
 from bridges.host.installed import how_to_install
 from workbench.graph.join import add_graph_arguments, command_line, complain, open_graph
 
@@ -70,7 +70,7 @@ def _incidents() -> Path:
     """The recorder service's folder where this user may read it, else this user's own recorder's."""
     if os.access(RECORDER, os.R_OK | os.X_OK):
         return RECORDER
-    return places.state_base() / "recordings"
+    return directories.state_base() / "recordings"
 
 
 def _address(text: str) -> tuple[str, int]:

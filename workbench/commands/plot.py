@@ -13,10 +13,10 @@ from typing import Final
 
 from bridges.messages.words import KINDS
 from bridges.runtime import faults
-from workbench.explain.lanes import Drawing
+from workbench.explain.device_timeline import Drawing
+from workbench.explain.heard_devices import Site
 from workbench.explain.palette import PAPER, Theme
 from workbench.explain.picture import svg
-from workbench.explain.site import Site
 from workbench.explain.text import lines
 from workbench.explain.timeline import Timeline
 from workbench.graph.join import complain

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Final
 
 from bridges.blackbox.entries import Head
-from bridges.blackbox.trees import Tree, UnknownValue, value
+from bridges.blackbox.value_codec import Tree, UnknownValue, value
 from bridges.host.log import plain
 from bridges.settings.load import SettingsError, load
 from workbench.replay.files import opened

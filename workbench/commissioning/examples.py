@@ -16,7 +16,7 @@ from bridges.kinds import kind_names
 from bridges.settings import names as named
 from bridges.settings.load import load
 from bridges.settings.shown import is_section
-from bridges.yaml.leaves import choices
+from bridges.yaml.scalar_types import choices
 from drivers.profiles import Profile
 
 CONFIG = Path(drivers.__file__).parents[1] / "config"

@@ -19,7 +19,7 @@ from bridges.kinds.shared.graph_kind import AnyGraphKind, GraphKind
 from bridges.kinds.shared.recording_section import Recording
 from bridges.kinds.shared.rmf_section import Rmf
 from bridges.settings import names as named
-from bridges.yaml.leaves import Extra, choices, wanted_text
+from bridges.yaml.scalar_types import Extra, choices, wanted_text
 from drivers.driver_type import AnyDriver
 from workbench.commissioning.examples import example, field_names, flow
 

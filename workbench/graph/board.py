@@ -18,8 +18,8 @@ from bridges.host.paint import repainted
 from bridges.messages import definitions as d
 from bridges.messages import words
 from bridges.messages.heard import Heard
+from bridges.observe.all_devices import AnyDevice, ObservedGraph, PlainGraph
 from bridges.observe.door import ObservedDoor
-from bridges.observe.graph import AnyDevice, ObservedGraph, PlainGraph
 from bridges.observe.limits import SILENT_S
 from bridges.runtime import diagnostics
 

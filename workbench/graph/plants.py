@@ -9,7 +9,7 @@ import sys
 from contextlib import suppress
 from pathlib import Path
 
-from bridges.host.places import as_given, by_hand, opened
+from bridges.host.directories import as_given, by_hand, opened
 from bridges.runtime.completers import Completer, completed_by, device_names
 
 ANSWER_S = 5.0

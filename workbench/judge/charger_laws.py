@@ -6,7 +6,7 @@ from typing import Final
 from bridges.messages import definitions as d
 from bridges.messages import words
 from bridges.messages.stamps import in_seconds
-from workbench.judge.charger_scene import (
+from workbench.judge.charger_history import (
     ASSIGNED,
     CHARGING,
     ERROR,
@@ -15,8 +15,8 @@ from workbench.judge.charger_scene import (
     ChargerScene,
     unrequested,
 )
+from workbench.judge.history import NOT_YET
 from workbench.judge.law import KEPT, Doubt, Finding, Law, shown
-from workbench.judge.scene import NOT_YET
 from workbench.judge.shared_laws import ANSWERED, ONE, RATE, STAMP, fresh, named, stamped
 
 LATE_S: Final = 10.0

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from typing import Final
 
 from bridges.messages import definitions as d
-from workbench.judge.door_scene import CLOSED, OPEN, DoorScene
+from workbench.judge.door_history import CLOSED, OPEN, DoorScene
 from workbench.judge.law import KEPT, Doubt, Finding, Law
 from workbench.judge.shared_laws import ANSWERED, ONE, RATE, STAMP, fresh, named, stamped
 

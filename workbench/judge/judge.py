@@ -9,11 +9,11 @@ from bridges.messages.heard import Heard
 from bridges.messages.words import KINDS as KINDS
 from bridges.messages.words import Kind as Kind
 from workbench.judge import charger_laws, door_laws, lift_laws
-from workbench.judge.charger_scene import ChargerScene
-from workbench.judge.door_scene import DoorScene
+from workbench.judge.charger_history import ChargerScene
+from workbench.judge.door_history import DoorScene
+from workbench.judge.history import Scene
 from workbench.judge.law import Doubt, Evidence, Judged, Law, Verdict
-from workbench.judge.lift_scene import LiftScene
-from workbench.judge.scene import Scene
+from workbench.judge.lift_history import LiftScene
 
 LAWS: Final[Mapping[Kind, tuple[Law[Any], ...]]] = MappingProxyType(
     {"lift": lift_laws.LAWS, "door": door_laws.LAWS, "charger": charger_laws.LAWS}

@@ -5,9 +5,9 @@ from typing import Final
 from bridges.messages import definitions as d
 from bridges.messages import words
 from bridges.observe.lift import HAZARDS
+from workbench.judge.history import NOT_YET
 from workbench.judge.law import KEPT, Doubt, Finding, shown
-from workbench.judge.lift_scene import GRACE_S, LATE_S, LiftScene
-from workbench.judge.scene import NOT_YET
+from workbench.judge.lift_history import GRACE_S, LATE_S, LiftScene
 
 ENDS_WITHIN_S: Final = 3.0
 """A state period of 2 s, and one scan."""

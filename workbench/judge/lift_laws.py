@@ -4,7 +4,7 @@ from typing import Final
 
 from workbench.judge import lift_checks as checks
 from workbench.judge.law import Law
-from workbench.judge.lift_scene import LiftScene
+from workbench.judge.lift_history import LiftScene
 from workbench.judge.shared_laws import ANSWERED, ONE, RATE, STAMP, fresh, named, stamped
 
 A6: Final = "rmf_ros2 lift_supervisor/Node.cpp:58-140"

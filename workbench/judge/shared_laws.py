@@ -6,8 +6,8 @@ from typing import Any, Final
 
 from bridges.messages import words
 from bridges.observe.limits import SLOWEST_S
+from workbench.judge.history import BURST, Scene
 from workbench.judge.law import KEPT, Finding, Law
-from workbench.judge.scene import BURST, Scene
 
 AnyScene = Scene[Any]
 

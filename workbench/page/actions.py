@@ -21,7 +21,7 @@ from typing import Final
 from bridges.host.log import pairs
 from bridges.messages import definitions as d
 from bridges.messages.words import printable
-from workbench.page.site import DeviceView
+from workbench.page.live_site import DeviceView
 
 log = logging.getLogger(__name__)
 

@@ -11,9 +11,9 @@ from nicegui import ui
 
 from workbench.graph.plants import MODES
 from workbench.page.actions import Action, Deeds, Local, actions, fail, press, queue
-from workbench.page.gallery import AGES_S, Gallery, Key
+from workbench.page.cards import AGES_S, Gallery, Key
 from workbench.page.head import part
-from workbench.page.here import Here
+from workbench.page.local_daemons import Here
 from workbench.page.login import Login
 from workbench.page.tables import table
 

@@ -11,7 +11,7 @@ from urllib.parse import quote
 
 from bridges.messages import definitions as d
 from bridges.messages import words
-from workbench.page.site import DeviceView, Robot, Stands
+from workbench.page.live_site import DeviceView, Robot, Stands
 
 OLD: Final = ' class="old"'
 LONGEST: Final = 160

@@ -14,9 +14,9 @@ from nicegui import Client, app, ui
 from bridges.messages.words import printable
 from workbench.explain.picture import svg
 from workbench.page import incidents
+from workbench.page.explanation_html import explanation, story, timeline
 from workbench.page.head import head, main, part
 from workbench.page.login import Login
-from workbench.page.why import explanation, story, timeline
 
 
 class IncidentViews:

@@ -17,10 +17,10 @@ import msgspec
 
 from bridges.messages.heard import Heard
 from bridges.runtime import faults
-from workbench.explain import site
+from workbench.explain import heard_devices
 from workbench.explain.answer import Remedies
+from workbench.explain.device_timeline import Drawing
 from workbench.explain.explanation import Explanation
-from workbench.explain.lanes import Drawing
 from workbench.explain.timeline import Timeline
 from workbench.replay.bags import heard_in
 from workbench.replay.sources import BagError, Notes
@@ -111,7 +111,7 @@ def main(path: Path) -> int:
 
 def read(path: Path, remedies: Remedies) -> Recording:
     """The whole recording, in bounded time. Raises BagError if it is none."""
-    notes, story = Notes(), site.Site()
+    notes, story = Notes(), heard_devices.Site()
     cut = not _all_of(path, notes, story.take)
     devices = story.devices()
     drawings = {key: Drawing(*key) for key in devices[:MOST_DEVICES]}

@@ -9,7 +9,7 @@ from pathlib import Path
 from bridges.blackbox.entries import AnyEntry, Known, Step
 from bridges.blackbox.incident import ERRORS, READING
 from bridges.blackbox.ring import NAME, RingError, Tail
-from bridges.blackbox.trees import HOLDS, TYPE, Tree
+from bridges.blackbox.value_codec import HOLDS, TYPE, Tree
 
 Rows = Mapping[str, str]
 """What something is called, and what it is now."""

@@ -13,7 +13,7 @@ from bridges.messages.definitions import Message
 from bridges.messages.heard import Heard, bounded
 from bridges.messages.topics import AnyTopic
 from bridges.transports.transport import Transport, TransportError
-from workbench.page.site import HEARD, Site
+from workbench.page.live_site import HEARD, Site
 
 log = logging.getLogger(__name__)
 

@@ -16,13 +16,13 @@ from workbench.explain.picture import svg
 from workbench.page import tables
 from workbench.page.actions import Deeds
 from workbench.page.buttons import Buttons
+from workbench.page.cards import AGES_S, ROBOTS, STATUS, Gallery, Key, place_of
 from workbench.page.drawing import path_of
-from workbench.page.gallery import AGES_S, ROBOTS, STATUS, Gallery, Key, place_of
+from workbench.page.explanation_html import explanation, story
 from workbench.page.head import head, main, part
-from workbench.page.here import Here
+from workbench.page.live_site import Site
+from workbench.page.local_daemons import Here
 from workbench.page.login import Login
-from workbench.page.site import Site
-from workbench.page.why import explanation, story
 
 SECTIONS: Final = (
     ("lift", "Lifts"),

@@ -29,14 +29,14 @@ from bridges.transports.transport import Transport
 from workbench.graph.join import interruptible
 from workbench.page.access import Door
 from workbench.page.actions import Deeds
-from workbench.page.gallery import Gallery
+from workbench.page.cards import Gallery
 from workbench.page.guard import Guard, Refusal
-from workbench.page.here import Here
 from workbench.page.incident_views import IncidentViews
 from workbench.page.listener import Listener
+from workbench.page.live_site import Site
+from workbench.page.local_daemons import Here
 from workbench.page.login import STYLE, Login
 from workbench.page.silent import Silent
-from workbench.page.site import Site
 from workbench.page.site_views import SiteViews
 
 log = logging.getLogger(__name__)

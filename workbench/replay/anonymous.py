@@ -24,7 +24,7 @@ from msgspec.structs import replace
 
 from bridges.blackbox.entries import AnyEntry, Clocks, Died, Ended, Head, Known, Lost, Spoken, Step
 from bridges.blackbox.incident import Incident
-from bridges.blackbox.trees import HOLDS, TYPE, Tree
+from bridges.blackbox.value_codec import HOLDS, TYPE, Tree
 from bridges.kinds import kind_called, kind_names
 from bridges.kinds.shared.graph_kind import GraphKind
 from bridges.messages import cdr

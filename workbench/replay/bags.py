@@ -15,8 +15,8 @@ from typing import Final
 
 from bridges.blackbox.entries import Spoken
 from bridges.blackbox.incident import INSTALL, timed
+from bridges.blackbox.recordings import CONTINUOUS
 from bridges.blackbox.ring import MAGIC, Read, RingError
-from bridges.blackbox.shelf import CONTINUOUS
 from bridges.host import user_files
 from bridges.host.log import pairs
 from bridges.messages import cdr

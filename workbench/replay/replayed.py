@@ -22,7 +22,7 @@ from bridges.blackbox.entries import (
     Same,
     Step,
 )
-from bridges.blackbox.trees import Tree, UnknownValue, first_difference, tree
+from bridges.blackbox.value_codec import Tree, UnknownValue, first_difference, tree
 from bridges.host.log import plain
 from bridges.kinds import kind_called
 from bridges.kinds.shared.decision import Decision, IoFailed, Sampled

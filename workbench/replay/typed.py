@@ -9,7 +9,7 @@ from functools import cache
 from itertools import zip_longest
 from typing import Any, Literal, Never, TypeVar, Union, get_args, get_origin, get_type_hints
 
-from bridges.blackbox.trees import Tree, UnknownValue, value
+from bridges.blackbox.value_codec import Tree, UnknownValue, value
 
 LONGEST = 100
 

@@ -11,7 +11,8 @@ COORDINATOR-3. A request is repeated until the station shows it. A station that 
    TAKEN_S is passed over for SHUNNED_S, and the wish goes to the end of the queue.
 COORDINATOR-4. How a request ends, and who is at fault, is read from the stations' states
    (`stations.py`).
-COORDINATOR-5. A robot on a pad that is not its own is told to leave it, or a person is (`astray.py`).
+COORDINATOR-5. A robot on a pad that is not its own is told to leave it, or a person is
+   (`wrong_pad.py`).
 COORDINATOR-6. A request for one of our robots counts as that robot's, even if another node has made it.
 COORDINATOR-7. During the quiet start it only listens. Beside another node that publishes charging
    assignments (RMF's rmf_charging_schedule) it sends none, and asks for the stations that those
@@ -20,7 +21,7 @@ COORDINATOR-7. During the quiet start it only listens. Beside another node that 
 
 from msgspec.structs import replace
 
-from bridges.kinds.charger_coordinator import astray, report, stations, wishes
+from bridges.kinds.charger_coordinator import report, stations, wishes, wrong_pad
 from bridges.kinds.charger_coordinator.memory import Memory, Site
 from bridges.kinds.charger_coordinator.queue import allot, suiting
 from bridges.kinds.charger_coordinator.report import SiteReport
@@ -56,7 +57,7 @@ def decide(memory: Memory, event: Event, now: float, site: Site) -> Decided:
     memory = stations.in_time(stations.adopted(memory, now, site), now, site)
     if memory.may_speak:
         memory = allot(_as_dedicated(memory, site), now, site)
-    memory = astray.nudged(memory, now, site)
+    memory = wrong_pad.nudged(memory, now, site)
     shown = report.report(memory, now, site)
     memory, publish = report.messages(memory, shown.faults, now, site)
     return Decision(memory, None, shown, _wake_at(memory, now, site), refused, publish)
@@ -118,5 +119,5 @@ def _wake_at(memory: Memory, now: float, site: Site) -> float:
             due.append(stations.not_taken_at(grant))
     due += [stations.proven_at(memory, who) for who in memory.strikes]
     due += report.due(memory, site)
-    due += astray.due(memory, now, site)
+    due += wrong_pad.due(memory, now, site)
     return min((at for at in due if at > now), default=NEVER)

@@ -18,7 +18,7 @@ from msgspec.structs import replace
 from bridges.kinds.charger.pad import misplaced_in
 from bridges.kinds.charger.report import Diagnosis, diagnosis
 from bridges.kinds.charger.settings import Robot
-from bridges.kinds.charger_coordinator import astray
+from bridges.kinds.charger_coordinator import wrong_pad
 from bridges.kinds.charger_coordinator.memory import (
     ASSIGNED,
     CHARGING,
@@ -124,8 +124,8 @@ def _faults(memory: Memory, now: float, site: Site) -> Iterator[Fault]:
             yield from _faults_of(memory, name, memory.stations[name], now, site)
         if now < memory.shunned.get(name, now):
             yield Fault("REQUEST_NOT_TAKEN", f"{name}: its daemon's log says why")
-    for one in astray.found(memory, now, site).values():
-        if astray.alarming(memory, one, now):
+    for one in wrong_pad.found(memory, now, site).values():
+        if wrong_pad.alarming(memory, one, now):
             yield _misplaced(one)
     for who, error in memory.receivers.items():
         if error and diagnosis(error) is not Diagnosis.LOST:
@@ -138,14 +138,14 @@ def _faults_of(memory: Memory, name: str, seen: Seen, now: float, site: Site) ->
         yield Fault("STATION_OUT_OF_SERVICE", f"{name}: {seen.error}")
     if seen.diagnosis is not Diagnosis.PAD:
         return
-    who = astray.on_pad(seen.error, site)
+    who = wrong_pad.on_pad(seen.error, site)
     unasked = who is not None and memory.station_of(who) is None and now >= seen.since + ASKS_S
     if who is None or unasked:
         what = who or _stranger(seen.error)
         yield Fault("WRONG_STATION", f"{what} stands at {name}, but nobody requested that")
 
 
-def _misplaced(one: astray.Astray) -> Fault:
+def _misplaced(one: wrong_pad.Astray) -> Fault:
     if one.expected:
         text = f"{one.who} stands at {one.station}, but is expected at {one.expected}"
         return Fault("WRONG_STATION", text)
@@ -228,10 +228,10 @@ def _to_station(name: str, grant: Grant) -> tuple[AnyTopic, d.Message]:
 
 def _assignments(memory: Memory, now: float, site: Site) -> Iterator[d.ChargingAssignments]:
     """Every robot's place, fleet by fleet, in the order of names. One that is told to leave a pad has
-    for a moment another mode (`astray.py`)."""
+    for a moment another mode (`wrong_pad.py`)."""
     fleets: dict[str, list[d.ChargingAssignment]] = {}
     for who in sorted(site.robots):
-        station, told = memory.station_of(who), astray.is_nudged(memory, who, now)
+        station, told = memory.station_of(who), wrong_pad.is_nudged(memory, who, now)
         charges = (station is None) == told
         mode = d.ChargingMode.MODE_CHARGE if charges else d.ChargingMode.MODE_WAIT
         place = site.places[station][who.fleet] if station and not told else site.waits_at[who]

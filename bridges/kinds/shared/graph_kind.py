@@ -2,7 +2,7 @@
 
 A supervisor or coordinator has no driver and no bus. It learns from messages which subjects (lifts,
 doors) there are, and keeps one core memory for each. `bridges/kinds/<kind>/__init__.py` holds the
-`KIND`; `bridges/runtime/graph.py` serves it.
+`KIND`; `bridges/runtime/graph_node.py` serves it.
 """
 
 from collections.abc import Callable, Collection, Iterable, Mapping

@@ -8,7 +8,7 @@ import msgspec
 from bridges.kinds import kind_called
 from bridges.kinds.shared.graph_kind import GraphKind
 from bridges.kinds.shared.table import Table
-from bridges.messages import instead
+from bridges.messages import fallbacks
 from bridges.settings.load import Config
 from bridges.settings.shown import choices_of, plain
 from bridges.yaml.nodes import Problem
@@ -86,7 +86,7 @@ def _lacking(config: Config) -> list[str]:
         topics = [*kind.publishes]
     else:
         topics = [t for device in config.devices.values() for t in kind.publishes(device)]
-    lines = [line for topic in topics for line in instead.remarks(topic, config.rmf.release)]
+    lines = [line for topic in topics for line in fallbacks.remarks(topic, config.rmf.release)]
     return list(dict.fromkeys(lines))
 
 

@@ -30,8 +30,8 @@ from bridges.host.log import pairs
 from bridges.messages.releases import Release
 from bridges.messages.topics import AnyTopic, Topic
 from bridges.transports import addresses, cyclone, notices
+from bridges.transports.dds.discovery import NodeOnGraph
 from bridges.transports.dds.ends import DdsPublisher, DdsSubscription
-from bridges.transports.dds.graph import NodeOnGraph
 from bridges.transports.dds.idl import sample_type
 from bridges.transports.dds.peers import DdsPeers
 from bridges.transports.threaded import LOOK_EVERY_S, Threaded

@@ -27,7 +27,7 @@ import serial
 
 from drivers.hal.deadline import Deadline
 from drivers.hal.modbus import frames
-from drivers.hal.modbus.places import Serial
+from drivers.hal.modbus.connections import Serial
 from drivers.hal.modbus.wire import Answer, BadReply, NoReply, Question, Unreachable
 
 LATE: Final = 3.0

@@ -8,7 +8,7 @@ import msgspec
 from bridges.kinds.shared.fields import Name, Period, tells
 from bridges.kinds.shared.remarks import Remarks
 from drivers.hal import BusSettings, Needs, UnwatchedOutputs, Where, serial_port
-from drivers.hal.modbus.places import Serial, Tcp
+from drivers.hal.modbus.connections import Serial, Tcp
 from drivers.hal.modbus.registers import Unit
 from drivers.hal.modbus.watchdog import Watchdog
 

@@ -15,7 +15,7 @@ from msgspec.structs import replace
 from bridges.blackbox.incident import Incident, Note, part
 from bridges.blackbox.mcap_write import write
 from bridges.blackbox.ring import Read
-from bridges.blackbox.trees import tree
+from bridges.blackbox.value_codec import tree
 from bridges.runtime import record
 from bridges.settings.load import load
 from drivers.profiles import texts

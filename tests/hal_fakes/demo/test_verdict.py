@@ -9,9 +9,9 @@ from msgspec.structs import replace
 
 from bridges.messages import definitions as d
 from bridges.messages.words import Stated
+from hal_fakes.demo.demo_run import summary
 from hal_fakes.demo.journal import Journal
 from hal_fakes.demo.ride import DEMO, FROM, LIFT, RELAYS, TO, problems
-from hal_fakes.demo.stage import summary
 from hal_fakes.plants.plant import Edge
 
 ME = "demo/robot"

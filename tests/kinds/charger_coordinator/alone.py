@@ -14,7 +14,7 @@ from bridges.kinds.charger_coordinator.report import SiteReport
 from bridges.kinds.charger_coordinator.signals import Event, FleetSeen, Sighting, StateHeard
 from bridges.kinds.shared.graph_kind import Woken
 from bridges.messages import definitions as d
-from tests.kinds.charger_coordinator.yard import settings
+from tests.kinds.charger_coordinator.virtual_site import settings
 from tests.kinds.shared import alone
 
 SETTINGS = settings()

@@ -9,7 +9,7 @@ from bridges.kinds.charger_coordinator import messages
 from bridges.kinds.charger_coordinator.signals import ReceiverHeard
 from bridges.messages import definitions as d
 from bridges.messages import topics
-from tests.kinds.charger_coordinator.yard import PLACES, Yard, settings, two_brands
+from tests.kinds.charger_coordinator.virtual_site import PLACES, Yard, settings, two_brands
 
 
 def yard() -> Yard:

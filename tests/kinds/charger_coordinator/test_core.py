@@ -7,7 +7,6 @@ from msgspec.structs import replace
 
 from bridges.kinds.charger.report import LOST, Diagnosis, diagnosis
 from bridges.kinds.charger.settings import Robot
-from bridges.kinds.charger_coordinator.astray import on_pad
 from bridges.kinds.charger_coordinator.memory import (
     ASSIGNED,
     CHARGING,
@@ -26,11 +25,12 @@ from bridges.kinds.charger_coordinator.signals import (
     StateHeard,
     Wanted,
 )
+from bridges.kinds.charger_coordinator.wrong_pad import on_pad
 from bridges.kinds.shared.decision import OperatorReset
 from bridges.kinds.shared.graph_kind import MaySpeak, Woken
 from bridges.messages import definitions as d
 from tests.kinds.charger_coordinator.alone import ONE, SETTINGS, THREE, TWO, A, Alone, B, busy
-from tests.kinds.charger_coordinator.yard import RECEIVERS
+from tests.kinds.charger_coordinator.virtual_site import RECEIVERS
 
 SERVED = [CHARGING, RELEASED]
 

@@ -14,7 +14,7 @@ from bridges.kinds.charger_coordinator.signals import (
     Wanted,
 )
 from tests.kinds.charger_coordinator.alone import ONE, SETTINGS, THREE, TWO, A, Alone, B
-from tests.kinds.charger_coordinator.yard import settings
+from tests.kinds.charger_coordinator.virtual_site import settings
 
 
 def test_a_restart_remembers_who_was_charging_and_which_robot_a_station_must_release() -> None:

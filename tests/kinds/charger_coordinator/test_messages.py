@@ -13,7 +13,7 @@ from bridges.kinds.charger_coordinator.signals import Dedicated, Sighting, State
 from bridges.kinds.shared.decision import RequestRefused
 from bridges.messages import definitions as d
 from bridges.settings.load import SettingsError, load
-from tests.kinds.charger_coordinator.yard import settings
+from tests.kinds.charger_coordinator.virtual_site import settings
 
 SETTINGS = settings(near_m=2.5)
 CONFIG = Path(__file__).parents[3] / "config" / "charger_coordinator.yaml"

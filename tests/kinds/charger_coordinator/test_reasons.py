@@ -19,7 +19,7 @@ from bridges.kinds.charger_coordinator.reasons import queued, reasons
 from bridges.kinds.charger_coordinator.schedule import Charging
 from bridges.kinds.charger_coordinator.signals import Sighting
 from bridges.messages.definitions import ChargerStateValue
-from tests.kinds.charger_coordinator.yard import settings
+from tests.kinds.charger_coordinator.virtual_site import settings
 
 ONE, TWO, THREE = (Robot("tiny", f"AMR0{i}") for i in (1, 2, 3))
 X, Y = Robot("big", "X"), Robot("big", "Y")

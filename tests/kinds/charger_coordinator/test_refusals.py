@@ -10,7 +10,7 @@ from bridges.kinds.charger_coordinator import KIND
 from bridges.messages import topics
 from bridges.messages.definitions import ChargerRequest, Duration
 from bridges.runtime.clock import Clock
-from bridges.runtime.graph import GraphNode
+from bridges.runtime.graph_node import GraphNode
 from bridges.settings.load import load
 from tests.transports.memory import MemoryNetwork, MemoryTransport
 

@@ -11,7 +11,7 @@ import pytest
 from bridges.kinds.charger_coordinator.schedule import Charging
 from bridges.kinds.shared.decision import OperatorReset
 from bridges.messages import definitions as d
-from tests.kinds.charger_coordinator.yard import Yard, settings
+from tests.kinds.charger_coordinator.virtual_site import Yard, settings
 from workbench.rmf_model.fleet import Finishing
 
 FINISHING: Final[tuple[Finishing, ...]] = ("charge", "park", "nothing")

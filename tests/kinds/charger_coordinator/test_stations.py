@@ -22,7 +22,7 @@ from bridges.kinds.charger_coordinator.memory import (
 )
 from bridges.kinds.charger_coordinator.signals import Sighting, StateHeard
 from bridges.kinds.shared.durations import AGES_AGO, NEVER
-from tests.kinds.charger_coordinator.yard import settings
+from tests.kinds.charger_coordinator.virtual_site import settings
 
 SITE = Site.of(settings())
 ONE, TWO = Robot("tiny", "AMR01"), Robot("tiny", "AMR02")

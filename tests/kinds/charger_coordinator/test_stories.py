@@ -10,7 +10,7 @@ from bridges.kinds.shared.decision import OperatorReset
 from bridges.messages import definitions as d
 from bridges.messages import topics
 from bridges.transports.transport import Publisher
-from tests.kinds.charger_coordinator.yard import Yard
+from tests.kinds.charger_coordinator.virtual_site import Yard
 
 
 def yard(**changes: object) -> Yard:

@@ -36,7 +36,7 @@ from bridges.kinds.shared.decision import OperatorReset
 from bridges.kinds.shared.graph_kind import MaySpeak, Woken
 from bridges.messages import definitions as d
 from tests.depth import depth, examples
-from tests.kinds.charger_coordinator.yard import settings
+from tests.kinds.charger_coordinator.virtual_site import settings
 from tests.walk import histories
 
 SETTINGS = settings()

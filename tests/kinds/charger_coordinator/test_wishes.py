@@ -9,7 +9,7 @@ from bridges.kinds.charger_coordinator.memory import By, Grant, Memory, Site, St
 from bridges.kinds.charger_coordinator.schedule import Charging, LocalTime
 from bridges.kinds.charger_coordinator.signals import Sighting, Wanted
 from bridges.kinds.shared.durations import AGES_AGO
-from tests.kinds.charger_coordinator.yard import settings
+from tests.kinds.charger_coordinator.virtual_site import settings
 
 NIGHT = Charging(at="22:00", until="05:00", robots=["tiny/AMR01"], percent=95.0)
 SITE = Site.of(settings())

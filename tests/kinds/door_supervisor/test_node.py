@@ -9,9 +9,9 @@ from bridges.kinds.door_supervisor.settings import Settings
 from bridges.messages import definitions as d
 from bridges.messages import topics
 from bridges.messages.stamps import stamp
-from bridges.runtime import graph as graph_node
+from bridges.runtime import graph_node as graph_node
 from bridges.runtime.clock import Clock
-from bridges.runtime.graph import GraphNode
+from bridges.runtime.graph_node import GraphNode
 from tests.runtime.virtual_graph import Disk
 from tests.transports.memory import MemoryNetwork, MemoryTransport
 

@@ -8,7 +8,7 @@ from bridges.kinds.lift_supervisor import KIND
 from bridges.kinds.lift_supervisor.settings import Settings
 from bridges.messages.topics import Topic
 from bridges.runtime.clock import Clock
-from bridges.runtime.graph import GraphNode
+from bridges.runtime.graph_node import GraphNode
 from bridges.transports.transport import Subscription
 from tests.transports.memory import MemoryNetwork, MemoryTransport
 

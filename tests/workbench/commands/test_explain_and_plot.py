@@ -13,9 +13,9 @@ from bridges.messages.heard import Heard
 from bridges.messages.releases import NEWEST
 from hal_fakes.wire import wire
 from tests.transports.memory import MemoryNetwork, MemoryTransport
-from tests.workbench.explain.scenes import fire, held_by_another
+from tests.workbench.explain.situations import fire, held_by_another
 from tests.workbench.replay.written import MCAP, SQLITE, write
-from workbench.explain.site import Site
+from workbench.explain.heard_devices import Site
 from workbench.graph import live
 from workbench.replay.recordings import FIRST_OF_OTHERS, Sieve
 

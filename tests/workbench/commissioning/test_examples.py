@@ -11,7 +11,7 @@ from msgspec import inspect as mi
 from bridges.kinds.shared.rmf_section import Rmf
 from bridges.settings import names as named
 from bridges.yaml.nodes import Page
-from bridges.yaml.spots import Spot
+from bridges.yaml.positions import Spot
 from bridges.yaml.values import Values
 from workbench.commissioning import reference
 from workbench.commissioning.examples import example

@@ -3,7 +3,7 @@
 import logging
 import sys
 
-from tests.workbench.explain.scenes import SCENES
+from tests.workbench.explain.situations import SCENES
 from tests.workbench.explain.test_sentences import GOLDEN, told
 
 logging.disable(logging.CRITICAL)

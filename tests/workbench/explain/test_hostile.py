@@ -9,8 +9,8 @@ from bridges.messages.stamps import stamp
 from bridges.messages.words import KINDS
 from bridges.observe.limits import MOST_DEVICES, MOST_REQUESTERS
 from workbench.explain.device import MOST_LINES
+from workbench.explain.heard_devices import Site
 from workbench.explain.lift_facts import LiftFacts
-from workbench.explain.site import Site
 from workbench.explain.text import lines
 
 WALL = 1_800_000_000.0

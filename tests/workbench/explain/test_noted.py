@@ -8,9 +8,9 @@ import pytest
 from bridges.messages import definitions as d
 from bridges.messages.heard import Heard, Own
 from bridges.runtime.diagnostics import diagnosis
-from workbench.explain.lanes import Drawing
+from workbench.explain.device_timeline import Drawing
+from workbench.explain.heard_devices import Site
 from workbench.explain.noted import MOST, Noted, levels, noted
-from workbench.explain.site import Site
 from workbench.explain.timeline import Level
 from workbench.replay.recordings import Span as Part
 from workbench.replay.recordings import told_between

@@ -12,10 +12,10 @@ from bridges.messages import definitions as d
 from bridges.messages.heard import Heard
 from bridges.messages.stamps import stamp
 from bridges.runtime.faults import for_explain
-from tests.workbench.explain.scenes import SCENES
+from tests.workbench.explain.situations import SCENES
 from workbench.explain.explanation import Explanation
+from workbench.explain.heard_devices import Site
 from workbench.explain.phrases import JOINS, on_graph
-from workbench.explain.site import Site
 
 GRAPH = ("--config", "our site.yaml", "--domain-id", "7", "--transport", "zenoh", "--localhost")
 WHOLE = cli.whole_parser()

@@ -7,7 +7,7 @@ import pytest
 from bridges.messages import definitions as d
 from bridges.messages.heard import Heard
 from bridges.messages.stamps import stamp
-from workbench.explain.site import Site
+from workbench.explain.heard_devices import Site
 
 WALL = 1_800_000_000.0
 EITHER = "the supervisor, or a person with `send --direct`,"

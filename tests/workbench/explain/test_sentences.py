@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from bridges.runtime.faults import remedies
-from tests.workbench.explain.scenes import SCENES
-from workbench.explain.site import Site
+from tests.workbench.explain.situations import SCENES
+from workbench.explain.heard_devices import Site
 from workbench.explain.text import SCREEN_LINES, lines
 
 GOLDEN = Path(__file__).parent / "golden"

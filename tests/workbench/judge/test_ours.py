@@ -6,7 +6,7 @@ from tests.site.building import CHARGERS, DOORS, LIFTS, devices
 from tests.site.daemons import DeviceDaemon
 from tests.workbench.judge.world import World, told
 from workbench.judge.judge import Kind
-from workbench.judge.plays import Charge, Passages, Performance, Ride
+from workbench.judge.scenarios import Charge, Passages, Performance, Ride
 
 CASES: list[tuple[Kind, str, Performance]] = [
     *(

@@ -11,9 +11,9 @@ from bridges.transports.transport import Publisher
 from tests.site.network import CLEAR, Air, Place
 from tests.site.timeline import EPOCH, NEVER, Alarm, Timeline
 from workbench.judge.judge import Judge, Kind
+from workbench.judge.judge_run import Stage
 from workbench.judge.law import Verdict
-from workbench.judge.plays import Charge, Passages, Performance, Ride
-from workbench.judge.stage import Stage
+from workbench.judge.scenarios import Charge, Passages, Performance, Ride
 from workbench.rmf_model import Party, Said
 
 HEARD: tuple[AnyTopic, ...] = (

@@ -6,7 +6,7 @@ from bridges.cli import whole_parser
 from bridges.messages import definitions as d
 from workbench.graph.board import Row
 from workbench.page.actions import Action, Local, actions, fail, press, queue
-from workbench.page.site import DeviceView
+from workbench.page.live_site import DeviceView
 
 GRAPH = ("--domain-id", "7", "--localhost")
 HOSTILE = "--config=/etc/shadow"

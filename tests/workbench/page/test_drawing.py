@@ -8,7 +8,7 @@ from bridges.messages import definitions as d
 from bridges.messages.words import Stated
 from workbench.graph.board import Row
 from workbench.page import drawing
-from workbench.page.site import DeviceView, Robot, Stands
+from workbench.page.live_site import DeviceView, Robot, Stands
 
 HOSTILE = "<script>alert(1)</script>\"'&"
 LIFT = d.LiftState(

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from bridges.blackbox.entries import Step
-from bridges.blackbox.trees import tree
+from bridges.blackbox.value_codec import tree
 from bridges.kinds.door.signals import DoorOutputs, DoorSample
 from bridges.kinds.shared.decision import IoFailed, Sampled
 from workbench.page.levels import Levels

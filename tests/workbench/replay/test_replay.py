@@ -8,7 +8,7 @@ from msgspec.structs import replace
 
 from bridges.blackbox.entries import Known, Step
 from bridges.blackbox.ring import Read
-from bridges.blackbox.trees import value
+from bridges.blackbox.value_codec import value
 from bridges.kinds.lift import core as lift_core
 from bridges.kinds.shared.decision import Fault
 from tests.blackbox.kept import keep

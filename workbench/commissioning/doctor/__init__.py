@@ -10,7 +10,7 @@
     can.py       the kernel's CAN interfaces
     served.py    what a running daemon says, in place of its buses
     answers.py   who answers on the buses of a daemon that does not run; it only reads
-    graph.py     RMF's graph: interface, domain, who is there, message versions
+    network.py   RMF's graph: interface, domain, who is there, message versions
     examination.py  every subject in turn
     kill_test.py a process that holds an output on is killed; victim.py is that process
 

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-from bridges.host import places as kept
-from bridges.host.places import Places
-from bridges.runtime import directory
+from bridges.host import directories as kept
+from bridges.host.directories import Places
+from bridges.runtime import runtime_directory
 from bridges.settings.load import Config
 from drivers.hal.gpio.header import canonical
 from workbench.commissioning.doctor import can, gpio, health, ports
@@ -54,7 +54,7 @@ def examined(
     yield from health.clock(machine)
     yield from health.watchdog(machine)
     try:
-        places = directory.find(file, options.runtime_dir)
+        places = runtime_directory.find(file, options.runtime_dir)
     except PermissionError as error:
         places, now = kept.of_service(file), unseen(str(error))
     else:
@@ -65,7 +65,7 @@ def examined(
         yield from _way(config, name, machine, who, now)
     yield from _answering(config, places, now, options)
     if options.listen_s:
-        from workbench.commissioning.doctor.graph import Look, graph
+        from workbench.commissioning.doctor.network import Look, graph
 
         loopback = options.localhost or now.simulated
         simulated = ["--localhost"] if loopback and not options.localhost else []
@@ -123,8 +123,8 @@ def _answering(config: Config, places: Places, now: Served, options: Options) ->
     if now.busy or not names:
         return
     try:
-        held = directory.RuntimeDirectory(places, config.path.absolute(), serves=False)
-    except (directory.AlreadyRunning, PermissionError) as error:
+        held = runtime_directory.RuntimeDirectory(places, config.path.absolute(), serves=False)
+    except (runtime_directory.AlreadyRunning, PermissionError) as error:
         yield wrong(DAEMON, str(error), NOT_ASKED, "stop what uses it, and try again")
         return
     try:

@@ -16,7 +16,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Final
 
-from bridges.host.places import Places
+from bridges.host.directories import Places
 from bridges.runtime.record import Records
 from workbench.commissioning.doctor.finding import Finding, ok, warning, wrong
 from workbench.commissioning.walk.core import Step

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final
 
-from bridges.host.places import Places
+from bridges.host.directories import Places
 from bridges.runtime import holder
 from bridges.runtime.daemons import Daemon, daemons
 from bridges.runtime.faults import remedies

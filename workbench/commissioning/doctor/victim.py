@@ -10,11 +10,11 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any, Final
 
-from bridges.runtime import directory, guard, signals
+from bridges.runtime import guard, runtime_directory, signals
 from bridges.settings.load import Config, SettingsError, load
 from drivers import Driver, DriverError
 from drivers.hal import Bus
-from workbench.commissioning.by_hand import guarded, not_off
+from workbench.commissioning.manual_control import guarded, not_off
 from workbench.commissioning.walk.core import Step
 from workbench.commissioning.walk.steps import steps
 
@@ -26,8 +26,8 @@ def main(file: Path, device: str, step: str, runtime_dir: str | None) -> int:
     signals.End()
     try:
         config = load(file)
-        held = directory.held(file, runtime_dir, serves=False)
-    except (SettingsError, directory.AlreadyRunning, PermissionError) as error:
+        held = runtime_directory.held(file, runtime_dir, serves=False)
+    except (SettingsError, runtime_directory.AlreadyRunning, PermissionError) as error:
         return _say(f"{error}")
     try:
         return _held(config, device, step, held, guard.command(file, runtime_dir))
@@ -39,7 +39,7 @@ def _held(
     config: Config,
     device: str,
     step: str,
-    held: directory.RuntimeDirectory,
+    held: runtime_directory.RuntimeDirectory,
     switches_off: list[str],
 ) -> int:
     try:

@@ -10,7 +10,7 @@ from typing import Any, Final
 from bridges.host.log import plain
 from drivers import Driver, DriverError
 from drivers.hal.points import Wire
-from workbench.commissioning.by_hand import not_off
+from workbench.commissioning.manual_control import not_off
 from workbench.commissioning.walk import core
 from workbench.commissioning.walk.core import Event, Lost, Memory, Read, Step, Tick
 from workbench.commissioning.walk.tap import Tap

@@ -17,7 +17,7 @@ from typing import Any
 import pytest
 
 from bridges import cli
-from bridges.host.places import Places
+from bridges.host.directories import Places
 from bridges.messages.definitions import DoorMode, DoorModeValue, DoorState, Time
 from bridges.messages.topics import DOOR_REQUESTS, DOOR_STATES
 from bridges.runtime import record

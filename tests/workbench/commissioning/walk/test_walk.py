@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from bridges import cli
-from bridges.host.places import Places
+from bridges.host.directories import Places
 from bridges.runtime.record import Records, of
 from bridges.settings.load import load
 from tests.commands.terminal import Terminal

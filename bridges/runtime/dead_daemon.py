@@ -1,0 +1,159 @@
+"""The outputs of a dead daemon, off from a new process: what `rmf-bridge outputs-off` does.
+
+The record that it wrote before it claimed anything takes precedence over the YAML, which may have been
+edited since. A directory that is full, missing or read-only does not delay switching off.
+"""
+
+import argparse
+import logging
+import os
+from collections.abc import Mapping
+from pathlib import Path
+
+import msgspec
+
+from bridges.host import log
+from bridges.host.directories import Places, act_as_owner, by_hand, work_somewhere
+from bridges.host.files import read
+from bridges.host.log import pairs
+from bridges.runtime import last_mark, signals
+from bridges.runtime import runtime_directory as runtime
+from bridges.runtime.holder import STATUS, STATUS_MAX
+from bridges.runtime.record import Record, Records
+from bridges.runtime.switch_off import outputs_off
+from bridges.settings.config import Config
+from bridges.yaml.problems import SettingsError
+
+TIMEOUT_S = 5.0
+
+
+def switch_off(args: argparse.Namespace) -> int:
+    """0 when every output is verified off, 1 when not, 69 while the daemon lives or may live."""
+    log.start()
+    signals.ignore()
+    file = args.file.absolute()
+    try:
+        places = _places(file, args.runtime_dir)
+    except PermissionError as error:
+        logging.error(str(error))
+        return os.EX_UNAVAILABLE
+    work_somewhere(places or by_hand(file))
+    if places is None:
+        return _off_by_yaml(file, {})
+    answered = ages(places)
+    records = Records(places, file)
+    if args.record:  # the daemon that asks holds the lock meanwhile (`runtime/predecessor.py`)
+        return _off_by_records(records, answered, args.record)
+    claimed = last_mark.says_claimed(os.environ) and bool(records.unreleased())
+    try:
+        held = runtime.RuntimeDirectory(
+            places, file, serves=False, wait_s=0.0 if claimed else runtime.WAIT_S
+        )
+    except runtime.AlreadyRunning as error:
+        if claimed:
+            logging.warning("%s. But this run's outputs are not off yet", error)
+            return _off_by_records(records, answered)
+        logging.error("%s. That switches its outputs off", error)
+        return os.EX_UNAVAILABLE
+    try:
+        if held.records.unreleased():
+            return _off_by_records(held.records, answered)
+        return _off_by_yaml(file, answered)
+    finally:
+        held.close()
+
+
+def _places(file: Path, given: str | None) -> Places | None:
+    """The daemon's directories. None if they cannot be trusted and systemd says that it is dead.
+
+    Raises PermissionError if it cannot be known whether a daemon runs there.
+    """
+    try:
+        places = runtime.find(file, given)
+        act_as_owner(places)
+    except PermissionError as error:
+        if "SERVICE_RESULT" not in os.environ:  # set for ExecStopPost: systemd.exec(5)
+            raise
+        logging.error("%s; switching off what %s names", error, file)
+        return None
+    return places
+
+
+def _off_by_yaml(file: Path, answered: Mapping[str, float]) -> int:
+    from bridges.settings.load import load
+
+    try:
+        config = load(file)
+    except SettingsError as error:
+        _say(error)
+        return os.EX_CONFIG
+    if not config.buses:
+        logging.info(pairs("nothing_to_switch_off", file=file, kind=config.kind))
+        return 0
+    return _told(_unsafe(config, (), answered, TIMEOUT_S) == set())
+
+
+def _off_by_records(
+    records: Records, answered: Mapping[str, float], names: list[str] | None = None
+) -> int:
+    """Switch off what these records name; all records by default."""
+    found = [r for r in records.unreleased() if names is None or r.name in names]
+    each_s = TIMEOUT_S / max(1, len(found))  # a dead bus of one leaves time for the others
+    return _told(not [r for r in found if not _off_by_record(records, r, answered, each_s)])
+
+
+def _off_by_record(
+    records: Records, record: Record, answered: Mapping[str, float], within_s: float
+) -> bool:
+    try:
+        config = record.config()
+    except SettingsError as error:
+        _say(error)  # another version's YAML: that of now is all that there is to go by
+        _off_by_yaml(Path(record.file), answered)
+        return False
+    unsafe = _unsafe(config, record.safe, answered, within_s)
+    try:
+        if unsafe:
+            records.still_unsafe(record, unsafe, config)
+        else:
+            records.release(record)
+    except OSError as error:
+        logging.warning(pairs("not_written", what="record", reason=error))
+    return not unsafe
+
+
+def _unsafe(
+    config: Config, safe: tuple[str, ...], answered: Mapping[str, float], within_s: float
+) -> set[str]:
+    return set(config.devices) - set(safe) - outputs_off(config, within_s, safe, answered)
+
+
+class _Device(msgspec.Struct):
+    input_age_s: float | None = None
+
+
+class _StatusFile(msgspec.Struct):
+    devices: dict[str, _Device] = {}
+
+
+def ages(places: Places) -> Mapping[str, float]:
+    """How long ago (s) each device had answered when the dead daemon wrote its last status, if that is
+    still there; those that never had are left out."""
+    try:
+        shown = msgspec.json.decode(read(places.runtime / STATUS, STATUS_MAX), type=_StatusFile)
+    except (OSError, msgspec.MsgspecError, UnicodeDecodeError, RecursionError):
+        return {}
+    found = {name: device.input_age_s for name, device in shown.devices.items()}
+    return {name: age for name, age in found.items() if age is not None}
+
+
+def _told(all_off: bool) -> int:
+    if all_off:
+        return 0
+    logging.error("outputs not verified off: cut the relays' supply before working on the device")
+    return 1
+
+
+def _say(error: SettingsError) -> None:
+    for problem in error.problems:
+        logging.error(str(problem))

@@ -1,0 +1,341 @@
+"""Serves a kind without hardware: a core memory for each subject, and its publishers on RMF's graph.
+
+A round takes the messages that arrived, wakes the subjects that are due and publishes their messages.
+A test calls it in virtual time; the daemon has a thread for it (`bridges/runtime/serving.py`).
+"""
+
+import logging
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from typing import Any, Generic
+
+from bridges.host.log import pairs
+from bridges.kinds.shared.decision import Fault, M, OperatorReset, R, RequestRefused
+from bridges.kinds.shared.durations import NEVER
+from bridges.kinds.shared.graph_kind import GraphEvent, GraphKind, MaySpeak, Woken
+from bridges.kinds.shared.kind import E, L, S
+from bridges.messages.definitions import Message
+from bridges.messages.stamps import ClockError, stamp
+from bridges.messages.topics import Topic
+from bridges.runtime.answers import Answers
+from bridges.runtime.clock import Clock
+from bridges.runtime.inbox import Inbox
+from bridges.runtime.keeper import Keeper, MemoryStore
+from bridges.runtime.outlet import Named, Outlet
+from bridges.runtime.presence import Presence
+from bridges.runtime.refusals import Refusals
+from bridges.runtime.ring_writer import NOBODY, Nobody
+from bridges.runtime.subject import Core, Status, Subject
+from bridges.transports.transport import Subscription, Transport
+
+log = logging.getLogger(__name__)
+
+MAX_SUBJECTS = 1000
+"""More lifts or doors than any site has; more names must be invented ones."""
+MAX_UNSHOWN = 100
+"""At most this many names that only requests mention, without a state of such a lift or door."""
+MAX_REQUESTERS = 10_000
+"""At most this many requesters of all lifts or doors that the YAML does not name: more than any site's
+robots at a time. A holder is never forgotten, so made-up ones would pile up.
+"""
+DEFECT = "a defect"
+
+
+def _core(kind: GraphKind[S, L, M, E, R], limits: L) -> Core[M, GraphEvent[E], None, R]:
+    """A fault is identified by code and detail: the detail says whose it is."""
+
+    def itself(fault: Fault) -> Fault:
+        return fault
+
+    return Core(
+        "subject",
+        lambda memory, event, now: kind.decide(memory, event, now, limits),
+        kind.summary,
+        itself,
+    )
+
+
+def _same(topic: Topic[Message]) -> Topic[Message]:
+    return topic
+
+
+class GraphNode(Generic[S, L, M, E, R]):
+    """Serves one GraphKind. `named`: renames topics as the site's YAML says."""
+
+    def __init__(
+        self,
+        kind: GraphKind[S, L, M, E, R],
+        settings: S,
+        transport: Transport,
+        clock: Clock,
+        named: Named = _same,
+        kept: MemoryStore | None = None,
+        witness: Nobody = NOBODY,
+    ) -> None:
+        self.name = f"graph-{kind.name}"
+        self.inbox: Inbox[tuple[Topic[Message], E]] = Inbox()
+        self.presence = Presence(kind.name, kind.quiet_s(settings))
+        on = ", ".join(topic.name for topic in kind.yields)
+        self.alone = Presence(f"{kind.name} on {on}", 0.0) if on else None
+        self.subjects: dict[str, Subject[M, GraphEvent[E], None, R]] = {}
+        self._kind = kind
+        self._settings = settings
+        self._core = _core(kind, kind.limits(settings))
+        self._transport = transport
+        self._clock = clock
+        self._named = named
+        self._witness = witness
+        self._outlet = Outlet(transport, named, witness)
+        self._refusals = Refusals()
+        self._answers = Answers()
+        self._keeper = Keeper(kind, kept, self._publish)
+        self._started_at = clock.monotonic()
+        self._reset = False
+        self._may = MaySpeak(False, alone=self.alone is None)
+        self._hears: dict[str, Subscription] = {}
+        self._unsaid: list[tuple[Topic[Message], Message]] = []
+        self._shown: set[str] = set()
+        self._reserved = frozenset(kind.reserved(settings))
+        self._requesters = 0
+        for name, memory in self._keeper.restore(settings, self._started_at).items():
+            self._add(name, memory)
+
+    def subscribe(self) -> None:
+        """Subscribe to every topic. Retained messages arrive at once."""
+        self.presence.listen(self._transport, map(self._named, self._kind.sole))
+        if self.alone:
+            self.alone.listen(self._transport, map(self._named, self._kind.yields))
+        for topic in self._kind.requests:
+            others_only = topic in self._kind.publishes
+            hear = self._to_inbox(topic)
+            self._hears[topic.name] = self._transport.subscribe(
+                self._named(topic), hear, others_only=others_only
+            )
+
+    def reset(self) -> None:
+        """An operator says that latched faults may clear; from any thread."""
+        self._reset = True
+        self.inbox.wake()
+
+    @property
+    def finished(self) -> int:
+        """Nothing within a round."""
+        return 0
+
+    @property
+    def ready(self) -> bool:
+        """Always: a passive node is ready too, as another one does its work."""
+        return True
+
+    @property
+    def wake_at(self) -> float:
+        """When the next round is due if no message arrives (monotonic s)."""
+        due = (subject.wake_at for subject in self.subjects.values())
+        looks = [look.look_at for look in (self.presence, self.alone) if look]
+        answers_at = self._answers.due_at if self.presence.may_speak else NEVER
+        return min(*looks, self._keeper.wake_at, answers_at, *due)
+
+    def round(self) -> None:
+        """Take the messages that arrived, wake the subjects that are due, publish."""
+        self._look_around()
+        for name, events in self.inbox.take().items():
+            for topic, event in events:
+                self._receive(name, topic, event)
+        if self._reset:
+            self._reset = False
+            self._decide_all(OperatorReset())
+        self._wake()
+        memories = {name: subject.memory for name, subject in self.subjects.items()}
+        now = self._clock.monotonic()
+        self._keeper.keep(self._real(memories), now)
+        self._say()
+        if self.presence.may_speak:
+            self._answers.say(now, self._kind.answer, self._publish)
+        self._keeper.tell(memories, now, self.presence.may_speak)
+        self._witness.flush()
+
+    def end(self) -> bool:
+        """Nothing to switch off."""
+        return True
+
+    @property
+    def refused(self) -> dict[str, int]:
+        """The number of refused requests, by reason."""
+        return self._refusals.counts()
+
+    def status(self) -> Status:
+        """For the status file: whether it is passive, how many rivals there are, and who hears whom."""
+        return {
+            "passive": not self.presence.may_speak,
+            "other_publishers": self.presence.rivals,
+            "refused": self.refused,
+            **self._answers.status(),
+            "faults": [{"code": f.code, "detail": f.detail} for f in self._faults()],
+            "heard_by": self._heard_by(),
+            "hears": {name: end.matched() for name, end in self._hears.items()},
+        }
+
+    def _faults(self) -> tuple[Fault, ...]:
+        return *self.presence.faults, *self._outlet.faults, *self._keeper.faults
+
+    def devices(self) -> Mapping[str, Status]:
+        """For the status file, from any thread: each subject by name."""
+        return {subject.name: subject.status() for subject in list(self.subjects.values())}
+
+    def _to_inbox(self, topic: Topic[Message]) -> Callable[[Message], None]:
+        """A callback for the transport's thread. Only what is accepted waits: it is not endless."""
+
+        heard_on = self._named(topic).name
+
+        def put(message: Message) -> None:
+            self._witness.spoken(heard_on, message, sent=False)
+            with self._counting(topic.name, message):
+                event = self._kind.requests[topic](message, self._settings, self._clock.wall())
+                self.inbox.put(self._kind.device_name(message), (topic, event))
+
+        return put
+
+    @contextmanager
+    def _counting(self, about: str, message: object = None) -> Iterator[None]:
+        """Count what is refused, or fails by a defect of ours. A core that fails has changed
+        nothing."""
+        try:
+            yield
+        except RequestRefused as refusal:
+            self._refusals.add(refusal.kind, refusal.detail)
+            if message is not None:
+                self._answers.add(message, str(refusal))
+        except Exception as error:
+            if not self._refusals.counts().get(DEFECT):
+                log.exception(pairs("defect", kind=self._kind.name, about=about, reason=error))
+            self._refusals.add(DEFECT, f"{type(error).__name__} about {about}")
+
+    def _look_around(self) -> None:
+        """Declare our publishers when we may speak, and withdraw them when not."""
+        for look in filter(None, (self.presence, self.alone)):
+            look.look(self._clock.monotonic())
+        may = self._may_speak()
+        if may == self._may:
+            return
+        self._may = may
+        if may.yes or may.at_once:
+            silent = () if may.alone else self._kind.yields
+            topics = dict.fromkeys((*self._kind.publishes, *self._kind.sole))
+            self._outlet.close(silent)
+            self._outlet.open(topic for topic in topics if topic not in silent)
+        else:
+            self._outlet.close()
+        self._decide_all(may)
+
+    def _may_speak(self) -> MaySpeak:
+        alone = self.alone is None or self.alone.may_speak
+        presence = self.presence
+        return MaySpeak(presence.may_speak, self._must_at_once(), alone, presence.waits)
+
+    def _must_at_once(self) -> bool:
+        """Is there something that cannot wait for the end of the quiet start, and no rival?"""
+        if self.presence.may_speak or self.presence.rivals:
+            return False
+        return any(self._kind.urgent(subject.memory) for subject in self.subjects.values())
+
+    def _heard_by(self) -> dict[str, int]:
+        """By the topic: how many other nodes listen to what is sent."""
+        names = {topic.name for topic in self._kind.publishes}
+        return {name: n for name, n in self._outlet.heard_by().items() if name in names}
+
+    def _wake(self) -> None:
+        now = self._clock.monotonic()
+        for subject in list(self.subjects.values()):
+            if now >= subject.wake_at:
+                self._decide(subject, Woken())
+            if self._kind.idle(subject.memory, now):
+                self._requesters -= self._remembered(subject)
+                del self.subjects[subject.name]
+                self._witness.forgotten(subject.name, now)
+                self._shown.discard(subject.name)
+
+    def _receive(self, name: str, topic: Topic[Message], event: E) -> None:
+        with self._counting(name):
+            subject = self._subject(name, shows_itself=self._kind.shown_by in (None, topic))
+            self._require_room(subject, self._kind.requester(event))
+            self._decide(subject, event)
+
+    def _subject(self, name: str, shows_itself: bool) -> Subject[M, GraphEvent[E], None, R]:
+        """The subject of this name; made if it is new."""
+        if name not in self.subjects and not self._has_room(name, shows_itself):
+            raise RequestRefused("too many names", name)
+        if shows_itself:
+            self._shown.add(name)
+        found = self.subjects.get(name)
+        return found or self._add(name, self._kind.initial(name, self._started_at))
+
+    def _has_room(self, name: str, shows_itself: bool) -> bool:
+        """Invented names must not displace those of the YAML, or those whose states were heard."""
+        if name in self._reserved:
+            return True
+        if shows_itself:
+            return len(self._shown) < MAX_SUBJECTS
+        return len(self.subjects) - len(self._shown) < MAX_UNSHOWN
+
+    def _require_room(self, subject: Subject[M, GraphEvent[E], None, R], who: str) -> None:
+        """Raises RequestRefused for a new requester where there are too many already."""
+        full = who and self._requesters >= MAX_REQUESTERS and subject.name not in self._reserved
+        if full and who not in self._kind.requesters(subject.memory):
+            raise RequestRefused("too many requesters", f"{who} at {subject.name}")
+
+    def _remembered(self, subject: Subject[M, GraphEvent[E], None, R]) -> int:
+        """How many requesters it remembers; those of the YAML's have a bound of their own."""
+        if subject.name in self._reserved:
+            return 0
+        return len(self._kind.requesters(subject.memory))
+
+    def _real(self, memories: Mapping[str, M]) -> Mapping[str, M]:
+        """Leave out names that never published a state, if they are a flood: it would be back at
+        the next start."""
+        if len(memories) - len(self._shown) < MAX_UNSHOWN:
+            return memories
+        real = self._shown | self._reserved
+        return {name: memory for name, memory in memories.items() if name in real}
+
+    def _add(self, name: str, memory: M) -> Subject[M, GraphEvent[E], None, R]:
+        refusals, clock = self._refusals, self._clock
+        say, witness = self._will_say, self._witness
+        subject = Subject(name, memory, self._core, say, refusals, clock, witness)
+        self.subjects[name] = subject
+        self._requesters += self._remembered(subject)
+        self._decide(subject, self._may)
+        return subject
+
+    def _decide(self, subject: Subject[M, GraphEvent[E], None, R], event: GraphEvent[E]) -> None:
+        before = self._remembered(subject)
+        decision = subject.decide(event)
+        if decision.refused:
+            self._answers.add(event, decision.refused)
+        subject.log(decision.report)
+        self._requesters += self._remembered(subject) - before
+
+    def _decide_all(self, event: GraphEvent[E]) -> None:
+        for subject in self.subjects.values():
+            self._decide(subject, event)
+
+    def _will_say(self, topic: Topic[Message], message: Message) -> None:
+        """Hold the message back until the round has written its memories to disk."""
+        self._unsaid.append((topic, message))
+
+    def _say(self) -> None:
+        unsaid, self._unsaid = self._unsaid, []
+        for topic, message in unsaid:
+            self._publish(topic, message)
+
+    def _publish(self, topic: Topic[Message], message: Message) -> None:
+        """Publish a message, stamped now."""
+        try:
+            stamped = self._kind.stamped(message, stamp(self._clock.wall()))
+        except ClockError as error:
+            self._outlet.failed(topic, error)
+            return
+        self._outlet.publish(topic, stamped)
+
+
+AnyGraphNode = GraphNode[Any, Any, Any, Any, Any]
+"""A node of a kind that was found by its name."""

@@ -1,0 +1,324 @@
+"""The witness: it writes what a daemon sees and does into its ring.
+
+A scan only puts what happened into a queue, which takes less than a microsecond. After the outputs are
+written and the states are published, `flush` encodes the queue and appends it to the ring. A witness
+that fails loses entries; it never raises, and it delays no scan.
+"""
+
+import struct
+import threading
+from collections import deque
+from collections.abc import Callable
+from contextlib import suppress
+from typing import Any, Final
+
+from bridges.blackbox import entries
+from bridges.blackbox.entries import AnyEntry, Clocks, Forgotten, Published, Same, Spoken
+from bridges.blackbox.known import AnyDecision, Seen, known, step
+from bridges.blackbox.ring import FRAME, Ring
+from bridges.kinds.shared.decision import IoFailed, Sampled
+from bridges.kinds.shared.durations import AGES_AGO, NEVER
+from bridges.messages import cdr
+from bridges.messages.definitions import Message
+from bridges.messages.releases import Release
+from bridges.messages.rihs01 import type_name
+from bridges.runtime.clock import Clock
+from bridges.runtime.runtime_directory import Once
+
+KNOWN_EVERY_S: Final = 60.0
+"""All that is known is written again this often (s), so that a recording can begin there."""
+MOST_WAITING: Final = 20_000
+SAME_AT_ONCE: Final = 20
+"""This many unchanged readings make an entry; a kill loses no more than that."""
+LONGEST_SAME: Final = 400
+"""The size of such an entry (bytes)."""
+MOST_SPOKEN_PER_S: Final = 200.0
+"""More messages than this in a second are only counted: a flood must not delay a scan."""
+STEP_S: Final = 0.05
+AGAIN_S: Final = 10.0
+"""How long (s) a witness whose ring failed waits before it makes another."""
+
+
+class Nobody:
+    """A daemon without a recording."""
+
+    def decided(
+        self, subject: str, before: object, event: object, now: float, decision: AnyDecision
+    ) -> None:
+        """A core has decided. `before`: the subject's memory until then."""
+
+    def published(self, subject: str, memory: object, now: float) -> None:
+        """A report was published. `memory`: as the core has it after that."""
+
+    def forgotten(self, subject: str, now: float) -> None:
+        """A subject is no longer remembered."""
+
+    def spoken(self, topic: str, message: Message, *, sent: bool) -> None:
+        """A message was heard, or sent, on this topic."""
+
+    def flush(self) -> None:
+        """Write down what has happened; called when nothing is urgent."""
+
+    def look(self) -> None:
+        """Called each second, from the daemon's main thread."""
+
+    def died(self, reason: str) -> None:
+        """A defect ends the daemon."""
+
+    def ended(self, *, safe: bool) -> None:
+        """The daemon ends in good order."""
+
+
+NOBODY: Final = Nobody()
+
+
+class Witness(Nobody):
+    """The witness of one daemon. Every method may be called from any thread."""
+
+    def __init__(
+        self, make: Callable[[], Ring], clock: Clock, release: Callable[[], Release]
+    ) -> None:
+        """`make`: makes the ring anew; it may raise OSError."""
+        self._make = make
+        self._clock = clock
+        self._release = release
+        self._ring: Ring | None = None
+        self._lock = threading.Lock()
+        self._waiting: deque[tuple[Any, ...]] = deque(maxlen=MOST_WAITING)
+        self._once = Once()
+        self._again_at = AGES_AGO
+        self._dead = False
+        self._fresh()
+        self.look()
+
+    def decided(
+        self, subject: str, before: object, event: object, now: float, decision: AnyDecision
+    ) -> None:
+        self._waiting.append((self._step, subject, before, event, now, decision))
+
+    def published(self, subject: str, memory: object, now: float) -> None:
+        self._waiting.append((self._published, subject, memory, now))
+
+    def forgotten(self, subject: str, now: float) -> None:
+        self._waiting.append((self._forgotten, subject, now))
+
+    def spoken(self, topic: str, message: Message, *, sent: bool) -> None:
+        self._waiting.append((self._spoken, self._clock.monotonic(), topic, message, sent))
+
+    def died(self, reason: str) -> None:
+        self._dead = True
+        self._waiting.append((self._last, entries.Died(self._clock.monotonic(), reason)))
+        self.flush()
+
+    def ended(self, *, safe: bool) -> None:
+        self._waiting.append((self._last, entries.Ended(self._clock.monotonic(), safe)))
+        self.flush()
+        with self._lock, suppress(OSError):
+            ring, self._ring = self._ring, None
+            self._again_at = NEVER
+            if ring is not None:
+                ring.close(ended=safe and not self._dead)
+
+    def flush(self) -> None:
+        if self._lock.acquire(blocking=False):  # else another thread is at it
+            try:
+                self._drain()
+            except Exception as error:  # noqa: BLE001 - logged by _failed
+                self._failed(error)
+            finally:
+                self._lock.release()
+
+    def look(self) -> None:
+        with self._lock:
+            now = self._clock.monotonic()
+            if self._ring is not None and not self._ring.lives:
+                self._failed(FileNotFoundError(f"{self._ring.path} was removed"))
+                self._again_at = now
+            if self._ring is None and now >= self._again_at:
+                self._open(now)
+        self.flush()
+
+    def _open(self, now: float) -> None:
+        self._again_at = now + AGAIN_S
+        try:
+            self._ring = self._make()
+        except OSError as error:
+            self._once.failed("recording", error)
+        else:
+            self._once.works("recording")
+
+    def _failed(self, error: Exception) -> None:
+        self._once.failed("recording", error)
+        ring, self._ring = self._ring, None
+        self._fresh()
+        if ring is not None:
+            with suppress(OSError):
+                ring.close(ended=True)  # the run goes on; only this ring ends
+
+    def _fresh(self) -> None:
+        """Begin with an empty ring: nothing has been written yet."""
+        self._subjects: dict[str, Seen] = {}
+        self._out = bytearray()
+        self._same: dict[str, Seen] = {}
+        self._known_at = AGES_AGO
+        self._may_speak, self._spoken_at, self._lost = MOST_SPOKEN_PER_S, AGES_AGO, 0
+        self._offset_s = 0.0
+
+    def _drain(self) -> None:
+        waiting = self._waiting
+        if self._ring is None:
+            waiting.clear()
+            return
+        self._tell_time()
+        while waiting:
+            take, *what = waiting.popleft()
+            take(*what)
+        self._write()
+
+    def _tell_time(self) -> None:
+        """Write what the wall clock shows, if it has stepped; now and then, all that is known."""
+        now = self._clock.monotonic()
+        offset_s = self._clock.wall() - now
+        stepped = abs(offset_s - self._offset_s) > STEP_S
+        if stepped:
+            self._offset_s = offset_s
+        if now >= self._known_at + KNOWN_EVERY_S:
+            self._know(now)
+        elif stepped:
+            self._put(Clocks(now, now + offset_s))
+
+    def _step(
+        self, name: str, before: object, event: object, now: float, decision: AnyDecision
+    ) -> None:
+        subject = self._subjects.get(name)
+        if subject is None or subject.memory is not before:
+            subject = self._anew(name, before, now)
+        is_reading = type(event) in (Sampled, IoFailed)
+        news = decision.report.news()
+        if is_reading and subject.is_as_before(event, decision, news):
+            subject.memory, subject.report = decision.memory, decision.report
+            self._again(name, subject, now)
+            return
+        self._say_same(name)
+        self._put(step(name, subject, event, now, decision, news))
+        subject.memory, subject.outputs = decision.memory, decision.outputs
+        subject.report, subject.news = decision.report, news
+        if is_reading:
+            subject.reading = event
+
+    def _anew(self, name: str, memory: object, now: float) -> Seen:
+        self._say_same(name)
+        self._put(known(name, Seen(memory), now, anew=True))
+        self._subjects[name] = subject = Seen(memory)
+        return subject
+
+    def _again(self, name: str, subject: Seen, now: float) -> None:
+        subject.times.append(now)
+        self._same[name] = subject
+        if len(subject.times) == SAME_AT_ONCE:
+            self._say_same(name)
+
+    def _say_same(self, name: str) -> None:
+        """Write when the last reading came again. There is always room for that."""
+        subject = self._same.pop(name, None)
+        if subject is not None:
+            times, subject.times = subject.times, []
+            self._append(Same(times[-1], name, struct.pack(f"<{len(times)}d", *times)))
+
+    def _published(self, name: str, memory: object, now: float) -> None:
+        subject = self._subjects.get(name)
+        if subject is not None:
+            self._say_same(name)
+            self._put(Published(now, name))
+            subject.memory = memory
+
+    def _forgotten(self, name: str, now: float) -> None:
+        if self._subjects.pop(name, None) is not None:
+            self._put(Forgotten(now, name))
+
+    def _spoken(self, now: float, topic: str, message: Message, sent: bool) -> None:
+        if not self._may_keep(now):
+            self._lost += 1
+            return
+        release, kind = self._release(), type(message)
+        sample = cdr.encode(kind, message, release)
+        self._put(Spoken(now, sent, topic, type_name(kind), release.name, sample))
+
+    def _may_keep(self, now: float) -> bool:
+        """Whether there is room for one more message of this second."""
+        gained = MOST_SPOKEN_PER_S * (now - self._spoken_at)
+        self._may_speak = min(MOST_SPOKEN_PER_S, self._may_speak + gained)
+        self._spoken_at = now
+        if self._may_speak < 1.0:
+            return False
+        self._may_speak -= 1.0
+        if self._lost:
+            lost, self._lost = self._lost, 0
+            self._put(entries.Lost(now, lost))
+        return True
+
+    def _last(self, entry: AnyEntry) -> None:
+        """Append the last entry, after those of repeated readings."""
+        self._say_all_same()
+        self._put(entry)
+
+    def _say_all_same(self) -> None:
+        for name in list(self._same):
+            self._say_same(name)
+
+    def _put(self, entry: AnyEntry) -> None:
+        """Append an entry; in the next segment, after all that is known, if this one is full."""
+        assert self._ring is not None
+        content = entries.encode(entry)
+        if len(content) > self._ring.room // 2:
+            self._put(entries.Lost(entry.at, 1))
+            return
+        if not self._fits(len(content)):
+            self._next_segment(entry.at)
+        self._frame(content)
+
+    def _append(self, entry: AnyEntry) -> None:
+        self._frame(entries.encode(entry))
+
+    def _frame(self, content: bytes) -> None:
+        assert self._ring is not None
+        self._out += self._ring.frame(content)
+
+    def _fits(self, length: int) -> bool:
+        assert self._ring is not None
+        reserved = (LONGEST_SAME + FRAME.size) * (len(self._same) + 1)
+        return self._ring.fits(len(self._out) + length + FRAME.size + reserved)
+
+    def _know(self, now: float) -> None:
+        """Write down all that is known: here if there is room, else in the next segment."""
+        self._say_all_same()
+        known = self._all_known(now)
+        if not self._fits(sum(len(content) + FRAME.size for content in known)):
+            self._next_segment(now)
+            return
+        self._known_at = now
+        for content in known:
+            self._frame(content)
+
+    def _next_segment(self, now: float) -> None:
+        """Begin the next segment with all that is known. If that is more than half of it, the rest
+        of the subjects is left out."""
+        assert self._ring is not None
+        self._say_all_same()
+        self._write()
+        self._ring.begin_segment()
+        self._known_at, room = now, self._ring.room // 2
+        for content in self._all_known(now):
+            room -= len(content) + FRAME.size
+            if room >= 0:
+                self._frame(content)
+
+    def _all_known(self, now: float) -> list[bytes]:
+        clocks = Clocks(now, now + self._offset_s)
+        all_known = [known(name, seen, now) for name, seen in self._subjects.items()]
+        return [entries.encode(clocks), *map(entries.encode, all_known)]
+
+    def _write(self) -> None:
+        if self._out and self._ring is not None:
+            self._ring.write(bytes(self._out))
+            self._out.clear()

@@ -1,0 +1,303 @@
+"""A daemon's files while it runs: its lock, its name, its status and its record.
+
+`holder.lock`   locked by the daemon, `outputs-off`, a walk; nobody else may open it, as whoever could
+                might lock it too, and so keep `outputs-off` from its work
+`holder.json`   who that is, for whoever looks: see `bridges/runtime/holder.py`
+`status.json`   the state of every device, for people and scripts
+`claimed-….json`   see `bridges/runtime/record.py`
+
+None of them is vital. A file that cannot be written is logged once and tried again each second, also
+after its directory was removed; meanwhile the device is served.
+"""
+
+import fcntl
+import logging
+import os
+import time
+from contextlib import suppress
+from pathlib import Path
+
+import msgspec
+
+from bridges.host import files
+from bridges.host.directories import (
+    SERVICE_RUN,
+    SERVICE_STATE,
+    Distrusted,
+    Places,
+    as_given,
+    by_hand,
+    everywhere,
+    named,
+    opened,
+    state_base,
+)
+from bridges.host.log import pairs
+from bridges.runtime import holder
+from bridges.runtime.holder import HOLDER, STATUS, LockHolder
+from bridges.runtime.record import Record, Records, paths, read
+
+log = logging.getLogger(__name__)
+
+KEPT = "kept.json"
+KEPT_MAX = 64 << 20
+LOCK = "holder.lock"
+WAIT_S = 7.0
+"""How long a daemon that starts waits for `outputs-off`, which takes less."""
+LOOK_EVERY_S = 0.05
+
+
+class AlreadyRunning(Exception):
+    """Another daemon serves this YAML, or uses these directories."""
+
+
+def find(file: Path, given: str | None) -> Places:
+    """The directories of this file's daemon, by the one rule (`bridges/host/directories.py`).
+
+    Raises PermissionError if the service's directory cannot be read.
+    """
+    told = as_given(given)
+    if told:
+        return told
+    return next((p for p in everywhere(file) if _is_about(p, file)), by_hand(file))
+
+
+def _is_about(places: Places, file: Path) -> bool:
+    holders = [holder.shown(places), *map(holder.written, places.folders)]
+    found = {one.file for one in holders if one}
+    found |= {record.file for path in paths(places) if (record := read(path))}
+    return named(file) in found
+
+
+def _in_use(folder: Path, found: LockHolder | None) -> str:
+    if found is None:
+        return f"{folder / LOCK} is locked by a program that has not said its name: end that"
+    if not found.serves:
+        used = "a walk, a kill test or outputs-off"
+        return f"{folder} is in use by {found} ({used}): wait for its end"
+    stop = f"Ctrl-C where it runs, or kill {found.pid}"
+    if folder.parent in (SERVICE_RUN, SERVICE_STATE):
+        stop = f"sudo systemctl stop rmf-bridge@{folder.name}"
+    return (
+        f"{Path(found.file).name} is already running: {found}; rmf-bridge status shows it."
+        f" A device has one daemon. To stop it: {stop}"
+    )
+
+
+def state_file(file: Path) -> Path:
+    """The file that outlives a daemon and a reboot: in systemd's state directory, else the user's."""
+    given = os.environ.get("STATE_DIRECTORY", "").split(":")[0]
+    return Path(given or state_base() / file.stem).absolute() / KEPT
+
+
+class MemoryFile:
+    """A file that is replaced as a whole and is on disk when `write` returns.
+
+    `instead`: the path to use while the first cannot be written; a file there is the newer one.
+    """
+
+    def __init__(self, path: Path, instead: Path | None = None) -> None:
+        self._path = path
+        self._instead = instead
+        self._once = Once()
+
+    def read(self) -> bytes | None:
+        """The file's bytes; None if there is no file. Raises OSError."""
+        for path in filter(None, (self._instead, self._path)):
+            with suppress(FileNotFoundError, NotADirectoryError), opened(path.parent):
+                return files.read(path, KEPT_MAX)
+        return None
+
+    def write(self, kept: bytes) -> None:
+        """Replace the file. Raises OSError if neither path can be written; the old one then remains."""
+        try:
+            _replace(self._path, kept)
+            if self._instead is not None:
+                self._instead.unlink(missing_ok=True)
+        except OSError as error:
+            self._once.failed(str(self._path), error)
+            if self._instead is None:
+                raise
+            _replace(self._instead, kept)
+        else:
+            self._once.works(str(self._path))
+
+
+def _replace(path: Path, content: bytes) -> None:
+    with opened(path.parent, make=True):
+        files.replace(path, content)
+
+
+class Once:
+    """Logs one line when a write fails, and one when it works again; the daemon runs on.
+
+    `fails`, `again`: the events; `key`: of what is written; `level`: of the first; `wrong`: it, why."""
+
+    def __init__(
+        self,
+        fails: str = "not_written",
+        again: str = "written_again",
+        key: str = "what",
+        level: int = logging.WARNING,
+    ) -> None:
+        self.wrong: dict[str, str] = {}
+        self._fails, self._again, self._key, self._level = fails, again, key, level
+
+    def failed(self, what: str, error: Exception) -> None:
+        """Note a failed attempt; the caller will try again."""
+        if what not in self.wrong:
+            log.log(self._level, pairs(self._fails, **{self._key: what}, reason=error))
+        self.wrong[what] = str(error)
+
+    def works(self, what: str) -> None:
+        """Note a successful attempt."""
+        if self.wrong.pop(what, None) is not None:
+            log.info(pairs(self._again, **{self._key: what}))
+
+
+class RuntimeDirectory:
+    """One process's lock, status and record.
+
+    `serves`: whether the process is a daemon, to which a reset may be sent.
+    """
+
+    def __init__(self, places: Places, file: Path, *, serves: bool, wait_s: float = WAIT_S) -> None:
+        """Take the locks; waits for an `outputs-off` that holds them.
+
+        Raises AlreadyRunning, and PermissionError if a directory cannot be trusted.
+        """
+        self.places = places
+        self.path = places.runtime
+        self.records = Records(places, file)
+        self._holder = holder.ourselves(file, serves=serves)
+        self._locks: dict[Path, int] = {}
+        self._record: Record | None = None
+        self._once = Once()
+        deadline = time.monotonic() + wait_s
+        for folder in places.folders:
+            self._lock_by(folder, deadline)
+        self._sign(self._holder)
+
+    def claim(self, record: Record) -> None:
+        """Write the record of what this daemon is about to claim; a failure is tried again."""
+        self._record = record
+        self._write_record()
+
+    def released(self) -> None:
+        """Every output is off and released: remove the record."""
+        record, self._record = self._record, None
+        if record is not None:
+            try:
+                self.records.release(record)
+            except OSError as error:
+                self._once.failed("record", error)
+
+    def write_status(self, json: bytes) -> None:
+        """Replace the status file; also write again what failed before or was removed."""
+        for folder in self.places.folders:
+            self._lock(folder)
+        self._sign(self._holder)
+        self._write_record()
+        try:
+            files.show(self.path / STATUS, json)
+        except OSError as error:
+            self._once.failed(STATUS, error)
+        else:
+            self._once.works(STATUS)
+
+    def close(self) -> None:
+        """Release the locks for another daemon, and remove the status, which is now outdated."""
+        with suppress(OSError), opened(self.path):
+            (self.path / STATUS).unlink(missing_ok=True)
+        self._sign(msgspec.structs.replace(self._holder, pid=0))
+        self._unlock()
+
+    def _unlock(self) -> None:
+        for lock in self._locks.values():
+            fcntl.flock(lock, fcntl.LOCK_UN)  # a process that another thread forks now has a copy
+            os.close(lock)
+        self._locks.clear()
+
+    def _lock_by(self, folder: Path, deadline: float) -> None:
+        """Take the lock; wait while `outputs-off` holds it. A daemon of an older version, which has
+        another lock, shows its status."""
+        while holder.shown(self.places) or not self._lock(folder):
+            found = holder.look(self.places)
+            if (found and found.serves) or time.monotonic() >= deadline:
+                self._unlock()
+                raise AlreadyRunning(_in_use(folder, found))
+            time.sleep(LOOK_EVERY_S)
+
+    def _lock(self, folder: Path) -> bool:
+        """Hold the folder's lock; False while another process holds it. Raises Distrusted."""
+        try:
+            return self._has(folder) or self._take(folder)
+        except Distrusted:
+            raise
+        except OSError as error:
+            self._once.failed(f"{folder}/{LOCK}", error)
+            return True
+
+    def _has(self, folder: Path) -> bool:
+        """Whether the folder's lock file is the one that we hold."""
+        lock = self._locks.get(folder)
+        try:
+            return lock is not None and os.path.samestat(os.fstat(lock), os.lstat(folder / LOCK))
+        except (FileNotFoundError, NotADirectoryError):
+            return False
+
+    def _take(self, folder: Path) -> bool:
+        with opened(folder, make=True) as directory:
+            lock = _lock_in(directory)
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            os.close(lock)
+            return False
+        if old := self._locks.pop(folder, None):
+            os.close(old)
+        self._locks[folder] = lock
+        self._once.works(f"{folder}/{LOCK}")
+        return True
+
+    def _sign(self, name: LockHolder) -> None:
+        """Write this name beside each lock that we hold, unless it stands there."""
+        for folder in filter(self._has, self._locks):
+            try:
+                if holder.written(folder) != name:
+                    files.show(folder / HOLDER, msgspec.json.encode(name))
+            except OSError as error:
+                self._once.failed(f"{folder}/{HOLDER}", error)
+            else:
+                self._once.works(f"{folder}/{HOLDER}")
+
+    def _write_record(self) -> None:
+        if self._record is None:
+            return
+        try:
+            self.records.write(self._record)
+        except OSError as error:
+            self._once.failed("record", error)
+        else:
+            self._once.works("record")
+
+
+def _lock_in(directory: int) -> int:
+    """Open the lock for writing, or read-only if that is not permitted: it can still be locked."""
+    flags = os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC
+    try:
+        return os.open(LOCK, flags | os.O_RDWR | os.O_CREAT, 0o600, dir_fd=directory)
+    except OSError:
+        return os.open(LOCK, flags | os.O_RDONLY, dir_fd=directory)
+
+
+def held(
+    file: Path, given: str | None, *, serves: bool, simulated: bool = False
+) -> RuntimeDirectory:
+    """The directories for this file, locked by us. A simulation never takes a service's.
+
+    Raises AlreadyRunning or PermissionError.
+    """
+    file = file.absolute()
+    found = (as_given(given) or by_hand(file)) if simulated else find(file, given)
+    return RuntimeDirectory(found, file, serves=serves)

@@ -1,0 +1,184 @@
+"""Checks files against each other: places or names used twice, domains that differ, unknown names.
+
+Files that are checked together belong to one site. Unless the user says otherwise, they run on one
+machine.
+"""
+
+from collections.abc import Iterable, Iterator, Sequence
+
+from msgspec import Struct
+
+from bridges.kinds import kind_called
+from bridges.kinds.shared.graph_kind import GraphKind
+from bridges.settings.load import Config
+from bridges.yaml.nodes import Page, Problem, compose
+from bridges.yaml.positions import Spot, locate
+from bridges.yaml.spelling import unknown
+from drivers.hal import Where
+
+Path = tuple[str, ...]
+
+
+class Found(Struct, frozen=True):
+    """Errors and warnings, in the order of the files."""
+
+    errors: list[Problem]
+    warnings: list[Problem]
+
+
+class Claim(Struct, frozen=True):
+    """A file uses something that only one file may use. `what`: its name. `path`: where it says so."""
+
+    config: Config
+    what: str
+    path: Path
+
+    def place(self) -> Problem:
+        """The place in the file, as a Problem without text."""
+        page = Page(str(self.config.path))
+        root = compose(page, self.config.text)
+        return page.problem(locate(Spot(root, root, ""), self.path).where(), "")
+
+
+def across(configs: Sequence[Config], one_machine: bool = True) -> Found:
+    """Errors and warnings about these files together."""
+    claims = [claim for config in configs for claim in _claims(config, one_machine)]
+    errors = [*_domains(configs), *taken(configs, one_machine), *_nowhere(configs)]
+    gateways = [claim for config in configs for claim in _gateways(config)]
+    warnings = [_shared(pair, claims) for pair in _twice(gateways)]
+    return Found(errors, [*warnings, *_unspoken(configs)])
+
+
+def taken(configs: Sequence[Config], one_machine: bool = True) -> Iterator[Problem]:
+    """What a file uses that an earlier one has for itself: ports, pins, units' points, RMF's names."""
+    lines = list(_twice(c for config in configs for c in _lines(config, one_machine)))
+    busy = {claim.what for claim, _ in lines}
+    claims = (c for config in configs for c in _claims(config, one_machine))
+    rest = (c for c in claims if not any(c.what.endswith(f" of {b}") for b in busy))
+    yield from map(_taken, (*lines, *_twice(rest)))
+
+
+def _twice(claims: Iterable[Claim]) -> Iterator[tuple[Claim, Claim]]:
+    """(later, first) for what two files claim; the loader has checked each file by itself."""
+    first: dict[str, Claim] = {}
+    for claim in claims:
+        other = first.setdefault(claim.what, claim)
+        if other.config is not claim.config:
+            yield claim, other
+
+
+def _said(claim: Claim, text: str) -> Problem:
+    place = claim.place()
+    return Problem(place.file, place.line, place.column, text)
+
+
+def _taken(pair: tuple[Claim, Claim]) -> Problem:
+    claim, other = pair
+    first = other.place()
+    return _said(claim, f"{claim.what} is used in {first.file} too, on line {first.line}")
+
+
+def _buses(config: Config) -> Iterator[tuple[str, Where]]:
+    for name, settings in config.buses.items():
+        where = config.bus_type(name).where(settings)
+        if where is not None:
+            yield name, where
+
+
+def _lines(config: Config, one_machine: bool) -> Iterator[Claim]:
+    """Ports that only one daemon can open."""
+    for name, where in _buses(config):
+        if where.clients == "one" and one_machine:
+            yield Claim(config, where.text, ("buses", name))
+
+
+def _gateways(config: Config) -> Iterator[Claim]:
+    """Addresses where the make decides how many clients may connect."""
+    for name, where in _buses(config):
+        if where.clients is None:
+            yield Claim(config, where.text, ("buses", name))
+
+
+def _claims(config: Config, one_machine: bool) -> Iterator[Claim]:
+    """Names on RMF's graph, and places on buses."""
+    kind = kind_called(config.kind)
+    if isinstance(kind, GraphKind):
+        yield Claim(config, f"kind: {kind.name}", ("kind",))
+        return
+    for name in config.devices:
+        yield Claim(config, f"the {kind.name} '{name}'", (kind.devices_key, name))
+    for bus, where in _buses(config):
+        if one_machine or not where.local:
+            for device in config.devices_on(bus):
+                for place, path in _places(config, bus, device):
+                    what = f"{place} of {where.text}"
+                    yield Claim(config, what, (kind.devices_key, device, *path))
+
+
+def _places(config: Config, bus: str, device: str) -> Iterator[tuple[str, Path]]:
+    """Every point and claim of a device, in its bus's canonical spelling."""
+    canonical = config.bus_type(bus).canonical
+    for wire in config.wires(device):
+        yield canonical(wire.point), (*wire.path, "point")
+        if wire.flash is not None:
+            yield canonical(wire.flash.point), (*wire.path, "flash")
+    yield from config.driver_type(device).claims(config.devices[device])
+
+
+def _shared(pair: tuple[Claim, Claim], claims: Sequence[Claim]) -> Problem:
+    """The warning for one gateway in two files; it names the units that both ask."""
+    claim, other = pair
+    both = _units(claim.config, claim.what, claims) & _units(other.config, claim.what, claims)
+    units = f" for unit {', '.join(sorted(both))}" if both else ""
+    text = f"warning: {claim.what} is asked in {other.config.path} too{units}"
+    return _said(
+        claim, f"{text}: many gateways take only one client: use one file for each gateway"
+    )
+
+
+def _units(config: Config, gateway: str, claims: Sequence[Claim]) -> set[str]:
+    ours = (c.what.split() for c in claims if c.config is config and c.what.endswith(gateway))
+    return {words[1] for words in ours if words[0] == "unit"}
+
+
+def _domains(configs: Sequence[Config]) -> Iterator[Problem]:
+    for config in configs[1:]:
+        ours, first = (c.rmf.domain_id or 0 for c in (config, configs[0]))
+        if ours != first:
+            text = f"DDS domain {ours}, but {configs[0].path} is in domain {first}"
+            yield _said(
+                Claim(config, "", ("rmf", "domain_id")), f"{text}: they cannot hear each other"
+            )
+
+
+def _devices(configs: Sequence[Config], kind: str) -> dict[str, Config]:
+    return {name: c for c in configs if c.kind == kind for name in c.devices}
+
+
+def _nowhere(configs: Sequence[Config]) -> Iterator[Problem]:
+    """Devices that a kind without hardware names, but no file of their kind has."""
+    for claim, kind, name in _spoken(configs):
+        known = _devices(configs, kind)
+        if known and name not in known:
+            yield _said(claim, unknown(kind, name, known))
+
+
+def _unspoken(configs: Sequence[Config]) -> Iterator[Problem]:
+    """Devices that a kind without hardware does not name, though it names others of their kind."""
+    spoken = [(kind, name, claim) for claim, kind, name in _spoken(configs)]
+    for kind in sorted({kind for kind, _, _ in spoken}):
+        names = {name for k, name, _ in spoken if k == kind}
+        speaker = next(claim.config for k, _, claim in spoken if k == kind)
+        for name, config in _devices(configs, kind).items():
+            if name not in names:
+                key = kind_called(kind).devices_key
+                text = f"warning: '{name}' is not served: {speaker.path} does not name it"
+                yield _said(Claim(config, "", (key, name)), text)
+
+
+def _spoken(configs: Sequence[Config]) -> Iterator[tuple[Claim, str, str]]:
+    for config in configs:
+        kind = kind_called(config.kind)
+        if isinstance(kind, GraphKind):
+            for path, what, name in kind.speaks_of(config.section):
+                yield Claim(config, name, (kind.devices_key, *path)), what, name

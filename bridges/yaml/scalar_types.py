@@ -1,0 +1,214 @@
+"""Converts one YAML scalar to a text, number, boolean or choice, or says why it cannot.
+
+msgspec decides whether the type allows the value. No version of YAML may read a text as anything else,
+and a number must be written unambiguously (`scalars.py`).
+"""
+
+from collections.abc import Callable, Mapping
+from typing import Annotated, Literal
+
+import msgspec
+from msgspec.inspect import (
+    BoolType,
+    DictType,
+    EnumType,
+    FloatType,
+    IntType,
+    ListType,
+    LiteralType,
+    Metadata,
+    NoneType,
+    StrType,
+    StructType,
+    Type,
+    UnionType,
+    VarTupleType,
+)
+from yaml import Node, ScalarNode, SequenceNode
+
+from bridges.yaml.nodes import is_plain
+from bridges.yaml.scalars import TRUTHS, number, reads_as, whole_number
+from bridges.yaml.spelling import either, nearest, short
+from bridges.yaml.typo_hints import has_unit, number_meant
+
+Extra = Mapping[str, str]
+"""What a field's `Meta(extra=…)` says: its `unit`, its `pattern` in words, its `check`."""
+
+
+class Wrong(Exception):
+    """A scalar of the wrong kind. The text continues after the value's name: "is ...", no full stop."""
+
+
+def looks(node: Node) -> str:
+    """What the node is, in words."""
+    if isinstance(node, SequenceNode):
+        return "a list"
+    if not isinstance(node, ScalarNode):
+        return "a mapping"
+    written = short(node.value)
+    reading = reads_as(node.value) if is_plain(node) else None
+    if reading is None:
+        return f"the text '{written}'"
+    if number(node.value) is not None:
+        return f"the number {written}"
+    return reading if written == reading else f"{reading} ({written})"
+
+
+def wanted_text(wanted: Type, extra: Extra | None = None) -> str:
+    """What a type requires, with bounds and unit."""
+    if isinstance(wanted, Metadata):
+        return wanted_text(wanted.type, wanted.extra)
+    if isinstance(wanted, UnionType):
+        members = [t for t in wanted.types if not isinstance(t, NoneType)]
+        return either(wanted_text(t, extra) for t in members)
+    if isinstance(wanted, IntType | FloatType):
+        noun = "a whole number" if isinstance(wanted, IntType) else "a number"
+        return f"{noun}{_span(wanted, extra or {})}"
+    if isinstance(wanted, LiteralType | EnumType):
+        return either(choices(wanted))
+    return _NOUNS[type(wanted)]
+
+
+_NOUNS: dict[type[Type], str] = {
+    StrType: "text",
+    BoolType: "true or false",
+    ListType: "a list ([...])",
+    VarTupleType: "a list ([...])",
+    DictType: "a mapping (key: value)",
+    StructType: "a mapping (key: value)",
+}
+
+
+def leaf(types: list[Type], node: ScalarNode, extra: Extra) -> object:
+    """The scalar converted to the first of these types that fits. Raises Wrong."""
+    *others, last = sorted(types, key=_rank)
+    for wanted in others:
+        try:
+            return leaf([wanted], node, extra)
+        except Wrong:
+            continue
+    if isinstance(last, Metadata):
+        return leaf([last.type], node, last.extra or {})
+    if is_plain(node) and not node.value:
+        raise Wrong(f"has no value: write {wanted_text(last, extra)}")
+    value = _read(last, node, extra)
+    try:
+        return msgspec.convert(value, _annotation(last))
+    except msgspec.ValidationError as error:
+        raise Wrong(_reason(last, node, extra, "length" in str(error))) from None
+
+
+def _rank(wanted: Type) -> int:
+    """Sort key that tries text last: it fits nearly everything."""
+    return isinstance(wanted.type if isinstance(wanted, Metadata) else wanted, StrType)
+
+
+def _annotation(wanted: Type) -> object:
+    """The type that msgspec described, with its bounds, for `convert`."""
+    if isinstance(wanted, EnumType):
+        return wanted.cls
+    if isinstance(wanted, LiteralType):
+        return Literal[wanted.values]
+    return Annotated[_PLAIN[type(wanted)], msgspec.Meta(**msgspec.structs.asdict(wanted))]
+
+
+_PLAIN: dict[type[Type], type] = {StrType: str, IntType: int, FloatType: float, BoolType: bool}
+
+
+def _read(wanted: Type, node: ScalarNode, extra: Extra) -> object:
+    """The value, if it is unambiguous. Raises Wrong."""
+    if isinstance(wanted, LiteralType | EnumType):  # as written: how YAML reads it does not matter
+        return choices(wanted).get(node.value, node.value)
+    if isinstance(wanted, StrType):
+        _check_text(node, extra)
+        return node.value
+    value = _READINGS[type(wanted)](node.value) if is_plain(node) else None
+    if value is None:
+        raise _misread(wanted, node, extra)
+    return value
+
+
+_READINGS: dict[type[Type], Callable[[str], object]] = {
+    IntType: whole_number,
+    FloatType: number,
+    BoolType: TRUTHS.get,
+}
+
+
+def _reason(wanted: Type, node: ScalarNode, extra: Extra, length: bool) -> str:
+    """Why `convert` refused a value; `length`: because of its length."""
+    written = short(node.value)
+    if isinstance(wanted, LiteralType | EnumType):
+        near = nearest(node.value, choices(wanted))
+        meant = f" (did you mean '{near}'?)" if near else ""
+        return f"is '{written}': write {wanted_text(wanted)}{meant}"
+    if not isinstance(wanted, StrType):
+        return f"is {written}: write {wanted_text(wanted, extra)}"
+    if length:
+        least, most = wanted.min_length or 0, wanted.max_length
+        span = f"at least {least}" if most is None else f"{least} to {most}"
+        return f"has {len(node.value)} characters: {span} are allowed"
+    form = extra.get("pattern", "text of another form")
+    return f"is '{written}': write {form}"
+
+
+def _check_text(node: ScalarNode, extra: Extra) -> None:
+    text: str = node.value
+    reading = reads_as(text) if is_plain(node) and "check" not in extra else None
+    if reading is not None and "number" in extra:
+        raise Wrong(f"is the number {text}: write {extra['number']}")
+    if reading is not None:
+        taken = f"is written {short(text)}, which YAML may read as {reading}"
+        if looks(node) == f"the number {text}":
+            taken = f"is the number {text}"
+        raise Wrong(f'{taken}: if the text is meant, write "{short(text)}" in quotes')
+
+
+def _misread(wanted: Type, node: ScalarNode, extra: Extra) -> Wrong:
+    """The error for a text that is not a plain number or boolean; it says how to write it."""
+    text, asked = short(node.value), wanted_text(wanted, extra)
+    whole = isinstance(wanted, IntType)
+    if not is_plain(node):
+        read = _READINGS[type(wanted)](node.value) is not None
+        return Wrong(f'is the text "{text}": write {asked}{", without quotes" if read else ""}')
+    meant = "" if isinstance(wanted, BoolType) else number_meant(node.value, whole)
+    if meant:
+        return Wrong(f"is written {text}: write {meant}, {asked}")
+    if extra.get("unit") and has_unit(node.value):
+        return Wrong(f"is written {text}: write the number alone, {asked}")
+    reading = reads_as(node.value) or ""
+    if isinstance(wanted, BoolType) and reading in ("true", "false"):
+        return Wrong(f"is written {text}, which YAML versions read differently: write {reading}")
+    if reading.startswith("the number") and number(node.value) is None:
+        return Wrong(f"is written {text}, which YAML may read as {reading}: write {asked} plainly")
+    return Wrong(f"is {looks(node)}: write {asked}")
+
+
+def _span(wanted: IntType | FloatType, extra: Extra) -> str:
+    """The bounds with their unit: ` from 0 to 10 s`."""
+    words = []
+    if wanted.ge is not None and wanted.le is not None:
+        words += [f"from {_digits(wanted.ge)} to {_digits(wanted.le)}"]
+    else:
+        words += [f"of at least {_digits(wanted.ge)}"] if wanted.ge is not None else []
+        words += [f"of at most {_digits(wanted.le)}"] if wanted.le is not None else []
+    words += [f"above {_digits(wanted.gt)}"] if wanted.gt is not None else []
+    words += [f"below {_digits(wanted.lt)}"] if wanted.lt is not None else []
+    words += (
+        [f"in steps of {_digits(wanted.multiple_of)}"] if wanted.multiple_of is not None else []
+    )
+    unit = extra.get("unit", "")
+    if not words:
+        return f" ({unit})" if unit else ""
+    return f" {' and '.join(words)}{f' {unit}' if unit else ''}"
+
+
+def _digits(bound: float) -> str:
+    """The bound as a person writes it: 1000000, 0.05."""
+    return str(int(bound)) if bound == int(bound) else f"{bound:g}"
+
+
+def choices(wanted: LiteralType | EnumType) -> dict[str, object]:
+    """The allowed texts -> their values."""
+    values = wanted.values if isinstance(wanted, LiteralType) else [m.value for m in wanted.cls]
+    return {str(value): value for value in values}

@@ -1,0 +1,246 @@
+"""Robots on the wrong pad, rule by rule: memories made by hand, and whole answers."""
+
+from collections.abc import Mapping
+
+import pytest
+from msgspec.structs import replace
+
+from bridges.kinds.charger.settings import Robot
+from bridges.kinds.charger_coordinator import wrong_pad
+from bridges.kinds.charger_coordinator.memory import (
+    ASSIGNED,
+    CHARGING,
+    ERROR,
+    IDLE,
+    Grant,
+    Memory,
+    Nudge,
+    Seen,
+    Site,
+    Standing,
+    Wish,
+)
+from bridges.kinds.charger_coordinator.signals import Sighting
+from bridges.kinds.charger_coordinator.wrong_pad import Astray
+from bridges.kinds.shared.durations import NEVER
+from bridges.messages.definitions import ChargerStateValue
+from tests.kinds.charger_coordinator.virtual_site import settings
+
+SITE = Site.of(settings())
+ONE, TWO, THREE = (Robot("tiny", f"AMR0{i}") for i in (1, 2, 3))
+A, B = "charger_a", "charger_b"
+AT = {A: "charger_a", B: "dock_b"}
+"""Station -> its waypoint."""
+PAD = "wrong docking: tiny/AMR01 is not assigned here"
+
+
+def at(
+    who: Robot, place: str | None, since: float, task: str = "", heard: float = 85.0
+) -> Standing:
+    """A robot at one of our waypoints since then, as its fleet showed it last at `heard`."""
+    return Standing(Sighting(who, False, place, 50.0, task), heard, since, since)
+
+
+def shows(state: ChargerStateValue = IDLE, since: float = 0.0, error: str = "") -> Seen:
+    """A station's state since then."""
+    return Seen(state, "", None, error, 85.0, since)
+
+
+def site(*robots: Standing, **changes: object) -> Memory:
+    """Both stations are idle, and we assign."""
+    found: Mapping[str, object] = {
+        "may_speak": True,
+        "robots": {standing.sighting.who: standing for standing in robots},
+        "stations": {A: shows(), B: shows()},
+    }
+    return Memory(**{**found, **changes})  # type: ignore[arg-type]
+
+
+def found(memory: Memory, *times: float) -> list[list[Astray]]:
+    """Who is astray at each of these times."""
+    return [list(wrong_pad.found(memory, now, SITE).values()) for now in times]
+
+
+# ---- COORDINATOR-ASTRAY-1: who has a station, and stands at another
+
+EXPECTED = {A: Grant(ONE, "r1", 10.0, shown=True)}
+
+
+@pytest.mark.parametrize(("came_at", "since"), [(20.0, 22.0), (10.0, 40.0), (5.0, 40.0)])
+def test_a_robot_that_came_after_its_call_is_astray_soon_and_one_that_was_there_may_drive_off(
+    came_at: float, since: float
+) -> None:
+    memory = site(at(ONE, AT[B], came_at), grants=EXPECTED)
+    one = Astray(ONE, B, since, "r1", 2, expected=A)
+    assert found(memory, since - 0.1, since, NEVER) == [[], [one], [one]]
+
+
+def test_a_robot_at_its_own_station_or_at_none_is_not_astray() -> None:
+    for place in (AT[A], "wait_1", None):
+        assert found(site(at(ONE, place, 20.0), grants=EXPECTED), NEVER) == [[]]
+
+
+def test_a_robot_that_was_charged_or_has_lost_its_station_is_not_astray_and_the_next_still_is() -> (
+    None
+):
+    two = Astray(TWO, A, 22.0, "r2", 2, expected=B)
+    for first in (replace(EXPECTED[A], started=True), replace(EXPECTED[A], over=True)):
+        grants = {A: first, B: Grant(TWO, "r2", 10.0, shown=True)}
+        memory = site(at(ONE, AT[B], 20.0), at(TWO, AT[A], 20.0), grants=grants)
+        assert found(memory, 50.0) == [[two]]
+
+
+def test_the_stations_own_word_for_who_is_on_its_pad_counts_at_once_and_only_in_error() -> None:
+    for state, strays in ((ERROR, [Astray(ONE, B, 15.0, "r1", 2, expected=A)]), (IDLE, [])):
+        stations = {A: shows(), B: shows(state, 15.0, PAD)}
+        memory = site(at(ONE, None, 12.0), grants=EXPECTED, stations=stations)
+        assert found(memory, 15.0) == [strays]
+
+
+def history(memory: Memory, *times: float) -> list[tuple[float, dict[Robot, Nudge], bool, bool]]:
+    """(s, who was told so far, whether ONE is told now, whether a person must come), as time passes."""
+    lines = []
+    for now in times:
+        memory = wrong_pad.nudged(memory, now, SITE)
+        alarms = any(
+            wrong_pad.alarming(memory, a, now) for [*all_] in found(memory, now) for a in all_
+        )
+        lines.append((now, dict(memory.nudges), wrong_pad.is_nudged(memory, ONE, now), alarms))
+    return lines
+
+
+# ---- COORDINATOR-ASTRAY-1, COORDINATOR-ASTRAY-4: what it is told
+
+
+def test_a_stray_is_told_twice_for_one_request_and_then_a_person_is() -> None:
+    memory = site(at(ONE, AT[B], 20.0), grants=EXPECTED)
+    first, second = {ONE: Nudge("r1", 1, 22.0)}, {ONE: Nudge("r1", 2, 37.0)}
+    assert history(memory, 21.9, 22.0, 22.9, 23.0, 36.9, 37.0, 37.9, 38.0, 51.9, 52.0, 99.0) == [
+        (21.9, {}, False, False),
+        (22.0, first, True, False),
+        (22.9, first, True, False),
+        (23.0, first, False, False),
+        (36.9, first, False, False),
+        (37.0, second, True, False),
+        (37.9, second, True, False),
+        (38.0, second, False, False),
+        (51.9, second, False, False),
+        (52.0, second, False, True),
+        (99.0, second, False, True),
+    ]
+
+
+def test_a_stray_is_told_again_for_a_new_request_and_the_count_lasts_on_its_way() -> None:
+    memory = site(at(ONE, AT[B], 20.0), grants=EXPECTED, nudges={ONE: Nudge("r0", 2, 21.0)})
+    assert wrong_pad.nudged(memory, 22.0, SITE).nudges == {ONE: Nudge("r1", 1, 22.0)}
+    left = site(at(ONE, None, 50.0), grants=EXPECTED, nudges={ONE: Nudge("r1", 1, 22.0)})
+    assert wrong_pad.nudged(left, 60.0, SITE).nudges == {ONE: Nudge("r1", 1, 22.0)}
+
+
+# ---- COORDINATOR-ASTRAY-3, COORDINATOR-ASTRAY-4: who cannot be told
+
+
+@pytest.mark.parametrize("why", ["it works", "another node assigns", "we may not speak"])
+def test_where_no_robot_can_be_told_a_person_is_alerted_at_once(why: str) -> None:
+    standing = at(ONE, AT[B], 20.0, task="work" if why == "it works" else "")
+    memory = site(standing, grants=EXPECTED)
+    if why == "another node assigns":
+        memory = replace(memory, alone=False)
+    if why == "we may not speak":
+        memory = replace(memory, may_speak=False)
+    assert history(memory, 21.9, 22.0) == [(21.9, {}, False, False), (22.0, {}, False, True)]
+
+
+def test_the_core_wakes_for_every_step_with_a_robot_astray() -> None:
+    memory = site(at(ONE, AT[B], 20.0), grants=EXPECTED)
+    dues = []
+    for now in (21.0, 22.0, 37.0):
+        memory = wrong_pad.nudged(memory, now, SITE)
+        dues.append(sorted(wrong_pad.due(memory, now, SITE)))
+    assert dues == [[22.0, 22.0, NEVER], [22.0, 23.0, 37.0, NEVER], [22.0, 38.0, 52.0, NEVER]]
+
+
+# ---- COORDINATOR-ASTRAY-2: who has no station, and stands on a pad that another waits for
+
+WAITS = (Wish(ONE, "fleet"),)
+BLOCKS = Astray(TWO, A, 90.0, A, 1, waiter=ONE)
+
+
+def blocks(station: str) -> Astray:
+    """TWO blocks this one."""
+    return BLOCKS._replace(station=station, why=station)
+
+
+def blocked(came_at: float = 30.0, **changes: object) -> Memory:
+    """TWO stands at charger_a, where nobody charges it, and ONE waits."""
+    return site(at(TWO, AT[A], came_at), **{"wishes": WAITS, **changes})
+
+
+def test_a_robot_blocks_a_pad_a_while_after_it_came_or_the_station_let_it_go() -> None:
+    assert found(blocked(), 89.9, 90.0, NEVER) == [[], [BLOCKS], [BLOCKS]]
+    later = blocked(5.0, stations={A: shows(since=30.0), B: shows()})
+    assert found(later, 89.9, 90.0, NEVER) == [[], [BLOCKS], [BLOCKS]]
+
+
+def test_nobody_blocks_where_nobody_waits_or_the_waiting_robot_itself_stands() -> None:
+    for wishes in ((), (Wish(TWO, "fleet"),)):
+        assert found(blocked(wishes=wishes), NEVER) == [[]]
+    has_another = blocked(grants={B: Grant(ONE, "r1", 10.0, shown=True)})
+    assert found(has_another, NEVER) == [[]]
+
+
+def test_waiting_robots_are_looked_for_among_all_wishes_and_their_pads_in_order() -> None:
+    """THREE, which is first in the queue, has its station; ONE and TWO wait, and TWO stands on one."""
+    memory = blocked(
+        wishes=(Wish(THREE, "fleet"), Wish(TWO, "fleet"), Wish(ONE, "fleet")),
+        grants={B: Grant(THREE, "r3", 10.0, shown=True)},
+    )
+    assert found(memory, 90.0) == [[BLOCKS]]
+    memory = site(at(TWO, AT[B], 30.0), wishes=WAITS)
+    assert found(memory, 90.0) == [[blocks(B)]]
+    both = site(at(ONE, AT[A], 0.0), at(TWO, AT[B], 30.0), wishes=WAITS)
+    assert found(both, 90.0) == [[blocks(B)]]
+
+
+def test_a_station_that_serves_somebody_or_was_never_heard_is_not_blocked() -> None:
+    grant = Grant(THREE, "r3", 10.0, shown=True)
+    not_blocked = [
+        blocked(stations={A: shows(CHARGING)}),
+        blocked(stations={B: shows()}),
+        blocked(stations={A: shows(ASSIGNED)}, grants={A: grant}),
+        blocked(grants={B: replace(grant, robot=TWO, started=True)}),
+    ]
+    assert [found(memory, NEVER) for memory in not_blocked] == [[[]]] * 4
+    over = blocked(grants={A: replace(grant, over=True)})
+    assert found(over, 90.0) == [[BLOCKS]]
+
+
+def test_of_two_robots_on_a_pad_the_one_without_a_station_blocks_it() -> None:
+    grants = {B: Grant(THREE, "r3", 10.0, shown=True, started=True)}
+    memory = site(at(THREE, AT[A], 0.0), at(TWO, AT[A], 30.0), wishes=WAITS, grants=grants)
+    assert found(memory, 90.0) == [[BLOCKS]]
+
+
+def test_an_old_position_blocks_nothing_now_and_the_core_still_wakes_for_it() -> None:
+    memory = site(at(TWO, AT[A], 30.0, heard=60.0), wishes=WAITS)
+    assert found(memory, 89.9, 90.0, NEVER) == [[], [], [BLOCKS]]
+
+
+def test_a_blocking_robot_is_told_once_then_a_person_is_and_all_is_forgotten_when_it_leaves() -> (
+    None
+):
+    memory, told = blocked(), {TWO: Nudge(A, 1, 90.0)}
+    assert history(memory, 89.9, 90.0, 104.9, 105.0, 110.0) == [
+        (89.9, {}, False, False),
+        (90.0, told, False, False),
+        (104.9, told, False, False),
+        (105.0, told, False, True),
+        (110.0, told, False, True),
+    ]
+    memory = wrong_pad.nudged(memory, 90.0, SITE)
+    assert sorted(wrong_pad.due(memory, 90.0, SITE)) == [90.0, 91.0, 105.0, NEVER]
+    for place in (None, "wait_2"):
+        gone = replace(memory, robots={TWO: at(TWO, place, 95.0)})
+        assert wrong_pad.nudged(gone, 96.0, SITE).nudges == {}
+    elsewhere = replace(memory, robots={TWO: at(TWO, AT[B], 30.0)})
+    assert wrong_pad.nudged(elsewhere, 96.0, SITE).nudges == {TWO: Nudge(B, 1, 96.0)}

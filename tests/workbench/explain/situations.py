@@ -1,0 +1,358 @@
+"""The situations that `explain` must tell rightly: real cores, drivers and plants in virtual time.
+
+Each gives what was heard, and the device that is asked about.
+"""
+
+from collections.abc import Callable, Mapping
+from typing import Final
+
+from msgspec.structs import replace
+
+from bridges.kinds.charger.pad import Misplaced
+from bridges.kinds.charger.settings import Robot
+from bridges.messages import definitions as d
+from bridges.messages import topics
+from bridges.messages.heard import Heard
+from bridges.messages.stamps import stamp
+from bridges.messages.words import Kind
+from tests.site.network import Place
+from tests.site.timeline import EPOCH
+from tests.workbench.explain.story import Guest, Scene
+
+Case = tuple[list[Heard], Kind, str]
+
+
+def held_by_another() -> Case:
+    """A robot waits because another has the lift."""
+    scene, red, blue = _two("Lift1")
+    scene.until(red)
+    scene.run(8.0)
+    assert not blue.robot.done
+    return scene.heard, "lift", "Lift1"
+
+
+def holder_rides() -> Case:
+    """A robot waits; the one that has the lift waits for the car itself."""
+    scene, red, _ = _two("Lift1")
+    scene.until(red)
+    red.asks("Lift1", "L4", inside=True)
+    scene.run(3.0)
+    return scene.heard, "lift", "Lift1"
+
+
+def holder_is_dead() -> Case:
+    """The holder's fleet adapter died without END."""
+    scene, red, _ = _two("Lift1")
+    scene.until(red)
+    red.dies()
+    scene.run(70.0)
+    return scene.heard, "lift", "Lift1"
+
+
+def holder_alone_is_dead() -> Case:
+    """The holder's fleet adapter died without END, and nobody else asks."""
+    scene = Scene("Lift1")
+    red = scene.robot("fleet/red")
+    red.asks("Lift1", "L2")
+    scene.until(red)
+    red.dies()
+    scene.run(20.0)
+    return scene.heard, "lift", "Lift1"
+
+
+def fire() -> Case:
+    """The lift goes into fire mode before the robot has boarded."""
+    scene, _, _ = _two("Lift1")
+    scene.press("Lift1", "fire_alarm", True)
+    scene.run(30.0)
+    return scene.heard, "lift", "Lift1"
+
+
+def fire_with_a_robot_inside() -> Case:
+    """The lift goes into fire mode while the robot is in the car."""
+    scene, red, _ = _two("Lift1")
+    scene.until(red)
+    red.asks("Lift1", "L4", inside=True)
+    scene.run(1.0)
+    scene.press("Lift1", "fire_alarm", True)
+    scene.run(20.0)
+    return scene.heard, "lift", "Lift1"
+
+
+def open_but_at_no_floor() -> Case:
+    """The door is shown open by a node that does not know its floor."""
+    scene = Scene()
+    red = scene.robot("fleet/red")
+    node = _Foreign(scene, session_id="fleet/red", current_floor="", door_state=2, motion_state=0)
+    scene.run(1.0)
+    red.asks("Lift9", "L2")
+    scene.run(20.0)
+    assert node
+    return scene.heard, "lift", "Lift9"
+
+
+def floor_contact_lost() -> Case:
+    """The car stands at a floor that its code does not show."""
+    scene = Scene("Lift2")
+    red = scene.robot("fleet/red")
+    scene.fail("Lift2", "floor_L3", "off")
+    red.asks("Lift2", "L3")
+    scene.run(150.0)
+    return scene.heard, "lift", "Lift2"
+
+
+def forgotten_by_rmf() -> Case:
+    """RMF's supervisor has restarted and asks for another robot; the holder's adapter is dead."""
+    scene = Scene("Lift1", rmf=True)
+    red, blue = scene.robot("fleet/red"), scene.robot("fleet/blue")
+    red.asks("Lift1", "L2")
+    scene.until(red)
+    supervisor = scene.supervisors["rmf_lift_supervisor"]
+    red.dies()
+    supervisor.kill()
+    blue.asks("Lift1", "L1")
+    scene.run(1.0)
+    supervisor.start()
+    scene.run(20.0)
+    return scene.heard, "lift", "Lift1"
+
+
+def unknown_floor() -> Case:
+    """A request to a floor that the lift does not serve."""
+    scene = Scene("Lift1")
+    scene.robot("fleet/red").asks("Lift1", "B2")
+    scene.run(30.0)
+    return scene.heard, "lift", "Lift1"
+
+
+def foreign_node_refuses() -> Case:
+    """Another maker's node never grants a session, and gives no reason."""
+    scene = Scene(diagnoses=False)
+    _Foreign(scene, available_floors=("L1", "L2"))
+    scene.robot("fleet/red").asks("Lift9", "L2")
+    scene.run(20.0)
+    return scene.heard, "lift", "Lift9"
+
+
+def no_supervisor() -> Case:
+    """Nobody passes the adapters' requests on."""
+    scene = Scene("Lift1")
+    scene.supervisors["lift_supervisor"].kill()
+    scene.run(1.0)
+    scene.heard.clear()
+    scene.robot("fleet/red").asks("Lift1", "L2")
+    scene.run(20.0)
+    return scene.heard, "lift", "Lift1"
+
+
+def supervisor_is_passive() -> Case:
+    """A node that does nothing else has a publisher on `lift_requests`, so our supervisor is silent."""
+    scene = Scene("Lift1")
+    Place(scene.air, "forgotten_pub", lambda: None).publisher(topics.LIFT_REQUESTS)
+    scene.run(5.0)
+    scene.heard.clear()
+    scene.robot("fleet/red").asks("Lift1", "L2")
+    scene.run(20.0)
+    return scene.heard, "lift", "Lift1"
+
+
+def reading_is_old() -> Case:
+    """The lift's bus does not answer any more."""
+    scene, red, _ = _two("Lift2")
+    scene.devices["Lift2"].far.down = "the module does not answer"
+    scene.run(30.0)
+    assert not red.robot.done
+    return scene.heard, "lift", "Lift2"
+
+
+def nobody_publishes() -> Case:
+    """The name is asked for, and nobody publishes its states."""
+    scene = Scene("Lift2")
+    scene.robot("fleet/red").asks("Lift1", "L3")
+    scene.run(30.0)
+    return scene.heard, "lift", "Lift1"
+
+
+def daemon_is_gone() -> Case:
+    """The lift's daemon dies in the middle of a ride."""
+    scene, red, _ = _two("Lift1")
+    scene.until(red)
+    scene.daemons["Lift1"].kill()
+    scene.run(30.0)
+    return scene.heard, "lift", "Lift1"
+
+
+def stamps_of_another_clock() -> Case:
+    """The clock of the robots' machine is an hour slow."""
+    scene = Scene("Lift1")
+    red = scene.robot("fleet/red")
+    red.behind_s = 3600.0
+    red.asks("Lift1", "L2")
+    scene.run(4.0)
+    heard = [
+        replace(one, message=replace(one.message, lift_time=stamp(one.wall + 600.0)))
+        if isinstance(one.message, d.LiftState)
+        else one
+        for one in scene.heard
+    ]
+    return heard, "lift", "Lift1"
+
+
+def two_nodes() -> Case:
+    """Two nodes publish states under one name."""
+    scene = Scene(diagnoses=False)
+    _Foreign(scene)
+    scene.run(0.4)
+    _Foreign(scene, stamp_s=-1.0, current_floor="L2")
+    scene.robot("fleet/red").asks("Lift9", "L2")
+    scene.run(20.0)
+    return scene.heard, "lift", "Lift9"
+
+
+def all_is_well() -> Case:
+    """A ride that is over."""
+    scene = Scene("Lift1")
+    scene.rides(scene.robot("fleet/red"), "Lift1", "L2", "L3")
+    scene.run(10.0)
+    return scene.heard, "lift", "Lift1"
+
+
+def door_held_by_a_dead_robot() -> Case:
+    """A robot has died in the doorway."""
+    scene = Scene("ward")
+    red = scene.robot("fleet/red")
+    red.opens("ward")
+    scene.until(red)
+    red.dies()
+    scene.run(400.0)
+    return scene.heard, "door", "ward"
+
+
+def door_does_not_open() -> Case:
+    """The door is told to open and stays shut."""
+    scene = Scene("ward")
+    scene.fail("ward", "operator", "stuck")
+    scene.robot("fleet/red").opens("ward")
+    scene.run(30.0)
+    return scene.heard, "door", "ward"
+
+
+def door_without_supervisor() -> Case:
+    """Nobody takes the adapters' requests."""
+    scene = Scene("ward")
+    scene.supervisors["door_supervisor"].kill()
+    scene.run(1.0)
+    scene.heard.clear()
+    scene.robot("fleet/red").opens("ward")
+    scene.run(15.0)
+    return scene.heard, "door", "ward"
+
+
+def door_held_open_by_a_person() -> Case:
+    """A person keeps the door open."""
+    scene = Scene("ward")
+    scene.press("ward", "push", True)
+    scene.run(12.0)
+    return scene.heard, "door", "ward"
+
+
+def charger_refuses() -> Case:
+    """A second robot asks for a charger that another one has."""
+    scene = Scene("bay1")
+    scene.says(topics.CHARGER_REQUESTS, _charge("bay1", "red", "r1"))
+    scene.run(3.0)
+    scene.says(topics.CHARGER_REQUESTS, _charge("bay1", "blue", "r2"))
+    scene.run(4.0)
+    return scene.heard, "charger", "bay1"
+
+
+def wrong_station() -> Case:
+    """A robot stands at a charger that is another's."""
+    scene = Scene(diagnoses=False)
+    who, whose = Robot("fleet", "red"), Robot("fleet", "blue")
+    text = Misplaced(who, "7", whose).text
+    state = d.ChargerState(stamp(EPOCH), 200, "bay1", text, "r2", "fleet", "blue", d.Duration())
+    for _ in range(10):
+        wall = EPOCH + scene.timeline.now
+        scene.says(topics.CHARGER_STATES, replace(state, charger_time=stamp(wall)))
+        scene.run(1.0)
+    return scene.heard, "charger", "bay1"
+
+
+def coordinator_queues() -> Case:
+    """More robots than chargers: the queue and its reasons."""
+    scene = Scene("bay1")
+    scene.coordinate("red", "blue")
+    scene.run(6.0)
+    for robot, request in (("red", "r1"), ("blue", "r2")):
+        scene.says(topics.ADAPTER_CHARGER_REQUESTS, _charge("", robot, request))
+    scene.run(10.0)
+    return scene.heard, "charger", "bay1"
+
+
+SCENES: Final[Mapping[str, Callable[[], Case]]] = {
+    made.__name__: made
+    for made in (
+        held_by_another,
+        holder_rides,
+        holder_is_dead,
+        holder_alone_is_dead,
+        fire,
+        fire_with_a_robot_inside,
+        open_but_at_no_floor,
+        floor_contact_lost,
+        forgotten_by_rmf,
+        unknown_floor,
+        foreign_node_refuses,
+        no_supervisor,
+        supervisor_is_passive,
+        reading_is_old,
+        nobody_publishes,
+        daemon_is_gone,
+        stamps_of_another_clock,
+        two_nodes,
+        all_is_well,
+        door_held_by_a_dead_robot,
+        door_does_not_open,
+        door_without_supervisor,
+        door_held_open_by_a_person,
+        charger_refuses,
+        wrong_station,
+        coordinator_queues,
+    )
+}
+
+
+def _two(lift: str) -> tuple[Scene, Guest, Guest]:
+    """Red asks for L2 and blue, 2 s later, for L1."""
+    scene = Scene(lift)
+    red, blue = scene.robot("fleet/red"), scene.robot("fleet/blue")
+    red.asks(lift, "L2")
+    scene.run(2.0)
+    blue.asks(lift, "L1")
+    return scene, red, blue
+
+
+def _charge(charger: str, robot: str, request: str) -> d.ChargerRequest:
+    return d.ChargerRequest(charger, "fleet", robot, d.Duration(), request)
+
+
+class _Foreign:
+    """Another maker's lift node, which says the same each second, whatever it is asked."""
+
+    def __init__(self, scene: Scene, stamp_s: float = 0.0, **fields: object) -> None:
+        self._scene = scene
+        self._stamp_s = stamp_s
+        known = d.LiftState(
+            lift_name="Lift9",
+            available_floors=("L1", "L2", "L3"),
+            current_floor="L1",
+            current_mode=d.LiftMode.MODE_AGV,
+        )
+        self._state = replace(known, **fields)
+        self._say()
+
+    def _say(self) -> None:
+        at = stamp(EPOCH + self._scene.timeline.now + self._stamp_s)
+        self._scene.says(topics.LIFT_STATES, replace(self._state, lift_time=at))
+        self._scene.timeline.after(1.0, self._say)

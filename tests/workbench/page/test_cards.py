@@ -1,0 +1,70 @@
+"""What browsers are sent: one script for all that has changed in a turn, and none where nothing has."""
+
+import json
+import re
+
+from msgspec.structs import replace
+
+from bridges.messages.heard import Heard
+from bridges.transports.transport import Transport, TransportError
+from tests.workbench.page.test_live_site import LIFT, lift
+from workbench.page.cards import Gallery, place_of, script
+from workbench.page.listener import Listener
+from workbench.page.live_site import Site
+
+HOSTILE = "</script>\u2028\"'`${1}"
+
+
+class Wall:
+    """Keeps what one browser would be sent."""
+
+    def __init__(self) -> None:
+        self.changes: list[list[str]] = []
+        self.rebuilt = 0
+
+    def change(self, script: str) -> None:
+        found = re.search(r"Object\.entries\((\{.*\})\)\) \{ const place", script)
+        assert found
+        self.changes.append(list(json.loads(found[1])))
+
+    def rebuild(self) -> None:
+        self.rebuilt += 1
+
+
+def nowhere() -> Transport:
+    raise TransportError("no graph in this test")
+
+
+def test_all_changes_of_a_turn_are_one_script_for_every_browser() -> None:
+    site, walls, now = Site(), [Wall(), Wall()], [100.0]
+    listener = Listener(site, nowhere)
+    gallery = Gallery(site, listener, lambda: now[0])
+    gallery.walls += walls
+
+    def turn(*heard: Heard) -> None:
+        for one in heard:
+            listener.hear(one)
+        gallery.turn()
+        now[0] += 0.1
+
+    first, second = lift(99.0), lift(99.0, "Lift2")
+    turn(first, second)
+    turn()
+    turn(first, second)
+    moved = [replace(LIFT, lift_name=name, current_floor="L2") for name in ("Lift1", "Lift2")]
+    turn(*(replace(first, message=message) for message in moved))
+    assert [wall.rebuilt for wall in walls] == [1, 1]
+    assert (
+        walls[0].changes
+        == walls[1].changes
+        == [
+            ["card/lift/Lift1", "card/lift/Lift2", "status", "robots"],
+            ["card/lift/Lift1", "card/lift/Lift2"],
+        ]
+    )
+
+
+def test_a_script_has_every_text_as_data_in_plain_ascii() -> None:
+    made = script({place_of(("lift", HOSTILE)): HOSTILE})
+    assert made.isascii()
+    assert HOSTILE not in made

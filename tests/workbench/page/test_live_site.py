@@ -1,0 +1,175 @@
+"""What the page knows of the graph: the latest of each device, in bounds, whatever is made up."""
+
+from msgspec.structs import replace
+
+from bridges.messages import definitions as d
+from bridges.messages import topics
+from bridges.messages.heard import Heard
+from bridges.messages.stamps import stamp
+from bridges.messages.topics import AnyTopic
+from bridges.observe.limits import FORGOTTEN_S, MOST_DEVICES
+from bridges.runtime.diagnostics import diagnosis
+from workbench.page.live_site import KEPT_S, MOST_ROBOTS, Site, Stands
+
+WALL = 1_700_000_000.0
+LIFT = d.LiftState(
+    lift_name="Lift1", available_floors=("L1", "L2"), current_floor="L1", door_state=2
+)
+
+
+def heard(at: float, topic: AnyTopic, message: d.Message) -> Heard:
+    return Heard(at, WALL + at, topic.name, message)
+
+
+def lift(at: float, name: str = "Lift1") -> Heard:
+    state = replace(LIFT, lift_name=name, lift_time=stamp(WALL + at))
+    return heard(at, topics.LIFT_STATES, state)
+
+
+def names(site: Site, now: float) -> list[str]:
+    return [shown.row.name for shown in site.devices(now, WALL + now)]
+
+
+def test_a_device_is_shown_with_its_state_and_its_row() -> None:
+    site = Site()
+    site.take(lift(1.0))
+    (shown,) = site.devices(1.2, WALL + 1.2)
+    assert (shown.row.state, shown.row.age) == ("car at L1, door open, mode UNKNOWN", "0.2 s")
+    assert isinstance(shown.state, d.LiftState)
+
+
+def charger(at: float, robot: str = "") -> Heard:
+    state = d.ChargerState(stamp(WALL + at), 2, "pad", robot_fleet="fleet", robot_name=robot)
+    return heard(at, topics.CHARGER_STATES, state)
+
+
+def test_how_long_a_robot_has_had_a_charger_is_shown_as_far_as_it_was_seen() -> None:
+    site, told = Site(), []
+    for at in (0, 1, 2, 3, 4, 5, 6, 30, 31):  # silent from 6 to 30
+        site.take(charger(float(at), "R1" if at < 3 else "" if at == 3 else "R2"))
+        told.append(next(one.stands for one in site.changed(at, WALL + at)))
+    assert told == [
+        Stands(0.0, at_least=True),
+        Stands(1.0, at_least=True),
+        Stands(2.0, at_least=True),
+        None,
+        Stands(0.0, at_least=False),
+        Stands(1.0, at_least=False),
+        Stands(2.0, at_least=False),
+        Stands(0.0, at_least=True),
+        Stands(1.0, at_least=True),
+    ]
+    assert [one.stands for one in site.devices(90.0, WALL + 90)] == [Stands(1.0, at_least=True)]
+
+
+def test_only_devices_heard_since_the_last_drawing_are_drawn_again() -> None:
+    site = Site()
+    site.take(lift(1.0))
+    site.take(lift(1.0, "Lift2"))
+    assert len(site.changed(1.1, WALL)) == 2
+    assert site.changed(1.2, WALL) == []
+    site.take(lift(2.0))
+    assert [shown.row.name for shown in site.changed(2.1, WALL)] == ["Lift1"]
+
+
+def test_ten_thousand_made_up_lifts_displace_no_known_one() -> None:
+    site = Site()
+    site.take(lift(0.0))
+    for number in range(10_000):
+        site.take(lift(0.001 * number, f"made up {number}"))
+    found = names(site, 10.0)
+    assert len(found) == MOST_DEVICES
+    assert "Lift1" in found
+    assert site.crowded == {"lift"}
+
+
+def test_a_device_that_went_silent_gives_way_to_a_new_one() -> None:
+    site = Site()
+    for number in range(MOST_DEVICES):
+        site.take(lift(0.0, f"old {number}"))
+    later = FORGOTTEN_S + 1.0
+    site.take(lift(later, "new"))
+    found = names(site, later)
+    assert len(found) == MOST_DEVICES
+    assert "new" in found
+    assert not site.knows("lift", "old 0")
+
+
+def test_a_lift_that_comes_after_made_up_ones_is_explained_and_they_leave_nothing() -> None:
+    site = Site()
+    for number in range(2 * MOST_DEVICES):
+        site.take(lift(number * FORGOTTEN_S, f"made up {number}"))
+    later = 2 * MOST_DEVICES * FORGOTTEN_S
+    site.take(lift(later))
+    told = site.explain("lift", "Lift1", later, WALL + later, {})
+    assert told is not None
+    assert told.now[0].startswith("Nobody has had it since")
+    assert len(names(site, later)) == MOST_DEVICES
+    assert [site.timeline("lift", f"made up {n}", later) for n in range(MOST_DEVICES)] == [
+        None for _ in range(MOST_DEVICES)
+    ]
+
+
+def test_requests_for_devices_that_nobody_has_seen_are_not_kept() -> None:
+    site = Site()
+    asked = heard(0.0, topics.LIFT_REQUESTS, d.LiftRequest("nowhere", session_id="a/b"))
+    for _ in range(1000):
+        site.take(asked)
+    assert site.timeline("lift", "nowhere", 0.0) is None
+    assert names(site, 0.0) == []
+
+
+def test_made_up_robots_are_bounded() -> None:
+    site = Site()
+    robots = tuple(d.RobotState(f"r{n}") for n in range(10_000))
+    site.take(heard(0.0, topics.FLEET_STATES, d.FleetState("fleet", robots)))
+    assert len(site.robots()) == MOST_ROBOTS
+
+
+def test_the_timeline_has_the_sessions_and_requests_of_its_own_device_only() -> None:
+    site = Site()
+    held = replace(LIFT, session_id="fleet/a", lift_time=stamp(WALL))
+    site.take(heard(0.0, topics.LIFT_STATES, held))
+    asked = d.LiftRequest("Lift1", session_id="fleet/b", destination_floor="L2")
+    site.take(heard(0.5, topics.ADAPTER_LIFT_REQUESTS, asked))
+    site.take(lift(0.6, "Lift2"))
+    timeline = site.timeline("lift", "Lift1", 1.0)
+    assert timeline is not None
+    found = {
+        (lane.name, lane.row) for lane in timeline.lanes if lane.name in ("sessions", "requests")
+    }
+    assert found == {("sessions", ""), ("requests", "fleet/b")}
+
+
+def test_a_day_of_rides_takes_no_more_room_than_ten_minutes() -> None:
+    site = Site()
+    for at in range(0, 3600, 2):
+        state = replace(LIFT, lift_time=stamp(WALL + at), session_id=f"fleet/robot{at}")
+        site.take(heard(float(at), topics.LIFT_STATES, state))
+    kept = site.timeline("lift", "Lift1", now=0.0)
+    assert kept is not None
+    sessions = kept.lanes[0].spans
+    assert (sessions[0].from_s, sessions[-1].to_s) == (3596.0 - KEPT_S, 3598.0)
+
+
+def test_faults_and_simulations_come_from_the_daemons_diagnostics() -> None:
+    site = Site()
+    site.take(lift(0.0))
+    fault = {"code": "OVERLOAD", "detail": "3 s"}
+    status = {"Lift1": {"faults": [fault], "input_age_s": 0.1}}
+    told = diagnosis("node", "lift", {"simulated": True}, status, stamp(WALL))
+    site.take(heard(0.1, topics.DIAGNOSTICS, told))
+    (shown,) = site.devices(0.2, WALL + 0.2)
+    assert (shown.row.faults, shown.row.simulated) == ("OVERLOAD (3 s)", True)
+
+
+def test_what_a_person_is_told_to_type_names_the_pages_graph() -> None:
+    site = Site(("--domain-id", "7"))
+    for n in range(9):
+        state = d.LiftState(stamp(WALL + n), "Lift1", ("L1",), "L1", session_id="fleet/red")
+        site.take(heard(float(n), topics.LIFT_STATES, state))
+    told = site.explain("lift", "Lift1", 9.0, WALL + 9.0, {})
+    assert told is not None
+    assert [step.what.split("`")[1] for step in told.next] == [
+        "rmf-bridge release Lift1 --domain-id 7"
+    ]

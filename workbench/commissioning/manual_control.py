@@ -1,0 +1,43 @@
+"""What the commands share that hold one device by hand: its record and guard, and its outputs off."""
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from bridges.host import directories
+from bridges.runtime import guard, record, runtime_directory
+from bridges.settings.load import Config
+from drivers import Driver, DriverError
+from drivers.hal import Bus
+
+
+def guarded(
+    config: Config,
+    device: str,
+    held: runtime_directory.RuntimeDirectory,
+    outputs_off: Sequence[str],
+) -> tuple[Bus, Callable[[], None]]:
+    """The device's bus, and what to call when every output is verified off. Raises HalError.
+
+    Once the bus is open, and before an output is claimed: the record, and a guard that runs
+    `outputs_off` if we die. A bus that cannot be opened leaves nothing to switch off.
+    """
+    directories.work_somewhere(held.places)
+    bus = config.open_bus(config.bus_of(device))
+    held.claim(record.of(config))
+    watching = guard.Guard(outputs_off)
+
+    def all_off() -> None:
+        held.released()
+        watching.dismiss()
+
+    return bus, all_off
+
+
+def not_off(driver: Driver[Any, Any], insist: Callable[[], None]) -> str:
+    """Switch every output off; why that is not verified, or "". `insist`: ends the bus's pauses."""
+    insist()
+    try:
+        driver.make_safe()
+    except DriverError as error:
+        return f"not verified off: {error}"
+    return ""

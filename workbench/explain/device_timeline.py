@@ -1,0 +1,276 @@
+"""The timeline of one device as lanes: what `plot` and the web page draw.
+
+A lane has one or more rows, such as one for each relay; the spans of a row never overlap. Times are on
+`Heard.at`'s clock. Everything is bounded: the newest spans of a row and the rows with the latest
+news are kept, and `left_out` says how many were dropped.
+
+`Drawing` grows message by message, for a page that is live; `lanes` draws a whole recording. Both
+give a `Timeline` of plain values: `dataclasses.asdict` makes JSON of it.
+"""
+
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Final
+
+from bridges.kinds.charger import refusals
+from bridges.messages import definitions as d
+from bridges.messages import words
+from bridges.messages.heard import Heard, Own
+from bridges.messages.words import Kind
+from bridges.observe.door import listed
+from bridges.observe.limits import ASKS_WITHIN_S, OLD_S, STEP_S
+from bridges.runtime import diagnostics
+from workbench.explain import state_tones
+from workbench.explain.noted import levels, noted
+from workbench.explain.rows import Row, label
+from workbench.explain.timeline import LANES, Lane, LaneName, Level, Timeline, Tone
+
+MOST_ROWS: Final = 12
+"""The most rows of a lane: a flood of made-up requesters or faults must not fill a page."""
+STAMP: Final = "stamp"
+"""The row of `faults` for states that are too old."""
+SUPERVISOR: Final = "supervisor"
+"""The row of `requests` for what the supervisor passes on to the device's own daemon."""
+
+
+def lanes(
+    heard: Iterable[Heard | Level | Own],
+    kind: Kind,
+    device: str,
+    from_s: float = float("-inf"),
+    to_s: float = float("inf"),
+) -> Timeline:
+    """The timeline of a whole recording, or of a part of it. `heard`: in the order of time."""
+    drawing = Drawing(kind, device)
+    for one in heard:
+        if one.at > to_s:
+            break
+        drawing.take(one)
+    return drawing.timeline(from_s, to_s)
+
+
+class Drawing:
+    """The timeline of one device while it grows. What was over `past_s` (s) before is forgotten."""
+
+    def __init__(self, kind: Kind, device: str, past_s: float = float("inf")) -> None:
+        self._kind: Kind = kind
+        self._device = device
+        self._past_s = past_s
+        self._began_at: float | None = None
+        self._now = float("-inf")
+        self._wall = 0.0
+        self._steps = Row()
+        self._rows: dict[LaneName, dict[str, Row]] = {name: {} for name in LANES}
+        self._left_out = 0
+        self._noted: set[str] = set()
+        self._destination = ""
+        self._on: dict[tuple[str, str], str] = {}
+        self._faulty: dict[str, frozenset[str]] = {}
+
+    def take(self, heard: Heard | Level | Own) -> None:
+        """Take the next one. One that a recording has in the wrong order counts as of now."""
+        if isinstance(heard, Own):
+            note = noted(heard.topic.rpartition("/")[2], heard.text)
+            if note is not None and note.subject == self._device:
+                for level in levels(heard.at, note, self._on):
+                    self.take(level)
+            return
+        self._now = max(self._now, heard.at)
+        if self._began_at is None:
+            self._began_at = self._now
+        match heard:
+            case Level():
+                self._note(heard)
+            case Heard():
+                self._clock(heard)
+                self._hear(heard.topic.rpartition("/")[2], heard.message, heard.wall)
+
+    def timeline(self, from_s: float = float("-inf"), to_s: float = float("inf")) -> Timeline:
+        """What was heard between these times, and at most until now."""
+        if self._began_at is None:
+            return Timeline(self._kind, self._device, 0.0, 0.0, 0.0, ())
+        to_s = max(self._began_at, min(to_s, self._now))
+        from_s = min(to_s, max(from_s, self._began_at))
+        drawn = tuple(self._drawn(from_s, to_s))
+        steps = tuple(self._steps.marks(from_s, to_s))
+        wall = self._wall + from_s
+        return Timeline(self._kind, self._device, from_s, to_s, wall, drawn, steps, self._left_out)
+
+    def _drawn(self, from_s: float, to_s: float) -> Iterator[Lane]:
+        for name in LANES:
+            for part, row in self._rows[name].items():
+                spans, marks = tuple(row.spans(from_s, to_s)), tuple(row.marks(from_s, to_s))
+                if spans or marks:
+                    yield Lane(name, part, spans, marks, row.left_out)
+
+    def _clock(self, heard: Heard) -> None:
+        """Compare the wall clock with the steady one."""
+        offset = heard.wall - heard.at
+        if self._wall and abs(offset - self._wall) > STEP_S:
+            self._steps.mark(
+                self._now, f"the clock was stepped by {offset - self._wall:+.0f} s", "wrong"
+            )
+        self._wall = offset
+
+    def _row(
+        self, lane: LaneName, part: str = "", keeps_s: float = ASKS_WITHIN_S, *, fills: bool = False
+    ) -> Row:
+        """The row of this name. If there is no room, the row that was silent the longest goes."""
+        rows, part = self._rows[lane], label(part)
+        if part not in rows:
+            if len(rows) >= MOST_ROWS:
+                del rows[min(rows, key=lambda one: rows[one].heard_at)]
+                self._left_out += 1
+            rows[part] = Row(keeps_s, fills=fills, past_s=self._past_s)
+        return rows[part]
+
+    def _say(self, lane: LaneName, text: str, tone: Tone) -> None:
+        """A lane of one row that a state fills."""
+        self._row(lane, fills=True).say(self._now, label(text), tone)
+
+    # ---- what our daemon noted
+
+    def _note(self, level: Level) -> None:
+        if level.lane not in self._noted:  # more exact than diagnostics, which come once a second
+            self._noted.add(level.lane)
+            self._rows[level.lane].clear()
+        tone: Tone = "wrong" if level.lane == "faults" else "works"
+        row = self._row(level.lane, level.name, keeps_s=float("inf"))
+        row.say(self._now, label(level.value), tone)
+
+    # ---- what was heard
+
+    def _hear(self, topic: str, message: d.Message, wall: float) -> None:
+        match message:
+            case d.LiftState() | d.DoorState() | d.ChargerState():
+                if self._is_it(message):
+                    self._state(message, wall)
+            case d.LiftRequest() | d.DoorRequest() | d.ChargerRequest() | d.ChargerCancel():
+                if self._is_it(message):
+                    self._request(topic, message)
+            case d.SupervisorHeartbeat() if self._kind == "door":
+                self._heartbeat(message)
+            case d.DiagnosticStatus():
+                self._refusal(message)
+            case d.DiagnosticArray():
+                for status in message.status:
+                    self._diagnosis(status)
+
+    def _is_it(self, message: words.Stated | words.Requested) -> bool:
+        return (words.kind(message), words.device(message)) == (self._kind, self._device)
+
+    def _state(self, state: words.Stated, wall: float) -> None:
+        self._age(words.stamped_at(state), wall)
+        match state:
+            case d.LiftState():
+                self._lift(state)
+            case d.DoorState():
+                mode = state.current_mode.value
+                self._say("door", words.plain(d.DoorModeValue, mode), state_tones.door(mode))
+            case d.ChargerState():
+                said = words.plain(d.ChargerStateValue, state.state)
+                text = f"{said}: {state.error_message}" if state.error_message else said
+                self._say("sessions", words.holder(state), "held")
+                self._say("mode", text, state_tones.charger(state.state))
+
+    def _age(self, stamped_at: float, wall: float) -> None:
+        """A state whose reading is old, or from another clock, is shown as a fault of its own."""
+        text = "" if stamped_at else "never read"
+        if stamped_at and wall - stamped_at > OLD_S:
+            text = "the reading is old"
+        elif wall - stamped_at < -OLD_S:
+            text = "the stamp is in the future"
+        if text or STAMP in self._rows["faults"]:
+            self._row("faults", STAMP).say(self._now, text, "wrong")
+
+    def _lift(self, state: d.LiftState) -> None:
+        floor, door = state.current_floor, state.door_state
+        motion, mode = state.motion_state, state.current_mode
+        runs = state_tones.motion(motion)
+        self._say("sessions", state.session_id, "held")
+        self._say("floors", floor or "?", _floor(floor, runs))
+        self._say("door", words.plain(d.LiftDoor, door), state_tones.lift_door(door))
+        self._say("motion", words.plain(d.LiftMotion, motion), runs)
+        self._say("mode", words.word(d.LiftMode, mode), state_tones.lift_mode(mode))
+        if state.destination_floor not in ("", self._destination):
+            to = label(f"to {state.destination_floor}")
+            self._row("floors", fills=True).mark(self._now, to, "asks")
+        self._destination = state.destination_floor
+
+    def _request(self, topic: str, message: words.Requested) -> None:
+        """One row for each requester, and one for the supervisor, which passes requests on."""
+        match message:
+            case d.LiftRequest():
+                ends = message.request_type == d.LiftRequestType.REQUEST_END_SESSION
+                passed_on, who = topic == "lift_requests", message.session_id
+                text = "END" if ends else message.destination_floor or "no floor"
+            case d.DoorRequest():
+                ends = message.requested_mode.value != d.DoorModeValue.MODE_OPEN
+                passed_on, who = topic == "door_requests", message.requester_id
+                text = words.plain(d.DoorModeValue, message.requested_mode.value)
+            case d.ChargerRequest():
+                ends, passed_on = False, False
+                who, text = f"{message.fleet_name}/{message.robot_name}", message.request_id
+            case d.ChargerCancel():
+                ends, passed_on, who, text = True, False, "cancel", message.request_id
+        if passed_on and who != "door_supervisor":
+            text = f"{text} for {who}"
+        row = self._row("requests", SUPERVISOR if passed_on else who)
+        once = isinstance(message, d.ChargerRequest | d.ChargerCancel)
+        row.say(self._now, "" if ends or once else label(text), "asks")
+        if ends or once:
+            row.mark(self._now, label(text), "asks")
+
+    def _refusal(self, status: d.DiagnosticStatus) -> None:
+        refusal = refusals.read(status)
+        if refusal is not None and (self._kind, refusal.charger) == ("charger", self._device):
+            row = self._row("requests", refusal.robot)
+            row.mark(self._now, label(f"refused: {refusal.text}"), "wrong")
+
+    def _heartbeat(self, message: d.SupervisorHeartbeat) -> None:
+        """RMF's own supervisor sends it after requests only: a session lasts until one without it."""
+        holders = set(map(label, listed(message, self._device)))
+        for who in holders:
+            self._row("sessions", who, keeps_s=float("inf")).say(self._now, who, "held")
+        for who, row in self._rows["sessions"].items():
+            if who not in holders:
+                row.say(self._now, "", "held")
+
+    def _diagnosis(self, status: d.DiagnosticStatus) -> None:
+        if diagnostics.about(status) != (self._kind, self._device):
+            return
+        values = {pair.key: pair.value for pair in status.values}
+        if "faults" not in self._noted:
+            self._faults(status, values)
+        if "relays" not in self._noted and "outputs" in values:
+            on = dict(_outputs(values["outputs"]))
+            self._levels("relays", on, self._rows["relays"].keys() - on.keys())
+
+    def _faults(self, status: d.DiagnosticStatus, values: Mapping[str, str]) -> None:
+        """A device and its supervisor may report the same fault; it lasts while either has it."""
+        found = {code: values.get(code) or code for code in diagnostics.faults(status)}
+        before = self._faulty.get(status.name, frozenset())
+        if status.name in self._faulty or len(self._faulty) < MOST_ROWS:
+            self._faulty[status.name] = frozenset(found)
+        self._levels("faults", found, before - frozenset().union(*self._faulty.values()))
+
+    def _levels(self, lane: LaneName, on: Mapping[str, str], over: Iterable[str]) -> None:
+        tone: Tone = "wrong" if lane == "faults" else "works"
+        for name, text in on.items():
+            self._row(lane, name).say(self._now, label(text), tone)
+        for name in over:
+            self._row(lane, name).say(self._now, "", tone)
+
+
+def _floor(floor: str, runs: Tone) -> Tone:
+    """A lift without motion lines stands where its floor is known."""
+    if not floor:
+        return "unknown"
+    return "works" if runs == "works" else "calm"
+
+
+def _outputs(told: str) -> Iterator[tuple[str, str]]:
+    """`agv_request yes, call L3` as the status file says it (`bridges.host.log.plain`)."""
+    for part in told.split(", ") if told != "-" else ():
+        name, _, value = part.partition(" ")
+        if value != "0":  # of a counter
+            yield name, value

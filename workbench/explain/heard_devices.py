@@ -1,0 +1,217 @@
+"""What was heard on a graph, device by device, and the explanation of each.
+
+`Site.take` is fed in the order of time and remembers in bounds, so a day's recording takes no more
+memory than a minute's.
+"""
+
+from collections import deque
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from datetime import tzinfo
+from typing import ClassVar, Final
+
+from bridges.kinds.charger import refusals
+from bridges.messages import definitions as d
+from bridges.messages.heard import Heard, Own
+from bridges.messages.words import KINDS, Kind
+from bridges.observe.all_devices import Key, ObservedGraph
+from bridges.observe.limits import MOST_DEVICES, SILENT_S
+from bridges.observe.requesters import Moment
+from bridges.runtime import diagnostics
+from workbench.explain import answer as common
+from workbench.explain import charger, door, lift
+from workbench.explain.answer import Answer, Remedies
+from workbench.explain.charger_facts import ChargerFacts
+from workbench.explain.device import MOST_LINES, Device
+from workbench.explain.door_facts import DoorFacts
+from workbench.explain.explanation import Explanation, Line, Step
+from workbench.explain.lift_facts import LiftFacts
+from workbench.explain.noted import noted
+from workbench.explain.phrases import Clock, lasted, on_graph
+from workbench.explain.rows import label
+
+STORY_LINES: Final = 40
+
+
+class Site(ObservedGraph[Device]):
+    """All devices that were heard, or only those of this `name`.
+
+    `session`: whose last ride's story is kept, even if others ride after it.
+    """
+
+    makes: ClassVar = {"lift": LiftFacts, "door": DoorFacts, "charger": ChargerFacts}
+
+    def __init__(
+        self,
+        name: str = "",
+        session: str = "",
+        most_lines: int = MOST_LINES,
+        graph: Sequence[str] = (),
+    ) -> None:
+        """`most_lines`: how many are remembered of what each device did. `graph`: the options that name
+        this graph, for commands."""
+        super().__init__()
+        self._most_lines = most_lines
+        self._graph = graph
+        self.messages = 0
+        self._story_from = float("-inf")
+        self._name = name
+        self._session = session
+        self._others: dict[Kind, dict[str, None]] = {kind: {} for kind in KINDS}
+        self._coordinator: tuple[Moment, Mapping[str, str]] | None = None
+
+    def take(self, heard: Heard | Own) -> None:
+        """The next message, or the next text of our own recorder's."""
+        if isinstance(heard, Own):
+            self._note(self.moment(heard), heard)
+            return
+        self.messages += 1
+        self.hear(heard)
+        match heard.message:
+            case d.DiagnosticStatus():
+                self._refusal(self.now, heard.message)
+            case d.DiagnosticArray():
+                for status in heard.message.status:
+                    self._diagnose(self.now, status)
+
+    def story_from(self, at: float) -> None:
+        """Leave everything before this time (s) out of the stories."""
+        self._story_from = at
+
+    def devices(self) -> list[Key]:
+        """The devices that have published a state, in the order of kinds and names."""
+        return [(kind, one) for kind in KINDS for one in sorted(d.id for d in self.stated(kind))]
+
+    def kinds(self, name: str) -> list[Kind]:
+        """The kinds of a device of this name: by its states, or else by the requests for it."""
+        found = [kind for kind in KINDS if (kind, name) in self.known]
+        return [kind for kind in found if self.known[kind, name].state is not None] or found
+
+    def explain(
+        self, kind: Kind, name: str, zone: tzinfo | None, remedies: Remedies | None = None
+    ) -> Explanation:
+        """The device at the end of what was heard. `zone`: of the times; None: this machine's."""
+        clock = Clock(self.now, zone)
+        began = self.began or self.now
+        device = self.known.get((kind, name)) or self.make(kind, name)
+        answer = self._answer(device, clock)
+        common.say_waits(answer, device, clock)
+        story = self._story(device, answer)
+        for_s = lasted(self.now.at - began.at)
+        return Explanation(
+            kind=kind,
+            device=label(name),
+            heard=f"{clock.date(began.wall)} to {clock.time(self.now.wall)} ({for_s})",
+            now=tuple(answer.now),
+            next=tuple(
+                Step(step.who, on_graph(step.what, self._graph))
+                for step in dict.fromkeys(answer.next)
+            ),
+            asks=answer.asks,
+            fields=answer.fields,
+            faults=tuple(
+                replace(fault, do=on_graph(fault.do, self._graph))
+                for fault in common.faults(device, clock, remedies or {})
+            ),
+            notes=(*answer.notes, *common.notes(device, clock), *self._stepped(clock)),
+            story=story[-STORY_LINES:],
+            left_out=max(0, len(story) - STORY_LINES),
+            before=_before(device, clock),
+        )
+
+    def _answer(self, device: Device, clock: Clock) -> Answer:
+        names = {
+            kind: (*self._others[kind], *(label(one.id) for one in self.stated(kind)))
+            for kind in KINDS
+        }
+        around = common.Heard(names, self.messages)
+        match device:
+            case LiftFacts():
+                return lift.answer(device, clock, around, self._session)
+            case DoorFacts():
+                return door.answer(device, clock, around, self._session)
+            case ChargerFacts():
+                return charger.answer(device, clock, around, self._coordinates())
+        raise AssertionError(device)
+
+    def _story(self, device: Device, answer: Answer) -> tuple[Line, ...]:
+        """All that is remembered of the ride in question."""
+        if isinstance(device, LiftFacts) and device.kept and not answer.asks:
+            return device.kept
+        return device.lines_since(max(answer.since, self._story_from))
+
+    # ---- who hears what
+
+    def make(self, kind: Kind, name: str) -> Device:
+        """A device of which nothing was heard yet."""
+        made = super().make(kind, name)
+        made.focus = self._session
+        made.lines = deque(maxlen=self._most_lines)
+        return made
+
+    def device(
+        self, kind: Kind, name: str, moment: Moment, *, stated: bool = False
+    ) -> Device | None:
+        """The device of this name, if we explain it."""
+        if self._name in ("", name):
+            return super().device(kind, name, moment, stated=stated)
+        if stated and name and len(self._others[kind]) < MOST_DEVICES:
+            self._others[kind][label(name)] = None
+        return None
+
+    def _refusal(self, moment: Moment, status: d.DiagnosticStatus) -> None:
+        refusal = refusals.read(status)
+        found = self.device("charger", refusal.charger, moment) if refusal else None
+        if refusal is not None and isinstance(found, ChargerFacts):
+            found.refused(moment, refusal)
+
+    def _diagnose(self, moment: Moment, status: d.DiagnosticStatus) -> None:
+        kind = diagnostics.kind_in(status)
+        of_daemon = status.name == f"{status.hardware_id}: daemon"
+        if kind == "charger_coordinator" and not of_daemon:
+            values = {pair.key: pair.value for pair in status.values}
+            self._coordinator = moment, values
+            return
+        about = diagnostics.about(status)
+        if about in self.known:
+            self.known[about].diagnose(moment, status, kind)
+
+    def _note(self, moment: Moment, own: Own) -> None:
+        note = noted(own.topic.rpartition("/")[2], own.text)
+        for kind in KINDS:
+            if note is not None and (kind, note.subject) in self.known:
+                self.known[kind, note.subject].note(moment, note)
+
+    def _coordinates(self) -> Mapping[str, str]:
+        if self._coordinator is None or self.now.at - self._coordinator[0].at > SILENT_S:
+            return {}
+        return self._coordinator[1]
+
+    def _stepped(self, clock: Clock) -> tuple[str, ...]:
+        return tuple(
+            f"At {clock.time(moment.wall)} the listener's clock was stepped by {by_s:+.0f} s."
+            for moment, by_s in self.steps
+        )
+
+
+def _before(device: Device, clock: Clock) -> str:
+    """What came before, in one sentence; "" if nothing did."""
+    match device:
+        case LiftFacts() if device.rides.ended:
+            rides = device.rides
+            longest = ""
+            if rides.longest_at is not None:
+                longest = (
+                    f"; the longest wait for the car was {lasted(rides.longest_s)}, of"
+                    f" {rides.longest_who} until {clock.time(rides.longest_at.wall)}"
+                )
+            return f"{_count(rides.ended, 'ride')} ended in this time{longest}."
+        case DoorFacts() if device.passages:
+            return f"{_count(device.passages, 'hold')} ended in this time."
+        case ChargerFacts() if device.charges:
+            return f"{_count(device.charges, 'charge')} began in this time."
+    return ""
+
+
+def _count(number: int, what: str) -> str:
+    return f"{number} {what}{'' if number == 1 else 's'}"

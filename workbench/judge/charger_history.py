@@ -1,0 +1,70 @@
+"""What is remembered of a charger: who requested it, and what its states have shown."""
+
+from typing import Final
+
+from bridges.messages import definitions as d
+from bridges.messages.heard import Heard
+from bridges.observe.charger import ObservedCharger
+from workbench.judge.history import NOT_YET, Scene, keep
+
+IDLE: Final = d.ChargerStateValue.CHARGER_IDLE
+ASSIGNED: Final = d.ChargerStateValue.CHARGER_ASSIGNED
+CHARGING: Final = d.ChargerStateValue.CHARGER_CHARGING
+RELEASED: Final = d.ChargerStateValue.CHARGER_RELEASED
+ERROR: Final = d.ChargerStateValue.CHARGER_ERROR
+UNREQUESTED: Final = "unrequested/"
+"""Whatever follows it, nobody asked for this charge. A station's next one may have the same id."""
+
+
+class ChargerScene(Scene[d.ChargerState]):
+    """`requests`: by id, the latest. `cancels`: id -> when it was first cancelled; the cancel of a
+    charge that nobody requested is forgotten with it. `foreign_at`: the last cancel of an id that the
+    station does not show."""
+
+    seen: ObservedCharger
+    observes = ObservedCharger
+
+    def __init__(self, name: str) -> None:
+        super().__init__(name)
+        self.requests: dict[str, d.ChargerRequest] = {}
+        self.cancels: dict[str, float] = {}
+        self.foreign_at = NOT_YET
+
+    @property
+    def same_since(self) -> float:
+        """Since when state and request have been as they are."""
+        return max(self.since, self.seen.condition.since.at, self.seen.request.since.at)
+
+    def take_other(self, heard: Heard) -> bool:
+        """Requests to this charger and their cancels."""
+        match heard.message:
+            case d.ChargerRequest(charger_name=self.name):
+                self.asked()
+                if not unrequested(heard.message.request_id):
+                    keep(self.requests, heard.message.request_id, heard.message)
+            case d.ChargerCancel(charger_name=self.name):
+                self._cancel(heard.message.request_id)
+            case _:
+                return False
+        return True
+
+    def forget(self) -> None:
+        """Forget what a silence may have ended."""
+        self.cancels.pop(UNREQUESTED + self.name, None)
+
+    def settle(self, state: d.ChargerState) -> None:
+        """Forget the cancel of what is over."""
+        if state.state in (IDLE, RELEASED):
+            self.cancels.pop(UNREQUESTED + self.name, None)
+
+    def _cancel(self, request_id: str) -> None:
+        shown = self.state is not None and request_id == self.state.request_id
+        if shown or not unrequested(request_id):
+            keep(self.cancels, request_id, self.cancels.get(request_id, self.now))
+        if self.state is not None and not shown:
+            self.foreign_at = self.now
+
+
+def unrequested(request_id: str) -> bool:
+    """Does nobody's request have this id?"""
+    return request_id.startswith(UNREQUESTED)

@@ -1,0 +1,167 @@
+"""What is remembered of one device while its messages are heard; bounded, however many come.
+
+A scene takes messages and decides nothing; laws read it. This file has what all three kinds share:
+what was heard of the device, the pace of its states, their stamps, and what followed a request.
+"""
+
+from abc import ABC, abstractmethod
+from collections import deque
+from typing import ClassVar, Final, Generic, TypeVar
+
+from msgspec.structs import replace
+
+from bridges.messages import definitions as d
+from bridges.messages import words
+from bridges.messages.heard import Heard
+from bridges.observe.all_devices import AnyDevice
+from bridges.observe.limits import SLOWEST_S
+from bridges.observe.requesters import Moment
+
+REMEMBERED: Final = 200
+"""How many requesters a scene remembers; a site has some dozens."""
+BURST: Final = 20
+FROZEN_S: Final = 0.05
+ANSWERS_WITHIN_S: Final = 0.1
+EARLY_S: Final = 0.15
+"""A state this early (s) cannot be explained by a timer's jitter."""
+
+NOT_YET: Final = float("-inf")
+
+T = TypeVar("T", d.LiftState, d.DoorState, d.ChargerState)
+V = TypeVar("V")
+
+
+def keep(known: dict[str, V], key: str, value: V) -> None:
+    """Put it last, and forget the oldest if there are too many."""
+    known.pop(key, None)
+    known[key] = value
+    if len(known) > REMEMBERED:
+        del known[next(iter(known))]
+
+
+class Scene(ABC, Generic[T]):
+    """One device. Times are those of what was heard (s).
+
+    `news`: the message taken last, None when only time has passed. `seen`: what was heard of it.
+    `before`: the state before the latest, None at the first one, and after a silence, because the
+    node may have restarted; `since`: when that was. `frozen_s`: for how long the states have shown
+    the same stamp. `burst_s`: how long the latest BURST unchanged states took.
+    """
+
+    observes: ClassVar[type[AnyDevice]]
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+        self.seen: AnyDevice = self.observes(name, Moment(0.0, 0.0))
+        self.now = self.since = NOT_YET
+        self.news: d.Message | None = None
+        self.before: T | None = None
+        self.frozen_s = 0.0
+        self.burst_s = float("inf")
+        self.states = 0
+        self.others: set[str] = set()
+        self._unchanged: deque[float] = deque(maxlen=BURST)
+        self._stamp = self._moved_at = NOT_YET
+        self._asked_at = NOT_YET
+        self._answers: deque[bool] = deque(maxlen=8)
+        self._quiet: deque[float] = deque(maxlen=15)
+
+    def take(self, heard: Heard) -> bool:
+        """Take a message. False if no law needs to look, because it is not about this device."""
+        self.now, self.news = heard.at, heard.message
+        message = heard.message
+        if not isinstance(message, words.Stated | words.Requested):
+            return self.take_other(heard)
+        if (words.kind(message), words.device(message)) == (self.seen.kind, self.name):
+            earlier = self.heard_at
+            self.seen.hear(Moment(heard.at, heard.wall), heard.topic, message)
+            if isinstance(message, words.Stated):
+                return self._take_state(message, earlier)  # type: ignore[arg-type]
+        elif isinstance(message, words.Stated):
+            if words.kind(message) == self.seen.kind and len(self.others) < REMEMBERED:
+                self.others.add(words.device(message))
+            return False
+        return self.take_other(heard)
+
+    def pass_time(self, now: float) -> None:
+        """Note that time has passed and nothing was heard."""
+        self.now, self.news = now, None
+
+    @abstractmethod
+    def take_other(self, heard: Heard) -> bool:
+        """Take a message that is not a state."""
+
+    @abstractmethod
+    def settle(self, state: T) -> None:
+        """Note what the new state means; `before` and `state` are set."""
+
+    def forget(self) -> None:
+        """Forget what a silence may have ended."""
+
+    def asked(self) -> None:
+        """Note a request to this device."""
+        self._asked_at = self.now
+
+    @property
+    def state(self) -> T | None:
+        """The latest state."""
+        return self.seen.state
+
+    @property
+    def heard_at(self) -> float:
+        """When it came."""
+        return self.seen.last_state.at if self.seen.last_state else NOT_YET
+
+    @property
+    def new(self) -> T | None:
+        """The state, if it is the latest message."""
+        return self.state if self.news is self.state else None
+
+    @property
+    def answers(self) -> int:
+        """How many of the latest 8 requests were each answered by a state that was not due."""
+        return sum(self._answers)
+
+    def _take_state(self, state: T, earlier: float) -> bool:
+        """Take the new state. `earlier`: when the one before came."""
+        self.states += 1
+        self.before = self.seen.before
+        if self.before is None or self.seen.gap_s > SLOWEST_S:
+            self.before, self.since = None, self.now
+            self.forget()
+        self._look_at_stamp(self.seen.stamped_at)
+        self._look_at_pace(state, earlier)
+        self.settle(state)
+        return True
+
+    def _look_at_stamp(self, stamp: float) -> None:
+        if abs(stamp - self._stamp) > FROZEN_S or self.before is None:
+            self._stamp, self._moved_at = stamp, self.now
+        self.frozen_s = self.now - self._moved_at
+
+    def _look_at_pace(self, state: T, earlier: float) -> None:
+        """Note the pace of unchanged states: they are due at the node's own rate, never at a
+        request."""
+        if self.before is None or _content(state) != _content(self.before):
+            return
+        self._unchanged.append(self.now)
+        if len(self._unchanged) == BURST:
+            self.burst_s = self.now - self._unchanged[0]
+        if self._asked_at <= earlier:
+            self._quiet.append(self.seen.gap_s)
+        elif self._quiet:
+            at_once = self.now - self._asked_at < ANSWERS_WITHIN_S
+            usual_s = sorted(self._quiet)[len(self._quiet) * 3 // 4]
+            early = at_once and self.seen.gap_s < usual_s - EARLY_S
+            self._answers.append(early)
+
+
+def _content(state: words.Stated) -> words.Stated:
+    """All but the stamp."""
+    match state:
+        case d.LiftState():
+            return replace(state, lift_time=d.Time())
+        case d.DoorState():
+            return replace(state, door_time=d.Time())
+        case d.ChargerState():
+            return replace(state, charger_time=d.Time())

@@ -1,0 +1,178 @@
+"""From the first message to the verdict: listen, play if asked and allowed, release, judge.
+
+Without I/O and clock, so that it is the same on a wire and in virtual time. The shell hands over what
+it hears, publishes what is returned, and calls `turn` at `wake_at`.
+"""
+
+from collections.abc import Callable
+from enum import Enum, auto
+from typing import Final
+
+from bridges.messages.heard import Heard
+from workbench.judge.judge import Judge
+from workbench.judge.scenarios import LEAVES_S, REPEAT_S, Performance
+from workbench.judge.shared_laws import BURST_WITHIN_S
+from workbench.rmf_model import NEVER, Said
+
+LISTENS_S: Final = 4.0
+"""Wait this long before a play: for the device's state, and to find other nodes."""
+APPEARS_S: Final = 15.0
+"""The first state may take this long, because nodes must find each other."""
+SETTLES_S: Final = 4.0
+"""Listen this long after a play: a law may need it to be seen broken."""
+
+
+class Act(Enum):
+    """The act that is under way."""
+
+    LISTEN = auto()
+    PLAY = auto()
+    LEAVE = auto()
+    SETTLE = auto()
+    DONE = auto()
+
+
+class Stage:
+    """`for_s`: how long to listen without a play; inf: until `stop`. `strangers()`: who else
+    publishes on the play's topics, "" for nobody. `note`: why a play was not played, or not to its
+    end.
+    """
+
+    def __init__(
+        self,
+        judge: Judge,
+        performance: Performance | None,
+        for_s: float,
+        strangers: Callable[[], str] = lambda: "",
+    ) -> None:
+        self.judge = judge
+        self.act = Act.LISTEN
+        self.note = ""
+        self._performance = performance
+        self._strangers = strangers
+        self._for_s = for_s if performance is None else LISTENS_S
+        self.began_at = 0.0
+        self._until = NEVER
+        self._leave_until = NEVER
+        self._epoch = 0.0
+        self._in_haste = False
+        self._last: tuple[float, float] = (0.0, 0.0)
+
+    @property
+    def done(self) -> bool:
+        """Is there a verdict?"""
+        return self.act is Act.DONE
+
+    def begin(self, at: float, wall: float) -> None:
+        """Listen from now on. `at`: monotonic s. `wall`: s since the epoch."""
+        self.began_at, self._until = at, at + self._for_s
+        self._epoch = wall - at
+        self._last = (at, wall)
+
+    def hear(self, heard: Heard) -> list[Said]:
+        """A message of the graph, ours not among them."""
+        self._last = (heard.at, heard.wall)
+        self.judge.hear(heard)
+        if self._performance is None or self.act not in (Act.PLAY, Act.LEAVE):
+            return []
+        if heard.topic not in (topic.name for topic in self._performance.hears):
+            return []
+        said = self._performance.hear(heard.topic, heard.message, self._now)
+        if self.act is not Act.PLAY:
+            return []
+        if self.judge.scene.burst_s < BURST_WITHIN_S:
+            self.note = "stopped: each request causes a state, and RMF asks at each state"
+            return self._begin_leaving()
+        return self._told(said)
+
+    def turn(self, at: float, wall: float) -> list[Said]:
+        """Do what is due now."""
+        self._last = (at, wall)
+        match self.act:
+            case Act.LISTEN if at >= self._until:
+                return self._begin_play()
+            case Act.PLAY:
+                return self._play_on()
+            case Act.LEAVE if at >= self._until:
+                return self._leave_on()
+            case Act.SETTLE if at >= self._until:
+                self.act = Act.DONE
+        return []
+
+    def wake_at(self) -> float:
+        """When to call `turn` at the latest (monotonic s)."""
+        if self.act is Act.PLAY and self._performance is not None:
+            return min(self._performance.wake_at() - self._epoch, self._last[0] + REPEAT_S)
+        return NEVER if self.act is Act.DONE else self._until
+
+    def stop(self) -> list[Said]:
+        """End early, after the device is released if we have it. May be called again."""
+        if self.act is Act.PLAY:
+            self.note, self._in_haste = "interrupted", True
+            return self._begin_leaving()
+        if self.act is not Act.LEAVE:
+            self.act = Act.DONE
+        self._in_haste = True
+        return []
+
+    @property
+    def _now(self) -> float:
+        """RMF's clock: the wall clock at the beginning plus the time since, so that no step changes
+        it."""
+        return self._epoch + self._last[0]
+
+    def _begin_play(self) -> list[Said]:
+        state = self.judge.scene.state
+        if self._performance is None:
+            self.act = Act.DONE
+            return []
+        if state is None and self._last[0] < self.began_at + APPEARS_S:
+            self._until = self._last[0] + REPEAT_S
+            return []
+        self.note = self._strangers() or (
+            self._performance.unfit(state) if state is not None else ""
+        )
+        if state is None or self.note:
+            self.act = Act.DONE
+            return []
+        self.act = Act.PLAY
+        return self._told(self._performance.begin(self._now)) + self._play_on()
+
+    def _play_on(self) -> list[Said]:
+        assert self._performance is not None
+        self.note = self._strangers()
+        said = [] if self.note else self._told(self._performance.tick(self._now))
+        if not (self.note or self._performance.over):
+            return said
+        self.note = self.note or self._performance.why
+        return said + self._begin_leaving()
+
+    def _begin_leaving(self) -> list[Said]:
+        self.act, self._leave_until = Act.LEAVE, self._last[0] + LEAVES_S
+        assert self._performance is not None
+        if not self.note and self._performance.left:
+            self._settle()
+            return []
+        return self._leave_on()
+
+    def _leave_on(self) -> list[Said]:
+        assert self._performance is not None
+        late = self._last[0] >= self._leave_until
+        if self._performance.left or late:
+            if not self._performance.left:
+                self.note = f"{self.note or 'played'}; and the device was not released".lstrip("; ")
+            self._settle()
+            return []
+        self._until = self._last[0] + REPEAT_S
+        return self._told(self._performance.leave(self._now))
+
+    def _settle(self) -> None:
+        self.act = Act.DONE if self._in_haste else Act.SETTLE
+        self._until = self._last[0] + SETTLES_S
+
+    def _told(self, said: list[Said]) -> list[Said]:
+        """Judge what we publish like everybody's messages."""
+        at, wall = self._last
+        for topic, message in said:
+            self.judge.hear(Heard(at, wall, topic.name, message))
+        return said

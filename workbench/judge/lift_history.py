@@ -1,0 +1,222 @@
+"""What is remembered of a lift: who asked for what, who has it, and where its door was open."""
+
+from collections import deque
+from dataclasses import dataclass, field
+from typing import Final
+
+from bridges.messages import definitions as d
+from bridges.messages import topics
+from bridges.messages.heard import Heard
+from bridges.observe.lift import HAZARDS, ObservedLift
+from bridges.observe.limits import SLOWEST_S
+from workbench.judge.history import NOT_YET, Scene, keep
+
+GRACE_S: Final = 65.0
+"""Until then the same session may resume: its robot may have been left in the car."""
+LATE_S: Final = 5.0
+"""An END may have been sent this long before the session was shown."""
+FLOORS: Final = 8
+AT_ONCE_S: Final = 0.3
+"""Longer than a scan, and than a state and a request take to cross on a wire."""
+REOPENS_WITHIN_S: Final = 1.0
+END: Final = d.LiftRequestType.REQUEST_END_SESSION
+
+
+@dataclass
+class Ask:
+    """The requests of one session. `at`: the latest. `direct_at`: the latest on lift_requests. `since`:
+    when the present row of requests there, without a gap, began. `human`: it asked for HUMAN mode.
+    `direct`: it was heard on lift_requests."""
+
+    at: float
+    since: float
+    floors: deque[str] = field(default_factory=lambda: deque(maxlen=FLOORS))
+    times: int = 0
+    human: bool = False
+    direct_at: float = NOT_YET
+    direct: bool = False
+
+
+@dataclass
+class Ending:
+    """The ENDs of the present session on lift_requests: `at`: the first; `bare_at`: the first without a
+    floor; `floor_at`: the first with one. RMF's supervisor sends one with a floor if the session is
+    still shown after one without."""
+
+    at: float = NOT_YET
+    bare_at: float = NOT_YET
+    floor_at: float = NOT_YET
+
+
+class LiftScene(Scene[d.LiftState]):
+    """`asks`, `elsewhere`: who asked for this lift, and for others. `ended`: session -> its last END.
+    `granted_at`: since when the present session has been shown; `held_since`: the same of the session
+    before. `known`: the beginning of the present one was seen. `last`: who had it before, until
+    `last_at`. `offered`: OPEN has been shown at its destination; `offers`: OPEN is shown while that
+    is not so. `ending`: the ENDs of the present session. `bare_refused`: how many sessions in a row
+    outlived an END without a floor and ended at one with a floor. `reopened`: when the door
+    reopened at once, in one stop. `open_seen`: floor and time of the last OPEN at another floor.
+    `other_asked_at`: when lift_requests last carried another session's request. `free_since`: since
+    when nobody has it and no hazard is there.
+    `false_alarms`: when the fire topic said false without need. `volatile`: whether its publisher
+    retains nothing, None if that is not known.
+    """
+
+    observes = ObservedLift
+
+    def __init__(self, name: str) -> None:
+        super().__init__(name)
+        self.asks: dict[str, Ask] = {}
+        self.elsewhere: dict[str, float] = {}
+        self.ended: dict[str, float] = {}
+        self.granted_at = self.held_since = self.last_at = NOT_YET
+        self.known = False
+        self.last = ""
+        self.offered = self.offers = False
+        self.ending = Ending()
+        self.bare_refused = 0
+        self.reopened: deque[float] = deque(maxlen=3)
+        self.open_seen = ("", NOT_YET)
+        self.other_asked_at = NOT_YET
+        self.false_alarms: deque[float] = deque(maxlen=3)
+        self.alarmed = False
+        self.volatile: bool | None = None
+        self.free_since = NOT_YET
+        self._open: tuple[str, float] = ("", NOT_YET)
+        self._shut_at = NOT_YET
+
+    @property
+    def session(self) -> str:
+        """Who has it now."""
+        return self.state.session_id if self.state else ""
+
+    @property
+    def session_before(self) -> str:
+        """Who had it in the state before."""
+        return self.before.session_id if self.before else ""
+
+    def has_ended(self, session: str, since: float) -> bool:
+        """Has an END for this session come since then?"""
+        return self.ended.get(session, NOT_YET) > since - LATE_S
+
+    def was_asked_to(self, floor: str) -> bool:
+        """Has the present session asked for this floor?"""
+        ask = self.asks.get(self.session)
+        return ask is not None and floor in ask.floors
+
+    def take_other(self, heard: Heard) -> bool:
+        """Requests of this lift and of others, and the fire alarm."""
+        message = heard.message
+        if isinstance(message, d.Bool) and heard.topic == topics.FIRE_ALARM_TRIGGER.name:
+            return self._alarm(message.data)
+        if not isinstance(message, d.LiftRequest):
+            return False
+        direct = heard.topic == topics.LIFT_REQUESTS.name
+        if message.lift_name != self.name:
+            if message.request_type != END and direct:
+                keep(self.elsewhere, message.session_id, self.now)
+            return False
+        if direct:
+            self.asked()
+        if message.request_type == END:
+            self._end(message, direct)
+        else:
+            self._ask(message, direct)
+        return True
+
+    def forget(self) -> None:
+        """Forget what a silence may have ended."""
+        self.known = False
+        self.granted_at = self.free_since = self.now
+        self.offered = True
+        self.ending = Ending()
+        self.open_seen = self._open = ("", NOT_YET)
+
+    def settle(self, state: d.LiftState) -> None:
+        """Note the session, whether OPEN is shown to it, and the door."""
+        if self.before is not None and self.session != self.session_before:
+            self._changed_hands(state)
+        if self.session or state.current_mode in HAZARDS:
+            self.free_since = self.now
+        opened = state.door_state == d.LiftDoor.DOOR_OPEN
+        wanted = (state.destination_floor, *self._wanted())
+        self.offers = bool(opened and self.session and not self.offered)
+        self._look_at_door(state, opened)
+        if self.offers and state.current_floor in wanted:
+            self.offered = True
+
+    def _wanted(self) -> tuple[str, ...]:
+        ask = self.asks.get(self.session)
+        return (ask.floors[-1],) if ask and ask.floors else ()
+
+    def _changed_hands(self, state: d.LiftState) -> None:
+        before, now = self.session_before, self.session
+        self._count_bare(before)
+        resumed = now == self.last and self.now - self.granted_at <= GRACE_S
+        self.offered = self.offered and (resumed or not now)
+        if before:
+            self.last, self.last_at = before, self.now
+        self.held_since, self.granted_at = self.granted_at, self.now
+        self.known, self.ending = True, Ending()
+        self.reopened.clear()
+
+    def _count_bare(self, before: str) -> None:
+        """Did this session end at an END without a floor, or only at one with a floor?"""
+        ending = self.ending
+        if not before or ending.bare_at == NOT_YET:
+            return
+        if ending.floor_at == NOT_YET:
+            self.bare_refused = 0
+        elif self.now - ending.floor_at < AT_ONCE_S < ending.floor_at - ending.bare_at:
+            self.bare_refused += 1
+
+    def _look_at_door(self, state: d.LiftState, opened: bool) -> None:
+        floor, at = self._open
+        if opened:
+            same = floor == state.current_floor
+            if same and at < self._shut_at and self.now - self._shut_at < REOPENS_WITHIN_S:
+                self.reopened.append(self.now)
+            self.open_seen = self.open_seen if same else self._open
+            stands = state.motion_state not in (d.LiftMotion.MOTION_UP, d.LiftMotion.MOTION_DOWN)
+            self._open = (state.current_floor, self.now) if stands else self._open
+        elif at > self._shut_at:
+            self._shut_at = self.now
+
+    def _end(self, message: d.LiftRequest, direct: bool) -> None:
+        keep(self.ended, message.session_id, self.now)
+        if message.session_id in self.asks:
+            self.asks[message.session_id].times = 0
+        if not direct or message.session_id != self.session or not self.session:
+            return
+        ending = self.ending
+        ending.at = self.now if ending.at == NOT_YET else ending.at
+        if message.destination_floor:
+            ending.floor_at = self.now if ending.floor_at == NOT_YET else ending.floor_at
+        elif ending.at == self.now:
+            ending.bare_at = self.now
+
+    def _ask(self, message: d.LiftRequest, direct: bool) -> None:
+        session = message.session_id
+        ask = self.asks.get(session) or Ask(self.now, self.now)
+        if direct and (not ask.times or self.now - ask.direct_at > SLOWEST_S):
+            ask.since = self.now
+        ask.direct_at = self.now if direct else ask.direct_at
+        ask.at, ask.direct = self.now, ask.direct or direct
+        ask.times += direct
+        ask.human |= message.request_type == d.LiftRequestType.REQUEST_HUMAN_MODE
+        moved = message.destination_floor not in list(ask.floors)[-1:]
+        if moved:
+            ask.floors.append(message.destination_floor)
+        keep(self.asks, session, ask)
+        if session != self.session:
+            self.other_asked_at = self.now if direct else self.other_asked_at
+        else:
+            self.ending = Ending()
+        if session == self.session and moved:
+            self.reopened.clear()
+
+    def _alarm(self, on: bool) -> bool:
+        if not on and not self.alarmed:
+            self.false_alarms.append(self.now)
+        self.alarmed = on
+        return True

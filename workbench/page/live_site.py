@@ -1,0 +1,230 @@
+"""What the page knows of RMF's graph: each device's latest state, and its last ten minutes.
+
+Pure: time comes with each message. Names come from the network, where anybody may make them up, so
+everything has a bound, and known devices stay whatever comes later.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from msgspec.structs import replace
+
+from bridges.messages import definitions as d
+from bridges.messages import topics, words
+from bridges.messages.heard import Heard
+from bridges.messages.topics import AnyTopic
+from bridges.messages.words import KINDS, Kind, Requested, Stated
+from bridges.observe.all_devices import Key
+from bridges.observe.charger import NOBODY, ObservedCharger
+from bridges.runtime import diagnostics
+from workbench.explain import heard_devices
+from workbench.explain.answer import Remedies
+from workbench.explain.device import Device
+from workbench.explain.device_timeline import Drawing
+from workbench.explain.explanation import Explanation
+from workbench.explain.timeline import Timeline
+from workbench.graph.board import Board, Row
+
+KEPT_S: Final = 600.0
+"""The past that a device's page shows."""
+MOST_LINES: Final = 100
+"""The most story lines of one device. Its view shows forty. With six hundred each a large site takes
+150 MB."""
+MOST_ROBOTS: Final = 500
+
+HEARD: Final[tuple[AnyTopic, ...]] = (
+    topics.LIFT_STATES,
+    topics.DOOR_STATES,
+    topics.CHARGER_STATES,
+    topics.LIFT_REQUESTS,
+    topics.ADAPTER_LIFT_REQUESTS.live(),
+    topics.DOOR_REQUESTS,
+    topics.ADAPTER_DOOR_REQUESTS,
+    topics.CHARGER_REQUESTS,
+    topics.CHARGER_CANCELS,
+    topics.ADAPTER_CHARGER_REQUESTS,
+    topics.ADAPTER_CHARGER_CANCELS,
+    topics.CHARGER_REFUSALS,
+    topics.DOOR_SUPERVISOR_HEARTBEAT,
+    topics.CHARGING_ASSIGNMENTS,
+    topics.FLEET_STATES,
+    topics.DIAGNOSTICS,
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Robot:
+    """A robot, as its fleet says. `place`: where the charging schedule sends it."""
+
+    fleet: str
+    state: d.RobotState
+    at: float
+    place: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Stands:
+    """How long a robot has had a charger (s). `at_least`: it had it when the page began to listen."""
+
+    for_s: float
+    at_least: bool
+
+
+@dataclass(frozen=True, slots=True)
+class DeviceView:
+    """A device as the page draws it: its row, as `watch` has it, and its last state if it has one.
+
+    `stands`: how long its robot has had a charger.
+    """
+
+    row: Row
+    state: Stated | None = None
+    stands: Stands | None = None
+
+
+class Site:
+    """Everything heard so far, within bounds."""
+
+    def __init__(self, graph: Sequence[str] = ()) -> None:
+        """`graph`: the options that name the page's graph, for commands."""
+        self._story = heard_devices.Site(most_lines=MOST_LINES, graph=graph)
+        self._board = Board(self._story)
+        self._drawings: dict[Key, Drawing] = {}
+        self._changed: set[Key] = set()
+        self._robots: dict[tuple[str, str], Robot] = {}
+        self.heard_at: float | None = None
+
+    @property
+    def crowded(self) -> set[Kind]:
+        """The kinds of which some devices had no room."""
+        return self._story.crowded
+
+    def take(self, heard: Heard) -> None:
+        """One message of the graph."""
+        self.heard_at = heard.at
+        message = heard.message
+        if isinstance(message, Stated):
+            self._story.take(heard)
+            self._remember((words.kind(message), words.device(message)), heard)
+        elif isinstance(message, d.FleetState):
+            self._fleet(message, heard.at)
+        elif isinstance(message, d.DiagnosticArray):
+            self._diagnosed(heard, message)
+        elif isinstance(message, d.DiagnosticStatus):
+            self._about(("charger", message.hardware_id), heard)
+        elif isinstance(message, Requested):
+            self._about((words.kind(message), words.device(message)), heard)
+        else:
+            self._story.take(heard)
+            self._heartbeat(heard)
+            self._board.note(heard)
+
+    def devices(self, now: float, wall: float) -> list[DeviceView]:
+        """All devices, coordinators and scheduled robots. `now`: monotonic s; `wall`: stamps' clock."""
+        every, rows = self._story.stated(), self._board.rows(now, wall)
+        shown = {f"{one.kind} {words.printable(one.id)}": one for one in every}
+        return [_view(row, shown.get(f"{row.kind} {row.name}")) for row in rows]
+
+    def changed(self, now: float, wall: float) -> list[DeviceView]:
+        """The devices that were heard of since this was asked last."""
+        changed, self._changed = self._changed, set()
+        known = [found for key in sorted(changed) if (found := self._device(key))]
+        rows = self._board.rows_of(known, now, wall)
+        return [_view(row, device) for row, device in zip(rows, known, strict=True)]
+
+    def knows(self, kind: str, name: str) -> bool:
+        """Whether the device of this printed name is still known; what has no states always is."""
+        return kind not in KINDS or self._found(kind, name) is not None
+
+    def explain(
+        self, kind: str, name: str, now: float, wall: float, remedies: Remedies
+    ) -> Explanation | None:
+        """Why somebody waits for this device, or what it does."""
+        device = self._found(kind, name)
+        if device is None:
+            return None
+        self._story.pass_time(now, wall)
+        return self._story.explain(device.kind, device.id, None, remedies)
+
+    def timeline(self, kind: str, name: str, now: float) -> Timeline | None:
+        """The last ten minutes of a device; `name` as it is shown."""
+        device = self._found(kind, name)
+        drawing = self._drawings.get((device.kind, device.id)) if device else None
+        return drawing.timeline(now - KEPT_S) if drawing else None
+
+    def _found(self, kind: str, name: str) -> Device | None:
+        """The device of this name, as it is shown."""
+        for known in (one for one in KINDS if one == kind):
+            every = (one for one in self._story.stated(known) if words.printable(one.id) == name)
+            return self._device((known, name)) or next(every, None)
+        return None
+
+    def _device(self, key: Key) -> Device | None:
+        """The device, if it has published a state."""
+        found = self._story.known.get(key)
+        return found if found is not None and found.state is not None else None
+
+    def robots(self) -> list[Robot]:
+        """The robots that fleets report, by fleet and name."""
+        return [robot for _, robot in sorted(self._robots.items())]
+
+    def _about(self, key: Key, heard: Heard) -> None:
+        """A request, a cancel or a refusal. None is kept for a device that does not exist: anybody can
+        ask for anything."""
+        if self._device(key):
+            self._story.take(heard)
+            self._remember(key, heard)
+
+    def _remember(self, key: Key, heard: Heard) -> None:
+        """What the device's timeline shows."""
+        if not self._device(key):
+            return
+        if key not in self._drawings:
+            for gone in self._drawings.keys() - self._story.known.keys():
+                del self._drawings[gone]
+            self._drawings[key] = Drawing(*key, KEPT_S)
+        self._drawings[key].take(heard)
+        self._changed.add(key)
+
+    def _diagnosed(self, heard: Heard, message: d.DiagnosticArray) -> None:
+        known = {one.id for one in self._story.stated()}
+        ours = [
+            status
+            for status in message.status[: diagnostics.MOST + 1]
+            if status.hardware_id in known or status.name.endswith(": daemon") or _is_graph(status)
+        ]
+        kept = replace(heard, message=replace(message, status=tuple(ours)))
+        self._board.note(kept)
+        self._story.take(kept)
+        for status in ours:
+            if device := diagnostics.about(status):
+                alone = replace(message, status=(status,))
+                self._remember(device, replace(heard, message=alone))
+
+    def _heartbeat(self, heard: Heard) -> None:
+        if not isinstance(heard.message, d.SupervisorHeartbeat):
+            return
+        listed = {one.door_name: one for one in heard.message.all_sessions}
+        for door in self._story.stated("door"):
+            own = (listed[door.id],) if door.id in listed else ()
+            self._remember(("door", door.id), replace(heard, message=d.SupervisorHeartbeat(own)))
+
+    def _fleet(self, message: d.FleetState, at: float) -> None:
+        for state in message.robots:
+            key = (message.name, state.name)
+            if key in self._robots or len(self._robots) < MOST_ROBOTS:
+                self._robots[key] = Robot(message.name, replace(state, path=()), at)
+
+
+def _view(row: Row, device: Device | None) -> DeviceView:
+    """What is drawn. A robot has had its charger as long as that is seen, until its last state."""
+    stands = None
+    if isinstance(device, ObservedCharger) and device.last_state and device.robot.value != NOBODY:
+        since = device.robot.since
+        stands = Stands(device.last_state.at - since.at, at_least=not since.seen)
+    return DeviceView(row, device.state if device else None, stands)
+
+
+def _is_graph(status: d.DiagnosticStatus) -> bool:
+    return diagnostics.kind_in(status).endswith(("supervisor", "coordinator"))

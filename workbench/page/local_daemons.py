@@ -1,0 +1,85 @@
+"""The daemons on this machine, as far as the page's user may see them: which YAML serves a device.
+
+It reads what `rmf-bridge status` reads, and asks a simulation for the names of its signals and parts.
+"""
+
+import json
+import socket
+import time
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+from bridges.host.directories import runtimes
+from bridges.runtime.daemons import Daemon, daemons
+from bridges.runtime.diagnostics import CONTACTS
+from workbench.graph.plants import ask
+from workbench.page.actions import Local
+from workbench.page.levels import Levels, Rows
+
+
+@dataclass(frozen=True, slots=True)
+class Served:
+    """A device that a daemon here serves: its YAML, what it senses and what it drives now.
+
+    `contacts`: each known signal, and whether it is asserted.
+    """
+
+    local: Local
+    sensed: Rows
+    driven: Rows
+    contacts: Mapping[str, bool]
+
+
+class Here:
+    """What was seen of this machine's daemons the last time. `served`: by kind and name."""
+
+    def __init__(self, base: Path | None) -> None:
+        """`base`: the folder of runtime directories, if not where `run` and systemd make them."""
+        self.served: Mapping[tuple[str, str], Served] = {}
+        self._base = base
+        self._levels: dict[Path, Levels] = {}
+
+    def look(self) -> None:
+        """See which daemons serve now. Raises OSError."""
+        base = self._base
+        folders = sorted(p for p in base.iterdir() if p.is_dir()) if base else list(runtimes())
+        found: dict[tuple[str, str], Served] = {}
+        for daemon in daemons(folders, {}, time.time()):
+            if daemon.state == "serving":
+                folder = next(one for one in folders if one.name == daemon.name)
+                levels = self._levels.setdefault(folder, Levels(folder))
+                levels.look()
+                found |= dict(_devices(daemon, folder, levels))
+        self._levels = {path: one for path, one in self._levels.items() if path in folders}
+        self.served = found
+
+
+def _devices(
+    daemon: Daemon, folder: Path, levels: Levels
+) -> Iterator[tuple[tuple[str, str], Served]]:
+    plant = _plant(folder) if daemon.status.get("simulated") else {}
+    for name, status in daemon.devices.items():
+        can = plant.get(name, {})
+        local = Local(
+            str(daemon.status.get("file", "")),
+            tuple(can.get("press", ())),
+            tuple(can.get("fail", ())),
+            str(folder),
+        )
+        served = Served(
+            local,
+            levels.sensed.get(name, {}),
+            levels.driven.get(name, {}),
+            status.get(CONTACTS, {}),
+        )
+        yield (str(daemon.status.get("kind")), name), served
+
+
+def _plant(folder: Path) -> Mapping[str, Mapping[str, list[str]]]:
+    with suppress(OSError, ValueError, socket.timeout):
+        for path in sorted(folder.glob("plant*.sock")):
+            found: Mapping[str, Mapping[str, list[str]]] = json.loads(ask(path, ["names"]))
+            return found
+    return {}
