@@ -24,7 +24,7 @@ from bridges.messages.stamps import in_seconds
 from bridges.messages.topics import CHARGER_STATES, DOOR_STATES
 from bridges.settings.load import Config, load
 from drivers.door.dry_contact import create
-from drivers.hal.can import CanBus, Frame, Settings, Wanted
+from drivers.hal.can import CanBus, CanSettings, Frame, FrameFilter
 from drivers.hal.modbus import ModbusBus
 from hal_fakes.caller import Caller
 from hal_fakes.simulate import Simulation
@@ -282,13 +282,13 @@ def _bare_can(channel: str, ended: threading.Event, heard: list[int]) -> float:
 
 def _our_can(channel: str, ended: threading.Event, heard: list[int]) -> float:
     """The CPU seconds that our bus takes, with four ids wanted."""
-    settings = Settings(socketcan="can0", scan_s=SCAN_S)
+    settings = CanSettings(socketcan="can0", scan_s=SCAN_S)
     bus = CanBus(settings, vendor=lambda: can.Bus(channel, interface="virtual"))
 
     def count(frame: Frame, at: float) -> None:
         heard[0] += 1
 
-    bus.listen([Wanted(frame_id) for frame_id in OURS], count)
+    bus.listen([FrameFilter(frame_id) for frame_id in OURS], count)
     bus.take()
     begun_s = time.thread_time()
     while not ended.wait(SCAN_S):

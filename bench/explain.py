@@ -87,11 +87,11 @@ def _heard(second: int, part: float, topic: str, message: d.Message) -> Heard:
 
 def main(bag: Path) -> None:
     """Explain, and print figures as JSON."""
-    from workbench.explain.heard_devices import Site
-    from workbench.replay.recordings import Span, told_between
+    from workbench.explain.heard_devices import HeardDevices
+    from workbench.replay.recordings import RecordingSpan, told_between
 
-    began, site = time.process_time(), Site("Lift1")
-    for heard in told_between(bag, Span(None, None), "bench", "Lift1"):
+    began, site = time.process_time(), HeardDevices("Lift1")
+    for heard in told_between(bag, RecordingSpan(None, None), "bench", "Lift1"):
         site.take(heard)
     told = site.explain("lift", "Lift1", None)
     took_s = time.process_time() - began

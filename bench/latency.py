@@ -30,12 +30,12 @@ from bridges.settings.load import load
 from bridges.transports.choose import missing_of_ros
 from bridges.transports.transport import Transport
 from drivers.hal.gpio import canonical
-from drivers.lift.dry_contact import Settings, wires
+from drivers.lift.dry_contact import DryContactLiftSettings, wires
 from hal_fakes.caller import Caller
 from hal_fakes.gpio import WiredFactory
 from hal_fakes.plants.lift import build
 from hal_fakes.wire import Wire
-from hal_fakes.wiring import Wiring
+from hal_fakes.wiring import PlantWiring
 
 ROUNDS = 300
 HAZARDS = 100
@@ -213,9 +213,9 @@ def _bare_callbacks(scratch: Path) -> Times:
     """From the contact to gpiozero's callback, in a process that does nothing else."""
     daemon(_quick_lift(), scratch / "callbacks")  # writes the file
     settings = load(scratch / "callbacks.yaml").devices["Lift1"]
-    assert isinstance(settings, Settings)
+    assert isinstance(settings, DryContactLiftSettings)
     plant = build("Lift1", settings)
-    factory = WiredFactory([Wiring(plant, wires(settings), canonical)])
+    factory = WiredFactory([PlantWiring(plant, wires(settings), canonical)])
     pin = factory.pin(canonical(settings.inputs.fire_alarm.point))  # type: ignore[union-attr]
     pin.input_with_pull("down")
     pin.edges = "both"

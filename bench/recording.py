@@ -13,23 +13,23 @@ from bench.latency import daemon_paths
 from bridges import __version__
 from bridges.blackbox.entries import Head
 from bridges.blackbox.recorder import Recorder
-from bridges.blackbox.recordings import Shelf
+from bridges.blackbox.recordings import Recordings
 from bridges.blackbox.ring import Ring
 from bridges.kinds.lift import KIND
 from bridges.kinds.lift.messages import state_message
-from bridges.kinds.lift.signals import Door, Ended, LiftSample, Requested
+from bridges.kinds.lift.signals import DoorReading, EndRequested, LiftRequested, LiftSample
 from bridges.kinds.shared.decision import Sampled
-from bridges.kinds.shared.recording_section import Recording
+from bridges.kinds.shared.recording_section import RecordingSettings
 from bridges.messages.definitions import LiftRequest, Time
 from bridges.messages.releases import JAZZY
 from bridges.runtime.clock import Clock
 from bridges.runtime.refusals import Refusals
-from bridges.runtime.ring_writer import Witness
-from bridges.runtime.subject import Core, Subject
+from bridges.runtime.ring_writer import RingWriter
+from bridges.runtime.subject import Subject, SubjectCore
 from bridges.settings.load import load
 from workbench.replay.bags import heard_in
 from workbench.replay.files import opened
-from workbench.replay.replayed import Cores, Replay, of_head
+from workbench.replay.replayed import Replay, ReplayedCores, of_head
 from workbench.replay.sources import Notes
 
 ROUNDS, WATCHED_S = 2, 30.0
@@ -87,7 +87,7 @@ def _day(scratch: Path) -> Row:
     heard = sum(1 for _ in heard_in(files))
     read_s = time.perf_counter() - began
     head, entries = opened(files, Notes())
-    replay = Replay(entries, Cores(of_head(head)))
+    replay = Replay(entries, ReplayedCores(of_head(head)))
     began = time.perf_counter()
     differences = len(list(replay.differences()))
     return {
@@ -110,17 +110,17 @@ class Day:
         config = load(CONFIG)
         self._settings = config.devices["Lift1"]
         limits = KIND.limits(self._settings, config.driver_type("Lift1").debounce(self._settings))
-        keep = Recording(keep="continuous", files=10_000, files_mb=10_000)
+        keep = RecordingSettings(keep="continuous", files=10_000, files_mb=10_000)
         text = config.text
         head = Head("day", os.getpid(), __version__, "lift", str(CONFIG), text, {}, True, {}, keep)
         runtime = scratch / "runtime"
         runtime.mkdir()
         clock = Clock(lambda: self.now, lambda: WALL + self.now)
         make = partial(Ring, runtime, head, 1_000_000)
-        self._witness = Witness(make, clock, lambda: JAZZY)
-        shelf = Shelf(scratch / "recordings")
-        self._recorder = Recorder(lambda: [runtime], shelf, lambda: self.now)
-        core: Core[Any, Any, Any, Any] = Core(
+        self._writer = RingWriter(make, clock, lambda: JAZZY)
+        recordings = Recordings(scratch / "recordings")
+        self._recorder = Recorder(lambda: [runtime], recordings, lambda: self.now)
+        core: SubjectCore[Any, Any, Any, Any] = SubjectCore(
             "device",
             lambda memory, event, now: KIND.decide(memory, event, now, limits),
             lambda report, now: {},
@@ -128,7 +128,7 @@ class Day:
         )
         memory = KIND.initial(limits, 0.0)
         self._lift = Subject(
-            "Lift1", memory, core, lambda *_: None, Refusals(), clock, self._witness
+            "Lift1", memory, core, lambda *_: None, Refusals(), clock, self._writer
         )
 
     def play(self) -> None:
@@ -140,7 +140,7 @@ class Day:
             if scan % 20 == 0:
                 self._tell()
                 self._recorder.look()
-            self._witness.flush()
+            self._writer.flush()
         self._recorder.close()
 
     def _tell(self) -> None:
@@ -148,13 +148,13 @@ class Day:
         assert self._lift.decision
         report = self._lift.decision.report
         state = state_message("Lift1", self._settings, report, Time(int(WALL + self.now)))
-        self._witness.spoken("lift_states", state, sent=True)
+        self._writer.spoken("lift_states", state, sent=True)
         self._lift.published(KIND.published(self._lift.memory, report))
         if self.now % RIDE_S < 15.0:
             request = LiftRequest(
                 "Lift1", Time(int(self.now)), "fleet/robot", 1, _floor(self.now), 2
             )
-            self._witness.spoken("lift_requests", request, sent=False)
+            self._writer.spoken("lift_requests", request, sent=False)
 
 
 def _floor(now: float) -> str:
@@ -166,16 +166,16 @@ def events(now: float) -> Iterator[object]:
     into, before = now % RIDE_S, _floor(now - RIDE_S)
     agv = 0.5 < into < 16.0
     if into < 2.0:
-        yield Sampled(LiftSample(before, Door.CLOSED, agv=agv))
+        yield Sampled(LiftSample(before, DoorReading.CLOSED, agv=agv))
     elif into < 8.0:
-        yield Sampled(LiftSample(None, Door.CLOSED, agv=agv))
+        yield Sampled(LiftSample(None, DoorReading.CLOSED, agv=agv))
     elif into < 9.5 or 15.5 <= into < 17.0:
-        yield Sampled(LiftSample(_floor(now), Door.BETWEEN, agv=agv))
+        yield Sampled(LiftSample(_floor(now), DoorReading.BETWEEN, agv=agv))
     elif into < 15.5:
-        yield Sampled(LiftSample(_floor(now), Door.OPEN, agv=agv))
+        yield Sampled(LiftSample(_floor(now), DoorReading.OPEN, agv=agv))
     else:
-        yield Sampled(LiftSample(_floor(now), Door.CLOSED, agv=agv))
+        yield Sampled(LiftSample(_floor(now), DoorReading.CLOSED, agv=agv))
     if into < 15.0 and into % 1.0 < SCAN_S:
-        yield Requested("fleet/robot", True, _floor(now))
+        yield LiftRequested("fleet/robot", True, _floor(now))
     elif 15.0 <= into < 15.0 + SCAN_S:
-        yield Ended("fleet/robot")
+        yield EndRequested("fleet/robot")

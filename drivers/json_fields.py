@@ -31,7 +31,7 @@ Value = bool | int | float | str
 """A value that a field may hold: true, 3, 0.5 or a word."""
 
 
-class Flag(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class JsonFlag(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """A yes or no in the answer."""
 
     field: Annotated[Field, tells("the field that holds it: names with dots between them.")]
@@ -42,7 +42,7 @@ class Flag(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
     ] = []
 
 
-def flag(answer: Mapping[str, object], place: Flag) -> bool:
+def flag(answer: Mapping[str, object], place: JsonFlag) -> bool:
     """Yes or no; null means no. Raises DriverError for an absent field or a value of the wrong type."""
     value = needed(answer, place.field)
     if value is None:
@@ -54,12 +54,12 @@ def flag(answer: Mapping[str, object], place: Flag) -> bool:
     return value
 
 
-def flag_if(answer: Mapping[str, object], place: Flag | None) -> bool | None:
+def flag_if(answer: Mapping[str, object], place: JsonFlag | None) -> bool | None:
     """The same; None without a place."""
     return None if place is None else flag(answer, place)
 
 
-def place_text(place: Flag) -> str:
+def place_text(place: JsonFlag) -> str:
     """The flag as `check` prints it: its field, and the values that mean yes."""
     values = (str(yes).lower() if isinstance(yes, bool) else str(yes) for yes in place.when)
     return f"{place.field} is {', '.join(values) or 'true'}"

@@ -11,7 +11,7 @@ from hal_fakes.plants.plant import Edge
 PATIENCE_S: Final = 120.0
 
 
-class Refused(Exception):
+class SimulationRefused(Exception):
     """The simulation refuses; the text is its answer."""
 
 
@@ -40,10 +40,10 @@ class Caller:
         return self.hear()
 
     def order(self, line: str) -> None:
-        """Send a line. Raises Refused unless it is done."""
+        """Send a line. Raises SimulationRefused unless it is done."""
         answer = self.say(line)
         if answer != "ok":
-            raise Refused(f"{line}: {answer or 'no answer'}")
+            raise SimulationRefused(f"{line}: {answer or 'no answer'}")
 
     def hear(self) -> str:
         """The next line; "" when the simulation has hung up."""

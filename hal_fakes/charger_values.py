@@ -8,7 +8,16 @@ from collections.abc import Iterator, Mapping
 from typing import Final
 
 from bridges.kinds.charger.signals import Activity
-from drivers.charger.rules import MEANINGS, UNKNOWN, Errors, Meaning, Rule, Test, judge, places
+from drivers.charger.rules import (
+    MEANINGS,
+    UNKNOWN,
+    Meaning,
+    Rule,
+    StationErrors,
+    Test,
+    judge,
+    places,
+)
 from drivers.charger.state_codes import ROBOT_ERROR
 from drivers.json_fields import Value
 
@@ -22,7 +31,7 @@ NEAREST: Final = {
 
 def values(
     rules: list[Rule],
-    errors: Errors,
+    errors: StationErrors,
     wanted: Meaning,
     natural: Mapping[str, Value],
 ) -> dict[str, Value] | None:
@@ -46,7 +55,7 @@ def values(
     return values(rules, errors, (activity, ""), natural) if activity else None
 
 
-def _shows_error(errors: Errors, shown: dict[str, Value], robot: bool) -> bool:
+def _shows_error(errors: StationErrors, shown: dict[str, Value], robot: bool) -> bool:
     """Show an error of this side, or of the other where this one has none."""
     sides = ("robot", "station") if robot else ("station", "robot")
     for side in sides:

@@ -14,7 +14,7 @@ from drivers.hal import Bus, HalError
 from drivers.hal.points import Wire
 from hal_fakes.plants.plant import Plant
 from hal_fakes.realtime import RealTime
-from hal_fakes.wiring import Wiring
+from hal_fakes.wiring import PlantWiring
 
 Settings = TypeVar("Settings")
 Station = TypeVar("Station")
@@ -26,7 +26,7 @@ class Fake(Generic[Settings]):
 
     `plant(name, settings, wires)`: its physics; `wires` is the driver's table.
     `station(plant, settings)`: what the bus's fake puts on the bus, with that plant behind it. Without
-    it, the plant's contacts are put there as a `Wiring`.
+    it, the plant's contacts are put there as a `PlantWiring`.
     """
 
     plant: Callable[[str, Settings, Sequence[Wire]], Plant]
@@ -86,7 +86,7 @@ def stations_on(config: Config, bus: str, plants: Mapping[str, Plant]) -> list[A
 def _station(config: Config, bus: str, name: str, plant: Plant) -> object:
     station = _fake(config, name).station
     if station is None:
-        return Wiring(plant, config.wires(name), config.bus_type(bus).canonical)
+        return PlantWiring(plant, config.wires(name), config.bus_type(bus).canonical)
     return station(plant, config.devices[name])
 
 

@@ -14,11 +14,11 @@ from gpiozero import PinInvalidFunction
 from gpiozero.pins.mock import MockFactory, MockPin
 
 from drivers.hal.gpio import GpioBus
-from drivers.hal.gpio import Settings as GpioSettings
+from drivers.hal.gpio import GpioSettings as GpioSettings
 from drivers.hal.gpio import open_bus as open_real_bus
 from hal_fakes.fake import Inside
 from hal_fakes.realtime import RealTime
-from hal_fakes.wiring import Wiring
+from hal_fakes.wiring import PlantWiring
 
 
 class WiredPin(MockPin):  # type: ignore[misc]
@@ -75,7 +75,7 @@ class WiredFactory(MockFactory):  # type: ignore[misc]
 
     def __init__(
         self,
-        wirings: Sequence[Wiring],
+        wirings: Sequence[PlantWiring],
         clock: Callable[[], float] = time.monotonic,
         lock: AbstractContextManager[object] | None = None,
     ) -> None:
@@ -101,7 +101,7 @@ class WiredFactory(MockFactory):  # type: ignore[misc]
                         claimed[point].follow_wire(level)
 
 
-def open_bus(settings: GpioSettings, wirings: Sequence[Wiring], world: RealTime) -> GpioBus:
+def open_bus(settings: GpioSettings, wirings: Sequence[PlantWiring], world: RealTime) -> GpioBus:
     """A real GPIO bus on pins that are wired to the plants of this bus."""
     factory = WiredFactory(wirings, lock=world.lock)
     world.on_step.append(factory.show)

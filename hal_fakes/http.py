@@ -32,12 +32,12 @@ Failures = Mapping[str, FailureMode]
 NONE: Final[Failures] = MappingProxyType({})
 
 
-def serve(settings: http.Settings, stations: Sequence["Station"]) -> "HttpServer":
+def serve(settings: http.HttpSettings, stations: Sequence["HttpStation"]) -> "HttpServer":
     """Serve the stations of this bus on a free port of 127.0.0.1."""
     return HttpServer(stations, http.base(settings.api_base).path, settings.timeout_s)
 
 
-class Station(Protocol):
+class HttpStation(Protocol):
     """A controller with a plant behind it.
 
     `reads`: the path of its state. `commands`: method and path -> signal, and asserted or not.
@@ -63,7 +63,7 @@ class HttpServer:
     `path`: the API's path. `timeout_s`: the client's deadline, which slow failures overrun.
     """
 
-    def __init__(self, stations: Sequence[Station], path: str, timeout_s: float) -> None:
+    def __init__(self, stations: Sequence[HttpStation], path: str, timeout_s: float) -> None:
         self._server = _Listener(stations, path, timeout_s)
         host, port = self._server.server_address[:2]
         self.replace: dict[str, object] = {"api_base": f"{host!s}:{port}{path}", "token_file": None}
@@ -83,7 +83,7 @@ class HttpServer:
 class _Listener(ThreadingHTTPServer):
     daemon_threads = True
 
-    def __init__(self, stations: Sequence[Station], path: str, timeout_s: float) -> None:
+    def __init__(self, stations: Sequence[HttpStation], path: str, timeout_s: float) -> None:
         self.get = {path + s.reads: s for s in stations}
         self.commands = {
             (method, path + below): (s, *does)

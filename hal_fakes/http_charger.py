@@ -9,7 +9,7 @@ import time
 from collections.abc import Iterator, Mapping
 
 from bridges.kinds.charger.signals import Activity
-from drivers.charger.http import Settings
+from drivers.charger.http import HttpChargerSettings
 from drivers.charger.rules import places
 from drivers.charger.state_codes import ROBOT_ERROR
 from drivers.json_fields import Value, found
@@ -20,7 +20,7 @@ from hal_fakes.plants.charger import ChargerPlant, Reading
 from hal_fakes.plants.plant import Plant
 
 
-def build(name: str, settings: Settings) -> ChargerPlant:
+def build(name: str, settings: HttpChargerSettings) -> ChargerPlant:
     """The station that these settings speak to, with the robots that it knows."""
     return ChargerPlant(
         name,
@@ -32,10 +32,10 @@ def build(name: str, settings: Settings) -> ChargerPlant:
     )
 
 
-class HttpCharger:
-    """A station (`hal_fakes.http.Station`): one plant with the numbers and paths of its maker."""
+class FakeHttpCharger:
+    """A station (`hal_fakes.http.HttpStation`): one plant with the numbers and paths of its maker."""
 
-    def __init__(self, plant: Plant, settings: Settings) -> None:
+    def __init__(self, plant: Plant, settings: HttpChargerSettings) -> None:
         self.plant = plant
         self.reads = settings.state_path
         self.commands: Mapping[tuple[str, str], tuple[str, bool]] = dict(_commands(settings))
@@ -129,7 +129,7 @@ class HttpCharger:
         return next(code for code in range(100, 65536) if code not in known)
 
 
-def _commands(settings: Settings) -> Iterator[tuple[tuple[str, str], tuple[str, bool]]]:
+def _commands(settings: HttpChargerSettings) -> Iterator[tuple[tuple[str, str], tuple[str, bool]]]:
     """Method and path of each command, and what it does to the plant."""
     if settings.clear_error_path:
         yield ("POST", settings.clear_error_path), ("clear_error", True)
@@ -147,7 +147,7 @@ def _numbers(reading: Reading) -> list[tuple[str, float | None]]:
     return [(name, getattr(reading, name)) for name in names]
 
 
-FAKE = Fake[Settings](
+FAKE = Fake[HttpChargerSettings](
     plant=lambda name, settings, wires: build(name, settings),
-    station=lambda plant, settings: HttpCharger(plant, settings),
+    station=lambda plant, settings: FakeHttpCharger(plant, settings),
 )

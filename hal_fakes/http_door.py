@@ -9,7 +9,7 @@ import time
 from collections.abc import Mapping
 from typing import Final
 
-from drivers.door.http import HOLD, Settings
+from drivers.door.http import HOLD, HttpDoorSettings
 from drivers.hal.points import Wire
 from hal_fakes.fake import Fake
 from hal_fakes.json_answers import put, value_of
@@ -19,17 +19,17 @@ from hal_fakes.plants.plant import Plant
 PARTS: Final = ("server", "headers", "body")
 
 
-def contacts(settings: Settings) -> list[Wire]:
+def contacts(settings: HttpDoorSettings) -> list[Wire]:
     """The controller's own contacts and relay, for the plant: they can fail like wires to us."""
     fields = settings.inputs.__struct_fields__
     inputs = [Wire(s, "in", s, "high") for s in fields if getattr(settings.inputs, s)]
     return [*inputs, Wire(HOLD, "out", HOLD, "high")]
 
 
-class HttpDoor:
-    """A controller (`hal_fakes.http.Station`)."""
+class FakeHttpDoor:
+    """A controller (`hal_fakes.http.HttpStation`)."""
 
-    def __init__(self, plant: Plant, settings: Settings) -> None:
+    def __init__(self, plant: Plant, settings: HttpDoorSettings) -> None:
         self.plant = plant
         self.reads = settings.state_path
         hold, release = settings.hold, settings.release
@@ -73,7 +73,7 @@ class HttpDoor:
         return {"off": b"", "garbage": self._last[:-9]}.get(body or "", self._last)
 
 
-FAKE = Fake[Settings](
+FAKE = Fake[HttpDoorSettings](
     plant=lambda name, settings, wires: door.build(name, settings, contacts(settings), PARTS),
-    station=lambda plant, settings: HttpDoor(plant, settings),
+    station=lambda plant, settings: FakeHttpDoor(plant, settings),
 )

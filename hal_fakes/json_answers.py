@@ -1,9 +1,9 @@
 """The other side of `drivers/json_fields.py`: writes the answer in which a driver finds its fields."""
 
-from drivers.json_fields import Flag, Value, same
+from drivers.json_fields import JsonFlag, Value, same
 
 
-def value_of(place: Flag, yes: bool) -> Value:
+def value_of(place: JsonFlag, yes: bool) -> Value:
     """The value that means yes or no."""
     if not place.when:
         return yes

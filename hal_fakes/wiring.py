@@ -9,7 +9,7 @@ from drivers.hal.points import Wire
 from hal_fakes.plants.plant import Plant
 
 
-class Wiring:
+class PlantWiring:
     """The wires between one plant and one bus. `canonical` is the bus's spelling of a point."""
 
     def __init__(

@@ -12,7 +12,7 @@ import msgspec
 from msgspec import Meta
 
 from bridges.blackbox.value_codec import Tree
-from bridges.kinds.shared.recording_section import Recording
+from bridges.kinds.shared.recording_section import RecordingSettings
 from bridges.messages.releases import RELEASES
 from bridges.messages.rihs01 import MESSAGES
 
@@ -43,22 +43,22 @@ class Head(msgspec.Struct, frozen=True):
     texts: dict[str, bytes]
     simulated: bool
     versions: dict[str, str]
-    recording: Recording
+    recording: RecordingSettings
 
 
-class Entry(msgspec.Struct, frozen=True, array_like=True, tag_field="is"):
+class RingEntry(msgspec.Struct, frozen=True, array_like=True, tag_field="is"):
     """Every entry."""
 
     at: Seconds
 
 
-class Clocks(Entry, frozen=True, tag_field="is", tag=0):
+class Clocks(RingEntry, frozen=True, tag_field="is", tag=0):
     """What the wall clock showed at this time (s since the epoch)."""
 
     wall: Seconds
 
 
-class Spoken(Entry, frozen=True, tag_field="is", tag=1):
+class Spoken(RingEntry, frozen=True, tag_field="is", tag=1):
     """A message heard from RMF's graph, or sent. `cdr`: as it is on the wire in `release`."""
 
     sent: bool
@@ -68,7 +68,7 @@ class Spoken(Entry, frozen=True, tag_field="is", tag=1):
     cdr: bytes
 
 
-class Known(Entry, frozen=True, tag_field="is", tag=2):
+class Known(RingEntry, frozen=True, tag_field="is", tag=2):
     """All that a replay needs to start here: a subject's memory, its last reading, and what was last
     decided; None before the first. `anew`: the memory is not what the last decision left."""
 
@@ -80,7 +80,7 @@ class Known(Entry, frozen=True, tag_field="is", tag=2):
     anew: bool = False
 
 
-class Step(Entry, frozen=True, tag_field="is", tag=3):
+class Decided(RingEntry, frozen=True, tag_field="is", tag=3):
     """An event, and what the core decided. `outputs`, `news`, `faults`: only those that have
     changed."""
 
@@ -94,44 +94,55 @@ class Step(Entry, frozen=True, tag_field="is", tag=3):
     publish: list[Tree] = []
 
 
-class Same(Entry, frozen=True, tag_field="is", tag=4):
+class Same(RingEntry, frozen=True, tag_field="is", tag=4):
     """The last reading came again at each of these times (doubles), and changed no decision."""
 
     subject: str
     times: bytes
 
 
-class Published(Entry, frozen=True, tag_field="is", tag=5):
+class Published(RingEntry, frozen=True, tag_field="is", tag=5):
     """The subject's report went out, and its memory took note of that."""
 
     subject: str
 
 
-class Forgotten(Entry, frozen=True, tag_field="is", tag=6):
+class SubjectForgotten(RingEntry, frozen=True, tag_field="is", tag=6):
     """The subject is no longer remembered."""
 
     subject: str
 
 
-class Died(Entry, frozen=True, tag_field="is", tag=7):
+class DaemonDied(RingEntry, frozen=True, tag_field="is", tag=7):
     """A defect ends the daemon."""
 
     reason: str
 
 
-class Lost(Entry, frozen=True, tag_field="is", tag=8):
+class EntriesLost(RingEntry, frozen=True, tag_field="is", tag=8):
     """This many entries could not be stored."""
 
     number: int
 
 
-class Ended(Entry, frozen=True, tag_field="is", tag=9):
+class DaemonEnded(RingEntry, frozen=True, tag_field="is", tag=9):
     """The daemon ended in good order. `safe`: every output was verified off."""
 
     safe: bool
 
 
-AnyEntry = Clocks | Spoken | Known | Step | Same | Published | Forgotten | Died | Lost | Ended
+AnyEntry = (
+    Clocks
+    | Spoken
+    | Known
+    | Decided
+    | Same
+    | Published
+    | SubjectForgotten
+    | DaemonDied
+    | EntriesLost
+    | DaemonEnded
+)
 
 _ENCODER: Final = msgspec.msgpack.Encoder()
 _DECODER: Final[msgspec.msgpack.Decoder[AnyEntry]] = msgspec.msgpack.Decoder(AnyEntry)
@@ -186,7 +197,7 @@ def _known(entry: AnyEntry) -> AnyEntry:
     elif isinstance(entry, Known):
         for tree in (entry.memory, entry.reading, entry.outputs, entry.report):
             _require_shallow(tree, DEEPEST)
-    elif isinstance(entry, Step):
+    elif isinstance(entry, Decided):
         for tree in (entry.event, *entry.outputs, *entry.news, *entry.faults, *entry.publish):
             _require_shallow(tree, DEEPEST)
     return entry

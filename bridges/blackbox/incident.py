@@ -6,7 +6,7 @@ from typing import Final
 
 import msgspec
 
-from bridges.blackbox.entries import AnyEntry, Clocks, Head, Known, Step
+from bridges.blackbox.entries import AnyEntry, Clocks, Decided, Head, Known
 from bridges.blackbox.value_codec import Tree, name_of
 from bridges.kinds.shared.decision import IoFailed, Sampled, Suspended, WriteFailed
 
@@ -54,7 +54,7 @@ def timed(entries: Sequence[AnyEntry]) -> Iterator[tuple[AnyEntry, float, float]
         yield entry, entry.at + steady, entry.at + wall
 
 
-def readable(step: Step) -> Iterator[tuple[str, Tree]]:
+def readable(step: Decided) -> Iterator[tuple[str, Tree]]:
     """A step as (topic, JSON), for readers in Foxglove or `ros2 bag`."""
     event = step.event if isinstance(step.event, dict) else {}
     kind = str(event.get("", ""))

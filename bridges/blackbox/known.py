@@ -2,14 +2,14 @@
 
 from typing import Any
 
-from bridges.blackbox.entries import Known, Step
+from bridges.blackbox.entries import Decided, Known
 from bridges.blackbox.value_codec import Tree, tree
 from bridges.kinds.shared.decision import Decision
 
 AnyDecision = Decision[Any, Any, Any]
 
 
-class Seen:
+class KnownSubject:
     """What is known of a subject. `times`: when the last reading came again, not yet in the ring."""
 
     def __init__(self, memory: object) -> None:
@@ -32,7 +32,7 @@ class Seen:
         )
 
 
-def known(name: str, subject: Seen, now: float, *, anew: bool = False) -> Known:
+def known(name: str, subject: KnownSubject, now: float, *, anew: bool = False) -> Known:
     """The entry with all that a replay needs of a subject. `anew`: its memory is not what the last
     decision left."""
     return Known(
@@ -48,15 +48,15 @@ def known(name: str, subject: Seen, now: float, *, anew: bool = False) -> Known:
 
 def step(
     name: str,
-    subject: Seen,
+    subject: KnownSubject,
     event: object,
     now: float,
     decision: AnyDecision,
     news: object,
-) -> Step:
+) -> Decided:
     """The entry of a decision: what has not changed is left out."""
     faults, before = decision.report.faults, subject.report
-    return Step(
+    return Decided(
         now,
         name,
         tree(event),

@@ -15,7 +15,7 @@ from mcap.writer import CompressionType, Writer
 
 from bridges import __version__
 from bridges.blackbox import entries
-from bridges.blackbox.entries import AnyEntry, Spoken, Step
+from bridges.blackbox.entries import AnyEntry, Decided, Spoken
 from bridges.blackbox.incident import LIBRARY, OWN_TOPICS, Incident, readable, timed
 from bridges.blackbox.value_codec import Tree
 from bridges.messages import cdr, topics
@@ -104,7 +104,7 @@ def _entry(channels: "_Channels", entry: AnyEntry, steady: float, wall: float) -
         channels.spoken(entry, steady, wall)
         return
     channels.text(ENTRIES, entries.as_json(entry), steady, wall)
-    if isinstance(entry, Step):
+    if isinstance(entry, Decided):
         for topic, told in readable(entry):
             channels.say(OWN_TOPICS + topic, told, steady, wall)
 

@@ -11,11 +11,11 @@ from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Final
 
-from bridges.blackbox.entries import AnyEntry, Clocks, Died, Ended, Head, Known, Step
+from bridges.blackbox.entries import AnyEntry, Clocks, DaemonDied, DaemonEnded, Decided, Head, Known
 from bridges.blackbox.incident import AFTER_S, BEFORE_S, Incident, Note, part
-from bridges.blackbox.recordings import CONTINUOUS, Shelf
+from bridges.blackbox.recordings import CONTINUOUS, Recordings
 from bridges.blackbox.ring import DIED as DIED_NAME
-from bridges.blackbox.ring import NAME, Read, RingError, Tail
+from bridges.blackbox.ring import NAME, RingContent, RingError, Tail
 from bridges.blackbox.triggers import AGAIN_S, DIED, Triggers
 from bridges.host.log import pairs
 from bridges.kinds.shared.durations import AGES_AGO
@@ -34,10 +34,13 @@ class Recorder:
     """Follows the rings of all daemons. `folders`: their runtime directories. `now`: machine s."""
 
     def __init__(
-        self, folders: Callable[[], Iterable[Path]], shelf: Shelf, now: Callable[[], float]
+        self,
+        folders: Callable[[], Iterable[Path]],
+        recordings: Recordings,
+        now: Callable[[], float],
     ) -> None:
         self._folders = folders
-        self._shelf = shelf
+        self._recordings = recordings
         self._now = now
         self._followed: dict[Path, _Followed] = {}
         self._seen_dead: set[tuple[int, int]] = set()
@@ -93,12 +96,12 @@ class Recorder:
             identity = _identity(path)
             if identity in self._seen_dead:
                 return
-            read = Read(path)
+            read = RingContent(path)
         except RingError:
             return
         self._seen_dead.add(identity)
         entries = list(read.entries())
-        served = any(isinstance(entry, Step) for entry in entries)
+        served = any(isinstance(entry, Decided) for entry in entries)
         if served and not read.ended and self._is_first(read.head):
             at = entries[-1].at
             note = Note(at, DIED, _last_words(entries))
@@ -107,7 +110,7 @@ class Recorder:
     def _is_first(self, head: Head) -> bool:
         """Is it not recorded yet, and not one of many deaths in a row?"""
         last = self._died_at.get(head.file, AGES_AGO)
-        if self._shelf.has(head, DIED) or self._now() < last + AGAIN_S:
+        if self._recordings.has(head, DIED) or self._now() < last + AGAIN_S:
             return False
         self._died_at[head.file] = self._now()
         return True
@@ -115,10 +118,10 @@ class Recorder:
     def _put(self, incident: Incident, code: str) -> None:
         """Write a file. A failure is logged once, and the recording is lost."""
         try:
-            path = self._shelf.put(incident, wall_of(incident.entries), code)
+            path = self._recordings.put(incident, wall_of(incident.entries), code)
         except OSError as error:
             if not self._failing:
-                log.warning(pairs("not_recorded", folder=self._shelf.folder, reason=error))
+                log.warning(pairs("not_recorded", folder=self._recordings.folder, reason=error))
             self._failing = True
             return
         self._failing = False
@@ -138,7 +141,7 @@ class _Followed:
         self._triggers = Triggers(self.head.recording.waiting_s)
         self._since = now - LATE_S
         self._notes: list[Note] = []
-        self._kept: Read | None = None
+        self._kept: RingContent | None = None
         self._part: list[AnyEntry] = []
 
     def is_replaced(self) -> bool:
@@ -153,7 +156,7 @@ class _Followed:
             if entry.at >= self._since:
                 self._notes += notes
         if self._notes and self._kept is None:
-            self._kept = Read(self._tail.path)
+            self._kept = RingContent(self._tail.path)
         if self.head.recording.keep == "continuous":
             self._part += new
 
@@ -175,10 +178,10 @@ class _Followed:
         entries = part(list(read.entries()), first.at - BEFORE_S, end_at)
         return Incident(read.head, entries, notes), first.code
 
-    def _read(self) -> Read:
+    def _read(self) -> RingContent:
         """The ring as it is now; as it was at first, if it is gone."""
         try:
-            read = Read(self._tail.path)
+            read = RingContent(self._tail.path)
             if read.head.run == self.head.run:
                 return read
         except RingError:
@@ -198,9 +201,9 @@ class _Followed:
 def _last_words(entries: Sequence[AnyEntry]) -> str:
     """Why a run died, as far as it said so."""
     for entry in entries:
-        if isinstance(entry, Died):
+        if isinstance(entry, DaemonDied):
             return entry.reason
-    if isinstance(entries[-1], Ended):
+    if isinstance(entries[-1], DaemonEnded):
         return "it ended, and not every output was verified off"
     return "it ended without an entry: killed, or the machine stopped"
 

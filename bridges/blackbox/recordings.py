@@ -18,7 +18,7 @@ class DiskFull(OSError):
     """The disk has too little room for a recording."""
 
 
-class Shelf:
+class Recordings:
     """The recordings of all daemons of a machine, in one directory."""
 
     def __init__(self, folder: Path) -> None:

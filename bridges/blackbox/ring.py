@@ -120,7 +120,7 @@ def _died(path: Path) -> bool:
     return found[: len(MAGIC)] == MAGIC and found[ENDED_AT : ENDED_AT + 1] == b"\0"
 
 
-class Read:
+class RingContent:
     """A ring's content at one time. `head`: of the run. `ended`: it ended in good order.
 
     `segments`: each one's number and entries, in order, without what is being written meanwhile or

@@ -10,7 +10,7 @@ The same cause at the same subject counts once in AGAIN_S.
 from collections.abc import Iterator
 from typing import Final
 
-from bridges.blackbox.entries import AnyEntry, Died, Forgotten, Known, Spoken, Step
+from bridges.blackbox.entries import AnyEntry, DaemonDied, Decided, Known, Spoken, SubjectForgotten
 from bridges.blackbox.incident import Note
 from bridges.blackbox.value_codec import Tree
 from bridges.kinds.shared.decision import EXPECTED
@@ -41,19 +41,19 @@ class Triggers:
         return [note for note in self._all(entry) if self._is_new(note)]
 
     def _all(self, entry: AnyEntry) -> Iterator[Note]:
-        if isinstance(entry, Step):
+        if isinstance(entry, Decided):
             yield from self._step(entry)
         elif isinstance(entry, Known):
             report = entry.report if isinstance(entry.report, dict) else {}
             self._faults[entry.subject] = set(_codes(report.get("faults")))
-        elif isinstance(entry, Forgotten):
+        elif isinstance(entry, SubjectForgotten):
             self._faults.pop(entry.subject, None)
-        elif isinstance(entry, Died):
+        elif isinstance(entry, DaemonDied):
             yield Note(entry.at, DIED, entry.reason)
         elif isinstance(entry, Spoken):
             yield from self._spoken(entry)
 
-    def _step(self, step: Step) -> Iterator[Note]:
+    def _step(self, step: Decided) -> Iterator[Note]:
         for faults in step.faults:
             codes, before = _codes(faults), self._faults.get(step.subject, set())
             for code, detail in codes.items():

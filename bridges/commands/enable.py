@@ -21,7 +21,7 @@ from bridges.runtime.services import (
     NO_INSTANCE,
     Run,
     Step,
-    Write,
+    WriteFile,
     add_root,
     carry_out,
     drop_in_file,
@@ -71,8 +71,8 @@ def steps(config: Config, root: Path, present: Collection[str]) -> Iterator[Step
     yield Run(("systemctl", "stop", unit(name)), running_only=True)
     yield switch_off(name)
     if not target.exists() or not target.samefile(config.path):
-        yield Write(target, config.text, config.path)
-    yield Write(root / drop_in_file(name), drop_in.text(config, present).encode())
+        yield WriteFile(target, config.text, config.path)
+    yield WriteFile(root / drop_in_file(name), drop_in.text(config, present).encode())
     yield Run(("systemctl", "daemon-reload"), running_only=True)
     yield Run(("systemctl", "enable", "rmf-bridges.target", unit(name)))
     yield Run(("systemctl", "start", unit(name)), running_only=True)

@@ -8,7 +8,7 @@ from datetime import datetime
 from pathlib import Path
 
 from bridges.blackbox.incident import AFTER_S, BEFORE_S, INSTALL, Incident, Note, part
-from bridges.blackbox.ring import DIED, NAME, Read, RingError
+from bridges.blackbox.ring import DIED, NAME, RingContent, RingError
 from bridges.host.installed import of_workbench
 from bridges.host.written import no_folder, not_written
 from bridges.runtime import holder
@@ -86,7 +86,7 @@ def _hint(*, died: bool) -> str:
 
 def _incident(ring: Path, args: argparse.Namespace, follows: bool) -> Incident:
     """From 120 s before now on, and what `follows` from a daemon that runs. Raises RingError."""
-    before = Read(ring)
+    before = RingContent(ring)
     if args.died:
         entries = list(before.entries())
         at = entries[-1].at if entries else 0.0
@@ -97,7 +97,7 @@ def _incident(ring: Path, args: argparse.Namespace, follows: bool) -> Incident:
     else:
         print(f"no daemon serves {args.file} now: nothing follows")
     try:
-        after = Read(ring)
+        after = RingContent(ring)
     except RingError:
         after = before
     entries = list(after.entries())

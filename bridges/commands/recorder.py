@@ -8,7 +8,7 @@ from pathlib import Path
 
 from bridges.blackbox.incident import INSTALL
 from bridges.blackbox.recorder import Recorder
-from bridges.blackbox.recordings import Shelf
+from bridges.blackbox.recordings import Recordings
 from bridges.host import directories, log
 from bridges.runtime import signals
 from bridges.runtime.clock import machine_s
@@ -33,9 +33,9 @@ def run(args: argparse.Namespace) -> int:
         print(f"the recorder needs {error.name}: {INSTALL}", file=sys.stderr)
         return os.EX_UNAVAILABLE
     end = signals.End()
-    shelf = Shelf(args.output or _folder())
-    shelf.tidy()
-    recorder = Recorder(directories.runtimes, shelf, machine_s)
+    recordings = Recordings(args.output or _folder())
+    recordings.tidy()
+    recorder = Recorder(directories.runtimes, recordings, machine_s)
     recorder.look()
     _notify("READY=1")
     while not end.wait(EVERY_S):

@@ -5,7 +5,7 @@ import os
 import sys
 from pathlib import Path
 
-from bridges.host.directories import Places, act_as_owner
+from bridges.host.directories import Directories, act_as_owner
 from bridges.runtime import holder
 from bridges.runtime.runtime_directory import find
 from bridges.runtime.signals import RESET
@@ -31,7 +31,7 @@ def run(args: argparse.Namespace) -> int:
         return os.EX_UNAVAILABLE
 
 
-def _reset(file: Path, places: Places) -> int:
+def _reset(file: Path, places: Directories) -> int:
     found = holder.look(places)
     if found is None or not found.serves or not found.started:  # else the number may be another's
         why = f"{found}, which is not a daemon of this version" if found else "no process holds it"

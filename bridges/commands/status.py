@@ -17,7 +17,7 @@ import msgspec
 from bridges.host.directories import runtimes
 from bridges.host.paint import bold, red
 from bridges.messages.words import printable
-from bridges.runtime.daemons import NONE, Daemon, daemons, units
+from bridges.runtime.daemons import NONE, DaemonStatus, daemons, units
 from bridges.runtime.faults import Remedy, here, remedies, values
 from bridges.runtime.subject import Status
 
@@ -53,7 +53,7 @@ def run(args: argparse.Namespace) -> int:
     return max((one.level for one in found), default=NONE)
 
 
-def show(found: Iterable[Daemon], out: TextIO) -> None:
+def show(found: Iterable[DaemonStatus], out: TextIO) -> None:
     """A block of lines for each daemon."""
     blocks = list(found)
     if not blocks:
@@ -65,7 +65,7 @@ def show(found: Iterable[Daemon], out: TextIO) -> None:
         print("\n".join(_lines(one, known, out)), file=out)
 
 
-def _lines(one: Daemon, known: Mapping[str, Remedy], out: TextIO) -> Iterator[str]:
+def _lines(one: DaemonStatus, known: Mapping[str, Remedy], out: TextIO) -> Iterator[str]:
     paint = red if one.level else bold
     simulated = " SIMULATED" if one.status.get("simulated") else ""
     by = f"{one.by}, {one.unit}" if one.unit else one.by
@@ -76,7 +76,7 @@ def _lines(one: Daemon, known: Mapping[str, Remedy], out: TextIO) -> Iterator[st
         yield from _serving(one, known, out)
 
 
-def _serving(one: Daemon, known: Mapping[str, Remedy], out: TextIO) -> Iterator[str]:
+def _serving(one: DaemonStatus, known: Mapping[str, Remedy], out: TextIO) -> Iterator[str]:
     about = {
         "file": "?",
         "transport": "?",
@@ -97,7 +97,7 @@ def _serving(one: Daemon, known: Mapping[str, Remedy], out: TextIO) -> Iterator[
         yield from _fault_lines(device, known, out, file, name)
 
 
-def _state(one: Daemon) -> str:
+def _state(one: DaemonStatus) -> str:
     match one.state:
         case "old":
             age = (
@@ -138,7 +138,7 @@ def _nodes(count: int) -> str:
     return f"{count} node{'s' if count > 1 else ''}"
 
 
-def _faults(one: Daemon) -> bool:
+def _faults(one: DaemonStatus) -> bool:
     return any(part.get("faults") for part in (one.status, *one.devices.values()))
 
 

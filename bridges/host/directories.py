@@ -26,7 +26,7 @@ GROUPS = ("gpio", "dialout")
 """The groups that a drop-in may give this user beside its own (`drop_in.py`)."""
 
 
-class Places(Struct, frozen=True):
+class Directories(Struct, frozen=True):
     """The directories of one daemon."""
 
     runtime: Path
@@ -43,24 +43,24 @@ def named(file: Path) -> str:
     return os.path.realpath(file)
 
 
-def as_given(given: str | None) -> Places | None:
+def as_given(given: str | None) -> Directories | None:
     """The directories that the command line or systemd's unit gives; None if neither does."""
     if given:
-        return Places(Path(given).absolute(), Path(given).absolute())
+        return Directories(Path(given).absolute(), Path(given).absolute())
     runtime = os.environ.get("RUNTIME_DIRECTORY", "").split(":")[0]
     state = os.environ.get("STATE_DIRECTORY", "").split(":")[0]
-    return Places(Path(runtime), Path(state or runtime)) if runtime else None
+    return Directories(Path(runtime), Path(state or runtime)) if runtime else None
 
 
-def of_service(file: Path) -> Places:
+def of_service(file: Path) -> Directories:
     """The directories of `rmf-bridge@.service`."""
-    return Places(SERVICE_RUN / file.stem, SERVICE_STATE / file.stem)
+    return Directories(SERVICE_RUN / file.stem, SERVICE_STATE / file.stem)
 
 
-def by_hand(file: Path) -> Places:
+def by_hand(file: Path) -> Directories:
     """The directories of a daemon that this user starts by hand."""
     runtime = Path(os.environ.get("XDG_RUNTIME_DIR") or TMP / f"rmf-bridge-{os.getuid()}")
-    return Places(runtime / "rmf-bridge" / file.stem, state_base() / file.stem)
+    return Directories(runtime / "rmf-bridge" / file.stem, state_base() / file.stem)
 
 
 def state_base() -> Path:
@@ -70,7 +70,7 @@ def state_base() -> Path:
     return Path(os.environ.get("XDG_STATE_HOME") or default) / "rmf-bridge"
 
 
-def everywhere(file: Path) -> Iterator[Places]:
+def everywhere(file: Path) -> Iterator[Directories]:
     """Where a daemon of this file may be: in the service's directories, or those of a daemon started by
     hand; for root also those of the user who called sudo.
     """
@@ -80,7 +80,7 @@ def everywhere(file: Path) -> Iterator[Places]:
     yield by_hand(file)
 
 
-def _of_user(uid: int, file: Path) -> Iterator[Places]:
+def _of_user(uid: int, file: Path) -> Iterator[Directories]:
     """The directories of this user, if they belong to that user."""
     for base in (USERS_RUN / str(uid), TMP / f"rmf-bridge-{uid}"):
         runtime = base / "rmf-bridge" / file.stem
@@ -90,7 +90,7 @@ def _of_user(uid: int, file: Path) -> Iterator[Places]:
         except (KeyError, OSError):
             continue
         if his:
-            yield Places(runtime, home / ".local/state/rmf-bridge" / file.stem)
+            yield Directories(runtime, home / ".local/state/rmf-bridge" / file.stem)
 
 
 def runtimes() -> Iterator[Path]:
@@ -168,7 +168,7 @@ def _distrusted(place: Path, owner: int, *, last: bool) -> str:
     return ""
 
 
-def act_as_owner(places: Places) -> None:
+def act_as_owner(places: Directories) -> None:
     """Root permanently becomes the directories' owner, with the groups that the unit gives.
 
     Files in them can then do no more than their owner could. Raises PermissionError if somebody else
@@ -208,7 +208,7 @@ def owner_of(path: Path) -> str:
         return "another user"
 
 
-def work_somewhere(places: Places) -> None:
+def work_somewhere(places: Directories) -> None:
     """Change to a directory where lgpio can make its FIFO: one of these, or a temporary one."""
     for folder in (places.runtime, places.state, TMP, Path("/dev/shm"), Path("/var/tmp")):
         probe = folder / f".rmf-bridge-{os.getpid()}"

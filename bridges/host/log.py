@@ -17,7 +17,7 @@ codecs.lookup(ESCAPED)  # at once: without a free descriptor it could not be loa
 _PRIORITY = {"DEBUG": 7, "INFO": 6, "WARNING": 4, "ERROR": 3, "CRITICAL": 2}
 
 
-class Line(str):
+class LogLine(str):
     """A log line `event key=value …`, and what it was made of, for `--log-format json`."""
 
     __slots__ = ("event", "values")
@@ -25,10 +25,10 @@ class Line(str):
     values: Mapping[str, object]
 
 
-def pairs(event: str, **values: object) -> Line:
+def pairs(event: str, **values: object) -> LogLine:
     """One log line. Values with spaces, quotes or line breaks are quoted and escaped."""
     shown = (f"{key}={_quoted(plain(value))}" for key, value in values.items())
-    line = Line(" ".join([event, *shown]))
+    line = LogLine(" ".join([event, *shown]))
     line.event, line.values = event, values
     return line
 
@@ -99,7 +99,7 @@ class _Json(logging.Formatter):
     def format(self, record: logging.LogRecord) -> str:
         at = datetime.fromtimestamp(record.created, UTC).isoformat(timespec="milliseconds")
         told: dict[str, object] = {"at": at, "priority": record.levelname.lower()}
-        if isinstance(record.msg, Line):
+        if isinstance(record.msg, LogLine):
             told["event"] = record.msg.event
             told["values"] = {key: _as_json(value) for key, value in record.msg.values.items()}
         told["text"] = record.getMessage()
@@ -165,7 +165,7 @@ class Seldom(logging.Filter):
         if run.times > self.OFTEN and now - run.told_at < self.AGAIN_S:
             run.left_out += 1
             return False
-        if run.left_out and isinstance(record.msg, Line):
+        if run.left_out and isinstance(record.msg, LogLine):
             record.msg = pairs(record.msg.event, **record.msg.values, left_out=run.left_out)
         run.told_at, run.left_out = now, 0
         return True

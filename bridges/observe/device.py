@@ -9,7 +9,7 @@ from typing import ClassVar, Generic, Literal, NamedTuple, TypeVar
 from bridges.messages import definitions as d
 from bridges.messages import words
 from bridges.observe.limits import OLD_S, SILENT_S
-from bridges.observe.requesters import Fact, Moment, Requester, Requesters
+from bridges.observe.requesters import DeviceRequester, DeviceRequesters, Fact, Moment
 
 T = TypeVar("T", d.LiftState, d.DoorState, d.ChargerState)
 
@@ -38,7 +38,7 @@ class News:
     at: Moment
     who: str = ""
     text: str = ""
-    requester: Requester | None = None
+    requester: DeviceRequester | None = None
     gap_s: float = 0.0
     passed_on: bool = False
 
@@ -81,7 +81,7 @@ class ObservedDevice(ABC, Generic[T]):
     def __init__(self, name: str, began: Moment) -> None:
         self.id = name
         self.began = began
-        self.requesters = Requesters(began)
+        self.requesters = DeviceRequesters(began)
         self.state: T | None = None
         self.before: T | None = None
         self.first_state: Moment | None = None
@@ -114,11 +114,11 @@ class ObservedDevice(ABC, Generic[T]):
         """How often the stamps went back by more than this lately, as those of two nodes do."""
         return sum(by > by_s and now - at < within_s for at, by in self._back)
 
-    def checks(self, one: Requester) -> tuple[Check, ...]:
+    def checks(self, one: DeviceRequester) -> tuple[Check, ...]:
         """What RMF's phase of this requester looks at; nothing where RMF has none."""
         return ()
 
-    def matches(self, one: Requester) -> bool:
+    def matches(self, one: DeviceRequester) -> bool:
         """Does RMF see what this requester waits for?"""
         return all(check.met for check in self.checks(one))
 

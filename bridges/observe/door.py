@@ -8,7 +8,7 @@ from bridges.messages import definitions as d
 from bridges.messages import words
 from bridges.observe.device import Check, News, ObservedDevice, Wait
 from bridges.observe.limits import ASKS_WITHIN_S, MOST_HOLDERS
-from bridges.observe.requesters import Fact, Moment, Requester
+from bridges.observe.requesters import DeviceRequester, Fact, Moment
 
 OPEN: Final = "open"
 CLOSED: Final = "closed"
@@ -61,14 +61,14 @@ class ObservedDoor(ObservedDevice[d.DoorState]):
         """The mode."""
         return {"mode": words.plain(d.DoorModeValue, state.current_mode.value)}
 
-    def checks(self, one: Requester) -> tuple[Check, ...]:
+    def checks(self, one: DeviceRequester) -> tuple[Check, ...]:
         """What DoorOpen or DoorClose of this requester looks at."""
         heartbeat = LISTS if one.who in self.holders else LISTS_NOT
         if self.last_heartbeat is None:
             heartbeat = "not heard"
         return door_open(self.mode.value, heartbeat) if one.wants == OPEN else door_close(heartbeat)
 
-    def asking(self, now: Moment) -> list[Requester]:
+    def asking(self, now: Moment) -> list[DeviceRequester]:
         """Those who repeat their request now and still wait, the earliest first."""
         asks = [one for one in self.requesters if one.asks(now) and not self.matches(one)]
         return sorted(asks, key=lambda one: one.since.at)

@@ -8,7 +8,7 @@ from bridges.messages import definitions as d
 from bridges.messages import words
 from bridges.observe.device import Check, News, ObservedDevice, Wait
 from bridges.observe.limits import ASKS_WITHIN_S
-from bridges.observe.requesters import Fact, Moment, Requester
+from bridges.observe.requesters import DeviceRequester, Fact, Moment
 
 END: Final = d.LiftRequestType.REQUEST_END_SESSION
 NOBODY: Final = "nobody"
@@ -54,12 +54,12 @@ class ObservedLift(ObservedDevice[d.LiftState]):
             "door": words.plain(d.LiftDoor, state.door_state),
         }
 
-    def checks(self, one: Requester) -> tuple[Check, ...]:
+    def checks(self, one: DeviceRequester) -> tuple[Check, ...]:
         """What RequestLift of this requester looks at."""
         wants = one.wants or "no floor"
         return request_lift(self.session.value, self.floor.value, self.door.value, one.who, wants)
 
-    def asking(self, now: Moment) -> list[Requester]:
+    def asking(self, now: Moment) -> list[DeviceRequester]:
         """Those who ask now, the earliest first. While no state comes nobody repeats itself, and all
         wait."""
         stands = self.last_state is None or self.is_silent(now)
@@ -169,7 +169,7 @@ class ObservedLift(ObservedDevice[d.LiftState]):
         if new is not None and holder != NOBODY:
             new.granted = moment
 
-    def _over(self, moment: Moment, one: Requester) -> News:
+    def _over(self, moment: Moment, one: DeviceRequester) -> News:
         if one.ended is not None:
             self.requesters.drop(one.who)
         return News("over", moment, one.who, requester=one)

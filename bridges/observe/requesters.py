@@ -36,7 +36,7 @@ class Fact:
 
 
 @dataclass(slots=True)
-class Requester:
+class DeviceRequester:
     """What one requester asks for. `wants`: a floor, or whatever else. `first`: when its visit began;
     `since`: when it began to ask for this; `lacks`: since when it has been without it, though it asks;
     `last`: when it asked last. `times`: how often it asked.
@@ -73,7 +73,7 @@ class Requester:
         self.stamp_age_s = moment.wall - in_seconds(stamp)
 
 
-class Requesters:
+class DeviceRequesters:
     """All requesters of one device. A flood of names pushes out the one that was silent the longest.
 
     `began`: when we began to listen.
@@ -81,18 +81,18 @@ class Requesters:
 
     def __init__(self, began: Moment) -> None:
         self._began = began
-        self._all: OrderedDict[str, Requester] = OrderedDict()
+        self._all: OrderedDict[str, DeviceRequester] = OrderedDict()
 
-    def __iter__(self) -> Iterator[Requester]:
+    def __iter__(self) -> Iterator[DeviceRequester]:
         return iter([*self._all.values()])
 
-    def get(self, who: str) -> Requester | None:
+    def get(self, who: str) -> DeviceRequester | None:
         """This requester, while its visit lasts."""
         return self._all.get(who)
 
     def ask(
         self, who: str, wants: str, moment: Moment, keep: str = "", *, stands: bool = False
-    ) -> tuple[Requester, bool]:
+    ) -> tuple[DeviceRequester, bool]:
         """It asks for this. Returns the requester, and whether it asks for something new. `keep`: who
         must stay. `stands`: no state comes, so nobody repeats itself."""
         found = self._all.get(who)
@@ -104,7 +104,7 @@ class Requesters:
                 self.drop(next(one for one in self._all if one != keep))
             early = moment.at - self._began.at < REPEATS_S
             since = Moment(moment.at, moment.wall, seen=moment.seen and not early)
-            found = self._all[who] = Requester(who, wants, since, since, since, moment)
+            found = self._all[who] = DeviceRequester(who, wants, since, since, since, moment)
         elif new := found.wants != wants:
             found.wants, found.since, found.lacks, found.met = wants, moment, moment, None
         found.last, found.gone = moment, False

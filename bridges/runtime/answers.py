@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from typing import Final
 
 from bridges.kinds.shared.durations import AGES_AGO, NEVER
-from bridges.kinds.shared.kind import Answer
+from bridges.kinds.shared.kind import RefusalAnswer
 from bridges.runtime.clock import TELL_GAP_S
 from bridges.runtime.subject import Publish
 
@@ -14,7 +14,7 @@ MOST: Final = 10
 """At most this many are answered every TELL_GAP_S: the last ones."""
 
 
-class Answers:
+class RefusalAnswers:
     """The refusals of one device or node. `last`: the last answer, for the status file."""
 
     def __init__(self) -> None:
@@ -31,7 +31,9 @@ class Answers:
         """When the next answers are due (monotonic s); NEVER if none waits."""
         return self._said_at + TELL_GAP_S if self._waiting else NEVER
 
-    def say(self, now: float, answer: Callable[[object, str], Answer | None], say: Publish) -> None:
+    def say(
+        self, now: float, answer: Callable[[object, str], RefusalAnswer | None], say: Publish
+    ) -> None:
         """Publish the answers that are due."""
         if now < self.due_at:
             return

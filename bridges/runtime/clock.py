@@ -36,7 +36,7 @@ def machine_s() -> float:
     return time.clock_gettime(time.CLOCK_BOOTTIME)
 
 
-class Pace:
+class PublishPace:
     """Decides when to publish something: each second, and at once when it has changed."""
 
     def __init__(self) -> None:

@@ -26,8 +26,8 @@ from bridges.runtime.diagnostics import diagnosis
 from bridges.runtime.guard import Guard
 from bridges.runtime.notify import notify, watchdog_s
 from bridges.runtime.predecessor import Predecessor
-from bridges.runtime.record import Record
-from bridges.runtime.ring_writer import NOBODY, Nobody, Witness
+from bridges.runtime.record import ClaimRecord
+from bridges.runtime.ring_writer import NOBODY, NoWriter, RingWriter
 from bridges.runtime.runtime_directory import KEPT, MemoryFile, Once, RuntimeDirectory, state_file
 from bridges.runtime.service import OpenBus, clock_of, named_by, service
 from bridges.runtime.serving import stop
@@ -80,8 +80,8 @@ class Daemon:
         )
         kept = None if simulated else MemoryFile(state_file(config.path), runtime.path / KEPT)
         open_bus = open_bus or config.open_bus
-        self._witness = self._witness_of(ours)
-        self._service = service(config, self._transport, open_bus, kept, unsafe, self._witness)
+        self._writer = self._writer_of(ours)
+        self._service = service(config, self._transport, open_bus, kept, unsafe, self._writer)
         self._loops = self._service.loops
         # Every bus is open, and no output is claimed before `serve`: a bus that cannot be opened leaves
         # no record. `outputs-off` reads the record.
@@ -95,7 +95,7 @@ class Daemon:
         if config.rmf.diagnostics:
             self._diagnostics = self._transport.publisher(self._health_topic)
 
-    def _witness_of(self, record: Record) -> Nobody:
+    def _writer_of(self, record: ClaimRecord) -> NoWriter:
         """Keeps what happens in a ring, unless the YAML says otherwise."""
         keep = self._config.recording
         if keep.keep == "nothing":
@@ -113,7 +113,7 @@ class Daemon:
             recording=keep,
         )
         make = partial(Ring, self._runtime.path, head, int(keep.ring_mb * 1e6))
-        return Witness(make, clock_of(self._transport), lambda: self._transport.release)
+        return RingWriter(make, clock_of(self._transport), lambda: self._transport.release)
 
     def serve(self) -> int:
         """Run until a signal, and return the exit code: 0 when every output is off and verified."""
@@ -125,7 +125,7 @@ class Daemon:
                 loop.start()
             self._watch()
         except Exception as error:
-            self._witness.died(f"{type(error).__name__}: {error}")
+            self._writer.died(f"{type(error).__name__}: {error}")
             raise
         finally:
             safe = self._shut_down()
@@ -151,24 +151,24 @@ class Daemon:
             if told_ready and time.monotonic() >= tell_at:
                 tell_at = time.monotonic() + STATUS_EVERY_S - period_s / 2
                 self._convenience("graph", self._service.look)
-                self._witness.look()
+                self._writer.look()
                 self._convenience("status", self._tell)
 
     def _require_life(self) -> None:
         """What has died cannot be restarted in here; systemd starts us again."""
         if not self._transport.lives:
             log.critical(pairs("died", transport=self._transport.name))
-            self._witness.died(f"transport {self._transport.name}")
+            self._writer.died(f"transport {self._transport.name}")
         elif all(loop.alive for loop in self._loops):
             return
         else:
-            self._witness.died("; ".join(loop.died for loop in self._loops if loop.died))
+            self._writer.died("; ".join(loop.died for loop in self._loops if loop.died))
         raise SystemExit(os.EX_SOFTWARE)
 
     def _shut_down(self) -> bool:
         self._convenience("sd_notify", partial(notify, "STOPPING=1"))
         safe = stop(self._loops, STOP_WITHIN_S)
-        self._witness.ended(safe=safe)
+        self._writer.ended(safe=safe)
         self._convenience("transport", self._transport.close)
         if self._predecessor is not None:
             self._predecessor.close()
@@ -228,7 +228,7 @@ class Daemon:
             self._diagnostics.publish(found)
             self._told += 1
             if self._told % max(1, len(devices)) == 0:  # their size grows with the devices
-                self._witness.spoken(self._health_topic.name, found, sent=True)
+                self._writer.spoken(self._health_topic.name, found, sent=True)
         except (
             TransportError,
             ClockError,

@@ -11,7 +11,7 @@ from typing import Any, Final, cast
 import msgspec
 
 from bridges.host import files
-from bridges.host.directories import SERVICE_RUN, SERVICE_STATE, Places, owner_of, state_base
+from bridges.host.directories import SERVICE_RUN, SERVICE_STATE, Directories, owner_of, state_base
 from bridges.runtime import holder
 from bridges.runtime.record import paths, read
 from bridges.runtime.subject import Status
@@ -60,7 +60,7 @@ class StatusFile(msgspec.Struct):
     hears: dict[str, int] = {}
 
 
-class Daemon(msgspec.Struct, kw_only=True):
+class DaemonStatus(msgspec.Struct, kw_only=True):
     """One daemon, or a unit without one.
 
     `state`: `serving`; `old`: it writes no status any more; `died` without tidying up; `left on`: it
@@ -91,7 +91,7 @@ class Daemon(msgspec.Struct, kw_only=True):
 
 def daemons(
     folders: Iterable[Path], found_units: Mapping[str, str], wall: float
-) -> Iterator[Daemon]:
+) -> Iterator[DaemonStatus]:
     """The daemon of each runtime directory, and each of systemd's units without one. `wall`: now."""
     rest = dict(found_units)
     for folder in folders:
@@ -101,13 +101,13 @@ def daemons(
         with suppress(NotADirectoryError, FileNotFoundError):
             yield _daemon(folder, by, unit, wall)
     for name, unit in rest.items():
-        yield Daemon(name=name, state=_without_directory(unit), by="service", unit=unit)
+        yield DaemonStatus(name=name, state=_without_directory(unit), by="service", unit=unit)
 
 
-def _daemon(folder: Path, by: str, unit: str, wall: float) -> Daemon:
-    one = Daemon(name=folder.name, state="stopped", by=by, unit=unit)
+def _daemon(folder: Path, by: str, unit: str, wall: float) -> DaemonStatus:
+    one = DaemonStatus(name=folder.name, state="stopped", by=by, unit=unit)
     try:
-        held_by = holder.look(Places(folder, folder))
+        held_by = holder.look(Directories(folder, folder))
         status, one.age_s = _read(folder / holder.STATUS, wall)
     except PermissionError as error:
         one.state, one.why = "unknown", str(error)
@@ -128,7 +128,7 @@ def _daemon(folder: Path, by: str, unit: str, wall: float) -> Daemon:
 def _unreleased(folder: Path) -> str:
     """What to do about outputs of a dead daemon that nobody has verified off; "" without a record."""
     state = SERVICE_STATE if folder.parent == SERVICE_RUN else state_base()
-    for path in paths(Places(folder, state / folder.name)):
+    for path in paths(Directories(folder, state / folder.name)):
         if record := read(path):
             return (
                 f"do: rmf-bridge outputs-off {record.file}; if that hardware is gone, cut its"

@@ -13,13 +13,13 @@ from pathlib import Path
 import msgspec
 
 from bridges.host import log
-from bridges.host.directories import Places, act_as_owner, by_hand, work_somewhere
+from bridges.host.directories import Directories, act_as_owner, by_hand, work_somewhere
 from bridges.host.files import read
 from bridges.host.log import pairs
 from bridges.runtime import last_mark, signals
 from bridges.runtime import runtime_directory as runtime
 from bridges.runtime.holder import STATUS, STATUS_MAX
-from bridges.runtime.record import Record, Records
+from bridges.runtime.record import ClaimRecord, Records
 from bridges.runtime.switch_off import outputs_off
 from bridges.settings.config import Config
 from bridges.yaml.problems import SettingsError
@@ -63,7 +63,7 @@ def switch_off(args: argparse.Namespace) -> int:
         held.close()
 
 
-def _places(file: Path, given: str | None) -> Places | None:
+def _places(file: Path, given: str | None) -> Directories | None:
     """The daemon's directories. None if they cannot be trusted and systemd says that it is dead.
 
     Raises PermissionError if it cannot be known whether a daemon runs there.
@@ -103,7 +103,7 @@ def _off_by_records(
 
 
 def _off_by_record(
-    records: Records, record: Record, answered: Mapping[str, float], within_s: float
+    records: Records, record: ClaimRecord, answered: Mapping[str, float], within_s: float
 ) -> bool:
     try:
         config = record.config()
@@ -136,7 +136,7 @@ class _StatusFile(msgspec.Struct):
     devices: dict[str, _Device] = {}
 
 
-def ages(places: Places) -> Mapping[str, float]:
+def ages(places: Directories) -> Mapping[str, float]:
     """How long ago (s) each device had answered when the dead daemon wrote its last status, if that is
     still there; those that never had are left out."""
     try:

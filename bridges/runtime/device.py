@@ -23,17 +23,17 @@ from bridges.kinds.shared.decision import (
     X,
 )
 from bridges.kinds.shared.durations import AGES_AGO
-from bridges.kinds.shared.kind import Answer, DeviceEvent, E, Kind, L, S
+from bridges.kinds.shared.kind import DeviceEvent, E, Kind, L, RefusalAnswer, S
 from bridges.messages.definitions import Message
 from bridges.messages.stamps import ClockError
 from bridges.messages.topics import Topic
 from bridges.runtime import diagnostics
-from bridges.runtime.answers import Answers
-from bridges.runtime.clock import Clock, Pace
+from bridges.runtime.answers import RefusalAnswers
+from bridges.runtime.clock import Clock, PublishPace
 from bridges.runtime.contained import Contained
 from bridges.runtime.refusals import Refusals
-from bridges.runtime.ring_writer import NOBODY, Nobody
-from bridges.runtime.subject import Core, Publish, Status, Subject
+from bridges.runtime.ring_writer import NOBODY, NoWriter
+from bridges.runtime.subject import Publish, Status, Subject, SubjectCore
 from drivers import Driver, DriverError
 
 NotSent = Callable[[Topic[Message], Exception], None]
@@ -54,7 +54,7 @@ class Node(Generic[S, L, M, X, E, O, R]):
         driver: Driver[X, O],
         publish: Publish,
         clock: Clock,
-        witness: Nobody = NOBODY,
+        writer: NoWriter = NOBODY,
         not_sent: NotSent = lambda topic, error: None,
     ) -> None:
         self.name = name
@@ -67,15 +67,15 @@ class Node(Generic[S, L, M, X, E, O, R]):
         self._clock = clock
         self._refusals = Refusals()
         memory = kind.initial(limits, clock.monotonic())
-        core: Core[M, DeviceEvent[X, E], O, R] = Core(
+        core: SubjectCore[M, DeviceEvent[X, E], O, R] = SubjectCore(
             "device",
             lambda memory, event, now: kind.decide(memory, event, now, limits),
             lambda report, now: kind.summary(report),
             self._identity,
         )
-        self.subject = Subject(name, memory, core, publish, self._refusals, clock, witness)
-        self._pace = Pace()
-        self._answers = Answers()
+        self.subject = Subject(name, memory, core, publish, self._refusals, clock, writer)
+        self._pace = PublishPace()
+        self._answers = RefusalAnswers()
         self._open = False
         self._has_read = False
         self._contacts: Mapping[str, bool] = {}
@@ -190,7 +190,7 @@ class Node(Generic[S, L, M, X, E, O, R]):
         self._answers.say(self._clock.monotonic(), self._answered, self._publish)
         self.wake_at = min(self.wake_at, self._answers.due_at)
 
-    def _answered(self, request: object, reason: str) -> Answer | None:
+    def _answered(self, request: object, reason: str) -> RefusalAnswer | None:
         decision = self.subject.decision
         assert decision is not None
         return self._kind.answer(self.name, request, reason, decision.report)

@@ -17,15 +17,15 @@ from bridges.kinds.shared.kind import E, L, S
 from bridges.messages.definitions import Message
 from bridges.messages.stamps import ClockError, stamp
 from bridges.messages.topics import Topic
-from bridges.runtime.answers import Answers
+from bridges.runtime.answers import RefusalAnswers
 from bridges.runtime.clock import Clock
 from bridges.runtime.inbox import Inbox
 from bridges.runtime.keeper import Keeper, MemoryStore
 from bridges.runtime.outlet import Named, Outlet
 from bridges.runtime.presence import Presence
 from bridges.runtime.refusals import Refusals
-from bridges.runtime.ring_writer import NOBODY, Nobody
-from bridges.runtime.subject import Core, Status, Subject
+from bridges.runtime.ring_writer import NOBODY, NoWriter
+from bridges.runtime.subject import Status, Subject, SubjectCore
 from bridges.transports.transport import Subscription, Transport
 
 log = logging.getLogger(__name__)
@@ -41,13 +41,13 @@ robots at a time. A holder is never forgotten, so made-up ones would pile up.
 DEFECT = "a defect"
 
 
-def _core(kind: GraphKind[S, L, M, E, R], limits: L) -> Core[M, GraphEvent[E], None, R]:
+def _core(kind: GraphKind[S, L, M, E, R], limits: L) -> SubjectCore[M, GraphEvent[E], None, R]:
     """A fault is identified by code and detail: the detail says whose it is."""
 
     def itself(fault: Fault) -> Fault:
         return fault
 
-    return Core(
+    return SubjectCore(
         "subject",
         lambda memory, event, now: kind.decide(memory, event, now, limits),
         kind.summary,
@@ -70,7 +70,7 @@ class GraphNode(Generic[S, L, M, E, R]):
         clock: Clock,
         named: Named = _same,
         kept: MemoryStore | None = None,
-        witness: Nobody = NOBODY,
+        writer: NoWriter = NOBODY,
     ) -> None:
         self.name = f"graph-{kind.name}"
         self.inbox: Inbox[tuple[Topic[Message], E]] = Inbox()
@@ -84,10 +84,10 @@ class GraphNode(Generic[S, L, M, E, R]):
         self._transport = transport
         self._clock = clock
         self._named = named
-        self._witness = witness
-        self._outlet = Outlet(transport, named, witness)
+        self._writer = writer
+        self._outlet = Outlet(transport, named, writer)
         self._refusals = Refusals()
-        self._answers = Answers()
+        self._answers = RefusalAnswers()
         self._keeper = Keeper(kind, kept, self._publish)
         self._started_at = clock.monotonic()
         self._reset = False
@@ -152,7 +152,7 @@ class GraphNode(Generic[S, L, M, E, R]):
         if self.presence.may_speak:
             self._answers.say(now, self._kind.answer, self._publish)
         self._keeper.tell(memories, now, self.presence.may_speak)
-        self._witness.flush()
+        self._writer.flush()
 
     def end(self) -> bool:
         """Nothing to switch off."""
@@ -188,7 +188,7 @@ class GraphNode(Generic[S, L, M, E, R]):
         heard_on = self._named(topic).name
 
         def put(message: Message) -> None:
-            self._witness.spoken(heard_on, message, sent=False)
+            self._writer.spoken(heard_on, message, sent=False)
             with self._counting(topic.name, message):
                 event = self._kind.requests[topic](message, self._settings, self._clock.wall())
                 self.inbox.put(self._kind.device_name(message), (topic, event))
@@ -251,7 +251,7 @@ class GraphNode(Generic[S, L, M, E, R]):
             if self._kind.idle(subject.memory, now):
                 self._requesters -= self._remembered(subject)
                 del self.subjects[subject.name]
-                self._witness.forgotten(subject.name, now)
+                self._writer.forgotten(subject.name, now)
                 self._shown.discard(subject.name)
 
     def _receive(self, name: str, topic: Topic[Message], event: E) -> None:
@@ -299,8 +299,8 @@ class GraphNode(Generic[S, L, M, E, R]):
 
     def _add(self, name: str, memory: M) -> Subject[M, GraphEvent[E], None, R]:
         refusals, clock = self._refusals, self._clock
-        say, witness = self._will_say, self._witness
-        subject = Subject(name, memory, self._core, say, refusals, clock, witness)
+        say, writer = self._will_say, self._writer
+        subject = Subject(name, memory, self._core, say, refusals, clock, writer)
         self.subjects[name] = subject
         self._requesters += self._remembered(subject)
         self._decide(subject, self._may)

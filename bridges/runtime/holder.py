@@ -12,7 +12,7 @@ from typing import Final
 
 import msgspec
 
-from bridges.host.directories import Distrusted, Places, cannot_be_seen, named, opened
+from bridges.host.directories import Directories, Distrusted, cannot_be_seen, named, opened
 from bridges.host.files import read
 
 HOLDER: Final = "holder.json"
@@ -60,7 +60,7 @@ def ourselves(file: Path, *, serves: bool) -> LockHolder:
     return LockHolder(os.getpid(), named(file), serves, _boot(), _started(os.getpid()))
 
 
-def look(places: Places) -> LockHolder | None:
+def look(places: Directories) -> LockHolder | None:
     """The process that has these directories; None if none lives. Raises PermissionError.
 
     On a read-only root the state directory keeps an old name: the runtime directory's comes first.
@@ -82,7 +82,7 @@ def written(folder: Path) -> LockHolder | None:
         raise cannot_be_seen(folder, error) from None
 
 
-def shown(places: Places) -> LockHolder | None:
+def shown(places: Directories) -> LockHolder | None:
     """The living daemon of a fresh status file: one that could not write its name, or whose version
     wrote none."""
     path = places.runtime / STATUS

@@ -13,7 +13,7 @@ from bridges.kinds.shared.decision import Fault, M, R
 from bridges.kinds.shared.durations import AGES_AGO, NEVER
 from bridges.kinds.shared.graph_kind import GraphKind
 from bridges.kinds.shared.kind import E, L, S
-from bridges.runtime.clock import Pace
+from bridges.runtime.clock import PublishPace
 from bridges.runtime.subject import Publish
 
 log = logging.getLogger(__name__)
@@ -44,7 +44,7 @@ class Keeper(Generic[S, L, M, E, R]):
         self._bytes: bytes | None = None
         self._again_at = AGES_AGO
         self._fault: Fault | None = None
-        self._pace = Pace()
+        self._pace = PublishPace()
 
     def restore(self, settings: S, now: float) -> Mapping[str, M]:
         """The memories on disk; an invalid file is logged and ignored."""

@@ -17,7 +17,7 @@ from bridges.kinds.shared.durations import AGES_AGO, NEVER
 from bridges.runtime.clock import Clock
 from bridges.runtime.device import AnyNode
 from bridges.runtime.inbox import Inbox
-from bridges.runtime.ring_writer import NOBODY, Nobody
+from bridges.runtime.ring_writer import NOBODY, NoWriter
 from bridges.runtime.serving import LEAST_GAP_S
 from drivers.hal import Bus
 
@@ -37,7 +37,7 @@ class Loop:
         nodes: Sequence[AnyNode],
         scan_s: float,
         clock: Clock,
-        witness: Nobody = NOBODY,
+        writer: NoWriter = NOBODY,
     ) -> None:
         self.name = f"bus-{bus_name}"
         self.nodes = nodes
@@ -46,7 +46,7 @@ class Loop:
         self._bus = bus
         self._scan_s = scan_s
         self._clock = clock
-        self._witness = witness
+        self._writer = writer
         self._due = dict.fromkeys((node.name for node in nodes), AGES_AGO)
         self._edge = False
         self._ran_at = NEVER
@@ -74,7 +74,7 @@ class Loop:
         self._notice_suspension()
         self._take_edge()
         self._scan_in_turn(self.inbox.waiting())
-        self._witness.flush()
+        self._writer.flush()
         if self.inbox.closed:
             return
         self._bus.scanned()

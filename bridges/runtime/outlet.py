@@ -9,7 +9,7 @@ from bridges.kinds.shared.decision import Fault
 from bridges.messages.definitions import Alert, Message
 from bridges.messages.fallbacks import INSTEAD, converted
 from bridges.messages.topics import Topic
-from bridges.runtime.ring_writer import NOBODY, Nobody
+from bridges.runtime.ring_writer import NOBODY, NoWriter
 from bridges.runtime.runtime_directory import Once
 from bridges.transports.transport import Publisher, Transport, TransportError
 
@@ -26,10 +26,10 @@ class Outlet:
     An alarm and its end take the same way, even if the release changes in between.
     """
 
-    def __init__(self, transport: Transport, named: Named, witness: Nobody = NOBODY) -> None:
+    def __init__(self, transport: Transport, named: Named, writer: NoWriter = NOBODY) -> None:
         self._transport = transport
         self._named = named
-        self._witness = witness
+        self._writer = writer
         self._ends: dict[str, Publisher[Message]] = {}
         self._instead: set[str] = set()
         self._once = Once("not_published", "published_again", "topic", logging.ERROR)
@@ -54,7 +54,7 @@ class Outlet:
             self.failed(topic, error)
             return False
         self._once.works(topic.name)
-        self._witness.spoken(self._named(way).name, wanted, sent=True)
+        self._writer.spoken(self._named(way).name, wanted, sent=True)
         return True
 
     def failed(self, topic: Topic[Message], error: Exception) -> None:

@@ -13,7 +13,7 @@ from collections.abc import Callable, Collection, Sequence
 from typing import Any
 
 from bridges.host.log import pairs
-from bridges.runtime.record import Record, Records
+from bridges.runtime.record import ClaimRecord, Records
 from drivers import Driver
 
 log = logging.getLogger(__name__)
@@ -29,7 +29,7 @@ LOOK_EVERY_S = 0.02
 class Predecessor:
     """`ours`: this daemon's own record. `command`: the `outputs-off` of its file."""
 
-    def __init__(self, records: Records, ours: Record, command: Sequence[str]) -> None:
+    def __init__(self, records: Records, ours: ClaimRecord, command: Sequence[str]) -> None:
         self._records = records
         self._ours = ours
         self._command = command

@@ -19,7 +19,7 @@ import msgspec
 
 from bridges import BUILD, VERSION
 from bridges.host import files
-from bridges.host.directories import Places, named, opened
+from bridges.host.directories import Directories, named, opened
 from bridges.host.log import pairs
 from bridges.kinds.shared.rmf_section import Rmf
 from bridges.settings import names
@@ -33,7 +33,7 @@ SIZE_MAX = 64 << 20
 """Larger than any YAML with its profiles and DBC files."""
 
 
-class Claim(msgspec.Struct, frozen=True):
+class ClaimedSettings(msgspec.Struct, frozen=True):
     """Validated settings, each as JSON. `version`: of the program that wrote them."""
 
     version: str
@@ -55,10 +55,10 @@ class Claimed(msgspec.Struct, frozen=True):
     safe: tuple[str, ...] = ()
 
 
-class Record(Claimed, frozen=True):
+class ClaimRecord(Claimed, frozen=True):
     """`claim`: the YAML as settings."""
 
-    claim: Claim | None = None
+    claim: ClaimedSettings | None = None
 
     @property
     def name(self) -> str:
@@ -80,23 +80,23 @@ class Record(Claimed, frozen=True):
         return understood(self.file, self.yaml)
 
 
-def of(config: Config) -> Record:
+def of(config: Config) -> ClaimRecord:
     """The record of this config, which must be the only one that this process has loaded."""
     known = dict(sorted(texts.all_known().items()))
-    return Record(named(config.path), config.text, known, claim=_claim(config))
+    return ClaimRecord(named(config.path), config.text, known, claim=_claim(config))
 
 
-def _claim(config: Config) -> Claim:
+def _claim(config: Config) -> ClaimedSettings:
     buses = {name: (config.bus_types[name], _json(bus)) for name, bus in config.buses.items()}
     devices = {name: _json(device) for name, device in config.devices.items()}
-    return Claim(VERSION, config.kind, config.driver, buses, devices)
+    return ClaimedSettings(VERSION, config.kind, config.driver, buses, devices)
 
 
 def _json(settings: msgspec.Struct) -> bytes:
     return msgspec.json.encode(settings)
 
 
-def _claimed(record: Record, claim: Claim) -> Config:
+def _claimed(record: ClaimRecord, claim: ClaimedSettings) -> Config:
     """The Config of these settings. Raises MsgspecError, ImportError or AttributeError."""
     return Config(
         path=Path(record.file),
@@ -113,7 +113,7 @@ def _claimed(record: Record, claim: Claim) -> Config:
     )
 
 
-def _device(claim: Claim, text: bytes) -> msgspec.Struct:
+def _device(claim: ClaimedSettings, text: bytes) -> msgspec.Struct:
     """A device's settings, of its own driver or the file's."""
     own = msgspec.json.decode(text, type=_OwnDriver).driver or claim.driver
     device: msgspec.Struct = msgspec.json.decode(
@@ -129,13 +129,13 @@ class _OwnDriver(msgspec.Struct):
 class Records:
     """The records of one file in a daemon's directories."""
 
-    def __init__(self, places: Places, file: Path) -> None:
+    def __init__(self, places: Directories, file: Path) -> None:
         self._places = places
         self._file = named(file)
 
-    def unreleased(self) -> list[Record]:
+    def unreleased(self) -> list[ClaimRecord]:
         """The records not yet released; unreadable ones are named, and left out like other files'."""
-        by_name = dict[str, Record]()
+        by_name = dict[str, ClaimRecord]()
         for path in paths(self._places):
             if (record := read(path)) is None:
                 log.warning(pairs("record_not_read", path=path))
@@ -143,7 +143,7 @@ class Records:
                 by_name[record.name] = record
         return list(by_name.values())
 
-    def write(self, record: Record) -> Path:
+    def write(self, record: ClaimRecord) -> Path:
         """Write a record; returns its path. Raises OSError if neither directory takes it."""
         content = msgspec.json.encode(record)
         refused: OSError | None = None
@@ -160,12 +160,12 @@ class Records:
         assert refused is not None
         raise refused
 
-    def still_unsafe(self, record: Record, devices: Collection[str], config: Config) -> None:
+    def still_unsafe(self, record: ClaimRecord, devices: Collection[str], config: Config) -> None:
         """Note that these devices are not verified off, and all others are. Raises OSError."""
         safe = tuple(name for name in config.devices if name not in devices)
         self.write(msgspec.structs.replace(record, safe=safe))
 
-    def release(self, record: Record) -> None:
+    def release(self, record: ClaimRecord) -> None:
         """Remove a record whose outputs are all off. Raises OSError.
 
         That of another version has the name which that version gave it.
@@ -175,14 +175,14 @@ class Records:
                 path.unlink(missing_ok=True)
 
 
-def paths(places: Places) -> Iterator[Path]:
+def paths(places: Directories) -> Iterator[Path]:
     """Every file that may be a record."""
     for folder in places.folders:
         with suppress(OSError):
             yield from sorted(folder.glob(PATTERN))
 
 
-def read(path: Path) -> Record | None:
+def read(path: Path) -> ClaimRecord | None:
     """The record in a file; None if it is invalid, unreadable or a symbolic link."""
     try:
         return _decoded(files.read(path, SIZE_MAX))
@@ -190,9 +190,9 @@ def read(path: Path) -> Record | None:
         return None
 
 
-def _decoded(content: bytes) -> Record:
+def _decoded(content: bytes) -> ClaimRecord:
     """Raises MsgspecError or UnicodeDecodeError."""
     try:
-        return msgspec.json.decode(content, type=Record)
+        return msgspec.json.decode(content, type=ClaimRecord)
     except msgspec.ValidationError:  # another version's claim: the YAML beside it is enough
-        return Record(**msgspec.structs.asdict(msgspec.json.decode(content, type=Claimed)))
+        return ClaimRecord(**msgspec.structs.asdict(msgspec.json.decode(content, type=Claimed)))

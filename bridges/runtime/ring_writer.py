@@ -1,7 +1,7 @@
-"""The witness: it writes what a daemon sees and does into its ring.
+"""Writes what a daemon sees and does into its ring.
 
 A scan only puts what happened into a queue, which takes less than a microsecond. After the outputs are
-written and the states are published, `flush` encodes the queue and appends it to the ring. A witness
+written and the states are published, `flush` encodes the queue and appends it to the ring. A writer
 that fails loses entries; it never raises, and it delays no scan.
 """
 
@@ -13,8 +13,8 @@ from contextlib import suppress
 from typing import Any, Final
 
 from bridges.blackbox import entries
-from bridges.blackbox.entries import AnyEntry, Clocks, Forgotten, Published, Same, Spoken
-from bridges.blackbox.known import AnyDecision, Seen, known, step
+from bridges.blackbox.entries import AnyEntry, Clocks, Published, Same, Spoken, SubjectForgotten
+from bridges.blackbox.known import AnyDecision, KnownSubject, known, step
 from bridges.blackbox.ring import FRAME, Ring
 from bridges.kinds.shared.decision import IoFailed, Sampled
 from bridges.kinds.shared.durations import AGES_AGO, NEVER
@@ -36,10 +36,10 @@ MOST_SPOKEN_PER_S: Final = 200.0
 """More messages than this in a second are only counted: a flood must not delay a scan."""
 STEP_S: Final = 0.05
 AGAIN_S: Final = 10.0
-"""How long (s) a witness whose ring failed waits before it makes another."""
+"""How long (s) a writer whose ring failed waits before it makes another."""
 
 
-class Nobody:
+class NoWriter:
     """A daemon without a recording."""
 
     def decided(
@@ -69,11 +69,11 @@ class Nobody:
         """The daemon ends in good order."""
 
 
-NOBODY: Final = Nobody()
+NOBODY: Final = NoWriter()
 
 
-class Witness(Nobody):
-    """The witness of one daemon. Every method may be called from any thread."""
+class RingWriter(NoWriter):
+    """The ring's writer of one daemon. Every method may be called from any thread."""
 
     def __init__(
         self, make: Callable[[], Ring], clock: Clock, release: Callable[[], Release]
@@ -107,11 +107,11 @@ class Witness(Nobody):
 
     def died(self, reason: str) -> None:
         self._dead = True
-        self._waiting.append((self._last, entries.Died(self._clock.monotonic(), reason)))
+        self._waiting.append((self._last, entries.DaemonDied(self._clock.monotonic(), reason)))
         self.flush()
 
     def ended(self, *, safe: bool) -> None:
-        self._waiting.append((self._last, entries.Ended(self._clock.monotonic(), safe)))
+        self._waiting.append((self._last, entries.DaemonEnded(self._clock.monotonic(), safe)))
         self.flush()
         with self._lock, suppress(OSError):
             ring, self._ring = self._ring, None
@@ -157,9 +157,9 @@ class Witness(Nobody):
 
     def _fresh(self) -> None:
         """Begin with an empty ring: nothing has been written yet."""
-        self._subjects: dict[str, Seen] = {}
+        self._subjects: dict[str, KnownSubject] = {}
         self._out = bytearray()
-        self._same: dict[str, Seen] = {}
+        self._same: dict[str, KnownSubject] = {}
         self._known_at = AGES_AGO
         self._may_speak, self._spoken_at, self._lost = MOST_SPOKEN_PER_S, AGES_AGO, 0
         self._offset_s = 0.0
@@ -206,13 +206,13 @@ class Witness(Nobody):
         if is_reading:
             subject.reading = event
 
-    def _anew(self, name: str, memory: object, now: float) -> Seen:
+    def _anew(self, name: str, memory: object, now: float) -> KnownSubject:
         self._say_same(name)
-        self._put(known(name, Seen(memory), now, anew=True))
-        self._subjects[name] = subject = Seen(memory)
+        self._put(known(name, KnownSubject(memory), now, anew=True))
+        self._subjects[name] = subject = KnownSubject(memory)
         return subject
 
-    def _again(self, name: str, subject: Seen, now: float) -> None:
+    def _again(self, name: str, subject: KnownSubject, now: float) -> None:
         subject.times.append(now)
         self._same[name] = subject
         if len(subject.times) == SAME_AT_ONCE:
@@ -234,7 +234,7 @@ class Witness(Nobody):
 
     def _forgotten(self, name: str, now: float) -> None:
         if self._subjects.pop(name, None) is not None:
-            self._put(Forgotten(now, name))
+            self._put(SubjectForgotten(now, name))
 
     def _spoken(self, now: float, topic: str, message: Message, sent: bool) -> None:
         if not self._may_keep(now):
@@ -254,7 +254,7 @@ class Witness(Nobody):
         self._may_speak -= 1.0
         if self._lost:
             lost, self._lost = self._lost, 0
-            self._put(entries.Lost(now, lost))
+            self._put(entries.EntriesLost(now, lost))
         return True
 
     def _last(self, entry: AnyEntry) -> None:
@@ -271,7 +271,7 @@ class Witness(Nobody):
         assert self._ring is not None
         content = entries.encode(entry)
         if len(content) > self._ring.room // 2:
-            self._put(entries.Lost(entry.at, 1))
+            self._put(entries.EntriesLost(entry.at, 1))
             return
         if not self._fits(len(content)):
             self._next_segment(entry.at)

@@ -23,8 +23,8 @@ from bridges.host import files
 from bridges.host.directories import (
     SERVICE_RUN,
     SERVICE_STATE,
+    Directories,
     Distrusted,
-    Places,
     as_given,
     by_hand,
     everywhere,
@@ -35,7 +35,7 @@ from bridges.host.directories import (
 from bridges.host.log import pairs
 from bridges.runtime import holder
 from bridges.runtime.holder import HOLDER, STATUS, LockHolder
-from bridges.runtime.record import Record, Records, paths, read
+from bridges.runtime.record import ClaimRecord, Records, paths, read
 
 log = logging.getLogger(__name__)
 
@@ -51,7 +51,7 @@ class AlreadyRunning(Exception):
     """Another daemon serves this YAML, or uses these directories."""
 
 
-def find(file: Path, given: str | None) -> Places:
+def find(file: Path, given: str | None) -> Directories:
     """The directories of this file's daemon, by the one rule (`bridges/host/directories.py`).
 
     Raises PermissionError if the service's directory cannot be read.
@@ -62,7 +62,7 @@ def find(file: Path, given: str | None) -> Places:
     return next((p for p in everywhere(file) if _is_about(p, file)), by_hand(file))
 
 
-def _is_about(places: Places, file: Path) -> bool:
+def _is_about(places: Directories, file: Path) -> bool:
     holders = [holder.shown(places), *map(holder.written, places.folders)]
     found = {one.file for one in holders if one}
     found |= {record.file for path in paths(places) if (record := read(path))}
@@ -161,7 +161,9 @@ class RuntimeDirectory:
     `serves`: whether the process is a daemon, to which a reset may be sent.
     """
 
-    def __init__(self, places: Places, file: Path, *, serves: bool, wait_s: float = WAIT_S) -> None:
+    def __init__(
+        self, places: Directories, file: Path, *, serves: bool, wait_s: float = WAIT_S
+    ) -> None:
         """Take the locks; waits for an `outputs-off` that holds them.
 
         Raises AlreadyRunning, and PermissionError if a directory cannot be trusted.
@@ -171,14 +173,14 @@ class RuntimeDirectory:
         self.records = Records(places, file)
         self._holder = holder.ourselves(file, serves=serves)
         self._locks: dict[Path, int] = {}
-        self._record: Record | None = None
+        self._record: ClaimRecord | None = None
         self._once = Once()
         deadline = time.monotonic() + wait_s
         for folder in places.folders:
             self._lock_by(folder, deadline)
         self._sign(self._holder)
 
-    def claim(self, record: Record) -> None:
+    def claim(self, record: ClaimRecord) -> None:
         """Write the record of what this daemon is about to claim; a failure is tried again."""
         self._record = record
         self._write_record()

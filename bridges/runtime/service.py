@@ -24,7 +24,7 @@ from bridges.runtime.keeper import MemoryStore
 from bridges.runtime.loop import Loop
 from bridges.runtime.outlet import Named, Outlet
 from bridges.runtime.predecessor import SafeFirst
-from bridges.runtime.ring_writer import NOBODY, Nobody
+from bridges.runtime.ring_writer import NOBODY, NoWriter
 from bridges.runtime.serving import Serving
 from bridges.runtime.subject import Status
 from bridges.settings.load import Config
@@ -75,20 +75,20 @@ def service(
     open_bus: OpenBus,
     kept: MemoryStore | None = None,
     unsafe: Collection[str] = (),
-    witness: Nobody = NOBODY,
+    writer: NoWriter = NOBODY,
 ) -> Service:
     """The service for this YAML. Raises HalError when a bus cannot be opened.
 
     `kept`: where a kind without hardware keeps its memory across restarts; None to keep nothing.
-    `unsafe`: devices that a dead daemon may have left on. `witness`: is told what happens.
+    `unsafe`: devices that a dead daemon may have left on. `writer`: is told what happens.
     """
     kind = kind_called(config.kind)
     named = partial(named_by, config)
     clock = clock_of(transport)
     if isinstance(kind, GraphKind):
-        node = GraphNode(kind, config.section, transport, clock, named, kept, witness)
+        node = GraphNode(kind, config.section, transport, clock, named, kept, writer)
         return GraphService(node, clock)
-    return Devices(config, kind, transport, open_bus, named, clock, unsafe, witness)
+    return Devices(config, kind, transport, open_bus, named, clock, unsafe, writer)
 
 
 class GraphService:
@@ -117,17 +117,17 @@ class Devices:
         named: Named,
         clock: Clock,
         unsafe: Collection[str] = (),
-        witness: Nobody = NOBODY,
+        writer: NoWriter = NOBODY,
     ) -> None:
         self._config = config
-        self._witness = witness
+        self._writer = writer
         self._unsafe = unsafe
         self._kind = kind
         self._transport = transport
         self._clock = clock
         self._named = named
         self._strangers: Counter[str] = Counter()
-        self._outlet = Outlet(transport, named, witness)
+        self._outlet = Outlet(transport, named, writer)
         self._outlet.open(self._topics())
         self._hears: dict[str, Subscription] = {}
         self._attended: bool | None = None
@@ -183,7 +183,7 @@ class Devices:
         settings = self._config.buses[bus_name]
         bus = open_bus(bus_name)
         nodes = [self._node(name, bus) for name in self._config.devices_on(bus_name)]
-        return Loop(bus_name, bus, nodes, settings.scan_s, self._clock, self._witness)
+        return Loop(bus_name, bus, nodes, settings.scan_s, self._clock, self._writer)
 
     def _node(self, name: str, bus: Bus) -> AnyNode:
         device = self._config.devices[name]
@@ -192,9 +192,9 @@ class Devices:
         driver = driver_type.create(name, device, bus)
         if name in self._unsafe:
             driver = SafeFirst(name, driver)
-        out, clock, witness = self._outlet, self._clock, self._witness
+        out, clock, writer = self._outlet, self._clock, self._writer
         return Node(
-            name, self._kind, device, limits, driver, out.publish, clock, witness, out.failed
+            name, self._kind, device, limits, driver, out.publish, clock, writer, out.failed
         )
 
     def _to_inbox(
@@ -207,7 +207,7 @@ class Devices:
         def put(message: Message) -> None:
             device = self._kind.device_name(message)
             if device in self._placed:
-                self._witness.spoken(heard_on, message, sent=False)
+                self._writer.spoken(heard_on, message, sent=False)
                 node, loop = self._placed[device]
                 try:
                     event = accept(message, self._config.devices[device])

@@ -62,7 +62,7 @@ class SwitchOff:
 
 
 @dataclass(frozen=True, slots=True)
-class Write:
+class WriteFile:
     """A file with this content, which everybody may read; a copy of `source` if there is one."""
 
     path: Path
@@ -77,7 +77,7 @@ class Remove:
     path: Path
 
 
-Step = Run | SwitchOff | Write | Remove
+Step = Run | SwitchOff | WriteFile | Remove
 
 
 def switch_off(name: str) -> SwitchOff:
@@ -124,9 +124,9 @@ def _show(step: Step) -> None:
             print(shlex.join(words))
         case SwitchOff(words, state):
             print(f"{shlex.join(words)}   # if a record is left in {state}")
-        case Write(path, _, source) if source:
+        case WriteFile(path, _, source) if source:
             print(shlex.join(["install", "-m", "644", str(source), str(path)]))
-        case Write(path, content):
+        case WriteFile(path, content):
             print(f"write {path}:")
             print("".join(f"    {line}\n" for line in content.decode().splitlines()), end="")
         case Remove(path):
@@ -149,7 +149,7 @@ def _taken(step: Step, root: Path) -> int:
             return subprocess.run([words[0], *where, *words[1:]]).returncode
         case SwitchOff(words, state):
             return _off(words, state)
-        case Write(path, content):
+        case WriteFile(path, content):
             path.parent.mkdir(parents=True, exist_ok=True)
             replace(path, content)
             path.chmod(0o644)

@@ -14,7 +14,7 @@ from bridges.messages.definitions import Message
 from bridges.messages.topics import Topic
 from bridges.runtime.clock import Clock
 from bridges.runtime.refusals import Refusals
-from bridges.runtime.ring_writer import NOBODY, Nobody
+from bridges.runtime.ring_writer import NOBODY, NoWriter
 
 log = logging.getLogger(__name__)
 
@@ -28,7 +28,7 @@ V = TypeVar("V")
 """The events of a core."""
 
 
-class Core(Struct, Generic[M, V, O, R], frozen=True):
+class SubjectCore(Struct, Generic[M, V, O, R], frozen=True):
     """A kind's core with its limits, as subjects need it.
 
     `word`: the key of a subject's name in the log. `decide(memory, event, now)`.
@@ -49,11 +49,11 @@ class Subject(Generic[M, V, O, R]):
         self,
         name: str,
         memory: M,
-        core: Core[M, V, O, R],
+        core: SubjectCore[M, V, O, R],
         publish: Publish,
         refusals: Refusals,
         clock: Clock,
-        witness: Nobody = NOBODY,
+        writer: NoWriter = NOBODY,
     ) -> None:
         self.name = name
         self.memory = memory
@@ -64,7 +64,7 @@ class Subject(Generic[M, V, O, R]):
         self._publish = publish
         self._refusals = refusals
         self._clock = clock
-        self._witness = witness
+        self._writer = writer
         self._logged_news: object = None
         self._logged: Mapping[str, str] = {}
         self._faults: Mapping[object, Fault] = {}
@@ -73,7 +73,7 @@ class Subject(Generic[M, V, O, R]):
         """One step of the core."""
         before, now = self.memory, self._clock.monotonic()
         decision = self._core.decide(before, event, now)
-        self._witness.decided(self.name, before, event, now, decision)
+        self._writer.decided(self.name, before, event, now, decision)
         self.memory, self.wake_at, self.decision = decision.memory, decision.wake_at, decision
         for topic, message in decision.publish:
             self._publish(topic, message)
@@ -87,7 +87,7 @@ class Subject(Generic[M, V, O, R]):
         """Note that its report was published. `memory`: as the core has it after that."""
         if memory is not self.memory:
             self.memory = memory
-            self._witness.published(self.name, memory, self._clock.monotonic())
+            self._writer.published(self.name, memory, self._clock.monotonic())
 
     def log(self, report: R) -> None:
         """Log what has changed since the last report."""

@@ -21,7 +21,7 @@ from msgspec import Struct, field
 from yaml import CollectionNode, MappingNode, Node, ScalarNode, SequenceNode
 
 from bridges.kinds.shared.kind import CHARGER, DOOR, FLOOR, LIFT, WAYPOINT
-from bridges.yaml.nodes import Page, Sort, compose, read
+from bridges.yaml.nodes import Sort, YamlFile, compose, read
 
 MAP = Sort("building map or navigation graph", "levels: ...", 1024 * 1024, 100_000)
 """A file of this size takes some seconds to read; longer ones are refused at once."""
@@ -46,19 +46,19 @@ class BuildingMap(Struct, frozen=True):
 
 def load_map(file: str) -> BuildingMap:
     """Read a building map or navigation graph. Raises SettingsError with what is wrong with it."""
-    page = Page(file)
+    page = YamlFile(file)
     root = compose(page, read(file, MAP), MAP)
     page.check()
-    reading = _Reading(page)
+    reading = _MapReading(page)
     reading.all(root)
     page.check()
     return BuildingMap(file, reading.named, reading.stops, reading.places)
 
 
-class _Reading:
+class _MapReading:
     """Collects the names of one file; deviations from RMF's format go to the page."""
 
-    def __init__(self, page: Page) -> None:
+    def __init__(self, page: YamlFile) -> None:
         self.named: dict[str, Lines] = {w: {} for w in (FLOOR, LIFT, DOOR, CHARGER, WAYPOINT)}
         self.stops: dict[str, Lines] = {}
         self.places: dict[str, Place] = {}

@@ -6,8 +6,8 @@ from yaml import MappingNode, ScalarNode
 from bridges.kinds.shared.remarks import Remarks
 from bridges.settings import names as named
 from bridges.settings.top import word
-from bridges.yaml.nodes import Page
-from bridges.yaml.positions import Entry, below
+from bridges.yaml.nodes import YamlFile
+from bridges.yaml.positions import MappingEntry, below
 from bridges.yaml.spelling import either, nearest, unknown
 from bridges.yaml.values import BROKEN, Values
 from drivers.hal import AnyBus
@@ -19,7 +19,7 @@ class BusRead(Struct, frozen=True):
     `type` and `hal`: None where the type is missing or wrong. `settings`: BROKEN where they are wrong.
     """
 
-    entry: Entry
+    entry: MappingEntry
     type: str | None = None
     hal: AnyBus | None = None
     settings: object = BROKEN
@@ -29,7 +29,9 @@ class BusRead(Struct, frozen=True):
         return self.hal.warnings(self.settings) if self.hal and self.settings is not BROKEN else ()
 
 
-def read_bus(entry: Entry, allowed: list[str], driver: str, values: Values, page: Page) -> BusRead:
+def read_bus(
+    entry: MappingEntry, allowed: list[str], driver: str, values: Values, page: YamlFile
+) -> BusRead:
     """Read a bus; problems go to the page. `allowed`: the bus types that the file's drivers can use."""
     if not isinstance(entry.value, MappingNode):
         values.entries(entry.spot())
@@ -49,7 +51,7 @@ def read_bus(entry: Entry, allowed: list[str], driver: str, values: Values, page
     return BusRead(entry, name, hal, values.make(hal.settings, entry.spot(), ("type",)))
 
 
-def _note_untyped(bus: Entry, allowed: list[str], values: Values, page: Page) -> None:
+def _note_untyped(bus: MappingEntry, allowed: list[str], values: Values, page: YamlFile) -> None:
     """Note that a bus has no `type`, or misspells the key; its other keys mean nothing yet."""
     entries = {e.name: e for e in values.entries(bus.spot())}
     near = nearest("type", entries)
@@ -59,7 +61,7 @@ def _note_untyped(bus: Entry, allowed: list[str], values: Values, page: Page) ->
         page.note(entries[near].key, unknown("key", near, ["type"]))
 
 
-def _is_other_type(kind: Entry, allowed: list[str]) -> bool:
+def _is_other_type(kind: MappingEntry, allowed: list[str]) -> bool:
     """Whether there is such a bus type, but none of the file's drivers can use it."""
     others = set(named.bus_types()).difference(allowed)
     return isinstance(kind.value, ScalarNode) and kind.value.value in others

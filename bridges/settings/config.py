@@ -6,7 +6,7 @@ from typing import Any
 
 from msgspec import Struct, field
 
-from bridges.kinds.shared.recording_section import Recording
+from bridges.kinds.shared.recording_section import RecordingSettings
 from bridges.kinds.shared.rmf_section import Rmf
 from bridges.settings import names as named
 from bridges.yaml.problems import Problem
@@ -36,7 +36,7 @@ class Config(Struct, frozen=True):
     warnings: tuple[Problem, ...] = ()
     notes: tuple[Problem, ...] = ()
     section: Any = None
-    recording: Recording = Recording()
+    recording: RecordingSettings = RecordingSettings()
 
     def bus_of(self, device_name: str) -> str:
         """The name of the bus that a device is on."""

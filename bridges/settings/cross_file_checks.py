@@ -11,7 +11,7 @@ from msgspec import Struct
 from bridges.kinds import kind_called
 from bridges.kinds.shared.graph_kind import GraphKind
 from bridges.settings.load import Config
-from bridges.yaml.nodes import Page, Problem, compose
+from bridges.yaml.nodes import Problem, YamlFile, compose
 from bridges.yaml.positions import Spot, locate
 from bridges.yaml.spelling import unknown
 from drivers.hal import Where
@@ -26,7 +26,7 @@ class Found(Struct, frozen=True):
     warnings: list[Problem]
 
 
-class Claim(Struct, frozen=True):
+class ExclusiveUse(Struct, frozen=True):
     """A file uses something that only one file may use. `what`: its name. `path`: where it says so."""
 
     config: Config
@@ -35,7 +35,7 @@ class Claim(Struct, frozen=True):
 
     def place(self) -> Problem:
         """The place in the file, as a Problem without text."""
-        page = Page(str(self.config.path))
+        page = YamlFile(str(self.config.path))
         root = compose(page, self.config.text)
         return page.problem(locate(Spot(root, root, ""), self.path).where(), "")
 
@@ -58,21 +58,21 @@ def taken(configs: Sequence[Config], one_machine: bool = True) -> Iterator[Probl
     yield from map(_taken, (*lines, *_twice(rest)))
 
 
-def _twice(claims: Iterable[Claim]) -> Iterator[tuple[Claim, Claim]]:
+def _twice(claims: Iterable[ExclusiveUse]) -> Iterator[tuple[ExclusiveUse, ExclusiveUse]]:
     """(later, first) for what two files claim; the loader has checked each file by itself."""
-    first: dict[str, Claim] = {}
+    first: dict[str, ExclusiveUse] = {}
     for claim in claims:
         other = first.setdefault(claim.what, claim)
         if other.config is not claim.config:
             yield claim, other
 
 
-def _said(claim: Claim, text: str) -> Problem:
+def _said(claim: ExclusiveUse, text: str) -> Problem:
     place = claim.place()
     return Problem(place.file, place.line, place.column, text)
 
 
-def _taken(pair: tuple[Claim, Claim]) -> Problem:
+def _taken(pair: tuple[ExclusiveUse, ExclusiveUse]) -> Problem:
     claim, other = pair
     first = other.place()
     return _said(claim, f"{claim.what} is used in {first.file} too, on line {first.line}")
@@ -85,34 +85,34 @@ def _buses(config: Config) -> Iterator[tuple[str, Where]]:
             yield name, where
 
 
-def _lines(config: Config, one_machine: bool) -> Iterator[Claim]:
+def _lines(config: Config, one_machine: bool) -> Iterator[ExclusiveUse]:
     """Ports that only one daemon can open."""
     for name, where in _buses(config):
         if where.clients == "one" and one_machine:
-            yield Claim(config, where.text, ("buses", name))
+            yield ExclusiveUse(config, where.text, ("buses", name))
 
 
-def _gateways(config: Config) -> Iterator[Claim]:
+def _gateways(config: Config) -> Iterator[ExclusiveUse]:
     """Addresses where the make decides how many clients may connect."""
     for name, where in _buses(config):
         if where.clients is None:
-            yield Claim(config, where.text, ("buses", name))
+            yield ExclusiveUse(config, where.text, ("buses", name))
 
 
-def _claims(config: Config, one_machine: bool) -> Iterator[Claim]:
+def _claims(config: Config, one_machine: bool) -> Iterator[ExclusiveUse]:
     """Names on RMF's graph, and places on buses."""
     kind = kind_called(config.kind)
     if isinstance(kind, GraphKind):
-        yield Claim(config, f"kind: {kind.name}", ("kind",))
+        yield ExclusiveUse(config, f"kind: {kind.name}", ("kind",))
         return
     for name in config.devices:
-        yield Claim(config, f"the {kind.name} '{name}'", (kind.devices_key, name))
+        yield ExclusiveUse(config, f"the {kind.name} '{name}'", (kind.devices_key, name))
     for bus, where in _buses(config):
         if one_machine or not where.local:
             for device in config.devices_on(bus):
                 for place, path in _places(config, bus, device):
                     what = f"{place} of {where.text}"
-                    yield Claim(config, what, (kind.devices_key, device, *path))
+                    yield ExclusiveUse(config, what, (kind.devices_key, device, *path))
 
 
 def _places(config: Config, bus: str, device: str) -> Iterator[tuple[str, Path]]:
@@ -125,7 +125,7 @@ def _places(config: Config, bus: str, device: str) -> Iterator[tuple[str, Path]]
     yield from config.driver_type(device).claims(config.devices[device])
 
 
-def _shared(pair: tuple[Claim, Claim], claims: Sequence[Claim]) -> Problem:
+def _shared(pair: tuple[ExclusiveUse, ExclusiveUse], claims: Sequence[ExclusiveUse]) -> Problem:
     """The warning for one gateway in two files; it names the units that both ask."""
     claim, other = pair
     both = _units(claim.config, claim.what, claims) & _units(other.config, claim.what, claims)
@@ -136,7 +136,7 @@ def _shared(pair: tuple[Claim, Claim], claims: Sequence[Claim]) -> Problem:
     )
 
 
-def _units(config: Config, gateway: str, claims: Sequence[Claim]) -> set[str]:
+def _units(config: Config, gateway: str, claims: Sequence[ExclusiveUse]) -> set[str]:
     ours = (c.what.split() for c in claims if c.config is config and c.what.endswith(gateway))
     return {words[1] for words in ours if words[0] == "unit"}
 
@@ -147,7 +147,8 @@ def _domains(configs: Sequence[Config]) -> Iterator[Problem]:
         if ours != first:
             text = f"DDS domain {ours}, but {configs[0].path} is in domain {first}"
             yield _said(
-                Claim(config, "", ("rmf", "domain_id")), f"{text}: they cannot hear each other"
+                ExclusiveUse(config, "", ("rmf", "domain_id")),
+                f"{text}: they cannot hear each other",
             )
 
 
@@ -173,12 +174,12 @@ def _unspoken(configs: Sequence[Config]) -> Iterator[Problem]:
             if name not in names:
                 key = kind_called(kind).devices_key
                 text = f"warning: '{name}' is not served: {speaker.path} does not name it"
-                yield _said(Claim(config, "", (key, name)), text)
+                yield _said(ExclusiveUse(config, "", (key, name)), text)
 
 
-def _spoken(configs: Sequence[Config]) -> Iterator[tuple[Claim, str, str]]:
+def _spoken(configs: Sequence[Config]) -> Iterator[tuple[ExclusiveUse, str, str]]:
     for config in configs:
         kind = kind_called(config.kind)
         if isinstance(kind, GraphKind):
             for path, what, name in kind.speaks_of(config.section):
-                yield Claim(config, name, (kind.devices_key, *path)), what, name
+                yield ExclusiveUse(config, name, (kind.devices_key, *path)), what, name

@@ -22,7 +22,7 @@ from yaml import MappingNode, YAMLError
 from yaml.constructor import SafeConstructor
 
 from bridges.settings.similarity import Point
-from bridges.yaml.nodes import Page, Problem, SettingsError, Sort, compose, read
+from bridges.yaml.nodes import Problem, SettingsError, Sort, YamlFile, compose, read
 from bridges.yaml.positions import Spot, locate
 
 FLEET = Sort("fleet configuration", "rmf_fleet: ...", 256 * 1024, 20_000)
@@ -44,7 +44,7 @@ class OlderRobot(msgspec.Struct, frozen=True):
     charger: Charger | None = None
 
 
-class Robot(msgspec.Struct, frozen=True):
+class RobotConfig(msgspec.Struct, frozen=True):
     """One robot: its charger's waypoint, in either form."""
 
     charger: str | Charger | None = None
@@ -67,7 +67,7 @@ class RmfFleet(msgspec.Struct, frozen=True):
     recharge_threshold: Soc | None = None
     recharge_soc: Soc | None = None
     finishing_request: str | None = None
-    robots: dict[str, Robot | None] = msgspec.field(default_factory=dict)
+    robots: dict[str, RobotConfig | None] = msgspec.field(default_factory=dict)
 
 
 class Pairs(msgspec.Struct, frozen=True):
@@ -81,7 +81,7 @@ class Contents(msgspec.Struct, frozen=True):
     """The whole file."""
 
     rmf_fleet: RmfFleet
-    robots: dict[str, Robot | None] = msgspec.field(default_factory=dict)
+    robots: dict[str, RobotConfig | None] = msgspec.field(default_factory=dict)
     reference_coordinates: dict[str, Pairs] | None = None
 
 
@@ -97,14 +97,14 @@ class FleetFile(msgspec.Struct, frozen=True):
         """The fleet."""
         return self.contents.rmf_fleet
 
-    def robots(self) -> Iterator[tuple[Path, str, Robot]]:
+    def robots(self) -> Iterator[tuple[Path, str, RobotConfig]]:
         """Each robot's path, name and settings."""
         for top, found in (
             (("rmf_fleet", "robots"), self.fleet.robots),
             (("robots",), self.contents.robots),
         ):
             for name, robot in found.items():
-                yield (*top, name), name, robot or Robot()
+                yield (*top, name), name, robot or RobotConfig()
 
     def references(self) -> Mapping[str, Pairs]:
         """Level -> pairs; the level is EVERY_LEVEL in a file that gives them once."""
@@ -117,7 +117,7 @@ class FleetFile(msgspec.Struct, frozen=True):
 
 def load_fleet(file: str) -> FleetFile:
     """Read a fleet configuration. Raises SettingsError with what is wrong with it."""
-    page = Page(file)
+    page = YamlFile(file)
     root = compose(page, read(file, FLEET), FLEET)
     page.check()
     try:
@@ -139,4 +139,4 @@ def load_fleet(file: str) -> FleetFile:
 
 def _problem(file: str, root: MappingNode, path: Path, text: str) -> Problem:
     spot = Spot(root, root, "the file")
-    return Page(file).problem(locate(spot, path).key, text)
+    return YamlFile(file).problem(locate(spot, path).key, text)

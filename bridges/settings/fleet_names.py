@@ -12,12 +12,12 @@ from typing import Literal
 from msgspec import Struct, field
 from yaml import MappingNode
 
-from bridges.kinds.charger_coordinator.settings import Fleet, Settings, Waypoint
+from bridges.kinds.charger_coordinator.settings import CoordinatorSettings, FleetSettings, Waypoint
 from bridges.settings.building_map import BuildingMap
 from bridges.settings.config import Config
 from bridges.settings.fleet_config import EVERY_LEVEL, FleetFile
 from bridges.settings.similarity import Point, Similarity, estimate
-from bridges.yaml.nodes import Page, Problem, compose
+from bridges.yaml.nodes import Problem, YamlFile, compose
 from bridges.yaml.positions import Spot, locate
 from bridges.yaml.spelling import unknown
 
@@ -46,10 +46,10 @@ def compared(config: Config, fleet: FleetFile, building: BuildingMap | None) -> 
 
 class _Comparing:
     def __init__(self, config: Config, fleet: FleetFile) -> None:
-        assert isinstance(config.section, Settings)
+        assert isinstance(config.section, CoordinatorSettings)
         self.all = Compared()
-        self._settings: Settings = config.section
-        self._page = Page(str(config.path))
+        self._settings: CoordinatorSettings = config.section
+        self._page = YamlFile(str(config.path))
         self._root: MappingNode = compose(self._page, config.text)
         self._fleet = fleet
         self._name = fleet.fleet.name
@@ -81,7 +81,9 @@ class _Comparing:
                 self._theirs("errors", (*path, *below), text)
             self._charger(fleet, name, (*path, *below), waypoint)
 
-    def _charger(self, fleet: Fleet, name: str, path: tuple[str, ...], waypoint: str) -> None:
+    def _charger(
+        self, fleet: FleetSettings, name: str, path: tuple[str, ...], waypoint: str
+    ) -> None:
         robot = fleet.robots[name]
         places = [self._settings.places()[station][self._name] for station in robot.stations]
         if waypoint not in fleet.waypoints:

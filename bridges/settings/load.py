@@ -4,7 +4,7 @@
     driver: dry_contact     a file of drivers/<kind>/; a device may name another as its own `driver:`
     rmf: {...}              bridges.kinds.shared.rmf_section.Rmf
     buses: {name: {type: a file of drivers/hal/, ...}}
-    recording: {...}        bridges.kinds.shared.recording_section.Recording
+    recording: {...}        bridges.kinds.shared.recording_section.RecordingSettings
     lifts: {name: {...}}    the kind's own key; what each holds is the driver's `settings`
 
 A kind without hardware has only `kind`, `rmf`, `recording` and one section of its own.
@@ -22,7 +22,7 @@ from yaml import MappingNode, Node, ScalarNode
 from bridges.kinds import kind_called, kind_names
 from bridges.kinds.shared.fields import DeviceSettings, Name
 from bridges.kinds.shared.graph_kind import AnyGraphKind, AnyKind, GraphKind
-from bridges.kinds.shared.recording_section import Recording
+from bridges.kinds.shared.recording_section import RecordingSettings
 from bridges.kinds.shared.rmf_section import Rmf
 from bridges.messages import topics
 from bridges.settings import names as named
@@ -30,9 +30,9 @@ from bridges.settings.buses import BusRead, read_bus
 from bridges.settings.config import Config
 from bridges.settings.plausible import milliseconds, out_of_step
 from bridges.settings.top import MAPPING, keys_below, top_keys, word
-from bridges.settings.wiring import Use, Wiring, note_conflicts, note_unknown_signals
-from bridges.yaml.nodes import Page, Problem, SettingsError, compose, read
-from bridges.yaml.positions import Entry, Spot, below, is_none, locate
+from bridges.settings.wiring import Use, WiringCheck, note_conflicts, note_unknown_signals
+from bridges.yaml.nodes import Problem, SettingsError, YamlFile, compose, read
+from bridges.yaml.positions import MappingEntry, Spot, below, is_none, locate
 from bridges.yaml.spelling import either, unknown
 from bridges.yaml.values import BROKEN, Broken, Values
 from drivers.driver_type import AnyDriver
@@ -55,16 +55,16 @@ def load(path: Path | str) -> Config:
 
 def understood(path: Path | str, text: bytes) -> Config:
     """The Config of a device YAML's text, which is or was at this path. Raises SettingsError."""
-    page = Page(str(path))
+    page = YamlFile(str(path))
     root = compose(page, text)
     _note_rmfs(page, root)
-    reading = _Reading(page, root)
+    reading = _DeviceReading(page, root)
     reading.all()
     page.check()
     return reading.config(Path(path), text)
 
 
-def _note_rmfs(page: Page, root: MappingNode) -> None:
+def _note_rmfs(page: YamlFile, root: MappingNode) -> None:
     """Refuse a file of RMF's as a whole, before each of its keys is found unknown."""
     for key, (what, option) in OF_RMF.items():
         entry = below(root, key)
@@ -74,10 +74,10 @@ def _note_rmfs(page: Page, root: MappingNode) -> None:
             page.check()
 
 
-class _Reading:
+class _DeviceReading:
     """Reads one file section by section; problems go to its page."""
 
-    def __init__(self, page: Page, root: MappingNode) -> None:
+    def __init__(self, page: YamlFile, root: MappingNode) -> None:
         self._page = page
         self._top = Spot(root, root, "the file")
         self._values = Values(page)
@@ -88,7 +88,7 @@ class _Reading:
         self._driver_name = ""
         self._own_drivers: dict[str, AnyDriver | None] = {}
         self._rmf = Rmf()
-        self._recording = Recording()
+        self._recording = RecordingSettings()
         self._buses: dict[str, BusRead] = {}
         self._devices: dict[str, DeviceSettings] = {}
         self._uses: list[Use] = []
@@ -127,7 +127,7 @@ class _Reading:
         if "rmf" in sections:
             self._read_rmf(sections["rmf"].spot())
         if "recording" in sections:
-            read = self._values.make(Recording, sections["recording"].spot())
+            read = self._values.make(RecordingSettings, sections["recording"].spot())
             self._recording = self._recording if read is BROKEN else read
         if "buses" in sections:
             self._read_buses(sections["buses"].spot())
@@ -138,13 +138,13 @@ class _Reading:
         note_conflicts(self._page, self._uses)
         self._collect_unwatched()
 
-    def _read_kind(self, entry: Entry | None) -> None:
+    def _read_kind(self, entry: MappingEntry | None) -> None:
         name = word(self._values, entry, kind_names())
         if name:
             self._kind_name = name
             self._kind = kind_called(name)
 
-    def _read_driver(self, entry: Entry | None) -> None:
+    def _read_driver(self, entry: MappingEntry | None) -> None:
         if self._kind is None:
             return
         name = word(self._values, entry, named.driver_names(self._kind_name))
@@ -174,7 +174,7 @@ class _Reading:
                 key = locate(spot, ("topics", name)).key
                 self._page.note(key, unknown("topic", name, TOPICS))
 
-    def _read_section(self, entry: Entry | None, kind: AnyGraphKind) -> None:
+    def _read_section(self, entry: MappingEntry | None, kind: AnyGraphKind) -> None:
         """The settings of a kind without devices; all of them may have defaults."""
         if entry:
             self._section = self._values.make(kind.settings, entry.spot())
@@ -190,7 +190,7 @@ class _Reading:
     def _broken(self) -> bool:
         return self._section is BROKEN or bool(self._page.problems)
 
-    def _names(self, spot: Spot, of: str) -> list[Entry]:
+    def _names(self, spot: Spot, of: str) -> list[MappingEntry]:
         """The entries of a section whose keys are names."""
         entries = self._values.entries(spot)
         if isinstance(spot.node, MappingNode) and not spot.node.value:
@@ -226,7 +226,7 @@ class _Reading:
                 text = f"no device uses the bus '{name}': delete it, or name it in a 'bus:'"
                 self._page.note(self._buses[name].entry.key, text)
 
-    def _can_stand(self, device: Entry, bus: str | None, driver: AnyDriver) -> bool:
+    def _can_stand(self, device: MappingEntry, bus: str | None, driver: AnyDriver) -> bool:
         """Can the device's own driver use its bus? The file's driver was checked with the bus."""
         kind = self._buses[bus].type if bus else None
         if kind is None or kind in driver.buses:
@@ -236,7 +236,7 @@ class _Reading:
         self._page.note(where.where(), f"{on} {either(driver.buses)}")
         return False
 
-    def _bus_name(self, device: Entry) -> str | None:
+    def _bus_name(self, device: MappingEntry) -> str | None:
         """The bus of a device; None if it cannot be determined."""
         entry = below(device.value, "bus")
         if entry is None or is_none(entry.value):
@@ -250,11 +250,13 @@ class _Reading:
             self._page.note(entry.value, unknown("bus", name, self._buses))
         return None
 
-    def _device(self, entry: Entry, bus: str | None, driver: AnyDriver) -> DeviceSettings | Broken:
+    def _device(
+        self, entry: MappingEntry, bus: str | None, driver: AnyDriver
+    ) -> DeviceSettings | Broken:
         """A device's settings; checks its wires too."""
         spot = Spot(entry.value, entry.key, entry.spot().label)
         hal = self._buses[bus].hal if bus else None
-        wiring = Wiring(self._page, entry.name, bus or "", hal)
+        wiring = WiringCheck(self._page, entry.name, bus or "", hal)
         values = Values(self._page, wiring.checks)
         before = len(self._page.problems)
         settings = values.make(driver.settings, spot)
@@ -280,7 +282,7 @@ class _Reading:
         settings: DeviceSettings,
         wires: list[Wire],
         spot: Spot,
-        wiring: Wiring,
+        wiring: WiringCheck,
         driver: AnyDriver,
     ) -> None:
         """Check the wires of a device whose settings are complete and valid."""

@@ -12,7 +12,7 @@ from bridges.kinds.shared.graph_kind import GraphKind
 from bridges.kinds.shared.kind import CHARGER, DOOR, FLOOR, LIFT, WAYPOINT, Place
 from bridges.settings.building_map import BuildingMap
 from bridges.settings.load import Config
-from bridges.yaml.nodes import Page, Problem, compose
+from bridges.yaml.nodes import Problem, YamlFile, compose
 from bridges.yaml.positions import Spot, locate
 from bridges.yaml.spelling import nearest, short
 
@@ -34,7 +34,7 @@ def places(config: Config) -> list[Place]:
 
 def mismatches(config: Config, building: BuildingMap) -> list[Problem]:
     """Every name of the file that is missing on the map, and every stop that the file lacks."""
-    page = Page(str(config.path))
+    page = YamlFile(str(config.path))
     root = compose(page, config.text)
     top = Spot(root, root, "the file")
     found = places(config)

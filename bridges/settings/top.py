@@ -7,10 +7,10 @@ from msgspec.structs import fields
 
 from bridges.kinds import kind_called, kind_names
 from bridges.kinds.shared.graph_kind import AnyKind, GraphKind
-from bridges.kinds.shared.recording_section import Recording
+from bridges.kinds.shared.recording_section import RecordingSettings
 from bridges.kinds.shared.rmf_section import Rmf
 from bridges.settings import names as named
-from bridges.yaml.positions import Entry
+from bridges.yaml.positions import MappingEntry
 from bridges.yaml.spelling import either
 from bridges.yaml.values import BROKEN, Values
 from drivers.driver_type import AnyDriver
@@ -39,7 +39,7 @@ def top_keys(kind: AnyKind | None) -> dict[str, str | None]:
     return {**first, "driver": driver, **shared, kind.devices_key: MAPPING}
 
 
-def word(values: Values, entry: Entry | None, words: list[str]) -> str | None:
+def word(values: Values, entry: MappingEntry | None, words: list[str]) -> str | None:
     """One of these words; None if the entry is missing or another word."""
     if entry is None:
         return None
@@ -50,7 +50,7 @@ def word(values: Values, entry: Entry | None, words: list[str]) -> str | None:
 def keys_below(kind: AnyKind | None, driver: AnyDriver | None) -> dict[str, str]:
     """Keys that belong below the top: key -> what it stands below."""
     below_top = {field.encode_name: "rmf" for field in fields(Rmf)}
-    below_top |= {field.encode_name: "recording" for field in fields(Recording)}
+    below_top |= {field.encode_name: "recording" for field in fields(RecordingSettings)}
     if isinstance(kind, GraphKind):
         below_top |= {field.encode_name: kind.devices_key for field in fields(kind.settings)}
     elif kind and driver:

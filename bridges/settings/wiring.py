@@ -9,7 +9,7 @@ from collections.abc import Iterable
 from msgspec import Struct
 from yaml import Node
 
-from bridges.yaml.nodes import Page
+from bridges.yaml.nodes import YamlFile
 from bridges.yaml.positions import Spot, below, locate
 from bridges.yaml.spelling import unknown
 from bridges.yaml.values import BROKEN, Check
@@ -27,13 +27,13 @@ class Use(Struct, frozen=True):
     node: Node
 
 
-class Wiring:
+class WiringCheck:
     """Collects and checks a device's points: first while its settings are read, then as wires.
 
     `written`: the points that the daemon itself must switch off again.
     """
 
-    def __init__(self, page: Page, device: str, bus: str, hal: AnyBus | None) -> None:
+    def __init__(self, page: YamlFile, device: str, bus: str, hal: AnyBus | None) -> None:
         self._page = page
         self._device = device
         self._bus = bus
@@ -115,7 +115,7 @@ class Wiring:
             self._page.note(locate(spot, wire.path).key, f"'{name}': {text}")
 
 
-def note_conflicts(page: Page, uses: Iterable[Use]) -> None:
+def note_conflicts(page: YamlFile, uses: Iterable[Use]) -> None:
     """One point of one bus serves one signal: the later one in the file is the problem."""
     first: dict[tuple[str, str], Use] = {}
     for use in sorted(uses, key=lambda u: (u.node.start_mark.line, u.node.start_mark.column)):
@@ -127,7 +127,9 @@ def note_conflicts(page: Page, uses: Iterable[Use]) -> None:
             page.note(use.node, f"{taken}: {use.user} needs a point of its own")
 
 
-def note_unknown_signals(page: Page, accepted: Iterable[str], signals: list[str], s: Spot) -> None:
+def note_unknown_signals(
+    page: YamlFile, accepted: Iterable[str], signals: list[str], s: Spot
+) -> None:
     """`accept_unsafe` may only name existing signals."""
     for signal in accepted:
         if signal not in signals:

@@ -37,7 +37,7 @@ class Sort(Struct, frozen=True):
 DEVICE = Sort("device YAML", "kind: ...", 256 * 1024, 20_000)
 
 
-class Page:
+class YamlFile:
     """One file and the problems found in it so far."""
 
     def __init__(self, file: str) -> None:
@@ -71,7 +71,7 @@ class _Refused(MarkedYAMLError):
 class _Composer(yaml.SafeLoader):
     """Composes nodes within limits; refuses tags and recursive aliases."""
 
-    def __init__(self, text: str, page: Page, max_values: int) -> None:
+    def __init__(self, text: str, page: YamlFile, max_values: int) -> None:
         super().__init__(text)
         self._page = page
         self._max_values = max_values
@@ -139,7 +139,7 @@ def read(file: str, sort: Sort = DEVICE) -> bytes:
     return text
 
 
-def compose(page: Page, text: bytes, sort: Sort = DEVICE) -> MappingNode:
+def compose(page: YamlFile, text: bytes, sort: Sort = DEVICE) -> MappingNode:
     """The file's top-level mapping. Raises SettingsError if it has none."""
     root = _root(page, _decoded(page, text), sort)
     if not isinstance(root, MappingNode):
@@ -151,7 +151,7 @@ def compose(page: Page, text: bytes, sort: Sort = DEVICE) -> MappingNode:
     return root
 
 
-def _decoded(page: Page, text: bytes) -> str:
+def _decoded(page: YamlFile, text: bytes) -> str:
     try:
         return text.decode("utf-8")
     except UnicodeDecodeError as error:
@@ -160,7 +160,7 @@ def _decoded(page: Page, text: bytes) -> str:
         raise SettingsError([_problem_after(page, before, reason)]) from None
 
 
-def _root(page: Page, text: str, sort: Sort) -> Node | None:
+def _root(page: YamlFile, text: str, sort: Sort) -> Node | None:
     composer = None
     try:
         composer = _Composer(text, page, sort.max_values)
@@ -179,7 +179,7 @@ def _root(page: Page, text: str, sort: Sort) -> Node | None:
         raise SettingsError([page.problem(composer.get_mark(), reason)]) from None
 
 
-def _problem_after(page: Page, before: str, text: str) -> Problem:
+def _problem_after(page: YamlFile, before: str, text: str) -> Problem:
     lines = re.split(r"\r\n|\r|\n", before)
     return Problem(page.file, len(lines), len(lines[-1]) + 1, text)
 

@@ -23,7 +23,7 @@ class Spot(Struct, frozen=True):
     path: tuple[str, ...] = ()
 
 
-class Entry(Struct, frozen=True):
+class MappingEntry(Struct, frozen=True):
     """One `key: value` of a mapping."""
 
     name: str
@@ -42,20 +42,20 @@ class Entry(Struct, frozen=True):
         return self.key
 
 
-def below(node: Node, part: str) -> Entry | None:
+def below(node: Node, part: str) -> MappingEntry | None:
     """The entry of a mapping, or the item of a list, that `part` names."""
     if isinstance(node, MappingNode):
         for key, value in node.value:
             if isinstance(key, ScalarNode) and key.value == part:
-                return Entry(part, key, value)
+                return MappingEntry(part, key, value)
     if isinstance(node, SequenceNode) and part.isdecimal() and int(part) < len(node.value):
-        return Entry(part, node.value[int(part)], node.value[int(part)])
+        return MappingEntry(part, node.value[int(part)], node.value[int(part)])
     return None
 
 
-def locate(spot: Spot, path: Iterable[object]) -> Entry:
+def locate(spot: Spot, path: Iterable[object]) -> MappingEntry:
     """The entry at `path` below a value, or its nearest existing parent."""
-    found = Entry("", spot.at, spot.node)
+    found = MappingEntry("", spot.at, spot.node)
     for part in path:
         entry = below(found.value, str(part))
         if entry is None:

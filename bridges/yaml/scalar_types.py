@@ -35,7 +35,7 @@ Extra = Mapping[str, str]
 """What a field's `Meta(extra=…)` says: its `unit`, its `pattern` in words, its `check`."""
 
 
-class Wrong(Exception):
+class WrongScalar(Exception):
     """A scalar of the wrong kind. The text continues after the value's name: "is ...", no full stop."""
 
 
@@ -80,22 +80,22 @@ _NOUNS: dict[type[Type], str] = {
 
 
 def leaf(types: list[Type], node: ScalarNode, extra: Extra) -> object:
-    """The scalar converted to the first of these types that fits. Raises Wrong."""
+    """The scalar converted to the first of these types that fits. Raises WrongScalar."""
     *others, last = sorted(types, key=_rank)
     for wanted in others:
         try:
             return leaf([wanted], node, extra)
-        except Wrong:
+        except WrongScalar:
             continue
     if isinstance(last, Metadata):
         return leaf([last.type], node, last.extra or {})
     if is_plain(node) and not node.value:
-        raise Wrong(f"has no value: write {wanted_text(last, extra)}")
+        raise WrongScalar(f"has no value: write {wanted_text(last, extra)}")
     value = _read(last, node, extra)
     try:
         return msgspec.convert(value, _annotation(last))
     except msgspec.ValidationError as error:
-        raise Wrong(_reason(last, node, extra, "length" in str(error))) from None
+        raise WrongScalar(_reason(last, node, extra, "length" in str(error))) from None
 
 
 def _rank(wanted: Type) -> int:
@@ -116,7 +116,7 @@ _PLAIN: dict[type[Type], type] = {StrType: str, IntType: int, FloatType: float, 
 
 
 def _read(wanted: Type, node: ScalarNode, extra: Extra) -> object:
-    """The value, if it is unambiguous. Raises Wrong."""
+    """The value, if it is unambiguous. Raises WrongScalar."""
     if isinstance(wanted, LiteralType | EnumType):  # as written: how YAML reads it does not matter
         return choices(wanted).get(node.value, node.value)
     if isinstance(wanted, StrType):
@@ -156,32 +156,38 @@ def _check_text(node: ScalarNode, extra: Extra) -> None:
     text: str = node.value
     reading = reads_as(text) if is_plain(node) and "check" not in extra else None
     if reading is not None and "number" in extra:
-        raise Wrong(f"is the number {text}: write {extra['number']}")
+        raise WrongScalar(f"is the number {text}: write {extra['number']}")
     if reading is not None:
         taken = f"is written {short(text)}, which YAML may read as {reading}"
         if looks(node) == f"the number {text}":
             taken = f"is the number {text}"
-        raise Wrong(f'{taken}: if the text is meant, write "{short(text)}" in quotes')
+        raise WrongScalar(f'{taken}: if the text is meant, write "{short(text)}" in quotes')
 
 
-def _misread(wanted: Type, node: ScalarNode, extra: Extra) -> Wrong:
+def _misread(wanted: Type, node: ScalarNode, extra: Extra) -> WrongScalar:
     """The error for a text that is not a plain number or boolean; it says how to write it."""
     text, asked = short(node.value), wanted_text(wanted, extra)
     whole = isinstance(wanted, IntType)
     if not is_plain(node):
         read = _READINGS[type(wanted)](node.value) is not None
-        return Wrong(f'is the text "{text}": write {asked}{", without quotes" if read else ""}')
+        return WrongScalar(
+            f'is the text "{text}": write {asked}{", without quotes" if read else ""}'
+        )
     meant = "" if isinstance(wanted, BoolType) else number_meant(node.value, whole)
     if meant:
-        return Wrong(f"is written {text}: write {meant}, {asked}")
+        return WrongScalar(f"is written {text}: write {meant}, {asked}")
     if extra.get("unit") and has_unit(node.value):
-        return Wrong(f"is written {text}: write the number alone, {asked}")
+        return WrongScalar(f"is written {text}: write the number alone, {asked}")
     reading = reads_as(node.value) or ""
     if isinstance(wanted, BoolType) and reading in ("true", "false"):
-        return Wrong(f"is written {text}, which YAML versions read differently: write {reading}")
+        return WrongScalar(
+            f"is written {text}, which YAML versions read differently: write {reading}"
+        )
     if reading.startswith("the number") and number(node.value) is None:
-        return Wrong(f"is written {text}, which YAML may read as {reading}: write {asked} plainly")
-    return Wrong(f"is {looks(node)}: write {asked}")
+        return WrongScalar(
+            f"is written {text}, which YAML may read as {reading}: write {asked} plainly"
+        )
+    return WrongScalar(f"is {looks(node)}: write {asked}")
 
 
 def _span(wanted: IntType | FloatType, extra: Extra) -> str:

@@ -23,9 +23,9 @@ from msgspec.inspect import (
 )
 from yaml import MappingNode, Node, ScalarNode, SequenceNode
 
-from bridges.yaml.nodes import Page, is_plain
-from bridges.yaml.positions import Entry, Spot, is_none, locate
-from bridges.yaml.scalar_types import Extra, Wrong, leaf, looks, wanted_text
+from bridges.yaml.nodes import YamlFile, is_plain
+from bridges.yaml.positions import MappingEntry, Spot, is_none, locate
+from bridges.yaml.scalar_types import Extra, WrongScalar, leaf, looks, wanted_text
 from bridges.yaml.scalars import is_null
 from bridges.yaml.spelling import either, nearest, short, unknown
 
@@ -75,7 +75,7 @@ class Values:
     and only its check accepts or refuses it. `structs`: every struct that was made.
     """
 
-    def __init__(self, page: Page, checks: Mapping[str, Check] | None = None) -> None:
+    def __init__(self, page: YamlFile, checks: Mapping[str, Check] | None = None) -> None:
         self._page = page
         self._checks = checks or {}
         self.structs: list[tuple[tuple[str, ...], object]] = []
@@ -96,12 +96,12 @@ class Values:
             return self._struct(wanted, spot, besides)
         return self._value(wanted, spot)
 
-    def entries(self, spot: Spot) -> list[Entry]:
+    def entries(self, spot: Spot) -> list[MappingEntry]:
         """A mapping's valid entries; notes duplicate, merge and non-text keys."""
         if not isinstance(spot.node, MappingNode):
             self._mismatch(spot, "a mapping (key: value)")
             return []
-        seen: dict[str, Entry] = {}
+        seen: dict[str, MappingEntry] = {}
         for key, value in spot.node.value:
             if not isinstance(key, ScalarNode):
                 self._page.note(key, f"a key must be text, but this is {looks(key)}")
@@ -110,16 +110,16 @@ class Values:
             elif key.value in seen:
                 self._double(key, seen[key.value].key)
             else:
-                seen[key.value] = Entry(key.value, key, value)
+                seen[key.value] = MappingEntry(key.value, key, value)
         return list(seen.values())
 
     def known(
         self,
-        entries: list[Entry],
+        entries: list[MappingEntry],
         spot: Spot,
         fields: Mapping[str, str | None],
         elsewhere: Mapping[str, str] | None = None,
-    ) -> dict[str, Entry]:
+    ) -> dict[str, MappingEntry]:
         """The entries that `fields` names: key -> what its value must be, or None if it is optional.
 
         An unknown key that resembles a missing one is taken for it: one slip is one problem.
@@ -168,7 +168,7 @@ class Values:
             return BROKEN
         try:
             value = leaf(types, spot.node, extra)
-        except Wrong as wrong:
+        except WrongScalar as wrong:
             empty = is_plain(spot.node) and not spot.node.value
             self._page.note(spot.at if empty else spot.node, f"{spot.label} {wrong}")
             return BROKEN
@@ -252,7 +252,7 @@ class Values:
         self._page.note(key, f"the key '{name}' is already on line {line}: delete one of the two")
 
     def _mismatch(self, spot: Spot, wanted: str) -> None:
-        where = Entry("", spot.at, spot.node).where()
+        where = MappingEntry("", spot.at, spot.node).where()
         if isinstance(spot.node, ScalarNode) and is_plain(spot.node) and is_null(spot.node.value):
             self._page.note(where, f"{spot.label} has no value: write {wanted}")
         else:
@@ -274,7 +274,9 @@ def sections_of(wanted: StructType) -> dict[str, str]:
     )
 
 
-def _misplaced(entry: Entry, before: Entry | None, elsewhere: Mapping[str, str]) -> str:
+def _misplaced(
+    entry: MappingEntry, before: MappingEntry | None, elsewhere: Mapping[str, str]
+) -> str:
     """Which typing slip explains an unknown key; "" if none does."""
     empty = before is not None and _is_empty(before.value)
     if before is not None and empty and not _is_empty(entry.value):

@@ -30,7 +30,7 @@ from drivers.hal.can.broadcasts import Broadcasts, Said, Sequel, Values
 Volume = Annotated[float, msgspec.Meta(ge=-100_000, le=100_000)]
 
 
-class Settings(ChargerSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class FrameChargerSettings(ChargerSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """One charger."""
 
     profile: Annotated[
@@ -60,12 +60,12 @@ class Settings(ChargerSettings, frozen=True, kw_only=True, forbid_unknown_fields
         return True
 
 
-def frame_map(settings: Settings) -> FrameMap:
+def frame_map(settings: FrameChargerSettings) -> FrameMap:
     """The map: the one in the YAML, or the profile's."""
     return PROFILE.chosen(settings.profile, settings.map)
 
 
-def _setpoint_problems(settings: Settings) -> Remarks:
+def _setpoint_problems(settings: FrameChargerSettings) -> Remarks:
     found = frame_map(settings)
     wanted, given = found.wanted_setpoints(), set(settings.setpoints)
     for name in sorted(wanted - given):
@@ -91,7 +91,7 @@ def _beyond(setpoints: Mapping[str, float]) -> Remarks:
             yield ("setpoints", name), f"is {value:g}, above max_{name}, which is {most:g}"
 
 
-def _impossible(settings: Settings, found: FrameMap) -> Remarks:
+def _impossible(settings: FrameChargerSettings, found: FrameMap) -> Remarks:
     """A setpoint that its signal cannot hold."""
     frames = dbc.load(found.dbc)
     for sent in found.send:
@@ -103,7 +103,7 @@ def _impossible(settings: Settings, found: FrameMap) -> Remarks:
                 yield ("setpoints", name), f"is {value:g}: {sent.frame}.{signal} takes {allowed}"
 
 
-def _encoding_problems(settings: Settings, sent: Sent, on: bool) -> Remarks:
+def _encoding_problems(settings: FrameChargerSettings, sent: Sent, on: bool) -> Remarks:
     values = sent.values(on, settings.setpoints)
     if values is not None:
         try:
@@ -112,7 +112,7 @@ def _encoding_problems(settings: Settings, sent: Sent, on: bool) -> Remarks:
             yield ("setpoints",) if on and sent.setpoints else ("map",), str(error)
 
 
-def claims(settings: Settings) -> Iterator[tuple[str, tuple[str, ...]]]:
+def claims(settings: FrameChargerSettings) -> Iterator[tuple[str, tuple[str, ...]]]:
     """(place, path) of the frames, for this device alone; nothing while the map has problems.
 
     CANopen's NMT frame is everybody's.
@@ -129,7 +129,9 @@ def claims(settings: Settings) -> Iterator[tuple[str, tuple[str, ...]]]:
         yield f"frame {can.named(frames.id(name))}", ("map",) if settings.map else ("profile",)
 
 
-def describe(settings: Settings, bus_settings: can.Settings) -> list[tuple[str, str]]:
+def describe(
+    settings: FrameChargerSettings, bus_settings: can.CanSettings
+) -> list[tuple[str, str]]:
     """Rows that `check` prints instead of a wiring table: (what, meaning)."""
     found = frame_map(settings)
     stops_s = settings.limits.peer_internal_timeout_s
@@ -142,12 +144,12 @@ def describe(settings: Settings, bus_settings: can.Settings) -> list[tuple[str, 
     ]
 
 
-def frame_tables(settings: Settings) -> Iterator[Table]:
+def frame_tables(settings: FrameChargerSettings) -> Iterator[Table]:
     """The frames as bytes."""
     return tables(frame_map(settings), settings.setpoints)
 
 
-def warnings(settings: Settings) -> Remarks:
+def warnings(settings: FrameChargerSettings) -> Remarks:
     """Valid settings that deserve a second look: (path, text)."""
     yield from PROFILE.warnings(settings.profile, "watch the first charge")
     found = frame_map(settings)
@@ -158,7 +160,7 @@ def warnings(settings: Settings) -> Remarks:
         yield (), f"{text}; write it down as limits: {{peer_internal_timeout_s: …}}"
 
 
-def create(name: str, settings: Settings, bus: can.CanBus) -> "FrameDriver":
+def create(name: str, settings: FrameChargerSettings, bus: can.CanBus) -> "FrameDriver":
     """The charger's driver on its bus; before the first reading it only wakes it."""
     return FrameDriver(settings, bus)
 
@@ -166,7 +168,7 @@ def create(name: str, settings: Settings, bus: can.CanBus) -> "FrameDriver":
 class FrameDriver:
     """`drivers.Driver` for one charger."""
 
-    def __init__(self, settings: Settings, bus: can.CanBus) -> None:
+    def __init__(self, settings: FrameChargerSettings, bus: can.CanBus) -> None:
         self._setpoints = settings.setpoints
         self._map = frame_map(settings)
         self._dbc = dbc.load(self._map.dbc)
@@ -339,7 +341,7 @@ def _rounded(value: float | None) -> float | None:
 
 
 DRIVER = DriverType(
-    settings=Settings,
+    settings=FrameChargerSettings,
     buses=("can",),
     create=create,
     describe=describe,

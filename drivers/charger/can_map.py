@@ -14,7 +14,7 @@ from bridges.kinds.shared.table import Table
 from bridges.yaml.spelling import unknown
 from drivers.charger import dbc
 from drivers.charger import rules as by_rules
-from drivers.charger.rules import Errors, Rule
+from drivers.charger.rules import Rule, StationErrors
 from drivers.charger.state_codes import Codes
 from drivers.hal.can import named
 from drivers.profiles import Profile
@@ -126,7 +126,9 @@ class FrameMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
         tells("name -> a temperature's signal (°C), for status and diagnostics."),
     ] = {}
     rules: Annotated[list[Rule], tells("derive the state from other signals; before codes.")] = []
-    errors: Annotated[Errors, tells("signals that mean an error in any state.")] = Errors()
+    errors: Annotated[StationErrors, tells("signals that mean an error in any state.")] = (
+        StationErrors()
+    )
     send: Annotated[list[Sent], msgspec.Meta(min_length=1), tells("the frames to send.")]
     wake: Annotated[
         list[Wake],
@@ -226,7 +228,9 @@ def rows(found: FrameMap) -> Iterator[tuple[str, str]]:
         elif path[1] in ("station", "robot"):
             text = getattr(found.errors, path[1])[signal]
             yield f"{path[1]}'s error", f"{signal} ({at}): {text}"
-    yield from by_rules.rows(found.rules, Errors(codes=found.errors.codes, bits=found.errors.bits))
+    yield from by_rules.rows(
+        found.rules, StationErrors(codes=found.errors.codes, bits=found.errors.bits)
+    )
 
 
 def tables(found: FrameMap, setpoints: Mapping[str, float]) -> Iterator[Table]:

@@ -47,7 +47,9 @@ OBJECTS: Final[Mapping[str, Object]] = {
 }
 
 
-class Settings(ChargerSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class CanOpenChargerSettings(
+    ChargerSettings, frozen=True, kw_only=True, forbid_unknown_fields=True
+):
     """One receiver."""
 
     node: Annotated[
@@ -61,12 +63,14 @@ class Settings(ChargerSettings, frozen=True, kw_only=True, forbid_unknown_fields
     ] = 0.5
 
 
-def claims(settings: Settings) -> Iterable[tuple[str, tuple[str, ...]]]:
+def claims(settings: CanOpenChargerSettings) -> Iterable[tuple[str, tuple[str, ...]]]:
     """(place, path) of the node, which no other device of the bus may use."""
     yield f"node {settings.node}", ("node",)
 
 
-def describe(settings: Settings, bus_settings: can.Settings) -> list[tuple[str, str]]:
+def describe(
+    settings: CanOpenChargerSettings, bus_settings: can.CanSettings
+) -> list[tuple[str, str]]:
     """Rows that `check` prints instead of a wiring table: (what, meaning)."""
     rows = [("bus", f"{can.describe(bus_settings)}; node {settings.node}")]
     if settings.heartbeat == "required":
@@ -75,7 +79,7 @@ def describe(settings: Settings, bus_settings: can.Settings) -> list[tuple[str, 
     return rows + xnergy.rows(settings, {name: str(found) for name, found in OBJECTS.items()})
 
 
-def warnings(settings: Settings) -> Remarks:
+def warnings(settings: CanOpenChargerSettings) -> Remarks:
     """Valid settings that deserve a second look: (path, text)."""
     found = list(xnergy.warnings(settings, "CAN"))
     if settings.heartbeat == "none":
@@ -83,17 +87,18 @@ def warnings(settings: Settings) -> Remarks:
     return sorted(found)
 
 
-def create(name: str, settings: Settings, bus: can.CanBus) -> xnergy.Receiver:
+def create(name: str, settings: CanOpenChargerSettings, bus: can.CanBus) -> xnergy.Receiver:
     """The receiver's driver on its bus; it sends nothing before the first reading."""
     return xnergy.Receiver(settings, Objects(settings, bus))
 
 
 class Objects:
-    """`xnergy.Wire` on the objects of one node. No objects of its temperatures are published."""
+    """`xnergy.ReceiverAccess` on the objects of one node. No objects of its temperatures are
+    published."""
 
     reads = xnergy.ALWAYS
 
-    def __init__(self, settings: Settings, bus: can.CanBus) -> None:
+    def __init__(self, settings: CanOpenChargerSettings, bus: can.CanBus) -> None:
         limit_s = settings.heartbeat_timeout_s if settings.heartbeat == "required" else None
         self._node = CanOpenNode(bus, settings.node, limit_s)
         self._starts = 0
@@ -118,7 +123,7 @@ class Objects:
 
 
 DRIVER = DriverType(
-    settings=Settings,
+    settings=CanOpenChargerSettings,
     buses=("can",),
     create=create,
     describe=describe,

@@ -37,7 +37,7 @@ CUT_MUST_READ: Final = {
 ENABLE: Final = "enable"
 
 
-class Inputs(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class ChargerInputWiring(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """The contacts that are read."""
 
     charging: Annotated[Input, tells("current flows, also while it ramps down.")]
@@ -55,17 +55,19 @@ class Inputs(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     ] = None
 
 
-class Outputs(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class ChargerOutputWiring(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """The command to the station."""
 
     enable: Annotated[Output, tells("the station may charge while this relay is on.")]
 
 
-class Settings(ChargerSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class DryContactChargerSettings(
+    ChargerSettings, frozen=True, kw_only=True, forbid_unknown_fields=True
+):
     """One station and its wiring."""
 
-    inputs: Annotated[Inputs, tells("the contacts that are read.")]
-    outputs: Annotated[Outputs, tells("the relay that is driven.")]
+    inputs: Annotated[ChargerInputWiring, tells("the contacts that are read.")]
+    outputs: Annotated[ChargerOutputWiring, tells("the relay that is driven.")]
 
     def problems(self) -> Remarks:
         """Problems that involve more than one field."""
@@ -77,17 +79,17 @@ class Settings(ChargerSettings, frozen=True, kw_only=True, forbid_unknown_fields
         yield from unaccepted(_unsafe(self), self.accept_unsafe)
 
 
-def wires(settings: Settings) -> list[Wire]:
+def wires(settings: DryContactChargerSettings) -> list[Wire]:
     """The wiring table, inputs first."""
     relay = settings.outputs.enable.wire(ENABLE, ("outputs", ENABLE))
     return [*input_wires(settings.inputs, debounce_s=0.0), relay]
 
 
-def _unsafe(settings: Settings) -> Iterator[Unsafe]:
+def _unsafe(settings: DryContactChargerSettings) -> Iterator[Unsafe]:
     return unsafe_wires(wires(settings), CUT_MUST_READ)
 
 
-def tables(settings: Settings) -> Iterator[Table]:
+def tables(settings: DryContactChargerSettings) -> Iterator[Table]:
     """What the contacts mean together, what a cut wire makes of it, and how the relay is driven."""
     table = {wire.signal: wire for wire in wires(settings) if wire.direction == "in"}
     rows = []
@@ -108,7 +110,7 @@ def _means(shown: Mapping[str, bool]) -> str:
     return off if off == on else f"{off} ({on} while enabled)"
 
 
-def warnings(settings: Settings) -> Remarks:
+def warnings(settings: DryContactChargerSettings) -> Remarks:
     """Valid settings to review before the station goes into service: (path, text)."""
     for wire in wires(settings):
         if wire.debounce_s:
@@ -122,7 +124,7 @@ def warnings(settings: Settings) -> Remarks:
     yield (), "contacts tell nobody's receiver: the robot on the pad is not verified"
 
 
-def create(name: str, settings: Settings, bus: PointsBus) -> "DryContactCharger":
+def create(name: str, settings: DryContactChargerSettings, bus: PointsBus) -> "DryContactCharger":
     """The station's driver on its bus; it touches nothing before `open`."""
     return DryContactCharger(Points(wires(settings), bus))
 
@@ -168,7 +170,7 @@ def decode(shown: Mapping[str, bool], enabled: bool) -> ChargerSample:
 
 
 DRIVER = DriverType(
-    settings=Settings,
+    settings=DryContactChargerSettings,
     buses=("gpio", "modbus"),
     create=create,
     wires=wires,

@@ -22,7 +22,7 @@ from bridges.kinds.shared.remarks import Remarks
 from drivers import json_fields
 from drivers.charger import rules
 from drivers.charger.http_fields import Fields, Word
-from drivers.charger.rules import Errors, Rule, judged
+from drivers.charger.rules import Rule, StationErrors, judged
 from drivers.charger.state_codes import Code, Codes
 from drivers.driver_type import DriverType
 from drivers.hal import http
@@ -32,7 +32,7 @@ from drivers.unsafe import unaccepted
 POWER: Final = "power"
 
 
-class Settings(ChargerSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class HttpChargerSettings(ChargerSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """One station. The paths follow the bus's `api_base`."""
 
     codes: Annotated[
@@ -41,7 +41,9 @@ class Settings(ChargerSettings, frozen=True, kw_only=True, forbid_unknown_fields
     rules: Annotated[
         list[Rule], tells("derive the state from other fields of the answer; tried before `codes`.")
     ] = msgspec.field(default_factory=list)
-    errors: Annotated[Errors, tells("fields that mean an error, whatever the state is.")] = Errors()
+    errors: Annotated[StationErrors, tells("fields that mean an error, whatever the state is.")] = (
+        StationErrors()
+    )
     state_words: Annotated[
         dict[Word, Code], tells("word -> its number in `codes`, where the states are words.")
     ] = msgspec.field(default_factory=dict)
@@ -87,7 +89,7 @@ class Settings(ChargerSettings, frozen=True, kw_only=True, forbid_unknown_fields
             yield ("on_death",), "this station cannot be stopped: leave this out"
 
 
-def _place_problems(settings: Settings) -> Remarks:
+def _place_problems(settings: HttpChargerSettings) -> Remarks:
     looked_at = [(("rules", *path), at) for path, at in rules.places(settings.rules)]
     looked_at += [(("errors", *path), at) for path, at in settings.errors.places()]
     for path, at in looked_at:
@@ -95,7 +97,7 @@ def _place_problems(settings: Settings) -> Remarks:
             yield path, f"{at!r} is not a field: write names with dots between them (status.code)"
 
 
-def _timer_problems(settings: Settings) -> Remarks:
+def _timer_problems(settings: HttpChargerSettings) -> Remarks:
     """What has no state of its own is a relay: nothing but its timer knows that the network is gone."""
     timer = settings.switches_off_after_s
     if timer and not settings.start:
@@ -110,12 +112,12 @@ def _timer_problems(settings: Settings) -> Remarks:
         yield from unaccepted([(POWER, ("switches_off_after_s",), text)], settings.accept_unsafe)
 
 
-def create(name: str, settings: Settings, bus: Calls) -> "HttpCharger":
+def create(name: str, settings: HttpChargerSettings, bus: Calls) -> "HttpCharger":
     """The station's driver on its bus; it sends nothing before the first reading."""
     return HttpCharger(settings, bus)
 
 
-def claims(settings: Settings) -> Iterator[tuple[str, tuple[str, ...]]]:
+def claims(settings: HttpChargerSettings) -> Iterator[tuple[str, tuple[str, ...]]]:
     """The station's own state and commands, which no other charger can have."""
     yield f"{settings.fields.state} of {settings.state_path}", ("state_path",)
     for name in ("start", "stop"):
@@ -123,7 +125,9 @@ def claims(settings: Settings) -> Iterator[tuple[str, tuple[str, ...]]]:
             yield claim(call), (name, "path")
 
 
-def describe(settings: Settings, bus_settings: http.Settings) -> list[tuple[str, str]]:
+def describe(
+    settings: HttpChargerSettings, bus_settings: http.HttpSettings
+) -> list[tuple[str, str]]:
     """Rows that `check` prints instead of a wiring table: (what, meaning)."""
     api = http.base(bus_settings.api_base)
     rows = [("state", f"GET {api.url(settings.state_path)} every {bus_settings.scan_s:g} s")]
@@ -147,7 +151,7 @@ def describe(settings: Settings, bus_settings: http.Settings) -> list[tuple[str,
     return rows
 
 
-def warnings(settings: Settings) -> Remarks:
+def warnings(settings: HttpChargerSettings) -> Remarks:
     """What the station cannot do with these settings, and what deserves a second look: (path, text)."""
     missing = [name for name in ("receiver_id", "stop") if _lacks(settings, name)]
     consequences = {
@@ -174,11 +178,11 @@ def warnings(settings: Settings) -> Remarks:
             yield ("state_words", word), f"{code} is not in codes: an unknown state"
 
 
-def _lacks(settings: Settings, what: str) -> bool:
+def _lacks(settings: HttpChargerSettings, what: str) -> bool:
     return (settings.stop if what == "stop" else settings.fields.receiver_id) is None
 
 
-def _how_often(settings: Settings) -> str:
+def _how_often(settings: HttpChargerSettings) -> str:
     per_hour = settings.limits.clear_errors_per_h
     by_itself = f", and by itself at most {per_hour} times an hour" if per_hour else ""
     return f"when an operator resets{by_itself}"
@@ -190,7 +194,7 @@ class HttpCharger:
     Power is a level: `start` is repeated while the station stays idle, `stop` while it still charges.
     """
 
-    def __init__(self, settings: Settings, bus: Calls) -> None:
+    def __init__(self, settings: HttpChargerSettings, bus: Calls) -> None:
         self._settings = settings
         self._bus = bus
         self._activity = Activity.UNKNOWN
@@ -263,7 +267,7 @@ class HttpCharger:
 
 
 DRIVER = DriverType(
-    settings=Settings,
+    settings=HttpChargerSettings,
     buses=("http",),
     create=create,
     describe=describe,

@@ -10,7 +10,7 @@ from bridges.kinds.charger.signals import FaultSide, Measured
 from bridges.kinds.shared.fields import Name, tells
 from drivers import json_fields
 from drivers.charger.state_codes import CODE_MAX
-from drivers.json_fields import Field, Flag
+from drivers.json_fields import Field, JsonFlag
 
 Answer = Mapping[str, object]
 """One JSON object."""
@@ -20,7 +20,7 @@ TextMeans = Literal["none", "station", "robot"]
 WEEK_S: Final = 7 * 86400
 
 
-class Number(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class JsonNumber(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """A measurement."""
 
     field: Annotated[Field, tells("the field of the answer that holds it.")]
@@ -42,23 +42,24 @@ class Fields(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     receiver_id: Annotated[
         Field | None, tells('the id of the receiver that it sees; null or "" when it sees none.')
     ] = None
-    in_range: Annotated[Flag | None, tells("the robot stands where it can be charged.")] = None
+    in_range: Annotated[JsonFlag | None, tells("the robot stands where it can be charged.")] = None
     range_ok: Annotated[
-        Flag | None,
+        JsonFlag | None,
         tells("""whether the robot stands where it can be charged, if the station says so all the
         time: without it there is no power."""),
     ] = None
     at_height: Annotated[
-        Flag | None,
+        JsonFlag | None,
         tells("""whether a pad that the station moves is where it charges: without it there is no
         power, and a fault if it is lost while current flows."""),
     ] = None
-    volts: Annotated[Number | None, tells("the voltage at the battery.")] = None
-    amps: Annotated[Number | None, tells("the current into the battery.")] = None
-    battery_percent: Annotated[Number | None, tells("the battery's charge, 0 to 100.")] = None
-    time_to_full_s: Annotated[Number | None, tells("the time until it is full (s).")] = None
+    volts: Annotated[JsonNumber | None, tells("the voltage at the battery.")] = None
+    amps: Annotated[JsonNumber | None, tells("the current into the battery.")] = None
+    battery_percent: Annotated[JsonNumber | None, tells("the battery's charge, 0 to 100.")] = None
+    time_to_full_s: Annotated[JsonNumber | None, tells("the time until it is full (s).")] = None
     temperatures: Annotated[
-        dict[Name, Number], tells("name -> a temperature (°C), shown in status and diagnostics.")
+        dict[Name, JsonNumber],
+        tells("name -> a temperature (°C), shown in status and diagnostics."),
     ] = {}
 
     def code(self, answer: Answer, words: Mapping[str, int]) -> int | str:
@@ -110,7 +111,7 @@ class Fields(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
 
 
 def _number(
-    answer: Answer, number: Number | None, most: float = math.inf, bounds: str = ""
+    answer: Answer, number: JsonNumber | None, most: float = math.inf, bounds: str = ""
 ) -> float | None:
     """The value in our unit; where it has `bounds` it is 0 to `most`. Raises DriverError."""
     value = json_fields.number(answer, number.field, number.scale) if number else None
@@ -119,7 +120,7 @@ def _number(
     return value
 
 
-def _place(place: str | Number | Flag) -> str:
-    if isinstance(place, Number):
+def _place(place: str | JsonNumber | JsonFlag) -> str:
+    if isinstance(place, JsonNumber):
         return place.field if place.scale == 1.0 else f"{place.field} x {place.scale:g}"
-    return json_fields.place_text(place) if isinstance(place, Flag) else place
+    return json_fields.place_text(place) if isinstance(place, JsonFlag) else place

@@ -32,44 +32,46 @@ PLACES: Final[Mapping[str, str]] = {
 }
 
 
-class Settings(ChargerSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class ModbusChargerSettings(ChargerSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """One receiver."""
 
     unit: Annotated[Unit, tells("its Modbus unit id; the maker's default is 16.")]
 
 
-def points(settings: Settings) -> dict[str, Point]:
+def points(settings: ModbusChargerSettings) -> dict[str, Point]:
     """Name -> its register or coil."""
     return {name: at(settings.unit, place) for name, place in PLACES.items()}
 
 
-def claims(settings: Settings) -> Iterator[tuple[str, tuple[str, ...]]]:
+def claims(settings: ModbusChargerSettings) -> Iterator[tuple[str, tuple[str, ...]]]:
     """(place, path) of its coils, which no other device may use."""
     for name in (xnergy.ENABLE, xnergy.CHECK_RANGE):
         yield str(points(settings)[name]), ("unit",)
 
 
-def describe(settings: Settings, bus_settings: modbus.Settings) -> list[tuple[str, str]]:
+def describe(
+    settings: ModbusChargerSettings, bus_settings: modbus.ModbusSettings
+) -> list[tuple[str, str]]:
     """Rows that `check` prints instead of a wiring table: (what, meaning)."""
     return xnergy.rows(settings, {name: str(point) for name, point in points(settings).items()})
 
 
-def warnings(settings: Settings) -> Remarks:
+def warnings(settings: ModbusChargerSettings) -> Remarks:
     """Valid settings that deserve a second look: (path, text)."""
     return xnergy.warnings(settings, "bus")
 
 
-def create(name: str, settings: Settings, bus: modbus.ModbusBus) -> xnergy.Receiver:
+def create(name: str, settings: ModbusChargerSettings, bus: modbus.ModbusBus) -> xnergy.Receiver:
     """The receiver's driver on its bus; it sends nothing before the first reading."""
     return xnergy.Receiver(settings, Registers(settings, bus))
 
 
 class Registers:
-    """`xnergy.Wire` on the registers and coils of one unit."""
+    """`xnergy.ReceiverAccess` on the registers and coils of one unit."""
 
     reads = (*xnergy.ALWAYS, *xnergy.TEMPERATURES)
 
-    def __init__(self, settings: Settings, bus: modbus.ModbusBus) -> None:
+    def __init__(self, settings: ModbusChargerSettings, bus: modbus.ModbusBus) -> None:
         self._points = points(settings)
         self._bus = bus
         self.insist = bus.insist
@@ -91,7 +93,7 @@ class Registers:
 
 
 DRIVER = DriverType(
-    settings=Settings,
+    settings=ModbusChargerSettings,
     buses=("modbus",),
     create=create,
     describe=describe,

@@ -14,7 +14,7 @@ from bridges.kinds.shared.remarks import Remarks
 from bridges.kinds.shared.table import Table
 from drivers import DriverError
 from drivers.charger import rules
-from drivers.charger.register_map import PROFILE, ChargerMap, Number
+from drivers.charger.register_map import PROFILE, ChargerMap, RegisterNumber
 from drivers.charger.register_tables import samples
 from drivers.charger.rules import judged, receiver_text
 from drivers.driver_type import DriverType
@@ -25,7 +25,9 @@ from drivers.hal.modbus.registers import WRITABLE, Unit, at, misplaced
 POWER: Final = "power"
 
 
-class Settings(ChargerSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class RegisterChargerSettings(
+    ChargerSettings, frozen=True, kw_only=True, forbid_unknown_fields=True
+):
     """One station."""
 
     unit: Annotated[Unit, tells("its Modbus unit id.")]
@@ -52,23 +54,23 @@ class Settings(ChargerSettings, frozen=True, kw_only=True, forbid_unknown_fields
             yield ("on_death",), "this station cannot be stopped: leave this out"
 
 
-def charger_map(settings: Settings) -> ChargerMap:
+def charger_map(settings: RegisterChargerSettings) -> ChargerMap:
     """The map: the one in the YAML, or the profile's."""
     return PROFILE.chosen(settings.profile, settings.map)
 
 
-def cells(settings: Settings) -> dict[str, list[Point]]:
+def cells(settings: RegisterChargerSettings) -> dict[str, list[Point]]:
     """Value -> its registers, or its coil or discrete input."""
-    found: Mapping[str, Number] = charger_map(settings).values
+    found: Mapping[str, RegisterNumber] = charger_map(settings).values
     return {name: [at(settings.unit, p) for p in n.places()] for name, n in found.items()}
 
 
-def orders(settings: Settings) -> dict[str, Point]:
+def orders(settings: RegisterChargerSettings) -> dict[str, Point]:
     """Order -> the place that it is written to."""
     return {n: at(settings.unit, text) for n, text in charger_map(settings).orders().items()}
 
 
-def claims(settings: Settings) -> Iterator[tuple[str, tuple[str, ...]]]:
+def claims(settings: RegisterChargerSettings) -> Iterator[tuple[str, tuple[str, ...]]]:
     """(place, path) of each place that is written; nothing while the map has problems."""
     if any(PROFILE.problems(settings.profile, settings.map)):
         return
@@ -78,7 +80,7 @@ def claims(settings: Settings) -> Iterator[tuple[str, tuple[str, ...]]]:
             yield str(at(settings.unit, text)), path
 
 
-def describe(settings: Settings, bus: object) -> Iterator[tuple[str, str]]:
+def describe(settings: RegisterChargerSettings, bus: object) -> Iterator[tuple[str, str]]:
     """Rows for `check`: each value's place, what is written, and what the numbers mean."""
     found = charger_map(settings)
     for name, points in cells(settings).items():
@@ -100,12 +102,12 @@ def describe(settings: Settings, bus: object) -> Iterator[tuple[str, str]]:
     yield from found.codes.rows() if found.codes else ()
 
 
-def tables(settings: Settings) -> Iterator[Table]:
+def tables(settings: RegisterChargerSettings) -> Iterator[Table]:
     """Each value by a sample, to hold against the station's registers."""
     yield samples(charger_map(settings), cells(settings))
 
 
-def warnings(settings: Settings) -> Remarks:
+def warnings(settings: RegisterChargerSettings) -> Remarks:
     """Valid settings that deserve a second look: (path, text)."""
     yield from PROFILE.warnings(settings.profile, "watch the first charge")
     found = charger_map(settings)
@@ -117,7 +119,7 @@ def warnings(settings: Settings) -> Remarks:
         yield (), "without receivers the robot on the pad is not verified"
 
 
-def create(name: str, settings: Settings, bus: ModbusBus) -> "RegisterCharger":
+def create(name: str, settings: RegisterChargerSettings, bus: ModbusBus) -> "RegisterCharger":
     """The station's driver on its bus; it sends nothing before the first reading."""
     return RegisterCharger(settings, bus)
 
@@ -125,7 +127,7 @@ def create(name: str, settings: Settings, bus: ModbusBus) -> "RegisterCharger":
 class RegisterCharger:
     """`drivers.Driver` for one station. `_power`: the level that it has; None while unknown."""
 
-    def __init__(self, settings: Settings, bus: ModbusBus) -> None:
+    def __init__(self, settings: RegisterChargerSettings, bus: ModbusBus) -> None:
         self._settings = settings
         self._map = charger_map(settings)
         self._cells = cells(settings)
@@ -229,7 +231,7 @@ def _flag(value: float | None) -> bool | None:
 
 
 DRIVER = DriverType(
-    settings=Settings,
+    settings=RegisterChargerSettings,
     buses=("modbus",),
     create=create,
     describe=describe,

@@ -9,9 +9,9 @@ from bridges.kinds.shared.fields import Name, tells
 from bridges.kinds.shared.remarks import Remarks
 from bridges.yaml.spelling import unknown
 from drivers.charger import rules as by_rules
-from drivers.charger.rules import Errors, Rule
+from drivers.charger.rules import Rule, StationErrors
 from drivers.charger.state_codes import Codes
-from drivers.hal.modbus.map_parts import Levels, Placed, Written
+from drivers.hal.modbus.map_parts import Placed, WrittenLevels, WrittenPlace
 from drivers.hal.modbus.registers import Word, place
 from drivers.numbers import BITS, LongBit
 from drivers.profiles import Profile
@@ -21,7 +21,7 @@ KNOWN: Final = ("state", "receiver", "in_range", "range_ok", "at_height", *MEASU
 """The values whose names have a meaning of their own."""
 
 
-class Number(Placed, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class RegisterNumber(Placed, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """One value of the station."""
 
     words: Annotated[Literal[1, 2], tells("how many registers it takes: 2 for 32 bits.")] = 1
@@ -68,7 +68,7 @@ class Number(Placed, frozen=True, kw_only=True, forbid_unknown_fields=True):
         return [raw >> BITS * n & 0xFFFF for n in reversed(range(self.words))]
 
 
-class Power(Levels, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class Power(WrittenLevels, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """The command that lets the station charge."""
 
     ON = "start"
@@ -81,7 +81,7 @@ class Power(Levels, frozen=True, kw_only=True, forbid_unknown_fields=True):
     ] = True
 
 
-class Order(Written, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class Order(WrittenPlace, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """A command that is written once."""
 
     write: Annotated[Word, tells("the value that is written.")] = 1
@@ -91,7 +91,7 @@ class ChargerMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
     """A station's register map. Addresses begin at 0."""
 
     values: Annotated[
-        dict[Name, Number],
+        dict[Name, RegisterNumber],
         msgspec.Meta(min_length=1),
         tells("""name -> its place. `state` is the number that `codes` lists; `volts`, `amps`,
         `battery_percent` and `time_to_full_s` are shown; `receiver` is the id of the receiver that
@@ -110,9 +110,9 @@ class ChargerMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
         dict[Name, Name],
         tells("name -> the value that is this temperature (°C), shown in status and diagnostics."),
     ] = {}
-    errors: Annotated[Errors, tells("those of `values` that mean an error in any state.")] = (
-        Errors()
-    )
+    errors: Annotated[
+        StationErrors, tells("those of `values` that mean an error in any state.")
+    ] = StationErrors()
     power: Annotated[
         Power | None, tells("lets it charge; without it the station is only observed.")
     ] = None

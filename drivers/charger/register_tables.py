@@ -4,11 +4,11 @@ from collections.abc import Iterator, Mapping
 from typing import Final, NamedTuple
 
 from bridges.kinds.shared.table import Table
-from drivers.charger.register_map import ChargerMap, Number
+from drivers.charger.register_map import ChargerMap, RegisterNumber
 from drivers.hal.modbus.points import Point
 
 
-class Sample(NamedTuple):
+class ShownValue(NamedTuple):
     """A value that shows its scale and the order of its words, and its unit."""
 
     value: float
@@ -16,10 +16,10 @@ class Sample(NamedTuple):
 
 
 SAMPLES: Final = {
-    "volts": Sample(25.8, "V"),
-    "amps": Sample(12.9, "A"),
-    "battery_percent": Sample(50.0, "%"),
-    "time_to_full_s": Sample(600.0, "s"),
+    "volts": ShownValue(25.8, "V"),
+    "amps": ShownValue(12.9, "A"),
+    "battery_percent": ShownValue(50.0, "%"),
+    "time_to_full_s": ShownValue(600.0, "s"),
 }
 
 
@@ -42,12 +42,12 @@ def _meanings(found: ChargerMap, name: str, is_bit: bool) -> Iterator[tuple[floa
     elif is_bit:
         yield from ((0.0, "0"), (1.0, "1"))
     else:
-        value, unit = SAMPLES.get(name, Sample(1.0, ""))
+        value, unit = SAMPLES.get(name, ShownValue(1.0, ""))
         shown = found.values[name].value(found.values[name].encoded(value))
         yield value, f"{shown:g} {unit}".rstrip()
 
 
-def _held(number: Number, points: list[Point], value: float) -> str:
+def _held(number: RegisterNumber, points: list[Point], value: float) -> str:
     words = number.encoded(value)
     if _is_single(points):
         return str(words[0])
@@ -55,7 +55,7 @@ def _held(number: Number, points: list[Point], value: float) -> str:
     return " and ".join(f"0x{word:04X}" for word in words) + others
 
 
-def _is_bit(number: Number, points: list[Point]) -> bool:
+def _is_bit(number: RegisterNumber, points: list[Point]) -> bool:
     return number.bit is not None or _is_single(points)
 
 

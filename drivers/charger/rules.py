@@ -136,7 +136,7 @@ class ErrorBits(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
         return known + [("robot", self.robot[bit]) for bit in on if bit in self.robot]
 
 
-class Errors(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class StationErrors(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Errors of the station or of the robot on it, whatever the state is."""
 
     station: Annotated[
@@ -185,7 +185,7 @@ def judge(rules: list[Rule], read: Read) -> Rule | None:
     return next((r for r in rules if all(t.holds(read(at)) for at, t in r.when.items())), None)
 
 
-class Judged(msgspec.Struct, frozen=True):
+class JudgedState(msgspec.Struct, frozen=True):
     """What the station does, whose fault an error is, its code for texts, and what is wrong.
 
     `does`: what it does beneath an error.
@@ -203,7 +203,9 @@ class Judged(msgspec.Struct, frozen=True):
         return self.activity is Activity.ERROR and self.does is Activity.CHARGING
 
 
-def judged(station: "Station", read: Read, code: int | str | None, told: FaultSide = "") -> Judged:
+def judged(
+    station: "StateRules", read: Read, code: int | str | None, told: FaultSide = ""
+) -> JudgedState:
     """The state from rules, codes and errors.
 
     `code`: the maker's state, if there are codes. `told`: whose fault it is by the station's own text.
@@ -234,17 +236,17 @@ def meaning(rules: list[Rule], codes: Codes | None, read: Read, code: int | str 
 
 def with_errors(
     meant: Meant, errors: Found, codes: Codes | None = None, told: FaultSide = ""
-) -> Judged:
+) -> JudgedState:
     """The state with what is wrong. `told`: the side of an error that is told in words."""
     wrong: Found = [(meant.side, meant.text), *errors] if meant.text else errors
     shown = Activity.ERROR if wrong else meant.activity
     side = first_side([meant.side, told, *(whose for whose, _ in wrong)])
     if codes is not None:
         side = side or codes.unnamed_side(meant.code)
-    return Judged(shown, side, meant.code, said(wrong), meant.activity)
+    return JudgedState(shown, side, meant.code, said(wrong), meant.activity)
 
 
-class Station(Protocol):
+class StateRules(Protocol):
     """The part of a station's settings, or of its map, that defines its state."""
 
     @property
@@ -256,11 +258,11 @@ class Station(Protocol):
         """The rules, which are tried before the codes."""
 
     @property
-    def errors(self) -> Errors:
+    def errors(self) -> StationErrors:
         """The values that mean an error, whatever the state is."""
 
 
-def rows(rules: list[Rule], errors: Errors) -> Iterator[tuple[str, str]]:
+def rows(rules: list[Rule], errors: StationErrors) -> Iterator[tuple[str, str]]:
     """The rows that `check` prints."""
     for n, rule in enumerate(rules):
         tests = (f"{at} {test.text()}" for at, test in rule.when.items())

@@ -223,7 +223,7 @@ def _charges(code: int) -> bool:
 # ---- on a wire
 
 
-class Wire(Protocol):
+class ReceiverAccess(Protocol):
     """Access to the receiver's numbers on one type of bus."""
 
     @property
@@ -249,7 +249,7 @@ class Wire(Protocol):
 class Receiver:
     """`drivers.Driver` for one receiver."""
 
-    def __init__(self, settings: ChargerSettings, wire: Wire) -> None:
+    def __init__(self, settings: ChargerSettings, wire: ReceiverAccess) -> None:
         self._settings = settings
         self._wire = wire
         self._written = Written()

@@ -34,7 +34,7 @@ CUT_MUST_READ: Final = {
 """Signal -> (the level that a cut wire must read as, what goes wrong if it does not)."""
 
 
-class Inputs(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class DoorInputWiring(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """The contacts that are read. With `feedback: estimated` a limit contact may be missing."""
 
     opened: Annotated[Input | None, tells("the door is fully open, by its limit contact.")] = None
@@ -56,17 +56,17 @@ class Hold(Output, frozen=True, forbid_unknown_fields=True):
     ] = None
 
 
-class Outputs(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class DoorOutputWiring(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """The commands to the operator. No relay closes the door."""
 
     hold_open: Annotated[Hold, tells("holds the door open while it is on.")]
 
 
-class Settings(DoorSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class DryContactDoorSettings(DoorSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """A door and its wiring."""
 
-    inputs: Annotated[Inputs, tells("the contacts that are read.")] = Inputs()
-    outputs: Annotated[Outputs, tells("the relay that is driven.")]
+    inputs: Annotated[DoorInputWiring, tells("the contacts that are read.")] = DoorInputWiring()
+    outputs: Annotated[DoorOutputWiring, tells("the relay that is driven.")]
 
     def problems(self) -> Remarks:
         """Problems that involve more than one field."""
@@ -102,7 +102,7 @@ class Settings(DoorSettings, frozen=True, kw_only=True, forbid_unknown_fields=Tr
             yield ("feedback",), "both limit contacts are wired: leave feedback out"
 
 
-def wires(settings: Settings) -> list[Wire]:
+def wires(settings: DryContactDoorSettings) -> list[Wire]:
     """The wiring table, inputs first."""
     relay = settings.outputs.hold_open
     flash = None
@@ -112,12 +112,12 @@ def wires(settings: Settings) -> list[Wire]:
     return [*input_wires(settings.inputs, DEBOUNCE_S), relay.wire("hold_open", path, flash)]
 
 
-def debounce(settings: Settings) -> Mapping[str, float]:
+def debounce(settings: DryContactDoorSettings) -> Mapping[str, float]:
     """The debounce time of each input (s), by signal."""
     return {w.signal: w.debounce_s for w in wires(settings) if w.debounce_s is not None}
 
 
-def tables(settings: Settings) -> Iterator[Table]:
+def tables(settings: DryContactDoorSettings) -> Iterator[Table]:
     """How the relay is driven."""
     pulse = settings.pulse
     driven = "on while RMF holds the door"
@@ -128,7 +128,7 @@ def tables(settings: Settings) -> Iterator[Table]:
     yield Table("outputs", ("output", "how long"), rows)
 
 
-def warnings(settings: Settings) -> Remarks:
+def warnings(settings: DryContactDoorSettings) -> Remarks:
     """Valid settings to review before the door goes into service: (path, text)."""
     for wire in wires(settings):
         if wire.signal == "closed" and wire.broken_reads() is not False:
@@ -142,7 +142,7 @@ def warnings(settings: Settings) -> Remarks:
         yield ("feedback",), "RMF is told OPEN or CLOSED by the clock, whatever the door does"
 
 
-def create(name: str, settings: Settings, bus: PointsBus) -> "DryContactDoor":
+def create(name: str, settings: DryContactDoorSettings, bus: PointsBus) -> "DryContactDoor":
     """The door's driver on its bus; it touches nothing before `open`."""
     return DryContactDoor(
         Points(wires(settings), bus), flashes=settings.outputs.hold_open.flash is not None
@@ -176,12 +176,12 @@ class DryContactDoor(OnPoints):
         super().make_safe()
 
 
-def _unsafe(settings: Settings) -> Iterator[Unsafe]:
+def _unsafe(settings: DryContactDoorSettings) -> Iterator[Unsafe]:
     return unsafe_wires(wires(settings), CUT_MUST_READ)
 
 
 DRIVER = DriverType(
-    settings=Settings,
+    settings=DryContactDoorSettings,
     buses=("gpio", "modbus"),
     create=create,
     wires=wires,

@@ -20,32 +20,32 @@ from drivers.door.closing import CLOSING
 from drivers.driver_type import DriverType
 from drivers.hal import http
 from drivers.http_call import Call, InsistentCalls, claim, described, send, timer_unseen
-from drivers.json_fields import Flag
+from drivers.json_fields import JsonFlag
 from drivers.unsafe import Unsafe, needlessly_accepted, unaccepted
 
 HOLD: Final = "hold_open"
 
 
-class Inputs(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class DoorInputFields(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """The fields of the answer. With `feedback: estimated` `opened` or `closed` may be missing."""
 
-    opened: Annotated[Flag | None, tells("the door is fully open.")] = None
-    closed: Annotated[Flag | None, tells("the door is closed.")] = None
+    opened: Annotated[JsonFlag | None, tells("the door is fully open.")] = None
+    closed: Annotated[JsonFlag | None, tells("the door is closed.")] = None
     obstruction: Annotated[
-        Flag | None, tells("somebody is in the doorway: a hold lasts until it is clear.")
+        JsonFlag | None, tells("somebody is in the doorway: a hold lasts until it is clear.")
     ] = None
-    fire: Annotated[Flag | None, tells("the fire alarm; `on_fire` says what it does.")] = None
+    fire: Annotated[JsonFlag | None, tells("the fire alarm; `on_fire` says what it does.")] = None
 
 
-class Settings(DoorSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class HttpDoorSettings(DoorSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """A door and its controller. The paths follow the bus's `api_base`."""
 
     state_path: Annotated[http.Path, tells("the path that GET reads the inputs from.")]
-    inputs: Annotated[Inputs, tells("the fields of that answer.")] = Inputs()
+    inputs: Annotated[DoorInputFields, tells("the fields of that answer.")] = DoorInputFields()
     hold: Annotated[Call, tells("switches on the relay that holds the door open.")]
     release: Annotated[Call, tells("switches it off, so that the door closes by its own rules.")]
     held: Annotated[
-        Flag | None, tells("says that the relay is on; without it nothing proves it off.")
+        JsonFlag | None, tells("says that the relay is on; without it nothing proves it off.")
     ] = None
     switches_off_after_s: Annotated[
         Timeout | None,
@@ -77,7 +77,7 @@ class Settings(DoorSettings, frozen=True, kw_only=True, forbid_unknown_fields=Tr
         yield from unaccepted(_unsafe(self), self.accept_unsafe)
 
 
-def _unsafe(settings: Settings) -> Iterator[Unsafe]:
+def _unsafe(settings: HttpDoorSettings) -> Iterator[Unsafe]:
     if settings.switches_off_after_s is None:
         text = (
             "when the network dies nothing releases the door: have hold set the relay's own timer, and"
@@ -86,14 +86,14 @@ def _unsafe(settings: Settings) -> Iterator[Unsafe]:
         yield HOLD, ("hold",), text
 
 
-def claims(settings: Settings) -> Iterator[tuple[str, tuple[str, ...]]]:
+def claims(settings: HttpDoorSettings) -> Iterator[tuple[str, tuple[str, ...]]]:
     """(command, path): a second door with these commands would release this one."""
     yield claim(settings.hold), ("hold", "path")
     if settings.release != settings.hold:
         yield claim(settings.release), ("release", "path")
 
 
-def describe(settings: Settings, bus: http.Settings) -> Iterator[tuple[str, str]]:
+def describe(settings: HttpDoorSettings, bus: http.HttpSettings) -> Iterator[tuple[str, str]]:
     """Rows for `check`: what is read and what is sent."""
     api = http.base(bus.api_base)
     yield "state", f"GET {api.url(settings.state_path)} every {bus.scan_s:g} s"
@@ -107,14 +107,14 @@ def describe(settings: Settings, bus: http.Settings) -> Iterator[tuple[str, str]
     yield CLOSING
 
 
-def _renewed(settings: Settings, bus: http.Settings) -> str:
+def _renewed(settings: HttpDoorSettings, bus: http.HttpSettings) -> str:
     if settings.switches_off_after_s is None:
         return ""
     after = f"off by itself after {settings.switches_off_after_s:g} s"
     return f", again every {bus.scan_s:g} s while the door is held: {after}"
 
 
-def warnings(settings: Settings) -> Remarks:
+def warnings(settings: HttpDoorSettings) -> Remarks:
     """Valid settings to review before the door goes into service: (path, text)."""
     if settings.switches_off_after_s is not None:
         text = (
@@ -133,7 +133,7 @@ def warnings(settings: Settings) -> Remarks:
         yield ("feedback",), "RMF is told OPEN or CLOSED by the clock, whatever the door does"
 
 
-def create(name: str, settings: Settings, bus: InsistentCalls) -> "HttpDoor":
+def create(name: str, settings: HttpDoorSettings, bus: InsistentCalls) -> "HttpDoor":
     """The door's driver on its bus; it sends nothing before `open`."""
     return HttpDoor(settings, bus)
 
@@ -141,7 +141,7 @@ def create(name: str, settings: Settings, bus: InsistentCalls) -> "HttpDoor":
 class HttpDoor:
     """`drivers.Driver` for one door. `_told`: the relay's last commanded state; None when unknown."""
 
-    def __init__(self, settings: Settings, bus: InsistentCalls) -> None:
+    def __init__(self, settings: HttpDoorSettings, bus: InsistentCalls) -> None:
         self._settings = settings
         self._bus = bus
         self._renews = settings.switches_off_after_s is not None
@@ -197,7 +197,7 @@ class HttpDoor:
         return json_fields.flag_if(answer, self._settings.held)
 
 
-def decode(settings: Settings, answer: Mapping[str, object]) -> DoorSample:
+def decode(settings: HttpDoorSettings, answer: Mapping[str, object]) -> DoorSample:
     """Decode the answer. Raises DriverError that names the field it cannot decode."""
     found, said = settings.inputs, partial(json_fields.flag_if, answer)
     return DoorSample(
@@ -206,7 +206,7 @@ def decode(settings: Settings, answer: Mapping[str, object]) -> DoorSample:
 
 
 DRIVER = DriverType(
-    settings=Settings,
+    settings=HttpDoorSettings,
     buses=("http",),
     create=create,
     describe=describe,

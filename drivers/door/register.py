@@ -14,17 +14,17 @@ from bridges.kinds.shared.fields import Name, tells
 from bridges.kinds.shared.remarks import Remarks
 from bridges.kinds.shared.table import Table
 from drivers.door.closing import CLOSING
-from drivers.door.register_map import DoorMap, Errors, Parts, Status
+from drivers.door.register_map import DoorMap, OperatorFaults, Parts, Status
 from drivers.driver_type import DriverType
 from drivers.hal.modbus import ModbusBus
-from drivers.hal.modbus.lines import Lines
+from drivers.hal.modbus.lines import ModbusLines
 from drivers.hal.modbus.points import Point
 from drivers.hal.modbus.registers import WRITABLE, Unit, Word, at, misplaced, place
 from drivers.numbers import bits_on
 from drivers.profiles import Profile
 
 
-class Settings(DoorSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class RegisterDoorSettings(DoorSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """A door and its operator's registers."""
 
     unit: Annotated[Unit, tells("the operator's Modbus unit id.")]
@@ -59,12 +59,12 @@ class Settings(DoorSettings, frozen=True, kw_only=True, forbid_unknown_fields=Tr
 PROFILE: Final = Profile("door_register", "map", DoorMap)
 
 
-def door_map(settings: Settings) -> DoorMap:
+def door_map(settings: RegisterDoorSettings) -> DoorMap:
     """The map: the one in the YAML, or the profile's."""
     return PROFILE.chosen(settings.profile, settings.map).changed(settings.changes)
 
 
-def points(settings: Settings) -> dict[str, Point]:
+def points(settings: RegisterDoorSettings) -> dict[str, Point]:
     """The register or coil of each part of the map at this operator, `command` included."""
     return {
         part: at(settings.unit, text, settings.base_address)
@@ -72,7 +72,7 @@ def points(settings: Settings) -> dict[str, Point]:
     }
 
 
-def claims(settings: Settings) -> Iterator[tuple[str, tuple[str, ...]]]:
+def claims(settings: RegisterDoorSettings) -> Iterator[tuple[str, tuple[str, ...]]]:
     """(place, path) of the command, for this device alone; nothing while the map has problems."""
     if any(PROFILE.problems(settings.profile, settings.map)):
         return
@@ -83,7 +83,7 @@ def claims(settings: Settings) -> Iterator[tuple[str, tuple[str, ...]]]:
         yield str(point), (*written, "at") if written else ("unit",)
 
 
-def describe(settings: Settings, bus: object) -> Iterator[tuple[str, str]]:
+def describe(settings: RegisterDoorSettings, bus: object) -> Iterator[tuple[str, str]]:
     """Rows for `check`: each part of the map, its place, and what its numbers mean."""
     found = door_map(settings)
     meanings = {
@@ -99,7 +99,7 @@ def describe(settings: Settings, bus: object) -> Iterator[tuple[str, str]]:
     yield CLOSING
 
 
-def tables(settings: Settings) -> Iterator[Table]:
+def tables(settings: RegisterDoorSettings) -> Iterator[Table]:
     """What each number of the status means, and each bit of the errors."""
     found = door_map(settings)
     rows = [(meaning, str(number)) for number, meaning in _meanings(found.status)]
@@ -112,7 +112,7 @@ def tables(settings: Settings) -> Iterator[Table]:
         )
 
 
-def warnings(settings: Settings) -> Remarks:
+def warnings(settings: RegisterDoorSettings) -> Remarks:
     """Valid settings to review before the door goes into service: (path, text)."""
     yield from PROFILE.warnings(settings.profile, "watch the door move")
     if not door_map(settings).command.read_back:
@@ -121,26 +121,26 @@ def warnings(settings: Settings) -> Remarks:
         yield path, "the command cannot be read back: that the door was released is not verified"
 
 
-def _command_in(settings: Settings) -> tuple[str, ...]:
+def _command_in(settings: RegisterDoorSettings) -> tuple[str, ...]:
     """Where the YAML itself says what the command is; () where the profile does."""
     if settings.map:
         return "map", "command"
     return ("changes", "command") if settings.changes and settings.changes.command else ()
 
 
-def create(name: str, settings: Settings, bus: ModbusBus) -> "RegisterDoor":
+def create(name: str, settings: RegisterDoorSettings, bus: ModbusBus) -> "RegisterDoor":
     """The door's driver on its bus; it sends nothing before `open`."""
     found = points(settings)
     command, outputs = door_map(settings).command, {"command": found.pop("command")}
     safe = {"command": command.release}
-    lines = Lines(bus, found, outputs, safe, command.read_back)
+    lines = ModbusLines(bus, found, outputs, safe, command.read_back)
     return RegisterDoor(door_map(settings), lines)
 
 
 class RegisterDoor:
     """`drivers.Driver` for one door."""
 
-    def __init__(self, found: DoorMap, lines: Lines) -> None:
+    def __init__(self, found: DoorMap, lines: ModbusLines) -> None:
         self._map = found
         self._lines = lines
 
@@ -198,7 +198,7 @@ def _lost(found: DoorMap, words: Mapping[str, int]) -> str:
     return ""
 
 
-def _errors(errors: Errors | None, words: Mapping[str, int]) -> tuple[str, ...]:
+def _errors(errors: OperatorFaults | None, words: Mapping[str, int]) -> tuple[str, ...]:
     if errors is None:
         return ()
     return tuple(errors.bits.get(bit, f"error bit {bit}") for bit in bits_on(words["errors"]))
@@ -219,7 +219,7 @@ def _meanings(status: Status) -> list[tuple[int, str]]:
 
 
 DRIVER = DriverType(
-    settings=Settings,
+    settings=RegisterDoorSettings,
     buses=("modbus",),
     create=create,
     describe=describe,

@@ -6,7 +6,7 @@ import msgspec
 
 from bridges.kinds.shared.fields import Name, tells
 from bridges.kinds.shared.remarks import Remarks
-from drivers.hal.modbus.map_parts import InRegister, Levels, RegisterBit
+from drivers.hal.modbus.map_parts import InRegister, RegisterBit, WrittenLevels
 from drivers.hal.modbus.registers import Word
 from drivers.numbers import Bit, listed_twice
 
@@ -35,7 +35,7 @@ class Status(InRegister, frozen=True, kw_only=True, forbid_unknown_fields=True):
         )
 
 
-class Position(InRegister, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class DoorPosition(InRegister, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """How far the door is open, from 0 (closed) to 100 (open); any other number is a fault."""
 
     unknown: Annotated[
@@ -57,7 +57,7 @@ class Position(InRegister, frozen=True, kw_only=True, forbid_unknown_fields=True
             yield ("open_from",), "must be greater than closed_to"
 
 
-class Errors(InRegister, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class OperatorFaults(InRegister, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """The faults that the operator reports. They are shown only; no decision depends on them."""
 
     bits: Annotated[
@@ -65,7 +65,7 @@ class Errors(InRegister, frozen=True, kw_only=True, forbid_unknown_fields=True):
     ] = msgspec.field(default_factory=dict)
 
 
-class Command(Levels, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class HoldCommand(WrittenLevels, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """The command that holds the door open. No value drives it shut."""
 
     ON = "hold"
@@ -86,19 +86,19 @@ class Parts(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     """Parts that replace those of the profile's map; each is given in full."""
 
     status: Annotated[Status | None, tells("where the door is, as one number.")] = None
-    position: Annotated[Position | None, tells("how far it is open.")] = None
-    errors: Annotated[Errors | None, tells("the faults that it reports.")] = None
+    position: Annotated[DoorPosition | None, tells("how far it is open.")] = None
+    errors: Annotated[OperatorFaults | None, tells("the faults that it reports.")] = None
     obstruction: Annotated[
         RegisterBit | None, tells("somebody is in the doorway: a hold lasts until it is clear.")
     ] = None
-    command: Annotated[Command | None, tells("what holds it open.")] = None
+    command: Annotated[HoldCommand | None, tells("what holds it open.")] = None
 
 
 class DoorMap(Parts, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """An operator's register map. Addresses begin at 0."""
 
     status: Annotated[Status, tells("where the door is, as one number.")]
-    command: Annotated[Command, tells("what holds it open.")]
+    command: Annotated[HoldCommand, tells("what holds it open.")]
 
     def changed(self, parts: Parts | None) -> "DoorMap":
         """This map with `parts` in place of its own."""

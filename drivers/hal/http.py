@@ -24,7 +24,7 @@ from drivers.hal.deadline import Dialler, Resolve, tls_socket
 from drivers.hal.http_address import Base, Path, base
 from drivers.hal.http_json import excerpt, json_object
 
-__all__ = ["Base", "HttpBus", "Method", "Path", "Settings", "base"]
+__all__ = ["Base", "HttpBus", "HttpSettings", "Method", "Path", "base"]
 
 if TYPE_CHECKING:
     from requests.adapters import HTTPAdapter
@@ -58,7 +58,7 @@ _HINTS = {
 }
 
 
-class Settings(BusSettings, frozen=True, kw_only=True, forbid_unknown_fields=True, tag="http"):
+class HttpSettings(BusSettings, frozen=True, kw_only=True, forbid_unknown_fields=True, tag="http"):
     """A controller's HTTP API."""
 
     api_base: Annotated[
@@ -93,7 +93,7 @@ class Settings(BusSettings, frozen=True, kw_only=True, forbid_unknown_fields=Tru
             yield ("token_header",), "needs token_file: the file with what the header says"
 
 
-def warnings(settings: Settings) -> Remarks:
+def warnings(settings: HttpSettings) -> Remarks:
     """Valid settings that deserve a second look: (path, text)."""
     if settings.token_file and base(settings.api_base).scheme == "http":
         text = (
@@ -103,12 +103,12 @@ def warnings(settings: Settings) -> Remarks:
         yield ("token_file",), text
 
 
-def needs(settings: Settings) -> Needs:
+def needs(settings: HttpSettings) -> Needs:
     """The controller's address."""
     return Needs(host=base(settings.api_base).host)
 
 
-def where(settings: Settings) -> Where:
+def where(settings: HttpSettings) -> Where:
     """The controller's address."""
     return Where(base(settings.api_base).url(""), local=False)
 
@@ -121,7 +121,7 @@ class HttpBus(Bus):
 
     def __init__(
         self,
-        settings: Settings,
+        settings: HttpSettings,
         clock: Callable[[], float] = time.monotonic,
         resolve: Resolve = socket.getaddrinfo,
     ) -> None:
@@ -306,7 +306,7 @@ def _cause(error: BaseException) -> str:
 
 
 BUS = BusType(
-    settings=Settings,
+    settings=HttpSettings,
     open_bus=HttpBus,
     fake="hal_fakes.http",
     where=where,

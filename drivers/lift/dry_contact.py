@@ -6,7 +6,7 @@ The lines are GPIO pins, or coils and discrete inputs of a Modbus I/O module.
 from collections.abc import Mapping
 from functools import partial
 
-from bridges.kinds.lift.signals import Door, Hazard, LiftOutputs, LiftSample, Motion, Side
+from bridges.kinds.lift.signals import DoorReading, Hazard, LiftOutputs, LiftSample, Motion, Side
 from bridges.kinds.shared.remarks import Remarks
 from drivers.driver_type import DriverType
 from drivers.hal.points import Points, PointsBus
@@ -14,14 +14,14 @@ from drivers.lift import checks as lift_checks
 from drivers.lift import codes
 from drivers.lift import table as lift_table
 from drivers.lift import tables as lift_tables
-from drivers.lift.wiring import Inputs, LiftWiring
+from drivers.lift.wiring import LiftInputWiring, LiftWiring
 from drivers.on_points import OnPoints
 
 DOOR = {
-    (True, False): Door.OPEN,
-    (False, True): Door.CLOSED,
-    (False, False): Door.BETWEEN,
-    (True, True): Door.BOTH,
+    (True, False): DoorReading.OPEN,
+    (False, True): DoorReading.CLOSED,
+    (False, False): DoorReading.BETWEEN,
+    (True, True): DoorReading.BOTH,
 }
 """(opened, closed) contacts."""
 
@@ -33,7 +33,7 @@ UP_DOWN = {
 }
 
 
-class Settings(LiftWiring, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class DryContactLiftSettings(LiftWiring, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """A lift on dry contacts."""
 
     def problems(self) -> Remarks:
@@ -44,20 +44,20 @@ class Settings(LiftWiring, frozen=True, kw_only=True, forbid_unknown_fields=True
 wires, debounce, warnings = lift_table.wires, lift_table.debounce, lift_checks.warnings
 
 
-def notes(settings: Settings) -> Remarks:
+def notes(settings: DryContactLiftSettings) -> Remarks:
     """Choices that the site makes and should know of: (path below the device, text)."""
     return lift_checks.notes(settings, partial(lift_checks.sees, settings))
 
 
-def create(name: str, settings: Settings, bus: PointsBus) -> "LiftDryContact":
+def create(name: str, settings: DryContactLiftSettings, bus: PointsBus) -> "DryContactLift":
     """The lift's driver on its GPIO or Modbus bus; it touches nothing before `open`."""
-    return LiftDryContact(settings, bus)
+    return DryContactLift(settings, bus)
 
 
-class LiftDryContact(OnPoints):
+class DryContactLift(OnPoints):
     """`drivers.Driver[LiftSample, LiftOutputs]` for one lift."""
 
-    def __init__(self, settings: Settings, bus: PointsBus) -> None:
+    def __init__(self, settings: DryContactLiftSettings, bus: PointsBus) -> None:
         super().__init__(Points(wires(settings), bus))
         self._settings = settings
         self._conditional = lift_table.conditional(settings)
@@ -71,7 +71,7 @@ class LiftDryContact(OnPoints):
         self._points.write(encode(self._settings, outputs))
 
 
-def encode(settings: Settings, outputs: LiftOutputs) -> dict[str, bool]:
+def encode(settings: DryContactLiftSettings, outputs: LiftOutputs) -> dict[str, bool]:
     """Signal -> asserted, also for signals without a wire, which `Points` leaves out."""
     calls = {f"call_{level}": level == outputs.call for level in settings.calls}
     if settings.call_code:
@@ -85,7 +85,7 @@ def encode(settings: Settings, outputs: LiftOutputs) -> dict[str, bool]:
 
 
 def decode(
-    settings: Settings, shown: Mapping[str, bool], conditional: frozenset[str]
+    settings: DryContactLiftSettings, shown: Mapping[str, bool], conditional: frozenset[str]
 ) -> LiftSample:
     """Decode the lines (signal -> asserted). `conditional`: the groups that count only in AGV mode."""
     inputs = settings.inputs
@@ -93,11 +93,11 @@ def decode(
     agv = _agv(inputs, shown, service)
     unknown = frozenset() if agv else conditional
     level, code_fault = (None, "") if "floor" in unknown else settings.floor_code.read(shown)
-    front = Door.BETWEEN if "door" in unknown else _door(inputs, "door", shown)
-    rear = Door.BETWEEN if "rear_door" in unknown else _door(inputs, "rear_door", shown)
+    front = DoorReading.BETWEEN if "door" in unknown else _door(inputs, "door", shown)
+    rear = DoorReading.BETWEEN if "rear_door" in unknown else _door(inputs, "rear_door", shown)
     return LiftSample(
         level=level,
-        door=front or Door.BETWEEN,
+        door=front or DoorReading.BETWEEN,
         code_fault=code_fault,
         rear_door=rear,
         motion=None if "motion" in unknown else _motion(inputs, shown),
@@ -109,13 +109,13 @@ def decode(
     )
 
 
-def _service(inputs: Inputs, shown: Mapping[str, bool]) -> str | None:
+def _service(inputs: LiftInputWiring, shown: Mapping[str, bool]) -> str | None:
     if inputs.service is None:
         return None
     return inputs.service.means(codes.shown_number("service", shown, len(inputs.service.bits)))
 
 
-def _agv(inputs: Inputs, shown: Mapping[str, bool], service: str | None) -> bool | None:
+def _agv(inputs: LiftInputWiring, shown: Mapping[str, bool], service: str | None) -> bool | None:
     if inputs.agv_mode:
         return shown["agv_mode"]
     if inputs.service and "agv_mode" in inputs.service.codes.values():
@@ -123,18 +123,18 @@ def _agv(inputs: Inputs, shown: Mapping[str, bool], service: str | None) -> bool
     return None
 
 
-def _door(inputs: Inputs, prefix: str, shown: Mapping[str, bool]) -> Door | None:
+def _door(inputs: LiftInputWiring, prefix: str, shown: Mapping[str, bool]) -> DoorReading | None:
     single = getattr(inputs, prefix)
     if single and single.proves == "open":
-        return Door.OPEN if shown[prefix] else Door.NOT_OPEN
+        return DoorReading.OPEN if shown[prefix] else DoorReading.NOT_OPEN
     if single:
-        return Door.CLOSED if shown[prefix] else Door.NOT_CLOSED
+        return DoorReading.CLOSED if shown[prefix] else DoorReading.NOT_CLOSED
     if f"{prefix}_opened" not in shown:
         return None
     return DOOR[shown[f"{prefix}_opened"], shown[f"{prefix}_closed"]]
 
 
-def _motion(inputs: Inputs, shown: Mapping[str, bool]) -> Motion | None:
+def _motion(inputs: LiftInputWiring, shown: Mapping[str, bool]) -> Motion | None:
     if inputs.moving:
         return Motion.MOVING if shown["moving"] else Motion.STOPPED
     if inputs.stopped:
@@ -149,7 +149,7 @@ def _motion(inputs: Inputs, shown: Mapping[str, bool]) -> Motion | None:
 
 
 DRIVER = DriverType(
-    settings=Settings,
+    settings=DryContactLiftSettings,
     buses=("gpio", "modbus"),
     create=create,
     wires=wires,

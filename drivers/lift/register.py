@@ -8,25 +8,29 @@ from collections.abc import Iterable, Iterator, Mapping
 from typing import Annotated, Final
 
 from bridges.kinds.lift.settings import LiftSettings
-from bridges.kinds.lift.signals import Door, Hazard, LiftOutputs, LiftSample, Motion, Side
+from bridges.kinds.lift.signals import DoorReading, Hazard, LiftOutputs, LiftSample, Motion, Side
 from bridges.kinds.shared.fields import tells
 from bridges.kinds.shared.remarks import Remarks
 from bridges.kinds.shared.table import Table
 from drivers.driver_type import DriverType
 from drivers.hal.modbus import ModbusBus
-from drivers.hal.modbus.lines import Lines
+from drivers.hal.modbus.lines import ModbusLines
 from drivers.hal.modbus.registers import WRITABLE, Unit, at, misplaced
 from drivers.lift import checks
 from drivers.lift.register_map import DoorField, FloorField, LiftFlag, LiftMap, MotionField, Number
 from drivers.lift.table import DEBOUNCE_S, HAZARD_DEBOUNCE_S
 from drivers.lift.tables import BETWEEN, FAULT, floors, how_long
 
-DOOR: Final = {"open": Door.OPEN, "closed": Door.CLOSED, "moving": Door.BETWEEN}
+DOOR: Final = {
+    "open": DoorReading.OPEN,
+    "closed": DoorReading.CLOSED,
+    "moving": DoorReading.BETWEEN,
+}
 NUMBERS: Final = ("means", "number", "register reads")
 HOLD: Final = {Side.FRONT: "door_open", Side.REAR: "rear_door_open"}
 
 
-class Settings(LiftSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class RegisterLiftSettings(LiftSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """A lift and its gateway's registers."""
 
     unit: Annotated[Unit, tells("the gateway's Modbus unit id.")]
@@ -56,7 +60,7 @@ class Settings(LiftSettings, frozen=True, kw_only=True, forbid_unknown_fields=Tr
             yield ("accept_unsafe",), "a map has no wires that could be unsafe: delete this"
 
 
-def _rear_door(settings: Settings) -> Remarks:
+def _rear_door(settings: RegisterLiftSettings) -> Remarks:
     rear = any(stop.side is Side.REAR for stop in settings.stops().values())
     found = settings.map
     if rear and not found.rear_door:
@@ -67,7 +71,7 @@ def _rear_door(settings: Settings) -> Remarks:
         yield ("map", "commands"), "no rear_door_open, and some floors have side: rear"
 
 
-def warnings(settings: Settings) -> Remarks:
+def warnings(settings: RegisterLiftSettings) -> Remarks:
     """Valid settings that deserve a second look: (path below the device, text)."""
     found, commands = settings.map, settings.map.commands
     fire, told = found.shows(Hazard.FIRE), found.shows("agv_mode")
@@ -79,17 +83,17 @@ def warnings(settings: Settings) -> Remarks:
         yield ("map", "commands", "read_back"), text
 
 
-def notes(settings: Settings) -> Remarks:
+def notes(settings: RegisterLiftSettings) -> Remarks:
     """Choices that the site makes and should know of: (path below the device, text)."""
     return checks.notes(settings, settings.map.shows)
 
 
-def debounce(settings: Settings) -> Mapping[str, float]:
+def debounce(settings: RegisterLiftSettings) -> Mapping[str, float]:
     """How long a change must last (s), as for contacts: a gateway may show a half-changed number."""
     return {**DEBOUNCE_S, **dict.fromkeys(Hazard, HAZARD_DEBOUNCE_S)}
 
 
-def claims(settings: Settings) -> Iterator[tuple[str, tuple[str, ...]]]:
+def claims(settings: RegisterLiftSettings) -> Iterator[tuple[str, tuple[str, ...]]]:
     """(place, path) of each command; no other device may write there."""
     seen: set[str] = set()
     for path, where, _ in settings.map.commands.places():
@@ -98,7 +102,7 @@ def claims(settings: Settings) -> Iterator[tuple[str, tuple[str, ...]]]:
             yield str(at(settings.unit, where)), ("map", "commands", *path, "at")
 
 
-def describe(settings: Settings, bus: object) -> Iterator[tuple[str, str]]:
+def describe(settings: RegisterLiftSettings, bus: object) -> Iterator[tuple[str, str]]:
     """Rows for `check`: the place of each part of the map, and of each command."""
     for name, part in settings.map.parts().items():
         yield name, f"{at(settings.unit, part.at)}{_meaning(part)}"
@@ -111,7 +115,7 @@ def describe(settings: Settings, bus: object) -> Iterator[tuple[str, str]]:
         yield "commands", "written in every scan, and never read back"
 
 
-def tables(settings: Settings) -> Iterator[Table]:
+def tables(settings: RegisterLiftSettings) -> Iterator[Table]:
     """The floors from the lowest up, each part's numbers, and what is written for each command."""
     yield floors(settings)
     for name, part in settings.map.parts().items():
@@ -138,7 +142,7 @@ def _unlisted(part: Number) -> str:
     return "a car that moves" if isinstance(part, MotionField) else "out_of_service"
 
 
-def _outputs(settings: Settings) -> Table:
+def _outputs(settings: RegisterLiftSettings) -> Table:
     """Commands that share a register are written as one value; here each is alone."""
     commands, off = settings.map.commands, settings.map.commands.words((), None)
     levels = settings.levels()
@@ -164,19 +168,19 @@ def _meaning(part: Number | LiftFlag) -> str:
     return (f" bits {', '.join(map(str, part.bits))}" if part.bits else "") + text
 
 
-def create(name: str, settings: Settings, bus: ModbusBus) -> "RegisterLift":
+def create(name: str, settings: RegisterLiftSettings, bus: ModbusBus) -> "RegisterLift":
     """The lift's driver on its bus; it sends nothing before `open`."""
     inputs = {part: at(settings.unit, p.at) for part, p in settings.map.parts().items()}
     safe = encode(settings.map, LiftOutputs())
     outputs = {where: at(settings.unit, where) for where in safe}
-    lines = Lines(bus, inputs, outputs, safe, settings.map.commands.read_back)
+    lines = ModbusLines(bus, inputs, outputs, safe, settings.map.commands.read_back)
     return RegisterLift(settings.map, lines)
 
 
 class RegisterLift:
     """`drivers.Driver[LiftSample, LiftOutputs]` for one lift."""
 
-    def __init__(self, found: LiftMap, lines: Lines) -> None:
+    def __init__(self, found: LiftMap, lines: ModbusLines) -> None:
         self._map = found
         self._lines = lines
 
@@ -220,7 +224,7 @@ def decode(found: LiftMap, words: Mapping[str, int]) -> LiftSample:
     level, code_fault = (None, "") if "floor" in unknown else _floor(found, words)
     return LiftSample(
         level=level,
-        door=_door(found, "door", words, unknown) or Door.BETWEEN,
+        door=_door(found, "door", words, unknown) or DoorReading.BETWEEN,
         code_fault=code_fault,
         rear_door=_door(found, "rear_door", words, unknown),
         motion=None if "motion" in unknown else _motion(found, words),
@@ -252,14 +256,14 @@ def _floor(found: LiftMap, words: Mapping[str, int]) -> tuple[str | None, str]:
 
 def _door(
     found: LiftMap, name: str, words: Mapping[str, int], unknown: Iterable[str]
-) -> Door | None:
+) -> DoorReading | None:
     part = found.rear_door if name == "rear_door" else found.door
     if part is None:
         return None
     if name in unknown:
-        return Door.BETWEEN
+        return DoorReading.BETWEEN
     state = part.codes.get(part.number(words[name]))
-    return DOOR[state] if state else Door.UNKNOWN
+    return DOOR[state] if state else DoorReading.UNKNOWN
 
 
 def _motion(found: LiftMap, words: Mapping[str, int]) -> Motion | None:
@@ -270,7 +274,7 @@ def _motion(found: LiftMap, words: Mapping[str, int]) -> Motion | None:
 
 
 DRIVER = DriverType(
-    settings=Settings,
+    settings=RegisterLiftSettings,
     buses=("modbus",),
     create=create,
     debounce=debounce,

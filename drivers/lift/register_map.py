@@ -10,13 +10,13 @@ import msgspec
 from bridges.kinds.lift.signals import Hazard
 from bridges.kinds.shared.fields import Name, tells
 from bridges.kinds.shared.remarks import Remarks
-from drivers.hal.modbus.map_parts import InRegister, Levels, Placed, Written
+from drivers.hal.modbus.map_parts import InRegister, Placed, WrittenLevels, WrittenPlace
 from drivers.hal.modbus.registers import REGISTERS, Place, Word
 from drivers.lift.wiring import ServiceState
 from drivers.numbers import Bit
 
 
-class Field(InRegister, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class NumberField(InRegister, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """A number in a register."""
 
     bits: Annotated[
@@ -48,7 +48,7 @@ class Field(InRegister, frozen=True, kw_only=True, forbid_unknown_fields=True):
                 yield (key, str(number)), f"{number} does not fit on {len(self.bits)} bits"
 
 
-class FloorField(Field, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class FloorField(NumberField, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Where the car is."""
 
     codes: Annotated[dict[Word, Name], tells("number -> landing; an unlisted number is a fault.")]
@@ -64,7 +64,7 @@ class FloorField(Field, frozen=True, kw_only=True, forbid_unknown_fields=True):
                 yield ("codes", str(number)), f"{number} means between floors as well"
 
 
-class DoorField(Field, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class DoorField(NumberField, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """A door."""
 
     codes: Annotated[
@@ -79,7 +79,7 @@ class DoorField(Field, frozen=True, kw_only=True, forbid_unknown_fields=True):
             yield ("codes",), "needs a code for open and one for closed"
 
 
-class MotionField(Field, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class MotionField(NumberField, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """The car's motion."""
 
     codes: Annotated[
@@ -95,7 +95,7 @@ class MotionField(Field, frozen=True, kw_only=True, forbid_unknown_fields=True):
             yield ("codes",), "needs a code for stopped, and for moving or up and down"
 
 
-class ServiceField(Field, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class ServiceField(NumberField, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """The lift's service state."""
 
     codes: Annotated[
@@ -142,7 +142,7 @@ class LiftFlag(Placed, frozen=True, kw_only=True, forbid_unknown_fields=True):
             yield ("bit",), "is for registers: a coil or discrete input is one bit already"
 
 
-class Command(Levels, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class LiftCommand(WrittenLevels, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """One thing that is asked of the lift."""
 
     ON = "ask"
@@ -157,7 +157,7 @@ class Command(Levels, frozen=True, kw_only=True, forbid_unknown_fields=True):
     release: Annotated[Word, tells("the value that does not; its safe value.")] = 0
 
 
-class CallCommand(Written, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class CallCommand(WrittenPlace, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Calls as numbers in a register."""
 
     TABLES = ("holding register",)
@@ -177,16 +177,16 @@ class Commands(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     """The commands to the lift."""
 
     agv_mode_request: Annotated[
-        Command | None, tells("requests AGV mode while a robot holds the lift.")
+        LiftCommand | None, tells("requests AGV mode while a robot holds the lift.")
     ] = None
     door_open: Annotated[
-        Command | None, tells("holds the door open at the landing where the car stands.")
+        LiftCommand | None, tells("holds the door open at the landing where the car stands.")
     ] = None
     rear_door_open: Annotated[
-        Command | None, tells("holds the rear door open at the landing where the car stands.")
+        LiftCommand | None, tells("holds the rear door open at the landing where the car stands.")
     ] = None
     calls: Annotated[
-        dict[Name, Command], tells("landing -> its command. Give either `calls` or `call`.")
+        dict[Name, LiftCommand], tells("landing -> its command. Give either `calls` or `call`.")
     ] = {}
     call: Annotated[CallCommand | None, tells("calls as numbers in one register.")] = None
     read_back: Annotated[
@@ -195,10 +195,10 @@ class Commands(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
         nothing proves that the gateway took them."""),
     ] = True
 
-    def singles(self) -> Iterator[tuple[str, tuple[str, ...], Command]]:
+    def singles(self) -> Iterator[tuple[str, tuple[str, ...], LiftCommand]]:
         """Each command except `call`: its signal, its path below this section, and the command."""
         for name in ("agv_mode_request", "door_open", "rear_door_open"):
-            command: Command | None = getattr(self, name)
+            command: LiftCommand | None = getattr(self, name)
             if command:
                 yield name, (name,), command
         for level, command in self.calls.items():

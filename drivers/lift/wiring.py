@@ -84,7 +84,7 @@ class ServiceCode(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
         return Hazard.OUT_OF_SERVICE if state == "fault" else state
 
 
-class Inputs(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class LiftInputWiring(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """The lines from the lift.
 
     A hazard takes the lift away from RMF at once. A door has one contact or two. Give motion in one
@@ -222,7 +222,7 @@ class CallCode(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
         return codes.lines("call", number, len(self.bits))
 
 
-class Outputs(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class LiftOutputWiring(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """The lines to the lift, except calls. Each is a level, and off is its safe state."""
 
     agv_mode_request: Annotated[
@@ -239,9 +239,9 @@ class Outputs(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=T
 class LiftWiring(LiftSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """A lift on dry contacts, on GPIO pins or a Modbus I/O module."""
 
-    inputs: Annotated[Inputs, tells("the lines from the lift.")]
+    inputs: Annotated[LiftInputWiring, tells("the lines from the lift.")]
     floor_code: Annotated[FloorCode, tells("where the car is.")]
-    outputs: Annotated[Outputs, tells("the lines to the lift, except calls.")]
+    outputs: Annotated[LiftOutputWiring, tells("the lines to the lift, except calls.")]
     calls: Annotated[
         dict[Name, Output], tells("landing -> its line. Give either `calls` or `call_code`.")
     ] = msgspec.field(default_factory=dict)

@@ -87,11 +87,11 @@ def _lines(file: Path) -> list[str]:
 def _understood(
     file: str, text: bytes, reader: str, key: str, content: type[msgspec.Struct]
 ) -> dict[str, object]:
-    from bridges.yaml.nodes import Page, compose
+    from bridges.yaml.nodes import YamlFile, compose
     from bridges.yaml.positions import Spot
     from bridges.yaml.values import BROKEN, Values
 
-    page = Page(file)
+    page = YamlFile(file)
     root = compose(page, text)
     spot, values = Spot(root, root, "the file"), Values(page)
     types: dict[str, object] = {

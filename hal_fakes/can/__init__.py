@@ -6,13 +6,13 @@ charger with frames of its own in `frame_charger.py`.
 
 from collections.abc import Sequence
 
-from drivers.hal.can import Settings
-from hal_fakes.can.side import CanFarSide, Station, slow_s
+from drivers.hal.can import CanSettings
+from hal_fakes.can.side import CanFarSide, CanStation, slow_s
 from hal_fakes.can.slcan_port import SlcanPort
 from hal_fakes.fake import Outside
 
 
-def serve(settings: Settings, stations: Sequence[Station]) -> CanFarSide:
+def serve(settings: CanSettings, stations: Sequence[CanStation]) -> CanFarSide:
     """Serve the chargers of this bus on a pseudo-terminal."""
     return CanFarSide(SlcanPort(settings.slcan), stations, slow_s(settings))
 

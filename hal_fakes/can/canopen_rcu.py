@@ -16,7 +16,7 @@ import can
 import canopen
 from canopen.objectdictionary import ODRecord, ODVariable, datatypes
 
-from drivers.charger.canopen import HEARTBEAT_S, OBJECTS, Settings
+from drivers.charger.canopen import HEARTBEAT_S, OBJECTS, CanOpenChargerSettings
 from hal_fakes.can.side import Send
 from hal_fakes.fake import Fake
 from hal_fakes.plants.charger import Reading
@@ -30,7 +30,7 @@ NAMES: Final = {(found.index, found.subindex): name for name, found in OBJECTS.i
 
 
 class CanOpenRcu:
-    """A station (`hal_fakes.can.side.Station`)."""
+    """A station (`hal_fakes.can.side.CanStation`)."""
 
     def __init__(self, plant: Plant, node: int) -> None:
         self.plant = plant
@@ -130,7 +130,7 @@ def dictionary() -> canopen.ObjectDictionary:
     return made
 
 
-FAKE = Fake[Settings](
+FAKE = Fake[CanOpenChargerSettings](
     plant=lambda name, settings, wires: rcu_plant(name, "node", "heartbeat", "bus"),
     station=lambda plant, settings: CanOpenRcu(plant, settings.node),
 )

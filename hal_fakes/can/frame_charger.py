@@ -18,9 +18,9 @@ import can
 
 from bridges.kinds.charger.signals import Activity, FaultSide
 from drivers.charger import dbc
-from drivers.charger.can_frames import Settings, frame_map
+from drivers.charger.can_frames import FrameChargerSettings, frame_map
 from drivers.charger.can_map import FrameMap, Sent, State
-from drivers.charger.rules import UNKNOWN, Errors
+from drivers.charger.rules import UNKNOWN, StationErrors
 from hal_fakes.can.side import Send
 from hal_fakes.charger_values import NEAREST, values
 from hal_fakes.fake import Fake
@@ -45,9 +45,9 @@ ROBOTS_FAULTS: Final = frozenset(FLAGS) - {"transmitter_fault", "foreign_object"
 
 
 class FrameCharger:
-    """A station (`hal_fakes.can.side.Station`)."""
+    """A station (`hal_fakes.can.side.CanStation`)."""
 
-    def __init__(self, plant: Plant, settings: Settings) -> None:
+    def __init__(self, plant: Plant, settings: FrameChargerSettings) -> None:
         self.plant = plant
         self._map: FrameMap = frame_map(settings)
         self._dbc = dbc.load(self._map.dbc)
@@ -163,7 +163,7 @@ class FrameCharger:
         """What the signals of rules, error numbers and error flags hold."""
         known = self._map
         flags = (*known.errors.station, *known.errors.robot)
-        numbers = Errors(codes=known.errors.codes, bits=known.errors.bits)
+        numbers = StationErrors(codes=known.errors.codes, bits=known.errors.bits)
         in_error = reading.activity is Activity.ERROR
         side: FaultSide = "robot" if in_error and reading.faults & ROBOTS_FAULTS else ""
         wanted = UNKNOWN if wrong else (reading.activity, side)
@@ -190,7 +190,7 @@ def _short(message: can.Message) -> can.Message:
     )
 
 
-FAKE = Fake[Settings](
+FAKE = Fake[FrameChargerSettings](
     plant=lambda name, settings, wires: ChargerPlant(
         name,
         settings.receivers,

@@ -20,7 +20,7 @@ from typing import Final, Protocol
 
 import can
 
-from drivers.hal.can import Settings
+from drivers.hal.can import CanSettings
 from hal_fakes.plants.plant import FailureMode, Plant
 
 LOOK_S: Final = 0.02
@@ -30,7 +30,7 @@ SLOWNESS: Final = 1.5
 """How many of the client's timeouts a slow answer takes."""
 
 
-def slow_s(settings: Settings) -> float:
+def slow_s(settings: CanSettings) -> float:
     """How late a slow answer comes on this bus."""
     return SLOWNESS * settings.timeout_s
 
@@ -60,7 +60,7 @@ class Send(Protocol):
         """Send now; `late`: after the daemon has stopped waiting for it."""
 
 
-class Station(Protocol):
+class CanStation(Protocol):
     """One controller on the bus; its plant is behind it."""
 
     plant: Plant
@@ -125,7 +125,7 @@ class CanFarSide:
     `slow_s`: how late a frame comes that is sent late, or on a slow bus.
     """
 
-    def __init__(self, medium: Medium, stations: Sequence[Station], slow_s: float) -> None:
+    def __init__(self, medium: Medium, stations: Sequence[CanStation], slow_s: float) -> None:
         self.replace = medium.replace
         self._medium = medium
         self._stations = stations

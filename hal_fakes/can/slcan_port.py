@@ -19,7 +19,7 @@ import msgspec
 
 from drivers.hal.can import Slcan
 from hal_fakes.can.side import any_frame
-from hal_fakes.modbus.rtu import Adapter
+from hal_fakes.modbus.rtu import SerialAdapter
 from hal_fakes.plants.plant import FailureMode
 
 DIGITS: Final = {"t": 3, "T": 8}
@@ -30,7 +30,7 @@ class SlcanPort:
 
     def __init__(self, settings: Slcan | None = None) -> None:
         self._directory = tempfile.TemporaryDirectory(prefix="rmf-slcan-")
-        self.adapter = Adapter(Path(self._directory.name) / "adapter")
+        self.adapter = SerialAdapter(Path(self._directory.name) / "adapter")
         self.adapter.plug()
         found = settings or Slcan(port="", bitrate=250_000)
         place = msgspec.structs.replace(found, port=str(self.adapter.path))

@@ -6,7 +6,7 @@ import sys
 from collections.abc import Sequence
 
 from hal_fakes.demo import building, charging, ride
-from hal_fakes.demo.demo_run import Stage
+from hal_fakes.demo.demo_run import DemoRun
 
 DEMOS = {"ride": ride.DEMO, "charging": charging.DEMO, "page": building.DEMO}
 
@@ -35,7 +35,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     for device, _, _ in args.fail:
         if device not in demo.files:
             parser.error(f"no device '{device}'; there are {', '.join(demo.files)}")
-    return Stage(demo, args.fail, args.patience).play()
+    return DemoRun(demo, args.fail, args.patience).play()
 
 
 if __name__ == "__main__":

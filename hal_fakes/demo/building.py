@@ -17,7 +17,7 @@ from bridges.messages.stamps import duration
 from hal_fakes.demo.demo_run import Demo
 from hal_fakes.demo.world import World
 from workbench.rmf_model.phases import DoorClose, DoorOpen, EndLiftSession, RequestLift
-from workbench.rmf_model.robot import Phase, Robot
+from workbench.rmf_model.robot import Phase, RobotContext
 
 CONFIG = Path(__file__).parents[2] / "config"
 HERE = Path(__file__).parent
@@ -48,7 +48,7 @@ Step = Phase | float | Callable[[], bool]
 class Rider:
     """One robot on its errands."""
 
-    def __init__(self, world: World, robot: Robot, errands: Iterator[Step]) -> None:
+    def __init__(self, world: World, robot: RobotContext, errands: Iterator[Step]) -> None:
         self.robot = robot
         self._world = world
         self._errands = errands
@@ -74,7 +74,7 @@ class Rider:
 
 
 def errands(
-    robot: Robot, lift: str, door: str, floors: tuple[str, str], levels: dict[str, str]
+    robot: RobotContext, lift: str, door: str, floors: tuple[str, str], levels: dict[str, str]
 ) -> Iterator[Step]:
     """Through a door, up or down in a lift, a rest; and again. `levels`: where each robot is."""
     there = cycle((floors, floors[::-1]))
@@ -126,16 +126,16 @@ def live(world: World) -> None:
         ("R2", LIFT1, SIDE, ("L2", "L4")),
         ("R3", LIFT2, WARD, ("L4", "L1")),
     )
-    robots = [Robot(f"{FLEET}/{name}") for name, *_ in rides]
+    robots = [RobotContext(f"{FLEET}/{name}") for name, *_ in rides]
     levels = {f"{FLEET}/{name}": start for name, _, _, (start, _) in rides}
     world.join(*robots)
     riders = [
         Rider(world, robot, errands(robot, lift, door, floors, levels))
         for robot, (_, lift, door, floors) in zip(robots, rides, strict=True)
     ]
-    riders.append(Rider(world, Robot(f"{FLEET}/R4"), charges(world, "R4", PAD_A)))
-    riders.append(Rider(world, Robot(f"{FLEET}/R5"), charges(world, "R5", PAD_E)))
-    trouble = Rider(world, Robot("nobody"), _troubles(world))
+    riders.append(Rider(world, RobotContext(f"{FLEET}/R4"), charges(world, "R4", PAD_A)))
+    riders.append(Rider(world, RobotContext(f"{FLEET}/R5"), charges(world, "R5", PAD_E)))
+    trouble = Rider(world, RobotContext("nobody"), _troubles(world))
     fleet_at = [0.0]
 
     def turn() -> bool:

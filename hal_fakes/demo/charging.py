@@ -17,7 +17,7 @@ from bridges.messages import topics, words
 from bridges.messages.stamps import duration
 from bridges.settings.load import load
 from hal_fakes.demo.demo_run import Demo
-from hal_fakes.demo.fleets import Yard
+from hal_fakes.demo.fleets import DemoFleets
 from hal_fakes.demo.journal import Journal
 from hal_fakes.demo.world import World
 
@@ -37,20 +37,20 @@ def dawns(world: World) -> bool:
 
 def live(world: World) -> None:
     """All scenarios, in their order."""
-    yard = Yard(world, load(COORDINATOR).section)
-    world.join(yard)
+    fleets = DemoFleets(world, load(COORDINATOR).section)
+    world.join(fleets)
     with world.leg("1 scheduled", f"all day {ONE} is to be charged to 96 %"):
-        _scheduled(world, yard)
+        _scheduled(world, fleets)
     with world.leg("2 ad-hoc", "a robot asks for itself, and an operator for one on the pad"):
-        _ad_hoc(world, yard)
+        _ad_hoc(world, fleets)
     with world.leg("3 stacked", f"{PORTER} is full and stays on its pad; {ONE} and {TWO} come"):
-        _stacked(world, yard)
+        _stacked(world, fleets)
     with world.leg("4 wrong station", f"{ONE} is assigned to {A} and drives to {B}"):
-        _wrong_station(world, yard)
+        _wrong_station(world, fleets)
     with world.leg("5a station faulty", f"{A} is hot at the self-check, {B} during the charge"):
-        _stations_faulty(world, yard)
+        _stations_faulty(world, fleets)
     with world.leg("5b robot faulty", f"the receiver of {TWO} is defective"):
-        _robot_faulty(world, yard)
+        _robot_faulty(world, fleets)
 
 
 def _idle(world: World) -> bool:
@@ -62,9 +62,9 @@ def _charges(world: World, charger: str, who: str, within_s: float = 12) -> None
     world.shows(charging, lambda: world.charger_is(charger, "CHARGING", who), within_s)
 
 
-def _shown(world: World, yard: Yard, charger: str, text: str) -> None:
+def _shown(world: World, fleets: DemoFleets, charger: str, text: str) -> None:
     seen = f"the coordinator shows {charger}: {text}"
-    world.shows(seen, lambda: yard.shown.get(charger) == text)
+    world.shows(seen, lambda: fleets.shown.get(charger) == text)
 
 
 def _sent(world: World, who: str, place: str, within_s: float = 10) -> None:
@@ -87,9 +87,9 @@ def _free(world: World, within_s: float = 10) -> None:
     world.shows("both chargers are free again", lambda: _idle(world), within_s)
 
 
-def _waits(world: World, yard: Yard, who: str, why: str, within_s: float = 10) -> None:
+def _waits(world: World, fleets: DemoFleets, who: str, why: str, within_s: float = 10) -> None:
     def queued() -> bool:
-        return f"/{who} " in yard.queue and why in yard.queue
+        return f"/{who} " in fleets.queue and why in fleets.queue
 
     world.shows(f"{who} waits in the queue: {why}", queued, within_s)
 
@@ -102,52 +102,52 @@ def _mended(world: World, charger: str) -> None:
     world.shows(f"{charger} is in service", lambda: world.charger_is(charger, "IDLE"), 8)
 
 
-def _scheduled(world: World, yard: Yard) -> None:
-    yard.leaves(ONE)
+def _scheduled(world: World, fleets: DemoFleets) -> None:
+    fleets.leaves(ONE)
     world.pause(3.0)
-    yard.rests(ONE, 92)
+    fleets.rests(ONE, 92)
     _sent(world, ONE, f"charge at {A}")
-    _shown(world, yard, A, f"ASSIGNED tiny/{ONE}, by the schedule")
+    _shown(world, fleets, A, f"ASSIGNED tiny/{ONE}, by the schedule")
     _charges(world, A, ONE)
     _sent(world, ONE, "wait at wait_1")
     _free(world)
 
 
-def _ad_hoc(world: World, yard: Yard) -> None:
-    yard.needs(TWO, 40)
-    yard.robot(PORTER).battery_percent = 70
-    yard.leaves(PORTER, "bay_b")
+def _ad_hoc(world: World, fleets: DemoFleets) -> None:
+    fleets.needs(TWO, 40)
+    fleets.robot(PORTER).battery_percent = 70
+    fleets.leaves(PORTER, "bay_b")
     _error(world, B, "wrong docking: porter/P01 is not assigned here", PORTER)
     world.note(f"an operator wants {PORTER} charged: rmf-bridge send charger any --queue")
     request = d.ChargerRequest("", "porter", PORTER, duration(30.0), "operator-1")
     world.say([(topics.ADAPTER_CHARGER_REQUESTS, request)])
     _charges(world, B, PORTER)
-    _shown(world, yard, B, f"CHARGING porter/{PORTER}, by an operator")
+    _shown(world, fleets, B, f"CHARGING porter/{PORTER}, by an operator")
     _charges(world, A, TWO)
-    _shown(world, yard, A, f"CHARGING tiny/{TWO}, by the robot")
+    _shown(world, fleets, A, f"CHARGING tiny/{TWO}, by the robot")
     full = "both are full, and their chargers have let them go"
     world.shows(full, lambda: world.charger_is(A, "IDLE") and world.charger_is(B, "RELEASED"))
 
 
-def _stacked(world: World, yard: Yard) -> None:
-    yard.needs(ONE, 40)
+def _stacked(world: World, fleets: DemoFleets) -> None:
+    fleets.needs(ONE, 40)
     _sent(world, ONE, f"charge at {A}")
-    yard.needs(TWO, 40)
-    _waits(world, yard, TWO, f"porter/{PORTER} stands at {B}")
+    fleets.needs(TWO, 40)
+    _waits(world, fleets, TWO, f"porter/{PORTER} stands at {B}")
     _sent(world, TWO, "wait at wait_2")
     blocks = f"porter/{PORTER} stands at {B}, and tiny/{TWO} waits for it"
     _alerted(world, "PAD_BLOCKED", blocks)
-    yard.leaves(PORTER)
+    fleets.leaves(PORTER)
     _charges(world, B, TWO)
     _sent(world, ONE, "wait at wait_1")
     _sent(world, TWO, "wait at wait_2")
     _free(world)
 
 
-def _wrong_station(world: World, yard: Yard) -> None:
-    yard.needs(ONE, 60)
+def _wrong_station(world: World, fleets: DemoFleets) -> None:
+    fleets.needs(ONE, 60)
     _sent(world, ONE, f"charge at {A}")
-    yard.strays(ONE, "dock_b")
+    fleets.strays(ONE, "dock_b")
     _error(world, B, f"wrong docking: tiny/{ONE}", ONE)
     world.shows(f"{A} is kept for it", lambda: world.charger_is(A, "ASSIGNED", ONE), 2)
     _sent(world, ONE, "wait at wait_1")
@@ -157,9 +157,9 @@ def _wrong_station(world: World, yard: Yard) -> None:
     _free(world)
 
 
-def _stations_faulty(world: World, yard: Yard) -> None:
+def _stations_faulty(world: World, fleets: DemoFleets) -> None:
     world.press(A, "over_temperature", True)
-    yard.needs(ONE, 40)
+    fleets.needs(ONE, 40)
     _error(world, A, "station: over temperature", ONE)
     _alerted(world, "STATION_OUT_OF_SERVICE", f"{A}: station: over temperature")
     _charges(world, B, ONE)
@@ -175,10 +175,10 @@ def _stations_faulty(world: World, yard: Yard) -> None:
     _free(world)
 
 
-def _robot_faulty(world: World, yard: Yard) -> None:
+def _robot_faulty(world: World, fleets: DemoFleets) -> None:
     for charger in (A, B):
         world.fail(charger, "receiver", "wrong")
-    yard.needs(TWO, 40)
+    fleets.needs(TWO, 40)
     for charger in (A, B):
         _error(world, charger, "robot: authentication timeout", TWO)
     faulty = f"tiny/{TWO} failed at {A} and at {B}: not tried again"
@@ -186,7 +186,7 @@ def _robot_faulty(world: World, yard: Yard) -> None:
     _sent(world, TWO, "wait at wait_2")
     for charger in (A, B):
         world.fail(charger, "receiver", "ok")
-    yard.needs(ONE, 60)
+    fleets.needs(ONE, 60)
     _charges(world, A, ONE)
     _sent(world, ONE, "wait at wait_1")
     _free(world)

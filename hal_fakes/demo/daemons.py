@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable
 from contextlib import suppress
 from pathlib import Path
 
-from hal_fakes.caller import Caller, Refused
+from hal_fakes.caller import Caller, SimulationRefused
 from hal_fakes.plants.plant import Edge
 from hal_fakes.wire import wire
 from workbench.page import access
@@ -21,7 +21,7 @@ CONNECT_WITHIN_S = 60.0
 TAIL = 15
 
 
-class Wrong(Exception):
+class DemoFailed(Exception):
     """The demo did not go as it should; the text says what was missing."""
 
 
@@ -48,9 +48,9 @@ class Program:
             )
 
     def check(self) -> None:
-        """Raises Wrong when the daemon has died."""
+        """Raises DemoFailed when the daemon has died."""
         if self._exited():
-            raise Wrong(f"the daemon {self.name} has died; its log says why")
+            raise DemoFailed(f"the daemon {self.name} has died; its log says why")
 
     def tail(self) -> str:
         """The end of its log."""
@@ -77,7 +77,7 @@ class Program:
         return os.waitid(os.P_PID, self._process.pid, look) is not None
 
 
-class Daemon(Program):
+class DaemonProcess(Program):
     """One `rmf-bridge run FILE --simulate`."""
 
     def __init__(self, file: Path, directory: Path, domain_id: int) -> None:
@@ -92,12 +92,12 @@ class Daemon(Program):
         threading.Thread(target=_read, args=(caller, tell), daemon=True).start()
 
     def order(self, line: str) -> None:
-        """Give its plants one order. Raises Wrong when they refuse it."""
+        """Give its plants one order. Raises DemoFailed when they refuse it."""
         with self._caller() as caller:
             try:
                 caller.order(line)
-            except Refused as error:
-                raise Wrong(str(error)) from None
+            except SimulationRefused as error:
+                raise DemoFailed(str(error)) from None
 
     def reset(self) -> None:
         """As `rmf-bridge reset` does."""
@@ -112,11 +112,11 @@ class Daemon(Program):
                 return Caller(path, patience_s=None)
             except (FileNotFoundError, ConnectionRefusedError):
                 if time.monotonic() > deadline:
-                    raise Wrong(f"{self.name} made no {path.name}") from None
+                    raise DemoFailed(f"{self.name} made no {path.name}") from None
                 time.sleep(0.05)
 
 
-class Page(Program):
+class PageProcess(Program):
     """`rmf-bridge page`, on which `demo` may log in."""
 
     def __init__(self, directory: Path, domain_id: int, password: str) -> None:
@@ -134,7 +134,7 @@ class Page(Program):
         while not (said := [line for line in self.tail().splitlines() if "http://" in line]):
             self.check()
             if time.monotonic() > deadline:
-                raise Wrong("the page did not say where it is")
+                raise DemoFailed("the page did not say where it is")
             time.sleep(0.05)
         return f"{said[0]}; log in as demo, password {self._password}"
 

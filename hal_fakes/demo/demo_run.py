@@ -19,7 +19,7 @@ from bridges.messages import words
 from bridges.messages.topics import AnyTopic
 from bridges.settings.load import load
 from bridges.transports.transport import Transport, TransportError
-from hal_fakes.demo.daemons import Daemon, Page, Wrong, stop_all
+from hal_fakes.demo.daemons import DaemonProcess, DemoFailed, PageProcess, stop_all
 from hal_fakes.demo.journal import Journal
 from hal_fakes.demo.world import PUBLISHED, World
 from hal_fakes.domain import free_domain
@@ -37,9 +37,10 @@ class Interrupted(Exception):
 @dataclass(frozen=True, slots=True)
 class Demo:
     """`files`: a daemon's YAML, by the device that it serves. `dawn`: how everything stands in the
-    morning, which `dawns` sees. `live`: the day itself, which raises Wrong when something does not come
-    about in time. `problems`: whatever was not as it should be, from the journal alone. `right`: the
-    day in a sentence. `outcomes`: what each part of the day has shown, if the summary lists them.
+    morning, which `dawns` sees. `live`: the day itself, which raises DemoFailed when something does
+    not come about in time. `problems`: whatever was not as it should be, from the journal alone.
+    `right`: the day in a sentence. `outcomes`: what each part of the day has shown, if the summary
+    lists them.
     `page_password`: the page is served beside it, and `demo` may log in with it.
     `publishes`: the topics of RMF's side; without the supervisors' where real ones run."""
 
@@ -54,7 +55,7 @@ class Demo:
     publishes: Sequence[AnyTopic] = PUBLISHED
 
 
-class Stage:
+class DemoRun:
     """One performance of a demo; `failures` happen before its day begins.
 
     `patience`: how many times as long as usual each step may take.
@@ -64,9 +65,9 @@ class Stage:
         self.demo = demo
         self.failures = failures
         self._patience = patience
-        self.daemons: dict[str, Daemon] = {}
+        self.daemons: dict[str, DaemonProcess] = {}
         self.journal = Journal(time.monotonic(), sys.stdout.write, colour=sys.stdout.isatty())
-        self.page: Page | None = None
+        self.page: PageProcess | None = None
         self._page_says = ""
         self._interrupted = False
 
@@ -91,7 +92,7 @@ class Stage:
         except TransportError as error:
             sys.stdout.write(f"the demo cannot start: {error}\n")
             return 1, False
-        except Wrong as wrong:
+        except DemoFailed as wrong:
             self._fail([str(wrong)])
             return 1, True
         if problems := self.demo.problems(self.journal):
@@ -134,9 +135,9 @@ class Stage:
         try:
             for device, file in self.demo.files.items():
                 self._check()
-                self.daemons[device] = Daemon(file, directory, domain)
+                self.daemons[device] = DaemonProcess(file, directory, domain)
             if self.demo.page_password:
-                self.page = Page(directory, domain, self.demo.page_password)
+                self.page = PageProcess(directory, domain, self.demo.page_password)
                 self._page_says = self.page.address()
                 self.journal.note("demo", self._page_says, time.monotonic())
             yield transport
@@ -150,7 +151,7 @@ class Stage:
         self._interrupted = True
 
     def _check(self) -> None:
-        """Raises Interrupted, or Wrong when a daemon has died."""
+        """Raises Interrupted, or DemoFailed when a daemon has died."""
         sys.stdout.flush()
         if self._interrupted:
             raise Interrupted

@@ -9,14 +9,14 @@ from collections.abc import Collection, Sequence
 from pathlib import Path
 from typing import Final, cast, get_args
 
-from bridges.kinds.charger.settings import Robot
-from bridges.kinds.charger_coordinator.settings import Settings
+from bridges.kinds.charger.settings import RobotName
+from bridges.kinds.charger_coordinator.settings import CoordinatorSettings
 from bridges.messages import definitions as d
 from bridges.messages.topics import CHARGING_ASSIGNMENTS, DIAGNOSTICS, AnyTopic
 from bridges.settings.fleet_config import load_fleet
 from hal_fakes.demo.world import World
 from workbench.rmf_model import Party, Said
-from workbench.rmf_model.fleet import Finishing, Fleet, FleetRobot, Graph
+from workbench.rmf_model.fleet import Finishing, FleetAdapter, FleetRobot, Graph
 
 WARD: Final = "ward"
 DRIVE_S: Final = 1.0
@@ -26,13 +26,13 @@ CONFIGURED: Final = {"tiny": Path(__file__).parents[2] / "config" / "fleet_tiny.
 FINISHING: Final[dict[str, Finishing]] = {"porter": "nothing"}
 
 
-class Yard(Party):
+class DemoFleets(Party):
     """Both fleets, as one party on RMF's side; and what the coordinator shows on /diagnostics: its
     `queue`, and all of it, `shown`, by its key."""
 
     subscribes: Sequence[AnyTopic] = (CHARGING_ASSIGNMENTS, DIAGNOSTICS)
 
-    def __init__(self, world: World, site: Settings) -> None:
+    def __init__(self, world: World, site: CoordinatorSettings) -> None:
         self.world = world
         self.queue = "-"
         self.shown: dict[str, str] = {}
@@ -115,7 +115,7 @@ class Yard(Party):
                 percent = robot.battery_percent + passed_s * FILLS_PER_S
                 robot.battery_percent = min(100.0, percent)
 
-    def _stands(self, who: Robot) -> None:
+    def _stands(self, who: RobotName) -> None:
         """Onto a pad, and off it."""
         before = self._on_pad.get(who.name)
         charger = self._stations.get((who.fleet, self.robot(who.name).place))
@@ -130,17 +130,19 @@ class Yard(Party):
             self.world.press(charger, str(who), True)
 
 
-def _fleet(name: str, site: Settings) -> Fleet:
+def _fleet(name: str, site: CoordinatorSettings) -> FleetAdapter:
     settings = site.fleets[name]
     graph = {place: (at.level, at.x, at.y) for place, at in settings.waypoints.items()}
     graph[WARD] = ("L1", -20.0, 0.0)
     homes = {who: robot.waits_at for who, robot in settings.robots.items()}
     if name in CONFIGURED:
         return tutorial_fleet(CONFIGURED[name], graph, DRIVE_S, only=homes)
-    return Fleet(name, graph, homes, DRIVE_S, FINISHING[name])
+    return FleetAdapter(name, graph, homes, DRIVE_S, FINISHING[name])
 
 
-def tutorial_fleet(file: Path, graph: Graph, drive_s: float, only: Collection[str] = ()) -> Fleet:
+def tutorial_fleet(
+    file: Path, graph: Graph, drive_s: float, only: Collection[str] = ()
+) -> FleetAdapter:
     """A fleet from its adapter's configuration file, as RMF's tutorial shapes it, each robot at its
     charger's waypoint. Raises SettingsError, or ValueError.
 
@@ -159,4 +161,4 @@ def tutorial_fleet(file: Path, graph: Graph, drive_s: float, only: Collection[st
     request = found.fleet.finishing_request or "nothing"
     if request not in get_args(Finishing):
         raise ValueError(f"{file}: no finishing_request {request!r}")
-    return Fleet(found.fleet.name, graph, places, drive_s, cast(Finishing, request))
+    return FleetAdapter(found.fleet.name, graph, places, drive_s, cast(Finishing, request))

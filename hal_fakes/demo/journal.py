@@ -24,7 +24,7 @@ COLOURS = {
 
 
 @dataclass(frozen=True, slots=True)
-class Line:
+class JournalLine:
     """One printed line; `at` is monotonic s."""
 
     at: float
@@ -51,28 +51,28 @@ class Journal:
         self.legs: dict[str, float] = {}
         self._write = write
         self._colour = colour
-        self._waiting: list[Line] = []
+        self._waiting: list[JournalLine] = []
         self._told: dict[tuple[str, str], str] = {}
 
     def edge(self, edge: Edge) -> None:
         """A relay of ours, or a contact of the plant's."""
         self.edges.append(edge)
         value = ("off", "on")[edge.value] if isinstance(edge.value, bool) else edge.value
-        self._add(Line(edge.at, edge.what, edge.device, f"{edge.signal} {value}"))
+        self._add(JournalLine(edge.at, edge.what, edge.device, f"{edge.signal} {value}"))
 
     def request(self, message: Requested, at: float) -> None:
         """What a node is sent."""
         self.requests.append(message)
-        self._once(Line(at, "request", words.device(message), words.request(message)))
+        self._once(JournalLine(at, "request", words.device(message), words.request(message)))
 
     def state(self, message: Stated, at: float) -> None:
         """What a node says."""
         self.states.append(message)
-        self._once(Line(at, "state", words.device(message), words.described(message)))
+        self._once(JournalLine(at, "state", words.device(message), words.described(message)))
 
     def note(self, what: What, text: str, at: float, device: str = "") -> None:
         """What a robot does, where it is sent, what a person is told, or the demo itself."""
-        self._add(Line(at, what, device, text))
+        self._add(JournalLine(at, what, device, text))
 
     def forget(self) -> None:
         """Of a demo that never ends, only the latest of each device is kept."""
@@ -109,12 +109,12 @@ class Journal:
         counts["states"] = len(self.states)
         return counts
 
-    def _once(self, line: Line) -> None:
+    def _once(self, line: JournalLine) -> None:
         """Unless it says of this device what the last such line said."""
         key = (line.what, line.device)
         if self._told.get(key) != line.text:
             self._told[key] = line.text
             self._add(line)
 
-    def _add(self, line: Line) -> None:
+    def _add(self, line: JournalLine) -> None:
         self._waiting.append(replace(line, text=words.printable(line.text)))

@@ -13,7 +13,7 @@ from hal_fakes.demo.demo_run import Demo
 from hal_fakes.demo.journal import Journal
 from hal_fakes.demo.world import World
 from workbench.rmf_model.phases import DoorClose, DoorOpen, EndLiftSession, RequestLift
-from workbench.rmf_model.robot import Phase, Robot
+from workbench.rmf_model.robot import Phase, RobotContext
 from workbench.rmf_model.supervisors import DoorSupervisor, LiftSupervisor
 
 FLEET, ROBOT = "demo", "robot"
@@ -38,7 +38,7 @@ def dawns(world: World) -> bool:
 
 def live(world: World) -> None:
     """The whole day."""
-    robot = Robot(SESSION)
+    robot = RobotContext(SESSION)
     world.join(LiftSupervisor(), DoorSupervisor(), robot)
     with world.leg("door"):
         _through_the_door(world, robot)
@@ -50,7 +50,9 @@ def live(world: World) -> None:
         world.until(lambda: _at_rest(world), 15, "all relays to be off and the door to be closed")
 
 
-def _phase(world: World, robot: Robot, phase: Phase, text: str, within_s: float, what: str) -> None:
+def _phase(
+    world: World, robot: RobotContext, phase: Phase, text: str, within_s: float, what: str
+) -> None:
     """The robot's fleet adapter begins a phase, and ends it."""
     world.note(text, SESSION)
     world.say(robot.begin(phase, world.wall()))
@@ -62,7 +64,7 @@ def _drive(world: World, text: str) -> None:
     world.pause(DRIVE_S)
 
 
-def _through_the_door(world: World, robot: Robot) -> None:
+def _through_the_door(world: World, robot: RobotContext) -> None:
     listed = f"{DOOR} to be open, and the heartbeat to list the robot"
     _phase(world, robot, DoorOpen(DOOR), f"asks for {DOOR}", 20, listed)
     _drive(world, "drives through")
@@ -70,7 +72,7 @@ def _through_the_door(world: World, robot: Robot) -> None:
     _phase(world, robot, DoorClose(DOOR), f"is through, releases {DOOR}", 5, dropped)
 
 
-def _up_in_the_lift(world: World, robot: Robot) -> None:
+def _up_in_the_lift(world: World, robot: RobotContext) -> None:
     for floor, inside, text, drives in (
         (FROM, False, f"asks for {LIFT} at {FROM}", "drives in"),
         (TO, True, f"is in the car, asks for {TO}", "drives out"),

@@ -15,7 +15,7 @@ from bridges.messages import topics, words
 from bridges.messages.topics import AnyTopic
 from bridges.messages.words import Requested, Stated
 from bridges.transports.transport import Publisher, Transport
-from hal_fakes.demo.daemons import Daemon, Wrong
+from hal_fakes.demo.daemons import DaemonProcess, DemoFailed
 from hal_fakes.demo.journal import SETTLES_S, Journal
 from hal_fakes.plants.plant import Edge
 from workbench.rmf_model import Party, Said
@@ -52,7 +52,7 @@ class World:
     def __init__(
         self,
         transport: Transport,
-        daemons: Mapping[str, Daemon],
+        daemons: Mapping[str, DaemonProcess],
         journal: Journal,
         check: Callable[[], None],
         patience: float = 1.0,
@@ -148,8 +148,8 @@ class World:
             self.note(f"-- {name}: {text}")
         try:
             yield
-        except Wrong as wrong:
-            raise Wrong(f"{name}: {wrong}" if text else str(wrong)) from wrong
+        except DemoFailed as wrong:
+            raise DemoFailed(f"{name}: {wrong}" if text else str(wrong)) from wrong
         self.journal.legs[name] = time.monotonic() - began_at
 
     def until(
@@ -157,21 +157,21 @@ class World:
     ) -> None:
         """Go on until `ready`. `repeat` is published now and every second meanwhile.
 
-        Raises Wrong, with `what`, when it takes longer than `within_s`, times the patience.
+        Raises DemoFailed, with `what`, when it takes longer than `within_s`, times the patience.
         """
         within_s *= self._patience
         deadline = time.monotonic() + within_s
         repeat_at = time.monotonic() if repeat else float("inf")
         while not ready():
             if time.monotonic() >= deadline:
-                raise Wrong(f"waited {within_s:g} s for {what}")
+                raise DemoFailed(f"waited {within_s:g} s for {what}")
             if repeat and time.monotonic() >= repeat_at:
                 repeat_at += 1.0
                 self.say([repeat])
             self._turn(LOOK_EVERY_S)
 
     def shows(self, what: str, ready: Callable[[], bool], within_s: float = 10.0) -> None:
-        """Go on when this has come about, and say so. Raises Wrong if it takes too long."""
+        """Go on when this has come about, and say so. Raises DemoFailed if it takes too long."""
         self.until(ready, within_s, what)
         self.note(f"   so: {what}")
 

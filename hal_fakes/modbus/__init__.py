@@ -23,12 +23,12 @@ from typing import Any, Final
 
 from pymodbus.simulator import DataType, SimData, SimDevice
 
-from drivers.hal.modbus import Settings
+from drivers.hal.modbus import ModbusSettings
 from hal_fakes.fake import Outside
-from hal_fakes.modbus.dead_man import DeadMan
-from hal_fakes.modbus.flash import CoilRequest
+from hal_fakes.modbus.dead_man import ModuleWatchdog
+from hal_fakes.modbus.flash import TimedCoilRequest
 from hal_fakes.modbus.rtu import RtuLine
-from hal_fakes.modbus.units import FarSide, Units
+from hal_fakes.modbus.units import FakeUnits, FarSide
 
 _aiohttp = sys.modules.get("aiohttp")
 sys.modules["aiohttp"] = None  # type: ignore[assignment]  # as if it were not installed
@@ -47,10 +47,10 @@ LOOK_S: Final = 0.02
 READY_S: Final = 10.0
 
 
-def serve(settings: Settings, stations: Sequence[FarSide]) -> "ModbusServer | RtuLine":
+def serve(settings: ModbusSettings, stations: Sequence[FarSide]) -> "ModbusServer | RtuLine":
     """Serve the devices of this bus on a free port of 127.0.0.1, or on a line of their own."""
     dog = settings.module_watchdog
-    devices = [*map(DeadMan, dog.units if dog else ()), *stations]
+    devices = [*map(ModuleWatchdog, dog.units if dog else ()), *stations]
     if settings.serial:
         slow_s = (settings.retries + 1.2) * settings.timeout_s
         return RtuLine(devices, settings.serial, slow_s)
@@ -64,7 +64,7 @@ class ModbusServer:
     """
 
     def __init__(self, devices: Iterable[FarSide], slow_s: float) -> None:
-        self._units = Units(devices, slow_s)
+        self._units = FakeUnits(devices, slow_s)
         self._noise = random.Random("modbus")
         self._kinds = itertools.cycle((0, 1))
         self._port = 0
@@ -96,7 +96,7 @@ class ModbusServer:
             _placeholder(),
             address=("127.0.0.1", self._port),
             ignore_missing_devices=True,
-            custom_pdu=[CoilRequest],
+            custom_pdu=[TimedCoilRequest],
             trace_packet=self._send,
         )
         self._server.context = self._units

@@ -15,7 +15,7 @@ STOPPED, RUNNING, TRIPPED = 0, 1, 2
 TIME_AT_POWER_ON: Final = 100
 
 
-class DeadMan:
+class ModuleWatchdog:
     """One unit's watchdog. Times are monotonic seconds."""
 
     plant = None

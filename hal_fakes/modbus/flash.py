@@ -7,13 +7,13 @@ from pymodbus.datastore import ModbusServerContext
 from pymodbus.pdu import ExceptionResponse, ModbusPDU
 from pymodbus.pdu.bit_message import WriteSingleCoilRequest
 
-from hal_fakes.modbus.units import Units
+from hal_fakes.modbus.units import FakeUnits
 
 COIL_VALUES: Final = (0xFF00, 0)
 
 
-class CoilRequest(WriteSingleCoilRequest):
-    """Function 5 with its value as sent. A value other than on and off asks `Units` for a flash."""
+class TimedCoilRequest(WriteSingleCoilRequest):
+    """Function 5 with its value as sent. A value other than on and off asks `FakeUnits` for a flash."""
 
     def decode(self, data: bytes) -> None:
         """Keep the value."""
@@ -24,7 +24,7 @@ class CoilRequest(WriteSingleCoilRequest):
         """Write the coil. The reply to a flash is its echo."""
         if self.registers[0] in COIL_VALUES:
             return await super().datastore_update(context, device_id)
-        assert isinstance(context, Units)
+        assert isinstance(context, FakeUnits)
         refusal = await context.flash(device_id, self.address, self.registers[0])
         if refusal is not None:
             return ExceptionResponse(self.function_code, refusal)

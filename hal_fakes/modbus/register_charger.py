@@ -1,7 +1,7 @@
 """A charging station on registers: its plant in the numbers of its map."""
 
 from bridges.kinds.charger.signals import Activity
-from drivers.charger.register import POWER, Settings, cells, charger_map, orders
+from drivers.charger.register import POWER, RegisterChargerSettings, cells, charger_map, orders
 from drivers.charger.rules import UNKNOWN
 from drivers.charger.state_codes import ROBOT_ERROR
 from drivers.hal.modbus.points import Point
@@ -12,10 +12,10 @@ from hal_fakes.plants.charger import ChargerPlant, Reading
 from hal_fakes.plants.plant import Plant
 
 
-class RegisterCharger:
+class FakeRegisterCharger:
     """The cells of one station (`hal_fakes.modbus.units`)."""
 
-    def __init__(self, plant: Plant, settings: Settings) -> None:
+    def __init__(self, plant: Plant, settings: RegisterChargerSettings) -> None:
         self.plant = plant
         self.unit: int = settings.unit
         self._map = charger_map(settings)
@@ -77,7 +77,7 @@ class RegisterCharger:
         return codes[0]
 
 
-def build(name: str, settings: Settings) -> ChargerPlant:
+def build(name: str, settings: RegisterChargerSettings) -> ChargerPlant:
     """The station that this map speaks of."""
     found = charger_map(settings)
     return ChargerPlant(
@@ -90,7 +90,7 @@ def build(name: str, settings: Settings) -> ChargerPlant:
     )
 
 
-FAKE = Fake[Settings](
+FAKE = Fake[RegisterChargerSettings](
     plant=lambda name, settings, wires: build(name, settings),
-    station=lambda plant, settings: RegisterCharger(plant, settings),
+    station=lambda plant, settings: FakeRegisterCharger(plant, settings),
 )

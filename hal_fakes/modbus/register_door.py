@@ -3,7 +3,7 @@
 It has found its ends: the position is 0 or 100 there, and between them the number for `unknown`, or 50.
 """
 
-from drivers.door.register import Settings, door_map, points
+from drivers.door.register import RegisterDoorSettings, door_map, points
 from drivers.door.register_map import DoorMap, Status
 from drivers.hal.modbus.points import Point
 from drivers.hal.points import Wire
@@ -15,7 +15,7 @@ NONSENSE = 65535
 """The status of a door that is open and closed at once."""
 
 
-def contacts(settings: Settings) -> list[Wire]:
+def contacts(settings: RegisterDoorSettings) -> list[Wire]:
     """The operator's own contacts and relay, for the plant: they can fail like wires to us."""
     at = points(settings)
     signals = {"opened": "status", "closed": "status", "obstruction": "obstruction"}
@@ -23,10 +23,10 @@ def contacts(settings: Settings) -> list[Wire]:
     return [*inputs, Wire("hold_open", "out", str(at["command"]), "high")]
 
 
-class RegisterDoor:
+class FakeRegisterDoor:
     """The cells of one operator. `points`: what it has, `outputs` among it; `unit`: where."""
 
-    def __init__(self, plant: Plant, settings: Settings) -> None:
+    def __init__(self, plant: Plant, settings: RegisterDoorSettings) -> None:
         self.plant = plant
         self.unit = settings.unit
         self._map: DoorMap = door_map(settings)
@@ -76,7 +76,7 @@ class RegisterDoor:
         return closed if self.plant.sense("closed") else between
 
 
-FAKE = Fake[Settings](
+FAKE = Fake[RegisterDoorSettings](
     plant=lambda name, settings, wires: door.build(name, settings, contacts(settings)),
-    station=lambda plant, settings: RegisterDoor(plant, settings),
+    station=lambda plant, settings: FakeRegisterDoor(plant, settings),
 )

@@ -14,21 +14,28 @@ from bridges.kinds.lift.signals import Hazard
 from drivers.hal.modbus.points import Point
 from drivers.hal.modbus.registers import at
 from drivers.lift import dry_contact
-from drivers.lift.register import Settings
-from drivers.lift.register_map import DoorField, Field, LiftFlag, LiftMap, MotionField, ServiceField
+from drivers.lift.register import RegisterLiftSettings
+from drivers.lift.register_map import (
+    DoorField,
+    LiftFlag,
+    LiftMap,
+    MotionField,
+    NumberField,
+    ServiceField,
+)
 from hal_fakes.fake import Fake
-from hal_fakes.plants.lift import LiftPlant, Pace
+from hal_fakes.plants.lift import LiftPace, LiftPlant
 from hal_fakes.plants.plant import Plant
 
 NONSENSE = 65535
 """What a whole register shows of a door that is open and closed at once."""
 
 
-def contacts(settings: Settings) -> dry_contact.Settings:
+def contacts(settings: RegisterLiftSettings) -> dry_contact.DryContactLiftSettings:
     """The lift behind the gateway, as the wiring of its contacts."""
     found, inputs, coils = settings.map, count(), count()
 
-    def line(part: Field | LiftFlag | None = None, active: str = "high") -> dict[str, str]:
+    def line(part: NumberField | LiftFlag | None = None, active: str = "high") -> dict[str, str]:
         when = {"valid_when": part.valid_when} if part and part.valid_when else {}
         point = f"unit {settings.unit} discrete input {next(inputs)}"
         return {"point": point, "active": active, **when}
@@ -55,13 +62,13 @@ def contacts(settings: Settings) -> dry_contact.Settings:
         "outputs": {n: coil() for n in singles if not n.startswith("call_")},
         "calls": {level: coil() for level in levels},
     }
-    return msgspec.convert(msgspec.to_builtins(plain), dry_contact.Settings)
+    return msgspec.convert(msgspec.to_builtins(plain), dry_contact.DryContactLiftSettings)
 
 
-class RegisterLift:
+class FakeRegisterLift:
     """The cells of one gateway. `points`: what it has, `outputs` among it; `unit`: where."""
 
-    def __init__(self, plant: Plant, settings: Settings) -> None:
+    def __init__(self, plant: Plant, settings: RegisterLiftSettings) -> None:
         self.plant = plant
         self.unit = settings.unit
         self._map: LiftMap = settings.map
@@ -142,12 +149,12 @@ class RegisterLift:
         return next((numbers[state] for state in states if state in numbers), NONSENSE)
 
 
-def build(name: str, settings: Settings, pace: Pace | None = None) -> LiftPlant:
+def build(name: str, settings: RegisterLiftSettings, pace: LiftPace | None = None) -> LiftPlant:
     """The lift behind this gateway."""
     return LiftPlant(name, contacts(settings), pace)
 
 
-FAKE = Fake[Settings](
+FAKE = Fake[RegisterLiftSettings](
     plant=lambda name, settings, wires: build(name, settings),
-    station=lambda plant, settings: RegisterLift(plant, settings),
+    station=lambda plant, settings: FakeRegisterLift(plant, settings),
 )

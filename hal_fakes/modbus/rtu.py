@@ -36,8 +36,8 @@ from pymodbus.framer import FramerRTU
 from pymodbus.pdu import DecodePDU
 
 from drivers.hal.modbus.connections import Serial
-from hal_fakes.modbus.flash import CoilRequest
-from hal_fakes.modbus.units import FarSide, Units
+from hal_fakes.modbus.flash import TimedCoilRequest
+from hal_fakes.modbus.units import FakeUnits, FarSide
 from hal_fakes.plants.plant import FailureMode
 
 LOOK_S: Final = 0.02
@@ -45,7 +45,7 @@ LOOK_S: Final = 0.02
 READY_S: Final = 10.0
 
 
-class Adapter:
+class SerialAdapter:
     """A pseudo-terminal as a serial adapter: `path` leads to it while it is plugged in."""
 
     def __init__(self, path: Path) -> None:
@@ -87,9 +87,9 @@ class RtuLine:
     ) -> None:
         self._settings = settings
         self._slow_s = slow_s
-        self._units = Units(devices, slow_s=0.0)
+        self._units = FakeUnits(devices, slow_s=0.0)
         self._directory = tempfile.TemporaryDirectory(prefix="rmf-rs485-", dir=directory)
-        self.adapter = Adapter(Path(self._directory.name) / "adapter")
+        self.adapter = SerialAdapter(Path(self._directory.name) / "adapter")
         self.adapter.plug()
         place = msgspec.structs.replace(settings, port=str(self.adapter.path))
         self.replace: dict[str, object] = {"serial": msgspec.to_builtins(place)}
@@ -100,7 +100,7 @@ class RtuLine:
         self._busy_until = 0.0
         self._kinds: Iterator[int] = itertools.cycle(range(4))
         self._decoder = DecodePDU(is_server=True)
-        self._decoder.register(CoilRequest)
+        self._decoder.register(TimedCoilRequest)
         self._framer = FramerRTU(DecodePDU(is_server=False))
         self._loop = asyncio.new_event_loop()
         self._closed = threading.Event()

@@ -12,14 +12,14 @@ from pymodbus.constants import ExcCodes
 from pymodbus.exceptions import NoSuchIdException
 
 from drivers.hal.modbus.points import Point, Range, Table, parse
-from hal_fakes.modbus.dead_man import DeadMan
+from hal_fakes.modbus.dead_man import ModuleWatchdog
 from hal_fakes.plants.plant import FailureMode, Plant
-from hal_fakes.wiring import Wiring
+from hal_fakes.wiring import PlantWiring
 
 Part = Literal["unit", "server"]
 
 
-class Cells(Protocol):
+class UnitCells(Protocol):
     """Registers and bits of one unit, with a plant behind them. `outputs`: what can be written."""
 
     unit: int
@@ -37,7 +37,7 @@ class Cells(Protocol):
         """Write a value; False if nothing can be written there."""
 
 
-FarSide: TypeAlias = Wiring | Cells
+FarSide: TypeAlias = PlantWiring | UnitCells
 """What units can consist of."""
 
 TABLES: Final[dict[int, Table]] = {
@@ -53,7 +53,7 @@ TABLES: Final[dict[int, Table]] = {
 """Function -> its table."""
 
 
-class Units:
+class FakeUnits:
     """All units, as pymodbus's server reads and writes them. `slow_s`: a slow reply's delay (s).
 
     Coils keep what was written; inputs show the plants' contacts.
@@ -61,22 +61,22 @@ class Units:
 
     def __init__(self, devices: Iterable[FarSide], slow_s: float) -> None:
         self._slow_s = slow_s
-        self._at: dict[Point, tuple[Wiring, str]] = {}
+        self._at: dict[Point, tuple[PlantWiring, str]] = {}
         self._bits: dict[Point, list[Point]] = {}
-        self._cells: dict[Point, Cells] = {}
-        self._dead_men: list[DeadMan] = []
+        self._cells: dict[Point, UnitCells] = {}
+        self._dead_men: list[ModuleWatchdog] = []
         self._plants: dict[int | None, list[Plant]] = {None: []}
         self._coils: dict[Point, bool] = {}
         self._flashes: dict[Point, Point] = {}
         self._off_at: dict[Point, float] = {}
         self._before: dict[Point, int] = {}
         for device in devices:
-            if isinstance(device, Wiring):
+            if isinstance(device, PlantWiring):
                 self._add_wiring(device)
             else:
                 self._add_cells(device)
 
-    def _add_wiring(self, wiring: Wiring) -> None:
+    def _add_wiring(self, wiring: PlantWiring) -> None:
         points = {parse(name): name for name in (*wiring.inputs, *wiring.outputs)}
         self._at.update({point: (wiring, name) for point, name in points.items()})
         for point in points:
@@ -86,10 +86,10 @@ class Units:
         for unit in (None, *{point.unit for point in points}):
             self._plants.setdefault(unit, []).append(wiring.plant)
 
-    def _add_cells(self, device: Cells) -> None:
+    def _add_cells(self, device: UnitCells) -> None:
         self._cells.update(dict.fromkeys(device.points, device))
         self._plants.setdefault(device.unit, [])
-        if isinstance(device, DeadMan):
+        if isinstance(device, ModuleWatchdog):
             self._dead_men.append(device)
         if device.plant:
             for unit in (None, device.unit):

@@ -33,8 +33,8 @@ from bridges.kinds.charger.settings import ChargerSettings
 from bridges.kinds.charger.signals import CURRENT_FLOWS, Activity
 from drivers.hal.points import Wire
 from hal_fakes.fake import Fake
-from hal_fakes.plants.machine import Machine
-from hal_fakes.plants.pad import AMBIENT_C, GAP_MM, NEVER, SLOWNESS, TRIP_C, Coil, Pad
+from hal_fakes.plants.machine import WiredPlant
+from hal_fakes.plants.pad import AMBIENT_C, GAP_MM, NEVER, SLOWNESS, TRIP_C, Coil, LiftingPad
 from hal_fakes.plants.plant import FailureMode
 
 LASTS_S: Final = {Activity.HANDSHAKE: 2.0, Activity.STOPPING: 1.0, Activity.RELEASED: 1.5}
@@ -107,7 +107,7 @@ class Reading:
         return float(self.receiver) if self.receiver.isdecimal() else 0.0
 
 
-class ChargerPlant(Machine):
+class ChargerPlant(WiredPlant):
     """`battery`: 0-1, of the robot on the pad; nobody's when there is none.
 
     `receivers`: id -> robot. `commanded`: it charges only while `power` is on. `asked`: it knows
@@ -138,7 +138,7 @@ class ChargerPlant(Machine):
         self.faults: frozenset[str] = frozenset()
         self.battery = 0.0
         self.power = not commanded
-        self.pad = Pad()
+        self.pad = LiftingPad()
         self._coil = Coil()
         self._here: list[str] = []
         self._since, self._until = 0.0, NEVER

@@ -13,7 +13,7 @@ from typing import Final
 from bridges.kinds.door.settings import DoorSettings
 from drivers.hal.points import Wire
 from hal_fakes.fake import Fake
-from hal_fakes.plants.machine import Machine
+from hal_fakes.plants.machine import WiredPlant
 
 OPEN_S: Final = 2.0
 CLOSE_S: Final = 3.0
@@ -30,7 +30,7 @@ def build(
     return DoorPlant(name, wires, auto_close_s=max(AUTO_CLOSE_S, every_s), parts=parts)
 
 
-class DoorPlant(Machine):
+class DoorPlant(WiredPlant):
     """The door: `position` is 0 when closed and 1 when open.
 
     `open_s`, `close_s`: the time of a whole travel. `auto_close_s`: how long the operator waits

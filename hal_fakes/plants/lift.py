@@ -22,11 +22,11 @@ from dataclasses import dataclass
 
 from bridges.kinds.lift.signals import Hazard, Side
 from drivers.lift import codes
-from drivers.lift.dry_contact import Settings, wires
+from drivers.lift.dry_contact import DryContactLiftSettings, wires
 from drivers.lift.table import input_rows
 from hal_fakes.fake import Fake
 from hal_fakes.plants.lift_car import NEVER, Car, CarDoor
-from hal_fakes.plants.machine import Machine
+from hal_fakes.plants.machine import WiredPlant
 from hal_fakes.plants.plant import FailureMode
 
 CALL_SETTLES_S = 0.05
@@ -43,7 +43,7 @@ FAILS: dict[str, tuple[FailureMode, ...]] = {
 
 
 @dataclass(frozen=True, slots=True)
-class Pace:
+class LiftPace:
     """How long things take (s): a floor, a door's travel, AGV mode, a door's stay at a landing."""
 
     floor_s: float = 2.0
@@ -52,19 +52,21 @@ class Pace:
     dwell_s: float = 3.0
 
 
-def build(name: str, settings: Settings) -> "LiftPlant":
+def build(name: str, settings: DryContactLiftSettings) -> "LiftPlant":
     """The lift that these settings are wired to."""
     return LiftPlant(name, settings)
 
 
-class LiftPlant(Machine):
+class LiftPlant(WiredPlant):
     """One lift, standing at its lowest landing with its doors closed."""
 
-    def __init__(self, name: str, settings: Settings, pace: Pace | None = None) -> None:
+    def __init__(
+        self, name: str, settings: DryContactLiftSettings, pace: LiftPace | None = None
+    ) -> None:
         self.car = Car()
         self.agv = False
         self._wiring = settings
-        self._pace = pace or Pace()
+        self._pace = pace or LiftPace()
         self._levels = settings.levels()
         self._sides = {level: _sides(settings, level) for level in self._levels}
         self.doors = {side: CarDoor() for sides in self._sides.values() for side in sides}
@@ -82,7 +84,7 @@ class LiftPlant(Machine):
         self._code: dict[str, bool] = {}
         self._asserted: dict[str, bool] = {}
 
-    # ---- what Machine asks for
+    # ---- what WiredPlant asks for
 
     def contact(self, signal: str) -> bool:
         """Is this contact asserted, in truth?"""
@@ -286,11 +288,11 @@ class LiftPlant(Machine):
         return self._code
 
 
-def _sides(settings: Settings, level: str) -> set[Side]:
+def _sides(settings: DryContactLiftSettings, level: str) -> set[Side]:
     return {stop.side for stop in settings.stops().values() if stop.level == level}
 
 
-def _buttons(settings: Settings, doors: dict[Side, CarDoor]) -> list[str]:
+def _buttons(settings: DryContactLiftSettings, doors: dict[Side, CarDoor]) -> list[str]:
     inputs = settings.inputs
     states = set(inputs.service.codes.values()) if inputs.service else set()
     hazards = [h.value for h in Hazard if getattr(inputs, h) or h in states]
@@ -307,4 +309,4 @@ def _slowed(seconds: float, failure: FailureMode | None) -> float | None:
     return seconds * SLOWNESS if failure == "slow" else seconds
 
 
-FAKE = Fake[Settings](plant=lambda name, settings, wires: build(name, settings))
+FAKE = Fake[DryContactLiftSettings](plant=lambda name, settings, wires: build(name, settings))

@@ -1,6 +1,6 @@
 """What the plants have in common: a record of edges, wires that fail, parts that fail, a clock.
 
-A kind's plant derives from Machine and adds its physics. Edges are those of the terminal block: the
+A kind's plant derives from WiredPlant and adds its physics. Edges are those of the terminal block: the
 relay as we drove it, the contact as its wire showed it, so a cut wire is an edge like any other.
 """
 
@@ -15,7 +15,7 @@ from hal_fakes.plants.plant import FAILURE_MODES, Edge, FailureMode
 EDGES_KEPT = 100_000
 
 
-class Machine(ABC):
+class WiredPlant(ABC):
     """What every plant (`hal_fakes.plants.plant.Plant`) has besides its physics.
 
     `wires`: the driver's wiring table of this device; empty where the controller has no contacts.

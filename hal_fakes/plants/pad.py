@@ -26,7 +26,7 @@ TRIP_C: Final = 95.0
 WARMS_IN_S: Final = 20.0
 
 
-class Pad:
+class LiftingPad:
     """`rises_until`: monotonic s, or inf."""
 
     def __init__(self) -> None:

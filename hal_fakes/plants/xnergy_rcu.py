@@ -3,7 +3,7 @@
 from typing import Final
 
 from bridges.kinds.charger.signals import Activity
-from drivers.charger.modbus import Settings, points
+from drivers.charger.modbus import ModbusChargerSettings, points
 from drivers.charger.xnergy import CHECK_RANGE, ENABLE, IN_RANGE, TICKS_PER_UNIT
 from drivers.hal.modbus.points import Point
 from hal_fakes.fake import Fake
@@ -70,7 +70,7 @@ class ModbusRcu:
     `points`: what it has, `outputs` among it; `unit`: where.
     """
 
-    def __init__(self, plant: Plant, settings: Settings) -> None:
+    def __init__(self, plant: Plant, settings: ModbusChargerSettings) -> None:
         self.plant = plant
         self.unit: int = settings.unit
         self._names = {point: name for name, point in points(settings).items()}
@@ -99,7 +99,7 @@ class ModbusRcu:
         return True
 
 
-FAKE = Fake[Settings](
+FAKE = Fake[ModbusChargerSettings](
     plant=lambda name, settings, wires: rcu_plant(name, "unit", "server"),
     station=lambda plant, settings: ModbusRcu(plant, settings),
 )

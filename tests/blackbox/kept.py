@@ -12,9 +12,9 @@ from bridges import __version__
 from bridges.blackbox.entries import Head
 from bridges.blackbox.ring import Ring
 from bridges.kinds.shared.graph_kind import AnyGraphKind
-from bridges.kinds.shared.recording_section import Recording
+from bridges.kinds.shared.recording_section import RecordingSettings
 from bridges.runtime.clock import Clock
-from bridges.runtime.ring_writer import Witness
+from bridges.runtime.ring_writer import RingWriter
 from tests.site.building import Device
 from tests.site.daemons import DeviceDaemon, GraphDaemon
 from tests.site.day import Site
@@ -30,7 +30,9 @@ BUSES: dict[str, Any] = {
 def head(name: str, kind: str, content: dict[str, Any]) -> Head:
     """The head of a run that serves this YAML."""
     text = yaml.safe_dump({"kind": kind, **content}, sort_keys=False).encode()
-    return Head(name, 1, __version__, kind, f"/etc/{name}.yaml", text, {}, True, {}, Recording())
+    return Head(
+        name, 1, __version__, kind, f"/etc/{name}.yaml", text, {}, True, {}, RecordingSettings()
+    )
 
 
 def of_device(device: Device) -> Head:
@@ -63,12 +65,12 @@ def keep(site: Site, folder: Path, size: int) -> dict[str, Path]:
         place = folder / daemon.name
         place.mkdir()
         make = partial(Ring, place, told, size)
-        daemon.witness = witness(site.timeline, make, site)
+        daemon.writer = writer(site.timeline, make, site)
         found[daemon.name] = place / "ring"
     return found
 
 
-def witness(timeline: Timeline, make: Callable[[], Ring], site: Site) -> Witness:
-    """A witness in virtual time."""
+def writer(timeline: Timeline, make: Callable[[], Ring], site: Site) -> RingWriter:
+    """A writer in virtual time."""
     clock = Clock(lambda: timeline.now, lambda: EPOCH + timeline.now)
-    return Witness(make, clock, lambda: site.air.release)
+    return RingWriter(make, clock, lambda: site.air.release)

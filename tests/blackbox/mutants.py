@@ -24,7 +24,7 @@ from bridges.blackbox import entries
 from bridges.blackbox.entries import Spoken
 from bridges.blackbox.mcap_write import ENTRIES, HEAD, NOTES, String
 from bridges.blackbox.recorder import Recorder
-from bridges.blackbox.recordings import Shelf
+from bridges.blackbox.recordings import Recordings
 from bridges.blackbox.ring import FRAME, MAGIC, MARK, PAGE, SEGMENTS, TOP
 from bridges.messages import cdr
 from bridges.messages.definitions import Message
@@ -332,7 +332,9 @@ def endings(mutator: Mutator, times: int, folder: Path) -> Counter[str]:
             found[f"{words[0]}: {code}"] += 1
         with suppress(BagError):
             read(folder / "a.mcap", {})
-        recorder = Recorder(lambda: [folder / "run"], Shelf(folder / "shelf"), lambda: 0.0)
+        recorder = Recorder(
+            lambda: [folder / "run"], Recordings(folder / "recordings"), lambda: 0.0
+        )
         recorder.look()
         recorder.close()
         Levels(folder / "run").look()

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from bridges.blackbox.entries import Known, Spoken, Step
-from bridges.blackbox.ring import DIED, Read
+from bridges.blackbox.entries import Decided, Known, Spoken
+from bridges.blackbox.ring import DIED, RingContent
 from hal_fakes.wire import wire
 from tests.runtime.site import daemon, shipped
 from tests.waiting import wait_until
@@ -22,7 +22,9 @@ def lift(tmp_path: Path) -> Path:
 def spoken(ring: Path) -> list[str]:
     """What the ring shows to have been sent."""
     try:
-        return [one.topic for one in Read(ring).entries() if isinstance(one, Spoken) and one.sent]
+        return [
+            one.topic for one in RingContent(ring).entries() if isinstance(one, Spoken) and one.sent
+        ]
     except Exception:  # noqa: BLE001 - it is not there yet
         return []
 
@@ -35,14 +37,14 @@ def test_after_a_kill_the_ring_has_everything_up_to_it_and_the_next_run_keeps_it
     with daemon(lift, place, *options) as running:
         wait_until(lambda: len(spoken(place / "ring")) > 2, "states are in the ring")
         running.end(signal.SIGKILL)
-    read = Read(place / "ring")
+    read = RingContent(place / "ring")
     kinds = {type(entry) for entry in read.entries()}
     with daemon(lift, place, *options) as running:
         running.wait_for("ready")
-        again = Read(place / DIED)
+        again = RingContent(place / DIED)
         assert running.end(signal.SIGTERM) == 0
 
-    assert {Known, Step, Spoken} <= kinds
+    assert {Known, Decided, Spoken} <= kinds
     assert (read.head.file, read.head.kind, read.head.yaml, read.ended) == (
         os.path.realpath(lift),
         "lift",
@@ -50,7 +52,7 @@ def test_after_a_kill_the_ring_has_everything_up_to_it_and_the_next_run_keeps_it
         False,
     )
     assert again.head.run == read.head.run
-    assert Read(place / "ring").ended
+    assert RingContent(place / "ring").ended
 
 
 def test_a_daemon_serves_on_when_its_ring_is_taken_away_and_makes_another(
@@ -59,10 +61,10 @@ def test_a_daemon_serves_on_when_its_ring_is_taken_away_and_makes_another(
     place = tmp_path / "run"
     with daemon(lift, place, "--simulate", "--domain-id", str(domain)) as running:
         running.wait_for("ready")
-        first = Read(place / "ring").head.run
+        first = RingContent(place / "ring").head.run
         shutil.rmtree(place)
         wait_until(lambda: bool(spoken(place / "ring")), "a new ring is written")
-        assert Read(place / "ring").head.run == first
+        assert RingContent(place / "ring").head.run == first
         assert running.end(signal.SIGTERM) == 0
     assert "recording" in running.log.read_text()
 

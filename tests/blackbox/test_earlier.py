@@ -12,17 +12,17 @@ from typing import Any
 import msgspec
 import pytest
 
-from bridges.blackbox.entries import AnyEntry, Head, Known, Step
+from bridges.blackbox.entries import AnyEntry, Decided, Head, Known
 from bridges.blackbox.value_codec import TYPE, UnknownValue, name_of, tree, value
 from bridges.kinds import kind_called, kind_names, recorded
 from bridges.kinds.shared.graph_kind import GraphKind
 from bridges.kinds.shared.recorded import SHARED
-from bridges.runtime.record import Record
+from bridges.runtime.record import ClaimRecord
 from drivers.profiles import texts
 from tests.blackbox.earlier import DAYS
 from tests.blackbox.recordable import recordable, specimens
 from workbench.replay.files import opened
-from workbench.replay.replayed import Cores, Replay, of_head
+from workbench.replay.replayed import Replay, ReplayedCores, of_head
 from workbench.replay.sources import Notes
 
 ENDED = {"lift.memory.Session.own_stamp", "lift.signals.FromAdapter.stamp"}
@@ -113,7 +113,7 @@ def _is_read(file: Path) -> None:
     for entry in everything:
         for told in _values(entry):
             value(told)
-    replay = Replay(everything, Cores(of_head(head)))
+    replay = Replay(everything, ReplayedCores(of_head(head)))
     list(replay.differences())
     assert (notes.damage, replay.course.unusable, len(replay.course.subjects) > 0) == ("", 0, True)
     assert replay.course.decisions > 10
@@ -122,7 +122,7 @@ def _is_read(file: Path) -> None:
 def _values(entry: AnyEntry) -> Iterator[Any]:
     if isinstance(entry, Known):
         yield from (entry.memory, entry.reading, entry.outputs, entry.report)
-    elif isinstance(entry, Step):
+    elif isinstance(entry, Decided):
         yield entry.event
         yield from chain(entry.outputs, entry.news, entry.faults)
         yield from (message for _topic, message in typing.cast(Any, entry.publish))
@@ -147,7 +147,7 @@ def test_what_a_kind_without_hardware_kept_is_restored_whole(file: Path) -> None
     "file", files("claimed-*.json"), ids=lambda file: f"{file.parent.name} {file.name}"
 )
 def test_a_record_of_an_earlier_version_says_what_is_to_be_switched_off(file: Path) -> None:
-    record = msgspec.json.decode(file.read_bytes(), type=Record)
+    record = msgspec.json.decode(file.read_bytes(), type=ClaimRecord)
     config = record.config()
     assert record.name == file.name
     assert record.claim
@@ -161,7 +161,7 @@ def test_names_load_no_other_kind_than_the_one_that_is_recorded() -> None:
     script = (
         "import sys; from bridges.kinds.lift import memory;"
         "from bridges.blackbox.value_codec import tree, value;"
-        "assert value(tree(memory.Memory())) == memory.Memory();"
+        "assert value(tree(memory.LiftMemory())) == memory.LiftMemory();"
         "print([name for name in ('door', 'charger', 'lift_supervisor', 'door_supervisor',"
         " 'charger_coordinator') if sys.modules.keys() & {memory.__name__.replace('lift', name)}])"
     )

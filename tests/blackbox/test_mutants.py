@@ -11,7 +11,7 @@ from bridges.blackbox.entries import DEEPEST, Clocks, Invalid, Known, Spoken
 from bridges.blackbox.value_codec import UnknownValue, tree
 from bridges.kinds.door.core import decide as decide_door
 from bridges.kinds.lift.core import decide as decide_lift
-from bridges.kinds.lift.signals import Door
+from bridges.kinds.lift.signals import DoorReading
 from bridges.kinds.shared.debounce import Settled
 from bridges.kinds.shared.decision import IoFailed
 from bridges.messages import definitions as d
@@ -84,7 +84,7 @@ def test_an_entry_is_nested_as_deep_as_any_core_needs_and_no_deeper() -> None:
         (["a", 1], tuple[str, ...]),
         ({"": "map", "=": [["a", 1]]}, dict[str, str]),
         ({"": "set", "=": [1]}, frozenset[str]),
-        (tree(Settled("x", "x", 0.0)), Settled[Door]),
+        (tree(Settled("x", "x", 0.0)), Settled[DoorReading]),
     ],
 )  # fmt: skip
 def test_a_value_of_another_type_than_a_core_takes_is_refused(told: Any, hint: Any) -> None:

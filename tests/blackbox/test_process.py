@@ -15,7 +15,7 @@ import pytest
 
 from bridges import cli
 from bridges.blackbox.entries import Spoken
-from bridges.blackbox.ring import Read
+from bridges.blackbox.ring import RingContent
 from hal_fakes.wire import wire
 from tests.runtime.site import daemon, environment, shipped
 from tests.waiting import PATIENCE_S, wait_until
@@ -47,7 +47,7 @@ def bridge(*words: str | Path) -> Told:
 def states(place: Path) -> int:
     """How many states the ring shows to have been sent."""
     try:
-        return sum(isinstance(one, Spoken) for one in Read(place / "ring").entries())
+        return sum(isinstance(one, Spoken) for one in RingContent(place / "ring").entries())
     except Exception:  # noqa: BLE001 - it is not there yet
         return 0
 

@@ -8,16 +8,16 @@ from pathlib import Path
 import pytest
 from msgspec.structs import replace
 
-from bridges.blackbox import recordings as shelves
-from bridges.blackbox.entries import Head, Step
+from bridges.blackbox import recordings as stored
+from bridges.blackbox.entries import Decided, Head
 from bridges.blackbox.recorder import Recorder
-from bridges.blackbox.recordings import Shelf
-from bridges.blackbox.ring import DIED, Read, Ring
+from bridges.blackbox.recordings import Recordings
+from bridges.blackbox.ring import DIED, Ring, RingContent
 from bridges.kinds.lift.report import LiftReport
-from bridges.kinds.lift.signals import Door, LiftOutputs, LiftSample, Requested
+from bridges.kinds.lift.signals import DoorReading, LiftOutputs, LiftRequested, LiftSample
 from bridges.kinds.shared.decision import Decision, Fault, IoFailed, Sampled
 from bridges.kinds.shared.durations import NEVER
-from bridges.kinds.shared.recording_section import Recording
+from bridges.kinds.shared.recording_section import RecordingSettings
 from bridges.messages.definitions import (
     LiftDoor,
     LiftMode,
@@ -28,7 +28,7 @@ from bridges.messages.definitions import (
 )
 from bridges.messages.releases import KILTED
 from bridges.runtime.clock import Clock
-from bridges.runtime.ring_writer import Witness
+from bridges.runtime.ring_writer import RingWriter
 from workbench.replay.bags import Notes, heard_in
 from workbench.replay.incidents import entries_in, head_of, notes_in
 
@@ -36,20 +36,20 @@ WALL = 1_800_000_000.0
 REPORT = LiftReport(
     0.0, "L1", "", LiftDoor.DOOR_CLOSED, LiftMotion.MOTION_STOPPED, LiftMode.MODE_HUMAN, ""
 )
-SAMPLE = Sampled(LiftSample("L1", Door.CLOSED))
+SAMPLE = Sampled(LiftSample("L1", DoorReading.CLOSED))
 
 
 class Machine:
     """A machine with one daemon and a recorder, in virtual time."""
 
-    def __init__(self, folder: Path, keep: Recording = Recording()) -> None:  # noqa: B008
+    def __init__(self, folder: Path, keep: RecordingSettings = RecordingSettings()) -> None:  # noqa: B008
         self.now = 1000.0
         self.pid = os.getpid()
         self.keep = keep
         self.runtime = folder / "run" / "lift1"
         self.runtime.mkdir(parents=True)
         self.out = folder / "out"
-        self.recorder = Recorder(lambda: [self.runtime], Shelf(self.out), lambda: self.now)
+        self.recorder = Recorder(lambda: [self.runtime], Recordings(self.out), lambda: self.now)
         self.runs = 0
         self.start()
 
@@ -70,7 +70,7 @@ class Machine:
         )
         make = partial(Ring, self.runtime, head, 200_000)
         clock = Clock(lambda: self.now, lambda: WALL + self.now)
-        self.witness = Witness(make, clock, lambda: KILTED)
+        self.writer = RingWriter(make, clock, lambda: KILTED)
         self.memory = object()
         self.decide(SAMPLE)
 
@@ -78,13 +78,13 @@ class Machine:
         """One scan of it."""
         report = replace(REPORT, faults=faults)
         decision = Decision(None, LiftOutputs(), report, NEVER, refused)
-        self.witness.decided("Lift1", None, event, self.now, decision)
-        self.witness.flush()
+        self.writer.decided("Lift1", None, event, self.now, decision)
+        self.writer.flush()
 
     def say(self, topic: str, message: Message, *, sent: bool = False) -> None:
         """A message goes by."""
-        self.witness.spoken(topic, message, sent=sent)
-        self.witness.flush()
+        self.writer.spoken(topic, message, sent=sent)
+        self.writer.flush()
 
     def live(self, seconds: int, each: Callable[[], None] = lambda: None) -> None:
         """Let time pass, with a reading and a look each second."""
@@ -92,7 +92,7 @@ class Machine:
             self.now += 1.0
             self.decide(SAMPLE)
             each()
-            self.witness.look()
+            self.writer.look()
             self.recorder.look()
 
     def files(self) -> list[str]:
@@ -143,7 +143,7 @@ def test_a_fault_makes_one_file_with_what_went_before_and_what_followed(machine:
 @pytest.mark.parametrize(
     ("happens", "why"),
     [
-        (lambda m: m.decide(Requested("r2", True, "L3"), "busy: r1 rides"), "REFUSED"),
+        (lambda m: m.decide(LiftRequested("r2", True, "L3"), "busy: r1 rides"), "REFUSED"),
         (lambda m: m.decide(IoFailed("no answer"), "", Fault("INPUTS_NOT_FRESH")), "FAULT"),
         (lambda m: m.decide(SAMPLE, "released a moment ago"), None),
         (lambda m: m.decide(IoFailed("no answer")), None),
@@ -200,7 +200,9 @@ def test_a_killed_run_is_recorded_once_even_if_the_recorder_restarts(
     machine.live(50)
     machine.start()
     machine.live(5)
-    machine.recorder = Recorder(lambda: [machine.runtime], Shelf(machine.out), lambda: machine.now)
+    machine.recorder = Recorder(
+        lambda: [machine.runtime], Recordings(machine.out), lambda: machine.now
+    )
     machine.live(5)
 
     assert reasons(machine.only()) == [
@@ -211,8 +213,8 @@ def test_a_killed_run_is_recorded_once_even_if_the_recorder_restarts(
 
 def test_a_run_that_a_defect_ended_is_recorded_with_its_reason(machine: Machine) -> None:
     machine.live(10)
-    machine.witness.died("bus-io: ZeroDivisionError")
-    machine.witness.ended(safe=True)
+    machine.writer.died("bus-io: ZeroDivisionError")
+    machine.writer.ended(safe=True)
     machine.pid = 2**22 + 1
     machine.start()
     machine.live(40)
@@ -236,8 +238,8 @@ def test_a_daemon_that_dies_again_and_again_makes_one_file_in_ten_minutes(
 
 
 def test_a_start_that_fails_makes_no_recording(machine: Machine) -> None:
-    machine.witness.ended(safe=True)
-    head = Read(machine.runtime / "ring").head
+    machine.writer.ended(safe=True)
+    head = RingContent(machine.runtime / "ring").head
     for number in range(3):
         Ring(machine.runtime, replace(head, run=f"f{number}"), 200_000).close(ended=False)
         machine.live(3)
@@ -247,7 +249,7 @@ def test_a_start_that_fails_makes_no_recording(machine: Machine) -> None:
 
 def test_a_run_that_ended_in_good_order_is_not_recorded(machine: Machine) -> None:
     machine.live(10)
-    machine.witness.ended(safe=True)
+    machine.writer.ended(safe=True)
     machine.start()
     machine.live(40)
 
@@ -261,7 +263,7 @@ def test_a_daemon_that_ends_before_the_30_s_are_over_is_recorded_up_to_its_end(
     machine.live(20)
     machine.decide(SAMPLE, "", Fault("FIRE"))
     machine.live(5)
-    machine.witness.ended(safe=True)
+    machine.writer.ended(safe=True)
     (machine.runtime / "ring").unlink()
     machine.recorder.look()
 
@@ -271,7 +273,7 @@ def test_a_daemon_that_ends_before_the_30_s_are_over_is_recorded_up_to_its_end(
 def test_the_oldest_recordings_of_a_daemon_make_room_and_those_of_others_stay(
     tmp_path: Path,
 ) -> None:
-    machine = Machine(tmp_path, Recording(files=2))
+    machine = Machine(tmp_path, RecordingSettings(files=2))
     machine.out.mkdir()
     other = machine.out / "lift1_b_2026-01-01_00-00-00_fault_abcdefab.mcap"
     other.touch()
@@ -287,7 +289,7 @@ def test_the_oldest_recordings_of_a_daemon_make_room_and_those_of_others_stay(
 def test_a_full_disk_loses_recordings_and_is_logged_once(
     machine: Machine, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    monkeypatch.setattr(shelves, "LEAST_FREE", 1 << 62)
+    monkeypatch.setattr(stored, "LEAST_FREE", 1 << 62)
     for number in range(3):
         machine.decide(SAMPLE, "", Fault(f"F{number}"))
         machine.live(40)
@@ -297,7 +299,7 @@ def test_a_full_disk_loses_recordings_and_is_logged_once(
 
 
 def test_continuous_files_follow_each_other_without_gap_or_overlap(tmp_path: Path) -> None:
-    machine = Machine(tmp_path, Recording(keep="continuous"))
+    machine = Machine(tmp_path, RecordingSettings(keep="continuous"))
     machine.live(1000, lambda: machine.say("lift_states", LiftState(), sent=True))
     machine.recorder.close()
 
@@ -316,7 +318,7 @@ def test_a_damaged_ring_keeps_no_other_from_being_recorded(
     (broken / "ring").write_bytes(b"RMFRING1" + b"\xff" * 9000)
     (broken / DIED).write_bytes(b"")
     folders = [broken, machine.runtime, tmp_path / "none"]
-    machine.recorder = Recorder(lambda: folders, Shelf(machine.out), lambda: machine.now)
+    machine.recorder = Recorder(lambda: folders, Recordings(machine.out), lambda: machine.now)
     machine.decide(SAMPLE, "", Fault("FIRE"))
     machine.live(40)
 
@@ -325,5 +327,5 @@ def test_a_damaged_ring_keeps_no_other_from_being_recorded(
 
 def test_the_ring_shows_each_decision_of_the_machine(machine: Machine) -> None:
     machine.live(3)
-    steps = [e for e in Read(machine.runtime / "ring").entries() if isinstance(e, Step)]
+    steps = [e for e in RingContent(machine.runtime / "ring").entries() if isinstance(e, Decided)]
     assert len(steps) == 1

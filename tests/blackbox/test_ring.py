@@ -5,16 +5,18 @@ from pathlib import Path
 import pytest
 
 from bridges.blackbox import entries
-from bridges.blackbox.entries import AnyEntry, Forgotten, Head
-from bridges.blackbox.ring import DIED, MARK, SEGMENTS, Read, Ring, RingError, Tail
-from bridges.kinds.shared.recording_section import Recording
+from bridges.blackbox.entries import AnyEntry, Head, SubjectForgotten
+from bridges.blackbox.ring import DIED, MARK, SEGMENTS, Ring, RingContent, RingError, Tail
+from bridges.kinds.shared.recording_section import RecordingSettings
 
-HEAD = Head("run1", 7, "0.1.0", "lift", "/l.yaml", b"kind: lift", {}, False, {}, Recording())
+HEAD = Head(
+    "run1", 7, "0.1.0", "lift", "/l.yaml", b"kind: lift", {}, False, {}, RecordingSettings()
+)
 SIZE = 64 * 1024
 
 
 def entry(number: int) -> AnyEntry:
-    return Forgotten(float(number), f"Lift{number}" * 20)
+    return SubjectForgotten(float(number), f"Lift{number}" * 20)
 
 
 def write(ring: Ring, one: AnyEntry) -> None:
@@ -29,7 +31,7 @@ def test_what_was_written_is_read_with_its_head(tmp_path: Path) -> None:
     for number in range(5):
         write(ring, entry(number))
 
-    read = Read(ring.path)
+    read = RingContent(ring.path)
 
     assert (read.head, read.ended) == (HEAD, False)
     assert list(read.entries()) == [entry(number) for number in range(5)]
@@ -42,7 +44,7 @@ def test_after_many_turns_the_newest_are_there_in_order_without_a_gap(tmp_path: 
         write(ring, entry(number))
     ring.close(ended=False)
 
-    found = list(Read(ring.path).entries())
+    found = list(RingContent(ring.path).entries())
 
     assert found == [entry(number) for number in range(3000 - len(found), 3000)]
     assert len(found) > 300
@@ -58,7 +60,7 @@ def test_an_entry_torn_at_any_byte_is_dropped_and_those_before_it_are_kept(tmp_p
 
     for torn in range(1, len(entries.encode(entry(2))) + 8):
         ring.path.write_bytes(whole[: last - torn] + bytes(torn) + whole[last:])
-        assert list(Read(ring.path).entries()) == [entry(0), entry(1)]
+        assert list(RingContent(ring.path).entries()) == [entry(0), entry(1)]
 
 
 def test_an_entry_of_an_earlier_turn_is_not_taken_for_one_of_this(tmp_path: Path) -> None:
@@ -70,9 +72,9 @@ def test_an_entry_of_an_earlier_turn_is_not_taken_for_one_of_this(tmp_path: Path
     ring.write(ring.frame(entries.encode(entry(99))))
     ring.close(ended=False)
 
-    newest = max(Read(ring.path).segments)
+    newest = max(RingContent(ring.path).segments)
 
-    assert Read(ring.path).segments[newest] == [entry(99)]
+    assert RingContent(ring.path).segments[newest] == [entry(99)]
 
 
 def test_the_ring_of_a_run_that_died_is_kept_beside_the_next_one(tmp_path: Path) -> None:
@@ -84,8 +86,8 @@ def test_the_ring_of_a_run_that_died_is_kept_beside_the_next_one(tmp_path: Path)
     second.close(ended=True)
     Ring(tmp_path, HEAD, SIZE).close(ended=True)
 
-    assert list(Read(tmp_path / DIED).entries()) == [entry(1)]
-    assert list(Read(tmp_path / "ring").entries()) == []
+    assert list(RingContent(tmp_path / DIED).entries()) == [entry(1)]
+    assert list(RingContent(tmp_path / "ring").entries()) == []
 
 
 def test_a_ring_whose_file_was_removed_or_replaced_counts_as_gone(tmp_path: Path) -> None:
@@ -103,7 +105,7 @@ def test_a_file_that_is_not_a_ring_is_refused(tmp_path: Path, content: bytes) ->
     (tmp_path / "ring").write_bytes(content)
 
     with pytest.raises(RingError):
-        Read(tmp_path / "ring")
+        RingContent(tmp_path / "ring")
 
 
 def test_a_segment_whose_number_was_torn_is_left_out(tmp_path: Path) -> None:
@@ -116,7 +118,7 @@ def test_a_segment_whose_number_was_torn_is_left_out(tmp_path: Path) -> None:
     content[place : place + MARK.size] = b"\xff" * MARK.size
     ring.path.write_bytes(content)
 
-    assert list(Read(ring.path).entries()) == [entry(1)]
+    assert list(RingContent(ring.path).entries()) == [entry(1)]
 
 
 def test_a_follower_of_a_ring_gets_each_entry_once_and_misses_what_was_overwritten(

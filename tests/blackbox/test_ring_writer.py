@@ -1,4 +1,4 @@
-"""The witness: whatever happens to its ring, no scan notices, and what is kept is the truth."""
+"""The ring's writer: whatever happens to its ring, no scan notices, and what is kept is the truth."""
 
 import errno
 import os
@@ -8,23 +8,32 @@ from pathlib import Path
 
 import pytest
 
-from bridges.blackbox.entries import AnyEntry, Clocks, Head, Known, Lost, Same, Spoken, Step
+from bridges.blackbox.entries import (
+    AnyEntry,
+    Clocks,
+    Decided,
+    EntriesLost,
+    Head,
+    Known,
+    Same,
+    Spoken,
+)
 from bridges.blackbox.incident import Incident, timed
 from bridges.blackbox.mcap_write import write
-from bridges.blackbox.ring import Read, Ring
-from bridges.kinds.lift.signals import Door, LiftOutputs, LiftSample
+from bridges.blackbox.ring import Ring, RingContent
+from bridges.kinds.lift.signals import DoorReading, LiftOutputs, LiftSample
 from bridges.kinds.shared.decision import Decision, Sampled
 from bridges.kinds.shared.durations import NEVER
-from bridges.kinds.shared.recording_section import Recording
+from bridges.kinds.shared.recording_section import RecordingSettings
 from bridges.messages.definitions import LiftState, Message
 from bridges.messages.releases import KILTED
 from bridges.runtime.clock import Clock
-from bridges.runtime.ring_writer import Witness
+from bridges.runtime.ring_writer import RingWriter
 from tests.blackbox.test_recorder import REPORT, WALL
 from workbench.replay.bags import heard_in
 from workbench.replay.replayed import times
 
-HEAD = Head("r", 1, "1", "lift", "/l.yaml", b"", {}, False, {}, Recording())
+HEAD = Head("r", 1, "1", "lift", "/l.yaml", b"", {}, False, {}, RecordingSettings())
 
 
 class Daemon:
@@ -34,26 +43,26 @@ class Daemon:
         self.now, self.step_s = 100.0, 0.0
         self.folder = folder
         clock = Clock(lambda: self.now, lambda: WALL + self.now + self.step_s)
-        self.witness = Witness(make or self.ring, clock, lambda: KILTED)
+        self.writer = RingWriter(make or self.ring, clock, lambda: KILTED)
         self.memory: object = None
 
     def ring(self) -> Ring:
         return Ring(self.folder, HEAD, 100_000)
 
-    def scan(self, door: Door = Door.CLOSED, memory: object = None) -> None:
+    def scan(self, door: DoorReading = DoorReading.CLOSED, memory: object = None) -> None:
         """A reading, and what was decided."""
         decision = Decision(memory, LiftOutputs(), REPORT, NEVER)
         sample = Sampled(LiftSample("L1", door))
-        self.witness.decided("Lift1", self.memory, sample, self.now, decision)
+        self.writer.decided("Lift1", self.memory, sample, self.now, decision)
         self.memory = memory
-        self.witness.flush()
+        self.writer.flush()
 
     def say(self, message: Message) -> None:
-        self.witness.spoken("lift_states", message, sent=True)
-        self.witness.flush()
+        self.writer.spoken("lift_states", message, sent=True)
+        self.writer.flush()
 
     def entries(self) -> list[AnyEntry]:
-        return list(Read(self.folder / "ring").entries())
+        return list(RingContent(self.folder / "ring").entries())
 
 
 def test_unchanged_readings_cost_one_timestamp_each_and_none_is_lost(tmp_path: Path) -> None:
@@ -61,12 +70,12 @@ def test_unchanged_readings_cost_one_timestamp_each_and_none_is_lost(tmp_path: P
     scanned: list[float] = []
     for _ in range(90):
         daemon.now += 0.05
-        daemon.scan(Door.OPEN if len(scanned) == 50 else Door.CLOSED)
+        daemon.scan(DoorReading.OPEN if len(scanned) == 50 else DoorReading.CLOSED)
         scanned.append(daemon.now)
-    daemon.witness.ended(safe=True)
+    daemon.writer.ended(safe=True)
 
     found = daemon.entries()
-    steps = [one for one in found if isinstance(one, Step)]
+    steps = [one for one in found if isinstance(one, Decided)]
     read = [t for one in found if isinstance(one, Same) for t in times(one)]
     assert [one.at for one in steps] == [scanned[0], scanned[50], scanned[51]]
     assert sorted([*read, *(one.at for one in steps)]) == scanned
@@ -106,7 +115,7 @@ def test_a_step_of_the_wall_clock_is_recorded_and_recorded_time_never_goes_back(
     assert [steady for _, steady, _ in timed(entries)] == sorted(s for _, s, _ in timed(entries))
 
 
-def test_without_room_for_a_ring_the_witness_reports_it_once_and_tries_again(
+def test_without_room_for_a_ring_the_writer_reports_it_once_and_tries_again(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     full = [True]
@@ -120,16 +129,16 @@ def test_without_room_for_a_ring_the_witness_reports_it_once_and_tries_again(
     for _ in range(60):
         daemon.now += 1.0
         daemon.scan()
-        daemon.witness.look()
+        daemon.writer.look()
     assert not (tmp_path / "ring").exists()
     full[0] = False
     for _ in range(11):
         daemon.now += 1.0
-        daemon.witness.look()
+        daemon.writer.look()
         daemon.scan()
 
     assert [r.getMessage().split(" ")[0] for r in caplog.records] == ["not_written"]
-    assert [type(one) for one in daemon.entries()][:3] == [Clocks, Known, Step]
+    assert [type(one) for one in daemon.entries()][:3] == [Clocks, Known, Decided]
 
 
 def test_a_write_that_fails_ends_no_scan_and_the_next_ring_begins_afresh(
@@ -144,13 +153,13 @@ def test_a_write_that_fails_ends_no_scan_and_the_next_ring_begins_afresh(
     with monkeypatch.context() as broken:
         broken.setattr(os, "pwrite", fail)
         daemon.now += 1.0
-        daemon.scan(Door.OPEN)
+        daemon.scan(DoorReading.OPEN)
     for _ in range(12):
         daemon.now += 1.0
-        daemon.witness.look()
+        daemon.writer.look()
         daemon.scan()
 
-    assert [type(one) for one in daemon.entries()][:3] == [Clocks, Known, Step]
+    assert [type(one) for one in daemon.entries()][:3] == [Clocks, Known, Decided]
 
 
 def test_what_cannot_be_recorded_is_lost_and_no_scan_with_it(
@@ -170,7 +179,7 @@ def test_a_message_larger_than_a_segment_is_counted_as_lost(tmp_path: Path) -> N
     daemon.say(LiftState(lift_name="Lift1"))
 
     found = daemon.entries()
-    assert [one.number for one in found if isinstance(one, Lost)] == [1]
+    assert [one.number for one in found if isinstance(one, EntriesLost)] == [1]
     assert len([one for one in found if isinstance(one, Spoken)]) == 1
 
 
@@ -179,16 +188,16 @@ def test_a_flood_takes_no_more_than_its_bound_and_each_decision_is_kept(tmp_path
     for _ in range(5):
         daemon.now += 1.0
         for _ in range(10_000):
-            daemon.witness.spoken("lift_states", LiftState(), sent=True)
-        daemon.scan(Door.OPEN if daemon.now % 2 else Door.CLOSED)
+            daemon.writer.spoken("lift_states", LiftState(), sent=True)
+        daemon.scan(DoorReading.OPEN if daemon.now % 2 else DoorReading.CLOSED)
     daemon.now += 1.0
     daemon.say(LiftState())
 
     found = daemon.entries()  # of the last seconds: the flood has filled the ring
     kept = Counter(one.at for one in found if isinstance(one, Spoken))
     assert [kept[at] for at in (104.0, 105.0, 106.0)] == [200, 200, 1]
-    assert {one.number for one in found if isinstance(one, Lost)} == {9_800}
-    assert [one.at for one in found if isinstance(one, Step)][-2:] == [104.0, 105.0]
+    assert {one.number for one in found if isinstance(one, EntriesLost)} == {9_800}
+    assert [one.at for one in found if isinstance(one, Decided)][-2:] == [104.0, 105.0]
 
 
 def test_a_ring_that_failed_is_not_taken_for_a_run_that_died(tmp_path: Path) -> None:
@@ -196,7 +205,7 @@ def test_a_ring_that_failed_is_not_taken_for_a_run_that_died(tmp_path: Path) -> 
     daemon.memory = object()  # a defect of ours
     daemon.scan()
     daemon.now += 11.0
-    daemon.witness.look()
+    daemon.writer.look()
 
     assert (tmp_path / "ring").exists()
     assert not (tmp_path / "ring.died").exists()

@@ -7,10 +7,17 @@ import pytest
 from msgspec.structs import replace
 
 from bridges.blackbox.value_codec import UnknownValue, first_difference, tree, value
-from bridges.kinds.charger.settings import Robot
-from bridges.kinds.lift.memory import Memory, Senses, Session
+from bridges.kinds.charger.settings import RobotName
+from bridges.kinds.lift.memory import LiftMemory, LiftSenses, LiftSession
 from bridges.kinds.lift.relays import Channel, Relays
-from bridges.kinds.lift.signals import Door, Hazard, LiftOutputs, LiftSample, Requested, Side
+from bridges.kinds.lift.signals import (
+    DoorReading,
+    Hazard,
+    LiftOutputs,
+    LiftRequested,
+    LiftSample,
+    Side,
+)
 from bridges.kinds.shared.decision import Fault, IoFailed, OperatorReset, Sampled
 from bridges.kinds.shared.durations import NEVER
 from bridges.kinds.shared.graph_kind import MaySpeak, Woken
@@ -26,10 +33,10 @@ VALUES: list[Any] = [
     (1, ("a", None)),
     frozenset({Hazard.FIRE, Hazard.MANUAL}),
     {Hazard.FIRE: 1, ("a", 2): "b"},
-    Door.OPEN,
+    DoorReading.OPEN,
     LiftDoor.DOOR_OPEN,
-    Robot("fleet", "r1"),
-    Sampled(LiftSample("L1", Door.OPEN, hazards=frozenset({Hazard.FIRE}))),
+    RobotName("fleet", "r1"),
+    Sampled(LiftSample("L1", DoorReading.OPEN, hazards=frozenset({Hazard.FIRE}))),
     IoFailed("no answer"),
     OperatorReset(),
     MaySpeak(True),
@@ -37,10 +44,10 @@ VALUES: list[Any] = [
     LiftRequest("Lift1", Time(3, 4)),
     LiftOutputs(True, "L1", Side.REAR),
     Fault("A", "b"),
-    Requested("r1", True, "L3"),
-    Memory(
-        senses=Senses(read_at=3.0),
-        session=Session("r1", True, "L3", 2.0, retry_at=NEVER, fault=Fault("A")),
+    LiftRequested("r1", True, "L3"),
+    LiftMemory(
+        senses=LiftSenses(read_at=3.0),
+        session=LiftSession("r1", True, "L3", 2.0, retry_at=NEVER, fault=Fault("A")),
         relays=Relays(agv=Channel(True, 1.0, (1.0, 2.0))),
     ),
 ]
@@ -89,7 +96,7 @@ def test_an_object_that_no_core_uses_cannot_become_a_tree() -> None:
 
 
 def test_two_trees_are_compared_in_the_fields_that_both_versions_know() -> None:
-    memory = Memory(session=Session("r1", True, "L3", 2.0))
+    memory = LiftMemory(session=LiftSession("r1", True, "L3", 2.0))
     was, now = tree(memory), tree(replace(memory, alarmed=True))
     assert isinstance(was, dict)
     older = {name: part for name, part in was.items() if name != "fire_latched"}

@@ -11,7 +11,7 @@ import pytest
 from bridges.cli import main
 from bridges.commands import disable, enable
 from bridges.runtime import drop_in, services
-from bridges.runtime.services import Remove, Run, Write, carry_out, switch_off
+from bridges.runtime.services import Remove, Run, WriteFile, carry_out, switch_off
 from bridges.settings.load import load
 
 CONFIG = Path(__file__).parents[2] / "config"
@@ -42,8 +42,8 @@ def test_an_instance_is_stopped_and_off_before_its_file_and_drop_in_change(tmp_p
     assert list(enable.steps(config, tmp_path, ["gpio"])) == [
         Run(("systemctl", "stop", UNIT), running_only=True),
         switch_off("lift_dry_contact"),
-        Write(tmp_path / TARGET, LIFT.read_bytes(), LIFT),
-        Write(tmp_path / DROP_IN, drop_in.text(config, ["gpio"]).encode()),
+        WriteFile(tmp_path / TARGET, LIFT.read_bytes(), LIFT),
+        WriteFile(tmp_path / DROP_IN, drop_in.text(config, ["gpio"]).encode()),
         Run(("systemctl", "daemon-reload"), running_only=True),
         Run(("systemctl", "enable", "rmf-bridges.target", UNIT)),
         Run(("systemctl", "start", UNIT), running_only=True),
@@ -94,10 +94,10 @@ def test_the_installed_file_itself_is_enabled_again_without_a_copy(
     main(["enable", str(LIFT), "--root", str(tmp_path)])
     installed = tmp_path / TARGET
     assert not [
-        s for s in enable.steps(load(installed), tmp_path, []) if s == Write(installed, b"")
+        s for s in enable.steps(load(installed), tmp_path, []) if s == WriteFile(installed, b"")
     ]
     assert [type(s).__name__ for s in enable.steps(load(installed), tmp_path, [])].count(
-        "Write"
+        "WriteFile"
     ) == 1
 
 
@@ -205,7 +205,7 @@ def test_a_step_that_fails_after_the_stop_ends_with_the_service_started_again(
     (tmp_path / "file").touch()
     live = _told(LIFT, Path("/"))
     live.dry_run = False
-    full = Write(tmp_path / "file" / "drop_in", b"")  # no folder: as a full disk, an OSError
+    full = WriteFile(tmp_path / "file" / "drop_in", b"")  # no folder: as a full disk, an OSError
     assert carry_out([full, Remove(tmp_path / "never")], live, keeps=UNIT) == os.EX_IOERR
     assert calls == [["systemctl", "--quiet", "is-active", UNIT], ["systemctl", "start", UNIT]]
     assert "the steps after that were not taken" in capsys.readouterr().err

@@ -10,10 +10,10 @@ import pytest
 
 from bridges import cli
 from bridges.commands.status import show
-from bridges.host.directories import Places
+from bridges.host.directories import Directories
 from bridges.runtime import daemons as on_machine
 from bridges.runtime import faults
-from bridges.runtime.daemons import DOWN, FAULTY, NONE, WELL, Daemon, daemons
+from bridges.runtime.daemons import DOWN, FAULTY, NONE, WELL, DaemonStatus, daemons
 from bridges.runtime.holder import HOLDER
 from bridges.runtime.record import Records, of
 from bridges.settings.load import load
@@ -45,13 +45,15 @@ def lift(*found: dict[str, str]) -> dict[str, Any]:
     }
 
 
-def seen(folder: Path, age_s: float = 0.0, units: dict[str, str] | None = None) -> list[Daemon]:
+def seen(
+    folder: Path, age_s: float = 0.0, units: dict[str, str] | None = None
+) -> list[DaemonStatus]:
     path = folder / "status.json"
     written_at = path.stat().st_mtime if path.exists() else 0.0
     return list(daemons([folder], units or {}, written_at + age_s))
 
 
-def shown(found: list[Daemon]) -> list[str]:
+def shown(found: list[DaemonStatus]) -> list[str]:
     out = io.StringIO()
     show(found, out)
     return out.getvalue().splitlines()
@@ -167,7 +169,7 @@ def test_outputs_that_nobody_has_verified_off_are_reported_even_without_a_status
     with served(tmp_path / "lift_a", lift()) as folder:
         (folder / "status.json").unlink()
     config = load(ROOT / "config" / "door_modbus.yaml")
-    record = Records(Places(folder, folder), config.path).write(of(config))
+    record = Records(Directories(folder, folder), config.path).write(of(config))
     found = seen(folder)
     assert [(one.state, one.level) for one in found] == [("left on", DOWN)]
     head, remedy = shown(found)

@@ -12,13 +12,13 @@ from drivers import Driver, DriverError
 from drivers.hal import gpio, http, modbus
 from drivers.hal.points import Wire
 from hal_fakes.gpio import WiredFactory
-from hal_fakes.http import HttpServer, Station
+from hal_fakes.http import HttpServer, HttpStation
 from hal_fakes.modbus import ModbusServer
 from hal_fakes.modbus.rtu import RtuLine
 from hal_fakes.modbus.units import FarSide
 from hal_fakes.plants.plant import FailureMode, Plant
 from hal_fakes.realtime import RealTime
-from hal_fakes.wiring import Wiring
+from hal_fakes.wiring import PlantWiring
 from tests.drivers.hal.modbus.module import Time
 from tests.waiting import at_last, wait_until
 
@@ -121,7 +121,7 @@ def on_modbus(
         else ModbusServer(far_sides, slow_s=1.5 * timeout_s)
     )
     plain = {"type": "modbus", "timeout_s": timeout_s, **server.replace}
-    bus = modbus.ModbusBus(msgspec.convert(plain, modbus.Settings), clock)
+    bus = modbus.ModbusBus(msgspec.convert(plain, modbus.ModbusSettings), clock)
     try:
         yield bus, clock
     finally:
@@ -132,13 +132,13 @@ def on_modbus(
 
 @contextmanager
 def on_http(
-    world: RealTime, station: Station, timeout_s: float
+    world: RealTime, station: HttpStation, timeout_s: float
 ) -> Iterator[tuple[http.HttpBus, Time]]:
     """A bus to a simulated controller that answers HTTP."""
     clock = Time()
     server = HttpServer([station], "", timeout_s)
     plain = {"type": "http", "timeout_s": timeout_s, **server.replace}
-    bus = http.HttpBus(msgspec.convert(plain, http.Settings), clock)
+    bus = http.HttpBus(msgspec.convert(plain, http.HttpSettings), clock)
     try:
         yield bus, clock
     finally:
@@ -150,9 +150,9 @@ def on_http(
 @contextmanager
 def on_pins(world: RealTime, plant: Plant, wires: Sequence[Wire]) -> Iterator[gpio.GpioBus]:
     """A simulated header, wired to this plant."""
-    factory = WiredFactory([Wiring(plant, wires, gpio.canonical)], lock=world.lock)
+    factory = WiredFactory([PlantWiring(plant, wires, gpio.canonical)], lock=world.lock)
     world.on_step.append(factory.show)
-    bus = gpio.open_bus(gpio.Settings(), factory)
+    bus = gpio.open_bus(gpio.GpioSettings(), factory)
     try:
         yield bus
     finally:

@@ -12,10 +12,10 @@ from typing import Any, Protocol
 from drivers.hal import HalError, points
 from drivers.hal.modbus.points import Point
 from drivers.hal.points import Pull, Wire
-from hal_fakes.http_charger import HttpCharger
+from hal_fakes.http_charger import FakeHttpCharger
 from hal_fakes.plants.charger import ChargerPlant
 from hal_fakes.plants.plant import Plant
-from hal_fakes.wiring import Wiring
+from hal_fakes.wiring import PlantWiring
 
 WATCHDOG_S = 2.0
 
@@ -46,7 +46,7 @@ class PointsFar:
     def __init__(self, clock: Clocked, plant: Plant, wires: Iterable[Wire]) -> None:
         self.down = ""
         self._clock = clock
-        self._wiring = Wiring(plant, wires, str)
+        self._wiring = PlantWiring(plant, wires, str)
         self._safe: dict[str, bool] = {}
         self._levels: dict[str, bool] = {}
 
@@ -149,7 +149,7 @@ class HttpFar:
         self.down = ""
         self._clock = clock
         self._plant = plant
-        self._station = HttpCharger(plant, settings)
+        self._station = FakeHttpCharger(plant, settings)
 
     def watchdog(self) -> None:
         """For a station's own timeout, which this one does not have."""

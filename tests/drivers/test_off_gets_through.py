@@ -86,7 +86,7 @@ REGISTER_DOOR = msgspec.convert(
             "command": {"at": "holding register 20", "hold": 7, "release": 5},
         },
     },
-    register.Settings,
+    register.RegisterDoorSettings,
 )
 CONTACT_DOOR = msgspec.convert(
     {
@@ -96,7 +96,7 @@ CONTACT_DOOR = msgspec.convert(
         },
         "outputs": {"hold_open": {"point": "unit 1 coil 0", "active": "high"}},
     },
-    dry_contact.Settings,
+    dry_contact.DryContactDoorSettings,
 )
 
 
@@ -242,7 +242,7 @@ def test_a_start_releases_though_the_modules_watchdog_cannot_be_armed(
 def test_a_charge_on_modbus_is_stopped_while_its_state_cannot_be_read(
     module: Module, registers: Registers, code: int
 ) -> None:
-    settings = modbus.Settings(unit=1)
+    settings = modbus.ModbusChargerSettings(unit=1)
     charger = modbus.create("c", settings, bus_to(module.port, timeout_s=1.0))
     charger.read()
     charger.write(ChargerOutputs(power=True))
@@ -305,10 +305,10 @@ def test_a_charge_on_http_is_stopped_while_its_state_cannot_be_read() -> None:
     station = HttpStation()
     settings = msgspec.convert(
         {"codes": {"idle": [0], "charging": [2]}, "stop": {"path": "/stop"}},
-        charger_http.Settings,
+        charger_http.HttpChargerSettings,
     )
     api = f"127.0.0.1:{station.server.server_address[1]}"
-    bus = http.HttpBus(http.Settings(api_base=api, timeout_s=5.0), clock=Time())
+    bus = http.HttpBus(http.HttpSettings(api_base=api, timeout_s=5.0), clock=Time())
     charger = charger_http.create("c", settings, bus)
     try:
         charger.read()

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from bridges.kinds.lift.signals import Door, Hazard, LiftSample, Side
+from bridges.kinds.lift.signals import DoorReading, Hazard, LiftSample, Side
 from drivers.lift.dry_contact import wires
 from hal_fakes.plants.plant import FailureMode
 from tests.hal_fakes.virtual_lift import WiredLift, shipped
@@ -45,7 +45,9 @@ def changes(lift: WiredLift) -> list[tuple[float, LiftSample]]:
     return seen
 
 
-def sample(level: str | None, door: Door = Door.NOT_OPEN, agv: bool = True) -> LiftSample:
+def sample(
+    level: str | None, door: DoorReading = DoorReading.NOT_OPEN, agv: bool = True
+) -> LiftSample:
     return LiftSample(level=level, door=door, agv=agv)
 
 
@@ -57,7 +59,7 @@ def test_with_whole_wires_the_ride_is_seen_as_it_is(lift: WiredLift) -> None:
         (2.55, sample("L2")),
         (3.55, sample(None)),
         (4.55, sample("L3")),
-        (6.05, sample("L3", Door.OPEN)),
+        (6.05, sample("L3", DoorReading.OPEN)),
         (8.05, sample("L3")),
     ]
 
@@ -77,7 +79,7 @@ def test_a_cut_input_never_reads_as_an_open_door_or_another_floor(
     for _, seen in ride(lift):
         level, opened = truth(lift)
         assert seen.level in (None, level)
-        assert seen.door is Door.NOT_OPEN or (seen.door is Door.OPEN and opened)
+        assert seen.door is DoorReading.NOT_OPEN or (seen.door is DoorReading.OPEN and opened)
         hazards.add(seen.hazards)
     alarm = {signal} if signal in ("fire_alarm", "code_blue") else set()
     assert hazards == {frozenset(alarm)}
@@ -108,7 +110,7 @@ def test_a_stuck_fire_contact_stays_as_it_was(lift: WiredLift) -> None:
 
 def test_a_slow_door_contact_arrives_late(lift: WiredLift) -> None:
     lift.plant.fail("door", "slow")
-    opened = [now for now, seen in ride(lift) if seen.door is Door.OPEN]
+    opened = [now for now, seen in ride(lift) if seen.door is DoorReading.OPEN]
     assert (opened[0], opened[-1]) == (8.05, 10.0)
 
 

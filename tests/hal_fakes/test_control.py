@@ -12,12 +12,12 @@ import pytest
 from drivers.hal import HalError
 from hal_fakes.caller import Caller
 from hal_fakes.control import Control
-from hal_fakes.plants.lift import LiftPlant, Pace
+from hal_fakes.plants.lift import LiftPace, LiftPlant
 from hal_fakes.plants.plant import Edge
 from hal_fakes.realtime import RealTime
 from tests.hal_fakes.virtual_lift import shipped
 
-QUICK = Pace(floor_s=0.02, door_s=0.02, agv_s=0.02, dwell_s=0.02)
+QUICK = LiftPace(floor_s=0.02, door_s=0.02, agv_s=0.02, dwell_s=0.02)
 
 
 class World:

@@ -4,13 +4,14 @@ import can
 import msgspec
 
 from bridges.kinds.charger.signals import ChargerOutputs
-from drivers.charger.can_frames import Settings, create
+from drivers.charger.can_frames import FrameChargerSettings, create
 from hal_fakes.can.frame_charger import PERIODS, STATUS_S, FrameCharger
 from hal_fakes.plants.charger import ChargerPlant
 from tests.drivers.hal.can.far_end import Reactive
 
 SETTINGS = msgspec.convert(
-    {"profile": "wiferion", "setpoints": {"max_volts": 29.4, "volts": 29.2, "amps": 30}}, Settings
+    {"profile": "wiferion", "setpoints": {"max_volts": 29.4, "volts": 29.2, "amps": 30}},
+    FrameChargerSettings,
 )
 FED_EVERY_S = 0.5
 

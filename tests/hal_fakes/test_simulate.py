@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from bridges.kinds.lift.signals import Door, Hazard, LiftOutputs, LiftSample, Side
+from bridges.kinds.lift.signals import DoorReading, Hazard, LiftOutputs, LiftSample, Side
 from bridges.settings.load import Config, load
 from drivers.hal.gpio import GpioBus
-from drivers.lift.dry_contact import LiftDryContact, create
+from drivers.lift.dry_contact import DryContactLift, create
 from hal_fakes.caller import Caller
 from hal_fakes.plants import lift as lift_plant
 from hal_fakes.simulate import Simulation
@@ -27,7 +27,7 @@ class SimulatedLift:
         assert isinstance(self.bus, GpioBus)
         self._edge = threading.Event()
         self.bus.on_edge(self._edge.set)
-        self.driver: LiftDryContact = create("Lift1", config.devices["Lift1"], self.bus)
+        self.driver: DryContactLift = create("Lift1", config.devices["Lift1"], self.bus)
         self.driver.open()
 
     def until(self, reached: Callable[[LiftSample], bool]) -> LiftSample:
@@ -44,8 +44,8 @@ class SimulatedLift:
 
 @pytest.fixture
 def simulation(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Simulation]:
-    quick = lift_plant.Pace(floor_s=0.1, door_s=0.05, agv_s=0.05, dwell_s=0.1)
-    monkeypatch.setattr(lift_plant, "Pace", lambda: quick)
+    quick = lift_plant.LiftPace(floor_s=0.1, door_s=0.05, agv_s=0.05, dwell_s=0.1)
+    monkeypatch.setattr(lift_plant, "LiftPace", lambda: quick)
     made = Simulation(load(SHIPPED), tmp_path)
     yield made
     made.close()
@@ -63,12 +63,12 @@ def test_a_robot_rides_a_lift_on_simulated_hardware(lift: SimulatedLift) -> None
     lift.until(lambda seen: seen.agv is True)
     lift.driver.write(LiftOutputs(agv_request=True, call="L3"))
     lift.until(lambda seen: seen.level == "L2")
-    lift.until(lambda seen: seen.door is Door.OPEN)
+    lift.until(lambda seen: seen.door is DoorReading.OPEN)
     lift.driver.write(LiftOutputs(agv_request=True, hold_door=Side.FRONT))
-    assert lift.driver.read() == LiftSample(level="L3", door=Door.OPEN, agv=True)
+    assert lift.driver.read() == LiftSample(level="L3", door=DoorReading.OPEN, agv=True)
     lift.driver.write(LiftOutputs())
-    assert lift.until(lambda seen: seen.door is Door.NOT_OPEN) == LiftSample(
-        level="L3", door=Door.NOT_OPEN, agv=False
+    assert lift.until(lambda seen: seen.door is DoorReading.NOT_OPEN) == LiftSample(
+        level="L3", door=DoorReading.NOT_OPEN, agv=False
     )
 
 
@@ -83,7 +83,7 @@ def test_commands_on_the_control_socket_reach_the_pins(
     assert caller.say("fail Lift1 code_blue off") == "ok"
     lift.until(lambda seen: seen.hazards == {Hazard.CODE_BLUE})
     assert caller.say("fail Lift1 door wrong") == "ok"
-    lift.until(lambda seen: seen.door is Door.OPEN)
+    lift.until(lambda seen: seen.door is DoorReading.OPEN)
     caller.close()
 
 

@@ -7,30 +7,30 @@ import msgspec
 
 from bridges.kinds.lift.signals import LiftOutputs, LiftSample
 from bridges.settings.load import load
-from drivers.hal.gpio import Settings as GpioSettings
+from drivers.hal.gpio import GpioSettings as GpioSettings
 from drivers.hal.gpio import canonical, open_bus
-from drivers.lift.dry_contact import Settings, create, wires
+from drivers.lift.dry_contact import DryContactLiftSettings, create, wires
 from hal_fakes.gpio import WiredFactory
-from hal_fakes.plants.lift import LiftPlant, Pace
-from hal_fakes.wiring import Wiring
+from hal_fakes.plants.lift import LiftPace, LiftPlant
+from hal_fakes.wiring import PlantWiring
 from tests.drivers.lift.wirings import whole
 
 SHIPPED = Path(__file__).parents[2] / "config" / "lift_dry_contact.yaml"
-PACE = Pace(floor_s=2.0, door_s=1.0, agv_s=0.5, dwell_s=3.0)
+PACE = LiftPace(floor_s=2.0, door_s=1.0, agv_s=0.5, dwell_s=3.0)
 
 Event = tuple[float, str, object]
 
 
-def shipped() -> Settings:
+def shipped() -> DryContactLiftSettings:
     """The shipped example of `config/`."""
     settings = load(SHIPPED).devices["Lift1"]
-    assert isinstance(settings, Settings)
+    assert isinstance(settings, DryContactLiftSettings)
     return settings
 
 
 def lift(**changes: Any) -> LiftPlant:
     """A lift with three landings (B1, G, 1), wired as `tests/drivers/lift/wirings.py` says."""
-    plant = LiftPlant("lift", msgspec.convert(whole(**changes), Settings), PACE)
+    plant = LiftPlant("lift", msgspec.convert(whole(**changes), DryContactLiftSettings), PACE)
     plant.advance(0.0)
     return plant
 
@@ -49,7 +49,7 @@ class WiredLift:
         settings = shipped()
         self.plant = LiftPlant("Lift1", settings, PACE)
         self.factory = WiredFactory(
-            [Wiring(self.plant, wires(settings), canonical)], clock=lambda: self.now
+            [PlantWiring(self.plant, wires(settings), canonical)], clock=lambda: self.now
         )
         self.bus = open_bus(GpioSettings(), self.factory)
         self.driver = create("Lift1", settings, self.bus)

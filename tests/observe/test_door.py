@@ -5,7 +5,7 @@ from msgspec.structs import replace
 from bridges.messages import definitions as d
 from bridges.observe.door import ObservedDoor
 from bridges.observe.limits import MOST_HOLDERS, UNSEEN_S
-from bridges.observe.requesters import Requester
+from bridges.observe.requesters import DeviceRequester
 from tests.observe.story import BLUE, CHARGER, CLOSED, OPEN, RED, Story
 
 
@@ -25,7 +25,7 @@ def test_a_passage_from_open_to_the_heartbeat_that_lists_nobody() -> None:
     ]
 
 
-def missing(door: ObservedDoor, one: Requester) -> list[str]:
+def missing(door: ObservedDoor, one: DeviceRequester) -> list[str]:
     return [f"{check.name}: {check.shown}" for check in door.checks(one) if not check.met]
 
 

@@ -9,7 +9,7 @@ import msgspec
 import pytest
 
 from bridges.runtime import record
-from bridges.runtime.record import Claim, Record
+from bridges.runtime.record import ClaimedSettings, ClaimRecord
 from bridges.settings.config import Config
 from bridges.settings.load import SettingsError, load
 from drivers.profiles import texts
@@ -44,10 +44,10 @@ def claimed(config: Config) -> tuple[object, ...]:
     )
 
 
-def of_file(file: Path) -> tuple[Config, Record, Claim]:
+def of_file(file: Path) -> tuple[Config, ClaimRecord, ClaimedSettings]:
     config = load(file)
     written = record.of(config)
-    read = msgspec.json.decode(msgspec.json.encode(written), type=Record)
+    read = msgspec.json.decode(msgspec.json.encode(written), type=ClaimRecord)
     assert read == written
     assert read.claim is not None
     return config, read, read.claim
@@ -93,8 +93,8 @@ def test_nothing_that_takes_long_to_import_is_imported_to_switch_off() -> None:
     _, written, _ = of_file(next(file for file in DEVICES if file.stem == "lift_dry_contact"))
     code = (
         f"import sys, msgspec, bridges; bridges.BUILD = {BUILD!r}; import bridges.runtime.dead_daemon;"
-        "from bridges.runtime.record import Record;"
-        "config = msgspec.json.decode(sys.stdin.buffer.read(), type=Record).config();"
+        "from bridges.runtime.record import ClaimRecord;"
+        "config = msgspec.json.decode(sys.stdin.buffer.read(), type=ClaimRecord).config();"
         "[config.driver_type(name) for name in config.devices];"
         "slow = {'yaml', 'bridges.settings.load', 'gpiozero', 'dataclasses', 'difflib'};"
         "print(*slow & sys.modules.keys())"

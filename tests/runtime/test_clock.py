@@ -4,7 +4,7 @@ import pytest
 
 from bridges.messages.definitions import Time
 from bridges.messages.stamps import ClockError
-from bridges.runtime.clock import Clock, Pace
+from bridges.runtime.clock import Clock, PublishPace
 
 
 def test_a_stamp_is_the_wall_clock_now_less_the_age_of_the_reading_and_0_for_never() -> None:
@@ -23,7 +23,7 @@ def test_a_clock_past_2038_is_an_error_by_name(wall: float) -> None:
 def test_a_state_is_due_each_second_and_at_once_when_it_changes_but_10_times_a_second_at_most() -> (
     None
 ):
-    pace = Pace()
+    pace = PublishPace()
     assert pace.due_at("IDLE") < 0.0
     pace.published("IDLE", 5.0)
     assert (pace.due_at("IDLE"), pace.due_at("CHARGING")) == (6.0, 5.1)

@@ -11,10 +11,10 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from bridges.host.directories import Places
+from bridges.host.directories import Directories
 from bridges.kinds.charger_coordinator import keep as coordinator
 from bridges.kinds.door_supervisor import keep as doors
-from bridges.kinds.door_supervisor.settings import Settings as DoorSupervisor
+from bridges.kinds.door_supervisor.settings import DoorSupervisorSettings as DoorSupervisor
 from bridges.runtime.drop_in import FITS, misfit
 from bridges.runtime.record import PATTERN, Records, read
 from bridges.settings.load import load
@@ -37,7 +37,7 @@ def left(folder: Path, **later: object) -> tuple[Path, Records, str]:
     content = msgspec.json.decode(source.read_bytes()) | later
     path = folder / source.name
     path.write_bytes(msgspec.json.encode(content))
-    return path, Records(Places(folder, folder), Path(content["file"])), content["file"]
+    return path, Records(Directories(folder, folder), Path(content["file"])), content["file"]
 
 
 @pytest.mark.parametrize("folder", EARLIER, ids=lambda folder: folder.name)

@@ -8,7 +8,7 @@ import pytest
 from msgspec.structs import replace
 
 from bridges.kinds.lift_supervisor import KIND
-from bridges.kinds.lift_supervisor.settings import Settings
+from bridges.kinds.lift_supervisor.settings import LiftSupervisorSettings
 from bridges.messages.definitions import LiftRequest, LiftState, Time
 from bridges.messages.stamps import stamp
 from bridges.messages.topics import ADAPTER_LIFT_REQUESTS, LIFT_REQUESTS, LIFT_STATES, Topic
@@ -29,12 +29,14 @@ WALL = 1_800_000_000.0
 class Site:
     """Our node on a memory network, with a fleet adapter and a lift's node as tests play them."""
 
-    def __init__(self, settings: Settings | None = None, **more: Any) -> None:
+    def __init__(self, settings: LiftSupervisorSettings | None = None, **more: Any) -> None:
         self.now = 0.0
         self.network = MemoryNetwork()
         self.transport = MemoryTransport(self.network, "supervisor")
         clock = Clock(lambda: self.now, lambda: WALL + self.now)
-        self.node = GraphNode(KIND, settings or Settings(), self.transport, clock, **more)
+        self.node = GraphNode(
+            KIND, settings or LiftSupervisorSettings(), self.transport, clock, **more
+        )
         self.node.subscribe()
         self.others = MemoryTransport(self.network, "others")
         self.adapter = self.others.publisher(ADAPTER_LIFT_REQUESTS)
@@ -114,7 +116,7 @@ def test_while_another_publishes_it_is_passive_and_says_so_once(
 
 
 def test_lifts_are_served_separately_and_those_not_named_not_at_all() -> None:
-    site = Site(Settings(lifts=["Lift1", "Lift2"]))
+    site = Site(LiftSupervisorSettings(lifts=["Lift1", "Lift2"]))
     site.until(3.0)
     for lift in ("Lift1", "Lift2", "Lift3"):
         site.asks(lift=lift)
@@ -181,7 +183,7 @@ def test_a_lift_that_shows_itself_finds_room_in_a_flood_of_names(
 def test_the_lifts_of_the_yaml_are_never_turned_away(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(graph_node, "MAX_UNSHOWN", 0)
     monkeypatch.setattr(graph_node, "MAX_SUBJECTS", 0)
-    site = Site(Settings(lifts=["Lift1", "Lift2"]))
+    site = Site(LiftSupervisorSettings(lifts=["Lift1", "Lift2"]))
     site.until(3.0)
     for lift in ("Lift1", "Lift2", "Lift3"):
         site.asks(lift=lift)
@@ -223,7 +225,7 @@ def test_requesters_that_are_forgotten_leave_their_room(monkeypatch: pytest.Monk
 
 def test_the_lifts_of_the_yaml_keep_room_for_sessions(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(graph_node, "MAX_REQUESTERS", 0)
-    site = Site(Settings(lifts=["Lift1"]))
+    site = Site(LiftSupervisorSettings(lifts=["Lift1"]))
     site.until(3.0)
     site.asks()
     assert (len(site.sent), site.node.refused) == (1, {})
@@ -368,7 +370,7 @@ def test_a_served_graph_kind_runs_in_its_thread_until_it_is_stopped(
     wait_until(lambda: ear.matched() == 1, "the rival is there")
     kind = replace(KIND, quiet_s=lambda settings: 0.5)
     clock = Clock(time.monotonic, time.time)
-    node = GraphNode(kind, Settings(), ours, clock)
+    node = GraphNode(kind, LiftSupervisorSettings(), ours, clock)
     thread, presence = Serving(node, clock), node.presence
     node.subscribe()
     assert not thread.ready

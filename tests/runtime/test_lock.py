@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from bridges.host.directories import Places
+from bridges.host.directories import Directories
 from bridges.runtime import record
 from bridges.runtime.holder import HOLDER
 from bridges.runtime.runtime_directory import LOCK, RuntimeDirectory
@@ -81,7 +81,7 @@ def test_beside_a_walk_a_run_of_the_service_claims_nothing_and_switches_nothing_
     module: Module, tmp_path: Path
 ) -> None:
     run = tmp_path / "run"
-    walk = RuntimeDirectory(Places(run, run), module.file, serves=False)
+    walk = RuntimeDirectory(Directories(run, run), module.file, serves=False)
     walk.claim(record.of(load(module.file)))
     before = {path.name: path.read_bytes() for path in run.iterdir()}
     with daemon(module.file, run, **unit(run, "a")) as running:

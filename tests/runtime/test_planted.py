@@ -10,15 +10,15 @@ import pytest
 
 from bridges import cli
 from bridges.host import directories
-from bridges.host.directories import Distrusted, Places, opened
+from bridges.host.directories import Directories, Distrusted, opened
 from bridges.runtime import daemons as status
 from bridges.runtime import holder, runtime_directory
-from bridges.runtime.record import Record
+from bridges.runtime.record import ClaimRecord
 from bridges.runtime.runtime_directory import KEPT, MemoryFile, RuntimeDirectory, state_file
 
 NOBODY = 65534
 FILE = Path("/etc/rmf-bridges/lift.yaml")
-CLAIMED = Record(str(FILE), b"kind: lift\n", {})
+CLAIMED = ClaimRecord(str(FILE), b"kind: lift\n", {})
 ROOT = pytest.mark.skipif(os.geteuid() != 0, reason="only root can make what others would")
 
 
@@ -155,6 +155,6 @@ def test_a_link_of_ones_own_on_the_way_is_followed(tmp_path: Path) -> None:
     (tmp_path / "disk").mkdir()
     (tmp_path / "home").symlink_to(tmp_path / "disk")
     run = tmp_path / "home" / "run"
-    serving = RuntimeDirectory(Places(run, run), FILE, serves=True)
-    assert holder.look(Places(run, run)) is not None
+    serving = RuntimeDirectory(Directories(run, run), FILE, serves=True)
+    assert holder.look(Directories(run, run)) is not None
     serving.close()

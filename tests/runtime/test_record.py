@@ -7,7 +7,7 @@ import pytest
 
 from bridges.runtime import record
 from bridges.runtime.predecessor import SafeFirst
-from bridges.runtime.record import Record
+from bridges.runtime.record import ClaimRecord
 from bridges.settings.load import SettingsError, load
 from drivers import DriverError
 from drivers.charger import can_frames, dbc
@@ -34,7 +34,7 @@ def test_a_claim_is_read_as_it_was_recorded_and_not_as_the_disk_has_it_now() -> 
     written = record.of(load(file))
     profile = written.texts["wiferion.yaml"].replace(b"dbc: wiferion.dbc", b"dbc: gone.dbc")
     older = {"wiferion.yaml": profile, "gone.dbc": written.texts["wiferion.dbc"]}
-    found = Record(written.file, written.yaml, older).config()
+    found = ClaimRecord(written.file, written.yaml, older).config()
     (settings,) = found.devices.values()
     assert can_frames.frame_map(settings).dbc == "gone.dbc"
     assert dbc.load("gone.dbc").frames() == dbc.Dbc(written.texts["wiferion.dbc"].decode()).frames()
@@ -45,7 +45,7 @@ def test_a_claim_is_read_as_it_was_recorded_and_not_as_the_disk_has_it_now() -> 
 
 def test_a_profile_that_is_gone_from_the_disk_is_found_in_the_record() -> None:
     written = record.of(load(CONFIG / "door_register.yaml"))
-    renamed = Record(
+    renamed = ClaimRecord(
         written.file,
         written.yaml.replace(b"profile: generic-register-door", b"profile: no-more"),
         {"no-more.yaml": written.texts["generic-register-door.yaml"]},
@@ -53,7 +53,7 @@ def test_a_profile_that_is_gone_from_the_disk_is_found_in_the_record() -> None:
     assert list(renamed.config().devices) == list(written.config().devices)
     texts.give({})
     with pytest.raises(SettingsError, match="unknown profile 'no-more'"):
-        Record(renamed.file, renamed.yaml, {}).config()
+        ClaimRecord(renamed.file, renamed.yaml, {}).config()
 
 
 class Silent:

@@ -11,9 +11,9 @@ import msgspec
 import pytest
 from msgspec.structs import replace
 
-from bridges.host.directories import Places
+from bridges.host.directories import Directories
 from bridges.runtime.holder import HOLDER, LockHolder, look, ourselves
-from bridges.runtime.record import Record
+from bridges.runtime.record import ClaimRecord
 from bridges.runtime.runtime_directory import (
     LOCK,
     AlreadyRunning,
@@ -28,11 +28,11 @@ FILE = Path("/etc/rmf-bridges/lift.yaml")
 OURS = ourselves(FILE, serves=True)
 DEAD = replace(OURS, started=1)
 """Somebody else has its number by now."""
-CLAIMED = Record(str(FILE), b"kind: lift\n", {"make.yaml": b"for: door_register\n"})
+CLAIMED = ClaimRecord(str(FILE), b"kind: lift\n", {"make.yaml": b"for: door_register\n"})
 
 
-def in_one(path: Path) -> Places:
-    return Places(path, path)
+def in_one(path: Path) -> Directories:
+    return Directories(path, path)
 
 
 def named(folder: Path, holder: LockHolder) -> None:
@@ -65,7 +65,7 @@ def test_the_daemon_that_holds_a_directory_is_found_with_what_it_serves(tmp_path
 
 
 def test_its_name_in_either_directory_shows_that_a_daemon_lives(tmp_path: Path) -> None:
-    both = Places(tmp_path / "run", tmp_path / "state")
+    both = Directories(tmp_path / "run", tmp_path / "state")
     serving = RuntimeDirectory(both, FILE, serves=True)
     for path in (tmp_path / "run" / HOLDER, tmp_path / "state" / HOLDER):
         path.rename(path.with_name("away"))
@@ -77,7 +77,7 @@ def test_its_name_in_either_directory_shows_that_a_daemon_lives(tmp_path: Path) 
 def test_where_the_state_keeps_an_old_name_the_runtime_directory_says_who_it_is(
     tmp_path: Path,
 ) -> None:
-    both = Places(tmp_path / "run", tmp_path / "state")
+    both = Directories(tmp_path / "run", tmp_path / "state")
     serving = RuntimeDirectory(both, FILE, serves=False)
     named(tmp_path / "state", DEAD)  # of the daemon before the root became read-only
     assert look(both) == replace(OURS, serves=False)
@@ -108,7 +108,7 @@ def test_a_daemon_on_another_yaml_overwrites_no_unreleased_claim(tmp_path: Path)
     first = held(tmp_path)
     first.claim(CLAIMED)
     first.close()
-    edited = Record(str(FILE), b"kind: door\n", {})
+    edited = ClaimRecord(str(FILE), b"kind: door\n", {})
     second = held(tmp_path)
     second.claim(edited)
     assert sorted(r.yaml for r in second.records.unreleased()) == [b"kind: door\n", b"kind: lift\n"]
@@ -129,7 +129,7 @@ def test_a_record_counts_only_for_the_file_that_it_names(tmp_path: Path) -> None
 def test_a_record_goes_where_it_survives_a_power_cut_and_elsewhere_only_if_that_is_full(
     tmp_path: Path,
 ) -> None:
-    both = Places(tmp_path / "run", tmp_path / "state")
+    both = Directories(tmp_path / "run", tmp_path / "state")
     serving = RuntimeDirectory(both, FILE, serves=True)
     in_the_way = tmp_path / "state" / f".{CLAIMED.name}.new"
     in_the_way.mkdir()
@@ -184,8 +184,8 @@ def test_a_directory_that_was_removed_is_made_again_with_its_lock_and_its_record
 def test_a_start_waits_while_outputs_are_being_switched_off(tmp_path: Path) -> None:
     text = (
         "import sys; from pathlib import Path; from bridges.runtime.runtime_directory import *;"
-        "from bridges.host.directories import Places; p = Path(sys.argv[1]);"
-        "d = RuntimeDirectory(Places(p, p), Path('x'), serves=False);"
+        "from bridges.host.directories import Directories; p = Path(sys.argv[1]);"
+        "d = RuntimeDirectory(Directories(p, p), Path('x'), serves=False);"
         "print('held', flush=True); sys.stdin.read()"
     )
     command = [sys.executable, "-c", text, str(tmp_path)]
@@ -202,8 +202,8 @@ def test_a_start_waits_while_outputs_are_being_switched_off(tmp_path: Path) -> N
 def test_the_runtime_directory_is_the_given_one_or_systemds_or_the_services_or_the_users(
     machine: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    by_hand = Places(machine / "user/7/rmf-bridge/lift", machine / "home/rmf-bridge/lift")
-    service = Places(machine / "run/lift", machine / "var/lift")
+    by_hand = Directories(machine / "user/7/rmf-bridge/lift", machine / "home/rmf-bridge/lift")
+    service = Directories(machine / "run/lift", machine / "var/lift")
     assert find(FILE, None) == by_hand
     RuntimeDirectory(service, FILE, serves=True).close()
     assert find(FILE, None) == service
@@ -216,7 +216,7 @@ def test_the_runtime_directory_is_the_given_one_or_systemds_or_the_services_or_t
 
 
 def test_after_a_power_cut_only_the_record_shows_the_service(machine: Path) -> None:
-    service = Places(machine / "run/lift", machine / "var/lift")
+    service = Directories(machine / "run/lift", machine / "var/lift")
     serving = RuntimeDirectory(service, FILE, serves=True)
     serving.claim(CLAIMED)
     serving.close()
@@ -314,7 +314,7 @@ def test_only_its_user_can_open_the_lock_and_its_group_can_read_who_holds_it(
 
 
 def test_a_daemon_that_is_refused_leaves_the_other_ones_files_as_they_are(tmp_path: Path) -> None:
-    both = Places(tmp_path / "run", tmp_path / "state")
+    both = Directories(tmp_path / "run", tmp_path / "state")
     serving = held(tmp_path / "run")
     serving.write_status(b"{}")
     before = {path: path.read_bytes() for path in (tmp_path / "run").iterdir()}

@@ -10,7 +10,7 @@ from bridges.messages.definitions import Message
 from bridges.messages.topics import Topic
 from bridges.runtime.clock import Clock
 from bridges.runtime.refusals import Refusals
-from bridges.runtime.subject import Core, Subject
+from bridges.runtime.subject import Subject, SubjectCore
 
 
 class Seen(msgspec.Struct, frozen=True):
@@ -35,7 +35,9 @@ def subject(by_code: bool) -> tuple[Subject[int, Seen, None, Seen], Refusals]:
     def publish(topic: Topic[Message], message: Message) -> None:
         raise AssertionError("nothing is said")
 
-    core = Core("device", decide, lambda report, now: {"number": str(report.number)}, identity)
+    core = SubjectCore(
+        "device", decide, lambda report, now: {"number": str(report.number)}, identity
+    )
     refusals = Refusals()
     clock = Clock(lambda: 3.0, lambda: 1e6)
     return Subject("A", 0, core, publish, refusals, clock), refusals

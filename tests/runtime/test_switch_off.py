@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from bridges.host.directories import Places
+from bridges.host.directories import Directories
 from bridges.runtime.dead_daemon import ages
 from bridges.runtime.switch_off import outputs_off
 from bridges.settings.load import load
@@ -61,7 +61,7 @@ def test_a_frame_that_is_lost_leaves_no_relay_on(module: Module, tmp_path: Path)
 
 
 def test_the_dead_daemons_status_says_which_devices_answered_last(tmp_path: Path) -> None:
-    there = Places(tmp_path, tmp_path)
+    there = Directories(tmp_path, tmp_path)
     assert ages(there) == {}
     status = tmp_path / "status.json"
     status.write_text('{"devices":{"a":{"input_age_s":0.1},"b":{"input_age_s":null},"c":{}}}')

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from msgspec.structs import replace
 
-from bridges.host.directories import Places
+from bridges.host.directories import Directories
 from bridges.messages.definitions import DoorModeValue
 from bridges.runtime import dead_daemon, record
 from bridges.runtime.record import Records
@@ -87,7 +87,7 @@ def test_what_several_dead_daemons_left_on_shares_the_time_of_one(
 ) -> None:
     """systemd kills ExecStopPost after TimeoutStopSec: the last record has its turn before."""
     file, given = tmp_path / "lift.yaml", list[float]()
-    claims = Records(Places(tmp_path, tmp_path), file)
+    claims = Records(Directories(tmp_path, tmp_path), file)
     for name in ("lift_dry_contact", "lift_relay_board", "lift_one_hot"):
         config = load(ROOT / "config" / f"{name}.yaml")
         claims.write(replace(record.of(config), file=str(file)))

@@ -24,10 +24,10 @@ from drivers.door import dry_contact as door_dry_contact
 from drivers.door import register as door_register
 from drivers.lift import dry_contact as lift_dry_contact
 from hal_fakes import http_charger
-from hal_fakes.modbus.register_door import RegisterDoor, contacts
+from hal_fakes.modbus.register_door import FakeRegisterDoor, contacts
 from hal_fakes.plants import door as door_plant
 from hal_fakes.plants import lift as lift_plant
-from hal_fakes.plants.machine import Machine
+from hal_fakes.plants.machine import WiredPlant
 from tests.drivers.far import Far, HttpFar, PointsFar, RegisterFar
 from tests.drivers.lift.wirings import alarm, coil, line
 from tests.site.timeline import Timeline
@@ -49,7 +49,7 @@ class Device:
     name: str
     kind: AnyDeviceKind
     settings: Any
-    plant: Machine
+    plant: WiredPlant
     far: Far
     driver_name: str
     driver: Callable[[], Driver[Any, Any]]
@@ -106,7 +106,7 @@ def _dry_door(timeline: Timeline, name: str, settings: Any, bus: str) -> Device:
 
 def _register_door(timeline: Timeline, name: str, settings: Any) -> Device:
     plant = door_plant.build(name, settings, contacts(settings))
-    far = RegisterFar(timeline, RegisterDoor(plant, settings))
+    far = RegisterFar(timeline, FakeRegisterDoor(plant, settings))
     return Device(
         name,
         DOOR,
@@ -146,7 +146,7 @@ def _shipped(file: str, name: str) -> Any:
 
 
 def _convert(driver: Any, content: dict[str, Any]) -> Any:
-    return msgspec.convert(content, driver.Settings)
+    return msgspec.convert(content, driver.DRIVER.settings)
 
 
 def _lift2() -> dict[str, Any]:

@@ -5,10 +5,10 @@ battery is full (rmf_ros2 9dedd0f, ChargeBattery.cpp). `charging_assignments` sa
 """
 
 from bridges.kinds.charger_coordinator.settings import (
-    Fleet,
+    CoordinatorSettings,
+    FleetSettings,
     RobotSettings,
-    Settings,
-    Station,
+    StationSettings,
     Waypoint,
 )
 from bridges.messages import definitions as d
@@ -17,16 +17,16 @@ FLEET = "fleet"
 LOW, FULL = 30.0, 100.0
 
 
-def settings(chargers: tuple[str, ...], robots: tuple[str, ...]) -> Settings:
+def settings(chargers: tuple[str, ...], robots: tuple[str, ...]) -> CoordinatorSettings:
     """The coordinator's: every robot may use every charger, and waits at a place of its own."""
     places = [*chargers, *map(waits_at, robots)]
     waypoints = {name: Waypoint(level="L1", x=10.0 * n, y=0.0) for n, name in enumerate(places)}
     known = {
         robot: RobotSettings(stations=list(chargers), waits_at=waits_at(robot)) for robot in robots
     }
-    fleets = {FLEET: Fleet(waypoints=waypoints, robots=known)}
-    return Settings(
-        stations={name: Station() for name in chargers}, fleets=fleets, start_timeout_s=40.0
+    fleets = {FLEET: FleetSettings(waypoints=waypoints, robots=known)}
+    return CoordinatorSettings(
+        stations={name: StationSettings() for name in chargers}, fleets=fleets, start_timeout_s=40.0
     )
 
 
@@ -38,7 +38,7 @@ def waits_at(robot: str) -> str:
 class Charge:
     """What a fleet adapter tells of its robot. `place`: the waypoint where it is, "" on the road."""
 
-    def __init__(self, robot: str, known: Settings) -> None:
+    def __init__(self, robot: str, known: CoordinatorSettings) -> None:
         self.robot = robot
         self.dedicated = waits_at(robot)
         self.place = ""

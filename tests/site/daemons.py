@@ -18,7 +18,7 @@ from bridges.messages.topics import DOOR_REQUESTS, DOOR_SUPERVISOR_HEARTBEAT, LI
 from bridges.runtime.clock import Clock
 from bridges.runtime.device import AnyNode, Node
 from bridges.runtime.graph_node import AnyGraphNode, GraphNode
-from bridges.runtime.ring_writer import NOBODY, Nobody
+from bridges.runtime.ring_writer import NOBODY, NoWriter
 from bridges.runtime.subject import Status
 from bridges.transports.transport import Publisher
 from hal_fakes.plants.plant import Edge
@@ -52,7 +52,7 @@ class DeviceDaemon:
         self.looks: Callable[[DeviceDaemon, float], None] = lambda daemon, at: None
         self.scanned: Callable[[DeviceDaemon], None] = lambda daemon: None
         self.relayed: Callable[[Edge], None] = lambda edge: None
-        self.witness: Nobody = NOBODY
+        self.writer: NoWriter = NOBODY
         self.started: Callable[[DeviceDaemon], None] = lambda daemon: None
         self.hears: Callable[[DeviceDaemon, Topic[Any], Any], None] = lambda daemon, topic, told: (
             None
@@ -85,7 +85,7 @@ class DeviceDaemon:
             device.driver(),
             self._publish,
             clock,
-            self.witness,
+            self.writer,
         )
         self.alive = True
         for topic in kind.requests:
@@ -114,7 +114,7 @@ class DeviceDaemon:
         self.advance()
         self._changed = False
         self._node.scan(events)
-        self.witness.flush()
+        self.writer.flush()
         self.scans += 1
         self.scanned(self)
         changes_at = (now if self._changed else self.device.plant.next_at()) + self.device.poll_s
@@ -155,7 +155,7 @@ class DeviceDaemon:
         self.hears(self, topic, message)
         if self.device.kind.device_name(message) != self.name:
             return
-        self.witness.spoken(topic.name, message, sent=False)
+        self.writer.spoken(topic.name, message, sent=False)
         kind, settings = self.device.kind, self.device.settings
         if topic == kind.states:
             self.scan(RivalSeen())
@@ -165,7 +165,7 @@ class DeviceDaemon:
 
     def _publish(self, topic: Topic[Any], message: Message) -> None:
         self._publishers[topic.name].publish(message)
-        self.witness.spoken(topic.name, message, sent=True)
+        self.writer.spoken(topic.name, message, sent=True)
 
 
 RIVAL = "rmf_lift_supervisor"
@@ -241,7 +241,7 @@ class GraphDaemon:
         self.kind = kind
         self._settings = settings or kind.settings()
         self.alive = False
-        self.witness: Nobody = NOBODY
+        self.writer: NoWriter = NOBODY
         self._timeline = timeline
         self._air = air
         self._disk = Disk()
@@ -255,7 +255,7 @@ class GraphDaemon:
         self._place = Place(self._air, self.name, self._round)
         kept = self._disk if self.kind.persist else None
         self.node = GraphNode(
-            self.kind, self._settings, self._place, self._clock, kept=kept, witness=self.witness
+            self.kind, self._settings, self._place, self._clock, kept=kept, writer=self.writer
         )
         self.alive = True
         self.node.subscribe()

@@ -18,7 +18,7 @@ from bridges.messages import topics
 from bridges.messages.topics import Topic
 from bridges.transports.transport import Publisher, Subscription
 from hal_fakes import wire
-from hal_fakes.demo.daemons import Daemon, stop_all
+from hal_fakes.demo.daemons import DaemonProcess, stop_all
 from hal_fakes.plants.plant import Edge
 from tests.site.robots import Places, Resident
 from tests.site.timeline import EPOCH, Timeline
@@ -119,7 +119,7 @@ class RealSite:
         self._inside: set[str] = set()
         self._across: dict[str, str] = {}
         self._edges: dict[tuple[str, str], bool] = {}
-        self.daemons: dict[str, Daemon] = {}
+        self.daemons: dict[str, DaemonProcess] = {}
         self.observer = DdsPlace(self.timeline, domain, "observer")
         self.observer.subscribe(topics.LIFT_STATES, self._lift_state)
         self.voices = self.observer.subscribe(topics.LIFT_REQUESTS, lambda message: None)
@@ -132,7 +132,7 @@ class RealSite:
         self._started += 1
         directory = self._directory / str(self._started)
         directory.mkdir()
-        self.daemons[party] = daemon = Daemon(FILES[party], directory, self._domain)
+        self.daemons[party] = daemon = DaemonProcess(FILES[party], directory, self._domain)
         if party in ("lift", "door"):
             daemon.follow(lambda edge: self.timeline.post(partial(self._edge, edge)))
 

@@ -17,7 +17,7 @@ from bridges.transports.transport import Transport
 from tests.site.charging import Charge
 from tests.site.timeline import EPOCH, NEVER, Alarm, Timeline
 from workbench.rmf_model.phases import DoorClose, DoorOpen, EndLiftSession, RequestLift
-from workbench.rmf_model.robot import Phase, Robot
+from workbench.rmf_model.robot import Phase, RobotContext
 
 FRESH_S = 2.5
 """A charger's state as old as this is not driven by."""
@@ -115,7 +115,7 @@ class Resident:
         self.in_car: tuple[str, str, str] | None = None
         self.doorway = ""
         self.pad = ""
-        self.robot: Robot
+        self.robot: RobotContext
         self._timeline = timeline
         self._join = join
         self._ground = ground
@@ -139,7 +139,7 @@ class Resident:
     def start(self) -> None:
         """A new fleet adapter: it knows where its robot is, and nothing else."""
         self.alive = True
-        self.robot = Robot(self.name, self._jazzy)
+        self.robot = RobotContext(self.name, self._jazzy)
         self.robot.in_car = self.in_car is not None
         self._place = self._join(self.name)
         published = (

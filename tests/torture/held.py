@@ -8,7 +8,7 @@ import tempfile
 import threading
 from pathlib import Path
 
-from bridges.host.directories import Distrusted, Places
+from bridges.host.directories import Directories, Distrusted
 from bridges.runtime import holder
 from bridges.runtime.runtime_directory import RuntimeDirectory
 from tests.runtime.hostile import (
@@ -67,7 +67,7 @@ def readers(directory: Path, times: int, table: Table) -> None:
 
 def looks(directory: Path, table: Table) -> None:
     """Takes of the lock, each with one try, beside a loop of looks."""
-    places, end = Places(directory, directory), threading.Event()
+    places, end = Directories(directory, directory), threading.Event()
 
     def look() -> None:
         while not end.is_set():
@@ -96,7 +96,7 @@ def planted(directory: Path, table: Table) -> None:
         (link := shared / str(n)).symlink_to(precious.parent)
         os.lchown(link, NOBODY, NOBODY)
         try:
-            RuntimeDirectory(Places(link / "run", link / "run"), Path("x.yaml"), serves=True)
+            RuntimeDirectory(Directories(link / "run", link / "run"), Path("x.yaml"), serves=True)
         except Distrusted:
             assert not list(precious.iterdir())
             table.count("a planted link where root starts a daemon", "refused, nothing written")

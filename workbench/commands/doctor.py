@@ -87,7 +87,7 @@ def run(args: argparse.Namespace) -> int:
         print(why, file=sys.stderr)
         return os.EX_USAGE
     found: list[Finding] = []
-    show = Page(sys.stdout).show if not args.json else _nothing
+    show = FindingsText(sys.stdout).show if not args.json else _nothing
     try:
         with interruptible():
             for one in _examined(config, building, args):
@@ -162,7 +162,7 @@ def _nothing(one: Finding) -> None:
     """JSON is printed at the end."""
 
 
-class Page:
+class FindingsText:
     """The findings as they come, under a heading for each subject."""
 
     def __init__(self, out: TextIO) -> None:

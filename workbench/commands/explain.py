@@ -17,7 +17,7 @@ from bridges.messages.words import KINDS, Kind
 from bridges.runtime import faults
 from bridges.transports.transport import TransportError
 from workbench.explain.explanation import Explanation
-from workbench.explain.heard_devices import Site
+from workbench.explain.heard_devices import HeardDevices
 from workbench.explain.text import SCREEN_LINES, lines
 from workbench.graph.board import SECONDS
 from workbench.graph.join import (
@@ -29,7 +29,7 @@ from workbench.graph.join import (
     seconds,
 )
 from workbench.graph.live import Ear
-from workbench.replay.recordings import Span, add_span_arguments, told_between, unreadable
+from workbench.replay.recordings import RecordingSpan, add_span_arguments, told_between, unreadable
 from workbench.replay.sources import BagError
 
 LISTENS_S: Final = 5.0
@@ -90,8 +90,8 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _recorded(args: argparse.Namespace) -> int:
-    site = Site(args.device or "", args.session)
-    span = Span(args.from_, args.to)
+    site = HeardDevices(args.device or "", args.session)
+    span = RecordingSpan(args.from_, args.to)
     for heard in told_between(args.file, span, "explain", args.device or ""):
         site.take(heard)
     site.story_from(span.begins_at)
@@ -105,7 +105,7 @@ def _recorded(args: argparse.Namespace) -> int:
     return _one(site, args)
 
 
-def _all(site: Site, devices: list[tuple[Kind, str]], *, as_json: bool) -> int:
+def _all(site: HeardDevices, devices: list[tuple[Kind, str]], *, as_json: bool) -> int:
     """Each device in a line, or as JSON."""
     told = [site.explain(kind, name, None, faults.for_explain()) for kind, name in devices]
     if as_json:
@@ -117,7 +117,7 @@ def _all(site: Site, devices: list[tuple[Kind, str]], *, as_json: bool) -> int:
     return 0
 
 
-def _one(site: Site, args: argparse.Namespace) -> int:
+def _one(site: HeardDevices, args: argparse.Namespace) -> int:
     """The device that was named, or the only one."""
     name = args.device or args.live or site.devices()[0][1]
     kinds = [args.kind] if args.kind else site.kinds(name) or ["lift"]
@@ -146,14 +146,14 @@ def _tell(found: Explanation, *, as_json: bool) -> None:
 def _live(args: argparse.Namespace) -> int:
     with interruptible(), closing(open_graph(args, "rmf_bridge_explain")) as transport:
         ear = Ear(transport)
-        site = Site(args.live, args.session, graph=command_line(args).options)
+        site = HeardDevices(args.live, args.session, graph=command_line(args).options)
         if args.follow:
             _follow(ear, site, args)
         _listen(ear, site, args.for_s)
         return _one(site, args)
 
 
-def _listen(ear: Ear, site: Site, for_s: float) -> None:
+def _listen(ear: Ear, site: HeardDevices, for_s: float) -> None:
     """Listen for this long (s)."""
     until = time.monotonic() + for_s
     site.pass_time(time.monotonic(), time.time())
@@ -163,7 +163,7 @@ def _listen(ear: Ear, site: Site, for_s: float) -> None:
     site.pass_time(time.monotonic(), time.time())
 
 
-def _follow(ear: Ear, site: Site, args: argparse.Namespace) -> None:
+def _follow(ear: Ear, site: HeardDevices, args: argparse.Namespace) -> None:
     """Print each change, until Ctrl-C."""
     told: object = None
     _listen(ear, site, args.for_s)

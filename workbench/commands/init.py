@@ -21,7 +21,7 @@ from workbench.commissioning.init import ADDRESSES, WIRINGS, draft
 from workbench.commissioning.init.answers import (
     LIFT_INPUTS,
     OFFERED,
-    Answers,
+    DraftAnswers,
     Encoding,
     Impossible,
     Kind,
@@ -31,12 +31,12 @@ from workbench.commissioning.init.answers import (
 
 EX_USAGE, EX_NOINPUT, EX_CANTCREAT, EX_INTERRUPTED = 64, 66, 73, 130
 Given = dict[str, Any]
-"""Answers so far, by their names in Answers."""
+"""Answers so far, by their names in DraftAnswers."""
 
 
 @dataclass(frozen=True, slots=True)
 class Question:
-    """One answer: its name in Answers, how to ask for it, and when.
+    """One answer: its name in DraftAnswers, how to ask for it, and when.
 
     `offered`: the answer to begin with. `choices`: all that are possible; () for any text.
     """
@@ -247,7 +247,7 @@ def _ask(question: Question, offered: str, given: Given, found: BuildingMap | No
     return str(questionary.text(f"{question.text} [{offered}]").unsafe_ask()) or offered
 
 
-def answers(given: Given) -> Answers:
+def answers(given: Given) -> DraftAnswers:
     """The answers as the draft takes them. Raises Impossible with what to write instead."""
     told = dict(given)
     for name, most in (("unit", 247), ("domain_id", 232)):
@@ -262,7 +262,7 @@ def answers(given: Given) -> Answers:
         raise Impossible(
             f"a lift has no input {', '.join(unknown)}; there are {', '.join(LIFT_INPUTS)}"
         )
-    return Answers(**told)
+    return DraftAnswers(**told)
 
 
 def _number(name: str, text: str, most: int) -> int:

@@ -30,11 +30,11 @@ from workbench.graph.join import (
 )
 from workbench.graph.live import OF_DEVICES, Ear
 from workbench.judge.judge import KINDS, Judge, Kind
-from workbench.judge.judge_run import Stage
+from workbench.judge.judge_run import JudgeRun
 from workbench.judge.law import Verdict, shown
-from workbench.judge.report import Report, as_json, junit, markdown, report, text, verdict
-from workbench.judge.scenarios import FLEET, Charge, Passages, Performance, Ride
-from workbench.replay.recordings import Span, add_span_arguments, unreadable, within
+from workbench.judge.report import Judgement, as_json, junit, markdown, report, text, verdict
+from workbench.judge.scenarios import FLEET, ChargeScenario, PassageScenario, RideScenario, Scenario
+from workbench.replay.recordings import RecordingSpan, add_span_arguments, unreadable, within
 from workbench.replay.sources import BagError
 from workbench.rmf_model import NEVER, Said
 
@@ -125,7 +125,7 @@ def _add_plays(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def performance_of(args: argparse.Namespace) -> Performance | None:
+def performance_of(args: argparse.Namespace) -> Scenario | None:
     """What is to be played; None to listen alone. A contradiction ends with exit code 2."""
     kinds: dict[Kind, bool] = {
         "lift": args.ride is not None,
@@ -146,13 +146,13 @@ def performance_of(args: argparse.Namespace) -> Performance | None:
         case "lift":
             floors = (args.ride[0], args.ride[1])
             how = {"through": through, "restarts": args.restarts}
-            return Ride(args.name, floors, args.robots, args.patience, **how)
+            return RideScenario(args.name, floors, args.robots, args.patience, **how)
         case "door":
             how = {"through": through, "restarts": args.restarts}
-            return Passages(args.name, max(1, args.passages), args.patience, **how)
+            return PassageScenario(args.name, max(1, args.passages), args.patience, **how)
         case _:
             request_id = f"{FLEET}-{uuid4().hex[:8]}"
-            return Charge(args.name, args.robot, request_id, min(args.patience, 30.0))
+            return ChargeScenario(args.name, args.robot, request_id, min(args.patience, 30.0))
 
 
 def words_of(args: argparse.Namespace) -> str:
@@ -181,7 +181,7 @@ def run(args: argparse.Namespace) -> int:
 def _recorded(args: argparse.Namespace) -> int:
     judge = Judge(args.kind, args.name)
     last: Heard | None = None
-    for last in within(args.recording, Span(args.from_, args.to), "judge"):
+    for last in within(args.recording, RecordingSpan(args.from_, args.to), "judge"):
         judge.hear(last)
     if last is None or judge.first is None:
         complain("judge", f"{args.recording} has no message of RMF in that time")
@@ -189,28 +189,28 @@ def _recorded(args: argparse.Namespace) -> int:
     return tell(report(judge, judge.end(last.at, last.wall), last.at - judge.first.at), args)
 
 
-def _live(args: argparse.Namespace, performance: Performance | None) -> int:
-    stage: Stage | None = None
+def _live(args: argparse.Namespace, performance: Scenario | None) -> int:
+    judging: JudgeRun | None = None
     try:
         with interruptible(), closing(open_graph(args, NODE_NAME)) as transport:
             live = Live(transport, args.kind, args.beside, performance)
-            stage = Stage(Judge(args.kind, args.name), performance, args.for_s, live.strangers)
+            judging = JudgeRun(Judge(args.kind, args.name), performance, args.for_s, live.strangers)
             if sys.stderr.isatty():
                 complain("judge", _begins(args, performance))
-            live.judge(stage)
+            live.judge(judging)
     except TransportError as error:
         complain("judge", error)
     except KeyboardInterrupt:
         pass
-    if stage is None:
+    if judging is None:
         return os.EX_UNAVAILABLE
     now = time.monotonic()
-    judged = stage.judge.end(now, time.time())
-    notes = [f"not played to its end: {stage.note}"] if stage.note else []
-    return tell(report(stage.judge, judged, now - stage.began_at, *notes), args)
+    judged = judging.judge.end(now, time.time())
+    notes = [f"not played to its end: {judging.note}"] if judging.note else []
+    return tell(report(judging.judge, judged, now - judging.began_at, *notes), args)
 
 
-def _begins(args: argparse.Namespace, performance: Performance | None) -> str:
+def _begins(args: argparse.Namespace, performance: Scenario | None) -> str:
     """What is under way, for whoever waits for the verdict."""
     if performance is not None:
         return f"plays with {words_of(args)}; Ctrl-C releases it, and judges"
@@ -218,7 +218,7 @@ def _begins(args: argparse.Namespace, performance: Performance | None) -> str:
     return f"listens to {words_of(args)} {until}"
 
 
-def tell(found: Report, args: argparse.Namespace) -> int:
+def tell(found: Judgement, args: argparse.Namespace) -> int:
     """Print the verdict, write the file, and give the exit code."""
     if args.junit is not None:
         try:
@@ -238,7 +238,7 @@ class Live:
     """The graph: what is heard on it, in order of arrival, and what is said."""
 
     def __init__(
-        self, transport: Transport, kind: Kind, beside: list[str], performance: Performance | None
+        self, transport: Transport, kind: Kind, beside: list[str], performance: Scenario | None
     ) -> None:
         self._transport = transport
         self._publishers: dict[str, Publisher[Message]] = {}
@@ -259,32 +259,32 @@ class Live:
         beside = " ".join(f"--beside {name}" for name in who)
         return f"others publish on {', '.join(found)}: to play all the same, add {beside}"
 
-    def judge(self, stage: Stage) -> None:
+    def judge(self, judging: JudgeRun) -> None:
         """Run until there is a verdict. Whatever ends a play, the device is released first."""
-        stage.begin(time.monotonic(), time.time())
+        judging.begin(time.monotonic(), time.time())
         try:
             with _told_to_end() as told:
-                while not stage.done:
+                while not judging.done:
                     if told():
-                        self._say(stage.stop())
-                    self._turn(stage)
+                        self._say(judging.stop())
+                    self._turn(judging)
         except BaseException:
             with suppress(TransportError):
-                self._say(stage.stop())
+                self._say(judging.stop())
             raise
 
-    def _turn(self, stage: Stage) -> None:
-        waits_s = min(stage.wake_at() - time.monotonic(), LOOK_EVERY_S)
+    def _turn(self, judging: JudgeRun) -> None:
+        waits_s = min(judging.wake_at() - time.monotonic(), LOOK_EVERY_S)
         for heard in self._ear.listen(waits_s):
-            self._say(stage.hear(heard))
+            self._say(judging.hear(heard))
         now, wall = time.monotonic(), time.time()
         if self._looks_at_fire and now > self._looked_at + 1.0:
             self._looked_at = now
             publishers = self._ear.ends[FIRE.name].matched()
             supervisors = self._ear.ends[topics.LIFT_REQUESTS.name].matched()
             retaining = self._retained.matched()
-            stage.judge.fire_ends(publishers, retaining, supervisors, now, wall)
-        self._say(stage.turn(now, wall))
+            judging.judge.fire_ends(publishers, retaining, supervisors, now, wall)
+        self._say(judging.turn(now, wall))
 
     def _say(self, said: list[Said]) -> None:
         for topic, message in said:

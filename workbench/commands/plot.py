@@ -14,13 +14,13 @@ from typing import Final
 from bridges.messages.words import KINDS
 from bridges.runtime import faults
 from workbench.explain.device_timeline import Drawing
-from workbench.explain.heard_devices import Site
+from workbench.explain.heard_devices import HeardDevices
 from workbench.explain.palette import PAPER, Theme
 from workbench.explain.picture import svg
 from workbench.explain.text import lines
 from workbench.explain.timeline import Timeline
 from workbench.graph.join import complain
-from workbench.replay.recordings import Span, add_span_arguments, told_between, unreadable
+from workbench.replay.recordings import RecordingSpan, add_span_arguments, told_between, unreadable
 from workbench.replay.sources import BagError
 
 SUFFIXES: Final = (".html", ".svg", ".png")
@@ -95,8 +95,8 @@ def run(args: argparse.Namespace) -> int:
 
 def _only(args: argparse.Namespace) -> str:
     """The only device of the recording. Raises PlotError where there are more."""
-    site = Site()
-    for heard in told_between(args.file, Span(args.from_, args.to), "plot", ""):
+    site = HeardDevices()
+    for heard in told_between(args.file, RecordingSpan(args.from_, args.to), "plot", ""):
         site.take(heard)
     names = {name: f"{kind} {name}" for kind, name in site.devices() if args.kind in (None, kind)}
     if len(names) > 1:
@@ -109,7 +109,7 @@ def _only(args: argparse.Namespace) -> str:
 
 def _read(args: argparse.Namespace, name: str) -> tuple[Timeline, list[str]]:
     """The device's lanes, and its explanation in lines. Raises PlotError if it shows no state."""
-    span, site = Span(args.from_, args.to), Site(name)
+    span, site = RecordingSpan(args.from_, args.to), HeardDevices(name)
     drawings = {kind: Drawing(kind, name) for kind in KINDS if args.kind in (None, kind)}
     for heard in told_between(args.file, span, "plot", name):
         site.take(heard)

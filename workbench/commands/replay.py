@@ -16,7 +16,7 @@ from bridges.host.log import plain
 from bridges.settings.load import SettingsError, load
 from workbench.replay.files import opened
 from workbench.replay.recordings import unreadable
-from workbench.replay.replayed import Cores, Course, Difference, Replay, of_head
+from workbench.replay.replayed import Course, Difference, Replay, ReplayedCores, of_head
 from workbench.replay.sources import BagError, Notes, NotReplayable
 
 EX_DATAERR, EX_CONFIG = 65, 78
@@ -46,7 +46,7 @@ def run(args: argparse.Namespace) -> int:
             raise NotReplayable(
                 f"{args.config} is of a {config.kind}, {args.file} of a {head.kind}"
             )
-        replay = Replay(entries, Cores(config))
+        replay = Replay(entries, ReplayedCores(config))
         found = replay.changes() if args.config else replay.differences()
         differences = list(islice(found, MOST))
     except SettingsError as error:

@@ -29,8 +29,8 @@ from workbench.graph.join import (
     seconds,
 )
 from workbench.graph.live import Ear
-from workbench.graph.requests import Done, Failed, Request, Seen
-from workbench.graph.requests.charger import Charge, ChargeCancel, QueuedCancel, QueuedCharge
+from workbench.graph.requests import Failed, Fulfilled, Request, RequestProgress
+from workbench.graph.requests.charger import ChargeCancel, QueuedCancel, QueuedCharge, RobotCharge
 from workbench.graph.requests.door import DoorMove
 from workbench.graph.requests.lift import LiftEnd, LiftRide
 
@@ -163,7 +163,7 @@ def _charger_request(args: argparse.Namespace) -> Request:
     if not (fleet and slash and robot):
         args.usage(f"--robot '{args.robot}' is not FLEET/ROBOT")
     request_id = args.request_id or f"{NODE_NAME}-{uuid4().hex[:8]}"
-    charge = QueuedCharge if args.queue else Charge
+    charge = QueuedCharge if args.queue else RobotCharge
     return charge(args.name, fleet, robot, request_id, args.start_timeout, line=line)
 
 
@@ -235,7 +235,7 @@ class _Exchange:
             if request.supervisor is None
             else transport.subscribe(request.supervisor, lambda message: None)
         )
-        self.seen = Seen(began_at=time.monotonic(), timeout_s=timeout_s, graph=graph)
+        self.seen = RequestProgress(began_at=time.monotonic(), timeout_s=timeout_s, graph=graph)
         self.asked: set[str] = set()
         self.described = ""
 
@@ -289,8 +289,8 @@ class _Exchange:
         self.seen = self.seen.sends(now)
         self._publisher(topic).publish(message)
 
-    def _finish(self, outcome: Done | Failed) -> int:
-        if isinstance(outcome, Done):
+    def _finish(self, outcome: Fulfilled | Failed) -> int:
+        if isinstance(outcome, Fulfilled):
             self._line(time.monotonic(), "done", outcome.text)
             return 0
         complain(self.command, outcome.text)

@@ -116,7 +116,7 @@ def _on(
     args: argparse.Namespace, config: Config, device: str, bus: Bus, path: Path, end: signals.End
 ) -> int:
     from workbench.commissioning.walk import signed
-    from workbench.commissioning.walk.bench import Bench, Input
+    from workbench.commissioning.walk.bench import Bench, ContactReading
     from workbench.commissioning.walk.screen import Screen, keyboard, keys
     from workbench.commissioning.walk.steps import OFF, steps
     from workbench.commissioning.walk.tap import Tap
@@ -124,7 +124,7 @@ def _on(
     settings, driver_type = config.devices[device], config.driver_type(device)
     tap = Tap(bus)
     wires = config.wires(device)
-    inputs = [Input(w, tap.canonical(w.point)) for w in wires if w.direction == "in"]
+    inputs = [ContactReading(w, tap.canonical(w.point)) for w in wires if w.direction == "in"]
     tried = steps(config, device)
     bench = Bench(driver_type.create(device, settings, tap), tap, inputs, tried, OFF[config.kind])
     begun = datetime.now()

@@ -18,7 +18,7 @@ from msgspec.structs import asdict
 from bridges.host.paint import coloured
 from bridges.messages import topics
 from bridges.transports.transport import Transport, TransportError
-from workbench.graph.board import Board, Row, change_line, changes, json_line, repaint, table
+from workbench.graph.board import Board, BoardRow, change_line, changes, json_line, repaint, table
 from workbench.graph.join import add_graph_arguments, complain, interruptible, open_graph
 from workbench.graph.live import Ear
 
@@ -88,17 +88,17 @@ def show_once(ear: Ear, seconds: float, out: TextIO, *, as_json: bool = False) -
     return 0
 
 
-def settled(board: Board, now: float, wall: float) -> list[Row]:
+def settled(board: Board, now: float, wall: float) -> list[BoardRow]:
     """The rows without those that might not say yet that they are simulated."""
     young = board.unsettled(now)
     return [row for row in board.rows(now, wall) if (row.kind, row.name) not in young]
 
 
 def show(
-    ear: Ear, out: TextIO, *, live: bool, line: Callable[[Row, float], str] = change_line
+    ear: Ear, out: TextIO, *, live: bool, line: Callable[[BoardRow, float], str] = change_line
 ) -> None:
     """Show the rows until interrupted: redrawn in place, or a line for each change."""
-    board, rows, drawn = Board(), list[Row](), 0
+    board, rows, drawn = Board(), list[BoardRow](), 0
     next_at = 0.0
     while True:
         for heard in ear.listen(REDRAW_S):

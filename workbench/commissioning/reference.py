@@ -16,7 +16,7 @@ from msgspec import inspect as mi
 from bridges import __version__
 from bridges.kinds import kind_called, kind_names
 from bridges.kinds.shared.graph_kind import AnyGraphKind, GraphKind
-from bridges.kinds.shared.recording_section import Recording
+from bridges.kinds.shared.recording_section import RecordingSettings
 from bridges.kinds.shared.rmf_section import Rmf
 from bridges.settings import names as named
 from bridges.yaml.scalar_types import Extra, choices, wanted_text
@@ -66,7 +66,7 @@ def schema() -> Schema:
     graph = [kind.settings for kind in graph_kinds()]
     types: list[type] = [
         Rmf,
-        Recording,
+        RecordingSettings,
         *buses.values(),
         *(shape.type.settings for shape in shapes()),
         *graph,
@@ -131,7 +131,7 @@ def _file(shape: Shape, buses: dict[str, type], by_type: dict[type, Schema]) -> 
             **_key("kind", {"const": shape.kind}),
             **_key("driver", {"const": shape.driver}),
             **_key("rmf", by_type[Rmf]),
-            **_key("recording", by_type[Recording]),
+            **_key("recording", by_type[RecordingSettings]),
             **_key("buses", {"type": "object", "additionalProperties": {"oneOf": kinds_of_bus}}),
             shape.devices_key: {
                 "description": f"a {shape.kind}'s name on RMF's graph -> its settings.",
@@ -156,7 +156,7 @@ def _graph_file(kind: AnyGraphKind, by_type: dict[type, Schema]) -> Schema:
         "properties": {
             **_key("kind", {"const": kind.name}),
             **_key("rmf", by_type[Rmf]),
-            **_key("recording", by_type[Recording]),
+            **_key("recording", by_type[RecordingSettings]),
             kind.devices_key: {"description": _purpose(kind.settings), **by_type[kind.settings]},
         },
     }
@@ -197,7 +197,7 @@ def _is_of_one(heading: str) -> bool:
 
 def _tops() -> Headings:
     """The sections of a file, each with its heading; what several have comes before the first."""
-    found: Headings = {Rmf: "## `rmf`", Recording: "## `recording`"}
+    found: Headings = {Rmf: "## `rmf`", RecordingSettings: "## `recording`"}
     for name in named.bus_types():
         found[named.bus_called(name).settings] = f"## Bus of `type: {name}`"
     last = [

@@ -7,10 +7,10 @@ from typing import Final
 
 from bridges.messages.words import Kind
 from bridges.observe.limits import CLOCKS_DIFFER_S
-from bridges.observe.requesters import Requester
+from bridges.observe.requesters import DeviceRequester
 from workbench.explain.device import Device
-from workbench.explain.explanation import FaultTold, Field, Step
-from workbench.explain.phrases import Clock, lasted, listed
+from workbench.explain.explanation import CheckedField, FaultTold, NextStep
+from workbench.explain.phrases import TimePhrases, lasted, listed
 
 Remedies = Mapping[str, tuple[str, str]]
 """A fault's code -> its likely cause, and what to do."""
@@ -24,13 +24,13 @@ class Answer:
     """Sentences, RMF's view, and what has to happen next."""
 
     now: list[str] = field(default_factory=list)
-    next: list[Step] = field(default_factory=list)
+    next: list[NextStep] = field(default_factory=list)
     asks: str = ""
-    fields: tuple[Field, ...] = ()
+    fields: tuple[CheckedField, ...] = ()
     notes: tuple[str, ...] = ()
     since: float = float("-inf")
 
-    def say(self, text: str, *steps: Step) -> "Answer":
+    def say(self, text: str, *steps: NextStep) -> "Answer":
         """One more sentence, and what follows from it."""
         self.now.append(text)
         self.next += steps
@@ -38,21 +38,21 @@ class Answer:
 
 
 @dataclass(frozen=True, slots=True)
-class Heard:
+class OthersHeard:
     """What else was heard: the names of each kind, and the number of messages."""
 
     names: Mapping[Kind, tuple[str, ...]]
     messages: int
 
 
-def unheard(device: Device, around: Heard, clock: Clock) -> Answer:
+def unheard(device: Device, around: OthersHeard, clock: TimePhrases) -> Answer:
     """Nobody publishes a state of it."""
     answer = Answer(since=device.began.at)
     others = around.names.get(device.kind, ())
     if not around.messages:
         answer.say(
             "Nothing at all was heard.",
-            Step(
+            NextStep(
                 "a person",
                 "look at the domain, the network and the transport: `rmf-bridge doctor FILE`",
             ),
@@ -65,11 +65,11 @@ def unheard(device: Device, around: Heard, clock: Clock) -> Answer:
     return answer.say(
         "RMF waits for ever for a device that is silent: its fleet adapters ask again only when a"
         " state comes.",
-        Step("a person", what),
+        NextStep("a person", what),
     )
 
 
-def _others(around: Heard) -> str:
+def _others(around: OthersHeard) -> str:
     """`these were heard: lifts Lift2; doors ward`."""
     parts = [
         f"{kind}s {', '.join(names[:MOST_NAMES])}" for kind, names in around.names.items() if names
@@ -77,7 +77,7 @@ def _others(around: Heard) -> str:
     return f"these were heard: {'; '.join(parts)}" if parts else "no state of any device was heard"
 
 
-def silent(device: Device, clock: Clock) -> Answer | None:
+def silent(device: Device, clock: TimePhrases) -> Answer | None:
     """Its states have stopped."""
     last = device.last_state
     if last is None or not device.is_silent(clock.now):
@@ -91,7 +91,7 @@ def silent(device: Device, clock: Clock) -> Answer | None:
     return answer.say(
         "RMF is stuck too: fleet adapters and supervisor repeat their requests only when a state"
         " comes.",
-        Step(
+        NextStep(
             "a person",
             f"look at the daemon of {device.name} and its network: `rmf-bridge status` and"
             " `rmf-bridge doctor FILE` on its machine",
@@ -99,7 +99,7 @@ def silent(device: Device, clock: Clock) -> Answer | None:
     )
 
 
-def old_reading(device: Device, clock: Clock) -> str:
+def old_reading(device: Device, clock: TimePhrases) -> str:
     """What is wrong with the age of its states; "" if nothing is."""
     match device.reading.value:
         case "was never read":
@@ -113,14 +113,14 @@ def old_reading(device: Device, clock: Clock) -> str:
     return ""
 
 
-def say_waits(found: Answer, device: Device, clock: Clock) -> None:
+def say_waits(found: Answer, device: Device, clock: TimePhrases) -> None:
     """What our daemons say that a request waits for."""
     for kind, text in device.waits_said(clock.now).items():
         whose = "daemon" if kind == device.kind else "supervisor"
         found.say(f"Its {whose} says that the request waits {text}.")
 
 
-def notes(device: Device, clock: Clock) -> tuple[str, ...]:
+def notes(device: Device, clock: TimePhrases) -> tuple[str, ...]:
     """What may mislead the reader."""
     found = []
     if device.reading.value == "is from the future":
@@ -142,7 +142,7 @@ def notes(device: Device, clock: Clock) -> tuple[str, ...]:
     return tuple(found)
 
 
-def clock_of(claim: Requester) -> tuple[str, ...]:
+def clock_of(claim: DeviceRequester) -> tuple[str, ...]:
     """Note that a requester's clock differs, which makes its requests look old or new."""
     age_s = claim.stamp_age_s
     if abs(age_s) < CLOCKS_DIFFER_S or not claim.stamped:
@@ -154,7 +154,7 @@ def clock_of(claim: Requester) -> tuple[str, ...]:
     )
 
 
-def faults(device: Device, clock: Clock, remedies: Remedies) -> tuple[FaultTold, ...]:
+def faults(device: Device, clock: TimePhrases, remedies: Remedies) -> tuple[FaultTold, ...]:
     """The present faults, with their remedies."""
     return tuple(
         FaultTold(code, detail, clock.since(moment), *remedies.get(code, ()))
@@ -162,7 +162,7 @@ def faults(device: Device, clock: Clock, remedies: Remedies) -> tuple[FaultTold,
     )
 
 
-def relays(device: Device, clock: Clock) -> str:
+def relays(device: Device, clock: TimePhrases) -> str:
     """`; its daemon has these on: agv_request, call L3`, or "" if that is not known."""
     own = device.own(clock.now)
     told = own.values.get("outputs") if own else None

@@ -8,13 +8,13 @@ from collections.abc import Mapping
 from typing import Final
 
 from bridges.kinds.charger.pad import misplaced_in
-from bridges.kinds.charger.report import Diagnosis, diagnosis
+from bridges.kinds.charger.report import FaultCause, diagnosis
 from bridges.observe.charger import NOBODY
 from workbench.explain import answer as common
 from workbench.explain.answer import Answer
 from workbench.explain.charger_facts import ChargerFacts
-from workbench.explain.explanation import Step
-from workbench.explain.phrases import Clock, lasted
+from workbench.explain.explanation import NextStep
+from workbench.explain.phrases import TimePhrases, lasted
 from workbench.explain.rows import label
 
 REFUSED_LATELY_S: Final = 60.0
@@ -24,7 +24,7 @@ Coordinator = Mapping[str, str]
 
 
 def answer(
-    charger: ChargerFacts, clock: Clock, around: common.Heard, coordinator: Coordinator
+    charger: ChargerFacts, clock: TimePhrases, around: common.OthersHeard, coordinator: Coordinator
 ) -> Answer:
     """The charger at the end of what was heard. `coordinator`: what it says now, {} if nothing."""
     if charger.last_state is None:
@@ -44,7 +44,7 @@ def answer(
     return found
 
 
-def _state(found: Answer, charger: ChargerFacts, clock: Clock) -> None:
+def _state(found: Answer, charger: ChargerFacts, clock: TimePhrases) -> None:
     who, request = charger.robot.value, charger.request.value
     assigned = charger.condition.value == "assigned"
     whose = "" if who == NOBODY else f" {'to' if assigned else 'for'} {who}"
@@ -55,7 +55,7 @@ def _state(found: Answer, charger: ChargerFacts, clock: Clock) -> None:
     )
 
 
-def _next(found: Answer, charger: ChargerFacts, clock: Clock) -> None:
+def _next(found: Answer, charger: ChargerFacts, clock: TimePhrases) -> None:
     who = charger.robot.value
     match charger.condition.value:
         case "idle":
@@ -63,42 +63,46 @@ def _next(found: Answer, charger: ChargerFacts, clock: Clock) -> None:
         case "assigned":
             found.say(
                 f"It does not see {who} on its pad yet, or cannot charge it yet.",
-                Step("the robot", f"{who} has to come to {charger.name} and park exactly"),
+                NextStep("the robot", f"{who} has to come to {charger.name} and park exactly"),
             )
         case "charging":
             left = f"in {lasted(charger.full_in_s)}" if charger.full_in_s > 0 else "when it is full"
             found.say(
                 f"{who} is being charged.",
-                Step("the controller", f"end the charge {left}, or when it is cancelled"),
+                NextStep("the controller", f"end the charge {left}, or when it is cancelled"),
             )
         case "released":
             found.say(
                 "The charge is over, and the pad is not clear yet.",
-                Step("the robot", f"{who if who != NOBODY else 'the robot'} has to leave the pad"),
+                NextStep(
+                    "the robot", f"{who if who != NOBODY else 'the robot'} has to leave the pad"
+                ),
             )
         case "error":
             _error(found, charger)
         case other:
             found.say(
                 f"RMF defines no charger state {other}.",
-                Step("the device's node", "publish RMF's states"),
+                NextStep("the device's node", "publish RMF's states"),
             )
 
 
-def _idle(found: Answer, charger: ChargerFacts, clock: Clock) -> None:
+def _idle(found: Answer, charger: ChargerFacts, clock: TimePhrases) -> None:
     asking = [
         one
         for one in charger.requesters
         if one.ended is None and one.granted is None and one.asks(clock.now)
     ]
     if not asking:
-        found.say("Nobody asks for it.", Step("nobody", "there is nothing to do"))
+        found.say("Nobody asks for it.", NextStep("nobody", "there is nothing to do"))
         return
     first = asking[0]
     found.say(
         f"It has been asked to charge {first.wants} {clock.since(first.first)} (request {first.who}),"
         " and has not taken the request.",
-        Step("the device's node", "take the request; a refusal is explained below, or in its log"),
+        NextStep(
+            "the device's node", "take the request; a refusal is explained below, or in its log"
+        ),
     )
 
 
@@ -114,17 +118,17 @@ def _error(found: Answer, charger: ChargerFacts) -> None:
         )
         found.say(
             f"Wrong station: {who} stands at {charger.name}{instead}.",
-            Step("the robot", f"{who} has to leave the pad; then the error ends by itself"),
+            NextStep("the robot", f"{who} has to leave the pad; then the error ends by itself"),
         )
         return
     says = {
-        Diagnosis.ROBOT: ("The robot is at fault", "check the robot's receiver"),
-        Diagnosis.STATION: ("The station is at fault", "repair it, then `rmf-bridge reset FILE`"),
-        Diagnosis.PAD: (
+        FaultCause.ROBOT: ("The robot is at fault", "check the robot's receiver"),
+        FaultCause.STATION: ("The station is at fault", "repair it, then `rmf-bridge reset FILE`"),
+        FaultCause.PAD: (
             "What stands on the pad should not be there",
             "clear the pad; add a new receiver to `receivers:`",
         ),
-        Diagnosis.LOST: (
+        FaultCause.LOST: (
             "The station cannot be reached or commanded",
             "check its power and network",
         ),
@@ -133,10 +137,10 @@ def _error(found: Answer, charger: ChargerFacts) -> None:
         diagnosis(text),
         ("Its text does not say whether robot or station is at fault", "check both"),
     )
-    found.say(f"{side}: {text or 'no text was given'}.", Step("a person", do))
+    found.say(f"{side}: {text or 'no text was given'}.", NextStep("a person", do))
 
 
-def _refusal(found: Answer, charger: ChargerFacts, clock: Clock) -> None:
+def _refusal(found: Answer, charger: ChargerFacts, clock: TimePhrases) -> None:
     refusal = charger.refusal
     if refusal is None or clock.now.at - refusal.at.at > REFUSED_LATELY_S:
         return

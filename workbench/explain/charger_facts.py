@@ -12,7 +12,7 @@ from workbench.explain.rows import label
 
 
 @dataclass(slots=True)
-class Refusal:
+class HeardRefusal:
     """The last refusal that was heard of this charger."""
 
     who: str
@@ -26,7 +26,7 @@ class ChargerFacts(Device, ObservedCharger):
 
     def __init__(self, name: str, began: Moment) -> None:
         super().__init__(name, began)
-        self.refusal: Refusal | None = None
+        self.refusal: HeardRefusal | None = None
         self.charges = 0
 
     @property
@@ -53,10 +53,10 @@ class ChargerFacts(Device, ObservedCharger):
         began = one.what == "changed" and self.changed.keys() != {"request"}
         self.charges += began and self.condition.value == "charging"
 
-    def refused(self, moment: Moment, refusal: refusals.Refusal) -> None:
+    def refused(self, moment: Moment, refusal: refusals.ChargerRefusal) -> None:
         """A request was refused, and why."""
         who, text = label(refusal.robot), label(refusal.text, 300)
         last = self.refusal
         if last is None or (last.request, last.text) != (label(refusal.request_id), text):
             self.tell(moment, f"{self.name} refuses {who}: {text}")
-        self.refusal = Refusal(who, label(refusal.request_id), text, moment)
+        self.refusal = HeardRefusal(who, label(refusal.request_id), text, moment)

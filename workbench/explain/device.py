@@ -12,7 +12,7 @@ from bridges.observe.device import News, ObservedDevice
 from bridges.observe.limits import SILENT_S
 from bridges.observe.requesters import Moment
 from bridges.runtime import diagnostics
-from workbench.explain.explanation import Line
+from workbench.explain.explanation import StoryLine
 from workbench.explain.noted import Noted
 from workbench.explain.phrases import lasted
 from workbench.explain.rows import label
@@ -30,7 +30,7 @@ QUIET_S: Final = 60.0
 
 
 @dataclass(slots=True)
-class Refused:
+class RefusalCount:
     """How often a node of ours has refused for one reason, and when it last did."""
 
     count: int
@@ -38,14 +38,14 @@ class Refused:
 
 
 @dataclass(slots=True)
-class Diagnosis:
+class NodeDiagnosis:
     """What one node says of the device. `faults`: code -> (detail, since when)."""
 
     kind: str
     last: Moment
     values: Mapping[str, str] = field(default_factory=dict)
     faults: dict[str, tuple[str, Moment]] = field(default_factory=dict)
-    refused: dict[str, Refused] = field(default_factory=dict)
+    refused: dict[str, RefusalCount] = field(default_factory=dict)
 
 
 class Device(ObservedDevice[Any]):
@@ -56,10 +56,10 @@ class Device(ObservedDevice[Any]):
         super().__init__(name, began)
         self.name = label(name)
         self.focus = ""
-        self.lines: deque[Line] = deque(maxlen=MOST_LINES)
+        self.lines: deque[StoryLine] = deque(maxlen=MOST_LINES)
         self.told = 0
-        self.diagnoses: dict[str, Diagnosis] = {}
-        self.noted: Diagnosis | None = None
+        self.diagnoses: dict[str, NodeDiagnosis] = {}
+        self.noted: NodeDiagnosis | None = None
         self.notes_faults = False
 
     def hear(self, moment: Moment, topic: str, message: d.Message) -> list[News]:
@@ -99,9 +99,9 @@ class Device(ObservedDevice[Any]):
         if not text:
             return
         self.told += 1
-        self.lines.append(Line(moment.at, moment.wall, sys.intern(label(text, 200))))
+        self.lines.append(StoryLine(moment.at, moment.wall, sys.intern(label(text, 200))))
 
-    def lines_since(self, at: float) -> tuple[Line, ...]:
+    def lines_since(self, at: float) -> tuple[StoryLine, ...]:
         """The story from this time on."""
         return tuple(line for line in self.lines if line.at >= at)
 
@@ -116,7 +116,7 @@ class Device(ObservedDevice[Any]):
             if len(self.diagnoses) >= MOST_NODES:
                 return
             first = Moment(moment.at, moment.wall, moment.at - self.began.at > SILENT_S)
-            found = self.diagnoses[status.name] = Diagnosis(kind, first)
+            found = self.diagnoses[status.name] = NodeDiagnosis(kind, first)
             moment = first
         found.last = moment
         found.values = {pair.key: pair.value for pair in status.values}
@@ -127,7 +127,7 @@ class Device(ObservedDevice[Any]):
         """What its own daemon noted: it writes what changes, so each note holds until the next."""
         if self.noted is None:
             near = moment.at - self.began.at <= SILENT_S
-            self.noted = Diagnosis(self.kind, Moment(moment.at, moment.wall, seen=not near))
+            self.noted = NodeDiagnosis(self.kind, Moment(moment.at, moment.wall, seen=not near))
         known = self.noted
         if note.outputs is not None:
             on = [f"{label(name)} {label(value)}" for name, value in note.outputs.items() if value]
@@ -145,21 +145,21 @@ class Device(ObservedDevice[Any]):
         if note.refused:
             self._refuses(known, moment, label(note.refused.partition(": ")[0]))
 
-    def _refuses(self, known: Diagnosis, moment: Moment, reason: str) -> None:
+    def _refuses(self, known: NodeDiagnosis, moment: Moment, reason: str) -> None:
         before = known.refused.get(reason)
         if before is None and len(known.refused) >= MOST_CODES:
             return
         if before is None or moment.at - before.last.at > QUIET_S:
             self.tell(moment, f"its daemon refuses a request: {reason}")
-        known.refused[reason] = Refused(before.count + 1 if before else 1, moment)
+        known.refused[reason] = RefusalCount(before.count + 1 if before else 1, moment)
 
-    def heard_from(self, now: Moment) -> Iterator[Diagnosis]:
+    def heard_from(self, now: Moment) -> Iterator[NodeDiagnosis]:
         """What daemons of ours say now, and what the device's own noted."""
         if self.noted is not None:
             yield self.noted
         yield from (one for one in self.diagnoses.values() if now.at - one.last.at <= SILENT_S)
 
-    def own(self, now: Moment) -> Diagnosis | None:
+    def own(self, now: Moment) -> NodeDiagnosis | None:
         """What the device's own daemon says now; None if that is not ours, or silent."""
         return next((one for one in self.heard_from(now) if one.kind == self.kind), None)
 
@@ -186,20 +186,20 @@ class Device(ObservedDevice[Any]):
         ]
         return [reason for _, reason in sorted(found, reverse=True)]
 
-    def _faults(self, found: Diagnosis, moment: Moment, status: d.DiagnosticStatus) -> None:
+    def _faults(self, found: NodeDiagnosis, moment: Moment, status: d.DiagnosticStatus) -> None:
         codes = {
             label(code): label(found.values.get(code, ""))
             for code in diagnostics.faults(status)[:MOST_CODES]
         }
         self._set_faults(found, moment, codes)
 
-    def _of_its_own(self) -> Iterator[Diagnosis]:
+    def _of_its_own(self) -> Iterator[NodeDiagnosis]:
         """What its own daemon noted, and what it says on the graph."""
         if self.noted is not None:
             yield self.noted
         yield from (one for one in self.diagnoses.values() if one.kind == self.kind)
 
-    def _set_faults(self, found: Diagnosis, moment: Moment, codes: Mapping[str, str]) -> None:
+    def _set_faults(self, found: NodeDiagnosis, moment: Moment, codes: Mapping[str, str]) -> None:
         """Take its faults. A daemon notes a fault, and publishes it later: the story has it once."""
         repeated = self.notes_faults and found is not self.noted and found.kind == self.kind
         told = {code for one in self._of_its_own() for code in one.faults}
@@ -212,7 +212,7 @@ class Device(ObservedDevice[Any]):
                 self.tell(moment, f"fault {code}" + (f": {detail}" if detail else ""))
             found.faults[code] = detail, found.faults.get(code, ("", moment))[1]
 
-    def _refusals(self, found: Diagnosis, moment: Moment) -> None:
+    def _refusals(self, found: NodeDiagnosis, moment: Moment) -> None:
         for key, value in found.values.items():
             if not key.startswith(REFUSED) or not value.isdecimal() or len(value) > 18:
                 continue
@@ -220,7 +220,7 @@ class Device(ObservedDevice[Any]):
             before = found.refused.get(reason)
             if before is None:
                 if len(found.refused) < MOST_CODES:
-                    found.refused[reason] = Refused(count, moment)
+                    found.refused[reason] = RefusalCount(count, moment)
                     if moment.seen:
                         self.tell(moment, f"its daemon refuses a request: {reason}")
             elif count != before.count:

@@ -21,7 +21,7 @@ from bridges.observe.limits import ASKS_WITHIN_S, OLD_S, STEP_S
 from bridges.runtime import diagnostics
 from workbench.explain import state_tones
 from workbench.explain.noted import levels, noted
-from workbench.explain.rows import Row, label
+from workbench.explain.rows import LaneRow, label
 from workbench.explain.timeline import LANES, Lane, LaneName, Level, Timeline, Tone
 
 MOST_ROWS: Final = 12
@@ -58,8 +58,8 @@ class Drawing:
         self._began_at: float | None = None
         self._now = float("-inf")
         self._wall = 0.0
-        self._steps = Row()
-        self._rows: dict[LaneName, dict[str, Row]] = {name: {} for name in LANES}
+        self._steps = LaneRow()
+        self._rows: dict[LaneName, dict[str, LaneRow]] = {name: {} for name in LANES}
         self._left_out = 0
         self._noted: set[str] = set()
         self._destination = ""
@@ -113,14 +113,14 @@ class Drawing:
 
     def _row(
         self, lane: LaneName, part: str = "", keeps_s: float = ASKS_WITHIN_S, *, fills: bool = False
-    ) -> Row:
+    ) -> LaneRow:
         """The row of this name. If there is no room, the row that was silent the longest goes."""
         rows, part = self._rows[lane], label(part)
         if part not in rows:
             if len(rows) >= MOST_ROWS:
                 del rows[min(rows, key=lambda one: rows[one].heard_at)]
                 self._left_out += 1
-            rows[part] = Row(keeps_s, fills=fills, past_s=self._past_s)
+            rows[part] = LaneRow(keeps_s, fills=fills, past_s=self._past_s)
         return rows[part]
 
     def _say(self, lane: LaneName, text: str, tone: Tone) -> None:

@@ -9,12 +9,12 @@ from shlex import quote
 from typing import Final
 
 from bridges.observe.door import CLOSED, OPEN
-from bridges.observe.requesters import Moment, Requester
+from bridges.observe.requesters import DeviceRequester, Moment
 from workbench.explain import answer as common
 from workbench.explain.answer import Answer
 from workbench.explain.door_facts import DoorFacts
-from workbench.explain.explanation import Field, Step
-from workbench.explain.phrases import Clock
+from workbench.explain.explanation import CheckedField, NextStep
+from workbench.explain.phrases import TimePhrases
 
 SETTLES_S: Final = 2.0
 LONG_S: Final = 60.0
@@ -22,7 +22,9 @@ LONG_S: Final = 60.0
 AWAY: Final = ("offline", "unknown")
 
 
-def answer(door: DoorFacts, clock: Clock, around: common.Heard, focus: str = "") -> Answer:
+def answer(
+    door: DoorFacts, clock: TimePhrases, around: common.OthersHeard, focus: str = ""
+) -> Answer:
     """The door at the end of what was heard. `focus`: the requester in question; "" for whoever
     waits."""
     if door.last_state is None:
@@ -58,48 +60,52 @@ def answer(door: DoorFacts, clock: Clock, around: common.Heard, focus: str = "")
     return found
 
 
-def _in_question(door: DoorFacts, clock: Clock, focus: str) -> Requester | None:
+def _in_question(door: DoorFacts, clock: TimePhrases, focus: str) -> DeviceRequester | None:
     waiting = door.asking(clock.now)
     if focus:
         return next((one for one in waiting if one.who == focus), None)
     return waiting[0] if waiting else None
 
 
-def _begins(door: DoorFacts, claim: Requester | None) -> float:
+def _begins(door: DoorFacts, claim: DeviceRequester | None) -> float:
     starts = [claim.since.at] if claim else []
     starts += [since.at - SETTLES_S for since in door.holders.values()]
     return min(starts, default=float("-inf"))
 
 
-def _with_askers(found: Answer, door: DoorFacts, clock: Clock) -> Answer:
+def _with_askers(found: Answer, door: DoorFacts, clock: TimePhrases) -> Answer:
     for claim in [one for one in door.requesters if one.wants == OPEN and one.asks(clock.now)][:3]:
         found.say(f"{claim.who} has waited for it to be open {clock.since(claim.since)}.")
         found.since = min(found.since, claim.since.at)
     return found
 
 
-def _fields(door: DoorFacts, claim: Requester, clock: Clock) -> tuple[Field, ...]:
+def _fields(
+    door: DoorFacts, claim: DeviceRequester, clock: TimePhrases
+) -> tuple[CheckedField, ...]:
     """What DoorOpen or DoorClose checks, as this requester's fleet adapter sees it."""
     told = {
         "door": door.mode.since,
         "heartbeat": door.holders.get(claim.who) or claim.since,
     }
-    return tuple(Field(*check, clock.since(told[check.name])) for check in door.checks(claim))
+    return tuple(
+        CheckedField(*check, clock.since(told[check.name])) for check in door.checks(claim)
+    )
 
 
 # ---- somebody waits
 
 
-def _away(found: Answer, door: DoorFacts, clock: Clock) -> None:
+def _away(found: Answer, door: DoorFacts, clock: TimePhrases) -> None:
     own = door.own(clock.now)
     why = "its fault says why" if own and own.faults else "its daemon's log says why"
     found.say(
         f"The door is shown as {door.mode.value}: it cannot be read or believed, so nobody can pass.",
-        Step("a person", f"check the door's wires, bus and power: {why}"),
+        NextStep("a person", f"check the door's wires, bus and power: {why}"),
     )
 
 
-def _opens(found: Answer, door: DoorFacts, claim: Requester, clock: Clock) -> None:
+def _opens(found: Answer, door: DoorFacts, claim: DeviceRequester, clock: TimePhrases) -> None:
     """It waits for the door to be open."""
     if claim.who not in door.holders:
         _not_listed(found, door, claim, clock)
@@ -110,79 +116,79 @@ def _opens(found: Answer, door: DoorFacts, claim: Requester, clock: Clock) -> No
         what = "asks for CLOSE" if asked is not None else "has not asked the door to open"
         found.say(
             f"The supervisor lists {claim.who}, and {what}.",
-            Step("the supervisor", f"send OPEN for {door.name}"),
+            NextStep("the supervisor", f"send OPEN for {door.name}"),
         )
         return
     on = common.relays(door, clock)
     found.say(
         f"The supervisor asks for OPEN, and the door has been {door.mode.value}"
         f" {clock.since(door.mode.since)}{on}.",
-        Step("the controller", f"open {door.name} fully, and show it by its contact"),
+        NextStep("the controller", f"open {door.name} fully, and show it by its contact"),
     )
     if clock.now.at - door.mode.since.at > LONG_S:
         found.say("That is long: an obstacle, a locked door, or a contact that shows nothing.")
 
 
-def _not_listed(found: Answer, door: DoorFacts, claim: Requester, clock: Clock) -> None:
+def _not_listed(found: Answer, door: DoorFacts, claim: DeviceRequester, clock: TimePhrases) -> None:
     if clock.now.at - claim.since.at < SETTLES_S and claim.since.seen:
-        found.say("It was asked for a moment ago.", Step("the supervisor", f"list {claim.who}"))
+        found.say("It was asked for a moment ago.", NextStep("the supervisor", f"list {claim.who}"))
     elif door.last_heartbeat is None:
         found.say(
             "Nobody takes the request: no door supervisor was heard on `door_supervisor_heartbeat`.",
-            Step("a person", "start rmf_door_supervisor, or a door supervisor of rmf-bridges"),
+            NextStep("a person", "start rmf_door_supervisor, or a door supervisor of rmf-bridges"),
         )
     else:
         found.say(
             f"The door supervisor does not list {claim.who}: it takes its requests for replays, or"
             " has too many requesters.",
-            Step(
+            NextStep(
                 "the supervisor", f"take the request of {claim.who}; its log says why it does not"
             ),
         )
 
 
-def _not_let_go(found: Answer, door: DoorFacts, claim: Requester, clock: Clock) -> None:
+def _not_let_go(found: Answer, door: DoorFacts, claim: DeviceRequester, clock: TimePhrases) -> None:
     found.say(
         f"It asks for CLOSE, and the supervisor's heartbeat has listed it"
         f" {clock.since(door.holders[claim.who])}.",
-        Step("the supervisor", f"remove {claim.who} from its list"),
+        NextStep("the supervisor", f"remove {claim.who} from its list"),
     )
 
 
 # ---- nobody waits
 
 
-def _nobody_asks(found: Answer, door: DoorFacts, clock: Clock) -> None:
+def _nobody_asks(found: Answer, door: DoorFacts, clock: TimePhrases) -> None:
     asked = door.asked.value if door.asked else ""
     if door.holders:
         _held_open(found, door, clock)
     elif door.last_heartbeat is None and asked == OPEN and door.mode.value not in AWAY:
         _asked_open(found, door, clock)
     elif door.mode.value == CLOSED:
-        found.say("Nobody waits for it.", Step("nobody", "there is nothing to do"))
+        found.say("Nobody waits for it.", NextStep("nobody", "there is nothing to do"))
     elif door.mode.value in AWAY:
         _away(found, door, clock)
     else:
         found.say(
             "No robot keeps it open: a person or the door's own controller does. RMF's supervisor sends"
             " CLOSE at each of its states meanwhile; that releases a hold and shuts nothing.",
-            Step("the controller", f"close {door.name} when nobody is in the doorway"),
+            NextStep("the controller", f"close {door.name} when nobody is in the doorway"),
         )
 
 
-def _asked_open(found: Answer, door: DoorFacts, clock: Clock) -> None:
+def _asked_open(found: Answer, door: DoorFacts, clock: TimePhrases) -> None:
     """Only the supervisor was heard, or a person with `send --direct`, as the door's own daemon hears
     them."""
     assert door.asked is not None
     found.say(
         f"On door_requests {door.asked_by} has asked for OPEN {clock.since(door.asked.since)}."
     )
-    opened = Step("the robot", "drive through; then its fleet adapter sends CLOSE")
-    opens = Step("the controller", f"open {door.name} fully, and show it by its contact")
+    opened = NextStep("the robot", "drive through; then its fleet adapter sends CLOSE")
+    opens = NextStep("the controller", f"open {door.name} fully, and show it by its contact")
     found.next.append(opened if door.mode.value == OPEN else opens)
 
 
-def _held_open(found: Answer, door: DoorFacts, clock: Clock) -> None:
+def _held_open(found: Answer, door: DoorFacts, clock: TimePhrases) -> None:
     """Who holds it, and whether they are alive. A robot in a doorway is silent, so silence is
     normal."""
     who, since = min(door.holders.items(), key=lambda one: one[1].at)
@@ -192,13 +198,15 @@ def _held_open(found: Answer, door: DoorFacts, clock: Clock) -> None:
     if clock.now.at - since.at <= LONG_S:
         found.say(
             f"{said} A robot in the doorway says nothing until it is through.",
-            Step("the robot", f"{who} has to drive through; then its fleet adapter sends CLOSE"),
+            NextStep(
+                "the robot", f"{who} has to drive through; then its fleet adapter sends CLOSE"
+            ),
         )
         return
     found.say(
         f"{said} RMF has no time limit: a robot that died in the doorway, or a dashboard that somebody"
         " left, keeps the door open for ever.",
-        Step(
+        NextStep(
             "a person",
             f"look into the doorway; if nobody is there: `rmf-bridge send door {quote(door.name)}"
             f" close --requester {quote(who)}`",

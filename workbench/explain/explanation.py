@@ -23,7 +23,7 @@ of the lift, door or charger itself."""
 
 
 @dataclass(frozen=True, slots=True)
-class Field:
+class CheckedField:
     """One of the things that RMF checks. `wanted`: what the requester waits for. `met`: it is so.
     `since`: when it became what it is, in words.
     """
@@ -36,7 +36,7 @@ class Field:
 
 
 @dataclass(frozen=True, slots=True)
-class Step:
+class NextStep:
     """What has to happen next, and who has to do it."""
 
     who: Who
@@ -44,7 +44,7 @@ class Step:
 
 
 @dataclass(frozen=True, slots=True)
-class Line:
+class StoryLine:
     """One thing that happened. `at`: s on the recording's steady clock; `wall`: s since the epoch."""
 
     at: float
@@ -75,11 +75,11 @@ class Explanation:
     device: str
     heard: str
     now: tuple[str, ...]
-    next: tuple[Step, ...]
+    next: tuple[NextStep, ...]
     asks: str = ""
-    fields: tuple[Field, ...] = ()
+    fields: tuple[CheckedField, ...] = ()
     faults: tuple[FaultTold, ...] = ()
     notes: tuple[str, ...] = ()
-    story: tuple[Line, ...] = ()
+    story: tuple[StoryLine, ...] = ()
     left_out: int = 0
     before: str = ""

@@ -1,7 +1,7 @@
 """What was heard on a graph, device by device, and the explanation of each.
 
-`Site.take` is fed in the order of time and remembers in bounds, so a day's recording takes no more
-memory than a minute's.
+`HeardDevices.take` is fed in the order of time and remembers in bounds, so a day's recording takes
+no more memory than a minute's.
 """
 
 from collections import deque
@@ -24,16 +24,16 @@ from workbench.explain.answer import Answer, Remedies
 from workbench.explain.charger_facts import ChargerFacts
 from workbench.explain.device import MOST_LINES, Device
 from workbench.explain.door_facts import DoorFacts
-from workbench.explain.explanation import Explanation, Line, Step
+from workbench.explain.explanation import Explanation, NextStep, StoryLine
 from workbench.explain.lift_facts import LiftFacts
 from workbench.explain.noted import noted
-from workbench.explain.phrases import Clock, lasted, on_graph
+from workbench.explain.phrases import TimePhrases, lasted, on_graph
 from workbench.explain.rows import label
 
 STORY_LINES: Final = 40
 
 
-class Site(ObservedGraph[Device]):
+class HeardDevices(ObservedGraph[Device]):
     """All devices that were heard, or only those of this `name`.
 
     `session`: whose last ride's story is kept, even if others ride after it.
@@ -91,7 +91,7 @@ class Site(ObservedGraph[Device]):
         self, kind: Kind, name: str, zone: tzinfo | None, remedies: Remedies | None = None
     ) -> Explanation:
         """The device at the end of what was heard. `zone`: of the times; None: this machine's."""
-        clock = Clock(self.now, zone)
+        clock = TimePhrases(self.now, zone)
         began = self.began or self.now
         device = self.known.get((kind, name)) or self.make(kind, name)
         answer = self._answer(device, clock)
@@ -104,7 +104,7 @@ class Site(ObservedGraph[Device]):
             heard=f"{clock.date(began.wall)} to {clock.time(self.now.wall)} ({for_s})",
             now=tuple(answer.now),
             next=tuple(
-                Step(step.who, on_graph(step.what, self._graph))
+                NextStep(step.who, on_graph(step.what, self._graph))
                 for step in dict.fromkeys(answer.next)
             ),
             asks=answer.asks,
@@ -119,12 +119,12 @@ class Site(ObservedGraph[Device]):
             before=_before(device, clock),
         )
 
-    def _answer(self, device: Device, clock: Clock) -> Answer:
+    def _answer(self, device: Device, clock: TimePhrases) -> Answer:
         names = {
             kind: (*self._others[kind], *(label(one.id) for one in self.stated(kind)))
             for kind in KINDS
         }
-        around = common.Heard(names, self.messages)
+        around = common.OthersHeard(names, self.messages)
         match device:
             case LiftFacts():
                 return lift.answer(device, clock, around, self._session)
@@ -134,7 +134,7 @@ class Site(ObservedGraph[Device]):
                 return charger.answer(device, clock, around, self._coordinates())
         raise AssertionError(device)
 
-    def _story(self, device: Device, answer: Answer) -> tuple[Line, ...]:
+    def _story(self, device: Device, answer: Answer) -> tuple[StoryLine, ...]:
         """All that is remembered of the ride in question."""
         if isinstance(device, LiftFacts) and device.kept and not answer.asks:
             return device.kept
@@ -187,14 +187,14 @@ class Site(ObservedGraph[Device]):
             return {}
         return self._coordinator[1]
 
-    def _stepped(self, clock: Clock) -> tuple[str, ...]:
+    def _stepped(self, clock: TimePhrases) -> tuple[str, ...]:
         return tuple(
             f"At {clock.time(moment.wall)} the listener's clock was stepped by {by_s:+.0f} s."
             for moment, by_s in self.steps
         )
 
 
-def _before(device: Device, clock: Clock) -> str:
+def _before(device: Device, clock: TimePhrases) -> str:
     """What came before, in one sentence; "" if nothing did."""
     match device:
         case LiftFacts() if device.rides.ended:

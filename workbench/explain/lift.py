@@ -9,13 +9,13 @@ from shlex import quote
 from typing import Final
 
 from bridges.observe.lift import NO_FLOOR, NOBODY
-from bridges.observe.requesters import Requester
+from bridges.observe.requesters import DeviceRequester
 from workbench.explain import answer as common
 from workbench.explain.answer import Answer
-from workbench.explain.explanation import Field, Step, Who
+from workbench.explain.explanation import CheckedField, NextStep, Who
 from workbench.explain.lift_facts import DIRECT, LiftFacts
 from workbench.explain.lift_ungranted import SETTLES_S, not_granted
-from workbench.explain.phrases import Clock, lasted
+from workbench.explain.phrases import TimePhrases, lasted
 from workbench.explain.rows import label
 
 LONG_S: Final = 60.0
@@ -27,7 +27,9 @@ HAZARDS: Final = {
 }
 
 
-def answer(lift: LiftFacts, clock: Clock, around: common.Heard, focus: str = "") -> Answer:
+def answer(
+    lift: LiftFacts, clock: TimePhrases, around: common.OthersHeard, focus: str = ""
+) -> Answer:
     """The lift at the end of what was heard. `focus`: the session in question; "" for whoever waits."""
     if lift.last_state is None:
         return _with_askers(common.unheard(lift, around, clock), lift, clock)
@@ -58,7 +60,7 @@ def answer(lift: LiftFacts, clock: Clock, around: common.Heard, focus: str = "")
     return found
 
 
-def _in_question(lift: LiftFacts, clock: Clock, focus: str) -> Requester | None:
+def _in_question(lift: LiftFacts, clock: TimePhrases, focus: str) -> DeviceRequester | None:
     """The claim in question: that of `focus`, or of whoever waits longest, else the holder's."""
     if focus:
         return lift.requesters.get(focus)
@@ -68,7 +70,7 @@ def _in_question(lift: LiftFacts, clock: Clock, focus: str) -> Requester | None:
     return lift.requesters.get(lift.session.value)
 
 
-def _begins(lift: LiftFacts, claim: Requester | None) -> float:
+def _begins(lift: LiftFacts, claim: DeviceRequester | None) -> float:
     """When the story in question begins (s): when the one that waits asked, or the holder got it."""
     holder = lift.requesters.get(lift.session.value)
     starts = [claim.first.at] if claim else []
@@ -81,7 +83,7 @@ def _begins(lift: LiftFacts, claim: Requester | None) -> float:
     return min(starts, default=float("-inf"))
 
 
-def _with_askers(found: Answer, lift: LiftFacts, clock: Clock) -> Answer:
+def _with_askers(found: Answer, lift: LiftFacts, clock: TimePhrases) -> Answer:
     for claim in [one for one in lift.asking(clock.now) if one.met is None][:3]:
         since = clock.since(claim.since)
         found.say(f"{claim.who} has waited for it at {claim.wants or 'no floor'} {since}.")
@@ -89,7 +91,7 @@ def _with_askers(found: Answer, lift: LiftFacts, clock: Clock) -> Answer:
     return found
 
 
-def _hold(found: Answer, lift: LiftFacts, clock: Clock, *, then: bool = False) -> None:
+def _hold(found: Answer, lift: LiftFacts, clock: TimePhrases, *, then: bool = False) -> None:
     """Who has it, and where the car is. `then`: in the past tense, as of the last state."""
     holder = "nobody" if lift.session.value == NOBODY else lift.session.value
     motion = "" if lift.motion.value == "unknown" else f", {_motion(lift.motion.value)}"
@@ -105,24 +107,28 @@ def _motion(motion: str) -> str:
     return f"going {motion}" if motion in ("up", "down") else motion
 
 
-def _fields(lift: LiftFacts, claim: Requester, clock: Clock) -> tuple[Field, ...]:
+def _fields(
+    lift: LiftFacts, claim: DeviceRequester, clock: TimePhrases
+) -> tuple[CheckedField, ...]:
     """RequestLift's fields, as this requester's fleet adapter sees them; the name is what was heard."""
     since = (lift.session.since, lift.floor.since, lift.door.since)
     return tuple(
-        Field(*check, clock.since(moment))
+        CheckedField(*check, clock.since(moment))
         for check, moment in zip(lift.checks(claim), since, strict=True)
     )
 
 
-def _nobody_asks(found: Answer, lift: LiftFacts, clock: Clock) -> None:
+def _nobody_asks(found: Answer, lift: LiftFacts, clock: TimePhrases) -> None:
     holder = lift.session.value
     if holder == NOBODY:
-        found.say("Nobody asks for it.", Step("nobody", "there is nothing to do"))
+        found.say("Nobody asks for it.", NextStep("nobody", "there is nothing to do"))
     else:
         _without_word(found, lift, holder, clock)
 
 
-def _others_wait(found: Answer, lift: LiftFacts, claim: Requester | None, clock: Clock) -> None:
+def _others_wait(
+    found: Answer, lift: LiftFacts, claim: DeviceRequester | None, clock: TimePhrases
+) -> None:
     others = [
         one
         for one in lift.asking(clock.now)
@@ -137,7 +143,7 @@ def _others_wait(found: Answer, lift: LiftFacts, claim: Requester | None, clock:
 # ---- why it waits
 
 
-def _why(found: Answer, lift: LiftFacts, claim: Requester, clock: Clock) -> None:
+def _why(found: Answer, lift: LiftFacts, claim: DeviceRequester, clock: TimePhrases) -> None:
     """Why this claim is not met; if it is, who has to act next."""
     holder = lift.session.value
     if lift.matches(claim) and claim.asks(clock.now):
@@ -154,13 +160,13 @@ def _why(found: Answer, lift: LiftFacts, claim: Requester, clock: Clock) -> None
         _held(found, lift, claim, holder, clock)
 
 
-def _hazard(found: Answer, lift: LiftFacts, clock: Clock) -> None:
+def _hazard(found: Answer, lift: LiftFacts, clock: TimePhrases) -> None:
     mode = lift.mode.value
     who: Who = "a person" if mode == "OFFLINE" else "the controller"
     found.say(
         f"The lift has been in {mode} mode {clock.since(lift.mode.since)}: it takes no robot until that"
         " ends. RMF does not look at the mode, and only sees that the lift does not come.",
-        Step(who, HAZARDS[mode]),
+        NextStep(who, HAZARDS[mode]),
     )
     holder = lift.session.value
     if holder == NOBODY:
@@ -174,7 +180,9 @@ def _hazard(found: Answer, lift: LiftFacts, clock: Clock) -> None:
     found.say(f"{holder} keeps the session meanwhile: only its END ends one.{door}")
 
 
-def _held(found: Answer, lift: LiftFacts, claim: Requester, holder: str, clock: Clock) -> None:
+def _held(
+    found: Answer, lift: LiftFacts, claim: DeviceRequester, holder: str, clock: TimePhrases
+) -> None:
     """Another session has it."""
     theirs = lift.requesters.get(holder)
     if theirs is not None and theirs.ended is not None:
@@ -190,7 +198,7 @@ def _held(found: Answer, lift: LiftFacts, claim: Requester, holder: str, clock: 
     _forgotten(found, lift, holder, clock)
 
 
-def _forgotten(found: Answer, lift: LiftFacts, holder: str, clock: Clock) -> None:
+def _forgotten(found: Answer, lift: LiftFacts, holder: str, clock: TimePhrases) -> None:
     """The supervisor asks for another session than the one that has the lift."""
     asks = lift.supervisor
     if asks is None or asks.value in ("", holder, NOBODY):
@@ -207,14 +215,14 @@ def _forgotten(found: Answer, lift: LiftFacts, holder: str, clock: Clock) -> Non
     )
 
 
-def _without_word(found: Answer, lift: LiftFacts, holder: str, clock: Clock) -> None:
+def _without_word(found: Answer, lift: LiftFacts, holder: str, clock: TimePhrases) -> None:
     """The holder of the lift is silent."""
     theirs = lift.requesters.get(holder)
     heard_s = clock.now.at - max(lift.began.at, lift.session.since.at)
     if theirs is None and heard_s < common.LISTENS_S:
         found.say(
             f"{holder} has not been heard yet; that takes a few seconds.",
-            Step("nobody", "listen for longer"),
+            NextStep("nobody", "listen for longer"),
         )
         return
     since = f" since {clock.time(theirs.last.wall)}" if theirs else f" for {lasted(heard_s)}"
@@ -222,7 +230,7 @@ def _without_word(found: Answer, lift: LiftFacts, holder: str, clock: Clock) -> 
     found.say(
         f"{holder} has said nothing{since}, and has not sent END. A robot that waits or rides asks at"
         f" each state: its fleet adapter is gone.{once}",
-        Step(
+        NextStep(
             "a person",
             f"check the car; if it is empty, {_release(lift)} ends the session",
         ),
@@ -237,23 +245,25 @@ def _release(lift: LiftFacts) -> str:
     return f"`rmf-bridge release {quote(lift.name)}`"
 
 
-def _once(claim: Requester | None) -> bool:
+def _once(claim: DeviceRequester | None) -> bool:
     return claim is not None and claim.times == 1
 
 
-def _end_not_obeyed(found: Answer, lift: LiftFacts, claim: Requester, clock: Clock) -> None:
+def _end_not_obeyed(
+    found: Answer, lift: LiftFacts, claim: DeviceRequester, clock: TimePhrases
+) -> None:
     assert claim.ended is not None
     if clock.now.at - claim.ended.at < SETTLES_S:
         found.say(
             f"{claim.who} has just sent END.",
-            Step("the device's node", "show no session in its next state"),
+            NextStep("the device's node", "show no session in its next state"),
         )
         return
     if claim.own and not claim.end_passed_on and lift.supervisor_last is not None:
         found.say(
             f"{claim.who} sent END at {clock.time(claim.ended.wall)}, and the supervisor has not passed"
             " it on.",
-            Step(
+            NextStep(
                 "the supervisor",
                 f"pass on END; until then: {_release(lift)}",
             ),
@@ -262,19 +272,19 @@ def _end_not_obeyed(found: Answer, lift: LiftFacts, claim: Requester, clock: Clo
     found.say(
         f"{claim.who} sent END at {clock.time(claim.ended.wall)}, and the lift still shows its"
         " session.",
-        Step(
+        NextStep(
             "the device's node",
             f"end the session; until then: {_release(lift)}",
         ),
     )
 
 
-def _drives(found: Answer, lift: LiftFacts, claim: Requester, clock: Clock) -> None:
+def _drives(found: Answer, lift: LiftFacts, claim: DeviceRequester, clock: TimePhrases) -> None:
     """It has what it waits for."""
     met = claim.met or claim.since
     found.say(
         f"{claim.who} has seen its lift at {claim.wants} with the door open {clock.since(met)}.",
-        Step(
+        NextStep(
             "the robot",
             f"{claim.who} has to drive in or out; then its fleet adapter asks for the next floor, or"
             " sends END",
@@ -284,7 +294,7 @@ def _drives(found: Answer, lift: LiftFacts, claim: Requester, clock: Clock) -> N
         found.say("That is long: the robot may be blocked or lost, or its adapter hangs.")
 
 
-def _missing(found: Answer, lift: LiftFacts, claim: Requester, clock: Clock) -> None:
+def _missing(found: Answer, lift: LiftFacts, claim: DeviceRequester, clock: TimePhrases) -> None:
     """The session is given; the mode, the floor or the door is not there yet."""
     on = common.relays(lift, clock)
     if lift.mode.value in HAZARDS:
@@ -293,13 +303,15 @@ def _missing(found: Answer, lift: LiftFacts, claim: Requester, clock: Clock) -> 
         found.say(
             f"The door has been open {clock.since(lift.door.since)}, but the car is at no known floor,"
             f" so RMF does not let the robot drive{on}.",
-            Step("the controller", f"show its floor ({claim.wants}): check the floor code's wires"),
+            NextStep(
+                "the controller", f"show its floor ({claim.wants}): check the floor code's wires"
+            ),
         )
     elif lift.mode.value == "HUMAN":
         found.say(
             "It has the session, but the lift has been in HUMAN mode"
             f" {clock.since(lift.mode.since)}{on}.",
-            Step(
+            NextStep(
                 "the controller",
                 "confirm AGV mode: a key switch, people's calls that it serves first, or the contact",
             ),
@@ -307,7 +319,7 @@ def _missing(found: Answer, lift: LiftFacts, claim: Requester, clock: Clock) -> 
     elif lift.floor.value == NO_FLOOR and lift.motion.value == "stopped":
         found.say(
             f"The car has stood at no known floor {clock.since(lift.floor.since)}{on}.",
-            Step(
+            NextStep(
                 "the controller", "show its floor: a wire of the floor code, or a stop on the way"
             ),
         )
@@ -315,11 +327,11 @@ def _missing(found: Answer, lift: LiftFacts, claim: Requester, clock: Clock) -> 
         found.say(
             f"The car has not come to {claim.wants}: it has been at {lift.floor.value}"
             f" {clock.since(lift.floor.since)}{on}.",
-            Step("the controller", f"bring the car to {claim.wants}"),
+            NextStep("the controller", f"bring the car to {claim.wants}"),
         )
     else:
         found.say(
             f"The car is there, but its door has been {lift.door.value}"
             f" {clock.since(lift.door.since)}{on}.",
-            Step("the controller", f"open the door at {claim.wants}"),
+            NextStep("the controller", f"open the door at {claim.wants}"),
         )

@@ -5,9 +5,9 @@ from typing import Final
 
 from bridges.observe.device import News
 from bridges.observe.lift import NO_FLOOR, NOBODY, ObservedLift
-from bridges.observe.requesters import Moment, Requester
+from bridges.observe.requesters import DeviceRequester, Moment
 from workbench.explain.device import Device
-from workbench.explain.explanation import Line
+from workbench.explain.explanation import StoryLine
 from workbench.explain.phrases import lasted
 from workbench.explain.rows import label
 
@@ -33,7 +33,7 @@ class LiftFacts(Device, ObservedLift):
     def __init__(self, name: str, began: Moment) -> None:
         super().__init__(name, began)
         self.rides = Rides()
-        self.kept: tuple[Line, ...] = ()
+        self.kept: tuple[StoryLine, ...] = ()
 
     @property
     def floors(self) -> tuple[str, ...]:
@@ -92,7 +92,7 @@ class LiftFacts(Device, ObservedLift):
             if by.who == self.focus:
                 self.kept = self.lines_since(by.first.at)
 
-    def _asks(self, one: Requester, *, human: bool) -> str:
+    def _asks(self, one: DeviceRequester, *, human: bool) -> str:
         where = one.wants or "no floor"
         if self.session.value == one.who:
             return f"{one.who}, who has the lift, asks for {where}"

@@ -2,27 +2,31 @@
 
 from typing import Final
 
-from bridges.observe.requesters import Requester
+from bridges.observe.requesters import DeviceRequester
 from workbench.explain.answer import Answer
-from workbench.explain.explanation import Step
+from workbench.explain.explanation import NextStep
 from workbench.explain.lift_facts import LiftFacts
-from workbench.explain.phrases import Clock
+from workbench.explain.phrases import TimePhrases
 
 SETTLES_S: Final = 2.0
 """This much time between a request and its grant, or a supervisor's change of mind, is normal."""
 
 
-def not_granted(found: Answer, lift: LiftFacts, claim: Requester, clock: Clock) -> None:
+def not_granted(found: Answer, lift: LiftFacts, claim: DeviceRequester, clock: TimePhrases) -> None:
     """The lift is free, and yet it is not given to the requester."""
     if lift.floors and claim.wants not in lift.floors:
         found.say(
             f"{lift.name} serves {', '.join(lift.floors[:12])}, not {claim.wants or 'an empty name'}:"
             " the request is refused.",
-            Step("a person", "give the floor one name, on RMF's map and in the lift's settings"),
+            NextStep(
+                "a person", "give the floor one name, on RMF's map and in the lift's settings"
+            ),
         )
         return
     if clock.now.at - claim.since.at < SETTLES_S and claim.since.seen:
-        found.say("It was asked for a moment ago.", Step("the device's node", "grant the session"))
+        found.say(
+            "It was asked for a moment ago.", NextStep("the device's node", "grant the session")
+        )
         return
     if _not_passed_on(found, lift, claim, clock):
         return
@@ -30,7 +34,7 @@ def not_granted(found: Answer, lift: LiftFacts, claim: Requester, clock: Clock) 
     if reasons:
         found.say(
             f"Its daemon refuses the request: {', '.join(reasons)}.",
-            Step(
+            NextStep(
                 "the device's node", "grant the session once that is over; its log has the details"
             ),
         )
@@ -38,11 +42,13 @@ def not_granted(found: Answer, lift: LiftFacts, claim: Requester, clock: Clock) 
         found.say(
             "The request is passed on to the lift's node, which does not grant it and gives no reason"
             " on the graph.",
-            Step("the device's node", "grant the session; its log says why it does not"),
+            NextStep("the device's node", "grant the session; its log says why it does not"),
         )
 
 
-def _not_passed_on(found: Answer, lift: LiftFacts, claim: Requester, clock: Clock) -> bool:
+def _not_passed_on(
+    found: Answer, lift: LiftFacts, claim: DeviceRequester, clock: TimePhrases
+) -> bool:
     """Does the supervisor keep the request to itself?"""
     passed = claim.passed_on
     if not claim.own or (passed is not None and clock.now.at - passed.at < 5.0):
@@ -50,12 +56,14 @@ def _not_passed_on(found: Answer, lift: LiftFacts, claim: Requester, clock: Cloc
     if "lift_supervisor" in lift.waits_said(clock.now):
         found.say(
             "Its supervisor does not pass the request on.",
-            Step("a person", "end what it waits for; `rmf-bridge status` on its machine says how"),
+            NextStep(
+                "a person", "end what it waits for; `rmf-bridge status` on its machine says how"
+            ),
         )
     elif lift.supervisor_last is None:
         found.say(
             "Nobody passes the request on: no supervisor was heard on `lift_requests`.",
-            Step("a person", "start rmf_lift_supervisor, or a lift supervisor of rmf-bridges"),
+            NextStep("a person", "start rmf_lift_supervisor, or a lift supervisor of rmf-bridges"),
         )
     else:
         other = lift.supervisor.value if lift.supervisor else ""
@@ -64,7 +72,7 @@ def _not_passed_on(found: Answer, lift: LiftFacts, claim: Requester, clock: Cloc
             instead = f" {lift.sender(other).capitalize()} asks for {other}."
         found.say(
             f"The supervisor does not pass the request on.{instead}",
-            Step(
+            NextStep(
                 "the supervisor",
                 f"pass on the request of {claim.who}; its log says why it does not",
             ),

@@ -23,7 +23,7 @@ MEANING: Final[dict[Tone, str]] = {
 
 
 @dataclass(frozen=True, slots=True)
-class Look:
+class ToneStyle:
     """A tone in one theme. `text`: on the fill. `pattern`: lines over it; "" for none."""
 
     fill: str
@@ -31,25 +31,25 @@ class Look:
     pattern: str = ""
 
 
-LIGHT: Final[dict[Tone, Look]] = {
-    "calm": Look("#dcdfe3", "#1b1d21"),
-    "works": Look("#8fcdf2", "#10181d"),
-    "open": Look("#4fc3a1", "#0c1a15"),
-    "held": Look("#f3bf4a", "#1d1604"),
-    "asks": Look("#f7f0b0", "#1d1b04", "#a89a1c"),
-    "wrong": Look("#e8854a", "#1d0d04", "#7a2f00"),
-    "unknown": Look("#ffffff", "#44484f", "#b4b9c1"),
+LIGHT: Final[dict[Tone, ToneStyle]] = {
+    "calm": ToneStyle("#dcdfe3", "#1b1d21"),
+    "works": ToneStyle("#8fcdf2", "#10181d"),
+    "open": ToneStyle("#4fc3a1", "#0c1a15"),
+    "held": ToneStyle("#f3bf4a", "#1d1604"),
+    "asks": ToneStyle("#f7f0b0", "#1d1b04", "#a89a1c"),
+    "wrong": ToneStyle("#e8854a", "#1d0d04", "#7a2f00"),
+    "unknown": ToneStyle("#ffffff", "#44484f", "#b4b9c1"),
 }
-DARK: Final[dict[Tone, Look]] = {
-    "calm": Look("#474c55", "#f2f4f7"),
-    "works": Look("#236f9d", "#ffffff"),
-    "open": Look("#0a8463", "#ffffff"),
-    "held": Look("#c68a12", "#140e00"),
-    "asks": Look("#5c5614", "#fffbd1", "#c9bb2e"),
-    "wrong": Look("#d8641c", "#140700", "#4a1c00"),
-    "unknown": Look("#17191d", "#c3c8d0", "#5a606a"),
+DARK: Final[dict[Tone, ToneStyle]] = {
+    "calm": ToneStyle("#474c55", "#f2f4f7"),
+    "works": ToneStyle("#236f9d", "#ffffff"),
+    "open": ToneStyle("#0a8463", "#ffffff"),
+    "held": ToneStyle("#c68a12", "#140e00"),
+    "asks": ToneStyle("#5c5614", "#fffbd1", "#c9bb2e"),
+    "wrong": ToneStyle("#d8641c", "#140700", "#4a1c00"),
+    "unknown": ToneStyle("#17191d", "#c3c8d0", "#5a606a"),
 }
-LOOKS: Final[dict[Theme, dict[Tone, Look]]] = {"light": LIGHT, "dark": DARK}
+LOOKS: Final[dict[Theme, dict[Tone, ToneStyle]]] = {"light": LIGHT, "dark": DARK}
 PAPER: Final[dict[Theme, tuple[str, str, str, str]]] = {
     "light": ("#ffffff", "#1b1d21", "#5b616b", "#d3d7dd"),
     "dark": ("#17191d", "#eceff3", "#a7adb8", "#363b44"),

@@ -49,7 +49,7 @@ def on_graph(text: str, options: Sequence[str]) -> str:
 
 
 @dataclass(frozen=True, slots=True)
-class Clock:
+class TimePhrases:
     """Says times by one time zone (None: this machine's), as seen from `now`."""
 
     now: Moment

@@ -12,8 +12,8 @@ from xml.etree.ElementTree import Element, SubElement, tostring
 
 from bridges.observe.requesters import Moment
 from workbench.explain.palette import MEANING, TONES, Theme, style
-from workbench.explain.phrases import Clock, lasted
-from workbench.explain.timeline import Lane, Mark, Span, Timeline, Tone
+from workbench.explain.phrases import TimePhrases, lasted
+from workbench.explain.timeline import Lane, LaneSpan, Mark, Timeline, Tone
 
 LEAST_WIDE: Final = 480
 ROW: Final = 24.0
@@ -47,7 +47,7 @@ class Picture:
         self, timeline: Timeline, width: int, zone: tzinfo | None, theme: Theme | None
     ) -> None:
         self._timeline = timeline
-        self._clock = Clock(Moment(timeline.to_s, self._wall(timeline.to_s)), zone)
+        self._clock = TimePhrases(Moment(timeline.to_s, self._wall(timeline.to_s)), zone)
         self._left = _gutter(timeline.lanes, width)
         self._width = width
         rows = len(timeline.lanes)
@@ -198,7 +198,7 @@ class Picture:
             if not inside and (text := _fitted(mark.label, free)):
                 self._text(x + 7, y + 16, text, "small ink")
 
-    def _told(self, what: str, span: Span, parts: int) -> str:
+    def _told(self, what: str, span: LaneSpan, parts: int) -> str:
         start = self._clock.time(self._wall(span.from_s), tenths=True)
         end = self._clock.time(self._wall(span.to_s), tenths=True)
         label = span.label if parts == 1 else f"{parts} changes"
@@ -273,9 +273,11 @@ def _round_times(begin: float, end: float, step: int, zone: tzinfo | None) -> It
 WORST: Final[dict[Tone, int]] = {"wrong": 2, "unknown": 1}
 
 
-def _drawable(spans: Iterable[Span], x: Callable[[float], float]) -> Iterator[tuple[Span, int]]:
+def _drawable(
+    spans: Iterable[LaneSpan], x: Callable[[float], float]
+) -> Iterator[tuple[LaneSpan, int]]:
     """The spans, with those too narrow to be seen joined: each with the number that it stands for."""
-    joined: list[Span] = []
+    joined: list[LaneSpan] = []
     for span in spans:
         gap = joined and x(span.from_s) - x(joined[-1].to_s) > NARROW
         narrow = x(span.to_s) - x(span.from_s) < NARROW
@@ -290,8 +292,8 @@ def _drawable(spans: Iterable[Span], x: Callable[[float], float]) -> Iterator[tu
         yield _one(joined), len(joined)
 
 
-def _one(spans: list[Span]) -> Span:
+def _one(spans: list[LaneSpan]) -> LaneSpan:
     """Several narrow spans as one, with the tone of the one that is wrong, if any is."""
     tone = max(spans, key=lambda span: (WORST.get(span.tone, 0), span.to_s - span.from_s)).tone
     label = spans[0].label if len(spans) == 1 else ""
-    return Span(spans[0].from_s, spans[-1].to_s, label, tone)
+    return LaneSpan(spans[0].from_s, spans[-1].to_s, label, tone)

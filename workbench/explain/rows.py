@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from typing import Final
 
 from bridges.messages import words
-from workbench.explain.timeline import Mark, Span, Tone
+from workbench.explain.timeline import LaneSpan, Mark, Tone
 
 LONGEST_LABEL: Final = 120
 MOST_SPANS: Final = 2000
@@ -20,7 +20,7 @@ def label(text: str, longest: int = LONGEST_LABEL) -> str:
     return shown if len(shown) <= longest else shown[: longest - 1] + "…"
 
 
-class Row:
+class LaneRow:
     """Spans that never overlap, and marks.
 
     A value holds for `keeps_s` (s) at most; with `fills` a span then says NOT_HEARD. What ended
@@ -39,7 +39,7 @@ class Row:
         self._keeps_s = keeps_s
         self._fills = fills
         self._past_s = past_s
-        self._spans: deque[Span] = deque(maxlen=MOST_SPANS)
+        self._spans: deque[LaneSpan] = deque(maxlen=MOST_SPANS)
         self._marks: deque[Mark] = deque(maxlen=MOST_SPANS)
         self._open: tuple[float, str, Tone] | None = None
 
@@ -60,24 +60,26 @@ class Row:
             self._marks.popleft()
         self.heard_at = max(self.heard_at, at)
 
-    def spans(self, from_s: float, to_s: float) -> Iterator[Span]:
+    def spans(self, from_s: float, to_s: float) -> Iterator[LaneSpan]:
         """The spans between these times, cut to them; the last one may still go on."""
         for span in (*self._spans, *self._going_on(to_s)):
             if span.to_s > from_s and span.from_s < to_s:
-                yield Span(max(from_s, span.from_s), min(to_s, span.to_s), span.label, span.tone)
+                yield LaneSpan(
+                    max(from_s, span.from_s), min(to_s, span.to_s), span.label, span.tone
+                )
 
     def marks(self, from_s: float, to_s: float) -> Iterator[Mark]:
         """The marks between these times."""
         return (mark for mark in self._marks if from_s <= mark.at_s <= to_s)
 
-    def _going_on(self, to_s: float) -> Iterator[Span]:
+    def _going_on(self, to_s: float) -> Iterator[LaneSpan]:
         until = self.heard_at + self._keeps_s
         late = to_s > until
         if self._open is not None:
             since, text, tone = self._open
-            yield Span(since, self.heard_at if late else to_s, text, tone)
+            yield LaneSpan(since, self.heard_at if late else to_s, text, tone)
         if late and self._fills:
-            yield Span(self.heard_at, to_s, NOT_HEARD, "unknown")
+            yield LaneSpan(self.heard_at, to_s, NOT_HEARD, "unknown")
 
     def _expire(self, at: float) -> None:
         """Close what nobody has confirmed for too long, at its last confirmation."""
@@ -85,15 +87,15 @@ class Row:
             return
         self._close(self.heard_at)
         if self._fills:
-            self._append(Span(self.heard_at, at, NOT_HEARD, "unknown"))
+            self._append(LaneSpan(self.heard_at, at, NOT_HEARD, "unknown"))
 
     def _close(self, at: float) -> None:
         if self._open is not None:
             since, text, tone = self._open
-            self._append(Span(since, at, text, tone))
+            self._append(LaneSpan(since, at, text, tone))
         self._open = None
 
-    def _append(self, span: Span) -> None:
+    def _append(self, span: LaneSpan) -> None:
         if span.to_s > span.from_s:
             self.left_out += len(self._spans) == MOST_SPANS
             self._spans.append(span)

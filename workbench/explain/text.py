@@ -6,8 +6,8 @@ from datetime import tzinfo
 from typing import Final
 
 from bridges.observe.requesters import Moment
-from workbench.explain.explanation import Explanation, Field
-from workbench.explain.phrases import Clock
+from workbench.explain.explanation import CheckedField, Explanation
+from workbench.explain.phrases import TimePhrases
 
 MOST_WIDE: Final = 100
 
@@ -62,7 +62,7 @@ def _story(one: Explanation, zone: tzinfo | None, room: int) -> Iterator[str]:
     if not shown:
         return
     yield ""
-    clock = Clock(Moment(0.0, shown[-1].wall), zone)
+    clock = TimePhrases(Moment(0.0, shown[-1].wall), zone)
     told = [f"  {clock.time(line.wall, tenths=True)}  {line.text}" for line in shown]
     out = len(told) + one.left_out - room + 1
     if len(told) + (one.left_out > 0) <= room:
@@ -74,7 +74,7 @@ def _story(one: Explanation, zone: tzinfo | None, room: int) -> Iterator[str]:
     yield from told[len(told) - (room - 1 - FIRST) :]
 
 
-def _table(fields: tuple[Field, ...]) -> Iterator[str]:
+def _table(fields: tuple[CheckedField, ...]) -> Iterator[str]:
     """A row for each field: what it is, and what is wanted where that differs."""
     widths = [
         max(len(text) for text in column) for column in zip(*map(_cells, fields), strict=True)
@@ -84,7 +84,7 @@ def _table(fields: tuple[Field, ...]) -> Iterator[str]:
         yield f"  {'  '.join(cells)}  {field.since}"
 
 
-def _cells(field: Field) -> tuple[str, str, str]:
+def _cells(field: CheckedField) -> tuple[str, str, str]:
     met = "as wanted" if field.met else f"MISSING, wanted: {field.wanted}"
     return field.name, field.shown, met
 

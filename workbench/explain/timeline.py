@@ -31,7 +31,7 @@ unknown: not heard."""
 
 
 @dataclass(frozen=True, slots=True)
-class Span:
+class LaneSpan:
     """Something that was so from `from_s` to `to_s`."""
 
     from_s: float
@@ -57,7 +57,7 @@ class Lane:
 
     name: LaneName
     row: str
-    spans: tuple[Span, ...]
+    spans: tuple[LaneSpan, ...]
     marks: tuple[Mark, ...]
     left_out: int = 0
 

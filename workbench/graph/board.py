@@ -38,7 +38,7 @@ Device = tuple[str, str]
 """Its kind and its name, as they are shown."""
 
 
-class Row(Struct, frozen=True):
+class BoardRow(Struct, frozen=True):
     """One device, the charger coordinator, or a robot with its assigned place.
 
     `waiting`: who waits, or what the one that has it waits for. `age`: age of the reading.
@@ -75,7 +75,7 @@ class Row(Struct, frozen=True):
         return (self.simulated, *(SECONDS.sub("", text) for text in told))
 
 
-class Diagnosis(Struct, frozen=True):
+class DeviceDiagnosis(Struct, frozen=True):
     """A daemon's latest diagnostic status of one device, and when it arrived (monotonic s)."""
 
     at: float
@@ -119,7 +119,7 @@ class Board:
         """`graph`: what is remembered of the devices, if others fill it."""
         self._graph = graph or PlainGraph()
         self._places: dict[str, str] = {}
-        self._diagnoses: dict[str, Diagnosis] = {}
+        self._diagnoses: dict[str, DeviceDiagnosis] = {}
         self._full_until = float("-inf")
 
     def take(self, heard: Heard) -> None:
@@ -150,15 +150,15 @@ class Board:
         ]
         return {(o.kind, words.printable(o.id)) for o in young if (o.kind, o.id) not in known}
 
-    def rows_of(self, devices: Iterable[AnyDevice], now: float, wall: float) -> list[Row]:
+    def rows_of(self, devices: Iterable[AnyDevice], now: float, wall: float) -> list[BoardRow]:
         """The rows of these devices, in their order; each has published a state."""
-        about: dict[Device, list[Diagnosis]] = {}
+        about: dict[Device, list[DeviceDiagnosis]] = {}
         for one in self._current(now):
             if not one.of_daemon:
                 about.setdefault(one.device, []).append(one)
         return [self._device(one, about.get((one.kind, one.id), ()), now, wall) for one in devices]
 
-    def rows(self, now: float, wall: float) -> list[Row]:
+    def rows(self, now: float, wall: float) -> list[BoardRow]:
         """The rows, sorted by kind and name. `now`: monotonic s; `wall`: the clock of the stamps."""
         every = [one for kind in words.KINDS for one in sorted(self._graph.stated(kind), key=_name)]
         devices = self.rows_of(every, now, wall)
@@ -167,12 +167,12 @@ class Board:
     def _diagnose(self, status: d.DiagnosticStatus, at: float) -> None:
         """Keep a status of our daemons under `<node>: <device>`. Other nodes' have no `kind`."""
         kind = diagnostics.kind_in(status)
-        diagnosis = Diagnosis(at, kind, status)
+        diagnosis = DeviceDiagnosis(at, kind, status)
         of_daemon = bool(kind) and diagnosis.of_daemon
         ours = of_daemon or kind == COORDINATOR or diagnosis.device in self._graph.known
         if ours and (status.name in self._diagnoses or self._room(at)):
             kept = replace(status, values=status.values[:MOST_VALUES])
-            self._diagnoses[status.name] = Diagnosis(at, kind, kept)
+            self._diagnoses[status.name] = DeviceDiagnosis(at, kind, kept)
 
     def _room(self, now: float) -> bool:
         """For one more diagnosis: anybody can make names up, and a silent one gives way."""
@@ -181,12 +181,14 @@ class Board:
             self._full_until = now + SILENT_S
         return len(self._diagnoses) < MOST_DIAGNOSES
 
-    def _device(self, one: AnyDevice, found: Sequence[Diagnosis], now: float, wall: float) -> Row:
+    def _device(
+        self, one: AnyDevice, found: Sequence[DeviceDiagnosis], now: float, wall: float
+    ) -> BoardRow:
         state: words.Stated = one.state  # type: ignore[assignment]
         held_by = words.holder(state)
         if isinstance(one, ObservedDoor):
             held_by = words.printable(" ".join(one.holders))
-        return Row(
+        return BoardRow(
             one.kind,
             words.printable(one.id),
             words.condition(state),
@@ -198,14 +200,14 @@ class Board:
             _faults(found),
         )
 
-    def _coordinators(self, now: float) -> Iterator[Row]:
+    def _coordinators(self, now: float) -> Iterator[BoardRow]:
         for diagnosis in self._current(now):
             if diagnosis.kind != COORDINATOR or diagnosis.of_daemon:
                 continue
             daemon = self._daemon(diagnosis, now)
             passive = daemon.value(diagnostics.PASSIVE) if daemon else ""
             queue = diagnosis.value("queue")
-            yield Row(
+            yield BoardRow(
                 "coordinator",
                 words.printable(diagnosis.status.name.partition(": ")[0]),
                 words.printable(f"passive: {passive}") if passive else _coordinates(diagnosis),
@@ -214,24 +216,24 @@ class Board:
                 faults=_faults([diagnosis]),
             )
 
-    def _robots(self) -> Iterator[Row]:
+    def _robots(self) -> Iterator[BoardRow]:
         for who, place in sorted(self._places.items()):
-            yield Row("robot", who, words.printable(place))
+            yield BoardRow("robot", who, words.printable(place))
 
-    def _current(self, now: float) -> list[Diagnosis]:
+    def _current(self, now: float) -> list[DeviceDiagnosis]:
         return [one for one in self._diagnoses.values() if one.is_current(now)]
 
-    def _daemon(self, diagnosis: Diagnosis, now: float) -> Diagnosis | None:
+    def _daemon(self, diagnosis: DeviceDiagnosis, now: float) -> DeviceDiagnosis | None:
         node = diagnosis.status.name.partition(": ")[0]
         daemon = self._diagnoses.get(f"{node}: daemon")
         return daemon if daemon and daemon.is_current(now) else None
 
-    def _simulated(self, diagnosis: Diagnosis, now: float) -> bool:
+    def _simulated(self, diagnosis: DeviceDiagnosis, now: float) -> bool:
         daemon = self._daemon(diagnosis, now)
         return daemon is not None and diagnostics.SIMULATED in daemon.status.message
 
 
-def _coordinates(diagnosis: Diagnosis) -> str:
+def _coordinates(diagnosis: DeviceDiagnosis) -> str:
     """What the coordinator does, and its schedule."""
     silent = diagnosis.value("assigns").startswith("no:")
     does = "asks for chargers that another node assigns" if silent else "assigns chargers"
@@ -239,7 +241,7 @@ def _coordinates(diagnosis: Diagnosis) -> str:
     return words.printable(f"{does}, schedule {schedule}" if schedule else does)
 
 
-def _faults(found: Iterable[Diagnosis]) -> str:
+def _faults(found: Iterable[DeviceDiagnosis]) -> str:
     texts = [text for diagnosis in found for text in diagnosis.faults()]
     return words.printable("; ".join(dict.fromkeys(texts)))
 
@@ -266,7 +268,7 @@ def _mark(device: AnyDevice, now: float) -> str:
     return "STALE" if device.reading.value else ""
 
 
-def table(rows: Iterable[Row]) -> list[str]:
+def table(rows: Iterable[BoardRow]) -> list[str]:
     """The rows in columns, under headings; columns for queues, marks and faults only if needed."""
     shown = [row.cells() for row in rows]
     if not shown:
@@ -280,13 +282,13 @@ def table(rows: Iterable[Row]) -> list[str]:
     return aligned([*zip(*columns, strict=True)])
 
 
-def changes(before: list[Row], after: list[Row]) -> list[Row]:
+def changes(before: list[BoardRow], after: list[BoardRow]) -> list[BoardRow]:
     """The rows that have changed, not counting ages and running seconds."""
     known = {(row.kind, row.name): row.news() for row in before}
     return [row for row in after if known.get((row.kind, row.name)) != row.news()]
 
 
-def change_line(row: Row, wall: float) -> str:
+def change_line(row: BoardRow, wall: float) -> str:
     """A changed row as one line, for a pipe."""
     clock = time.strftime("%H:%M:%S", time.localtime(wall)) + f".{int(wall * 1000) % 1000:03d}"
     kind, name, state, held_by, waiting, age, marks, faults = row.cells()
@@ -296,13 +298,13 @@ def change_line(row: Row, wall: float) -> str:
     return "  ".join(parts)
 
 
-def json_line(row: Row, wall: float) -> str:
+def json_line(row: BoardRow, wall: float) -> str:
     """A changed row as one line of JSON, with the time of the change (s since the epoch)."""
     return json.dumps({"at": round(wall, 3), **asdict(row)})
 
 
 def repaint(
-    rows: list[Row], lines_before: int, columns: int, lines: int, *, coloured: bool = True
+    rows: list[BoardRow], lines_before: int, columns: int, lines: int, *, coloured: bool = True
 ) -> tuple[str, int]:
     """The text that redraws a terminal showing `lines_before` lines of the table, and the new number
     of lines. No line wraps and nothing scrolls away.
@@ -317,7 +319,7 @@ def repaint(
     return repainted(drawn, lines_before), len(shown)
 
 
-def _fitting(rows: list[Row], columns: int) -> Iterator[tuple[str, bool]]:
+def _fitting(rows: list[BoardRow], columns: int) -> Iterator[tuple[str, bool]]:
     """Each line of the table, and whether it needs attention. Where it is too long for a terminal, its
     marks and faults follow on a line of their own."""
     heading, *lines = table(rows)

@@ -11,7 +11,7 @@ from typing import Final
 
 from bridges.messages import words
 from bridges.observe.limits import SILENT_S
-from workbench.graph.requests import Done, Failed, Obstacle, Request, Seen
+from workbench.graph.requests import Failed, Fulfilled, Obstacle, Request, RequestProgress
 
 REPEAT_S: Final = 1.0
 PATIENCE_S: Final = 2.0
@@ -21,40 +21,40 @@ HINT_AFTER_S: Final = 3.0
 
 
 @dataclass(frozen=True, slots=True)
-class Step:
+class SendStep:
     """The next step: a request to send now, a hint to print once, or the outcome. `direct`: the request
     goes to the device's own daemon."""
 
     send: words.Requested | None = None
     hint: str = ""
-    outcome: Done | Failed | None = None
+    outcome: Fulfilled | Failed | None = None
     direct: bool = False
 
 
-def step(request: Request, seen: Seen, now: float) -> Step:
+def step(request: Request, seen: RequestProgress, now: float) -> SendStep:
     """What to do now."""
     over = request.outcome(seen)
     if over is not None:
-        return Step(outcome=over)
+        return SendStep(outcome=over)
     late = now >= seen.began_at + min(HINT_AFTER_S, seen.timeout_s)
     if late and (wrong_kind := request.misnamed(seen)):
-        return Step(outcome=Failed(wrong_kind))
+        return SendStep(outcome=Failed(wrong_kind))
     if now >= seen.began_at + seen.timeout_s:
-        return Step(outcome=Failed(_reason(request, seen, now)))
+        return SendStep(outcome=Failed(_reason(request, seen, now)))
     hint, direct = _hint(request, seen, now), request.goes_direct(seen, now)
     if not _may_send(request, seen, now, direct=direct):
-        return Step(hint=hint)
-    return Step(request.message(seen), hint, direct=direct)
+        return SendStep(hint=hint)
+    return SendStep(request.message(seen), hint, direct=direct)
 
 
-def _may_send(request: Request, seen: Seen, now: float, *, direct: bool) -> bool:
+def _may_send(request: Request, seen: RequestProgress, now: float, *, direct: bool) -> bool:
     if seen.last_sent_at is not None:
         return now >= seen.last_sent_at + REPEAT_S
     heard_or_late = request.ready(seen) or now >= seen.began_at + PATIENCE_S
     return (direct or seen.listeners > 0) and heard_or_late
 
 
-def _hint(request: Request, seen: Seen, now: float) -> str:
+def _hint(request: Request, seen: RequestProgress, now: float) -> str:
     """What the user can do, before the timeout."""
     if now < seen.began_at + HINT_AFTER_S:
         return ""
@@ -66,7 +66,7 @@ def _hint(request: Request, seen: Seen, now: float) -> str:
     return _said(obstacle) if obstacle.remedy else ""
 
 
-def _reason(request: Request, seen: Seen, now: float) -> str:
+def _reason(request: Request, seen: RequestProgress, now: float) -> str:
     """Why the request timed out, and where to look next."""
     if missed := _missed(request, seen):
         return _given_up("", seen) if _said(missed) in seen.hinted else _said(missed)
@@ -81,14 +81,14 @@ def _reason(request: Request, seen: Seen, now: float) -> str:
     )
 
 
-def _missed(request: Request, seen: Seen) -> Obstacle | None:
+def _missed(request: Request, seen: RequestProgress) -> Obstacle | None:
     """Who is not on the graph: whoever takes the request, or the device."""
     if seen.first_sent_at is None and seen.listeners == 0:
         return request.nobody(seen)
     return None if seen.states else request.unheard(seen)
 
 
-def _given_up(more: str, seen: Seen) -> str:
+def _given_up(more: str, seen: RequestProgress) -> str:
     """The end of a wait whose reason was said when it began."""
     return f"gave up after {seen.timeout_s:g} s{more}"
 

@@ -5,7 +5,7 @@ from typing import Final
 from bridges.messages import definitions as d
 from bridges.messages.heard import Heard
 from bridges.observe.charger import ObservedCharger
-from workbench.judge.history import NOT_YET, Scene, keep
+from workbench.judge.history import NOT_YET, History, keep
 
 IDLE: Final = d.ChargerStateValue.CHARGER_IDLE
 ASSIGNED: Final = d.ChargerStateValue.CHARGER_ASSIGNED
@@ -16,7 +16,7 @@ UNREQUESTED: Final = "unrequested/"
 """Whatever follows it, nobody asked for this charge. A station's next one may have the same id."""
 
 
-class ChargerScene(Scene[d.ChargerState]):
+class ChargerHistory(History[d.ChargerState]):
     """`requests`: by id, the latest. `cancels`: id -> when it was first cancelled; the cancel of a
     charge that nobody requested is forgotten with it. `foreign_at`: the last cancel of an id that the
     station does not show."""

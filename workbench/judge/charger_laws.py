@@ -12,7 +12,7 @@ from workbench.judge.charger_history import (
     ERROR,
     IDLE,
     RELEASED,
-    ChargerScene,
+    ChargerHistory,
     unrequested,
 )
 from workbench.judge.history import NOT_YET
@@ -26,28 +26,28 @@ FOREIGN_S: Final = 2.0
 UNREACHED_S: Final = 15.0
 
 
-def _numbers(scene: ChargerScene) -> Finding:
-    if scene.new is None:
+def _numbers(history: ChargerHistory) -> Finding:
+    if history.new is None:
         return None
-    known = scene.new.state in list(d.ChargerStateValue)
-    return KEPT if known else f"state {scene.new.state}: RMF has no such number"
+    known = history.new.state in list(d.ChargerStateValue)
+    return KEPT if known else f"state {history.new.state}: RMF has no such number"
 
 
-def _known(scene: ChargerScene) -> d.ChargerState | None:
+def _known(history: ChargerHistory) -> d.ChargerState | None:
     """The state, if it is one of RMF's."""
-    state = scene.new
+    state = history.new
     return state if state is not None and state.state in list(d.ChargerStateValue) else None
 
 
-def _has_id(scene: ChargerScene) -> Finding:
-    state = _known(scene)
+def _has_id(history: ChargerHistory) -> Finding:
+    state = _known(history)
     if state is None or state.state == IDLE:
         return None
     return KEPT if state.request_id else f"no request_id: {words.described(state)}"
 
 
-def _has_text(scene: ChargerScene) -> Finding:
-    state = _known(scene)
+def _has_text(history: ChargerHistory) -> Finding:
+    state = _known(history)
     if state is None:
         return None
     if (state.state == ERROR) == bool(state.error_message):
@@ -58,9 +58,9 @@ def _has_text(scene: ChargerScene) -> Finding:
     return f"{word}, and error_message is {shown(state.error_message)}"
 
 
-def _same_robot(scene: ChargerScene) -> Finding:
-    state = _known(scene)
-    asked = scene.requests.get(state.request_id) if state else None
+def _same_robot(history: ChargerHistory) -> Finding:
+    state = _known(history)
+    asked = history.requests.get(state.request_id) if state else None
     if state is None or asked is None or state.state == IDLE:
         return None
     wanted = asked.fleet_name, asked.robot_name
@@ -70,10 +70,10 @@ def _same_robot(scene: ChargerScene) -> Finding:
     return f"{whose}: {words.described(state)}"
 
 
-def _keeps(scene: ChargerScene) -> Finding:
+def _keeps(history: ChargerHistory) -> Finding:
     """One charge belongs to one request. What nobody requested becomes its own robot's charge when that
     robot's request comes, and a node that has started again may know of no request."""
-    state, before = scene.new, scene.before
+    state, before = history.new, history.before
     if state is None or before is None or (before.state, state.state) != (CHARGING, CHARGING):
         return None
     same = state.request_id == before.request_id or unrequested(state.request_id)
@@ -92,12 +92,12 @@ def _whose(state: d.ChargerState) -> str:
     return f"{shown(state.request_id)} of {shown('/'.join(_robot(state)))}"
 
 
-def _starts_in_time(scene: ChargerScene) -> Finding:
-    state = scene.new
-    asked = scene.requests.get(state.request_id) if state else None
+def _starts_in_time(history: ChargerHistory) -> Finding:
+    state = history.new
+    asked = history.requests.get(state.request_id) if state else None
     if state is None or asked is None or state.state != ASSIGNED:
         return None
-    limit_s, kept_s = in_seconds(asked.start_timeout), scene.now - scene.same_since
+    limit_s, kept_s = in_seconds(asked.start_timeout), history.now - history.same_since
     if limit_s <= 0.0:
         return None
     if kept_s <= limit_s + LATE_S:
@@ -106,34 +106,34 @@ def _starts_in_time(scene: ChargerScene) -> Finding:
     return f"assigned to {who} for {kept_s:.0f} s; its start_timeout is {limit_s:.0f} s"
 
 
-def _cancels(scene: ChargerScene) -> Finding:
-    state = scene.new
+def _cancels(history: ChargerHistory) -> Finding:
+    state = history.new
     if state is None:
         return None
-    at = scene.cancels.get(state.request_id, NOT_YET)
+    at = history.cancels.get(state.request_id, NOT_YET)
     if at == NOT_YET:
         return None
     limit_s = {ASSIGNED: CANCELLED_WITHIN_S, CHARGING: RAMPS_DOWN_S}.get(
         d.ChargerStateValue(state.state) if state.state in list(d.ChargerStateValue) else IDLE
     )
-    if limit_s is None or scene.now - at <= limit_s:
+    if limit_s is None or history.now - at <= limit_s:
         return KEPT
-    return f"{words.described(state)} {scene.now - at:.0f} s after its ChargerCancel"
+    return f"{words.described(state)} {history.now - at:.0f} s after its ChargerCancel"
 
 
-def _foreign_cancel(scene: ChargerScene) -> Finding:
-    state, before = scene.new, scene.before
+def _foreign_cancel(history: ChargerHistory) -> Finding:
+    state, before = history.new, history.before
     if state is None or before is None or before.state != ASSIGNED or not before.request_id:
         return None
     if unrequested(before.request_id):
         return None  # it ends when its robot leaves, which nobody announces
-    if scene.now - scene.foreign_at > FOREIGN_S:
+    if history.now - history.foreign_at > FOREIGN_S:
         return None
-    if state.state not in (IDLE, RELEASED) or before.request_id in scene.cancels:
+    if state.state not in (IDLE, RELEASED) or before.request_id in history.cancels:
         return KEPT
     mine = before.request_id
     text = f"the ChargerCancel of another request ended {shown(mine)}"
-    return Doubt(text, lambda: mine in scene.cancels)
+    return Doubt(text, lambda: mine in history.cancels)
 
 
 def _claims(state: d.ChargerState) -> bool:
@@ -142,7 +142,7 @@ def _claims(state: d.ChargerState) -> bool:
 
 CHARGER_STATE: Final = "ChargerState.msg"
 
-LAWS: Final[tuple[Law[ChargerScene], ...]] = (
+LAWS: Final[tuple[Law[ChargerHistory], ...]] = (
     named(
         RATE,
         "C4.rate",

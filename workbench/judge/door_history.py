@@ -7,7 +7,7 @@ from bridges.messages import definitions as d
 from bridges.messages import topics
 from bridges.messages.heard import Heard
 from bridges.observe.door import ObservedDoor
-from workbench.judge.history import NOT_YET, Scene
+from workbench.judge.history import NOT_YET, History
 
 CLOSED: Final = d.DoorModeValue.MODE_CLOSED
 OPEN: Final = d.DoorModeValue.MODE_OPEN
@@ -22,7 +22,7 @@ OPENING_S: Final = 1.0
 """No operator reverses an opening door sooner than this."""
 
 
-class DoorScene(Scene[d.DoorState]):
+class DoorHistory(History[d.DoorState]):
     """`latched`: the last request was OPEN. `asked_at`: the first OPEN of this latch; `asked`: how many
     since the door was last seen other than closed, at `not_closed_at`. `closed_at`: the last CLOSE on
     door_requests; `adapter_closed_at`: that of a fleet adapter to the supervisor. `was_open`: the

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from typing import Final
 
 from bridges.messages import definitions as d
-from workbench.judge.door_history import CLOSED, OPEN, DoorScene
+from workbench.judge.door_history import CLOSED, OPEN, DoorHistory
 from workbench.judge.law import KEPT, Doubt, Finding, Law
 from workbench.judge.shared_laws import ANSWERED, ONE, RATE, STAMP, fresh, named, stamped
 
@@ -19,87 +19,87 @@ FLICKERS_S: Final = 0.9
 """No door can close and open again in this time."""
 
 
-def _numbers(scene: DoorScene) -> Finding:
-    if scene.new is None:
+def _numbers(history: DoorHistory) -> Finding:
+    if history.new is None:
         return None
-    known = scene.mode in list(d.DoorModeValue)
-    return KEPT if known else f"current_mode {scene.mode}: RMF has no such number"
+    known = history.mode in list(d.DoorModeValue)
+    return KEPT if known else f"current_mode {history.mode}: RMF has no such number"
 
 
-def _opens(scene: DoorScene) -> Finding:
-    if scene.new is None or not scene.latched:
+def _opens(history: DoorHistory) -> Finding:
+    if history.new is None or not history.latched:
         return None
-    if scene.mode != CLOSED:
+    if history.mode != CLOSED:
         return KEPT
-    closed_s = scene.now - max(scene.asked_at, scene.not_closed_at)
-    if closed_s < OPENS_WITHIN_S or scene.openings < ASKED:
+    closed_s = history.now - max(history.asked_at, history.not_closed_at)
+    if closed_s < OPENS_WITHIN_S or history.openings < ASKED:
         return None
-    return f"closed, though OPEN was requested {scene.openings} times in {closed_s:.0f} s"
+    return f"closed, though OPEN was requested {history.openings} times in {closed_s:.0f} s"
 
 
-def _left_open(scene: DoorScene) -> bool:
+def _left_open(history: DoorHistory) -> bool:
     """Was it open for a requester, and has it just ceased to be?"""
-    moves = scene.mode in (CLOSED, d.DoorModeValue.MODE_MOVING)
-    return scene.latched and scene.was_open and moves and scene.mode_before == OPEN
+    moves = history.mode in (CLOSED, d.DoorModeValue.MODE_MOVING)
+    return history.latched and history.was_open and moves and history.mode_before == OPEN
 
 
-def _bypass(scene: DoorScene) -> bool:
-    return scene.now - scene.adapter_closed_at < BYPASS_S
+def _bypass(history: DoorHistory) -> bool:
+    return history.now - history.adapter_closed_at < BYPASS_S
 
 
-def _stays(scene: DoorScene) -> Finding:
+def _stays(history: DoorHistory) -> Finding:
     """Silence must not close it."""
-    if scene.new is None or not scene.latched or not scene.was_open:
+    if history.new is None or not history.latched or not history.was_open:
         return None
-    if not _left_open(scene) or _bypass(scene):
-        return KEPT if scene.mode == OPEN else None
-    return Doubt("no longer open, though the last request was OPEN", _comes_back(scene))
+    if not _left_open(history) or _bypass(history):
+        return KEPT if history.mode == OPEN else None
+    return Doubt("no longer open, though the last request was OPEN", _comes_back(history))
 
 
-def _comes_back(scene: DoorScene) -> Callable[[], bool]:
+def _comes_back(history: DoorHistory) -> Callable[[], bool]:
     """Excused if a CLOSE was on its way, or if the contact only flickered: another law judges that."""
-    left_at = scene.now
+    left_at = history.now
 
     def excused() -> bool:
-        flickered = scene.mode == OPEN and scene.now - left_at < FLICKERS_S
-        return flickered or not scene.latched
+        flickered = history.mode == OPEN and history.now - left_at < FLICKERS_S
+        return flickered or not history.latched
 
     return excused
 
 
-def _bypassed(scene: DoorScene) -> Finding:
+def _bypassed(history: DoorHistory) -> Finding:
     """A fleet adapter's CLOSE is for the supervisor."""
-    if scene.new is None or not scene.latched or not _bypass(scene):
+    if history.new is None or not history.latched or not _bypass(history):
         return None
-    if not _left_open(scene):
-        return KEPT if scene.mode == OPEN else None
+    if not _left_open(history):
+        return KEPT if history.mode == OPEN else None
     text = "no longer open after a fleet adapter's CLOSE, though the supervisor holds it open"
-    return Doubt(text, _comes_back(scene))
+    return Doubt(text, _comes_back(history))
 
 
-def _holds(scene: DoorScene) -> Finding:
-    if scene.new is None or not scene.latched or scene.mode != OPEN:
+def _holds(history: DoorHistory) -> Finding:
+    if history.new is None or not history.latched or history.mode != OPEN:
         return None
-    often = len(scene.reopened) == REOPENED
-    if often and scene.now - scene.reopened[0] < REOPENED_WITHIN_S:
+    often = len(history.reopened) == REOPENED
+    if often and history.now - history.reopened[0] < REOPENED_WITHIN_S:
         return f"open, not open and open again within 1 s, {REOPENED} times while it is held"
     return KEPT
 
 
-def _travels(scene: DoorScene) -> Finding:
-    if scene.new is None or not scene.opened:
+def _travels(history: DoorHistory) -> Finding:
+    if history.new is None or not history.opened:
         return None
-    if scene.instant < INSTANT:
+    if history.instant < INSTANT:
         return KEPT
-    return f"closed, and OPEN within 0.3 s of the request, {scene.instant} times in a row"
+    return f"closed, and OPEN within 0.3 s of the request, {history.instant} times in a row"
 
 
-def _people(scene: DoorScene) -> Finding:
-    if scene.new is None or not scene.left:
+def _people(history: DoorHistory) -> Finding:
+    if history.new is None or not history.left:
         return None
-    if scene.shut < SHUT:
+    if history.shut < SHUT:
         return KEPT
-    return f"opened by people, and closed as soon as RMF sent CLOSE, {scene.shut} times in a row"
+    return f"opened by people, and closed as soon as RMF sent CLOSE, {history.shut} times in a row"
 
 
 def _opened(state: d.DoorState) -> bool:
@@ -114,7 +114,7 @@ def _blind(state: d.DoorState) -> bool:
 DOOR_OPEN: Final = "rmf_ros2 phases/DoorOpen.cpp"
 SUPERVISOR: Final = "rmf_ros2 door_supervisor/Node.cpp:148-156"
 
-LAWS: Final[tuple[Law[DoorScene], ...]] = (
+LAWS: Final[tuple[Law[DoorHistory], ...]] = (
     named(RATE, "D1.rate", reason="A fleet adapter enters only on a state that says OPEN now"),
     named(
         ANSWERED,

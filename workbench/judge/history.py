@@ -1,6 +1,6 @@
 """What is remembered of one device while its messages are heard; bounded, however many come.
 
-A scene takes messages and decides nothing; laws read it. This file has what all three kinds share:
+A history takes messages and decides nothing; laws read it. This file has what all three kinds share:
 what was heard of the device, the pace of its states, their stamps, and what followed a request.
 """
 
@@ -18,7 +18,7 @@ from bridges.observe.limits import SLOWEST_S
 from bridges.observe.requesters import Moment
 
 REMEMBERED: Final = 200
-"""How many requesters a scene remembers; a site has some dozens."""
+"""How many requesters a history remembers; a site has some dozens."""
 BURST: Final = 20
 FROZEN_S: Final = 0.05
 ANSWERS_WITHIN_S: Final = 0.1
@@ -39,7 +39,7 @@ def keep(known: dict[str, V], key: str, value: V) -> None:
         del known[next(iter(known))]
 
 
-class Scene(ABC, Generic[T]):
+class History(ABC, Generic[T]):
     """One device. Times are those of what was heard (s).
 
     `news`: the message taken last, None when only time has passed. `seen`: what was heard of it.

@@ -9,17 +9,17 @@ from bridges.messages.heard import Heard
 from bridges.messages.words import KINDS as KINDS
 from bridges.messages.words import Kind as Kind
 from workbench.judge import charger_laws, door_laws, lift_laws
-from workbench.judge.charger_history import ChargerScene
-from workbench.judge.door_history import DoorScene
-from workbench.judge.history import Scene
-from workbench.judge.law import Doubt, Evidence, Judged, Law, Verdict
-from workbench.judge.lift_history import LiftScene
+from workbench.judge.charger_history import ChargerHistory
+from workbench.judge.door_history import DoorHistory
+from workbench.judge.history import History
+from workbench.judge.law import Doubt, Evidence, JudgedLaw, Law, Verdict
+from workbench.judge.lift_history import LiftHistory
 
 LAWS: Final[Mapping[Kind, tuple[Law[Any], ...]]] = MappingProxyType(
     {"lift": lift_laws.LAWS, "door": door_laws.LAWS, "charger": charger_laws.LAWS}
 )
-SCENES: Final[Mapping[Kind, type[Scene[Any]]]] = MappingProxyType(
-    {"lift": LiftScene, "door": DoorScene, "charger": ChargerScene}
+SCENES: Final[Mapping[Kind, type[History[Any]]]] = MappingProxyType(
+    {"lift": LiftHistory, "door": DoorHistory, "charger": ChargerHistory}
 )
 LEEWAY_S: Final = 1.0
 """How far apart in time (s) two topics may be heard."""
@@ -43,11 +43,11 @@ class _Tally:
         if len(self.evidence) < SHOWN:
             self.evidence.append(heard)
 
-    def judged(self) -> Judged:
+    def judged(self) -> JudgedLaw:
         """The law with its verdict."""
         if self.broken:
-            return Judged(self.law, Verdict.BROKEN, self.broken, tuple(self.evidence))
-        return Judged(self.law, Verdict.KEPT if self.kept else Verdict.NOT_SEEN, self.kept)
+            return JudgedLaw(self.law, Verdict.BROKEN, self.broken, tuple(self.evidence))
+        return JudgedLaw(self.law, Verdict.KEPT if self.kept else Verdict.NOT_SEEN, self.kept)
 
 
 class Judge:
@@ -60,7 +60,7 @@ class Judge:
         ids = {law.id for law in LAWS[kind]} if only is None else set(only)
         self.kind: Kind = kind
         self.name = name
-        self.scene = SCENES[kind](name)
+        self.history = SCENES[kind](name)
         self.first: Heard | None = None
         self.broken = False
         self._volatile_before: bool | None = None
@@ -69,7 +69,7 @@ class Judge:
     def hear(self, heard: Heard) -> None:
         """Take the next message, of any device, in order of arrival."""
         self.first = self.first or heard
-        if self.scene.take(heard):
+        if self.history.take(heard):
             for tally in self._tallies:
                 self._check(tally, heard.at, heard.wall)
         self._resolve(heard.at)
@@ -82,25 +82,25 @@ class Judge:
         Jazzy's lift supervisor has a volatile publisher, and never uses it (rmf_ros2 7eef65a,
         lift_supervisor/Node.cpp:52). Only what is found twice counts, because ends are discovered
         one by one."""
-        if isinstance(self.scene, LiftScene) and publishers and not self.scene.others:
+        if isinstance(self.history, LiftHistory) and publishers and not self.history.others:
             volatile = publishers - retaining
             found = None if 0 < volatile <= supervisors else volatile > 0
-            self.scene.volatile = found if found == self._volatile_before else None
+            self.history.volatile = found if found == self._volatile_before else None
             self._volatile_before = found
             for tally in self._tallies:
                 if tally.law.id == "L12.retained":
                     self._check(tally, at, wall)
 
-    def end(self, at: float, wall: float) -> tuple[Judged, ...]:
+    def end(self, at: float, wall: float) -> tuple[JudgedLaw, ...]:
         """End the hearing. Returns each law with its verdict, in the laws' order."""
-        self.scene.pass_time(at)
-        if self.scene.states:
+        self.history.pass_time(at)
+        if self.history.states:
             for tally in self._tallies:
                 self._check(tally, at, wall)
         self._resolve(at)
         return self.verdicts()
 
-    def verdicts(self) -> tuple[Judged, ...]:
+    def verdicts(self) -> tuple[JudgedLaw, ...]:
         """Each law with its verdict so far."""
         return tuple(tally.judged() for tally in self._tallies)
 
@@ -109,7 +109,7 @@ class Judge:
         tally.found(evidence)
 
     def _check(self, tally: _Tally, at: float, wall: float) -> None:
-        finding = tally.law.check(self.scene)
+        finding = tally.law.check(self.history)
         if finding is None:
             return
         if isinstance(finding, Doubt):

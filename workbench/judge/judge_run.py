@@ -10,7 +10,7 @@ from typing import Final
 
 from bridges.messages.heard import Heard
 from workbench.judge.judge import Judge
-from workbench.judge.scenarios import LEAVES_S, REPEAT_S, Performance
+from workbench.judge.scenarios import LEAVES_S, REPEAT_S, Scenario
 from workbench.judge.shared_laws import BURST_WITHIN_S
 from workbench.rmf_model import NEVER, Said
 
@@ -32,7 +32,7 @@ class Act(Enum):
     DONE = auto()
 
 
-class Stage:
+class JudgeRun:
     """`for_s`: how long to listen without a play; inf: until `stop`. `strangers()`: who else
     publishes on the play's topics, "" for nobody. `note`: why a play was not played, or not to its
     end.
@@ -41,16 +41,16 @@ class Stage:
     def __init__(
         self,
         judge: Judge,
-        performance: Performance | None,
+        scenario: Scenario | None,
         for_s: float,
         strangers: Callable[[], str] = lambda: "",
     ) -> None:
         self.judge = judge
         self.act = Act.LISTEN
         self.note = ""
-        self._performance = performance
+        self._scenario = scenario
         self._strangers = strangers
-        self._for_s = for_s if performance is None else LISTENS_S
+        self._for_s = for_s if scenario is None else LISTENS_S
         self.began_at = 0.0
         self._until = NEVER
         self._leave_until = NEVER
@@ -73,14 +73,14 @@ class Stage:
         """A message of the graph, ours not among them."""
         self._last = (heard.at, heard.wall)
         self.judge.hear(heard)
-        if self._performance is None or self.act not in (Act.PLAY, Act.LEAVE):
+        if self._scenario is None or self.act not in (Act.PLAY, Act.LEAVE):
             return []
-        if heard.topic not in (topic.name for topic in self._performance.hears):
+        if heard.topic not in (topic.name for topic in self._scenario.hears):
             return []
-        said = self._performance.hear(heard.topic, heard.message, self._now)
+        said = self._scenario.hear(heard.topic, heard.message, self._now)
         if self.act is not Act.PLAY:
             return []
-        if self.judge.scene.burst_s < BURST_WITHIN_S:
+        if self.judge.history.burst_s < BURST_WITHIN_S:
             self.note = "stopped: each request causes a state, and RMF asks at each state"
             return self._begin_leaving()
         return self._told(said)
@@ -101,8 +101,8 @@ class Stage:
 
     def wake_at(self) -> float:
         """When to call `turn` at the latest (monotonic s)."""
-        if self.act is Act.PLAY and self._performance is not None:
-            return min(self._performance.wake_at() - self._epoch, self._last[0] + REPEAT_S)
+        if self.act is Act.PLAY and self._scenario is not None:
+            return min(self._scenario.wake_at() - self._epoch, self._last[0] + REPEAT_S)
         return NEVER if self.act is Act.DONE else self._until
 
     def stop(self) -> list[Said]:
@@ -122,49 +122,47 @@ class Stage:
         return self._epoch + self._last[0]
 
     def _begin_play(self) -> list[Said]:
-        state = self.judge.scene.state
-        if self._performance is None:
+        state = self.judge.history.state
+        if self._scenario is None:
             self.act = Act.DONE
             return []
         if state is None and self._last[0] < self.began_at + APPEARS_S:
             self._until = self._last[0] + REPEAT_S
             return []
-        self.note = self._strangers() or (
-            self._performance.unfit(state) if state is not None else ""
-        )
+        self.note = self._strangers() or (self._scenario.unfit(state) if state is not None else "")
         if state is None or self.note:
             self.act = Act.DONE
             return []
         self.act = Act.PLAY
-        return self._told(self._performance.begin(self._now)) + self._play_on()
+        return self._told(self._scenario.begin(self._now)) + self._play_on()
 
     def _play_on(self) -> list[Said]:
-        assert self._performance is not None
+        assert self._scenario is not None
         self.note = self._strangers()
-        said = [] if self.note else self._told(self._performance.tick(self._now))
-        if not (self.note or self._performance.over):
+        said = [] if self.note else self._told(self._scenario.tick(self._now))
+        if not (self.note or self._scenario.over):
             return said
-        self.note = self.note or self._performance.why
+        self.note = self.note or self._scenario.why
         return said + self._begin_leaving()
 
     def _begin_leaving(self) -> list[Said]:
         self.act, self._leave_until = Act.LEAVE, self._last[0] + LEAVES_S
-        assert self._performance is not None
-        if not self.note and self._performance.left:
+        assert self._scenario is not None
+        if not self.note and self._scenario.left:
             self._settle()
             return []
         return self._leave_on()
 
     def _leave_on(self) -> list[Said]:
-        assert self._performance is not None
+        assert self._scenario is not None
         late = self._last[0] >= self._leave_until
-        if self._performance.left or late:
-            if not self._performance.left:
+        if self._scenario.left or late:
+            if not self._scenario.left:
                 self.note = f"{self.note or 'played'}; and the device was not released".lstrip("; ")
             self._settle()
             return []
         self._until = self._last[0] + REPEAT_S
-        return self._told(self._performance.leave(self._now))
+        return self._told(self._scenario.leave(self._now))
 
     def _settle(self) -> None:
         self.act = Act.DONE if self._in_haste else Act.SETTLE

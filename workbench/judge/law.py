@@ -42,7 +42,7 @@ KEPT: Final = ""
 class Law(Generic[S_contra]):
     """One sentence of RMF's contract, and how it is checked after each message.
 
-    `source`: where it can be read. `check(scene)`: a pure function of what has been heard.
+    `source`: where it can be read. `check(history)`: a pure function of what has been heard.
     `sensed`: a stuck or noisy wire below a correct node can break it too.
     """
 
@@ -64,7 +64,7 @@ class Evidence:
 
 
 @dataclass(frozen=True, slots=True)
-class Judged:
+class JudgedLaw:
     """A law and what was found. `times`: how often it was kept or broken; `evidence`: the first few."""
 
     law: Law[object]

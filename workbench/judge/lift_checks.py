@@ -7,7 +7,7 @@ from bridges.messages import words
 from bridges.observe.lift import HAZARDS
 from workbench.judge.history import NOT_YET
 from workbench.judge.law import KEPT, Doubt, Finding, shown
-from workbench.judge.lift_history import GRACE_S, LATE_S, LiftScene
+from workbench.judge.lift_history import GRACE_S, LATE_S, LiftHistory
 
 ENDS_WITHIN_S: Final = 3.0
 """A state period of 2 s, and one scan."""
@@ -28,13 +28,13 @@ def opened(state: d.LiftState) -> bool:
     return state.door_state == d.LiftDoor.DOOR_OPEN
 
 
-def _is_open(scene: LiftScene) -> d.LiftState | None:
-    state = scene.new
+def _is_open(history: LiftHistory) -> d.LiftState | None:
+    state = history.new
     return state if state is not None and opened(state) else None
 
 
-def numbers(scene: LiftScene) -> Finding:
-    state = scene.new
+def numbers(history: LiftHistory) -> Finding:
+    state = history.new
     if state is None:
         return None
     found = [
@@ -50,44 +50,48 @@ def numbers(scene: LiftScene) -> Finding:
     return f"{', '.join(found[:3])}: RMF has no such number" if found else KEPT
 
 
-def other_lift(scene: LiftScene) -> Finding:
+def other_lift(history: LiftHistory) -> Finding:
     """The lift is not given to a session that only asked for another lift."""
-    session = scene.session
-    if scene.new is None or not session or session == scene.session_before:
+    session = history.session
+    if history.new is None or not session or session == history.session_before:
         return None
-    if session not in scene.elsewhere or scene.before is None:
+    if session not in history.elsewhere or history.before is None:
         return KEPT
     return Doubt(
         f"held by {shown(session)}, which only asked for another lift",
-        lambda: session in scene.asks,
+        lambda: session in history.asks,
     )
 
 
-def own_name(scene: LiftScene) -> Finding:
+def own_name(history: LiftHistory) -> Finding:
     """The lift is not given to a session that did not ask."""
-    session = scene.session
-    if scene.new is None or scene.before is None or not session:
+    session = history.session
+    if history.new is None or history.before is None or not session:
         return None
-    if session == scene.session_before:
+    if session == history.session_before:
         return None
-    if session in scene.asks or session in scene.elsewhere or scene.now - scene.since < SETTLED_S:
+    if (
+        session in history.asks
+        or session in history.elsewhere
+        or history.now - history.since < SETTLED_S
+    ):
         return KEPT
     return Doubt(
-        f"held by {shown(session)}, which never asked for it", lambda: session in scene.asks
+        f"held by {shown(session)}, which never asked for it", lambda: session in history.asks
     )
 
 
-def grants(scene: LiftScene) -> Finding:
+def grants(history: LiftHistory) -> Finding:
     """The first request on a free lift in service is granted."""
-    if scene.new is None or scene.before is None:
+    if history.new is None or history.before is None:
         return None
-    if scene.session:
-        return KEPT if scene.session != scene.session_before else None
-    free_s = scene.now - scene.free_since
-    for session, ask in list(scene.asks.items()):
-        asked = ask.direct and ask.times >= GRANT_ASKED and scene.now - ask.direct_at < 3.0
-        served = ask.floors[-1] in scene.new.available_floors or not scene.new.available_floors
-        long_s = min(free_s, scene.now - ask.since)
+    if history.session:
+        return KEPT if history.session != history.session_before else None
+    free_s = history.now - history.free_since
+    for session, ask in list(history.asks.items()):
+        asked = ask.direct and ask.times >= GRANT_ASKED and history.now - ask.direct_at < 3.0
+        served = ask.floors[-1] in history.new.available_floors or not history.new.available_floors
+        long_s = min(free_s, history.now - ask.since)
         if asked and served and session and not ask.human and long_s > GRANTS_WITHIN_S:
             return (
                 f"{shown(session)} has asked {ask.times} times in {long_s:.0f} s; the lift is free"
@@ -95,128 +99,126 @@ def grants(scene: LiftScene) -> Finding:
     return None
 
 
-def bypassed(scene: LiftScene) -> Finding:
+def bypassed(history: LiftHistory) -> Finding:
     """Requests of fleet adapters to the supervisor grant nothing."""
-    session = scene.session
-    if scene.new is None or scene.before is None or session in ("", scene.session_before):
+    session = history.session
+    if history.new is None or history.before is None or session in ("", history.session_before):
         return None
-    ask = scene.asks.get(session)
-    if ask is None or ask.direct or scene.now - scene.other_asked_at > 10.0:
+    ask = history.asks.get(session)
+    if ask is None or ask.direct or history.now - history.other_asked_at > 10.0:
         return KEPT if ask else None
 
     def excused() -> bool:
-        later = scene.asks.get(session)
+        later = history.asks.get(session)
         return later is not None and later.direct
 
     text = f"held by {shown(session)}, for which the supervisor has not asked"
     return Doubt(text, excused)
 
 
-def ended_unasked(scene: LiftScene) -> Finding:
+def ended_unasked(history: LiftHistory) -> Finding:
     """A session ends only by its own END."""
-    old, new, since = scene.session_before, scene.session, scene.held_since
-    if scene.new is None or scene.before is None or old in ("", new):
+    old, new, since = history.session_before, history.session, history.held_since
+    if history.new is None or history.before is None or old in ("", new):
         return None
-    ask = scene.asks.get(old)
-    if scene.has_ended(old, since) or (ask and ask.human) or _foreign_end(scene, old, since):
+    ask = history.asks.get(old)
+    if history.has_ended(old, since) or (ask and ask.human) or _foreign_end(history, old, since):
         return KEPT
     what = f"session {shown(old)} became {shown(new)}" if new else f"session {shown(old)} ended"
 
     def excused() -> bool:
-        return scene.has_ended(old, since) or bool(_foreign_end(scene, old, since))
+        return history.has_ended(old, since) or bool(_foreign_end(history, old, since))
 
     return Doubt(f"{what}, and no END_SESSION for it was heard", excused)
 
 
-def _foreign_end(scene: LiftScene, session: str, since: float) -> str:
+def _foreign_end(history: LiftHistory, session: str, since: float) -> str:
     """The session whose END has just come, if this session's has not come since then; "" for none."""
-    if scene.has_ended(session, since):
+    if history.has_ended(session, since):
         return ""
-    others = (who for who in scene.ended if who not in ("", session))
-    return next((who for who in others if scene.now - scene.ended[who] < FOREIGN_S), "")
+    others = (who for who in history.ended if who not in ("", session))
+    return next((who for who in others if history.now - history.ended[who] < FOREIGN_S), "")
 
 
-def ended_by_another(scene: LiftScene) -> Finding:
+def ended_by_another(history: LiftHistory) -> Finding:
     """The END of a session that does not have the lift changes nothing."""
-    old = scene.session_before
-    if scene.new is None or scene.before is None or not old:
+    old = history.session_before
+    if history.new is None or history.before is None or not old:
         return None
-    since = scene.granted_at if old == scene.session else scene.held_since
-    other = _foreign_end(scene, old, since)
-    if not other or old not in scene.asks:
+    since = history.granted_at if old == history.session else history.held_since
+    other = _foreign_end(history, old, since)
+    if not other or old not in history.asks:
         return None
-    if old == scene.session:
+    if old == history.session:
         return KEPT
     text = f"END_SESSION of {shown(other)} ended the session of {shown(old)}"
-    return Doubt(text, lambda: scene.has_ended(old, since))
+    return Doubt(text, lambda: history.has_ended(old, since))
 
 
-def ends(scene: LiftScene) -> Finding:
+def ends(history: LiftHistory) -> Finding:
     """The holder's END ends the session, whatever floor and door it names."""
-    if scene.new is None:
+    if history.new is None:
         return None
-    if scene.bare_refused >= REFUSED:
+    if history.bare_refused >= REFUSED:
         return f"{REFUSED} sessions in a row outlived an END without a floor, as fleet adapters send it"
-    if scene.session_before and scene.session != scene.session_before:
+    if history.session_before and history.session != history.session_before:
         return KEPT
-    at = scene.ending.at
-    if at == NOT_YET or scene.now - at < ENDS_WITHIN_S:
+    at = history.ending.at
+    if at == NOT_YET or history.now - at < ENDS_WITHIN_S:
         return None
-    bare = scene.ending.bare_at == at and scene.ending.floor_at == NOT_YET
+    bare = history.ending.bare_at == at and history.ending.floor_at == NOT_YET
     floor = " without a floor" if bare else ""
-    return f"still held by {shown(scene.session)} {scene.now - at:.1f} s after its END{floor}"
+    return f"still held by {shown(history.session)} {history.now - at:.1f} s after its END{floor}"
 
 
-def stopped(scene: LiftScene) -> Finding:
-    state = _is_open(scene)
+def stopped(history: LiftHistory) -> Finding:
+    state = _is_open(history)
     if state is None:
         return None
     moving = state.motion_state in (d.LiftMotion.MOTION_UP, d.LiftMotion.MOTION_DOWN)
     return words.described(state) if moving else KEPT
 
 
-def somewhere(scene: LiftScene) -> Finding:
-    state = _is_open(scene)
+def somewhere(history: LiftHistory) -> Finding:
+    state = _is_open(history)
     if state is None:
         return None
     return KEPT if state.current_floor else words.described(state)
 
 
-def no_jump(scene: LiftScene) -> Finding:
-    state = _is_open(scene)
+def no_jump(history: LiftHistory) -> Finding:
+    state = _is_open(history)
     if state is None or not state.current_floor:
         return None
-    floor, at = scene.open_seen
-    if floor in ("", state.current_floor) or scene.now - at > JUMPS_WITHIN_S:
+    floor, at = history.open_seen
+    if floor in ("", state.current_floor) or history.now - at > JUMPS_WITHIN_S:
         return KEPT
-    return (
-        f"open at {shown(floor)}, and {scene.now - at:.1f} s later at {shown(state.current_floor)}"
-    )
+    return f"open at {shown(floor)}, and {history.now - at:.1f} s later at {shown(state.current_floor)}"
 
 
-def in_agv(scene: LiftScene) -> Finding:
+def in_agv(history: LiftHistory) -> Finding:
     """A robot is let in only while the car is not open to the public."""
-    state = scene.new
-    if state is None or not (scene.offers and scene.offered):
+    state = history.new
+    if state is None or not (history.offers and history.offered):
         return None
     if state.current_mode == d.LiftMode.MODE_HUMAN:
         return words.described(state)
     return KEPT if state.current_mode == d.LiftMode.MODE_AGV else None
 
 
-def holds(scene: LiftScene) -> Finding:
+def holds(history: LiftHistory) -> Finding:
     """The door stays open for the robot."""
-    state = _is_open(scene)
-    if state is None or not state.session_id or not scene.was_asked_to(state.current_floor):
+    state = _is_open(history)
+    if state is None or not state.session_id or not history.was_asked_to(state.current_floor):
         return None
-    often = len(scene.reopened) == REOPENED
-    if often and scene.now - scene.reopened[0] < REOPENED_WITHIN_S:
+    often = len(history.reopened) == REOPENED
+    if often and history.now - history.reopened[0] < REOPENED_WITHIN_S:
         return f"open, not open and open again within 1 s, {REOPENED} times in one stop"
     return KEPT
 
 
-def floors(scene: LiftScene) -> Finding:
-    state = scene.new
+def floors(history: LiftHistory) -> Finding:
+    state = history.new
     if state is None or not state.available_floors:
         return None
     if state.current_floor in ("", *state.available_floors):
@@ -224,24 +226,24 @@ def floors(scene: LiftScene) -> Finding:
     return f"current_floor {shown(state.current_floor)} is not one of its available_floors"
 
 
-def destination(scene: LiftScene) -> Finding:
+def destination(history: LiftHistory) -> Finding:
     """The car goes where its holder asked."""
-    state = scene.new
+    state = history.new
     if state is None or not state.session_id or not state.destination_floor:
         return None
-    if not scene.known or scene.was_asked_to(state.destination_floor):
+    if not history.known or history.was_asked_to(state.destination_floor):
         return KEPT
-    if state.session_id not in scene.asks:
+    if state.session_id not in history.asks:
         return None  # another law says so
     floor = state.destination_floor
     return Doubt(
         f"destination {shown(floor)}, which {shown(state.session_id)} did not ask for",
-        lambda: scene.was_asked_to(floor) or scene.session != state.session_id,
+        lambda: history.was_asked_to(floor) or history.session != state.session_id,
     )
 
 
-def unserved(scene: LiftScene) -> Finding:
-    state = scene.new
+def unserved(history: LiftHistory) -> Finding:
+    state = history.new
     if state is None or not state.available_floors or not state.destination_floor:
         return None
     if state.destination_floor in state.available_floors:
@@ -249,41 +251,41 @@ def unserved(scene: LiftScene) -> Finding:
     return f"destination {shown(state.destination_floor)} is not one of its available_floors"
 
 
-def lets_nobody_in(scene: LiftScene) -> Finding:
+def lets_nobody_in(history: LiftHistory) -> Finding:
     """Under a hazard no robot is let in."""
-    state = scene.new
+    state = history.new
     if state is None or state.current_mode not in HAZARDS or not state.session_id:
         return None
-    return words.described(state) if scene.offers else KEPT
+    return words.described(state) if history.offers else KEPT
 
 
-def grants_nothing(scene: LiftScene) -> Finding:
+def grants_nothing(history: LiftHistory) -> Finding:
     """Under a hazard no new session gets the lift."""
-    state, before = scene.new, scene.before
+    state, before = history.new, history.before
     if state is None or before is None or state.current_mode not in HAZARDS:
         return None
     new = state.session_id not in ("", before.session_id)
-    again = state.session_id == scene.last and scene.now - scene.last_at < GRACE_S + LATE_S
+    again = state.session_id == history.last and history.now - history.last_at < GRACE_S + LATE_S
     if not new or again or before.current_mode not in HAZARDS:
         return KEPT if before.current_mode in HAZARDS else None
     return f"granted in mode {words.word(d.LiftMode, state.current_mode)}: {words.described(state)}"
 
 
-def no_false(scene: LiftScene) -> Finding:
+def no_false(history: LiftHistory) -> Finding:
     """Only an operator calls an alarm off. With several lifts it is unknown which one published."""
-    if not isinstance(scene.news, d.Bool) or scene.others:
+    if not isinstance(history.news, d.Bool) or history.others:
         return None
-    often = len(scene.false_alarms) == FALSE
-    if often and scene.now - scene.false_alarms[0] < FALSE_WITHIN_S:
+    often = len(history.false_alarms) == FALSE
+    if often and history.now - history.false_alarms[0] < FALSE_WITHIN_S:
         return f"`false` {FALSE} times, with no alarm to call off"
     return KEPT
 
 
-def retained(scene: LiftScene) -> Finding:
+def retained(history: LiftHistory) -> Finding:
     """Fleets can hear the alarm."""
-    if scene.volatile is None:
+    if history.volatile is None:
         return None
-    return "its publisher is volatile: fleet adapters do not match it" if scene.volatile else KEPT
+    return "its publisher is volatile: fleet adapters do not match it" if history.volatile else KEPT
 
 
 def blind(state: d.LiftState) -> bool:

@@ -9,7 +9,7 @@ from bridges.messages import topics
 from bridges.messages.heard import Heard
 from bridges.observe.lift import HAZARDS, ObservedLift
 from bridges.observe.limits import SLOWEST_S
-from workbench.judge.history import NOT_YET, Scene, keep
+from workbench.judge.history import NOT_YET, History, keep
 
 GRACE_S: Final = 65.0
 """Until then the same session may resume: its robot may have been left in the car."""
@@ -48,7 +48,7 @@ class Ending:
     floor_at: float = NOT_YET
 
 
-class LiftScene(Scene[d.LiftState]):
+class LiftHistory(History[d.LiftState]):
     """`asks`, `elsewhere`: who asked for this lift, and for others. `ended`: session -> its last END.
     `granted_at`: since when the present session has been shown; `held_since`: the same of the session
     before. `known`: the beginning of the present one was seen. `last`: who had it before, until

@@ -4,14 +4,14 @@ from typing import Final
 
 from workbench.judge import lift_checks as checks
 from workbench.judge.law import Law
-from workbench.judge.lift_history import LiftScene
+from workbench.judge.lift_history import LiftHistory
 from workbench.judge.shared_laws import ANSWERED, ONE, RATE, STAMP, fresh, named, stamped
 
 A6: Final = "rmf_ros2 lift_supervisor/Node.cpp:58-140"
 REQUEST_LIFT: Final = "rmf_ros2 phases/RequestLift.cpp:322-326"
 CONTEXT: Final = "rmf_ros2 agv/RobotContext.cpp:1700-1735"
 
-LAWS: Final[tuple[Law[LiftScene], ...]] = (
+LAWS: Final[tuple[Law[LiftHistory], ...]] = (
     named(RATE, "L2.rate"),
     named(ANSWERED, "L2.answer"),
     named(ONE, "B0.one"),

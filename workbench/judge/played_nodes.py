@@ -12,7 +12,7 @@ from typing import Final
 from bridges.messages import definitions as d
 from bridges.messages import topics, words
 from workbench.rmf_model import NEVER, Party, Said
-from workbench.rmf_model.robot import Phase, Robot
+from workbench.rmf_model.robot import Phase, RobotContext
 
 DEAF_S: Final = 6.0
 """The played supervisor is silent for this long after an END without a floor. RMF's would send one with
@@ -20,7 +20,7 @@ a floor at once, and so hide that the first was refused."""
 RETAINED: Final = topics.ADAPTER_LIFT_REQUESTS.publish.depth
 
 Step = Phase | float
-Script = Callable[[Robot], Iterator[Step]]
+Script = Callable[[RobotContext], Iterator[Step]]
 """What a robot does: phases, and seconds in which it drives."""
 
 
@@ -28,7 +28,7 @@ class Traveller:
     """A robot with its fleet adapter. `waits_since`: when its phase began; inf while it drives."""
 
     def __init__(self, requester_id: str, script: Script) -> None:
-        self.robot = Robot(requester_id)
+        self.robot = RobotContext(requester_id)
         self.done = False
         self.waits_since = NEVER
         self._steps = script(self.robot)
@@ -61,8 +61,8 @@ class Traveller:
         return min(self.robot.wake_at(), drives)
 
 
-class Play:
-    """One performance for one device. `now` is RMF's clock (s since the epoch).
+class PlayedNodes:
+    """One scenario for one device. `now` is RMF's clock (s since the epoch).
 
     `supervisor`: makes a new one; None if one is on the graph. `over`: every step was done, or `failed`
     says why not. Methods return the messages to be published and judged.

@@ -9,7 +9,7 @@ import msgspec
 
 from bridges.messages import words
 from workbench.judge.judge import LAWS, Judge, Kind
-from workbench.judge.law import Evidence, Judged, Verdict, shown
+from workbench.judge.law import Evidence, JudgedLaw, Verdict, shown
 
 ORDER: Final = (Verdict.BROKEN, Verdict.KEPT, Verdict.NOT_SEEN)
 OTHERS: Final = 5
@@ -17,7 +17,7 @@ NARROWEST: Final = 60
 
 
 @dataclass(frozen=True, slots=True)
-class Report:
+class Judgement:
     """One judgement. `wall`: when it began (s since the epoch). `heard_s`: how long we listened.
     `states`: how many the device sent. `others`: other devices of its kind. `notes`: remarks of the
     listener."""
@@ -28,22 +28,22 @@ class Report:
     heard_s: float
     states: int
     others: tuple[str, ...]
-    judged: tuple[Judged, ...]
+    judged: tuple[JudgedLaw, ...]
     notes: tuple[str, ...] = ()
 
-    def of(self, verdict: Verdict) -> list[Judged]:
+    def of(self, verdict: Verdict) -> list[JudgedLaw]:
         """The laws with this verdict."""
         return [judged for judged in self.judged if judged.verdict is verdict]
 
 
-def report(judge: Judge, judged: tuple[Judged, ...], heard_s: float, *notes: str) -> Report:
+def report(judge: Judge, judged: tuple[JudgedLaw, ...], heard_s: float, *notes: str) -> Judgement:
     """What a judge has found."""
-    wall, scene = judge.first.wall if judge.first else 0.0, judge.scene
-    others = tuple(sorted(scene.others))
-    return Report(judge.kind, judge.name, wall, heard_s, scene.states, others, judged, notes)
+    wall, history = judge.first.wall if judge.first else 0.0, judge.history
+    others = tuple(sorted(history.others))
+    return Judgement(judge.kind, judge.name, wall, heard_s, history.states, others, judged, notes)
 
 
-def text(report: Report, width: int) -> str:
+def text(report: Judgement, width: int) -> str:
     """One screen: broken laws first, with their evidence; a line for each other one."""
     name = words.printable(report.name)
     if not report.states:
@@ -58,7 +58,7 @@ def text(report: Report, width: int) -> str:
     return "\n".join([*lines, *(f"\n{note}" for note in report.notes)])
 
 
-def _lines(judged: Judged, width: int) -> list[str]:
+def _lines(judged: JudgedLaw, width: int) -> list[str]:
     law, verdict = judged.law, judged.verdict
     line = f"{verdict.upper() if verdict is Verdict.BROKEN else verdict:8}  {law.id:14}  "
     if verdict is not Verdict.BROKEN:
@@ -81,7 +81,7 @@ def _time(wall: float) -> str:
         return f"{wall:.3f}"
 
 
-def _others(report: Report) -> str:
+def _others(report: Judgement) -> str:
     if not report.others:
         return (
             ": check the name, the domain and the network. States that are published BEST_EFFORT are"
@@ -117,12 +117,12 @@ class ReportJson(msgspec.Struct, frozen=True):
     laws: tuple[LawJson, ...]
 
 
-def verdict(report: Report) -> Verdict:
+def verdict(report: Judgement) -> Verdict:
     """The verdict on all laws together."""
     return next((v for v in ORDER if report.of(v)), Verdict.NOT_SEEN)
 
 
-def as_json(report: Report) -> str:
+def as_json(report: Judgement) -> str:
     """One JSON object."""
     laws = tuple(
         LawJson(
@@ -140,7 +140,7 @@ def as_json(report: Report) -> str:
     return msgspec.json.encode(told).decode()
 
 
-def junit(report: Report) -> str:
+def junit(report: Judgement) -> str:
     """JUnit's XML: each law a test case, a broken one a failure, one that was not seen skipped."""
     suite = ElementTree.Element(
         "testsuite",
@@ -156,7 +156,7 @@ def junit(report: Report) -> str:
     return f'<?xml version="1.0" encoding="utf-8"?>\n{ElementTree.tostring(suite, "unicode")}\n'
 
 
-def _case(suite: ElementTree.Element, report: Report, judged: Judged) -> None:
+def _case(suite: ElementTree.Element, report: Judgement, judged: JudgedLaw) -> None:
     law = judged.law
     case = ElementTree.SubElement(
         suite,

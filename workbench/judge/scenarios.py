@@ -11,10 +11,10 @@ from bridges.messages.stamps import duration, stamp
 from bridges.messages.topics import AnyTopic
 from bridges.observe.lift import HAZARDS
 from workbench.judge.law import shown
-from workbench.judge.played_nodes import Play, Step, Traveller
+from workbench.judge.played_nodes import PlayedNodes, Step, Traveller
 from workbench.rmf_model import NEVER, Said, door_request
 from workbench.rmf_model.phases import DoorClose, DoorOpen, EndLiftSession, RequestLift
-from workbench.rmf_model.robot import Robot
+from workbench.rmf_model.robot import RobotContext
 from workbench.rmf_model.supervisors import DoorSupervisor, LiftSupervisor
 
 FLEET: Final = "rmf_bridge_judge"
@@ -42,14 +42,14 @@ def busy(state: words.Stated) -> str:
     return "" if idle else f"{shown(words.device(state))} is not idle: {words.described(state)}"
 
 
-class Performance(ABC):
+class Scenario(ABC):
     """A play, its topics, and its end. `speaks`: the topics that we publish; `sole`: those of them that
     nobody else may publish, because two supervisors would spoil the test. After the play, however it
     ended, `leave` is called every REPEAT_S until `left`."""
 
     speaks: tuple[AnyTopic, ...]
     hears: tuple[AnyTopic, ...]
-    play: Play
+    play: PlayedNodes
     failed = ""
 
     @property
@@ -92,7 +92,7 @@ class Performance(ABC):
         """Is the device released?"""
 
 
-class Ride(Performance):
+class RideScenario(Scenario):
     """Robots ride from one floor to another, every second one back.
 
     `through`: a supervisor is on the graph. `restarts`: the played supervisor restarts with a robot
@@ -126,9 +126,9 @@ class Ride(Performance):
             for n in range(robots)
         ]
         supervisor = None if through else LiftSupervisor
-        self.play = Play(lift, travellers, supervisor, patience_s * robots)
+        self.play = PlayedNodes(lift, travellers, supervisor, patience_s * robots)
 
-    def _ride(self, robot: Robot, floors: tuple[str, str], number: int) -> Iterator[Step]:
+    def _ride(self, robot: RobotContext, floors: tuple[str, str], number: int) -> Iterator[Step]:
         start, goal = floors if number % 2 == 0 else floors[::-1]
         yield RequestLift(self.lift, start, inside=False)
         yield DRIVES_S
@@ -191,7 +191,7 @@ class Ride(Performance):
         return self._leaving > 0 and free
 
 
-class Passages(Performance):
+class PassageScenario(Scenario):
     """A robot goes through a door, so many times."""
 
     def __init__(
@@ -214,7 +214,7 @@ class Passages(Performance):
         self.hears = (topics.DOOR_STATES, topics.DOOR_SUPERVISOR_HEARTBEAT)
         script = lambda robot: self._pass(times)  # noqa: E731
         travellers = [Traveller(f"{FLEET}/robot1", script)]
-        self.play = Play(door, travellers, None if through else DoorSupervisor, patience_s)
+        self.play = PlayedNodes(door, travellers, None if through else DoorSupervisor, patience_s)
 
     def _pass(self, times: int) -> Iterator[Step]:
         for _ in range(times):
@@ -270,7 +270,7 @@ class _Asked:
     states: set[int] = field(default_factory=set)
 
 
-class Charge(Performance):
+class ChargeScenario(Scenario):
     """A station is requested, the request of another is cancelled, and then ours.
 
     `robot`: FLEET/ROBOT. No robot need come.
@@ -285,7 +285,7 @@ class Charge(Performance):
         self._state: d.ChargerState | None = None
         self.speaks = (topics.CHARGER_REQUESTS, topics.CHARGER_CANCELS)
         self.hears = (topics.CHARGER_STATES, topics.CHARGER_REFUSALS)
-        self.play = Play(charger, [], None, patience_s)
+        self.play = PlayedNodes(charger, [], None, patience_s)
 
     @property
     def over(self) -> bool:

@@ -6,10 +6,10 @@ from typing import Any, Final
 
 from bridges.messages import words
 from bridges.observe.limits import SLOWEST_S
-from workbench.judge.history import BURST, Scene
+from workbench.judge.history import BURST, History
 from workbench.judge.law import KEPT, Finding, Law
 
-AnyScene = Scene[Any]
+AnyScene = History[Any]
 
 STALE_S: Final = 5.0
 """No site may call a reading of this age fresh."""
@@ -20,41 +20,41 @@ STEPS_BACK: Final = 4
 STEPS_WITHIN_S: Final = 30.0
 
 
-def rate(scene: AnyScene) -> Finding:
+def rate(history: AnyScene) -> Finding:
     """States keep coming."""
-    if scene.news is None:
-        silent_s = scene.now - scene.heard_at
+    if history.news is None:
+        silent_s = history.now - history.heard_at
         return f"silent since then, for {silent_s:.1f} s" if silent_s > SLOWEST_S else None
-    if scene.new is None or scene.states == 1:
+    if history.new is None or history.states == 1:
         return None
-    gap_s = scene.seen.gap_s
+    gap_s = history.seen.gap_s
     return KEPT if gap_s <= SLOWEST_S else f"no state for {gap_s:.1f} s before this one"
 
 
-def answers(scene: AnyScene) -> Finding:
+def answers(history: AnyScene) -> Finding:
     """No state is caused by a request alone."""
-    if scene.new is None:
+    if history.new is None:
         return None
-    if scene.burst_s < BURST_WITHIN_S:
-        return f"{BURST} unchanged states in {scene.burst_s:.2f} s"
-    if scene.answers >= ANSWERS:
+    if history.burst_s < BURST_WITHIN_S:
+        return f"{BURST} unchanged states in {history.burst_s:.2f} s"
+    if history.answers >= ANSWERS:
         return f"{ANSWERS} of 8 requests were each answered by an unchanged state"
     return KEPT
 
 
-def one_node(scene: AnyScene) -> Finding:
+def one_node(history: AnyScene) -> Finding:
     """Stamps of one node go forwards; a clock steps back once, not again and again."""
-    if scene.new is None:
+    if history.new is None:
         return None
-    again = scene.seen.steps_back(scene.now, BACK_S, STEPS_WITHIN_S) >= STEPS_BACK
+    again = history.seen.steps_back(history.now, BACK_S, STEPS_WITHIN_S) >= STEPS_BACK
     return f"stamps go back and forth: {STEPS_BACK} times in 30 s" if again else KEPT
 
 
 def stamped(blind: Callable[[Any], bool]) -> Callable[[AnyScene], Finding]:
     """A state that claims something was read at some time. `blind(state)`: it claims nothing."""
 
-    def check(scene: AnyScene) -> Finding:
-        state = scene.new
+    def check(history: AnyScene) -> Finding:
+        state = history.new
         if state is None:
             return None
         if words.stamped_at(state) > 0.0:
@@ -67,13 +67,15 @@ def stamped(blind: Callable[[Any], bool]) -> Callable[[AnyScene], Finding]:
 def fresh(claims: Callable[[Any], bool], stale_s: float = STALE_S) -> Callable[[AnyScene], Finding]:
     """A robot must not act on an old reading. `claims(state)`: a robot would act on it."""
 
-    def check(scene: AnyScene) -> Finding:
-        state = scene.new
+    def check(history: AnyScene) -> Finding:
+        state = history.new
         if state is None or not claims(state) or words.stamped_at(state) == 0.0:
             return None
-        if scene.frozen_s <= stale_s:
+        if history.frozen_s <= stale_s:
             return KEPT
-        return f"{words.described(state)}, and its stamp has stood still for {scene.frozen_s:.1f} s"
+        return (
+            f"{words.described(state)}, and its stamp has stood still for {history.frozen_s:.1f} s"
+        )
 
     return check
 

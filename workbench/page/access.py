@@ -134,7 +134,7 @@ class Tries:
 
 
 @dataclass(slots=True)
-class Session:
+class LoginSession:
     """Somebody who has logged in. `proof`: what a form must send back (CSRF)."""
 
     user: str
@@ -143,21 +143,21 @@ class Session:
     proof: str
 
 
-class Sessions:
+class LoginSessions:
     """Who has logged in, by the secret of their cookie."""
 
     def __init__(self) -> None:
-        self._by_secret: OrderedDict[str, Session] = OrderedDict()
+        self._by_secret: OrderedDict[str, LoginSession] = OrderedDict()
 
     def begin(self, user: str, now: float) -> str:
         """Begin a session and return its secret. A user's earlier session ends."""
         secret = secrets.token_urlsafe(32)
-        self._by_secret[secret] = Session(user, now, now, secrets.token_urlsafe(16))
+        self._by_secret[secret] = LoginSession(user, now, now, secrets.token_urlsafe(16))
         while len(self._by_secret) > MOST_SESSIONS:
             self._by_secret.popitem(last=False)
         return secret
 
-    def find(self, secret: str | None, now: float) -> Session | None:
+    def find(self, secret: str | None, now: float) -> LoginSession | None:
         """The session of this cookie; None if there is none, or it is over."""
         session = self._by_secret.get(secret or "")
         if session is None or secret is None:
@@ -173,7 +173,7 @@ class Sessions:
         self._by_secret.pop(secret or "", None)
 
 
-class Door:
+class PasswordCheck:
     """Lets users in with a password, each address only so often."""
 
     def __init__(self, known: Mapping[str, str]) -> None:

@@ -55,7 +55,7 @@ class Local:
 
 
 @dataclass(frozen=True, slots=True)
-class Done:
+class PastAction:
     """One past action. `code`: the command's exit code; None if it took too long."""
 
     wall: float
@@ -135,19 +135,19 @@ class Deeds:
     def __init__(self, folder: Path | None) -> None:
         """`folder`: where `actions.jsonl` is written, if anywhere."""
         self._file = folder / "actions.jsonl" if folder else None
-        self.latest: deque[Done] = deque(maxlen=MOST_KEPT)
+        self.latest: deque[PastAction] = deque(maxlen=MOST_KEPT)
 
-    async def do(self, action: Action, user: str) -> Done:
+    async def do(self, action: Action, user: str) -> PastAction:
         """Run the command. Never raises; `said` has what went wrong."""
         code, said = await _run(action.words)
-        done = Done(time.time(), user, action.text, code, said)
+        done = PastAction(time.time(), user, action.text, code, said)
         self.latest.appendleft(done)
         command = " ".join(("rmf-bridge", *action.words))
         log.info(pairs("action", user=user, command=command, exit=code))
         self._write(done, action.words)
         return done
 
-    def _write(self, done: Done, words: Sequence[str]) -> None:
+    def _write(self, done: PastAction, words: Sequence[str]) -> None:
         if self._file is None:
             return
         line = {"at": round(done.wall, 3), "user": done.user, "exit": done.code, "command": words}

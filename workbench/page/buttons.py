@@ -11,9 +11,9 @@ from nicegui import ui
 
 from workbench.graph.plants import MODES
 from workbench.page.actions import Action, Deeds, Local, actions, fail, press, queue
-from workbench.page.cards import AGES_S, Gallery, Key
+from workbench.page.cards import AGES_S, Cards, Key
 from workbench.page.head import part
-from workbench.page.local_daemons import Here
+from workbench.page.local_daemons import LocalDaemons
 from workbench.page.login import Login
 from workbench.page.tables import table
 
@@ -26,9 +26,9 @@ class Buttons:
     """Shows the buttons, and carries their actions out."""
 
     def __init__(
-        self, gallery: Gallery, here: Here, login: Login, deeds: Deeds, graph: Sequence[str]
+        self, cards: Cards, here: LocalDaemons, login: Login, deeds: Deeds, graph: Sequence[str]
     ) -> None:
-        self._gallery = gallery
+        self._cards = cards
         self._here = here
         self._login = login
         self._deeds = deeds
@@ -78,7 +78,7 @@ class Buttons:
         self._of_kind(key, request)
 
     def _found(self, key: Key) -> Sequence[Action]:
-        shown = self._gallery.shown.get(key)
+        shown = self._cards.shown.get(key)
         return actions(shown, self._local(key), self._graph) if shown else ()
 
     def _local(self, key: Key) -> Local | None:

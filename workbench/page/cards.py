@@ -13,7 +13,7 @@ from typing import Final, Protocol
 from bridges.observe.limits import MOST_DEVICES, SILENT_S
 from workbench.page import drawing
 from workbench.page.listener import Listener
-from workbench.page.live_site import DeviceView, Site
+from workbench.page.live_site import DeviceView, LiveSite
 
 AGES_S: Final = 1.0
 """How often (s) ages and silences, which change by themselves, are drawn again."""
@@ -48,11 +48,11 @@ class Wall(Protocol):
         """Draw everything again: cards were added, or have gone."""
 
 
-class Gallery:
+class Cards:
     """The cards, and the walls that they hang on."""
 
     def __init__(
-        self, site: Site, listener: Listener, clock: Callable[[], float] = time.monotonic
+        self, site: LiveSite, listener: Listener, clock: Callable[[], float] = time.monotonic
     ) -> None:
         self.cards: dict[Key, str] = {}
         self.shown: dict[Key, DeviceView] = {}

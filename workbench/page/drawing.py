@@ -11,7 +11,7 @@ from urllib.parse import quote
 
 from bridges.messages import definitions as d
 from bridges.messages import words
-from workbench.page.live_site import DeviceView, Robot, Stands
+from workbench.page.live_site import DeviceView, RobotShown, Stands
 
 OLD: Final = ' class="old"'
 LONGEST: Final = 160
@@ -189,7 +189,7 @@ def _svg(width: float, height: float, said: str, inner: str) -> str:
     )
 
 
-def robots(found: Sequence[Robot], now: float) -> str:
+def robots(found: Sequence[RobotShown], now: float) -> str:
     """The robots that fleets report, as a table."""
     if not found:
         return ""
@@ -201,7 +201,7 @@ def robots(found: Sequence[Robot], now: float) -> str:
     return f'<h2>Robots</h2><div class="panel">{table}</div>'
 
 
-def _robot(robot: Robot, now: float) -> str:
+def _robot(robot: RobotShown, now: float) -> str:
     state = robot.state
     silent_s = now - robot.at
     old = f" (OLD: silent {silent_s:.0f} s)" if silent_s > 10 else ""

@@ -5,7 +5,7 @@ from html import escape
 
 from bridges.observe.requesters import Moment
 from workbench.explain.explanation import Explanation
-from workbench.explain.phrases import Clock
+from workbench.explain.phrases import TimePhrases
 from workbench.page.tables import table
 
 
@@ -45,7 +45,7 @@ def story(found: Explanation) -> str:
     if not found.story:
         return "<p>Nothing was heard of it.</p>"
     last = found.story[-1]
-    clock = Clock(Moment(last.at, last.wall), None)
+    clock = TimePhrases(Moment(last.at, last.wall), None)
     left_out = f"<p>{found.left_out} lines before that.</p>" if found.left_out else ""
     lines = "\n".join(f"{clock.time(line.wall)}  {line.text}" for line in found.story)
     return f"{left_out}<pre>{escape(lines)}</pre>"

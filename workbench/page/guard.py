@@ -33,7 +33,7 @@ HEADERS: Final = {
 
 
 @dataclass(frozen=True, slots=True)
-class Refusal:
+class HttpRefusal:
     """Why a request is not answered. `to`: where it is sent instead, if anywhere."""
 
     status: int
@@ -75,14 +75,14 @@ def _is_address(host: str) -> bool:
     return True
 
 
-class Guard:
+class RequestGuard:
     """The outermost layer of the page.
 
     `gate`: what else is asked of a request whose Host and Origin are right.
     """
 
     def __init__(
-        self, app: ASGIApp, hosts: Iterable[str], gate: Callable[[Scope], Refusal | None]
+        self, app: ASGIApp, hosts: Iterable[str], gate: Callable[[Scope], HttpRefusal | None]
     ) -> None:
         self._app = app
         self._hosts = frozenset(host.lower() for host in hosts)
@@ -94,7 +94,7 @@ class Guard:
             await self._app(scope, receive, send)
             return
         why = refused(scope, self._hosts)
-        refusal = Refusal(403, why) if why else self._gate(scope)
+        refusal = HttpRefusal(403, why) if why else self._gate(scope)
         if refusal is None and scope["type"] == "http":
             receive, refusal = await _whole(receive)
         if refusal is not None:
@@ -116,7 +116,7 @@ class Guard:
             return  # the server ends a connection whose answer is incomplete
 
 
-async def _whole(receive: Receive) -> tuple[Receive, Refusal | None]:
+async def _whole(receive: Receive) -> tuple[Receive, HttpRefusal | None]:
     """The same request with its body read, or why it is refused."""
     body, more = b"", True
     try:
@@ -126,9 +126,9 @@ async def _whole(receive: Receive) -> tuple[Receive, Refusal | None]:
                 body += message.get("body", b"")
                 more = message.get("more_body", False)
                 if len(body) > MOST_BODY:
-                    return receive, Refusal(413, f"a request takes at most {MOST_BODY} bytes")
+                    return receive, HttpRefusal(413, f"a request takes at most {MOST_BODY} bytes")
     except TimeoutError:
-        return receive, Refusal(408, f"a request takes at most {BODY_S:.0f} s")
+        return receive, HttpRefusal(408, f"a request takes at most {BODY_S:.0f} s")
     parts = [{"type": "http.request", "body": body, "more_body": False}]
 
     async def whole() -> Message:

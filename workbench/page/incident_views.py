@@ -113,7 +113,7 @@ def _download(name: str) -> str:
     return f'<p><a href="{_address(name)}/file">Download the recording (MCAP)</a></p>'
 
 
-def _told(found: incidents.Recording) -> Iterator[str]:
+def _told(found: incidents.ExplainedRecording) -> Iterator[str]:
     yield "".join(f"<p>{escape(note)}</p>" for note in found.notes)
     if not found.devices:
         yield "<p>It has nothing about RMF's lifts, doors and chargers.</p>"

@@ -48,7 +48,7 @@ class File:
 
 
 @dataclass(frozen=True, slots=True)
-class Recording:
+class ExplainedRecording:
     """What a recording tells: each device's explanation and timeline, and what could not be read."""
 
     devices: tuple[tuple[Explanation, Timeline], ...]
@@ -73,7 +73,7 @@ def path_in(folder: Path, name: str) -> Path | None:
     return next((folder / one.name for one in _files(folder) if one.name == name), None)
 
 
-async def read_apart(path: Path) -> Recording:
+async def read_apart(path: Path) -> ExplainedRecording:
     """`read`, in a process of its own. Raises BagError."""
     child = await asyncio.create_subprocess_exec(
         sys.executable,
@@ -109,9 +109,9 @@ def main(path: Path) -> int:
     return code
 
 
-def read(path: Path, remedies: Remedies) -> Recording:
+def read(path: Path, remedies: Remedies) -> ExplainedRecording:
     """The whole recording, in bounded time. Raises BagError if it is none."""
-    notes, story = Notes(), heard_devices.Site()
+    notes, story = Notes(), heard_devices.HeardDevices()
     cut = not _all_of(path, notes, story.take)
     devices = story.devices()
     drawings = {key: Drawing(*key) for key in devices[:MOST_DEVICES]}
@@ -122,7 +122,7 @@ def read(path: Path, remedies: Remedies) -> Recording:
 
     cut = not _all_of(path, Notes(), draw) or cut
     told = [(story.explain(*key, None, remedies), one.timeline()) for key, one in drawings.items()]
-    return Recording(tuple(told), tuple(_notes(notes, len(devices), cut=cut)))
+    return ExplainedRecording(tuple(told), tuple(_notes(notes, len(devices), cut=cut)))
 
 
 def _all_of(path: Path, notes: Notes, take: Callable[[Heard], None]) -> bool:
@@ -144,9 +144,9 @@ def _notes(notes: Notes, devices: int, *, cut: bool) -> Iterator[str]:
         yield f"{more} more devices are not shown."
 
 
-_RECORDING: Final = msgspec.msgpack.Decoder(Recording)
+_RECORDING: Final = msgspec.msgpack.Decoder(ExplainedRecording)
 
-__all__ = ["BagError", "File", "Recording", "listed", "path_in", "read", "read_apart"]
+__all__ = ["BagError", "ExplainedRecording", "File", "listed", "path_in", "read", "read_apart"]
 
 if __name__ == "__main__":
     sys.exit(main(Path(sys.argv[1])))

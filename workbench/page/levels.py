@@ -6,7 +6,7 @@ The ring has what the driver made of the contacts, and what the core decided; no
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
-from bridges.blackbox.entries import AnyEntry, Known, Step
+from bridges.blackbox.entries import AnyEntry, Decided, Known
 from bridges.blackbox.incident import ERRORS, READING
 from bridges.blackbox.ring import NAME, RingError, Tail
 from bridges.blackbox.value_codec import HOLDS, TYPE, Tree
@@ -42,7 +42,7 @@ class Levels:
             if isinstance(entry, Known):
                 self._event(entry.subject, entry.reading)
                 self._outputs(entry.subject, entry.outputs)
-            elif isinstance(entry, Step):
+            elif isinstance(entry, Decided):
                 self._event(entry.subject, entry.event)
                 for outputs in entry.outputs:
                     self._outputs(entry.subject, outputs)

@@ -13,7 +13,7 @@ from bridges.messages.definitions import Message
 from bridges.messages.heard import Heard, bounded
 from bridges.messages.topics import AnyTopic
 from bridges.transports.transport import Transport, TransportError
-from workbench.page.live_site import HEARD, Site
+from workbench.page.live_site import HEARD, LiveSite
 
 log = logging.getLogger(__name__)
 
@@ -27,7 +27,7 @@ AGAIN_S: Final = 3.0
 class Listener:
     """Fills a site from the graph, on a thread of its own."""
 
-    def __init__(self, site: Site, join: Callable[[], Transport]) -> None:
+    def __init__(self, site: LiveSite, join: Callable[[], Transport]) -> None:
         self._site = site
         self._join = join
         self._queue: Queue[Heard] = Queue(WAITING)

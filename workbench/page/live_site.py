@@ -24,7 +24,7 @@ from workbench.explain.device import Device
 from workbench.explain.device_timeline import Drawing
 from workbench.explain.explanation import Explanation
 from workbench.explain.timeline import Timeline
-from workbench.graph.board import Board, Row
+from workbench.graph.board import Board, BoardRow
 
 KEPT_S: Final = 600.0
 """The past that a device's page shows."""
@@ -54,7 +54,7 @@ HEARD: Final[tuple[AnyTopic, ...]] = (
 
 
 @dataclass(frozen=True, slots=True)
-class Robot:
+class RobotShown:
     """A robot, as its fleet says. `place`: where the charging schedule sends it."""
 
     fleet: str
@@ -78,21 +78,21 @@ class DeviceView:
     `stands`: how long its robot has had a charger.
     """
 
-    row: Row
+    row: BoardRow
     state: Stated | None = None
     stands: Stands | None = None
 
 
-class Site:
+class LiveSite:
     """Everything heard so far, within bounds."""
 
     def __init__(self, graph: Sequence[str] = ()) -> None:
         """`graph`: the options that name the page's graph, for commands."""
-        self._story = heard_devices.Site(most_lines=MOST_LINES, graph=graph)
+        self._story = heard_devices.HeardDevices(most_lines=MOST_LINES, graph=graph)
         self._board = Board(self._story)
         self._drawings: dict[Key, Drawing] = {}
         self._changed: set[Key] = set()
-        self._robots: dict[tuple[str, str], Robot] = {}
+        self._robots: dict[tuple[str, str], RobotShown] = {}
         self.heard_at: float | None = None
 
     @property
@@ -165,7 +165,7 @@ class Site:
         found = self._story.known.get(key)
         return found if found is not None and found.state is not None else None
 
-    def robots(self) -> list[Robot]:
+    def robots(self) -> list[RobotShown]:
         """The robots that fleets report, by fleet and name."""
         return [robot for _, robot in sorted(self._robots.items())]
 
@@ -214,10 +214,10 @@ class Site:
         for state in message.robots:
             key = (message.name, state.name)
             if key in self._robots or len(self._robots) < MOST_ROBOTS:
-                self._robots[key] = Robot(message.name, replace(state, path=()), at)
+                self._robots[key] = RobotShown(message.name, replace(state, path=()), at)
 
 
-def _view(row: Row, device: Device | None) -> DeviceView:
+def _view(row: BoardRow, device: Device | None) -> DeviceView:
     """What is drawn. A robot has had its charger as long as that is seen, until its last state."""
     stands = None
     if isinstance(device, ObservedCharger) and device.last_state and device.robot.value != NOBODY:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from bridges.host.directories import runtimes
-from bridges.runtime.daemons import Daemon, daemons
+from bridges.runtime.daemons import DaemonStatus, daemons
 from bridges.runtime.diagnostics import CONTACTS
 from workbench.graph.plants import ask
 from workbench.page.actions import Local
@@ -20,7 +20,7 @@ from workbench.page.levels import Levels, Rows
 
 
 @dataclass(frozen=True, slots=True)
-class Served:
+class ServedDevice:
     """A device that a daemon here serves: its YAML, what it senses and what it drives now.
 
     `contacts`: each known signal, and whether it is asserted.
@@ -32,12 +32,12 @@ class Served:
     contacts: Mapping[str, bool]
 
 
-class Here:
+class LocalDaemons:
     """What was seen of this machine's daemons the last time. `served`: by kind and name."""
 
     def __init__(self, base: Path | None) -> None:
         """`base`: the folder of runtime directories, if not where `run` and systemd make them."""
-        self.served: Mapping[tuple[str, str], Served] = {}
+        self.served: Mapping[tuple[str, str], ServedDevice] = {}
         self._base = base
         self._levels: dict[Path, Levels] = {}
 
@@ -45,7 +45,7 @@ class Here:
         """See which daemons serve now. Raises OSError."""
         base = self._base
         folders = sorted(p for p in base.iterdir() if p.is_dir()) if base else list(runtimes())
-        found: dict[tuple[str, str], Served] = {}
+        found: dict[tuple[str, str], ServedDevice] = {}
         for daemon in daemons(folders, {}, time.time()):
             if daemon.state == "serving":
                 folder = next(one for one in folders if one.name == daemon.name)
@@ -57,8 +57,8 @@ class Here:
 
 
 def _devices(
-    daemon: Daemon, folder: Path, levels: Levels
-) -> Iterator[tuple[tuple[str, str], Served]]:
+    daemon: DaemonStatus, folder: Path, levels: Levels
+) -> Iterator[tuple[tuple[str, str], ServedDevice]]:
     plant = _plant(folder) if daemon.status.get("simulated") else {}
     for name, status in daemon.devices.items():
         can = plant.get(name, {})
@@ -68,7 +68,7 @@ def _devices(
             tuple(can.get("fail", ())),
             str(folder),
         )
-        served = Served(
+        served = ServedDevice(
             local,
             levels.sensed.get(name, {}),
             levels.driven.get(name, {}),

@@ -17,7 +17,7 @@ from fastapi.requests import HTTPConnection
 from fastapi.responses import HTMLResponse, RedirectResponse
 
 from bridges.messages.words import printable
-from workbench.page.access import Door, Sessions
+from workbench.page.access import LoginSessions, PasswordCheck
 
 COOKIE: Final = "rmf_bridge_page"
 STYLE: Final = (Path(__file__).parent / "style.css").read_text(encoding="utf-8")
@@ -35,12 +35,12 @@ FORM: Final = """<!doctype html><html lang="en"><head><meta charset="utf-8">
 class Login:
     """Knows who asks. Without a password file and a proxy nobody can log in, and nobody may act."""
 
-    def __init__(self, door: Door | None, *, proxy: str = "", header: str = "") -> None:
+    def __init__(self, door: PasswordCheck | None, *, proxy: str = "", header: str = "") -> None:
         """`proxy`: the address whose `header` names the user."""
         self._door = door
         self._proxy = proxy
         self._header = header
-        self._sessions = Sessions()
+        self._sessions = LoginSessions()
         self._one_at_a_time = asyncio.Lock()
 
     def user(self, request: HTTPConnection) -> str:

@@ -16,12 +16,12 @@ from workbench.explain.picture import svg
 from workbench.page import tables
 from workbench.page.actions import Deeds
 from workbench.page.buttons import Buttons
-from workbench.page.cards import AGES_S, ROBOTS, STATUS, Gallery, Key, place_of
+from workbench.page.cards import AGES_S, ROBOTS, STATUS, Cards, Key, place_of
 from workbench.page.drawing import path_of
 from workbench.page.explanation_html import explanation, story
 from workbench.page.head import head, main, part
-from workbench.page.live_site import Site
-from workbench.page.local_daemons import Here
+from workbench.page.live_site import LiveSite
+from workbench.page.local_daemons import LocalDaemons
 from workbench.page.login import Login
 
 SECTIONS: Final = (
@@ -42,15 +42,15 @@ class SiteWall:
     """One browser's view of the site. It has few elements of the library's, because a browser goes
     through all of them at each update."""
 
-    def __init__(self, gallery: Gallery, client: Client) -> None:
-        self._gallery = gallery
+    def __init__(self, cards: Cards, client: Client) -> None:
+        self._cards = cards
         self._client = client
         self._missed = False
         self._built = 0
-        part(f'<div id="{STATUS}">{gallery.status()}</div>')
+        part(f'<div id="{STATUS}">{cards.status()}</div>')
         self._find = ui.input("Find a device").props("dense clearable").classes("find")
         self._box = part()
-        part(f'<div id="{ROBOTS}">{gallery.robots()}</div>')
+        part(f'<div id="{ROBOTS}">{cards.robots()}</div>')
         self._find.on_value_change(self.rebuild)
         self.rebuild()
 
@@ -73,13 +73,13 @@ class SiteWall:
         self._box.set_content(f'<div data-built="{self._built}">{html or none}</div>')
 
     def _section(self, kind: str, title: str, wanted: str) -> str:
-        keys = [key for key in self._gallery.cards if key[0] == kind and wanted in key[1].lower()]
+        keys = [key for key in self._cards.cards if key[0] == kind and wanted in key[1].lower()]
         slots = "".join(map(self._slot, sorted(keys)))
         return f'<h2>{title}</h2><div class="cards">{slots}</div>' if keys else ""
 
     def _slot(self, key: Key) -> str:
         """The link stands beside what is drawn again, so that it keeps the keyboard's focus."""
-        card = f'<div id="{place_of(key)}">{self._gallery.cards[key]}</div>'
+        card = f'<div id="{place_of(key)}">{self._cards.cards[key]}</div>'
         name, path = escape(key[1]), path_of(*key)
         link = f'<a class="cover" href="{path}" aria-label="{name}"></a>' if key[0] in KINDS else ""
         return f'<div class="slot">{card}{link}</div>'
@@ -90,18 +90,18 @@ class SiteViews:
 
     def __init__(
         self,
-        site: Site,
-        gallery: Gallery,
-        here: Here,
+        site: LiveSite,
+        cards: Cards,
+        here: LocalDaemons,
         login: Login,
         deeds: Deeds,
         graph: Sequence[str],
     ) -> None:
         self._site = site
-        self._gallery = gallery
+        self._cards = cards
         self._here = here
         self._login = login
-        self._buttons = Buttons(gallery, here, login, deeds, graph)
+        self._buttons = Buttons(cards, here, login, deeds, graph)
         self._remedies = faults.for_explain()
 
     def install(self) -> None:
@@ -114,20 +114,20 @@ class SiteViews:
         """Everything, as a wall of cards."""
         head("Site", self._login, request)
         with main():
-            wall = SiteWall(self._gallery, client)
-        self._gallery.walls.append(wall)
-        client.on_delete(lambda: self._gallery.walls.remove(wall))
+            wall = SiteWall(self._cards, client)
+        self._cards.walls.append(wall)
+        client.on_delete(lambda: self._cards.walls.remove(wall))
 
     def device(self, kind: str, name: str, request: Request) -> None:
         """One device."""
         head(name, self._login, request)
         key = (kind, name)
         with main("device"):
-            if key not in self._gallery.shown:
+            if key not in self._cards.shown:
                 part(f"<p>{escape(f'No {kind} named {name} was heard.')}</p>", WIDE)
 
                 def look() -> None:
-                    if key in self._gallery.shown:
+                    if key in self._cards.shown:
                         ui.navigate.reload()
 
                 ui.timer(AGES_S, look)
@@ -156,7 +156,7 @@ class SiteViews:
         ui.timer(AGES_S, refresh)
 
     def _card(self, key: Key) -> str:
-        return self._gallery.cards.get(key, "<p>It is no longer heard.</p>")
+        return self._cards.cards.get(key, "<p>It is no longer heard.</p>")
 
     def _why(self, key: Key) -> str:
         found = self._explained(key)

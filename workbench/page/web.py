@@ -27,14 +27,14 @@ from bridges.host.log import pairs
 from bridges.kinds.shared.durations import AGES_AGO
 from bridges.transports.transport import Transport
 from workbench.graph.join import interruptible
-from workbench.page.access import Door
+from workbench.page.access import PasswordCheck
 from workbench.page.actions import Deeds
-from workbench.page.cards import Gallery
-from workbench.page.guard import Guard, Refusal
+from workbench.page.cards import Cards
+from workbench.page.guard import HttpRefusal, RequestGuard
 from workbench.page.incident_views import IncidentViews
 from workbench.page.listener import Listener
-from workbench.page.live_site import Site
-from workbench.page.local_daemons import Here
+from workbench.page.live_site import LiveSite
+from workbench.page.local_daemons import LocalDaemons
 from workbench.page.login import STYLE, Login
 from workbench.page.silent import Silent
 from workbench.page.site_views import SiteViews
@@ -70,15 +70,15 @@ class Gate:
         self._login = login
         self._closed = closed
 
-    def __call__(self, scope: Scope) -> Refusal | None:
+    def __call__(self, scope: Scope) -> HttpRefusal | None:
         """Why a request is not answered; None if it is."""
         path = str(scope["path"])
         if path in OF_EVERYBODY or path.startswith(LIBRARY):
             return None
         if self._closed and not self._login.user(HTTPConnection(scope)):
-            return Refusal(303, "log in first", f"/login?next={quote(path)}")
+            return HttpRefusal(303, "log in first", f"/login?next={quote(path)}")
         if not path.startswith(SOCKET) and len(Client.instances) >= MOST_BROWSERS:
-            return Refusal(503, "too many browsers have this page open; try again in a minute")
+            return HttpRefusal(503, "too many browsers have this page open; try again in a minute")
         return None
 
 
@@ -94,7 +94,9 @@ def serve(
     address, _ = args.listen
     shown = f"[{address}]" if ":" in address else address
     netloc = f"{shown}:{opened.getsockname()[1]}"
-    login = Login(Door(known) if known else None, proxy=args.proxy or "", header=args.proxy_header)
+    login = Login(
+        PasswordCheck(known) if known else None, proxy=args.proxy or "", header=args.proxy_header
+    )
     ui.add_css(STYLE, shared=True)
     # Quasar draws a progress bar that has no name over the page during each request of a script.
     app.config.quasar_config["loadingBar"]["skipHijack"] = True
@@ -106,7 +108,7 @@ def serve(
     if args.recording is None:
         listener = _live(args, join, login, graph)
     gate = Gate(login, closed=not ipaddress.ip_address(address).is_loopback)
-    app.add_middleware(Guard, hosts=_hosts(address, netloc, args.host), gate=gate)
+    app.add_middleware(RequestGuard, hosts=_hosts(address, netloc, args.host), gate=gate)
     for name in ("engineio.server", "socketio.server"):
         logging.getLogger(name).handlers.clear()  # strange frames would fill the log
     app.on_startup(lambda: _end_useless())
@@ -140,28 +142,28 @@ def _live(
     login: Login,
     graph: Sequence[str],
 ) -> Listener:
-    site = Site(graph)
+    site = LiveSite(graph)
     listener = Listener(site, join)
-    gallery, here = Gallery(site, listener), Here(args.runtime_dirs)
+    cards, here = Cards(site, listener), LocalDaemons(args.runtime_dirs)
     state = os.environ.get("STATE_DIRECTORY")
     deeds = Deeds(Path(state) if state else None)
-    SiteViews(site, gallery, here, login, deeds, graph).install()
-    app.on_startup(lambda: _pump(gallery))
+    SiteViews(site, cards, here, login, deeds, graph).install()
+    app.on_startup(lambda: _pump(cards))
     app.on_startup(lambda: _look(here))
     listener.start()
     return listener
 
 
-async def _pump(gallery: Gallery) -> None:
+async def _pump(cards: Cards) -> None:
     while True:
         await asyncio.sleep(PUMP_S)
         try:
-            gallery.turn()
+            cards.turn()
         except Exception:  # the page goes on, whatever a message does to one card
             log.exception("page")
 
 
-async def _look(here: Here) -> None:
+async def _look(here: LocalDaemons) -> None:
     """See which daemons are on this machine, off the pump's path."""
     while True:
         with suppress(OSError):

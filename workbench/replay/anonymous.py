@@ -22,7 +22,17 @@ import msgspec
 import yaml
 from msgspec.structs import replace
 
-from bridges.blackbox.entries import AnyEntry, Clocks, Died, Ended, Head, Known, Lost, Spoken, Step
+from bridges.blackbox.entries import (
+    AnyEntry,
+    Clocks,
+    DaemonDied,
+    DaemonEnded,
+    Decided,
+    EntriesLost,
+    Head,
+    Known,
+    Spoken,
+)
 from bridges.blackbox.incident import Incident
 from bridges.blackbox.value_codec import HOLDS, TYPE, Tree
 from bridges.kinds import kind_called, kind_names
@@ -101,7 +111,7 @@ def _remembered(incident: Incident) -> Iterator[str]:
     for entry in incident.entries:
         if isinstance(entry, Known):
             yield from _tree_names([entry.memory, entry.reading])
-        elif isinstance(entry, Step):
+        elif isinstance(entry, Decided):
             yield from _tree_names([entry.event, *entry.publish])
 
 
@@ -213,9 +223,9 @@ def _swapped(value: Any, swap: Swap) -> Any:
 
 
 def _entry(entry: AnyEntry, swap: Swap) -> AnyEntry:
-    if isinstance(entry, Clocks | Ended | Lost):
+    if isinstance(entry, Clocks | DaemonEnded | EntriesLost):
         return entry
-    if isinstance(entry, Died):
+    if isinstance(entry, DaemonDied):
         return replace(entry, reason=swap(entry.reason))
     if isinstance(entry, Spoken):
         return _said(entry, swap)

@@ -16,7 +16,7 @@ from typing import Final
 from bridges.blackbox.entries import Spoken
 from bridges.blackbox.incident import INSTALL, timed
 from bridges.blackbox.recordings import CONTINUOUS
-from bridges.blackbox.ring import MAGIC, Read, RingError
+from bridges.blackbox.ring import MAGIC, RingContent, RingError
 from bridges.host import user_files
 from bridges.host.log import pairs
 from bridges.messages import cdr
@@ -139,7 +139,7 @@ def _raw_of(part: Path, noted: Notes) -> Iterator[Raw]:
 
 def _of_ring(path: Path) -> Iterator[Raw]:
     try:
-        entries = list(Read(path).entries())
+        entries = list(RingContent(path).entries())
     except RingError as error:
         raise BagError(str(error)) from None
     for entry, steady, wall in timed(entries):

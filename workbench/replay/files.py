@@ -5,7 +5,7 @@ from pathlib import Path
 
 from bridges.blackbox.entries import AnyEntry, Head
 from bridges.blackbox.incident import INSTALL
-from bridges.blackbox.ring import MAGIC, Read, RingError
+from bridges.blackbox.ring import MAGIC, RingContent, RingError
 from bridges.host import user_files
 from workbench.replay.bags import continuous
 from workbench.replay.sources import BagError, Notes
@@ -22,7 +22,7 @@ def opened(path: Path, notes: Notes) -> tuple[Head, Iterator[AnyEntry]]:
         raise BagError(f"{path} cannot be read: {error.strerror}") from None
     if begins.startswith(MAGIC):
         try:
-            ring = Read(path)
+            ring = RingContent(path)
         except RingError as error:
             raise BagError(str(error)) from None
         return ring.head, ring.entries()

@@ -28,7 +28,7 @@ COORDINATOR = b"charger_coordinator"
 
 
 @dataclass(frozen=True, slots=True)
-class Time:
+class TypedTime:
     """A time as typed: s from the beginning, or a local time of a day (None: the first one)."""
 
     after_s: float | None = None
@@ -45,11 +45,11 @@ class Time:
 
 
 @dataclass(slots=True)
-class Span:
+class RecordingSpan:
     """The part of a recording that is asked for. `begins_at`: when it began, by `Heard.at`."""
 
-    from_: Time | None
-    to: Time | None
+    from_: TypedTime | None
+    to: TypedTime | None
     begins_at: float = float("-inf")
 
 
@@ -70,12 +70,12 @@ def add_span_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--to", type=_time, metavar="TIME", help="end then")
 
 
-def _time(text: str) -> Time:
+def _time(text: str) -> TypedTime:
     """Raises ArgumentTypeError."""
     found = CLOCK.fullmatch(text)
     try:
         if found is None:
-            return Time(after_s=_plus(text))
+            return TypedTime(after_s=_plus(text))
         day, hour, minute, second = found.groups()
         if day:
             datetime.fromisoformat(day)
@@ -84,7 +84,7 @@ def _time(text: str) -> Time:
     except ValueError:
         why = "write 14:03:07, '2026-11-22 14:03:07', or +90 for 90 s after the beginning"
         raise argparse.ArgumentTypeError(f"'{text}' is not a time: {why}") from None
-    return Time(None, day, int(hour) * 3600.0 + int(minute) * 60.0 + float(second or 0))
+    return TypedTime(None, day, int(hour) * 3600.0 + int(minute) * 60.0 + float(second or 0))
 
 
 def _plus(text: str) -> float:
@@ -130,7 +130,9 @@ class Sieve:
         return True
 
 
-def told_between(path: Path, span: Span, command: str, device: str) -> Iterator[Heard | Own]:
+def told_between(
+    path: Path, span: RecordingSpan, command: str, device: str
+) -> Iterator[Heard | Own]:
     """What concerns the device ("": all), messages and our recorder's texts, as `between` gives it.
 
     Messages that differ little from second to second are thinned out (`Sieve`).
@@ -139,7 +141,7 @@ def told_between(path: Path, span: Span, command: str, device: str) -> Iterator[
 
 
 def between(
-    path: Path, span: Span, command: str, keep: Keep | None = None
+    path: Path, span: RecordingSpan, command: str, keep: Keep | None = None
 ) -> Iterator[Heard | Own]:
     """A recording until the end of the span; what is before it too, as states last.
 
@@ -159,7 +161,7 @@ def between(
         complain(command, notes.damage)
 
 
-def within(path: Path, span: Span, command: str) -> Iterator[Heard]:
+def within(path: Path, span: RecordingSpan, command: str) -> Iterator[Heard]:
     """The messages of the span alone, none left out. Damage is told. Raises BagError."""
     for heard in between(path, span, command):
         has_begun = span.from_ is None or heard.at >= span.begins_at > float("-inf")

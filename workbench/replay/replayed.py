@@ -15,12 +15,12 @@ from bridges.blackbox.entries import (
     LATEST_S,
     AnyEntry,
     Clocks,
-    Forgotten,
+    Decided,
     Head,
     Known,
     Published,
     Same,
-    Step,
+    SubjectForgotten,
 )
 from bridges.blackbox.value_codec import Tree, UnknownValue, first_difference, tree
 from bridges.host.log import plain
@@ -42,7 +42,7 @@ PARTS: Final = ("outputs", "news", "refused")
 
 
 @dataclass(frozen=True, slots=True)
-class Core:
+class ReplayedCore:
     """What a replay needs of a kind, with the limits of one subject. `types`: `typed.types_of`."""
 
     decide: Callable[[Any, Any, float], Any]
@@ -91,32 +91,32 @@ def of_head(head: Head) -> Config:
     return understood(head.file, head.yaml)
 
 
-class Cores:
+class ReplayedCores:
     """The cores of a daemon, from its settings."""
 
     def __init__(self, config: Config) -> None:
         self._config = config
         self._kind = kind_called(config.kind)
-        self._made: dict[str, Core | None] = {}
+        self._made: dict[str, ReplayedCore | None] = {}
 
-    def of(self, subject: str) -> Core | None:
+    def of(self, subject: str) -> ReplayedCore | None:
         """The core of a subject; None where these settings have no such device."""
         if subject not in self._made:
             self._made[subject] = self._make(subject)
         return self._made[subject]
 
-    def _make(self, subject: str) -> Core | None:
+    def _make(self, subject: str) -> ReplayedCore | None:
         config, kind = self._config, self._kind
         if isinstance(kind, GraphKind):
             limits = kind.limits(config.section)
-            return Core(
+            return ReplayedCore(
                 _with(kind.decide, limits), lambda memory, report: memory, types_of(kind.decide)
             )
         if subject not in config.devices:
             return None
         debounce = config.driver_type(subject).debounce(config.devices[subject])
         limits = kind.limits(config.devices[subject], debounce)
-        return Core(_with(kind.decide, limits), kind.published, types_of(kind.decide))
+        return ReplayedCore(_with(kind.decide, limits), kind.published, types_of(kind.decide))
 
 
 def _with(decide: Callable[..., Any], limits: Any) -> Callable[[Any, Any, float], Any]:
@@ -126,7 +126,7 @@ def _with(decide: Callable[..., Any], limits: Any) -> Callable[[Any, Any, float]
 class _Subject:
     """One subject, whose decisions are made again from its memory on."""
 
-    def __init__(self, core: Core, known: Known) -> None:
+    def __init__(self, core: ReplayedCore, known: Known) -> None:
         self._core = core
         self._memory = typed(known.memory, core.types["memory"])
         self._reading = typed(known.reading, core.types["event"] | None)
@@ -149,7 +149,7 @@ class _Subject:
         """The report has gone out."""
         self._memory = self._core.published(self._memory, self._report)
 
-    def step(self, step: Step) -> list[Parts]:
+    def step(self, step: Decided) -> list[Parts]:
         """Decide on an event; gives what differs."""
         event = typed(step.event, self._core.types["event"])
         if type(event) in (Sampled, IoFailed):
@@ -212,7 +212,7 @@ def _differing(recorded: dict[str, Tree], decision: AnyDecision) -> list[Parts]:
 class Replay:
     """A recording played again. `course`: how far it has come."""
 
-    def __init__(self, entries: Iterable[AnyEntry], cores: Cores) -> None:
+    def __init__(self, entries: Iterable[AnyEntry], cores: ReplayedCores) -> None:
         self.course = Course()
         self._entries = entries
         self._cores = cores
@@ -253,21 +253,21 @@ class Replay:
         """Each decision of one entry: when, and what differs. `strict`: memories are compared too."""
         if isinstance(entry, Known):
             yield from self._known(entry, strict=strict)
-        elif isinstance(entry, Forgotten):
+        elif isinstance(entry, SubjectForgotten):
             self._subjects.pop(entry.subject, None)
-        elif isinstance(entry, Step | Same | Published):
+        elif isinstance(entry, Decided | Same | Published):
             subject = self._subjects.get(entry.subject)
-            if subject is not None and (isinstance(entry, Step) or subject.has_decided):
+            if subject is not None and (isinstance(entry, Decided) or subject.has_decided):
                 yield from self._decided(subject, entry)
             else:
                 self.course.unusable += entry.subject not in self._subjects
 
     def _decided(
-        self, subject: _Subject, entry: Step | Same | Published
+        self, subject: _Subject, entry: Decided | Same | Published
     ) -> Iterator[tuple[float, list[Parts]]]:
         if isinstance(entry, Published):
             subject.published()
-        elif isinstance(entry, Step):
+        elif isinstance(entry, Decided):
             self.course.decisions += 1
             yield entry.at, subject.step(entry)
         else:

@@ -65,7 +65,7 @@ class FleetRobot:
         return self.doing in ("charge", "idle charge")
 
 
-class Fleet(Party):
+class FleetAdapter(Party):
     """Publishes FleetState at 1 Hz and hears ChargingAssignments."""
 
     subscribes: Sequence[AnyTopic] = (CHARGING_ASSIGNMENTS,)

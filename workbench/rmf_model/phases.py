@@ -10,7 +10,7 @@ from msgspec.structs import replace
 
 from bridges.messages import definitions as d
 from workbench.rmf_model import Said, has_session
-from workbench.rmf_model.robot import LiftDestination, Phase, Robot
+from workbench.rmf_model.robot import LiftDestination, Phase, RobotContext
 
 REPEAT_S: Final = 1.0
 
@@ -27,7 +27,7 @@ class RequestLift(Phase):
     def __init__(self, lift: str, floor: str, *, inside: bool) -> None:
         self.wanted = LiftDestination(lift, floor, inside)
 
-    def begin(self, robot: Robot, now: float) -> list[Said]:
+    def begin(self, robot: RobotContext, now: float) -> list[Said]:
         """Sends the request. If the robot is outside and the lift has come, the phase is done at
         once."""
         if not self.wanted.inside and robot.has_lift_arrived(self.wanted.lift, self.wanted.floor):
@@ -35,7 +35,7 @@ class RequestLift(Phase):
             return robot.set_lift_destination(replace(self.wanted, inside=True), now)
         return robot.set_lift_destination(self.wanted, now)
 
-    def hear(self, robot: Robot, message: d.Message, now: float) -> list[Said]:
+    def hear(self, robot: RobotContext, message: d.Message, now: float) -> list[Said]:
         """RequestLift.cpp:322-326, _finish: once the lift has come, it requests as from inside."""
         match message:
             case d.LiftState(
@@ -58,11 +58,11 @@ class EndLiftSession(Phase):
     def __init__(self, lift: str) -> None:
         self.lift = lift
 
-    def begin(self, robot: Robot, now: float) -> list[Said]:
+    def begin(self, robot: RobotContext, now: float) -> list[Said]:
         """Sends nothing: END_SESSION goes out at the next LiftState that shows our session."""
         return robot.release_lift()
 
-    def hear(self, robot: Robot, message: d.Message, now: float) -> list[Said]:
+    def hear(self, robot: RobotContext, message: d.Message, now: float) -> list[Said]:
         """EndLiftSession.cpp, _init_obs."""
         if isinstance(message, d.LiftState) and message.lift_name == self.lift:
             self.done = message.session_id != robot.requester_id
@@ -80,12 +80,12 @@ class DoorOpen(Phase):
         self._state: d.DoorState | None = None
         self._heartbeat: d.SupervisorHeartbeat | None = None
 
-    def begin(self, robot: Robot, now: float) -> list[Said]:
+    def begin(self, robot: RobotContext, now: float) -> list[Said]:
         """Begins to hold the door, and sends OPEN."""
         robot.holding_door = self.door
         return self.tick(robot, now)
 
-    def hear(self, robot: Robot, message: d.Message, now: float) -> list[Said]:
+    def hear(self, robot: RobotContext, message: d.Message, now: float) -> list[Said]:
         """DoorOpen.cpp, _update_status."""
         match message:
             case d.DoorState():
@@ -101,7 +101,7 @@ class DoorOpen(Phase):
         )
         return []
 
-    def tick(self, robot: Robot, now: float) -> list[Said]:
+    def tick(self, robot: RobotContext, now: float) -> list[Said]:
         """Sends OPEN again."""
         self.due_at = now + REPEAT_S
         return [robot.ask_door(self.door, d.DoorModeValue.MODE_OPEN, now)]
@@ -116,19 +116,19 @@ class DoorClose(Phase):
     def __init__(self, door: str) -> None:
         self.door = door
 
-    def begin(self, robot: Robot, now: float) -> list[Said]:
+    def begin(self, robot: RobotContext, now: float) -> list[Said]:
         """Stops holding the door, and sends CLOSE."""
         if robot.holding_door == self.door:
             robot.holding_door = None
         return self.tick(robot, now)
 
-    def hear(self, robot: Robot, message: d.Message, now: float) -> list[Said]:
+    def hear(self, robot: RobotContext, message: d.Message, now: float) -> list[Said]:
         """DoorClose.cpp, _update_status."""
         if isinstance(message, d.SupervisorHeartbeat):
             self.done = not has_session(message, robot.requester_id, self.door)
         return []
 
-    def tick(self, robot: Robot, now: float) -> list[Said]:
+    def tick(self, robot: RobotContext, now: float) -> list[Said]:
         """Sends CLOSE again."""
         self.due_at = now + REPEAT_S
         return [robot.ask_door(self.door, d.DoorModeValue.MODE_CLOSED, now)]

@@ -35,19 +35,19 @@ class Phase(ABC):
     claims_lift = False
 
     @abstractmethod
-    def begin(self, robot: "Robot", now: float) -> list[Said]:
+    def begin(self, robot: "RobotContext", now: float) -> list[Said]:
         """Start."""
 
     @abstractmethod
-    def hear(self, robot: "Robot", message: d.Message, now: float) -> list[Said]:
+    def hear(self, robot: "RobotContext", message: d.Message, now: float) -> list[Said]:
         """Take a message, after the context's own rules have."""
 
-    def tick(self, robot: "Robot", now: float) -> list[Said]:
+    def tick(self, robot: "RobotContext", now: float) -> list[Said]:
         """The phase's wall timer fires."""
         return []
 
 
-class Robot(Party):
+class RobotContext(Party):
     """A fleet adapter's RobotContext (`requester_id` is fleet/robot) and its one running phase.
 
     `on_task`: it has a task. `in_car`: its position is inside the lift. The caller sets both.

@@ -1,10 +1,10 @@
 """Chargers: ChargerRequest becomes commands to a station, and its readings become ChargerState."""
 
 from bridges.kinds.charger import core, memory, messages, refusals, report, settings, signals
-from bridges.kinds.charger.memory import ChargerLimits, Memory
+from bridges.kinds.charger.memory import ChargerLimits, ChargerMemory
 from bridges.kinds.charger.report import ChargerReport
 from bridges.kinds.charger.settings import ChargerSettings
-from bridges.kinds.charger.signals import Cancelled, ChargerOutputs, ChargerSample, Requested
+from bridges.kinds.charger.signals import Cancelled, ChargeRequested, ChargerOutputs, ChargerSample
 from bridges.kinds.shared.kind import Kind
 from bridges.kinds.shared.recorded import Recorded
 from bridges.messages.topics import (
@@ -17,9 +17,9 @@ from bridges.messages.topics import (
 KIND: Kind[
     ChargerSettings,
     ChargerLimits,
-    Memory,
+    ChargerMemory,
     ChargerSample,
-    Requested | Cancelled,
+    ChargeRequested | Cancelled,
     ChargerOutputs,
     ChargerReport,
 ] = Kind(
@@ -42,14 +42,14 @@ KIND: Kind[
 )
 
 RECORDED: Recorded = {
-    "charger.memory.Memory": memory.Memory,
-    "charger.memory.Session": memory.Session,
+    "charger.memory.Memory": memory.ChargerMemory,
+    "charger.memory.Session": memory.ChargeSession,
     "charger.report.ChargerReport": report.ChargerReport,
-    "charger.settings.Robot": settings.Robot,
+    "charger.settings.Robot": settings.RobotName,
     "charger.signals.Activity": signals.Activity,
     "charger.signals.Cancelled": signals.Cancelled,
     "charger.signals.ChargerOutputs": signals.ChargerOutputs,
     "charger.signals.ChargerSample": signals.ChargerSample,
     "charger.signals.Measured": signals.Measured,
-    "charger.signals.Requested": signals.Requested,
+    "charger.signals.Requested": signals.ChargeRequested,
 }

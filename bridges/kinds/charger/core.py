@@ -33,7 +33,13 @@ CHARGER-10. While another node publishes states under this charger's name, the p
 from msgspec.structs import replace
 
 from bridges.kinds.charger import pad, report, session
-from bridges.kinds.charger.memory import ChargerLimits, Memory, Session, rivalled, unreachable
+from bridges.kinds.charger.memory import (
+    ChargerLimits,
+    ChargerMemory,
+    ChargeSession,
+    rivalled,
+    unreachable,
+)
 from bridges.kinds.charger.refusals import OCCUPIED
 from bridges.kinds.charger.report import ChargerReport
 from bridges.kinds.charger.signals import (
@@ -41,10 +47,10 @@ from bridges.kinds.charger.signals import (
     CURRENT_FLOWS,
     Activity,
     Cancelled,
+    ChargeRequested,
     ChargerOutputs,
     ChargerSample,
     Event,
-    Requested,
 )
 from bridges.kinds.shared.decision import (
     Decision,
@@ -62,14 +68,14 @@ CLEARED_WITHIN_S = 30.0
 """How long after a clearing a good reading still proves that it has helped."""
 
 
-def initial(limits: ChargerLimits, now: float) -> Memory:
+def initial(limits: ChargerLimits, now: float) -> ChargerMemory:
     """Nothing has been read, and no request holds the station."""
-    return Memory()
+    return ChargerMemory()
 
 
 def decide(
-    memory: Memory, event: Event, now: float, limits: ChargerLimits
-) -> Decision[Memory, ChargerOutputs, ChargerReport]:
+    memory: ChargerMemory, event: Event, now: float, limits: ChargerLimits
+) -> Decision[ChargerMemory, ChargerOutputs, ChargerReport]:
     """One scan: take the event in, then derive outputs and report afresh."""
     memory, refused = _take(memory, event, now, limits)
     memory = replace(memory, power=_power(memory, now, limits))
@@ -78,7 +84,9 @@ def decide(
     return Decision(memory, outputs, report.report(memory, now, limits), wake_at, refused)
 
 
-def _take(memory: Memory, event: Event, now: float, limits: ChargerLimits) -> tuple[Memory, str]:
+def _take(
+    memory: ChargerMemory, event: Event, now: float, limits: ChargerLimits
+) -> tuple[ChargerMemory, str]:
     match event:
         case Sampled(sample):
             return _sampled(memory, sample, now, limits), ""
@@ -91,7 +99,7 @@ def _take(memory: Memory, event: Event, now: float, limits: ChargerLimits) -> tu
             return replace(memory, rival_at=now), ""
         case OperatorReset():
             return _reset(memory, now, limits)
-        case Requested():
+        case ChargeRequested():
             return _request(memory, event, now, limits)
         case _:
             return _cancel(memory, event, now)
@@ -100,7 +108,9 @@ def _take(memory: Memory, event: Event, now: float, limits: ChargerLimits) -> tu
 # ---- a good reading
 
 
-def _sampled(memory: Memory, sample: ChargerSample, now: float, limits: ChargerLimits) -> Memory:
+def _sampled(
+    memory: ChargerMemory, sample: ChargerSample, now: float, limits: ChargerLimits
+) -> ChargerMemory:
     came = unreachable(memory, limits)
     sample = pad.judged(sample)
     memory = replace(
@@ -123,7 +133,7 @@ def _sampled(memory: Memory, sample: ChargerSample, now: float, limits: ChargerL
     return memory
 
 
-def _held(memory: Memory, holder: Session | None) -> Memory:
+def _held(memory: ChargerMemory, holder: ChargeSession | None) -> ChargerMemory:
     """The memory with this session. If it is None, the ended request is remembered in `over`."""
     if holder or not memory.holder:
         return replace(memory, holder=holder)
@@ -132,7 +142,7 @@ def _held(memory: Memory, holder: Session | None) -> Memory:
     return replace(memory, holder=None, over=over)
 
 
-def _watched(memory: Memory, now: float) -> Memory:
+def _watched(memory: ChargerMemory, now: float) -> ChargerMemory:
     """Note since when the station charges although it was told not to."""
     sample = memory.sample
     charges = sample and (sample.activity is Activity.CHARGING or sample.charges)
@@ -142,7 +152,7 @@ def _watched(memory: Memory, now: float) -> Memory:
     return replace(memory, disobeyed_since=now if since is None else since)
 
 
-def _protected(memory: Memory, now: float, limits: ChargerLimits) -> Memory:
+def _protected(memory: ChargerMemory, now: float, limits: ChargerLimits) -> ChargerMemory:
     """The memory in or out of service: a station's fault starts it, a good reading after a clearing
     ends it."""
     sample, since = memory.sample, memory.disobeyed_since
@@ -159,7 +169,7 @@ def _protected(memory: Memory, now: float, limits: ChargerLimits) -> Memory:
     return memory
 
 
-def _served(memory: Memory, now: float, limits: ChargerLimits) -> Memory:
+def _served(memory: ChargerMemory, now: float, limits: ChargerLimits) -> ChargerMemory:
     """With `unrequested: serve_known`, serve a known robot on a free pad as if it had a request."""
     who = pad.seen(memory.sample, limits).robot
     if limits.unrequested != "serve_known" or who is None or memory.holder:
@@ -167,7 +177,7 @@ def _served(memory: Memory, now: float, limits: ChargerLimits) -> Memory:
     wrong = [f for f in report.errors(memory, now, limits) if f.code != pad.WRONG_DOCKING]
     if wrong:
         return memory
-    request = Requested("", who.fleet, who.name)
+    request = ChargeRequested("", who.fleet, who.name)
     flows = memory.sample is not None and memory.sample.activity in CURRENT_FLOWS
     holder = replace(session.granted(request, now, limits), started=flows)
     return replace(memory, holder=holder, adopted=False)
@@ -177,8 +187,8 @@ def _served(memory: Memory, now: float, limits: ChargerLimits) -> Memory:
 
 
 def _request(
-    memory: Memory, request: Requested, now: float, limits: ChargerLimits
-) -> tuple[Memory, str]:
+    memory: ChargerMemory, request: ChargeRequested, now: float, limits: ChargerLimits
+) -> tuple[ChargerMemory, str]:
     holder = memory.holder
     if holder and holder.request.request_id == request.request_id:
         return memory, "" if holder.request.who == request.who else "request_id of another robot"
@@ -200,8 +210,8 @@ def _request(
 
 
 def _granted(
-    memory: Memory, request: Requested, on_pad: bool, now: float, limits: ChargerLimits
-) -> tuple[Memory, str]:
+    memory: ChargerMemory, request: ChargeRequested, on_pad: bool, now: float, limits: ChargerLimits
+) -> tuple[ChargerMemory, str]:
     holder = session.granted(request, now, limits)
     if memory.adopted and on_pad:
         return replace(memory, holder=replace(holder, started=True), adopted=False), ""
@@ -210,13 +220,13 @@ def _granted(
     return replace(memory, holder=holder), ""
 
 
-def _in_the_way(memory: Memory, on_pad: bool, now: float, limits: ChargerLimits) -> bool:
+def _in_the_way(memory: ChargerMemory, on_pad: bool, now: float, limits: ChargerLimits) -> bool:
     """Is there an error that granting this request would not clear?"""
     found = report.errors(memory, now, limits)
     return any(not (on_pad and fault.code == pad.WRONG_DOCKING) for fault in found)
 
 
-def _cancel(memory: Memory, cancelled: Cancelled, now: float) -> tuple[Memory, str]:
+def _cancel(memory: ChargerMemory, cancelled: Cancelled, now: float) -> tuple[ChargerMemory, str]:
     holder = memory.holder
     if holder is None or holder.request.request_id != cancelled.request_id:
         known = cancelled.request_id in memory.over
@@ -228,7 +238,7 @@ def _cancel(memory: Memory, cancelled: Cancelled, now: float) -> tuple[Memory, s
     return replace(memory, holder=replace(holder, ended=ended, released_at=at)), ""
 
 
-def _reset(memory: Memory, now: float, limits: ChargerLimits) -> tuple[Memory, str]:
+def _reset(memory: ChargerMemory, now: float, limits: ChargerLimits) -> tuple[ChargerMemory, str]:
     if rivalled(memory, now):
         return memory, "two nodes for one device"
     if memory.sample is None or unreachable(memory, limits):
@@ -238,7 +248,7 @@ def _reset(memory: Memory, now: float, limits: ChargerLimits) -> tuple[Memory, s
     return _clear(memory, now), ""
 
 
-def _freed(memory: Memory, now: float, limits: ChargerLimits) -> tuple[Memory, str]:
+def _freed(memory: ChargerMemory, now: float, limits: ChargerLimits) -> tuple[ChargerMemory, str]:
     """An operator frees a silent station, once it must have switched off by itself."""
     after_s = limits.t.peer_internal_timeout_s
     silent_s = NEVER if memory.read_at is None else now - memory.read_at
@@ -247,14 +257,14 @@ def _freed(memory: Memory, now: float, limits: ChargerLimits) -> tuple[Memory, s
     return _held(memory, None), ""
 
 
-def _may_clear(memory: Memory, now: float, limits: ChargerLimits) -> bool:
+def _may_clear(memory: ChargerMemory, now: float, limits: ChargerLimits) -> bool:
     per_hour = limits.t.clear_errors_per_h
     if per_hour == 0 or rivalled(memory, now):
         return False
     return now - memory.cleared_at >= 3600 / per_hour
 
 
-def _clear(memory: Memory, now: float) -> Memory:
+def _clear(memory: ChargerMemory, now: float) -> ChargerMemory:
     return replace(
         memory,
         clear_errors=memory.clear_errors + 1,
@@ -266,7 +276,7 @@ def _clear(memory: Memory, now: float) -> Memory:
 # ---- power
 
 
-def _power(memory: Memory, now: float, limits: ChargerLimits) -> bool | None:
+def _power(memory: ChargerMemory, now: float, limits: ChargerLimits) -> bool | None:
     """May the station energise? None: leave it as it is."""
     holder = memory.holder
     if rivalled(memory, now) or memory.protection or (holder and holder.over):

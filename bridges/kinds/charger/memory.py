@@ -5,8 +5,14 @@ from typing import Literal
 
 import msgspec
 
-from bridges.kinds.charger.settings import ChargerSettings, Durations, Robot, Unrequested, robot
-from bridges.kinds.charger.signals import ChargerSample, Requested
+from bridges.kinds.charger.settings import (
+    ChargerDurations,
+    ChargerSettings,
+    RobotName,
+    Unrequested,
+    robot,
+)
+from bridges.kinds.charger.signals import ChargeRequested, ChargerSample
 from bridges.kinds.shared.durations import AGES_AGO, RIVAL_QUIET_S
 
 
@@ -17,8 +23,8 @@ class ChargerLimits(msgspec.Struct, frozen=True):
     `power`.
     """
 
-    t: Durations = Durations()
-    receivers: Mapping[str, Robot] = {}
+    t: ChargerDurations = ChargerDurations()
+    receivers: Mapping[str, RobotName] = {}
     unrequested: Unrequested = "refuse"
     can_stop: bool = True
 
@@ -31,7 +37,7 @@ class ChargerLimits(msgspec.Struct, frozen=True):
         return cls(settings.limits, known, settings.unrequested, settings.can_stop())
 
 
-class Session(msgspec.Struct, frozen=True):
+class ChargeSession(msgspec.Struct, frozen=True):
     """A request that holds the station, and how far its charge has come.
 
     `start_by`: when charging must have started (monotonic s). `paused_at`: since when another robot on
@@ -40,7 +46,7 @@ class Session(msgspec.Struct, frozen=True):
     more power. `ended`: why it is over. `released_at`: since when its robot is disconnected.
     """
 
-    request: Requested
+    request: ChargeRequested
     start_by: float
     paused_at: float | None = None
     checked_at: float | None = None
@@ -55,7 +61,7 @@ class Session(msgspec.Struct, frozen=True):
         return self.failed or bool(self.ended) or self.released_at is not None
 
 
-class Memory(msgspec.Struct, frozen=True):
+class ChargerMemory(msgspec.Struct, frozen=True):
     """Everything that outlives a scan. `sample`: the last good reading, taken at `read_at`.
 
     `misses`: polls that failed in a row. `write_misses`: scans in a row whose commands failed;
@@ -73,7 +79,7 @@ class Memory(msgspec.Struct, frozen=True):
     write_misses: int = 0
     write_failed: bool = False
     write_fault: str = ""
-    holder: Session | None = None
+    holder: ChargeSession | None = None
     over: tuple[str, ...] = ()
     adopted: bool = False
     power: bool | None = None
@@ -86,11 +92,11 @@ class Memory(msgspec.Struct, frozen=True):
     rival_at: float = AGES_AGO
 
 
-def rivalled(memory: Memory, now: float) -> bool:
+def rivalled(memory: ChargerMemory, now: float) -> bool:
     """Does another node publish this charger's states?"""
     return now - memory.rival_at < RIVAL_QUIET_S
 
 
-def unreachable(memory: Memory, limits: ChargerLimits) -> bool:
+def unreachable(memory: ChargerMemory, limits: ChargerLimits) -> bool:
     """Have `misses` polls failed since the last good reading, or has there been no reading yet?"""
     return memory.sample is None or memory.misses >= limits.t.misses

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 from bridges.kinds.charger.report import UNREQUESTED, ChargerReport
 from bridges.kinds.charger.settings import ChargerSettings
-from bridges.kinds.charger.signals import Cancelled, Requested
+from bridges.kinds.charger.signals import Cancelled, ChargeRequested
 from bridges.kinds.shared.decision import RequestRefused
 from bridges.kinds.shared.names import check_length
 from bridges.messages.definitions import (
@@ -21,7 +21,7 @@ LONGEST_TIMEOUT_S = 86400.0
 """A day. A longer timeout must be a mistaken unit."""
 
 
-def accept_request(request: ChargerRequest, settings: ChargerSettings) -> Requested:
+def accept_request(request: ChargerRequest, settings: ChargerSettings) -> ChargeRequested:
     """The ChargerRequest as an event. Raises RequestRefused if it is malformed.
 
     A start_timeout of zero means the configured default.
@@ -31,7 +31,7 @@ def accept_request(request: ChargerRequest, settings: ChargerSettings) -> Reques
     _check("robot_name", request.robot_name)
     if request.request_id.startswith(UNREQUESTED):
         raise RequestRefused("reserved request_id", f"{UNREQUESTED}… is what we publish ourselves")
-    return Requested(
+    return ChargeRequested(
         request.request_id,
         request.fleet_name,
         request.robot_name,

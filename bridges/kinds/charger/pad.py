@@ -20,8 +20,8 @@ from typing import Literal
 import msgspec
 from msgspec.structs import replace
 
-from bridges.kinds.charger.memory import ChargerLimits, Memory
-from bridges.kinds.charger.settings import Robot
+from bridges.kinds.charger.memory import ChargerLimits, ChargerMemory
+from bridges.kinds.charger.settings import RobotName
 from bridges.kinds.charger.signals import CURRENT_FLOWS, Activity, ChargerSample
 from bridges.kinds.shared.decision import Fault
 
@@ -41,7 +41,7 @@ _TEXT = re.compile(
 )
 
 
-class Pad(msgspec.Struct, frozen=True):
+class PadOccupant(msgspec.Struct, frozen=True):
     """What stands on the pad. `unverified`: the YAML has no receivers. `mute`: the station does not say
     which receiver it sees. `stranger`: a receiver that the YAML does not list.
 
@@ -50,28 +50,28 @@ class Pad(msgspec.Struct, frozen=True):
 
     sort: Literal["unverified", "mute", "empty", "robot", "stranger"]
     receiver: str = ""
-    robot: Robot | None = None
+    robot: RobotName | None = None
 
-    def may_be(self, who: Robot) -> bool:
+    def may_be(self, who: RobotName) -> bool:
         """Can this robot be the one on the pad, as far as the station can tell?"""
         return self.sort == "unverified" or self.robot == who
 
-    def is_another(self, who: Robot) -> bool:
+    def is_another(self, who: RobotName) -> bool:
         """Is another robot on the pad?"""
         return self.sort in ("robot", "stranger") and self.robot != who
 
 
-def seen(sample: ChargerSample | None, limits: ChargerLimits) -> Pad:
+def seen(sample: ChargerSample | None, limits: ChargerLimits) -> PadOccupant:
     """The pad as one reading shows it."""
     if not limits.receivers:
-        return Pad("unverified")
+        return PadOccupant("unverified")
     receiver = sample.measured.receiver_id if sample else None
     if receiver is None:
-        return Pad("mute")
+        return PadOccupant("mute")
     if not receiver:
-        return Pad("empty")
+        return PadOccupant("empty")
     known = limits.receivers.get(receiver)
-    return Pad("robot" if known else "stranger", receiver, known)
+    return PadOccupant("robot" if known else "stranger", receiver, known)
 
 
 def not_ready(sample: ChargerSample) -> str:
@@ -100,9 +100,9 @@ class Misplaced(msgspec.Struct, frozen=True):
     `expected`: the robot that the station waits for, None if it waits for none.
     """
 
-    robot: Robot | None
+    robot: RobotName | None
     receiver: str = ""
-    expected: Robot | None = None
+    expected: RobotName | None = None
 
     @property
     def text(self) -> str:
@@ -120,11 +120,13 @@ def misplaced_in(text: str) -> Misplaced | None:
     if found is None:
         return None
     receiver, *names = (part and _read(part) for part in found.groups())
-    robot, expected = (Robot(*names[i : i + 2]) if names[i] is not None else None for i in (0, 2))
+    robot, expected = (
+        RobotName(*names[i : i + 2]) if names[i] is not None else None for i in (0, 2)
+    )
     return Misplaced(robot, receiver or "", expected)
 
 
-def _robot(who: Robot) -> str:
+def _robot(who: RobotName) -> str:
     return f"{_id(who.fleet)}/{_id(who.name)}"
 
 
@@ -136,7 +138,7 @@ def _read(part: str) -> str:
     return str(json.loads(part)) if part.startswith('"') else part
 
 
-def misplaced(memory: Memory, limits: ChargerLimits) -> Fault | None:
+def misplaced(memory: ChargerMemory, limits: ChargerLimits) -> Fault | None:
     """Why the station must not energise for what is on the pad; None if it may."""
     pad, holder = seen(memory.sample, limits), memory.holder
     expected = holder.request.who if holder and not holder.over else None
@@ -151,7 +153,7 @@ def misplaced(memory: Memory, limits: ChargerLimits) -> Fault | None:
     return Fault(WRONG_DOCKING, Misplaced(pad.robot, expected=expected).text)
 
 
-def left_alone(memory: Memory, limits: ChargerLimits) -> bool:
+def left_alone(memory: ChargerMemory, limits: ChargerLimits) -> bool:
     """Does current flow without a request, in a case where we do not stop it?"""
     if memory.sample is None or memory.sample.activity not in CURRENT_FLOWS:
         return False

@@ -11,9 +11,9 @@ import msgspec
 from msgspec.structs import replace
 
 from bridges.kinds.charger.report import ChargerReport
-from bridges.kinds.charger.settings import Robot
-from bridges.kinds.charger.signals import Requested
-from bridges.kinds.shared.kind import Answer
+from bridges.kinds.charger.settings import RobotName
+from bridges.kinds.charger.signals import ChargeRequested
+from bridges.kinds.shared.kind import RefusalAnswer
 from bridges.messages.definitions import ChargerRequest, DiagnosticLevel, DiagnosticStatus, KeyValue
 from bridges.messages.topics import CHARGER_REFUSALS
 from bridges.messages.words import LONGEST_NAME
@@ -24,7 +24,7 @@ OCCUPIED = "charger occupied"
 LONGEST_REASON = 500
 
 
-class Refusal(msgspec.Struct, frozen=True, kw_only=True):
+class ChargerRefusal(msgspec.Struct, frozen=True, kw_only=True):
     """Why a request was refused, and who has the charger.
 
     `robot`: FLEET/ROBOT that the request was for. `state`: the charger's, in RMF's word. `held_by`,
@@ -58,17 +58,17 @@ class Refusal(msgspec.Struct, frozen=True, kw_only=True):
         return {key: getattr(self, key) for key in self.__struct_fields__}
 
 
-def read(status: DiagnosticStatus) -> Refusal | None:
-    """The Refusal that `message` wrote; None for any other status."""
+def read(status: DiagnosticStatus) -> ChargerRefusal | None:
+    """The ChargerRefusal that `message` wrote; None for any other status."""
     values = {pair.key: pair.value for pair in status.values}
     if status.name != NAME or not {"request_id", "charger", "robot", "reason"} <= values.keys():
         return None
-    return Refusal(**{key: values.get(key, "") for key in Refusal.__struct_fields__})
+    return ChargerRefusal(**{key: values.get(key, "") for key in ChargerRefusal.__struct_fields__})
 
 
-def refused(request_id: str, charger: str, who: Robot, reason: str) -> Refusal:
+def refused(request_id: str, charger: str, who: RobotName, reason: str) -> ChargerRefusal:
     """The refusal of a request, which may be malformed: a name may be of any length."""
-    return Refusal(
+    return ChargerRefusal(
         request_id=_cut(request_id),
         charger=_cut(charger),
         robot=f"{_cut(who.fleet)}/{_cut(who.name)}",
@@ -76,7 +76,7 @@ def refused(request_id: str, charger: str, who: Robot, reason: str) -> Refusal:
     )
 
 
-def answer(name: str, request: object, reason: str, report: ChargerReport) -> Answer | None:
+def answer(name: str, request: object, reason: str, report: ChargerReport) -> RefusalAnswer | None:
     """What is published when charger `name` refuses this; None for anything but a request.
 
     `request`: the message, if it is malformed, else the core's event. `report`: the charger as it
@@ -85,18 +85,18 @@ def answer(name: str, request: object, reason: str, report: ChargerReport) -> An
     match request:
         case ChargerRequest():
             request_id, fleet, robot = request.request_id, request.fleet_name, request.robot_name
-        case Requested():
+        case ChargeRequested():
             request_id, fleet, robot = request.request_id, request.fleet, request.robot
         case _:
             return None
     refusal = replace(
-        refused(request_id, name, Robot(fleet, robot), reason),
+        refused(request_id, name, RobotName(fleet, robot), reason),
         state=report.state.name.removeprefix("CHARGER_"),
         held_by=f"{report.fleet}/{report.robot}" if report.robot else "",
         held_request=report.request_id,
         error=report.error_message[:LONGEST_REASON],
     )
-    return Answer(CHARGER_REFUSALS, refusal.message(), refusal.fields())
+    return RefusalAnswer(CHARGER_REFUSALS, refusal.message(), refusal.fields())
 
 
 def _cut(text: str) -> str:

@@ -11,9 +11,9 @@ import msgspec
 from msgspec.structs import replace
 
 from bridges.kinds.charger import pad
-from bridges.kinds.charger.memory import ChargerLimits, Memory, rivalled, unreachable
+from bridges.kinds.charger.memory import ChargerLimits, ChargerMemory, rivalled, unreachable
 from bridges.kinds.charger.session import cleared_to_start
-from bridges.kinds.charger.settings import Robot
+from bridges.kinds.charger.settings import RobotName
 from bridges.kinds.charger.signals import CURRENT_FLOWS, Activity, ChargerSample, Measured
 from bridges.kinds.shared.decision import Fault
 from bridges.messages.definitions import ChargerStateValue
@@ -37,7 +37,7 @@ LOST = {
 OUT_OF_SERVICE = "out of service after: "
 
 
-class Diagnosis(StrEnum):
+class FaultCause(StrEnum):
     """Which side is at fault.
 
     PAD: what stands on the pad should not be there. LOST: the station cannot be reached or commanded,
@@ -54,13 +54,13 @@ class Diagnosis(StrEnum):
 
 
 _BEGINNINGS = {
-    "robot:": Diagnosis.ROBOT,
-    "station:": Diagnosis.STATION,
-    OUT_OF_SERVICE: Diagnosis.STATION,
-    pad.RECEIVER_NOT_TOLD_TEXT: Diagnosis.STATION,
-    pad.WRONG_DOCKING_TEXT: Diagnosis.PAD,
-    pad.UNKNOWN_RECEIVER_TEXT: Diagnosis.PAD,
-    **dict.fromkeys(LOST.values(), Diagnosis.LOST),
+    "robot:": FaultCause.ROBOT,
+    "station:": FaultCause.STATION,
+    OUT_OF_SERVICE: FaultCause.STATION,
+    pad.RECEIVER_NOT_TOLD_TEXT: FaultCause.STATION,
+    pad.WRONG_DOCKING_TEXT: FaultCause.PAD,
+    pad.UNKNOWN_RECEIVER_TEXT: FaultCause.PAD,
+    **dict.fromkeys(LOST.values(), FaultCause.LOST),
 }
 
 
@@ -69,10 +69,10 @@ def error_message(fault: Fault) -> str:
     return LOST.get(fault.code, fault.detail)
 
 
-def diagnosis(message: str) -> Diagnosis:
+def diagnosis(message: str) -> FaultCause:
     """Which side is at fault, by a ChargerState's error_message; a text of another node is UNCLEAR."""
     found = (whose for start, whose in _BEGINNINGS.items() if message.startswith(start))
-    return next(found, Diagnosis.UNCLEAR)
+    return next(found, FaultCause.UNCLEAR)
 
 
 class ChargerReport(msgspec.Struct, frozen=True):
@@ -103,7 +103,7 @@ class ChargerReport(msgspec.Struct, frozen=True):
         return replace(self, read_at=None, measured=measured, waits="")
 
 
-def report(memory: Memory, now: float, limits: ChargerLimits) -> ChargerReport:
+def report(memory: ChargerMemory, now: float, limits: ChargerLimits) -> ChargerReport:
     """The report as it is now."""
     found = errors(memory, now, limits)
     shown = ERROR if found else state(memory)
@@ -124,7 +124,7 @@ def report(memory: Memory, now: float, limits: ChargerLimits) -> ChargerReport:
     )
 
 
-def _waits(memory: Memory, shown: ChargerStateValue, limits: ChargerLimits) -> str:
+def _waits(memory: ChargerMemory, shown: ChargerStateValue, limits: ChargerLimits) -> str:
     """What the request waits for that is not charged yet, or must not be charged now."""
     holder, sample = memory.holder, memory.sample
     if not holder or not sample or shown not in (ASSIGNED, CHARGING):
@@ -142,7 +142,7 @@ def _waits(memory: Memory, shown: ChargerStateValue, limits: ChargerLimits) -> s
     return f"for the station to charge {who}" if ready else f"for {who} in range"
 
 
-def state(memory: Memory) -> ChargerStateValue:
+def state(memory: ChargerMemory) -> ChargerStateValue:
     """RMF's state of a station without an error."""
     sample, holder = memory.sample, memory.holder
     if sample is not None and sample.activity in CURRENT_FLOWS:
@@ -153,7 +153,7 @@ def state(memory: Memory) -> ChargerStateValue:
     return ASSIGNED if holder.released_at is None else RELEASED
 
 
-def errors(memory: Memory, now: float, limits: ChargerLimits) -> list[Fault]:
+def errors(memory: ChargerMemory, now: float, limits: ChargerLimits) -> list[Fault]:
     """Why the state is ERROR, most serious first."""
     found = []
     if rivalled(memory, now):
@@ -179,13 +179,15 @@ def errors(memory: Memory, now: float, limits: ChargerLimits) -> list[Fault]:
 def error_text(sample: ChargerSample) -> str:
     """A station's error in its own words, after the side that is at fault."""
     text = sample.error_text or f"the charger reports an error (vendor state {sample.code})"
-    if diagnosis(text) in (Diagnosis.PAD, Diagnosis.LOST):
+    if diagnosis(text) in (FaultCause.PAD, FaultCause.LOST):
         text = f"the charger says: {text}"
     side = f"{sample.side}: " if sample.side else ""
     return text if text.startswith(side) else side + text
 
 
-def _irregular(memory: Memory, shown: ChargerStateValue, limits: ChargerLimits) -> list[Fault]:
+def _irregular(
+    memory: ChargerMemory, shown: ChargerStateValue, limits: ChargerLimits
+) -> list[Fault]:
     """What is wrong although the state is not ERROR."""
     holder = memory.holder
     if holder is None:
@@ -204,7 +206,9 @@ def _irregular(memory: Memory, shown: ChargerStateValue, limits: ChargerLimits) 
     return []
 
 
-def _who(memory: Memory, shown: ChargerStateValue, limits: ChargerLimits) -> Robot | None:
+def _who(
+    memory: ChargerMemory, shown: ChargerStateValue, limits: ChargerLimits
+) -> RobotName | None:
     """The request's robot. Without a request: the robot on the pad, or the last one seen charging."""
     if memory.holder:
         return memory.holder.request.who

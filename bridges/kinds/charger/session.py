@@ -3,36 +3,38 @@
 from msgspec.structs import replace
 
 from bridges.kinds.charger import pad
-from bridges.kinds.charger.memory import ChargerLimits, Memory, Session
+from bridges.kinds.charger.memory import ChargerLimits, ChargerMemory, ChargeSession
 from bridges.kinds.charger.signals import (
     AT_FAULT,
     CURRENT_FLOWS,
     Activity,
+    ChargeRequested,
     ChargerSample,
-    Requested,
 )
 
 RANGE_EVERY_S = 5.0
 """The least time between two range checks (Xnergy RCU: wait 5 s between two checks)."""
 
 
-def granted(request: Requested, now: float, limits: ChargerLimits) -> Session:
+def granted(request: ChargeRequested, now: float, limits: ChargerLimits) -> ChargeSession:
     """A request that has just got the station; its `start_timeout` counts from now."""
-    return Session(request, now + _patience_s(request, limits))
+    return ChargeSession(request, now + _patience_s(request, limits))
 
 
-def taken_over(holder: Session, request: Requested, now: float, limits: ChargerLimits) -> Session:
+def taken_over(
+    holder: ChargeSession, request: ChargeRequested, now: float, limits: ChargerLimits
+) -> ChargeSession:
     """The session of a robot that was served without a request, and now has one."""
     return replace(holder, request=request, start_by=now + _patience_s(request, limits))
 
 
-def _patience_s(request: Requested, limits: ChargerLimits) -> float:
+def _patience_s(request: ChargeRequested, limits: ChargerLimits) -> float:
     return request.start_timeout_s or limits.t.start_timeout_s
 
 
 def follow(
-    holder: Session, sample: ChargerSample, now: float, limits: ChargerLimits
-) -> Session | None:
+    holder: ChargeSession, sample: ChargerSample, now: float, limits: ChargerLimits
+) -> ChargeSession | None:
     """The session after one reading; None when it is over and the station is free."""
     on_pad = pad.seen(sample, limits)
     another = on_pad.is_another(holder.request.who)
@@ -52,12 +54,14 @@ def follow(
     return _pending(holder, sample.activity, on_pad, now)
 
 
-def shown_released(holder: Session, now: float, limits: ChargerLimits) -> bool:
+def shown_released(holder: ChargeSession, now: float, limits: ChargerLimits) -> bool:
     """Has RELEASED been shown for `released_s`?"""
     return holder.released_at is not None and now - holder.released_at >= limits.t.released_s
 
 
-def _beside_another(holder: Session, now: float, limits: ChargerLimits) -> Session | None:
+def _beside_another(
+    holder: ChargeSession, now: float, limits: ChargerLimits
+) -> ChargeSession | None:
     """Another robot is on the pad. A robot that waits keeps waiting; one that was charged has left."""
     if shown_released(holder, now, limits):
         return None
@@ -68,25 +72,27 @@ def _beside_another(holder: Session, now: float, limits: ChargerLimits) -> Sessi
     return holder if holder.paused_at is not None else replace(holder, paused_at=now)
 
 
-def _resumed(holder: Session, now: float) -> Session:
+def _resumed(holder: ChargeSession, now: float) -> ChargeSession:
     if holder.paused_at is None:
         return holder
     return replace(holder, start_by=holder.start_by + now - holder.paused_at, paused_at=None)
 
 
-def _flowing(holder: Session, sample: ChargerSample, limits: ChargerLimits) -> Session:
+def _flowing(holder: ChargeSession, sample: ChargerSample, limits: ChargerLimits) -> ChargeSession:
     percent = sample.measured.battery_percent
     full = percent is not None and percent >= limits.t.full_percent and not holder.ended
     return replace(holder, started=True, released_at=None, ended="full" if full else holder.ended)
 
 
-def _sought_again(holder: Session, now: float, limits: ChargerLimits) -> Session:
+def _sought_again(holder: ChargeSession, now: float, limits: ChargerLimits) -> ChargeSession:
     """The station has lost the receiver and looks for it: the request waits for its start again."""
     by = now + _patience_s(holder.request, limits)
     return replace(holder, started=False, start_by=by, checked_at=None)
 
 
-def _pending(holder: Session, activity: Activity, on_pad: pad.Pad, now: float) -> Session:
+def _pending(
+    holder: ChargeSession, activity: Activity, on_pad: pad.PadOccupant, now: float
+) -> ChargeSession:
     if not holder.request.request_id and on_pad.sort == "empty":
         return replace(holder, ended=holder.ended or "left", released_at=now)
     if holder.started or (holder.failed and activity is not Activity.HANDSHAKE):
@@ -99,7 +105,7 @@ def _pending(holder: Session, activity: Activity, on_pad: pad.Pad, now: float) -
 # ---- may it start?
 
 
-def cleared_to_start(memory: Memory, limits: ChargerLimits) -> bool:
+def cleared_to_start(memory: ChargerMemory, limits: ChargerLimits) -> bool:
     """The right robot is on the pad and in range, as far as the station can tell."""
     holder, sample = memory.holder, memory.sample
     if holder is None or sample is None or memory.read_at is None:
@@ -112,7 +118,7 @@ def cleared_to_start(memory: Memory, limits: ChargerLimits) -> bool:
     return asked and sample.measured.in_range
 
 
-def range_checked(memory: Memory, now: float, limits: ChargerLimits) -> Memory:
+def range_checked(memory: ChargerMemory, now: float, limits: ChargerLimits) -> ChargerMemory:
     """Ask for a range check if only that is missing. A result from before the check does not count."""
     holder, sample = memory.holder, memory.sample
     if holder is None or sample is None or holder.started or holder.over:

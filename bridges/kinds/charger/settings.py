@@ -23,7 +23,7 @@ ReceiverId = Annotated[
 Unrequested = Literal["serve_known", "refuse"]
 
 
-class Robot(NamedTuple):
+class RobotName(NamedTuple):
     """A robot as RMF names it."""
 
     fleet: str
@@ -33,15 +33,15 @@ class Robot(NamedTuple):
         return f"{self.fleet}/{self.name}"
 
 
-def robot(text: str) -> Robot:
+def robot(text: str) -> RobotName:
     """FLEET/ROBOT in its parts. Raises ValueError."""
     fleet, slash, name = text.partition("/")
     if not (fleet and slash and name):
         raise ValueError(f"{text!r} is not a robot: write FLEET/ROBOT, as RMF names them")
-    return Robot(fleet, name)
+    return RobotName(fleet, name)
 
 
-class Durations(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class ChargerDurations(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Durations and counts of a charger."""
 
     misses: Annotated[
@@ -76,7 +76,9 @@ class Durations(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
 class ChargerSettings(DeviceSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """What every charger has, whatever its driver."""
 
-    limits: Annotated[Durations, tells("what differs from the defaults.")] = Durations()
+    limits: Annotated[ChargerDurations, tells("what differs from the defaults.")] = (
+        ChargerDurations()
+    )
     receivers: Annotated[
         dict[ReceiverId, Name],
         tells("""receiver id -> FLEET/ROBOT, the robot that carries it. With this table only the

@@ -9,7 +9,7 @@ from typing import Literal
 
 import msgspec
 
-from bridges.kinds.charger.settings import Robot
+from bridges.kinds.charger.settings import RobotName
 from bridges.kinds.shared.decision import IoFailed, OperatorReset, RivalSeen, Sampled
 
 
@@ -89,7 +89,7 @@ class ChargerOutputs(msgspec.Struct, frozen=True):
     range_checks: int = 0
 
 
-class Requested(msgspec.Struct, frozen=True):
+class ChargeRequested(msgspec.Struct, frozen=True):
     """A well-formed ChargerRequest for this charger; `start_timeout_s` 0 is the configured default.
 
     The session of a robot that is served without a request has one with an empty `request_id`.
@@ -101,9 +101,9 @@ class Requested(msgspec.Struct, frozen=True):
     start_timeout_s: float = 0.0
 
     @property
-    def who(self) -> Robot:
+    def who(self) -> RobotName:
         """The robot that it is for."""
-        return Robot(self.fleet, self.robot)
+        return RobotName(self.fleet, self.robot)
 
 
 class Cancelled(msgspec.Struct, frozen=True):
@@ -112,4 +112,4 @@ class Cancelled(msgspec.Struct, frozen=True):
     request_id: str
 
 
-Event = Sampled[ChargerSample] | IoFailed | RivalSeen | OperatorReset | Requested | Cancelled
+Event = Sampled[ChargerSample] | IoFailed | RivalSeen | OperatorReset | ChargeRequested | Cancelled

@@ -9,16 +9,21 @@ from bridges.kinds.charger_coordinator import (
     schedule,
     signals,
 )
-from bridges.kinds.charger_coordinator.memory import Memory, Site
+from bridges.kinds.charger_coordinator.memory import SiteLimits, SiteMemory
 from bridges.kinds.charger_coordinator.report import SiteReport
-from bridges.kinds.charger_coordinator.settings import Settings, speaks_of, tables, warnings
+from bridges.kinds.charger_coordinator.settings import (
+    CoordinatorSettings,
+    speaks_of,
+    tables,
+    warnings,
+)
 from bridges.kinds.charger_coordinator.signals import (
+    ChargerStateHeard,
+    ChargeUnwanted,
+    ChargeWanted,
     Dedicated,
     FleetSeen,
     ReceiverHeard,
-    StateHeard,
-    Unwanted,
-    Wanted,
 )
 from bridges.kinds.shared.fields import quiet_s
 from bridges.kinds.shared.graph_kind import GraphKind
@@ -37,15 +42,15 @@ from bridges.messages.topics import (
 )
 
 KIND: GraphKind[
-    Settings,
-    Site,
-    Memory,
-    FleetSeen | StateHeard | ReceiverHeard | Wanted | Unwanted | Dedicated,
+    CoordinatorSettings,
+    SiteLimits,
+    SiteMemory,
+    FleetSeen | ChargerStateHeard | ReceiverHeard | ChargeWanted | ChargeUnwanted | Dedicated,
     SiteReport,
 ] = GraphKind(
     name="charger_coordinator",
     devices_key="coordinator",
-    settings=Settings,
+    settings=CoordinatorSettings,
     requests={
         CHARGER_STATES: messages.accept_state,
         FLEET_STATES: messages.accept_fleet,
@@ -65,7 +70,7 @@ KIND: GraphKind[
     yields=(CHARGING_ASSIGNMENTS,),
     device_name=messages.subject,
     quiet_s=quiet_s,
-    limits=Site.of,
+    limits=SiteLimits.of,
     initial=core.initial,
     decide=core.decide,
     stamped=messages.stamped,
@@ -81,9 +86,9 @@ KIND: GraphKind[
 
 RECORDED: Recorded = {
     "charger_coordinator.memory.Grant": memory.Grant,
-    "charger_coordinator.memory.Memory": memory.Memory,
+    "charger_coordinator.memory.Memory": memory.SiteMemory,
     "charger_coordinator.memory.Nudge": memory.Nudge,
-    "charger_coordinator.memory.Seen": memory.Seen,
+    "charger_coordinator.memory.Seen": memory.StationSeen,
     "charger_coordinator.memory.Standing": memory.Standing,
     "charger_coordinator.memory.Wish": memory.Wish,
     "charger_coordinator.report.SiteReport": report.SiteReport,
@@ -92,7 +97,7 @@ RECORDED: Recorded = {
     "charger_coordinator.signals.FleetSeen": signals.FleetSeen,
     "charger_coordinator.signals.ReceiverHeard": signals.ReceiverHeard,
     "charger_coordinator.signals.Sighting": signals.Sighting,
-    "charger_coordinator.signals.StateHeard": signals.StateHeard,
-    "charger_coordinator.signals.Unwanted": signals.Unwanted,
-    "charger_coordinator.signals.Wanted": signals.Wanted,
+    "charger_coordinator.signals.StateHeard": signals.ChargerStateHeard,
+    "charger_coordinator.signals.Unwanted": signals.ChargeUnwanted,
+    "charger_coordinator.signals.Wanted": signals.ChargeWanted,
 }

@@ -22,36 +22,36 @@ COORDINATOR-7. During the quiet start it only listens. Beside another node that 
 from msgspec.structs import replace
 
 from bridges.kinds.charger_coordinator import report, stations, wishes, wrong_pad
-from bridges.kinds.charger_coordinator.memory import Memory, Site
+from bridges.kinds.charger_coordinator.memory import SiteLimits, SiteMemory
 from bridges.kinds.charger_coordinator.queue import allot, suiting
 from bridges.kinds.charger_coordinator.report import SiteReport
 from bridges.kinds.charger_coordinator.signals import (
+    ChargerStateHeard,
+    ChargeUnwanted,
+    ChargeWanted,
     Dedicated,
     Event,
     FleetSeen,
     ReceiverHeard,
-    StateHeard,
-    Unwanted,
-    Wanted,
 )
 from bridges.kinds.shared.decision import Decision, OperatorReset
 from bridges.kinds.shared.durations import NEVER
 from bridges.kinds.shared.graph_kind import MaySpeak
 
-Decided = Decision[Memory, None, SiteReport]
+Decided = Decision[SiteMemory, None, SiteReport]
 
 
-def initial(subject: str, started_at: float) -> Memory:
+def initial(subject: str, started_at: float) -> SiteMemory:
     """Nothing has been heard."""
-    return Memory(began_at=started_at)
+    return SiteMemory(began_at=started_at)
 
 
-def idle(memory: Memory, now: float) -> bool:
+def idle(memory: SiteMemory, now: float) -> bool:
     """Never: the one subject is the site."""
     return False
 
 
-def decide(memory: Memory, event: Event, now: float, site: Site) -> Decided:
+def decide(memory: SiteMemory, event: Event, now: float, site: SiteLimits) -> Decided:
     """Take the event in, allot free stations, and send what is due. Never raises."""
     memory, refused = _take(memory, event, now, site)
     memory = stations.in_time(stations.adopted(memory, now, site), now, site)
@@ -63,20 +63,20 @@ def decide(memory: Memory, event: Event, now: float, site: Site) -> Decided:
     return Decision(memory, None, shown, _wake_at(memory, now, site), refused, publish)
 
 
-def _take(memory: Memory, event: Event, now: float, site: Site) -> tuple[Memory, str]:
+def _take(memory: SiteMemory, event: Event, now: float, site: SiteLimits) -> tuple[SiteMemory, str]:
     match event:
         case FleetSeen(robots, when):
             memory = replace(memory, when=when)
             for sighting in robots:
                 memory = wishes.sighted(memory, sighting, now, site)
             return memory, ""
-        case StateHeard():
+        case ChargerStateHeard():
             return stations.heard(memory, event, now, site), ""
         case ReceiverHeard(robot, error):
             return replace(memory, receivers={**memory.receivers, robot: error}), ""
-        case Wanted():
+        case ChargeWanted():
             return wishes.wanted(memory, event, site)
-        case Unwanted(request_id):
+        case ChargeUnwanted(request_id):
             return wishes.unwanted(memory, request_id)
         case Dedicated(dedicated):
             return replace(memory, preferred={**memory.preferred, **dict(dedicated)}), ""
@@ -88,7 +88,7 @@ def _take(memory: Memory, event: Event, now: float, site: Site) -> tuple[Memory,
             return memory, ""
 
 
-def _may_speak(memory: Memory, yes: bool, alone: bool, now: float) -> Memory:
+def _may_speak(memory: SiteMemory, yes: bool, alone: bool, now: float) -> SiteMemory:
     """A request that no station has shown yet counts from now; assignments are published again."""
     grants = {
         name: grant if grant.shown else replace(grant, made_at=now)
@@ -97,7 +97,7 @@ def _may_speak(memory: Memory, yes: bool, alone: bool, now: float) -> Memory:
     return replace(memory, may_speak=yes, alone=alone, grants=grants, assigned=(), nudges={})
 
 
-def _as_dedicated(memory: Memory, site: Site) -> Memory:
+def _as_dedicated(memory: SiteMemory, site: SiteLimits) -> SiteMemory:
     """Beside a schedule: give up stations at which RMF will not bring their robots."""
     if memory.alone:
         return memory
@@ -109,7 +109,7 @@ def _as_dedicated(memory: Memory, site: Site) -> Memory:
     return memory
 
 
-def _wake_at(memory: Memory, now: float, site: Site) -> float:
+def _wake_at(memory: SiteMemory, now: float, site: SiteLimits) -> float:
     due = [*memory.shunned.values(), *(memory.silent_since(name) for name in site.places)]
     for name, grant in memory.grants.items():
         if grant.shown:

@@ -10,9 +10,9 @@ from typing import Annotated, Final
 import msgspec
 from msgspec import Meta
 
-from bridges.kinds.charger.settings import Robot, robot
-from bridges.kinds.charger_coordinator.memory import By, Grant, Memory, Wish
-from bridges.kinds.charger_coordinator.settings import Settings
+from bridges.kinds.charger.settings import RobotName, robot
+from bridges.kinds.charger_coordinator.memory import By, Grant, SiteMemory, Wish
+from bridges.kinds.charger_coordinator.settings import CoordinatorSettings
 from bridges.kinds.shared import keep
 from bridges.kinds.shared.keep import Text
 
@@ -42,8 +42,8 @@ class GrantRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     over: bool
 
 
-class Record(keep.Record, frozen=True, forbid_unknown_fields=True):
-    """The parts of Memory that are kept."""
+class KeptCoordinator(keep.Kept, frozen=True, forbid_unknown_fields=True):
+    """The parts of SiteMemory that are kept."""
 
     count: Annotated[int, Meta(ge=0)]
     wishes: list[WishRecord]
@@ -54,10 +54,10 @@ class Record(keep.Record, frozen=True, forbid_unknown_fields=True):
     preferred: dict[Text, Text]
 
 
-def persist(memories: Mapping[str, Memory]) -> bytes:
+def persist(memories: Mapping[str, SiteMemory]) -> bytes:
     """What the next start needs. The bytes stay the same until some of it changes."""
-    memory = memories.get(SITE, Memory())
-    record = Record(
+    memory = memories.get(SITE, SiteMemory())
+    record = KeptCoordinator(
         VERSION,
         memory.count,
         [_wish(wish) for wish in memory.wishes],
@@ -80,23 +80,23 @@ def _grant(g: Grant) -> GrantRecord:
     return GrantRecord(str(g.robot), g.request_id, g.start_timeout_s, g.started, g.over)
 
 
-def restore(kept: bytes, settings: Settings, now: float) -> dict[str, Memory]:
+def restore(kept: bytes, settings: CoordinatorSettings, now: float) -> dict[str, SiteMemory]:
     """The memory at start, for the robots and stations that are still in the YAML.
 
     ValueError if the bytes are not those of `persist`. Durations count from now.
     """
-    found = keep.read(kept, Record, VERSION, "a coordinator's memory")
+    found = keep.read(kept, KeptCoordinator, VERSION, "a coordinator's memory")
     return {SITE: _memory(found, settings, now)}
 
 
-def _memory(found: Record, settings: Settings, now: float) -> Memory:
+def _memory(found: KeptCoordinator, settings: CoordinatorSettings, now: float) -> SiteMemory:
     known, stations = settings.robots(), settings.stations
 
-    def ours(text: str) -> Robot | None:
+    def ours(text: str) -> RobotName | None:
         who = robot(text)
         return who if who in known else None
 
-    wishes: dict[Robot, Wish] = {}
+    wishes: dict[RobotName, Wish] = {}
     for w in found.wishes:
         if who := ours(w.robot):
             wish = Wish(who, w.by, w.task_id, w.called, w.station, w.request_id, w.start_timeout_s)
@@ -106,7 +106,7 @@ def _memory(found: Record, settings: Settings, now: float) -> Memory:
         for name, g in found.grants.items()
         if name in stations and (who := ours(g.robot))
     }
-    return Memory(
+    return SiteMemory(
         began_at=now,
         wishes=tuple(wishes.values()),
         grants=grants,

@@ -7,11 +7,11 @@ from typing import Final, Literal, TypeVar
 import msgspec
 from msgspec.structs import replace
 
-from bridges.kinds.charger.report import Diagnosis, diagnosis
-from bridges.kinds.charger.settings import Robot
+from bridges.kinds.charger.report import FaultCause, diagnosis
+from bridges.kinds.charger.settings import RobotName
 from bridges.kinds.charger_coordinator.schedule import Charging, LocalTime
-from bridges.kinds.charger_coordinator.settings import Settings
-from bridges.kinds.charger_coordinator.signals import Sighting, Wanted
+from bridges.kinds.charger_coordinator.settings import CoordinatorSettings
+from bridges.kinds.charger_coordinator.signals import ChargeWanted, Sighting
 from bridges.kinds.shared.durations import AGES_AGO
 from bridges.kinds.shared.graph_kind import LISTENS
 from bridges.messages.definitions import ChargerStateValue, ChargingAssignments
@@ -33,17 +33,17 @@ ERROR: Final = ChargerStateValue.CHARGER_ERROR
 
 
 @dataclass(frozen=True, slots=True)
-class Site:
+class SiteLimits:
     """What the core needs of the settings.
 
     `robots`: robot -> the stations that suit it, best first. `waits_at`: robot -> the waypoint where
     it waits. `places`: station -> fleet -> waypoint. `receivers`: receiver id -> robot.
     """
 
-    robots: Mapping[Robot, tuple[str, ...]]
-    waits_at: Mapping[Robot, str]
+    robots: Mapping[RobotName, tuple[str, ...]]
+    waits_at: Mapping[RobotName, str]
     places: Mapping[str, Mapping[str, str]]
-    receivers: Mapping[str, Robot]
+    receivers: Mapping[str, RobotName]
     start_timeout_s: float
     full_percent: float
     again_percent: float
@@ -64,7 +64,7 @@ class Site:
         return self._stations.get((fleet, place or ""))
 
     @classmethod
-    def of(cls, settings: Settings) -> "Site":
+    def of(cls, settings: CoordinatorSettings) -> "SiteLimits":
         """From the YAML."""
         robots = settings.robots()
         return cls(
@@ -97,7 +97,7 @@ class Wish(msgspec.Struct, frozen=True):
     operator's request.
     """
 
-    robot: Robot
+    robot: RobotName
     by: By
     task_id: str = ""
     called: bool = False
@@ -106,7 +106,7 @@ class Wish(msgspec.Struct, frozen=True):
     start_timeout_s: float = 0.0
 
     @classmethod
-    def of(cls, wanted: Wanted) -> "Wish":
+    def of(cls, wanted: ChargeWanted) -> "Wish":
         """The wish of an operator's request."""
         return cls(
             wanted.robot,
@@ -126,7 +126,7 @@ class Grant(msgspec.Struct, frozen=True):
     forgot it, so that it is made again.
     """
 
-    robot: Robot
+    robot: RobotName
     request_id: str
     made_at: float
     start_timeout_s: float = 0.0
@@ -152,22 +152,22 @@ class Standing(msgspec.Struct, frozen=True):
         return bool(self.sighting.task_id) and not self.sighting.charges
 
 
-class Seen(msgspec.Struct, frozen=True):
+class StationSeen(msgspec.Struct, frozen=True):
     """A station's last state, heard at `at`. `since`: since when state and error are the same.
     `full_in_s`: as it said then."""
 
     state: ChargerStateValue
     request_id: str
-    robot: Robot | None
+    robot: RobotName | None
     error: str
     at: float
     since: float
     full_in_s: float = 0.0
 
     @property
-    def diagnosis(self) -> Diagnosis:
+    def diagnosis(self) -> FaultCause:
         """Which side is at fault; NONE without an error."""
-        return diagnosis(self.error) if self.state is ERROR else Diagnosis.NONE
+        return diagnosis(self.error) if self.state is ERROR else FaultCause.NONE
 
 
 class Nudge(msgspec.Struct, frozen=True):
@@ -179,7 +179,7 @@ class Nudge(msgspec.Struct, frozen=True):
     at: float
 
 
-class Memory(msgspec.Struct, frozen=True):
+class SiteMemory(msgspec.Struct, frozen=True):
     """Everything that outlives an event.
 
     `may_speak`: it may publish. `passive`: what those wait for that wait for us, while it may not.
@@ -203,37 +203,37 @@ class Memory(msgspec.Struct, frozen=True):
     alone: bool = True
     wishes: tuple[Wish, ...] = ()
     grants: Mapping[str, Grant] = msgspec.field(default_factory=dict)
-    strikes: Mapping[Robot, tuple[str, ...]] = msgspec.field(default_factory=dict)
-    served: Mapping[Robot, str] = msgspec.field(default_factory=dict)
-    rested: frozenset[Robot] = frozenset()
-    absent: Mapping[Robot, float] = msgspec.field(default_factory=dict)
+    strikes: Mapping[RobotName, tuple[str, ...]] = msgspec.field(default_factory=dict)
+    served: Mapping[RobotName, str] = msgspec.field(default_factory=dict)
+    rested: frozenset[RobotName] = frozenset()
+    absent: Mapping[RobotName, float] = msgspec.field(default_factory=dict)
     over: tuple[str, ...] = ()
     count: int = 0
-    robots: Mapping[Robot, Standing] = msgspec.field(default_factory=dict)
-    stations: Mapping[str, Seen] = msgspec.field(default_factory=dict)
+    robots: Mapping[RobotName, Standing] = msgspec.field(default_factory=dict)
+    stations: Mapping[str, StationSeen] = msgspec.field(default_factory=dict)
     shunned: Mapping[str, float] = msgspec.field(default_factory=dict)
-    preferred: Mapping[Robot, str] = msgspec.field(default_factory=dict)
-    nudges: Mapping[Robot, Nudge] = msgspec.field(default_factory=dict)
-    receivers: Mapping[Robot, str] = msgspec.field(default_factory=dict)
+    preferred: Mapping[RobotName, str] = msgspec.field(default_factory=dict)
+    nudges: Mapping[RobotName, Nudge] = msgspec.field(default_factory=dict)
+    receivers: Mapping[RobotName, str] = msgspec.field(default_factory=dict)
     when: LocalTime | None = None
     assigned: tuple[ChargingAssignments, ...] = ()
     assigned_at: float = AGES_AGO
     alerts: frozenset[str] = frozenset()
 
-    def wish(self, robot: Robot) -> Wish | None:
+    def wish(self, robot: RobotName) -> Wish | None:
         """This robot's wish; None where it has none."""
         return next((wish for wish in self.wishes if wish.robot == robot), None)
 
-    def station_of(self, robot: Robot) -> str | None:
+    def station_of(self, robot: RobotName) -> str | None:
         """The station that it has; None where it has none."""
         return next((s for s, g in self.grants.items() if g.robot == robot and not g.over), None)
 
-    def place_of(self, robot: Robot) -> str | None:
+    def place_of(self, robot: RobotName) -> str | None:
         """The waypoint of ours at which its fleet saw it last."""
         standing = self.robots.get(robot)
         return standing.sighting.place if standing else None
 
-    def stands_at(self, robot: Robot, site: Site) -> str | None:
+    def stands_at(self, robot: RobotName, site: SiteLimits) -> str | None:
         """The station at which its fleet saw it last; None for none."""
         return site.station_at(robot.fleet, self.place_of(robot))
 
@@ -242,7 +242,7 @@ class Memory(msgspec.Struct, frozen=True):
         """May it tell the robots where to charge?"""
         return self.may_speak and self.alone
 
-    def faulty(self, robot: Robot) -> bool:
+    def faulty(self, robot: RobotName) -> bool:
         """Has it failed too often? It is not tried again until an operator resets."""
         return len(self.strikes.get(robot, ())) >= STRIKES
 
@@ -257,12 +257,12 @@ class Memory(msgspec.Struct, frozen=True):
 
     # ---- changed copies
 
-    def with_grant(self, station: str, grant: Grant | None) -> "Memory":
+    def with_grant(self, station: str, grant: Grant | None) -> "SiteMemory":
         """The memory with this grant of the station; None: it is granted to nobody."""
         rest = without(self.grants, station)
         return replace(self, grants=rest | ({} if grant is None else {station: grant}))
 
-    def without_wish(self, robot: Robot) -> "Memory":
+    def without_wish(self, robot: RobotName) -> "SiteMemory":
         """The memory without this robot's wish."""
         wish = self.wish(robot)
         if wish is None:
@@ -270,14 +270,14 @@ class Memory(msgspec.Struct, frozen=True):
         over = (*self.over, wish.request_id)[-8:] if wish.request_id else self.over
         return replace(self, wishes=tuple(w for w in self.wishes if w is not wish), over=over)
 
-    def last_in_queue(self, robot: Robot) -> "Memory":
+    def last_in_queue(self, robot: RobotName) -> "SiteMemory":
         """The memory with this robot's wish at the end of the queue."""
         wish = self.wish(robot)
         if wish is None:
             return self
         return replace(self, wishes=(*(w for w in self.wishes if w is not wish), wish))
 
-    def takes_back(self, robot: Robot) -> "Memory":
+    def takes_back(self, robot: RobotName) -> "SiteMemory":
         """The memory in which this robot's station is to release it."""
         station = self.station_of(robot)
         if station is None:

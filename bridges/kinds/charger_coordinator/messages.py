@@ -9,23 +9,23 @@ from msgspec.structs import replace
 
 from bridges.kinds.charger.messages import accept_request as accept_charger_request
 from bridges.kinds.charger.refusals import refused
-from bridges.kinds.charger.settings import ChargerSettings, Robot
+from bridges.kinds.charger.settings import ChargerSettings, RobotName
 from bridges.kinds.charger_coordinator.keep import SITE
 from bridges.kinds.charger_coordinator.report import SiteReport
 from bridges.kinds.charger_coordinator.schedule import LocalTime
-from bridges.kinds.charger_coordinator.settings import Fleet, Settings
+from bridges.kinds.charger_coordinator.settings import CoordinatorSettings, FleetSettings
 from bridges.kinds.charger_coordinator.signals import (
+    ChargerStateHeard,
+    ChargeUnwanted,
+    ChargeWanted,
     Dedicated,
     FleetSeen,
     ReceiverHeard,
     Sighting,
-    StateHeard,
-    Unwanted,
-    Wanted,
     is_dispatched,
 )
 from bridges.kinds.shared.decision import RequestRefused
-from bridges.kinds.shared.kind import Answer
+from bridges.kinds.shared.kind import RefusalAnswer
 from bridges.kinds.shared.names import LONGEST_TEXT, check_length
 from bridges.messages import definitions as d
 from bridges.messages.definitions import Time
@@ -36,7 +36,7 @@ CHARGE = d.ChargingMode.MODE_CHARGE
 CHARGES = (d.RobotModeValue.MODE_CHARGING, d.RobotModeValue.MODE_DOCKING)
 
 
-def accept_fleet(state: d.FleetState, settings: Settings, wall: float) -> FleetSeen:
+def accept_fleet(state: d.FleetState, settings: CoordinatorSettings, wall: float) -> FleetSeen:
     """A FleetState as an event. Robots that the YAML does not name are left out."""
     fleet = settings.fleets.get(state.name)
     if fleet is None:
@@ -61,11 +61,11 @@ def local_time(wall: float, timezone: str | None) -> LocalTime:
 
 
 def _sighting(
-    fleet_name: str, robot: d.RobotState, fleet: Fleet, places: set[str], near_m: float
+    fleet_name: str, robot: d.RobotState, fleet: FleetSettings, places: set[str], near_m: float
 ) -> Sighting:
     check_length(task_id=robot.task_id)
     return Sighting(
-        Robot(fleet_name, robot.name),
+        RobotName(fleet_name, robot.name),
         charges=robot.mode.mode in CHARGES and not is_dispatched(robot.task_id),
         place=_nearest(robot.location, fleet, places, near_m),
         battery_percent=robot.battery_percent,
@@ -73,7 +73,7 @@ def _sighting(
     )
 
 
-def _nearest(at: d.Location, fleet: Fleet, places: set[str], near_m: float) -> str | None:
+def _nearest(at: d.Location, fleet: FleetSettings, places: set[str], near_m: float) -> str | None:
     """The nearest of these waypoints within `near_m`; None if there is none."""
     away = {
         name: math.dist((at.x, at.y), (waypoint.x, waypoint.y))
@@ -85,8 +85,8 @@ def _nearest(at: d.Location, fleet: Fleet, places: set[str], near_m: float) -> s
 
 
 def accept_state(
-    state: d.ChargerState, settings: Settings, wall: float
-) -> StateHeard | ReceiverHeard:
+    state: d.ChargerState, settings: CoordinatorSettings, wall: float
+) -> ChargerStateHeard | ReceiverHeard:
     """The ChargerState of a station, or of a robot's receiver, as an event. Raises RequestRefused."""
     receiver_of = settings.rcus().get(state.charger_name)
     if receiver_of is None and state.charger_name not in settings.stations:
@@ -100,8 +100,8 @@ def accept_state(
     if receiver_of is not None:
         failed = state.state == d.ChargerStateValue.CHARGER_ERROR
         return ReceiverHeard(receiver_of, state.error_message if failed else "")
-    named = Robot(state.robot_fleet, state.robot_name)
-    return StateHeard(
+    named = RobotName(state.robot_fleet, state.robot_name)
+    return ChargerStateHeard(
         state.charger_name,
         d.ChargerStateValue(state.state),
         state.request_id,
@@ -111,25 +111,29 @@ def accept_state(
     )
 
 
-def accept_request(request: d.ChargerRequest, settings: Settings, wall: float) -> Wanted:
+def accept_request(
+    request: d.ChargerRequest, settings: CoordinatorSettings, wall: float
+) -> ChargeWanted:
     """An operator's request as an event. An empty charger_name means any suitable station."""
     check_length(charger_name=request.charger_name)
     asked = accept_charger_request(request, ChargerSettings())
     if asked.who not in settings.robots():
         raise RequestRefused("robot not ours", f"{asked.who} is in no fleet of the YAML")
-    return Wanted(asked.who, request.charger_name, asked.request_id, asked.start_timeout_s)
+    return ChargeWanted(asked.who, request.charger_name, asked.request_id, asked.start_timeout_s)
 
 
-def accept_withdrawal(cancel: d.ChargerCancel, settings: Settings, wall: float) -> Unwanted:
+def accept_withdrawal(
+    cancel: d.ChargerCancel, settings: CoordinatorSettings, wall: float
+) -> ChargeUnwanted:
     """An operator's cancel as an event. Raises RequestRefused."""
     if not cancel.request_id:
         raise RequestRefused("empty request_id", "which request is withdrawn?")
     check_length(request_id=cancel.request_id)
-    return Unwanted(cancel.request_id)
+    return ChargeUnwanted(cancel.request_id)
 
 
 def accept_assignments(
-    message: d.ChargingAssignments, settings: Settings, wall: float
+    message: d.ChargingAssignments, settings: CoordinatorSettings, wall: float
 ) -> Dedicated:
     """Another node's charging assignments as an event: which of our stations each of our robots has."""
     fleet, known = message.fleet_name, settings.robots()
@@ -138,7 +142,7 @@ def accept_assignments(
         tuple(
             (who, stations.get(one.waypoint_name, "") if one.mode == CHARGE else "")
             for one in message.assignments
-            if (who := Robot(fleet, one.robot_name)) in known
+            if (who := RobotName(fleet, one.robot_name)) in known
         )
     )
 
@@ -166,18 +170,18 @@ def summary(report: SiteReport, now: float) -> Mapping[str, str]:
     }
 
 
-def answer(request: object, reason: str) -> Answer | None:
+def answer(request: object, reason: str) -> RefusalAnswer | None:
     """What is published when a request for any charger is refused; None for anything else."""
     match request:
         case d.ChargerRequest():
             who, station, request_id = (
-                Robot(request.fleet_name, request.robot_name),
+                RobotName(request.fleet_name, request.robot_name),
                 request.charger_name,
                 request.request_id,
             )
-        case Wanted():
+        case ChargeWanted():
             who, station, request_id = request.robot, request.station, request.request_id
         case _:
             return None
     refusal = refused(request_id, station or "any", who, reason)
-    return Answer(CHARGER_REFUSALS, refusal.message(), refusal.fields())
+    return RefusalAnswer(CHARGER_REFUSALS, refusal.message(), refusal.fields())

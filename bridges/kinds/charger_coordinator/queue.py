@@ -19,25 +19,25 @@ from msgspec.structs import replace
 
 from bridges.kinds.charger.pad import misplaced_in
 from bridges.kinds.charger.report import UNREQUESTED
-from bridges.kinds.charger.settings import Robot
+from bridges.kinds.charger.settings import RobotName
 from bridges.kinds.charger_coordinator.memory import (
     CHARGING,
     IDLE,
     NODE,
     RELEASED,
     Grant,
-    Memory,
-    Site,
+    SiteLimits,
+    SiteMemory,
     Wish,
 )
 
 REMEMBERED_S: Final = 30.0
 """How long a robot's last place counts after its fleet has shown it."""
-Here = Mapping[str, Sequence[Robot]]
+Here = Mapping[str, Sequence[RobotName]]
 """Station -> the robots that stand there."""
 
 
-def allot(memory: Memory, now: float, site: Site) -> Memory:
+def allot(memory: SiteMemory, now: float, site: SiteLimits) -> SiteMemory:
     """Give the free stations to the robots that wait, in the order of the queue."""
     here = standing(memory, now, site)
     for wish in memory.wishes:
@@ -49,7 +49,9 @@ def allot(memory: Memory, now: float, site: Site) -> Memory:
     return memory
 
 
-def _granted(memory: Memory, wish: Wish, station: str, now: float, site: Site) -> Memory:
+def _granted(
+    memory: SiteMemory, wish: Wish, station: str, now: float, site: SiteLimits
+) -> SiteMemory:
     count = memory.count + 1
     request_id = f"{NODE}/{wish.robot}/{count}"
     timeout_s = wish.start_timeout_s or site.start_timeout_s
@@ -57,7 +59,7 @@ def _granted(memory: Memory, wish: Wish, station: str, now: float, site: Site) -
     return replace(memory, count=count).with_grant(station, grant)
 
 
-def suiting(memory: Memory, wish: Wish, site: Site) -> list[str]:
+def suiting(memory: SiteMemory, wish: Wish, site: SiteLimits) -> list[str]:
     """The stations to try, best first: the operator's, the one where it stands, the dedicated one, then
     the YAML's order."""
     here = memory.stands_at(wish.robot, site)
@@ -71,7 +73,7 @@ def suiting(memory: Memory, wish: Wish, site: Site) -> list[str]:
     return sorted(untried, key=lambda s: first.index(s) if s in first else len(first))
 
 
-def _free(memory: Memory, station: str, robot: Robot, now: float, here: Here) -> bool:
+def _free(memory: SiteMemory, station: str, robot: RobotName, now: float, here: Here) -> bool:
     if not memory.speaks(station, now) or now < memory.shunned.get(station, now):
         return False
     if in_the_way(here, station, robot):
@@ -87,9 +89,9 @@ def _free(memory: Memory, station: str, robot: Robot, now: float, here: Here) ->
     return is_refused or seen.state in (IDLE, CHARGING)
 
 
-def standing(memory: Memory, now: float, site: Site) -> Here:
+def standing(memory: SiteMemory, now: float, site: SiteLimits) -> Here:
     """The robots that stand at each station, by their fleets' states of the last REMEMBERED_S."""
-    here: dict[str, list[Robot]] = {}
+    here: dict[str, list[RobotName]] = {}
     for who, seen in memory.robots.items():
         station = memory.stands_at(who, site)
         if station is not None and now < seen.at + REMEMBERED_S:
@@ -97,6 +99,6 @@ def standing(memory: Memory, now: float, site: Site) -> Here:
     return here
 
 
-def in_the_way(here: Here, station: str, robot: Robot) -> Robot | None:
+def in_the_way(here: Here, station: str, robot: RobotName) -> RobotName | None:
     """Another robot that stands at the station; None if there is none."""
     return next((who for who in here.get(station, ()) if who != robot), None)

@@ -8,8 +8,15 @@ will get.
 from collections.abc import Iterator
 from typing import Final
 
-from bridges.kinds.charger.settings import Robot
-from bridges.kinds.charger_coordinator.memory import CHARGING, ERROR, WHOSE, Memory, Site, Wish
+from bridges.kinds.charger.settings import RobotName
+from bridges.kinds.charger_coordinator.memory import (
+    CHARGING,
+    ERROR,
+    WHOSE,
+    SiteLimits,
+    SiteMemory,
+    Wish,
+)
 from bridges.kinds.charger_coordinator.queue import Here, in_the_way, standing, suiting
 from bridges.kinds.shared.durations import NEVER
 
@@ -17,12 +24,12 @@ MOST: Final = 4
 """For at most this many stations the queue says why the robot does not have them."""
 
 
-def queued(memory: Memory) -> list[Wish]:
+def queued(memory: SiteMemory) -> list[Wish]:
     """The wishes without a station, in the order in which they are served."""
     return [wish for wish in memory.wishes if memory.station_of(wish.robot) is None]
 
 
-def reasons(memory: Memory, now: float, site: Site) -> Iterator[str]:
+def reasons(memory: SiteMemory, now: float, site: SiteLimits) -> Iterator[str]:
     """`tiny/AMR03 by the robot: charger_b charges tiny/AMR01, free in 12 min` for each that waits."""
     taken: set[str] = set()
     here = standing(memory, now, site)
@@ -41,7 +48,7 @@ def reasons(memory: Memory, now: float, site: Site) -> Iterator[str]:
         yield f"{wish.robot} {WHOSE[wish.by]}: {why}"
 
 
-def free_in_s(memory: Memory, station: str, now: float) -> float:
+def free_in_s(memory: SiteMemory, station: str, now: float) -> float:
     """How long its charge will still take, as it says; NEVER: that is not known."""
     seen = memory.stations.get(station)
     if seen is None or seen.state is not CHARGING or not seen.full_in_s:
@@ -49,7 +56,7 @@ def free_in_s(memory: Memory, station: str, now: float) -> float:
     return max(0.0, seen.at + seen.full_in_s - now)
 
 
-def _obstacle(memory: Memory, station: str, robot: Robot, now: float, here: Here) -> str:
+def _obstacle(memory: SiteMemory, station: str, robot: RobotName, now: float, here: Here) -> str:
     """Why the robot does not have this station."""
     seen, grant = memory.stations.get(station), memory.grants.get(station)
     if seen is None or not memory.speaks(station, now):

@@ -16,8 +16,8 @@ import msgspec
 from msgspec.structs import replace
 
 from bridges.kinds.charger.pad import misplaced_in
-from bridges.kinds.charger.report import Diagnosis, diagnosis
-from bridges.kinds.charger.settings import Robot
+from bridges.kinds.charger.report import FaultCause, diagnosis
+from bridges.kinds.charger.settings import RobotName
 from bridges.kinds.charger_coordinator import wrong_pad
 from bridges.kinds.charger_coordinator.memory import (
     ASSIGNED,
@@ -26,9 +26,9 @@ from bridges.kinds.charger_coordinator.memory import (
     NODE,
     WHOSE,
     Grant,
-    Memory,
-    Seen,
-    Site,
+    SiteLimits,
+    SiteMemory,
+    StationSeen,
 )
 from bridges.kinds.charger_coordinator.reasons import queued, reasons
 from bridges.kinds.shared.decision import Fault
@@ -68,10 +68,10 @@ class SiteReport(msgspec.Struct, frozen=True):
     read_at: float | None
     stations: tuple[tuple[str, str], ...] = ()
     queue: tuple[str, ...] = ()
-    waiting: tuple[Robot, ...] = ()
+    waiting: tuple[RobotName, ...] = ()
     assigns: str = ""
     schedule: tuple[str, ...] = ()
-    absent: tuple[Robot, ...] = ()
+    absent: tuple[RobotName, ...] = ()
     faults: tuple[Fault, ...] = ()
 
     def news(self) -> object:
@@ -79,7 +79,7 @@ class SiteReport(msgspec.Struct, frozen=True):
         return self.stations, self.waiting, self.assigns, self.schedule, self.absent
 
 
-def report(memory: Memory, now: float, site: Site) -> SiteReport:
+def report(memory: SiteMemory, now: float, site: SiteLimits) -> SiteReport:
     """The site as it is now."""
     waiting = queued(memory)
     return SiteReport(
@@ -94,13 +94,13 @@ def report(memory: Memory, now: float, site: Site) -> SiteReport:
     )
 
 
-def _assigns(memory: Memory) -> str:
+def _assigns(memory: SiteMemory) -> str:
     if memory.alone:
         return "yes" if memory.may_speak else "no"
     return "no: another node publishes charging_assignments"
 
 
-def _of(memory: Memory, name: str, now: float) -> str:
+def _of(memory: SiteMemory, name: str, now: float) -> str:
     """`CHARGING fleet/robot, by the schedule`, `IDLE`, or `?` before the first state."""
     seen, grant = memory.stations.get(name), memory.grants.get(name)
     state = "?" if seen is None else seen.state.name.removeprefix("CHARGER_")
@@ -112,7 +112,7 @@ def _of(memory: Memory, name: str, now: float) -> str:
     return f"{state} {grant.robot}{whose}{told}"
 
 
-def _faults(memory: Memory, now: float, site: Site) -> Iterator[Fault]:
+def _faults(memory: SiteMemory, now: float, site: SiteLimits) -> Iterator[Fault]:
     for who, stations in memory.strikes.items():
         if memory.faulty(who):
             what = f"{who} failed at {' and at '.join(stations)}: not tried again"
@@ -128,15 +128,17 @@ def _faults(memory: Memory, now: float, site: Site) -> Iterator[Fault]:
         if wrong_pad.alarming(memory, one, now):
             yield _misplaced(one)
     for who, error in memory.receivers.items():
-        if error and diagnosis(error) is not Diagnosis.LOST:
+        if error and diagnosis(error) is not FaultCause.LOST:
             yield Fault("RECEIVER_ERROR", f"the receiver on {who}: {error}")
 
 
-def _faults_of(memory: Memory, name: str, seen: Seen, now: float, site: Site) -> Iterator[Fault]:
+def _faults_of(
+    memory: SiteMemory, name: str, seen: StationSeen, now: float, site: SiteLimits
+) -> Iterator[Fault]:
     """Faults that a station's state shows."""
-    if seen.diagnosis in (Diagnosis.STATION, Diagnosis.LOST, Diagnosis.UNCLEAR):
+    if seen.diagnosis in (FaultCause.STATION, FaultCause.LOST, FaultCause.UNCLEAR):
         yield Fault("STATION_OUT_OF_SERVICE", f"{name}: {seen.error}")
-    if seen.diagnosis is not Diagnosis.PAD:
+    if seen.diagnosis is not FaultCause.PAD:
         return
     who = wrong_pad.on_pad(seen.error, site)
     unasked = who is not None and memory.station_of(who) is None and now >= seen.since + ASKS_S
@@ -145,7 +147,7 @@ def _faults_of(memory: Memory, name: str, seen: Seen, now: float, site: Site) ->
         yield Fault("WRONG_STATION", f"{what} stands at {name}, but nobody requested that")
 
 
-def _misplaced(one: wrong_pad.Astray) -> Fault:
+def _misplaced(one: wrong_pad.OnWrongPad) -> Fault:
     if one.expected:
         text = f"{one.who} stands at {one.station}, but is expected at {one.expected}"
         return Fault("WRONG_STATION", text)
@@ -164,8 +166,8 @@ def _stranger(error: str) -> str:
 
 
 def messages(
-    memory: Memory, faults: tuple[Fault, ...], now: float, site: Site
-) -> tuple[Memory, Messages]:
+    memory: SiteMemory, faults: tuple[Fault, ...], now: float, site: SiteLimits
+) -> tuple[SiteMemory, Messages]:
     """The messages that are due; none while it may not publish."""
     if not memory.may_speak:
         return memory, ()
@@ -185,7 +187,7 @@ def messages(
     return memory, tuple(found)
 
 
-def _again_at(memory: Memory, site: Site) -> Iterator[float]:
+def _again_at(memory: SiteMemory, site: SiteLimits) -> Iterator[float]:
     """When the assignment of a robot that stands elsewhere without a task is published again.
 
     An EasyFullControl adapter that starts takes the retained assignment, and a moment later the charger
@@ -201,7 +203,7 @@ def _again_at(memory: Memory, site: Site) -> Iterator[float]:
             yield max(memory.assigned_at, grant.made_at) + AGAIN_S
 
 
-def due(memory: Memory, site: Site) -> list[float]:
+def due(memory: SiteMemory, site: SiteLimits) -> list[float]:
     """When requests, cancels, assignments and faults are due."""
     if not memory.may_speak:
         return []
@@ -210,7 +212,7 @@ def due(memory: Memory, site: Site) -> list[float]:
     return asks + [_due_at(memory, name, grant) for name, grant in memory.grants.items()]
 
 
-def _due_at(memory: Memory, name: str, grant: Grant) -> float:
+def _due_at(memory: SiteMemory, name: str, grant: Grant) -> float:
     seen = memory.stations.get(name)
     if not grant.over:
         return due_at(grant.sent_at, new=False, again=not grant.shown)
@@ -226,7 +228,9 @@ def _to_station(name: str, grant: Grant) -> tuple[AnyTopic, d.Message]:
     return CHARGER_REQUESTS, d.ChargerRequest(name, who.fleet, who.name, timeout, grant.request_id)
 
 
-def _assignments(memory: Memory, now: float, site: Site) -> Iterator[d.ChargingAssignments]:
+def _assignments(
+    memory: SiteMemory, now: float, site: SiteLimits
+) -> Iterator[d.ChargingAssignments]:
     """Every robot's place, fleet by fleet, in the order of names. One that is told to leave a pad has
     for a moment another mode (`wrong_pad.py`)."""
     fleets: dict[str, list[d.ChargingAssignment]] = {}

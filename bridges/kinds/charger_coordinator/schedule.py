@@ -10,7 +10,7 @@ from typing import Annotated, Final, Literal, NamedTuple
 import msgspec
 from msgspec import Meta
 
-from bridges.kinds.charger.settings import Robot
+from bridges.kinds.charger.settings import RobotName
 from bridges.kinds.shared.fields import Name, tells
 from bridges.kinds.shared.remarks import Remarks
 
@@ -51,7 +51,7 @@ class Charging(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     ] = []
     percent: Annotated[Target, tells("how far they are charged.")] = 100.0
 
-    def concerns(self, who: Robot) -> bool:
+    def concerns(self, who: RobotName) -> bool:
         """Is it for this robot?"""
         everybody = not self.fleets and not self.robots
         return everybody or who.fleet in self.fleets or str(who) in self.robots
@@ -75,7 +75,7 @@ class Charging(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
         return f"{self.at}-{self.until}{days} {whom} to {self.percent:g} %{now}"
 
 
-def target(schedule: Iterable[Charging], who: Robot, when: LocalTime | None) -> float:
+def target(schedule: Iterable[Charging], who: RobotName, when: LocalTime | None) -> float:
     """How far the schedule charges this robot at this time (%); 0 where it does not."""
     if when is None:
         return 0.0
@@ -86,7 +86,7 @@ def target(schedule: Iterable[Charging], who: Robot, when: LocalTime | None) -> 
 def problems(
     schedule: Iterable[Charging],
     fleets: Iterable[str],
-    robots: Iterable[Robot],
+    robots: Iterable[RobotName],
     least: float,
     most: float,
 ) -> Remarks:

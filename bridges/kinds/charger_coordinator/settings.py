@@ -11,7 +11,7 @@ from zoneinfo import ZoneInfo
 import msgspec
 from msgspec import Meta
 
-from bridges.kinds.charger.settings import ReceiverId, Robot, StartTimeout
+from bridges.kinds.charger.settings import ReceiverId, RobotName, StartTimeout
 from bridges.kinds.charger_coordinator import schedule as times
 from bridges.kinds.charger_coordinator.schedule import Charging
 from bridges.kinds.shared.fields import GraphSettings, Name, Timeout, tells
@@ -34,7 +34,7 @@ class Waypoint(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     y: Annotated[Metres, tells("its y coordinate in the graph.")]
 
 
-class Station(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class StationSettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """A charger, under the name that its own daemon publishes."""
 
     waypoint: Annotated[
@@ -60,7 +60,7 @@ class RobotSettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
     ] = None
 
 
-class Fleet(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class FleetSettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """A fleet by the name of its adapter."""
 
     waypoints: Annotated[
@@ -73,13 +73,14 @@ class Fleet(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     ]
 
 
-class Settings(GraphSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class CoordinatorSettings(GraphSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Which robots charge where."""
 
     stations: Annotated[
-        dict[Name, Station], tells("the chargers, by the names under which their daemons publish.")
+        dict[Name, StationSettings],
+        tells("the chargers, by the names under which their daemons publish."),
     ]
-    fleets: Annotated[dict[Name, Fleet], tells("the fleets whose robots charge at them.")]
+    fleets: Annotated[dict[Name, FleetSettings], tells("the fleets whose robots charge at them.")]
     start_timeout_s: Annotated[
         StartTimeout, tells("how long a station stays assigned to a robot that is on its way.")
     ] = 300.0
@@ -130,7 +131,7 @@ class Settings(GraphSettings, frozen=True, kw_only=True, forbid_unknown_fields=T
         yield from self._doubles()
         yield from self._of_schedule()
 
-    def _of_station(self, name: str, station: Station) -> Remarks:
+    def _of_station(self, name: str, station: StationSettings) -> Remarks:
         places = self.places()[name]
         if not self._graphs_with(name):
             text = (
@@ -148,7 +149,7 @@ class Settings(GraphSettings, frozen=True, kw_only=True, forbid_unknown_fields=T
         places = self.places()[station]
         return [name for name, fleet in self.fleets.items() if places[name] in fleet.waypoints]
 
-    def _of_fleet(self, fleet_name: str, fleet: Fleet) -> Remarks:
+    def _of_fleet(self, fleet_name: str, fleet: FleetSettings) -> Remarks:
         known = ", ".join(fleet.waypoints) or "none"
         chargers = {places[fleet_name] for places in self.places().values()}
         for name, robot in fleet.robots.items():
@@ -198,10 +199,10 @@ class Settings(GraphSettings, frozen=True, kw_only=True, forbid_unknown_fields=T
         except (KeyError, OSError, ValueError):  # ZoneInfoNotFoundError is a KeyError
             yield ("timezone",), f"no time zone '{self.timezone}' on this machine (Asia/Singapore)"
 
-    def robots(self) -> dict[Robot, RobotSettings]:
+    def robots(self) -> dict[RobotName, RobotSettings]:
         """Every robot, by fleet and name."""
         return {
-            Robot(fleet_name, name): robot
+            RobotName(fleet_name, name): robot
             for fleet_name, fleet in self.fleets.items()
             for name, robot in fleet.robots.items()
         }
@@ -213,12 +214,12 @@ class Settings(GraphSettings, frozen=True, kw_only=True, forbid_unknown_fields=T
             for name, at in self.stations.items()
         }
 
-    def rcus(self) -> dict[str, Robot]:
+    def rcus(self) -> dict[str, RobotName]:
         """The name under which a robot's own receiver publishes -> the robot."""
         return {robot.rcu: who for who, robot in self.robots().items() if robot.rcu}
 
 
-def tables(settings: Settings) -> Iterator[Table]:
+def tables(settings: CoordinatorSettings) -> Iterator[Table]:
     """Each robot and its places, each station and its waypoint, and the schedule."""
     yield Table(
         "robots",
@@ -246,13 +247,13 @@ def _named(places: dict[str, str]) -> str:
     return ", ".join(f"{fleet}: {place}" for fleet, place in places.items())
 
 
-def speaks_of(settings: Settings) -> Iterator[Place]:
+def speaks_of(settings: CoordinatorSettings) -> Iterator[Place]:
     """Its stations are chargers' daemons."""
     for name in settings.stations:
         yield ("stations", name), CHARGER, name
 
 
-def warnings(settings: Settings) -> Remarks:
+def warnings(settings: CoordinatorSettings) -> Remarks:
     """What is legal but may be a mistake."""
     used = {name for robot in settings.robots().values() for name in robot.stations}
     for name in settings.stations:
@@ -269,7 +270,7 @@ def warnings(settings: Settings) -> Remarks:
     yield from _near(settings)
 
 
-def _near(settings: Settings) -> Remarks:
+def _near(settings: CoordinatorSettings) -> Remarks:
     """Places so close together that a robot's position cannot tell them apart."""
     for fleet_name, fleet in settings.fleets.items():
         names = list(fleet.waypoints)

@@ -5,7 +5,7 @@ from typing import Final
 
 import msgspec
 
-from bridges.kinds.charger.settings import Robot
+from bridges.kinds.charger.settings import RobotName
 from bridges.kinds.charger_coordinator.schedule import LocalTime
 from bridges.kinds.shared.decision import OperatorReset
 from bridges.kinds.shared.graph_kind import MaySpeak, Woken
@@ -25,7 +25,7 @@ class Sighting(msgspec.Struct, frozen=True):
     """One robot of a FleetState. `charges`: its mode is CHARGING or DOCKING, and its task is not one
     that RMF's dispatcher gave it. `place`: which of our waypoints it stands at; None for none."""
 
-    who: Robot
+    who: RobotName
     charges: bool
     place: str | None
     battery_percent: float
@@ -39,13 +39,13 @@ class FleetSeen(msgspec.Struct, frozen=True):
     when: LocalTime | None = None
 
 
-class StateHeard(msgspec.Struct, frozen=True):
+class ChargerStateHeard(msgspec.Struct, frozen=True):
     """A ChargerState. `robot`: None where it names none. `full_in_s`: 0 where it is not known."""
 
     station: str
     state: ChargerStateValue
     request_id: str = ""
-    robot: Robot | None = None
+    robot: RobotName | None = None
     error: str = ""
     full_in_s: float = 0.0
 
@@ -53,20 +53,20 @@ class StateHeard(msgspec.Struct, frozen=True):
 class ReceiverHeard(msgspec.Struct, frozen=True):
     """A ChargerState of a robot's own receiver, which is no station. `error`: "" without one."""
 
-    robot: Robot
+    robot: RobotName
     error: str
 
 
-class Wanted(msgspec.Struct, frozen=True):
+class ChargeWanted(msgspec.Struct, frozen=True):
     """An operator wants this robot charged; `station`: preferably there, "" for anywhere."""
 
-    robot: Robot
+    robot: RobotName
     station: str
     request_id: str
     start_timeout_s: float
 
 
-class Unwanted(msgspec.Struct, frozen=True):
+class ChargeUnwanted(msgspec.Struct, frozen=True):
     """An operator withdraws a request."""
 
     request_id: str
@@ -75,15 +75,15 @@ class Unwanted(msgspec.Struct, frozen=True):
 class Dedicated(msgspec.Struct, frozen=True):
     """Another node's charging assignments: each robot and the station that it is to use, or ""."""
 
-    stations: tuple[tuple[Robot, str], ...]
+    stations: tuple[tuple[RobotName, str], ...]
 
 
 Event = (
     FleetSeen
-    | StateHeard
+    | ChargerStateHeard
     | ReceiverHeard
-    | Wanted
-    | Unwanted
+    | ChargeWanted
+    | ChargeUnwanted
     | Dedicated
     | MaySpeak
     | OperatorReset

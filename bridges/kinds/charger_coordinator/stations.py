@@ -23,8 +23,8 @@ from typing import Final
 
 from msgspec.structs import replace
 
-from bridges.kinds.charger.report import OUT_OF_SERVICE, UNREQUESTED, Diagnosis, diagnosis
-from bridges.kinds.charger.settings import Robot
+from bridges.kinds.charger.report import OUT_OF_SERVICE, UNREQUESTED, FaultCause, diagnosis
+from bridges.kinds.charger.settings import RobotName
 from bridges.kinds.charger_coordinator.memory import (
     ASSIGNED,
     CHARGING,
@@ -33,13 +33,13 @@ from bridges.kinds.charger_coordinator.memory import (
     NODE,
     RELEASED,
     Grant,
-    Memory,
-    Seen,
-    Site,
+    SiteLimits,
+    SiteMemory,
+    StationSeen,
     Wish,
     without,
 )
-from bridges.kinds.charger_coordinator.signals import StateHeard
+from bridges.kinds.charger_coordinator.signals import ChargerStateHeard
 from bridges.kinds.charger_coordinator.wishes import COMES_S, fulfilled, gives_up, stays_away
 from bridges.kinds.shared.durations import AGES_AGO, NEVER
 
@@ -49,12 +49,12 @@ LOST_S: Final = 30.0
 PROVEN_S: Final = 10.0
 
 
-def heard(memory: Memory, state: StateHeard, now: float, site: Site) -> Memory:
+def heard(memory: SiteMemory, state: ChargerStateHeard, now: float, site: SiteLimits) -> SiteMemory:
     """A station has shown its state."""
     name, before = state.station, memory.stations.get(state.station)
     same = before is not None and (before.state, before.error) == (state.state, state.error)
     since = before.since if before is not None and same else now
-    seen = Seen(
+    seen = StationSeen(
         state.state, state.request_id, state.robot, state.error, now, since, state.full_in_s
     )
     memory = replace(memory, stations={**memory.stations, name: seen})
@@ -66,14 +66,14 @@ def heard(memory: Memory, state: StateHeard, now: float, site: Site) -> Memory:
         return _followed(memory, name, grant, seen, now, site)
     if grant.over:
         return memory.with_grant(name, None)
-    if grant.shown and seen.diagnosis is Diagnosis.LOST:
+    if grant.shown and seen.diagnosis is FaultCause.LOST:
         return memory
     if grant.shown and not _forgot(memory, name, grant, now, site):
         return _ended(memory.with_grant(name, None), name, grant, now, site)
     return memory.with_grant(name, _repeated(grant, seen, now))
 
 
-def _forgot(memory: Memory, name: str, grant: Grant, now: float, site: Site) -> bool:
+def _forgot(memory: SiteMemory, name: str, grant: Grant, now: float, site: SiteLimits) -> bool:
     """Has the station forgotten the request that it has shown? An IDLE one may also have released it
     without our notice. Then the robot has left, or did not come in time."""
     seen = memory.stations[name]
@@ -84,7 +84,7 @@ def _forgot(memory: Memory, name: str, grant: Grant, now: float, site: Site) -> 
     return now < grant.made_at + grant.start_timeout_s
 
 
-def _repeated(grant: Grant, seen: Seen, now: float) -> Grant | None:
+def _repeated(grant: Grant, seen: StationSeen, now: float) -> Grant | None:
     """The grant while the station does not show its request yet; None if it will not take it."""
     before = seen.state is RELEASED or seen.request_id.startswith(UNREQUESTED)
     may_come = seen.state is IDLE or (before and seen.robot == grant.robot)
@@ -96,8 +96,8 @@ def _repeated(grant: Grant, seen: Seen, now: float) -> Grant | None:
 
 
 def _followed(
-    memory: Memory, name: str, grant: Grant, seen: Seen, now: float, site: Site
-) -> Memory:
+    memory: SiteMemory, name: str, grant: Grant, seen: StationSeen, now: float, site: SiteLimits
+) -> SiteMemory:
     """The station shows our request."""
     grant = replace(grant, shown=True, started=grant.started or seen.state is CHARGING)
     memory = memory.with_grant(name, grant)
@@ -106,13 +106,15 @@ def _followed(
     if seen.state is RELEASED:
         memory = _ended(memory, name, grant, now, site)
         return memory.with_grant(name, replace(grant, over=True))
-    if seen.diagnosis in (Diagnosis.ROBOT, Diagnosis.STATION, Diagnosis.UNCLEAR):
+    if seen.diagnosis in (FaultCause.ROBOT, FaultCause.STATION, FaultCause.UNCLEAR):
         memory = memory.with_grant(name, replace(grant, over=True, sent_at=AGES_AGO))
-        return memory if seen.diagnosis is Diagnosis.STATION else _struck(memory, name, grant.robot)
+        return (
+            memory if seen.diagnosis is FaultCause.STATION else _struck(memory, name, grant.robot)
+        )
     return memory
 
 
-def _ended(memory: Memory, name: str, grant: Grant, now: float, site: Site) -> Memory:
+def _ended(memory: SiteMemory, name: str, grant: Grant, now: float, site: SiteLimits) -> SiteMemory:
     """A request has ended without our cancel."""
     who, wish = grant.robot, memory.wish(grant.robot)
     if grant.started and now < grant.forgotten_at + PROVEN_S:
@@ -125,14 +127,14 @@ def _ended(memory: Memory, name: str, grant: Grant, now: float, site: Site) -> M
     return memory.last_in_queue(who) if stays else memory.without_wish(who)
 
 
-def _struck(memory: Memory, name: str, who: Robot) -> Memory:
+def _struck(memory: SiteMemory, name: str, who: RobotName) -> SiteMemory:
     """The robot has failed at this station. After its second failure it is not tried again."""
     strikes = {**memory.strikes, who: (*memory.strikes.get(who, ()), name)}
     memory = replace(memory, strikes=strikes)
     return memory.without_wish(who) if memory.faulty(who) else memory
 
 
-def adopted(memory: Memory, now: float, site: Site) -> Memory:
+def adopted(memory: SiteMemory, now: float, site: SiteLimits) -> SiteMemory:
     """Adopt requests that another node has made for our robots, and charges that nobody requested."""
     for name, seen in memory.stations.items():
         if name not in memory.grants and seen.state in (ASSIGNED, CHARGING):
@@ -140,7 +142,9 @@ def adopted(memory: Memory, now: float, site: Site) -> Memory:
     return memory
 
 
-def _adopt(memory: Memory, name: str, seen: Seen, now: float, site: Site) -> Memory:
+def _adopt(
+    memory: SiteMemory, name: str, seen: StationSeen, now: float, site: SiteLimits
+) -> SiteMemory:
     who = seen.robot or _waits_at(memory, name, site)
     if who is None or who not in site.robots:
         return memory
@@ -157,7 +161,7 @@ def _adopt(memory: Memory, name: str, seen: Seen, now: float, site: Site) -> Mem
     return replace(memory, wishes=(*memory.wishes, Wish(who, "operator")))
 
 
-def _waits_at(memory: Memory, station: str, site: Site) -> Robot | None:
+def _waits_at(memory: SiteMemory, station: str, site: SiteLimits) -> RobotName | None:
     """Which robot is charged here without a name: one with a wish that stands here."""
     here = (w.robot for w in memory.wishes if memory.stands_at(w.robot, site) == station)
     return next((who for who in here if memory.station_of(who) is None), None)
@@ -166,7 +170,7 @@ def _waits_at(memory: Memory, station: str, site: Site) -> Robot | None:
 # ---- time
 
 
-def in_time(memory: Memory, now: float, site: Site) -> Memory:
+def in_time(memory: SiteMemory, now: float, site: SiteLimits) -> SiteMemory:
     """What changes without an event."""
     for name, grant in list(memory.grants.items()):
         if grant.over or grant.started:
@@ -187,18 +191,18 @@ def not_taken_at(grant: Grant) -> float:
     return max(grant.made_at, grant.forgotten_at) + TAKEN_S
 
 
-def hopeless_at(memory: Memory, name: str, grant: Grant) -> float:
+def hopeless_at(memory: SiteMemory, name: str, grant: Grant) -> float:
     """When a robot on its way should get another station. Reasons: we do not hear the station's
     daemon, the daemon does not reach the station, or another robot does not leave the pad."""
     seen, at = memory.stations.get(name), memory.silent_since(name) + LOST_S
-    if seen is not None and seen.diagnosis is Diagnosis.LOST:
+    if seen is not None and seen.diagnosis is FaultCause.LOST:
         at = min(at, seen.since + LOST_S)
-    if seen is not None and seen.diagnosis is Diagnosis.PAD:
+    if seen is not None and seen.diagnosis is FaultCause.PAD:
         at = min(at, seen.since + max(grant.start_timeout_s, LOST_S))
     return at
 
 
-def absent_at(memory: Memory, name: str, grant: Grant, site: Site) -> float:
+def absent_at(memory: SiteMemory, name: str, grant: Grant, site: SiteLimits) -> float:
     """When a robot that was called, and does not come, loses the station."""
     stays = memory.may_speak and grant.shown and stays_away(memory, name, grant, site)
     return grant.made_at + COMES_S if stays else NEVER
@@ -207,7 +211,9 @@ def absent_at(memory: Memory, name: str, grant: Grant, site: Site) -> float:
 # ---- whose fault
 
 
-def _acquitted(memory: Memory, name: str, before: Seen | None, now: float, site: Site) -> Memory:
+def _acquitted(
+    memory: SiteMemory, name: str, before: StationSeen | None, now: float, site: SiteLimits
+) -> SiteMemory:
     """Forget robots' failures at this station that turn out to be the station's fault."""
     for who, failed_at in memory.strikes.items():
         if name in failed_at and _was_the_stations(memory, who, name, before, now, site):
@@ -218,19 +224,24 @@ def _acquitted(memory: Memory, name: str, before: Seen | None, now: float, site:
 
 
 def _was_the_stations(
-    memory: Memory, who: Robot, name: str, before: Seen | None, now: float, site: Site
+    memory: SiteMemory,
+    who: RobotName,
+    name: str,
+    before: StationSeen | None,
+    now: float,
+    site: SiteLimits,
 ) -> bool:
     """Does the error name the station, or did it end only long after the robot had left?"""
     seen, standing = memory.stations[name], memory.robots.get(who)
     if seen.state is ERROR:
-        return diagnosis(seen.error.removeprefix(OUT_OF_SERVICE)) is Diagnosis.STATION
-    failed = before and before.diagnosis in (Diagnosis.STATION, Diagnosis.UNCLEAR)
+        return diagnosis(seen.error.removeprefix(OUT_OF_SERVICE)) is FaultCause.STATION
+    failed = before and before.diagnosis in (FaultCause.STATION, FaultCause.UNCLEAR)
     if not failed or standing is None or memory.stands_at(who, site) == name:
         return False
     return now >= standing.here_since + PROVEN_S
 
 
-def _proven(memory: Memory, now: float) -> Memory:
+def _proven(memory: SiteMemory, now: float) -> SiteMemory:
     """Forget the failures of robots that are being charged."""
     for who in memory.strikes:
         if now >= proven_at(memory, who):
@@ -238,7 +249,7 @@ def _proven(memory: Memory, now: float) -> Memory:
     return memory
 
 
-def proven_at(memory: Memory, who: Robot) -> float:
+def proven_at(memory: SiteMemory, who: RobotName) -> float:
     """When a robot that is being charged has proven that it can be."""
     station = memory.station_of(who)
     seen = memory.stations.get(station or "")

@@ -25,18 +25,18 @@ from typing import Final
 
 from msgspec.structs import replace
 
-from bridges.kinds.charger.settings import Robot
+from bridges.kinds.charger.settings import RobotName
 from bridges.kinds.charger_coordinator import schedule
 from bridges.kinds.charger_coordinator.memory import (
     By,
     Grant,
-    Memory,
-    Site,
+    SiteLimits,
+    SiteMemory,
     Standing,
     Wish,
     without,
 )
-from bridges.kinds.charger_coordinator.signals import Sighting, Wanted, is_dispatched
+from bridges.kinds.charger_coordinator.signals import ChargeWanted, Sighting, is_dispatched
 
 SETTLES_S: Final = 2.0
 """A robot that passes by on another task may still show the mode CHARGING."""
@@ -47,7 +47,7 @@ COMES_S: Final = 60.0
 ABSENT_S: Final = 600.0
 
 
-def sighted(memory: Memory, sighting: Sighting, now: float, site: Site) -> Memory:
+def sighted(memory: SiteMemory, sighting: Sighting, now: float, site: SiteLimits) -> SiteMemory:
     """A fleet has shown one robot."""
     who = sighting.who
     standing = _standing(memory.robots.get(who), sighting, now)
@@ -65,7 +65,7 @@ def sighted(memory: Memory, sighting: Sighting, now: float, site: Site) -> Memor
     return fulfilled(memory, who, site) if full else memory.without_wish(who)
 
 
-def wanted(memory: Memory, event: Wanted, site: Site) -> tuple[Memory, str]:
+def wanted(memory: SiteMemory, event: ChargeWanted, site: SiteLimits) -> tuple[SiteMemory, str]:
     """An operator wants this robot charged."""
     who = event.robot
     if event.request_id in memory.over:
@@ -84,7 +84,7 @@ def wanted(memory: Memory, event: Wanted, site: Site) -> tuple[Memory, str]:
     return replace(memory, wishes=tuple(wish if w is before else w for w in memory.wishes)), ""
 
 
-def unwanted(memory: Memory, request_id: str) -> tuple[Memory, str]:
+def unwanted(memory: SiteMemory, request_id: str) -> tuple[SiteMemory, str]:
     """An operator withdraws a request."""
     wish = next((w for w in memory.wishes if request_id and w.request_id == request_id), None)
     grants = memory.grants.values()
@@ -95,7 +95,7 @@ def unwanted(memory: Memory, request_id: str) -> tuple[Memory, str]:
     return memory.takes_back(who).without_wish(who), ""
 
 
-def fulfilled(memory: Memory, who: Robot, site: Site) -> Memory:
+def fulfilled(memory: SiteMemory, who: RobotName, site: SiteLimits) -> SiteMemory:
     """The robot was charged in its present task, so its failures are forgotten."""
     standing = memory.robots.get(who)
     served = {**memory.served, who: standing.sighting.task_id if standing else ""}
@@ -105,7 +105,7 @@ def fulfilled(memory: Memory, who: Robot, site: Site) -> Memory:
     return memory.without_wish(who)
 
 
-def stays_away(memory: Memory, station: str, grant: Grant, site: Site) -> bool:
+def stays_away(memory: SiteMemory, station: str, grant: Grant, site: SiteLimits) -> bool:
     """Has a robot without a task not left its place since it was called?"""
     standing, wish = memory.robots.get(grant.robot), memory.wish(grant.robot)
     if standing is None or wish is None or wish.by == "operator" or standing.sighting.task_id:
@@ -114,7 +114,7 @@ def stays_away(memory: Memory, station: str, grant: Grant, site: Site) -> bool:
     return elsewhere and standing.here_since <= grant.made_at
 
 
-def gives_up(memory: Memory, who: Robot, now: float) -> Memory:
+def gives_up(memory: SiteMemory, who: RobotName, now: float) -> SiteMemory:
     """It did not come when it was called: the station is for others."""
     absent = {**memory.absent, who: now + ABSENT_S}
     return replace(memory.takes_back(who).without_wish(who), absent=absent)
@@ -134,7 +134,7 @@ def _standing(before: Standing | None, sighting: Sighting, now: float) -> Standi
     )
 
 
-def _served(memory: Memory, sighting: Sighting) -> Memory:
+def _served(memory: SiteMemory, sighting: Sighting) -> SiteMemory:
     """Forget in which task a robot was charged, once it has left in another one."""
     who, task = sighting.who, sighting.task_id
     if sighting.place is None and task and memory.served.get(who, task) != task:
@@ -142,7 +142,7 @@ def _served(memory: Memory, sighting: Sighting) -> Memory:
     return memory
 
 
-def _rested(memory: Memory, sighting: Sighting, site: Site) -> Memory:
+def _rested(memory: SiteMemory, sighting: Sighting, site: SiteLimits) -> SiteMemory:
     """Note whether the robot is full enough for the schedule now. That holds until the schedule's
     time is over, or the robot has worked."""
     who = sighting.who
@@ -155,7 +155,7 @@ def _rested(memory: Memory, sighting: Sighting, site: Site) -> Memory:
     return memory
 
 
-def _called(memory: Memory, sighting: Sighting, now: float) -> Memory:
+def _called(memory: SiteMemory, sighting: Sighting, now: float) -> SiteMemory:
     """A task that begins when the robot is called is its drive to the station, unless the dispatcher
     gave it."""
     who, task = sighting.who, sighting.task_id
@@ -169,7 +169,7 @@ def _called(memory: Memory, sighting: Sighting, now: float) -> Memory:
     return replace(memory, wishes=tuple(called if w is wish else w for w in memory.wishes))
 
 
-def _begun(memory: Memory, standing: Standing, now: float, site: Site) -> Memory:
+def _begun(memory: SiteMemory, standing: Standing, now: float, site: SiteLimits) -> SiteMemory:
     sighting = standing.sighting
     who = sighting.who
     by = None if memory.faulty(who) else _asks(memory, standing, now, site)
@@ -179,7 +179,7 @@ def _begun(memory: Memory, standing: Standing, now: float, site: Site) -> Memory
     return replace(memory, wishes=(*memory.wishes, Wish(who, by, sighting.task_id)))
 
 
-def _asks(memory: Memory, standing: Standing, now: float, site: Site) -> By | None:
+def _asks(memory: SiteMemory, standing: Standing, now: float, site: SiteLimits) -> By | None:
     """Who wants this robot charged, by its fleet's state and the schedule; None for nobody."""
     s = standing.sighting
     if s.place is None or s.battery_percent >= site.full_percent:
@@ -197,7 +197,7 @@ def _asks(memory: Memory, standing: Standing, now: float, site: Site) -> By | No
     return "fleet" if low else None
 
 
-def _believed(memory: Memory, standing: Standing, now: float) -> bool:
+def _believed(memory: SiteMemory, standing: Standing, now: float) -> bool:
     """Does the mode belong to its present task, and not to an earlier one?"""
     served = memory.served.get(standing.sighting.who)
     if served is None:
@@ -205,7 +205,7 @@ def _believed(memory: Memory, standing: Standing, now: float) -> bool:
     return served != standing.sighting.task_id and now >= standing.since + LINGERS_S
 
 
-def _lasts(memory: Memory, wish: Wish, s: Sighting, site: Site) -> bool:
+def _lasts(memory: SiteMemory, wish: Wish, s: Sighting, site: SiteLimits) -> bool:
     """Does it still want to be charged, and stand at one of our waypoints or drive there?"""
     if s.battery_percent >= _goal(memory, wish, site):
         return False
@@ -215,7 +215,7 @@ def _lasts(memory: Memory, wish: Wish, s: Sighting, site: Site) -> bool:
     return same and (bool(s.task_id) or memory.station_of(s.who) is not None)
 
 
-def _goal(memory: Memory, wish: Wish, site: Site) -> float:
+def _goal(memory: SiteMemory, wish: Wish, site: SiteLimits) -> float:
     """The battery charge (%) at which the wish is fulfilled."""
     if wish.by != "schedule" or not site.schedule:
         return site.full_percent
@@ -223,7 +223,7 @@ def _goal(memory: Memory, wish: Wish, site: Site) -> float:
     return max(aim, site.again_percent)
 
 
-def _full(memory: Memory, wish: Wish, site: Site) -> bool:
+def _full(memory: SiteMemory, wish: Wish, site: SiteLimits) -> bool:
     """Has its robot been charged, and does its fleet show that the goal is reached?"""
     grant = memory.grants.get(memory.station_of(wish.robot) or "")
     percent = memory.robots[wish.robot].sighting.battery_percent

@@ -3,15 +3,15 @@
 RMF's fleet adapter starts a robot's ChargeBattery again when the waypoint or the mode of its charging
 assignment changes (rmf_ros2 9dedd0f, ChargeBattery.cpp, _consider_restart). That moves a robot, but
 only while its ChargeBattery runs: as a task, or as `finishing_request: charge`. Rules:
-COORDINATOR-ASTRAY-1. A robot that is expected at one station and comes to another, or does not leave it
-   for LEAVES_S, is told to wait, and TOLD_S later to charge at its own. Not more than twice for one
-   request.
-COORDINATOR-ASTRAY-2. A robot that has no station, and stands on a pad that another waits for, is told
-   to wait again, by the other mode for TOLD_S. This happens `leaves_s` after it came or the station let
-   it go.
-COORDINATOR-ASTRAY-3. Where we may not assign, or the robot is in another task, nothing is told: RMF
+COORDINATOR-WRONG-PAD-1. A robot that is expected at one station and comes to another, or does not
+   leave it for LEAVES_S, is told to wait, and TOLD_S later to charge at its own. Not more than
+   twice for one request.
+COORDINATOR-WRONG-PAD-2. A robot that has no station, and stands on a pad that another waits for, is
+   told to wait again, by the other mode for TOLD_S. This happens `leaves_s` after it came or the
+   station let it go.
+COORDINATOR-WRONG-PAD-3. Where we may not assign, or the robot is in another task, nothing is told: RMF
    would not move it.
-COORDINATOR-ASTRAY-4. If it still stands there OBEYS_S later, or cannot be told, a person is alerted.
+COORDINATOR-WRONG-PAD-4. If it still stands there OBEYS_S later, or cannot be told, a person is alerted.
 Who stands where is the fleet's word (FleetState's position), or the station's, if it reads receivers.
 """
 
@@ -21,9 +21,9 @@ from typing import Final, NamedTuple
 from msgspec.structs import replace
 
 from bridges.kinds.charger.pad import misplaced_in
-from bridges.kinds.charger.report import Diagnosis
-from bridges.kinds.charger.settings import Robot
-from bridges.kinds.charger_coordinator.memory import CHARGING, Memory, Nudge, Site
+from bridges.kinds.charger.report import FaultCause
+from bridges.kinds.charger.settings import RobotName
+from bridges.kinds.charger_coordinator.memory import CHARGING, Nudge, SiteLimits, SiteMemory
 from bridges.kinds.charger_coordinator.queue import Here, standing, suiting
 from bridges.kinds.charger_coordinator.wishes import SETTLES_S
 from bridges.kinds.shared.durations import AGES_AGO, NEVER
@@ -34,29 +34,29 @@ LEAVES_S: Final = 30.0
 TRIES: Final = 2
 
 
-class Astray(NamedTuple):
+class OnWrongPad(NamedTuple):
     """`who` has stood at `station` since `since`. `expected`: the station that it has; None if it has
     none, and `waiter` waits for this one. `tries`: how often it may be told to leave."""
 
-    who: Robot
+    who: RobotName
     station: str
     since: float
     why: str
     tries: int
     expected: str | None = None
-    waiter: Robot | None = None
+    waiter: RobotName | None = None
 
 
-def found(memory: Memory, now: float, site: Site) -> dict[Robot, Astray]:
+def found(memory: SiteMemory, now: float, site: SiteLimits) -> dict[RobotName, OnWrongPad]:
     """Every robot that stands at the wrong station or in another robot's way. If `now` is NEVER, also
     those that will count as such unless somebody moves."""
-    astray: dict[Robot, Astray] = {}
+    astray: dict[RobotName, OnWrongPad] = {}
     for one in (*_strayed(memory, now, site), *_blocking(memory, now, site)):
         astray.setdefault(one.who, one)
     return astray
 
 
-def nudged(memory: Memory, now: float, site: Site) -> Memory:
+def nudged(memory: SiteMemory, now: float, site: SiteLimits) -> SiteMemory:
     """Nudge the robots that are to leave, and forget those that have left."""
     astray = found(memory, now, site)
     nudges = {who: n for who, n in memory.nudges.items() if _matters(memory, who, n, astray)}
@@ -68,17 +68,17 @@ def nudged(memory: Memory, now: float, site: Site) -> Memory:
     return replace(memory, nudges=nudges)
 
 
-def is_nudged(memory: Memory, who: Robot, now: float) -> bool:
+def is_nudged(memory: SiteMemory, who: RobotName, now: float) -> bool:
     """Is it being told to leave now, by an assignment that is not its own?"""
     return who in memory.nudges and now < memory.nudges[who].at + TOLD_S
 
 
-def alarming(memory: Memory, one: Astray, now: float) -> bool:
+def alarming(memory: SiteMemory, one: OnWrongPad, now: float) -> bool:
     """Should a person be alerted?"""
     return now >= max(one.since, _alarm_at(memory, one))
 
 
-def due(memory: Memory, now: float, site: Site) -> Iterator[float]:
+def due(memory: SiteMemory, now: float, site: SiteLimits) -> Iterator[float]:
     """When any of this changes without an event."""
     for nudge in memory.nudges.values():
         yield nudge.at + TOLD_S
@@ -91,7 +91,7 @@ def due(memory: Memory, now: float, site: Site) -> Iterator[float]:
 # ---- inside
 
 
-def _strayed(memory: Memory, now: float, site: Site) -> Iterator[Astray]:
+def _strayed(memory: SiteMemory, now: float, site: SiteLimits) -> Iterator[OnWrongPad]:
     """Those that have a station, were not charged there yet, and stand at another."""
     for name, grant in memory.grants.items():
         if grant.over or grant.started:
@@ -99,20 +99,22 @@ def _strayed(memory: Memory, now: float, site: Site) -> Iterator[Astray]:
         at, came_at, settled_at = _stands(memory, grant.robot, site)
         since = settled_at if came_at > grant.made_at else grant.made_at + LEAVES_S
         if at is not None and at != name and since <= now:
-            yield Astray(grant.robot, at, since, grant.request_id, TRIES, expected=name)
+            yield OnWrongPad(grant.robot, at, since, grant.request_id, TRIES, expected=name)
 
 
-def _stands(memory: Memory, who: Robot, site: Site) -> tuple[str | None, float, float]:
+def _stands(
+    memory: SiteMemory, who: RobotName, site: SiteLimits
+) -> tuple[str | None, float, float]:
     """The station where it stands, by its fleet or by that station; since when; from when it counts."""
     for name, seen in memory.stations.items():
-        if seen.diagnosis is Diagnosis.PAD and on_pad(seen.error, site) == who:
+        if seen.diagnosis is FaultCause.PAD and on_pad(seen.error, site) == who:
             return name, seen.since, seen.since
     standing, at = memory.robots.get(who), memory.stands_at(who, site)
     came_at = standing.here_since if standing else AGES_AGO
     return at, came_at, came_at + SETTLES_S
 
 
-def _blocking(memory: Memory, now: float, site: Site) -> Iterator[Astray]:
+def _blocking(memory: SiteMemory, now: float, site: SiteLimits) -> Iterator[OnWrongPad]:
     """Those that have no station, and stand on a pad that another robot waits for."""
     here = standing(memory, AGES_AGO if now == NEVER else now, site)
     idle = {name: who for name in here if (who := _idle_at(memory, name, here)) is not None}
@@ -125,10 +127,10 @@ def _blocking(memory: Memory, now: float, site: Site) -> Iterator[Astray]:
                 continue
             since = max(memory.robots[who].here_since, seen.since) + site.leaves_s
             if since <= now:
-                yield Astray(who, name, since, name, 1, waiter=wish.robot)
+                yield OnWrongPad(who, name, since, name, 1, waiter=wish.robot)
 
 
-def _idle_at(memory: Memory, station: str, here: Here) -> Robot | None:
+def _idle_at(memory: SiteMemory, station: str, here: Here) -> RobotName | None:
     """A robot without a station that stands at this one, which nobody has."""
     grant, seen = memory.grants.get(station), memory.stations.get(station)
     if seen is None or seen.state is CHARGING or (grant is not None and not grant.over):
@@ -136,7 +138,9 @@ def _idle_at(memory: Memory, station: str, here: Here) -> Robot | None:
     return next((who for who in here[station] if memory.station_of(who) is None), None)
 
 
-def _matters(memory: Memory, who: Robot, nudge: Nudge, astray: Mapping[Robot, Astray]) -> bool:
+def _matters(
+    memory: SiteMemory, who: RobotName, nudge: Nudge, astray: Mapping[RobotName, OnWrongPad]
+) -> bool:
     """Does this nudge still count? While a robot has a station, its nudges count until it gets another
     request: a robot that goes astray twice is not told more often."""
     station = memory.station_of(who)
@@ -145,12 +149,12 @@ def _matters(memory: Memory, who: Robot, nudge: Nudge, astray: Mapping[Robot, As
     return who in astray and astray[who].why == nudge.why
 
 
-def _can_be_nudged(memory: Memory, who: Robot) -> bool:
+def _can_be_nudged(memory: SiteMemory, who: RobotName) -> bool:
     standing = memory.robots.get(who)
     return memory.assigns and standing is not None and not standing.works
 
 
-def _next_at(memory: Memory, one: Astray) -> float:
+def _next_at(memory: SiteMemory, one: OnWrongPad) -> float:
     """When it is told to leave, or told again; NEVER if it was told often enough, or cannot be."""
     nudge = memory.nudges.get(one.who)
     if not _can_be_nudged(memory, one.who):
@@ -160,7 +164,7 @@ def _next_at(memory: Memory, one: Astray) -> float:
     return nudge.at + OBEYS_S if nudge.count < one.tries else NEVER
 
 
-def _alarm_at(memory: Memory, one: Astray) -> float:
+def _alarm_at(memory: SiteMemory, one: OnWrongPad) -> float:
     nudge = memory.nudges.get(one.who)
     if not _can_be_nudged(memory, one.who):
         return one.since
@@ -169,7 +173,7 @@ def _alarm_at(memory: Memory, one: Astray) -> float:
     return nudge.at + OBEYS_S
 
 
-def on_pad(error: str, site: Site) -> Robot | None:
+def on_pad(error: str, site: SiteLimits) -> RobotName | None:
     """Which of our robots stands on the pad, by the station's error; None if it is none of ours."""
     seen = misplaced_in(error)
     if seen is None:

@@ -1,7 +1,7 @@
 """Doors: RMF's DoorRequest becomes a relay or register, and the door's inputs become DoorState."""
 
 from bridges.kinds.door import core, memory, messages, report, signals
-from bridges.kinds.door.memory import DoorLimits, Memory
+from bridges.kinds.door.memory import DoorLimits, DoorMemory
 from bridges.kinds.door.report import DoorReport
 from bridges.kinds.door.settings import DoorSettings
 from bridges.kinds.door.signals import CloseRequested, DoorOutputs, DoorSample, OpenRequested
@@ -13,7 +13,7 @@ from bridges.messages import topics
 KIND: Kind[
     DoorSettings,
     DoorLimits,
-    Memory,
+    DoorMemory,
     DoorSample,
     OpenRequested | CloseRequested | Attended,
     DoorOutputs,
@@ -34,8 +34,8 @@ KIND: Kind[
 )
 
 RECORDED: Recorded = {
-    "door.memory.Memory": memory.Memory,
-    "door.memory.Senses": memory.Senses,
+    "door.memory.Memory": memory.DoorMemory,
+    "door.memory.Senses": memory.DoorSenses,
     "door.report.DoorReport": report.DoorReport,
     "door.signals.CloseRequested": signals.CloseRequested,
     "door.signals.DoorOutputs": signals.DoorOutputs,

@@ -30,8 +30,8 @@ from msgspec.structs import replace
 
 from bridges.kinds.door.memory import (
     DoorLimits,
-    Memory,
-    Senses,
+    DoorMemory,
+    DoorSenses,
     lost_at,
     opening_ends_at,
     rivalled,
@@ -39,7 +39,7 @@ from bridges.kinds.door.memory import (
     travel_ends_at,
 )
 from bridges.kinds.door.report import DoorReport, report
-from bridges.kinds.door.sensing import View, look, miss, released_by_fire, take
+from bridges.kinds.door.sensing import BelievedDoor, look, miss, released_by_fire, take
 from bridges.kinds.door.settings import Pulse
 from bridges.kinds.door.signals import CloseRequested, DoorOutputs, Event, OpenRequested
 from bridges.kinds.shared.decision import (
@@ -54,14 +54,14 @@ from bridges.kinds.shared.decision import (
 from bridges.kinds.shared.durations import NEVER, RIVAL_QUIET_S
 
 
-def initial(limits: DoorLimits, now: float) -> Memory:
+def initial(limits: DoorLimits, now: float) -> DoorMemory:
     """At start nothing is known, and the hold is off."""
-    return Memory(held_since=now)
+    return DoorMemory(held_since=now)
 
 
 def decide(
-    memory: Memory, event: Event, now: float, limits: DoorLimits
-) -> Decision[Memory, DoorOutputs, DoorReport]:
+    memory: DoorMemory, event: Event, now: float, limits: DoorLimits
+) -> Decision[DoorMemory, DoorOutputs, DoorReport]:
     """One scan. `now`: monotonic s, never before that of the last scan. Never raises."""
     memory, refused = _hear(memory, event, now, limits)
     memory = _let_go(memory, now, limits)
@@ -77,13 +77,15 @@ def decide(
     )
 
 
-def _hear(memory: Memory, event: Event, now: float, limits: DoorLimits) -> tuple[Memory, str]:
+def _hear(
+    memory: DoorMemory, event: Event, now: float, limits: DoorLimits
+) -> tuple[DoorMemory, str]:
     match event:
         case Sampled(sample):
             senses = take(memory.senses, sample, now, limits)
             return replace(memory, senses=senses, io_failure=""), ""
         case Suspended(reason):
-            return replace(memory, senses=Senses(), io_failure=reason), ""
+            return replace(memory, senses=DoorSenses(), io_failure=reason), ""
         case WriteFailed(reason):
             senses = replace(memory.senses, linked_since=None)
             return replace(memory, senses=senses, io_failure=reason), ""
@@ -100,7 +102,7 @@ def _hear(memory: Memory, event: Event, now: float, limits: DoorLimits) -> tuple
     return memory, ""  # an operator's reset: nothing here latches
 
 
-def _open(memory: Memory, now: float, limits: DoorLimits) -> tuple[Memory, str]:
+def _open(memory: DoorMemory, now: float, limits: DoorLimits) -> tuple[DoorMemory, str]:
     if released_by_fire(_look(memory, now, limits), limits):
         return memory, "the fire alarm has released the door"
     latched_at = now if memory.latched_at is None else memory.latched_at
@@ -111,24 +113,24 @@ def _open(memory: Memory, now: float, limits: DoorLimits) -> tuple[Memory, str]:
     )
 
 
-def _close(memory: Memory, now: float, limits: DoorLimits) -> Memory:
+def _close(memory: DoorMemory, now: float, limits: DoorLimits) -> DoorMemory:
     if memory.latched_at is None or memory.close_at is not None:
         return memory
     return replace(memory, close_at=now + limits.t.close_grace_s)
 
 
-def _let_go(memory: Memory, now: float, limits: DoorLimits) -> Memory:
+def _let_go(memory: DoorMemory, now: float, limits: DoorLimits) -> DoorMemory:
     close_at = NEVER if memory.close_at is None else memory.close_at
     if now < min(close_at, lost_at(memory, limits)):
         return memory
     return replace(memory, latched_at=None, close_at=None)
 
 
-def _look(memory: Memory, now: float, limits: DoorLimits) -> View:
+def _look(memory: DoorMemory, now: float, limits: DoorLimits) -> BelievedDoor:
     return look(memory.senses, memory.held, memory.held_since, now, limits)
 
 
-def _hold(memory: Memory, view: View, now: float, limits: DoorLimits) -> Memory:
+def _hold(memory: DoorMemory, view: BelievedDoor, now: float, limits: DoorLimits) -> DoorMemory:
     """The memory with the hold on or off, and with what the next decision needs."""
     if released_by_fire(view, limits):
         memory = replace(memory, latched_at=None, close_at=None)
@@ -149,7 +151,7 @@ def _hold(memory: Memory, view: View, now: float, limits: DoorLimits) -> Memory:
     )
 
 
-def _wanted(memory: Memory, view: View, limits: DoorLimits) -> bool:
+def _wanted(memory: DoorMemory, view: BelievedDoor, limits: DoorLimits) -> bool:
     if view.fire:
         return limits.on_fire == "open"
     return memory.latched_at is not None
@@ -161,11 +163,13 @@ def _since(before: float | None, is_so: bool, now: float) -> float | None:
     return now if before is None else before
 
 
-def _pulse_is_on(memory: Memory, now: float, pulse: Pulse | None) -> bool:
+def _pulse_is_on(memory: DoorMemory, now: float, pulse: Pulse | None) -> bool:
     return pulse is None or (now - memory.held_since) % pulse.every_s < pulse.on_s
 
 
-def _wakes(memory: Memory, view: View, now: float, limits: DoorLimits) -> Iterator[float]:
+def _wakes(
+    memory: DoorMemory, view: BelievedDoor, now: float, limits: DoorLimits
+) -> Iterator[float]:
     """Each time at which the decision may change without an event."""
     yield view.changes_at
     yield NEVER if memory.close_at is None else memory.close_at

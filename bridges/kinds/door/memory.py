@@ -5,7 +5,7 @@ from typing import Literal
 
 import msgspec
 
-from bridges.kinds.door.settings import DoorSettings, Durations, Pulse
+from bridges.kinds.door.settings import DoorDurations, DoorSettings, Pulse
 from bridges.kinds.shared.debounce import Settled
 from bridges.kinds.shared.durations import NEVER, RIVAL_QUIET_S
 
@@ -16,7 +16,7 @@ class DoorLimits(msgspec.Struct, frozen=True):
     `estimated`: a missing limit contact is estimated by time.
     """
 
-    t: Durations = Durations()
+    t: DoorDurations = DoorDurations()
     debounce: Mapping[str, float] = {}
     estimated: bool = False
     on_fire: Literal["open", "release"] = "release"
@@ -38,7 +38,7 @@ Contact = Settled[bool | None]
 """One debounced input. If it is not wired, its value and its candidate are None."""
 
 
-class Senses(msgspec.Struct, frozen=True):
+class DoorSenses(msgspec.Struct, frozen=True):
     """Each contact; None before it was first read.
 
     `read_at`: when all were last read. `linked_since`: since when no read or write has failed; None
@@ -55,7 +55,7 @@ class Senses(msgspec.Struct, frozen=True):
     errors: tuple[str, ...] = ()
 
 
-class Memory(msgspec.Struct, frozen=True):
+class DoorMemory(msgspec.Struct, frozen=True):
     """Everything that the next decision needs to know of the past. Times are monotonic seconds.
 
     `latched_at`: since when RMF wants the door open. `close_at`: when a CLOSE releases the hold.
@@ -70,7 +70,7 @@ class Memory(msgspec.Struct, frozen=True):
     held: bool = False
     held_since: float = 0.0
     closing: bool = False
-    senses: Senses = Senses()
+    senses: DoorSenses = DoorSenses()
     between_since: float | None = None
     shut_since: float | None = None
     rival_at: float | None = None
@@ -78,12 +78,12 @@ class Memory(msgspec.Struct, frozen=True):
     unattended_since: float | None = None
 
 
-def rivalled(memory: Memory, now: float) -> bool:
+def rivalled(memory: DoorMemory, now: float) -> bool:
     """Does another node publish this door's states?"""
     return memory.rival_at is not None and now < memory.rival_at + RIVAL_QUIET_S
 
 
-def travel_ends_at(memory: Memory, limits: DoorLimits) -> float:
+def travel_ends_at(memory: DoorMemory, limits: DoorLimits) -> float:
     """When a door at neither end position has taken too long; a change of the hold restarts the
     time."""
     if memory.between_since is None:
@@ -91,21 +91,21 @@ def travel_ends_at(memory: Memory, limits: DoorLimits) -> float:
     return max(memory.between_since, memory.held_since) + limits.t.travel_s
 
 
-def opening_ends_at(memory: Memory, limits: DoorLimits) -> float:
+def opening_ends_at(memory: DoorMemory, limits: DoorLimits) -> float:
     """When a held door should have opened; NEVER if it is open or not held."""
     if memory.shut_since is None or not memory.held:
         return NEVER
     return max(memory.shut_since, memory.held_since) + limits.t.open_timeout_s
 
 
-def too_long_at(memory: Memory, limits: DoorLimits) -> float:
+def too_long_at(memory: DoorMemory, limits: DoorLimits) -> float:
     """When RMF will have held the door for `max_hold_s`; NEVER if there is no such limit."""
     if memory.latched_at is None or limits.t.max_hold_s is None:
         return NEVER
     return memory.latched_at + limits.t.max_hold_s
 
 
-def lost_at(memory: Memory, limits: DoorLimits) -> float:
+def lost_at(memory: DoorMemory, limits: DoorLimits) -> float:
     """When the supervisor has been gone for `supervisor_lost_s`; NEVER if there is no such limit."""
     if memory.unattended_since is None or limits.t.supervisor_lost_s is None:
         return NEVER

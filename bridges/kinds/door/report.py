@@ -6,14 +6,14 @@ import msgspec
 
 from bridges.kinds.door.memory import (
     DoorLimits,
-    Memory,
+    DoorMemory,
     lost_at,
     opening_ends_at,
     rivalled,
     too_long_at,
     travel_ends_at,
 )
-from bridges.kinds.door.sensing import View, released_by_fire
+from bridges.kinds.door.sensing import BelievedDoor, released_by_fire
 from bridges.kinds.shared.decision import Fault
 from bridges.messages.definitions import DoorModeValue
 
@@ -37,7 +37,7 @@ class DoorReport(msgspec.Struct, frozen=True):
         return self.mode, self.faults, self.hold, self.estimated
 
 
-def report(memory: Memory, view: View, now: float, limits: DoorLimits) -> DoorReport:
+def report(memory: DoorMemory, view: BelievedDoor, now: float, limits: DoorLimits) -> DoorReport:
     """The door as it is now."""
     mode = _mode(memory, view, now, limits)
     return DoorReport(
@@ -50,7 +50,7 @@ def report(memory: Memory, view: View, now: float, limits: DoorLimits) -> DoorRe
     )
 
 
-def _waits(memory: Memory, view: View, mode: DoorModeValue, now: float) -> str:
+def _waits(memory: DoorMemory, view: BelievedDoor, mode: DoorModeValue, now: float) -> str:
     if memory.latched_at is None or mode is DoorModeValue.MODE_OPEN:
         return ""
     if rivalled(memory, now):
@@ -68,7 +68,7 @@ _PROOFS = {
 """The contacts that prove each mode."""
 
 
-def _mode(memory: Memory, view: View, now: float, limits: DoorLimits) -> DoorModeValue:
+def _mode(memory: DoorMemory, view: BelievedDoor, now: float, limits: DoorLimits) -> DoorModeValue:
     if rivalled(memory, now) or not view.fresh:
         return DoorModeValue.MODE_OFFLINE
     if not view.seen or released_by_fire(view, limits):
@@ -84,7 +84,9 @@ def _mode(memory: Memory, view: View, now: float, limits: DoorLimits) -> DoorMod
     return DoorModeValue.MODE_MOVING
 
 
-def _faults(memory: Memory, view: View, now: float, limits: DoorLimits) -> Iterator[Fault]:
+def _faults(
+    memory: DoorMemory, view: BelievedDoor, now: float, limits: DoorLimits
+) -> Iterator[Fault]:
     """Everything that is wrong now, most serious first. No text counts up: a changed text is news."""
     if rivalled(memory, now):
         yield Fault("TWO_NODES_FOR_ONE_DEVICE", "another node publishes states of this door")
@@ -100,14 +102,14 @@ def _faults(memory: Memory, view: View, now: float, limits: DoorLimits) -> Itera
         yield Fault("SUPERVISOR_LOST", f"no node publishes door_requests for {lost_s} s: released")
 
 
-def _silence(memory: Memory, limits: DoorLimits) -> Iterator[Fault]:
+def _silence(memory: DoorMemory, limits: DoorLimits) -> Iterator[Fault]:
     if memory.io_failure:
         yield Fault("COMMUNICATION_LOST", memory.io_failure)
     elif memory.senses.read_at is not None:
         yield Fault("COMMUNICATION_LOST", f"no reading for {limits.t.stale_after_s} s")
 
 
-def _hazards(memory: Memory, view: View, limits: DoorLimits) -> Iterator[Fault]:
+def _hazards(memory: DoorMemory, view: BelievedDoor, limits: DoorLimits) -> Iterator[Fault]:
     if view.fire:
         done = "held open" if limits.on_fire == "open" else "released"
         yield Fault("FIRE_ALARM", f"the door is {done}")
@@ -117,7 +119,9 @@ def _hazards(memory: Memory, view: View, limits: DoorLimits) -> Iterator[Fault]:
         yield Fault("DOOR_CONTROLLER_FAULT", "; ".join(view.errors))
 
 
-def _contradictions(memory: Memory, view: View, now: float, limits: DoorLimits) -> Iterator[Fault]:
+def _contradictions(
+    memory: DoorMemory, view: BelievedDoor, now: float, limits: DoorLimits
+) -> Iterator[Fault]:
     if view.seen and view.opened and view.closed:
         yield Fault("DOOR_CONTACTS_CONTRADICT", "the door reads open and closed")
     if view.lost:

@@ -17,7 +17,7 @@ from collections.abc import Iterator
 import msgspec
 from msgspec.structs import replace
 
-from bridges.kinds.door.memory import Contact, DoorLimits, Senses
+from bridges.kinds.door.memory import Contact, DoorLimits, DoorSenses
 from bridges.kinds.door.signals import DoorSample
 from bridges.kinds.shared.debounce import forget, settle
 from bridges.kinds.shared.durations import NEVER
@@ -26,7 +26,7 @@ SIGNALS = ("opened", "closed", "obstruction", "fire")
 HAZARDS = ("obstruction", "fire")
 
 
-class View(msgspec.Struct, frozen=True):
+class BelievedDoor(msgspec.Struct, frozen=True):
     """The inputs as they are believed at one instant.
 
     `fresh`: they were read within `stale_after_s`. `seen`: and each has settled, so the door's position
@@ -46,17 +46,17 @@ class View(msgspec.Struct, frozen=True):
     errors: tuple[str, ...] = ()
 
 
-def take(senses: Senses, sample: DoorSample, now: float, limits: DoorLimits) -> Senses:
+def take(senses: DoorSenses, sample: DoorSample, now: float, limits: DoorLimits) -> DoorSenses:
     """Add one reading."""
     if not is_fresh(senses, now, limits):
-        senses = Senses()
+        senses = DoorSenses()
     contacts: dict[str, Contact] = {}
     for signal in SIGNALS:
         before: Contact | None = getattr(senses, signal)
         seen: bool | None = getattr(sample, signal)
         contacts[signal] = settle(before, seen, now, _hold_s(before, seen, signal, limits))
     linked_since = now if senses.linked_since is None else senses.linked_since
-    return Senses(
+    return DoorSenses(
         **contacts,
         read_at=now,
         linked_since=linked_since,
@@ -65,7 +65,7 @@ def take(senses: Senses, sample: DoorSample, now: float, limits: DoorLimits) -> 
     )
 
 
-def miss(senses: Senses) -> Senses:
+def miss(senses: DoorSenses) -> DoorSenses:
     """A read has failed: the debounce and the estimates' time start again."""
     return replace(
         senses,
@@ -77,18 +77,20 @@ def miss(senses: Senses) -> Senses:
     )
 
 
-def is_fresh(senses: Senses, now: float, limits: DoorLimits) -> bool:
+def is_fresh(senses: DoorSenses, now: float, limits: DoorLimits) -> bool:
     """Is the last reading younger than `stale_after_s`?"""
     return senses.read_at is not None and now < senses.read_at + limits.t.stale_after_s
 
 
-def look(senses: Senses, held: bool, held_since: float, now: float, limits: DoorLimits) -> View:
+def look(
+    senses: DoorSenses, held: bool, held_since: float, now: float, limits: DoorLimits
+) -> BelievedDoor:
     """What is believed now. The relay has been on (`held`) or off since `held_since`."""
     opened, closed = _believed(senses.opened), _believed(senses.closed)
     opened_at, closed_at = _estimates(senses, held, held_since, limits)
     guessed = frozenset(s for s in ("opened", "closed") if _unwired(getattr(senses, s)))
     fresh = is_fresh(senses, now, limits)
-    return View(
+    return BelievedDoor(
         fresh=fresh,
         seen=fresh and all(_settled(getattr(senses, signal)) for signal in SIGNALS),
         opened=opened or ("opened" in guessed and now >= opened_at and not closed),
@@ -102,7 +104,7 @@ def look(senses: Senses, held: bool, held_since: float, now: float, limits: Door
     )
 
 
-def released_by_fire(view: View, limits: DoorLimits) -> bool:
+def released_by_fire(view: BelievedDoor, limits: DoorLimits) -> bool:
     """Has a fire alarm released the hold?"""
     return view.fresh and view.fire and limits.on_fire == "release"
 
@@ -134,7 +136,7 @@ def _feared(contact: Contact | None) -> bool:
 
 
 def _estimates(
-    senses: Senses, held: bool, held_since: float, limits: DoorLimits
+    senses: DoorSenses, held: bool, held_since: float, limits: DoorLimits
 ) -> tuple[float, float]:
     """When a door without contacts counts as open, and when as closed; NEVER for "not at all"."""
     if not limits.estimated or senses.linked_since is None:
@@ -144,7 +146,9 @@ def _estimates(
     return (since + delay_s, NEVER) if held else (NEVER, since + limits.t.travel_s)
 
 
-def _changes(senses: Senses, limits: DoorLimits, now: float, *estimates: float) -> Iterator[float]:
+def _changes(
+    senses: DoorSenses, limits: DoorLimits, now: float, *estimates: float
+) -> Iterator[float]:
     """When a reading goes stale, an estimate becomes due or a contact settles (s)."""
     stale_at = NEVER if senses.read_at is None else senses.read_at + limits.t.stale_after_s
     due = [stale_at, *estimates]

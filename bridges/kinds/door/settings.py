@@ -12,7 +12,7 @@ StaleAfter = Annotated[float, Meta(ge=0.1, le=60, extra={"unit": "s"})]
 PulseSeconds = Annotated[float, Meta(ge=0.05, le=600, extra={"unit": "s"})]
 
 
-class Durations(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class DoorDurations(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Durations of a door."""
 
     stale_after_s: Annotated[
@@ -54,7 +54,7 @@ class Pulse(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
 class DoorSettings(DeviceSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """One door, apart from its wiring."""
 
-    limits: Annotated[Durations, tells("what differs from the defaults.")] = Durations()
+    limits: Annotated[DoorDurations, tells("what differs from the defaults.")] = DoorDurations()
     feedback: Annotated[
         Literal["sensors", "estimated"],
         tells("""`estimated` if a limit contact is missing; the door's state is then estimated by

@@ -1,10 +1,10 @@
 """The door supervisor: replaces RMF's own, between the fleet adapters and any number of doors."""
 
 from bridges.kinds.door_supervisor import core, keep, memory, messages, report, signals
-from bridges.kinds.door_supervisor.memory import Limits, Memory
+from bridges.kinds.door_supervisor.memory import DoorSupervisorLimits, SupervisedDoor
 from bridges.kinds.door_supervisor.report import DoorHoldReport
-from bridges.kinds.door_supervisor.settings import Settings, speaks_of
-from bridges.kinds.door_supervisor.signals import CloseRequested, OpenRequested, StateHeard
+from bridges.kinds.door_supervisor.settings import DoorSupervisorSettings, speaks_of
+from bridges.kinds.door_supervisor.signals import DoorStateHeard, RequesterCloses, RequesterOpens
 from bridges.kinds.shared.fields import quiet_s
 from bridges.kinds.shared.graph_kind import GraphKind
 from bridges.kinds.shared.recorded import Recorded
@@ -16,15 +16,15 @@ from bridges.messages.topics import (
 )
 
 KIND: GraphKind[
-    Settings,
-    Limits,
-    Memory,
-    OpenRequested | CloseRequested | StateHeard,
+    DoorSupervisorSettings,
+    DoorSupervisorLimits,
+    SupervisedDoor,
+    RequesterOpens | RequesterCloses | DoorStateHeard,
     DoorHoldReport,
 ] = GraphKind(
     name="door_supervisor",
     devices_key="supervisor",
-    settings=Settings,
+    settings=DoorSupervisorSettings,
     requests={
         ADAPTER_DOOR_REQUESTS: messages.accept_request,
         DOOR_STATES: messages.accept_state,
@@ -33,7 +33,7 @@ KIND: GraphKind[
     sole=(DOOR_REQUESTS,),
     device_name=messages.device_name,
     quiet_s=quiet_s,
-    limits=Limits.of,
+    limits=DoorSupervisorLimits.of,
     initial=core.initial,
     decide=core.decide,
     stamped=messages.stamped,
@@ -52,9 +52,9 @@ KIND: GraphKind[
 
 RECORDED: Recorded = {
     "door_supervisor.memory.Holder": memory.Holder,
-    "door_supervisor.memory.Memory": memory.Memory,
+    "door_supervisor.memory.Memory": memory.SupervisedDoor,
     "door_supervisor.report.DoorHoldReport": report.DoorHoldReport,
-    "door_supervisor.signals.CloseRequested": signals.CloseRequested,
-    "door_supervisor.signals.OpenRequested": signals.OpenRequested,
-    "door_supervisor.signals.StateHeard": signals.StateHeard,
+    "door_supervisor.signals.CloseRequested": signals.RequesterCloses,
+    "door_supervisor.signals.OpenRequested": signals.RequesterOpens,
+    "door_supervisor.signals.StateHeard": signals.DoorStateHeard,
 }

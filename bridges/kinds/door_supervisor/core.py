@@ -28,9 +28,14 @@ from typing import Final
 
 from msgspec.structs import replace
 
-from bridges.kinds.door_supervisor.memory import Holder, Limits, Memory
+from bridges.kinds.door_supervisor.memory import DoorSupervisorLimits, Holder, SupervisedDoor
 from bridges.kinds.door_supervisor.report import DoorHoldReport, report
-from bridges.kinds.door_supervisor.signals import CloseRequested, Event, OpenRequested, StateHeard
+from bridges.kinds.door_supervisor.signals import (
+    DoorStateHeard,
+    Event,
+    RequesterCloses,
+    RequesterOpens,
+)
 from bridges.kinds.shared.decision import Decision, Said
 from bridges.kinds.shared.durations import FORGOTTEN_S, NEVER, due_at
 from bridges.kinds.shared.freshness import Rules, hear
@@ -43,26 +48,28 @@ REQUESTER_ID: Final = "door_supervisor"
 INSIST_S: Final = 5.0
 RULES: Final = Rules(retained=False)
 
-Decided = Decision[Memory, None, DoorHoldReport]
+Decided = Decision[SupervisedDoor, None, DoorHoldReport]
 
 
-def initial(door: str, started_at: float) -> Memory:
+def initial(door: str, started_at: float) -> SupervisedDoor:
     """Nothing has been heard, and we may not publish yet."""
-    return Memory(door)
+    return SupervisedDoor(door)
 
 
-def idle(memory: Memory, now: float) -> bool:
+def idle(memory: SupervisedDoor, now: float) -> bool:
     """May this door be forgotten? Nobody holds it, and nothing was heard of it for FORGOTTEN_S."""
     heard = [memory.shown_at, *(who.heard_at for who in memory.requesters.values())]
     return not memory.holders and now >= max(heard) + FORGOTTEN_S
 
 
-def urgent(memory: Memory) -> bool:
+def urgent(memory: SupervisedDoor) -> bool:
     """Must a door be held before the quiet start is over?"""
     return memory.holds_restored
 
 
-def decide(memory: Memory, event: Event, now: float, limits: Limits) -> Decided:
+def decide(
+    memory: SupervisedDoor, event: Event, now: float, limits: DoorSupervisorLimits
+) -> Decided:
     """Take the event in, and send what is due: at most one message. Never raises."""
     memory, refused = _take(memory, event, now)
     publish: tuple[Said, ...] = ()
@@ -82,11 +89,11 @@ def decide(memory: Memory, event: Event, now: float, limits: Limits) -> Decided:
 # --- what is heard -----------------------------------------------------------------------------
 
 
-def _take(memory: Memory, event: Event, now: float) -> tuple[Memory, str]:
+def _take(memory: SupervisedDoor, event: Event, now: float) -> tuple[SupervisedDoor, str]:
     match event:
-        case OpenRequested() | CloseRequested():
+        case RequesterOpens() | RequesterCloses():
             return _hear(memory, event, now)
-        case StateHeard(mode):
+        case DoorStateHeard(mode):
             return _see(replace(memory, mode=mode, shown_at=now), now), ""
         case MaySpeak(yes, at_once, waits=passive):
             memory = replace(memory, may_speak=yes, at_once=at_once, passive=passive)
@@ -95,19 +102,21 @@ def _take(memory: Memory, event: Event, now: float) -> tuple[Memory, str]:
             return memory, ""
 
 
-def _hear(memory: Memory, event: OpenRequested | CloseRequested, now: float) -> tuple[Memory, str]:
+def _hear(
+    memory: SupervisedDoor, event: RequesterOpens | RequesterCloses, now: float
+) -> tuple[SupervisedDoor, str]:
     who, holders = event.requester, {holder.requester for holder in memory.holders}
     requesters, refused = hear(memory.requesters, who, event.stamp, now, RULES, holders=holders)
     memory = replace(memory, requesters=requesters)
     if refused:
         return memory, refused
-    if isinstance(event, OpenRequested):
+    if isinstance(event, RequesterOpens):
         return _enter(memory, event, now), ""
     rest = tuple(holder for holder in memory.holders if holder.requester != who)
     return replace(memory, holders=rest), ""
 
 
-def _enter(memory: Memory, event: OpenRequested, now: float) -> Memory:
+def _enter(memory: SupervisedDoor, event: RequesterOpens, now: float) -> SupervisedDoor:
     """Add a holder, or note that one has repeated its OPEN."""
     before = memory.holder(event.requester)
     if before:
@@ -118,7 +127,7 @@ def _enter(memory: Memory, event: OpenRequested, now: float) -> Memory:
     return replace(memory, holders=holders, prompted=True)
 
 
-def _see(memory: Memory, now: float) -> Memory:
+def _see(memory: SupervisedDoor, now: float) -> SupervisedDoor:
     """A state has come: should the last request be repeated?"""
     insists = any(now < holder.since + INSIST_S for holder in memory.holders)
     return replace(memory, prompted=memory.disagrees or insists)
@@ -127,7 +136,7 @@ def _see(memory: Memory, now: float) -> Memory:
 # --- what is sent ------------------------------------------------------------------------------
 
 
-def _request(memory: Memory) -> DoorRequest:
+def _request(memory: SupervisedDoor) -> DoorRequest:
     """The request to the door's node, without its stamp."""
     return DoorRequest(
         requester_id=REQUESTER_ID,
@@ -136,14 +145,14 @@ def _request(memory: Memory) -> DoorRequest:
     )
 
 
-def _due_at(memory: Memory) -> float:
+def _due_at(memory: SupervisedDoor) -> float:
     """When the next request is due."""
     if not memory.may_send:
         return NEVER
     return due_at(memory.sent_at, new=memory.owed, again=memory.prompted)
 
 
-def _wake_at(memory: Memory, now: float, limits: Limits) -> float:
+def _wake_at(memory: SupervisedDoor, now: float, limits: DoorSupervisorLimits) -> float:
     """When the decision may change without an event."""
     due = [_due_at(memory), memory.silent_at]
     due += [holder.since + limits.open_alarm_s for holder in memory.holders]

@@ -9,9 +9,9 @@ from typing import Annotated, Final
 import msgspec
 from msgspec import Meta
 
-from bridges.kinds.door_supervisor.memory import Holder, Memory
+from bridges.kinds.door_supervisor.memory import Holder, SupervisedDoor
 from bridges.kinds.door_supervisor.report import by_name
-from bridges.kinds.door_supervisor.settings import Settings
+from bridges.kinds.door_supervisor.settings import DoorSupervisorSettings
 from bridges.kinds.shared import keep
 from bridges.kinds.shared.freshness import SECOND_NS, Requester
 from bridges.kinds.shared.keep import Text
@@ -20,29 +20,29 @@ VERSION: Final = 1
 Stamp = Annotated[int, Meta(ge=0, lt=2**31 * SECOND_NS)]
 
 
-class Record(keep.Record, frozen=True, forbid_unknown_fields=True):
+class KeptDoors(keep.Kept, frozen=True, forbid_unknown_fields=True):
     """`doors`: door -> requester -> the stamp (ns) of the first OPEN of its present visit."""
 
     doors: dict[Text, dict[Text, Stamp]]
 
 
-def persist(memories: Mapping[str, Memory]) -> bytes:
+def persist(memories: Mapping[str, SupervisedDoor]) -> bytes:
     """What the next start needs. The bytes stay the same until a holder comes or goes."""
     doors = {
         name: {holder.requester: holder.visit for holder in by_name(memory)}
         for name, memory in sorted(memories.items())
         if memory.holders
     }
-    return msgspec.json.encode(Record(VERSION, doors))
+    return msgspec.json.encode(KeptDoors(VERSION, doors))
 
 
-def restore(kept: bytes, settings: Settings, now: float) -> dict[str, Memory]:
+def restore(kept: bytes, settings: DoorSupervisorSettings, now: float) -> dict[str, SupervisedDoor]:
     """The memories at start, from the bytes of `persist`, for the doors still served.
 
     ValueError for any other bytes. How long each has held its door counts from now: the monotonic
     clock before the restart means nothing any more.
     """
-    found = keep.read(kept, Record, VERSION, "a table of who holds which door")
+    found = keep.read(kept, KeptDoors, VERSION, "a table of who holds which door")
     served = found.doors if settings.doors is None else set(settings.doors)
     return {
         door: _restored(door, holders, now)
@@ -51,8 +51,8 @@ def restore(kept: bytes, settings: Settings, now: float) -> dict[str, Memory]:
     }
 
 
-def _restored(door: str, holders: Mapping[str, int], now: float) -> Memory:
-    return Memory(
+def _restored(door: str, holders: Mapping[str, int], now: float) -> SupervisedDoor:
+    return SupervisedDoor(
         door,
         holders=tuple(
             Holder(who, now, now, stamp, stamp, restored=True) for who, stamp in holders.items()

@@ -5,7 +5,7 @@ from typing import Final
 import msgspec
 from msgspec.structs import replace
 
-from bridges.kinds.door_supervisor.settings import Settings
+from bridges.kinds.door_supervisor.settings import DoorSupervisorSettings
 from bridges.kinds.shared.durations import AGES_AGO, NEVER, SILENT_S
 from bridges.kinds.shared.freshness import Requesters
 from bridges.kinds.shared.graph_kind import LISTENS
@@ -19,13 +19,13 @@ MOVING: Final = DoorModeValue.MODE_MOVING
 OPEN: Final = DoorModeValue.MODE_OPEN
 
 
-class Limits(msgspec.Struct, frozen=True):
+class DoorSupervisorLimits(msgspec.Struct, frozen=True):
     """The duration (s) that the site has set for one door."""
 
     open_alarm_s: float = 600.0
 
     @classmethod
-    def of(cls, settings: Settings) -> "Limits":
+    def of(cls, settings: DoorSupervisorSettings) -> "DoorSupervisorLimits":
         """From the YAML."""
         return cls(settings.open_alarm_s)
 
@@ -50,7 +50,7 @@ class Holder(msgspec.Struct, frozen=True):
         return replace(self, asked_at=now, stamp=stamp, visit=stamp if again else self.visit)
 
 
-class Memory(msgspec.Struct, frozen=True):
+class SupervisedDoor(msgspec.Struct, frozen=True):
     """Everything that outlives an event.
 
     `passive`: what those wait for that wait for us, while we may not publish.

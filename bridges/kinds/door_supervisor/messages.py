@@ -6,8 +6,8 @@ from msgspec.structs import replace
 
 from bridges.kinds.door_supervisor.core import REQUESTER_ID
 from bridges.kinds.door_supervisor.report import DoorHoldReport
-from bridges.kinds.door_supervisor.settings import Settings
-from bridges.kinds.door_supervisor.signals import CloseRequested, OpenRequested, StateHeard
+from bridges.kinds.door_supervisor.settings import DoorSupervisorSettings
+from bridges.kinds.door_supervisor.signals import DoorStateHeard, RequesterCloses, RequesterOpens
 from bridges.kinds.shared.decision import RequestRefused
 from bridges.kinds.shared.freshness import in_ns
 from bridges.kinds.shared.names import check_length, check_listed
@@ -21,8 +21,8 @@ from bridges.messages.definitions import (
 
 
 def accept_request(
-    request: DoorRequest, settings: Settings, wall: float
-) -> OpenRequested | CloseRequested:
+    request: DoorRequest, settings: DoorSupervisorSettings, wall: float
+) -> RequesterOpens | RequesterCloses:
     """An adapter's request as an event. Raises RequestRefused. `wall` is not used: stamps are compared
     with those of the same requester only.
 
@@ -40,20 +40,20 @@ def accept_request(
     stamp = in_ns(request.request_time)
     mode = request.requested_mode.value
     if mode == DoorModeValue.MODE_OPEN:
-        return OpenRequested(who, stamp)
+        return RequesterOpens(who, stamp)
     if mode == DoorModeValue.MODE_CLOSED:
-        return CloseRequested(who, stamp)
+        return RequesterCloses(who, stamp)
     text = f"requested_mode {mode}; only OPEN (2) and CLOSED (0) can be"
     raise RequestRefused("mode that cannot be asked", text)
 
 
-def accept_state(state: DoorState, settings: Settings, wall: float) -> StateHeard:
+def accept_state(state: DoorState, settings: DoorSupervisorSettings, wall: float) -> DoorStateHeard:
     """A door's state as an event. Raises RequestRefused."""
     check_listed("door", state.door_name, settings.doors)
     mode = state.current_mode.value
     if mode not in set(DoorModeValue):
         raise RequestRefused("unknown current_mode", str(mode))
-    return StateHeard(DoorModeValue(mode))
+    return DoorStateHeard(DoorModeValue(mode))
 
 
 def device_name(message: DoorRequest | DoorState) -> str:
@@ -61,9 +61,9 @@ def device_name(message: DoorRequest | DoorState) -> str:
     return message.door_name
 
 
-def requester(event: OpenRequested | CloseRequested | StateHeard) -> str:
+def requester(event: RequesterOpens | RequesterCloses | DoorStateHeard) -> str:
     """Who sends this request; "" for a state."""
-    return "" if isinstance(event, StateHeard) else event.requester
+    return "" if isinstance(event, DoorStateHeard) else event.requester
 
 
 def stamped(

@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping
 
 import msgspec
 
-from bridges.kinds.door_supervisor.memory import Holder, Limits, Memory
+from bridges.kinds.door_supervisor.memory import DoorSupervisorLimits, Holder, SupervisedDoor
 from bridges.kinds.shared.decision import Fault
 from bridges.kinds.shared.freshness import SECOND_NS
 from bridges.messages.definitions import (
@@ -41,7 +41,7 @@ class DoorHoldReport(msgspec.Struct, frozen=True):
         return self.mode, tuple(requester for requester, _ in self.holders)
 
 
-def report(memory: Memory, now: float, limits: Limits) -> DoorHoldReport:
+def report(memory: SupervisedDoor, now: float, limits: DoorSupervisorLimits) -> DoorHoldReport:
     """One door as it is now."""
     return DoorHoldReport(
         read_at=None if memory.mode is None else memory.shown_at,
@@ -52,7 +52,7 @@ def report(memory: Memory, now: float, limits: Limits) -> DoorHoldReport:
     )
 
 
-def _faults(memory: Memory, now: float, limits: Limits) -> Iterator[Fault]:
+def _faults(memory: SupervisedDoor, now: float, limits: DoorSupervisorLimits) -> Iterator[Fault]:
     late = [h.requester for h in memory.holders if now >= h.since + limits.open_alarm_s]
     if late:
         yield Fault("DOOR_HELD_OPEN", f"longer than {limits.open_alarm_s:g} s by {', '.join(late)}")
@@ -60,7 +60,7 @@ def _faults(memory: Memory, now: float, limits: Limits) -> Iterator[Fault]:
         yield Fault("DOOR_SILENT", "no DoorState comes")
 
 
-def heartbeat(memories: Mapping[str, Memory]) -> tuple[AnyTopic, SupervisorHeartbeat]:
+def heartbeat(memories: Mapping[str, SupervisedDoor]) -> tuple[AnyTopic, SupervisorHeartbeat]:
     """All held doors with their holders, in the order of names."""
     doors = tuple(
         DoorSessions(name, tuple(map(_session, by_name(memory))))
@@ -70,7 +70,7 @@ def heartbeat(memories: Mapping[str, Memory]) -> tuple[AnyTopic, SupervisorHeart
     return DOOR_SUPERVISOR_HEARTBEAT, SupervisorHeartbeat(doors)
 
 
-def by_name(memory: Memory) -> list[Holder]:
+def by_name(memory: SupervisedDoor) -> list[Holder]:
     """The door's holders in the order of names."""
     return sorted(memory.holders, key=lambda holder: holder.requester)
 

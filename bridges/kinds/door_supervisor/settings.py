@@ -8,7 +8,7 @@ from bridges.kinds.shared.kind import Place
 from bridges.kinds.shared.remarks import Remarks
 
 
-class Settings(GraphSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class DoorSupervisorSettings(GraphSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """The door supervisor's policy."""
 
     doors: Annotated[
@@ -28,7 +28,7 @@ class Settings(GraphSettings, frozen=True, kw_only=True, forbid_unknown_fields=T
             yield ("doors",), "is empty: name the doors, or leave it out to serve every door"
 
 
-def speaks_of(settings: Settings) -> Iterable[Place]:
+def speaks_of(settings: DoorSupervisorSettings) -> Iterable[Place]:
     """The doors that it is to serve."""
     for i, name in enumerate(settings.doors or ()):
         yield ("doors", str(i)), "door", name

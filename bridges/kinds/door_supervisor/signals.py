@@ -7,24 +7,24 @@ from bridges.kinds.shared.graph_kind import MaySpeak, Woken
 from bridges.messages.definitions import DoorModeValue
 
 
-class OpenRequested(msgspec.Struct, frozen=True):
+class RequesterOpens(msgspec.Struct, frozen=True):
     """A requester's OPEN; `stamp` is by its clock (ns)."""
 
     requester: str
     stamp: int
 
 
-class CloseRequested(msgspec.Struct, frozen=True):
+class RequesterCloses(msgspec.Struct, frozen=True):
     """A requester's CLOSE; `stamp` is by its clock (ns)."""
 
     requester: str
     stamp: int
 
 
-class StateHeard(msgspec.Struct, frozen=True):
+class DoorStateHeard(msgspec.Struct, frozen=True):
     """A DoorState."""
 
     mode: DoorModeValue
 
 
-Event = OpenRequested | CloseRequested | StateHeard | MaySpeak | Woken | OperatorReset
+Event = RequesterOpens | RequesterCloses | DoorStateHeard | MaySpeak | Woken | OperatorReset

@@ -1,7 +1,7 @@
 """Lifts: RMF's LiftRequest becomes outputs, and the lift's inputs become LiftState."""
 
 from bridges.kinds.lift import core, memory, messages, relays, report, signals
-from bridges.kinds.lift.memory import LiftLimits, Memory
+from bridges.kinds.lift.memory import LiftLimits, LiftMemory
 from bridges.kinds.lift.report import LiftReport
 from bridges.kinds.lift.settings import LiftSettings
 from bridges.kinds.lift.signals import Asked, LiftOutputs, LiftSample
@@ -12,7 +12,7 @@ from bridges.messages.topics import LIFT_REQUESTS, LIFT_STATES
 KIND: Kind[
     LiftSettings,
     LiftLimits,
-    Memory,
+    LiftMemory,
     LiftSample,
     Asked,
     LiftOutputs,
@@ -37,22 +37,22 @@ KIND: Kind[
 RECORDED: Recorded = {
     "lift.memory.Channel": relays.Channel,
     "lift.memory.Doubted": memory.Doubted,
-    "lift.memory.Forgotten": memory.Forgotten,
+    "lift.memory.Forgotten": memory.ForgottenSession,
     "lift.memory.Grace": memory.Grace,
-    "lift.memory.Memory": memory.Memory,
+    "lift.memory.Memory": memory.LiftMemory,
     "lift.memory.OwnWords": memory.OwnWords,
-    "lift.memory.Position": memory.Position,
+    "lift.memory.Position": memory.CarPosition,
     "lift.memory.Relays": relays.Relays,
-    "lift.memory.Senses": memory.Senses,
-    "lift.memory.Session": memory.Session,
+    "lift.memory.Senses": memory.LiftSenses,
+    "lift.memory.Session": memory.LiftSession,
     "lift.report.LiftReport": report.LiftReport,
-    "lift.signals.Door": signals.Door,
-    "lift.signals.Ended": signals.Ended,
+    "lift.signals.Door": signals.DoorReading,
+    "lift.signals.Ended": signals.EndRequested,
     "lift.signals.FromAdapter": signals.FromAdapter,
     "lift.signals.Hazard": signals.Hazard,
     "lift.signals.LiftOutputs": signals.LiftOutputs,
     "lift.signals.LiftSample": signals.LiftSample,
     "lift.signals.Motion": signals.Motion,
-    "lift.signals.Requested": signals.Requested,
+    "lift.signals.Requested": signals.LiftRequested,
     "lift.signals.Side": signals.Side,
 }

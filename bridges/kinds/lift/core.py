@@ -36,16 +36,16 @@ LIFT-5. RMF is told OPEN when fresh inputs show that the car stands at a known f
 from msgspec.structs import replace
 
 from bridges.kinds.lift import drive, forgotten, sessions
-from bridges.kinds.lift.memory import LiftLimits, Memory, Session
+from bridges.kinds.lift.memory import LiftLimits, LiftMemory, LiftSession
 from bridges.kinds.lift.report import NOT_FRESH, LiftReport, report
-from bridges.kinds.lift.sensing import HAZARDS, View, gap, look, take, trust, unsure
+from bridges.kinds.lift.sensing import HAZARDS, BelievedLift, gap, look, take, trust, unsure
 from bridges.kinds.lift.signals import (
     Event,
     FromAdapter,
     Hazard,
     LiftOutputs,
+    LiftRequested,
     LiftSample,
-    Requested,
 )
 from bridges.kinds.shared.decision import (
     STARTING,
@@ -76,14 +76,14 @@ NOT_RMFS = frozenset(
 """Hazards that take the lift away; overload only delays it."""
 
 
-def initial(limits: LiftLimits, now: float) -> Memory:
+def initial(limits: LiftLimits, now: float) -> LiftMemory:
     """Nothing has been read, there is no session, every output is off."""
-    return Memory()
+    return LiftMemory()
 
 
 def decide(
-    memory: Memory, event: Event, now: float, limits: LiftLimits
-) -> Decision[Memory, LiftOutputs, LiftReport]:
+    memory: LiftMemory, event: Event, now: float, limits: LiftLimits
+) -> Decision[LiftMemory, LiftOutputs, LiftReport]:
     """One scan: take in the event, look at the inputs, derive outputs and report afresh."""
     alarmed_before = memory.alarmed
     memory, refused = _take(sessions.lapse(memory, now, limits), event, now, limits)
@@ -101,7 +101,7 @@ def decide(
     )
 
 
-def published(memory: Memory, shown: LiftReport) -> Memory:
+def published(memory: LiftMemory, shown: LiftReport) -> LiftMemory:
     """The memory once this report was sent. After OPEN at the destination a robot may be inside."""
     session = memory.session
     if session is None or not shown.open_at:
@@ -112,7 +112,9 @@ def published(memory: Memory, shown: LiftReport) -> Memory:
     return replace(memory, session=replace(session, boarded=boarded, robot=robot))
 
 
-def obstacles(memory: Memory, view: View, now: float, limits: LiftLimits) -> tuple[Fault, ...]:
+def obstacles(
+    memory: LiftMemory, view: BelievedLift, now: float, limits: LiftLimits
+) -> tuple[Fault, ...]:
     """What forbids every output now, most serious first."""
     found = []
     if memory.fire_latched and Hazard.FIRE not in view.hazards:
@@ -127,15 +129,15 @@ def obstacles(memory: Memory, view: View, now: float, limits: LiftLimits) -> tup
     return tuple(found)
 
 
-def _unwritten_at(memory: Memory, limits: LiftLimits) -> float:
+def _unwritten_at(memory: LiftMemory, limits: LiftLimits) -> float:
     """When failed writes become an obstacle; NEVER if the last write succeeded."""
     since = memory.unwritten_since
     return NEVER if since is None else since + limits.t.stale_after_s
 
 
 def _drive(
-    memory: Memory, view: View, allowed: bool, now: float, limits: LiftLimits
-) -> tuple[Memory, LiftOutputs]:
+    memory: LiftMemory, view: BelievedLift, allowed: bool, now: float, limits: LiftLimits
+) -> tuple[LiftMemory, LiftOutputs]:
     """The memory with the next state of the relays, and the outputs that are wanted."""
     session, grace, relays = memory.session, memory.grace, memory.relays
     outputs = LiftOutputs()
@@ -154,7 +156,9 @@ def _drive(
     return replace(memory, session=session, grace=grace, relays=relays), outputs
 
 
-def _take(memory: Memory, event: Event, now: float, limits: LiftLimits) -> tuple[Memory, str]:
+def _take(
+    memory: LiftMemory, event: Event, now: float, limits: LiftLimits
+) -> tuple[LiftMemory, str]:
     match event:
         case Sampled(sample):
             return _read(memory, sample, now, limits), ""
@@ -169,14 +173,14 @@ def _take(memory: Memory, event: Event, now: float, limits: LiftLimits) -> tuple
             return replace(memory, rival_at=now), ""
         case OperatorReset():
             return _reset(memory, now, limits), ""
-        case Requested():
+        case LiftRequested():
             return sessions.ask(memory, event, now, lambda: _why_not(memory, now, limits))
         case FromAdapter():
             return sessions.hear_adapter(memory, event.asked, now, limits), ""
     return sessions.end(memory, event, now, limits)
 
 
-def _read(memory: Memory, sample: LiftSample, now: float, limits: LiftLimits) -> Memory:
+def _read(memory: LiftMemory, sample: LiftSample, now: float, limits: LiftLimits) -> LiftMemory:
     """Take in a reading. If no write has failed since the last one, the outputs are written."""
     return replace(
         memory,
@@ -187,7 +191,7 @@ def _read(memory: Memory, sample: LiftSample, now: float, limits: LiftLimits) ->
     )
 
 
-def _why_not(memory: Memory, now: float, limits: LiftLimits) -> str:
+def _why_not(memory: LiftMemory, now: float, limits: LiftLimits) -> str:
     """Why nobody gets a lift that is free; "" if somebody may."""
     view = look(memory.senses, now, limits)
     why_not = obstacles(memory, view, now, limits)
@@ -197,7 +201,7 @@ def _why_not(memory: Memory, now: float, limits: LiftLimits) -> str:
     return STARTING if starting else why_not[0].code
 
 
-def _reset(memory: Memory, now: float, limits: LiftLimits) -> Memory:
+def _reset(memory: LiftMemory, now: float, limits: LiftLimits) -> LiftMemory:
     """An operator says that it is safe: clear the latches, unless their cause may still be present."""
     session = memory.session
     if session and session.fault:
@@ -213,7 +217,7 @@ def _reset(memory: Memory, now: float, limits: LiftLimits) -> Memory:
     )
 
 
-def _latch(memory: Memory, view: View, now: float, limits: LiftLimits) -> Memory:
+def _latch(memory: LiftMemory, view: BelievedLift, now: float, limits: LiftLimits) -> LiftMemory:
     """Latch a fire as `fire_reset` says, and an alarm until an operator resets. Forget a rival once it
     has been silent for RIVAL_QUIET_S."""
     burning = Hazard.FIRE in view.hazards
@@ -227,7 +231,7 @@ def _latch(memory: Memory, view: View, now: float, limits: LiftLimits) -> Memory
     )
 
 
-def _alarms(before: bool, memory: Memory, limits: LiftLimits) -> tuple[Said, ...]:
+def _alarms(before: bool, memory: LiftMemory, limits: LiftLimits) -> tuple[Said, ...]:
     """`true` once when a hazard of `alarm_on` comes; `false` once when an operator resets."""
     if memory.alarmed == before or limits.alarm == "none":
         return ()
@@ -236,7 +240,9 @@ def _alarms(before: bool, memory: Memory, limits: LiftLimits) -> tuple[Said, ...
     return ((EMERGENCY_SIGNAL, EmergencySignal((), memory.alarmed)),)
 
 
-def _faults(memory: Memory, view: View, now: float, limits: LiftLimits) -> tuple[Fault, ...]:
+def _faults(
+    memory: LiftMemory, view: BelievedLift, now: float, limits: LiftLimits
+) -> tuple[Fault, ...]:
     session = memory.session
     found = [*obstacles(memory, view, now, limits)]
     if view.settling and not memory.io_fault:
@@ -252,7 +258,7 @@ def _faults(memory: Memory, view: View, now: float, limits: LiftLimits) -> tuple
     return (*found, *view.faults)
 
 
-def _faults_of_rmf(session: Session, now: float, limits: LiftLimits) -> list[Fault]:
+def _faults_of_rmf(session: LiftSession, now: float, limits: LiftLimits) -> list[Fault]:
     """A supervisor that asks for another session explains why no request comes for this one."""
     if session.forgotten:
         fault = forgotten.fault(session, now)
@@ -263,7 +269,7 @@ def _faults_of_rmf(session: Session, now: float, limits: LiftLimits) -> list[Fau
 
 
 def _wake_at(
-    memory: Memory, view: View, outputs: LiftOutputs, now: float, limits: LiftLimits
+    memory: LiftMemory, view: BelievedLift, outputs: LiftOutputs, now: float, limits: LiftLimits
 ) -> float:
     due = [
         view.changes_at,

@@ -25,9 +25,9 @@ LIFT-DRIVE-6. Switching off is immediate. Switching on waits until the relay has
 
 from msgspec.structs import replace
 
-from bridges.kinds.lift.memory import Grace, LiftLimits, Session, Waiting
+from bridges.kinds.lift.memory import Grace, LiftLimits, LiftSession, Waiting
 from bridges.kinds.lift.relays import Relays
-from bridges.kinds.lift.sensing import View
+from bridges.kinds.lift.sensing import BelievedLift
 from bridges.kinds.lift.signals import Hazard, LiftOutputs
 from bridges.kinds.shared.decision import Fault
 from bridges.kinds.shared.durations import NEVER
@@ -35,35 +35,35 @@ from bridges.kinds.shared.durations import NEVER
 RETRY_AFTER_S = (10.0, 30.0, 60.0)
 
 
-def at_destination(session: Session, view: View, limits: LiftLimits) -> bool:
+def at_destination(session: LiftSession, view: BelievedLift, limits: LiftLimits) -> bool:
     """Does the car stand at the landing that the session asked for?"""
     return view.stopped and view.level == limits.stops[session.destination].level
 
 
-def agv_ok(view: View) -> bool:
+def agv_ok(view: BelievedLift) -> bool:
     """Is AGV mode on, as far as the wiring can tell? True if no status line is wired."""
     return view.agv is not False
 
 
-def silent(session: Session, now: float, limits: LiftLimits) -> bool:
+def silent(session: LiftSession, now: float, limits: LiftLimits) -> bool:
     """RMF has not repeated its request for too long."""
     return now >= session.asked_at + limits.t.request_timeout_s
 
 
-def serves(session: Session, allowed: bool, now: float, limits: LiftLimits) -> bool:
+def serves(session: LiftSession, allowed: bool, now: float, limits: LiftLimits) -> bool:
     """May anything be energised for this session? `allowed`: there is no obstacle."""
     outside_and_gone = silent(session, now, limits) and not session.boarded
     return allowed and session.agv and not outside_and_gone
 
 
-def paused(session: Session) -> Session:
+def paused(session: LiftSession) -> LiftSession:
     """The session with its ride interrupted: it starts anew when outputs are allowed again."""
     return replace(session, agv_seen=False, arrived=False, call_at=None, waiting=None)
 
 
 def advance(
-    session: Session, view: View, relays: Relays, now: float, limits: LiftLimits
-) -> Session:
+    session: LiftSession, view: BelievedLift, relays: Relays, now: float, limits: LiftLimits
+) -> LiftSession:
     """The session after this scan's inputs: arrivals, timeouts and retries.
 
     `relays`: their state before this scan.
@@ -89,7 +89,7 @@ def advance(
     return session
 
 
-def wanted(session: Session, view: View, now: float, limits: LiftLimits) -> LiftOutputs:
+def wanted(session: LiftSession, view: BelievedLift, now: float, limits: LiftLimits) -> LiftOutputs:
     """The outputs for a session that is served."""
     if session.retry_at is not None:
         return LiftOutputs()
@@ -106,7 +106,7 @@ def wanted(session: Session, view: View, now: float, limits: LiftLimits) -> Lift
 
 
 def stays_on(
-    grace: Grace, relays: Relays, view: View, now: float, limits: LiftLimits
+    grace: Grace, relays: Relays, view: BelievedLift, now: float, limits: LiftLimits
 ) -> LiftOutputs:
     """The outputs in the grace after END."""
     if now >= grace.off_at:
@@ -121,7 +121,7 @@ def let_go_at(grace: Grace, limits: LiftLimits) -> float:
     return min(grace.off_at, grace.until) - limits.t.dead_time_s
 
 
-def next_at(session: Session, limits: LiftLimits) -> tuple[float, ...]:
+def next_at(session: LiftSession, limits: LiftLimits) -> tuple[float, ...]:
     """When time alone may change this session's outputs or report."""
     waits = NEVER if session.waiting is None else session.since + _time_for(session.waiting, limits)
     return (
@@ -132,14 +132,14 @@ def next_at(session: Session, limits: LiftLimits) -> tuple[float, ...]:
     )
 
 
-def _requested(session: Session, relays: Relays, limits: LiftLimits) -> bool:
+def _requested(session: LiftSession, relays: Relays, limits: LiftLimits) -> bool:
     """Has one of our outputs requested AGV mode until now?"""
     if limits.by_call:
         return session.call_at is not None or relays.hold.on is not None
     return bool(relays.agv.on)
 
 
-def _arrive(session: Session, view: View, limits: LiftLimits) -> Session:
+def _arrive(session: LiftSession, view: BelievedLift, limits: LiftLimits) -> LiftSession:
     """A car that stands at the destination ends the call. If it is then seen elsewhere, it is called
     again.
 
@@ -155,7 +155,7 @@ def _arrive(session: Session, view: View, limits: LiftLimits) -> Session:
     return session
 
 
-def _waits_for(session: Session, view: View, limits: LiftLimits) -> Waiting | None:
+def _waits_for(session: LiftSession, view: BelievedLift, limits: LiftLimits) -> Waiting | None:
     if not agv_ok(view):
         return "agv"
     if not at_destination(session, view, limits):
@@ -168,7 +168,7 @@ def _time_for(waiting: Waiting, limits: LiftLimits) -> float:
     return {"agv": t.agv_timeout_s, "floor": t.floor_timeout_s, "door": t.door_timeout_s}[waiting]
 
 
-def _timeout_fault(session: Session, waiting: Waiting, limits: LiftLimits) -> Fault:
+def _timeout_fault(session: LiftSession, waiting: Waiting, limits: LiftLimits) -> Fault:
     after = f"after {_time_for(waiting, limits):g} s"
     if waiting == "agv":
         return Fault("AGV_MODE_NOT_GRANTED", f"no AGV mode status {after}")
@@ -177,14 +177,14 @@ def _timeout_fault(session: Session, waiting: Waiting, limits: LiftLimits) -> Fa
     return Fault("DOOR_OPENING_FAULT", f"not open at {session.destination} {after}")
 
 
-def _trip(session: Session, fault: Fault, now: float) -> Session:
+def _trip(session: LiftSession, fault: Fault, now: float) -> LiftSession:
     """Switch the outputs off until the next try. After the third retry the fault latches."""
     latched = session.tries >= len(RETRY_AFTER_S)
     retry_at = NEVER if latched else now + RETRY_AFTER_S[session.tries]
     return replace(paused(session), tries=session.tries + 1, retry_at=retry_at, fault=fault)
 
 
-def _pulse_ends_at(session: Session, limits: LiftLimits) -> float:
+def _pulse_ends_at(session: LiftSession, limits: LiftLimits) -> float:
     """When a pulsed call ends; NEVER for one that is held."""
     if session.call_at is None or limits.t.call_pulse_s is None:
         return NEVER

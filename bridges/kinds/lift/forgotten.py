@@ -30,8 +30,8 @@ from typing import Final
 
 from msgspec.structs import replace
 
-from bridges.kinds.lift.memory import Forgotten, OwnWords, Session
-from bridges.kinds.lift.signals import Ended, Requested
+from bridges.kinds.lift.memory import ForgottenSession, LiftSession, OwnWords
+from bridges.kinds.lift.signals import EndRequested, LiftRequested
 from bridges.kinds.shared.decision import Fault
 from bridges.kinds.shared.durations import AGES_AGO, NEVER
 from bridges.kinds.shared.freshness import SECOND_NS, Requester, Rules
@@ -50,13 +50,13 @@ CLOSE_S: Final = 1e-6
 CODE: Final = "FORGOTTEN_BY_SUPERVISOR"
 
 
-def overruled(session: Session, other: str, now: float) -> Session:
+def overruled(session: LiftSession, other: str, now: float) -> LiftSession:
     """The session once `lift_requests` asks for another one."""
-    before = session.forgotten or Forgotten(other, now)
+    before = session.forgotten or ForgottenSession(other, now)
     return replace(session, forgotten=replace(before, by=other))
 
 
-def remembered(session: Session, other: str) -> Session:
+def remembered(session: LiftSession, other: str) -> LiftSession:
     """The session once `lift_requests` has had the END of another one."""
     forgotten = session.forgotten
     if forgotten is None or forgotten.by != other:
@@ -64,13 +64,13 @@ def remembered(session: Session, other: str) -> Session:
     return replace(session, forgotten=replace(forgotten, by="") if forgotten.disowned else None)
 
 
-def disowned(session: Session, now: float) -> Session:
+def disowned(session: LiftSession, now: float) -> LiftSession:
     """The session once the supervisor has ended it although its robot goes on asking."""
-    before = session.forgotten or Forgotten("", now)
+    before = session.forgotten or ForgottenSession("", now)
     return replace(session, forgotten=replace(before, disowned=True))
 
 
-def goes_on(session: Session, now: float) -> bool:
+def goes_on(session: LiftSession, now: float) -> bool:
     """Does a robot that may be inside go on asking by itself?"""
     robot = session.robot
     if not session.boarded or robot.ended_at >= robot.asked_at:
@@ -78,13 +78,13 @@ def goes_on(session: Session, now: float) -> bool:
     return _has_just_asked(robot, now) and now >= robot.ended_at + FORWARDED_S
 
 
-def lapses_at(session: Session) -> float:
+def lapses_at(session: LiftSession) -> float:
     """When a disowned session ends by its robot's silence; NEVER if it is not disowned."""
     disowned = session.forgotten is not None and session.forgotten.disowned
     return session.robot.asked_at + ASKS_S if disowned else NEVER
 
 
-def in_car_until(session: Session, now: float) -> float:
+def in_car_until(session: LiftSession, now: float) -> float:
     """Until when a robot that may have been left in the car is waited for, if its session ends now;
     AGES_AGO if it has told us itself that its ride is over.
 
@@ -104,13 +104,13 @@ def _has_just_asked(robot: OwnWords, now: float) -> bool:
     return until < robot.asked_at + ASKS_S
 
 
-def granted(session: Session, stamp: int) -> Session:
+def granted(session: LiftSession, stamp: int) -> LiftSession:
     """The session once it is granted by a request with this stamp."""
     since = stamp / SECOND_NS - CLOSE_S if stamp else AGES_AGO
     return replace(session, ends=Requester(newest=since, newest_end=since))
 
 
-def counts(session: Session, ended: Ended, now: float) -> tuple[Session, bool]:
+def counts(session: LiftSession, ended: EndRequested, now: float) -> tuple[LiftSession, bool]:
     """Take the session's END. False if it is older than the session."""
     if not ended.stamp:
         return session, True
@@ -118,14 +118,16 @@ def counts(session: Session, ended: Ended, now: float) -> tuple[Session, bool]:
     return (session if counts else replace(session, ends=ends)), counts
 
 
-def heard(session: Session, asked: Requested | Ended, now: float) -> tuple[Session, bool]:
+def heard(
+    session: LiftSession, asked: LiftRequested | EndRequested, now: float
+) -> tuple[LiftSession, bool]:
     """Take one of the robot's own requests. True if it is to be obeyed."""
-    ends, robot = isinstance(asked, Ended), session.robot
+    ends, robot = isinstance(asked, EndRequested), session.robot
     newer = asked.stamp > robot.stamp or (ends and asked.stamp == 0)
     if not newer:
         return session, False
     stamp = max(robot.stamp, asked.stamp)
-    if isinstance(asked, Ended):
+    if isinstance(asked, EndRequested):
         ended_at = now if robot.ended_at <= robot.asked_at else robot.ended_at
         robot = replace(robot, stamp=stamp, ended_at=ended_at)
     else:
@@ -139,12 +141,12 @@ def heard(session: Session, asked: Requested | Ended, now: float) -> tuple[Sessi
     return replace(session, forgotten=replace(forgotten, ended=ends)), obeyed
 
 
-def named_at(session: Session) -> float:
+def named_at(session: LiftSession) -> float:
     """When the fault appears (s); NEVER if the session is not forgotten."""
     return session.forgotten.since + NAMED_AFTER_S if session.forgotten else NEVER
 
 
-def fault(session: Session, now: float) -> Fault | None:
+def fault(session: LiftSession, now: float) -> Fault | None:
     """What the supervisor does instead, once it is too late for a handover."""
     if session.forgotten is None or now < named_at(session):
         return None

@@ -7,8 +7,8 @@ from typing import Literal
 import msgspec
 
 from bridges.kinds.lift.relays import Relays
-from bridges.kinds.lift.settings import Durations, LiftSettings
-from bridges.kinds.lift.signals import Door, Hazard, Motion, Side, Stop
+from bridges.kinds.lift.settings import LiftDurations, LiftSettings
+from bridges.kinds.lift.signals import DoorReading, Hazard, Motion, Side, Stop
 from bridges.kinds.shared.debounce import Settled
 from bridges.kinds.shared.decision import Fault
 from bridges.kinds.shared.durations import AGES_AGO, NEVER
@@ -26,7 +26,7 @@ class LiftLimits(msgspec.Struct, frozen=True, dict=True):
     """
 
     stops: Mapping[str, Stop]
-    t: Durations = Durations()
+    t: LiftDurations = LiftDurations()
     debounce: Mapping[str, float] = {}
     fire_reset: Literal["auto", "manual"] = "auto"
     alarm: Literal["none", "fire_alarm_trigger", "emergency_signal"] = "none"
@@ -71,7 +71,7 @@ class LiftLimits(msgspec.Struct, frozen=True, dict=True):
         return self.stops[floor].side
 
 
-class Position(msgspec.Struct, frozen=True):
+class CarPosition(msgspec.Struct, frozen=True):
     """Where the car is. `trusted`: the landing last believed, last seen at `seen_at`. `suspect`: one
     that the floor code shows, but that the car cannot have reached.
 
@@ -84,19 +84,22 @@ class Position(msgspec.Struct, frozen=True):
     moved_at: float | None = None
 
 
-class Senses(msgspec.Struct, frozen=True):
+class LiftSenses(msgspec.Struct, frozen=True):
     """Every input, debounced, and when all were last read."""
 
     read_at: float | None = None
     code: Settled[tuple[str | None, str]] | None = None
-    doors: tuple[Settled[Door | None] | None, Settled[Door | None] | None] = (None, None)
+    doors: tuple[Settled[DoorReading | None] | None, Settled[DoorReading | None] | None] = (
+        None,
+        None,
+    )
     motion: Settled[Motion | None] | None = None
     agv: Settled[bool | None] | None = None
     hazards: dict[Hazard, Settled[bool]] = {}
-    position: Position = Position()
+    position: CarPosition = CarPosition()
 
 
-class Forgotten(msgspec.Struct, frozen=True):
+class ForgottenSession(msgspec.Struct, frozen=True):
     """RMF's supervisor asks for another session instead (`by`, "" for none), or has ended this one
     while its robot goes on asking (`disowned`), `since` when. `ended`: the robot's own END was heard
     once (`bridges/kinds/lift/forgotten.py`)."""
@@ -128,7 +131,7 @@ class Doubted(msgspec.Struct, frozen=True):
     since: float
 
 
-class Session(msgspec.Struct, frozen=True):
+class LiftSession(msgspec.Struct, frozen=True):
     """Who holds the lift, what was requested, and how far the ride has come.
 
     `boarded`: OPEN at the destination has been published for this session, so a robot may be inside.
@@ -152,7 +155,7 @@ class Session(msgspec.Struct, frozen=True):
     tries: int = 0
     retry_at: float | None = None
     fault: Fault | None = None
-    forgotten: Forgotten | None = None
+    forgotten: ForgottenSession | None = None
     robot: OwnWords = OwnWords()
     doubted: Doubted | None = None
     ends: Requester = Requester()
@@ -162,13 +165,13 @@ class Grace(msgspec.Struct, frozen=True):
     """After END: this session, and only this one, is granted again until `until`. Its outputs go off at
     `off_at`. `in_car`: its robot may still be inside, and may resume by its own requests too."""
 
-    session: Session
+    session: LiftSession
     until: float
     off_at: float = NEVER
     in_car: bool = False
 
 
-class Memory(msgspec.Struct, frozen=True):
+class LiftMemory(msgspec.Struct, frozen=True):
     """Everything that outlives a scan.
 
     `io_fault`: why the last read or write failed; "" if both succeeded. `unwritten_since`: since when
@@ -176,8 +179,8 @@ class Memory(msgspec.Struct, frozen=True):
     robot itself last asked the lift to go, by its session.
     """
 
-    senses: Senses = Senses()
-    session: Session | None = None
+    senses: LiftSenses = LiftSenses()
+    session: LiftSession | None = None
     grace: Grace | None = None
     relays: Relays = Relays()
     fire_latched: bool = False

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 from bridges.kinds.lift.report import LiftReport
 from bridges.kinds.lift.settings import LiftSettings
-from bridges.kinds.lift.signals import Ended, FromAdapter, Requested
+from bridges.kinds.lift.signals import EndRequested, FromAdapter, LiftRequested
 from bridges.kinds.shared.decision import RequestRefused
 from bridges.kinds.shared.freshness import in_ns
 from bridges.kinds.shared.names import check_length
@@ -29,7 +29,7 @@ OWN_REQUESTS = ADAPTER_LIFT_REQUESTS.live()
 AVAILABLE_MODES = (int(LiftMode.MODE_HUMAN), int(LiftMode.MODE_AGV))
 
 
-def accept(request: LiftRequest, settings: LiftSettings) -> Requested | Ended:
+def accept(request: LiftRequest, settings: LiftSettings) -> LiftRequested | EndRequested:
     """The request as an event. Raises RequestRefused if it is malformed or asks for the impossible.
 
     An END_SESSION counts whatever its floor and door are: fleet adapters send "" and 0
@@ -41,7 +41,7 @@ def accept(request: LiftRequest, settings: LiftSettings) -> Requested | Ended:
     stamp = _stamp(request)
     if request.request_type == LiftRequestType.REQUEST_END_SESSION:
         by_person = request.door_state == LiftRequestDoor.DOOR_OPEN
-        return Ended(request.session_id, stamp, by_person)
+        return EndRequested(request.session_id, stamp, by_person)
     if not request.session_id:
         raise RequestRefused("empty session_id", "a session needs a name")
     agv = request.request_type == LiftRequestType.REQUEST_AGV_MODE
@@ -54,7 +54,7 @@ def accept(request: LiftRequest, settings: LiftSettings) -> Requested | Ended:
         raise RequestRefused(
             "floor not served", f"{request.destination_floor!r} is not one of {', '.join(floors)}"
         )
-    return Requested(request.session_id, agv, request.destination_floor, stamp)
+    return LiftRequested(request.session_id, agv, request.destination_floor, stamp)
 
 
 def accept_adapters(request: LiftRequest, settings: LiftSettings) -> FromAdapter:

@@ -8,7 +8,7 @@ from typing import Any, Generic, TypeVar
 import msgspec
 from msgspec.structs import replace
 
-from bridges.kinds.lift.settings import Durations
+from bridges.kinds.lift.settings import LiftDurations
 from bridges.kinds.lift.signals import LiftOutputs, Side
 from bridges.kinds.shared.durations import AGES_AGO, NEVER
 
@@ -25,7 +25,7 @@ class Channel(msgspec.Struct, Generic[T], frozen=True):
     off_at: float = AGES_AGO
     ons: tuple[float, ...] = ()
 
-    def step(self, wanted: T | None, now: float, ready_at: float, t: Durations) -> "Channel[T]":
+    def step(self, wanted: T | None, now: float, ready_at: float, t: LiftDurations) -> "Channel[T]":
         """The next state. It goes off at once. It comes on, or changes, only after its rest and after
         `ready_at`."""
         if self.on is not None:
@@ -38,7 +38,7 @@ class Channel(msgspec.Struct, Generic[T], frozen=True):
         """When it was switched on during the last minute."""
         return tuple(at for at in self.ons if now - at < 60.0)
 
-    def may_switch_on_at(self, now: float, ready_at: float, t: Durations) -> float:
+    def may_switch_on_at(self, now: float, ready_at: float, t: LiftDurations) -> float:
         """The earliest time at which it may be energised."""
         recent = self.recent(now)
         most = t.max_cycles_per_min
@@ -57,7 +57,7 @@ class Relays(msgspec.Struct, frozen=True):
         """What the driver is to write."""
         return LiftOutputs(bool(self.agv.on), self.call.on, self.hold.on)
 
-    def step(self, wanted: LiftOutputs, now: float, t: Durations) -> "Relays":
+    def step(self, wanted: LiftOutputs, now: float, t: LiftDurations) -> "Relays":
         """Move every output towards what is wanted, as far as is allowed now."""
         agv = self.agv.step(wanted.agv_request or None, now, AGES_AGO, t)
         rested_at = self._rested_at(t) if agv.on else NEVER
@@ -67,13 +67,13 @@ class Relays(msgspec.Struct, frozen=True):
         hold = self.hold.step(wanted.hold_door, now, hold_ready_at, t)
         return Relays(agv, call, hold)
 
-    def changes_at(self, wanted: LiftOutputs, now: float, t: Durations) -> float:
+    def changes_at(self, wanted: LiftOutputs, now: float, t: LiftDurations) -> float:
         """When an output that is wanted and still off may come on; always later than `now`."""
         off = self._still_off(wanted, now, t)
         due = [channel.may_switch_on_at(now, ready_at, t) for _, channel, ready_at in off]
         return max(min(due, default=NEVER), math.nextafter(now, NEVER))
 
-    def resting(self, wanted: LiftOutputs, now: float, t: Durations) -> tuple[str, bool]:
+    def resting(self, wanted: LiftOutputs, now: float, t: LiftDurations) -> tuple[str, bool]:
         """The first output that is wanted and must rest before it comes on, and whether
         `max_cycles_per_min` is why; "" for none."""
         for name, channel, ready_at in self._still_off(wanted, now, t):
@@ -83,7 +83,7 @@ class Relays(msgspec.Struct, frozen=True):
         return "", False
 
     def _still_off(
-        self, wanted: LiftOutputs, now: float, t: Durations
+        self, wanted: LiftOutputs, now: float, t: LiftDurations
     ) -> Iterator[tuple[str, Channel[Any], float]]:
         """Each output that is wanted and off, its name, and when the others let it come on."""
         agv_at = now if self.agv.on else self.agv.may_switch_on_at(now, AGES_AGO, t)
@@ -95,6 +95,6 @@ class Relays(msgspec.Struct, frozen=True):
         if wanted.hold_door and not self.hold.on:
             yield "the door", self.hold, ready_at
 
-    def _rested_at(self, t: Durations) -> float:
+    def _rested_at(self, t: LiftDurations) -> float:
         """When call and door command will both have been off for `dead_time_s`."""
         return max(self.call.off_at, self.hold.off_at) + t.dead_time_s

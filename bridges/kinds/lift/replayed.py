@@ -17,8 +17,8 @@ LIFT-REPLAYED-3. An END counts as always. A request within the grace resumes the
 from collections.abc import Mapping
 from typing import Final
 
-from bridges.kinds.lift.memory import Doubted, Session
-from bridges.kinds.lift.signals import Ended, Requested
+from bridges.kinds.lift.memory import Doubted, LiftSession
+from bridges.kinds.lift.signals import EndRequested, LiftRequested
 
 LASTS_S: Final = 3.0
 """A replay is over within a second, and the robot's own repeats come at 1 Hz."""
@@ -26,10 +26,10 @@ MOST: Final = 100
 """More robots than any site has. Beyond this number the one that was heard first is forgotten."""
 
 
-def noted(own: Mapping[str, str], asked: Requested | Ended) -> Mapping[str, str]:
+def noted(own: Mapping[str, str], asked: LiftRequested | EndRequested) -> Mapping[str, str]:
     """Session -> destination, once a robot itself has asked for this."""
     others = {session: floor for session, floor in own.items() if session != asked.session_id}
-    if isinstance(asked, Ended):
+    if isinstance(asked, EndRequested):
         return others
     if len(others) == MOST:
         del others[next(iter(others))]
@@ -37,7 +37,7 @@ def noted(own: Mapping[str, str], asked: Requested | Ended) -> Mapping[str, str]
 
 
 def doubt(
-    session: Session, request: Requested, own: str, held_open: bool, now: float
+    session: LiftSession, request: LiftRequested, own: str, held_open: bool, now: float
 ) -> Doubted | None:
     """The doubt about a request of this session; None if it counts. `own`: where its robot would go."""
     other = request.destination != session.destination
@@ -49,8 +49,8 @@ def doubt(
     return before if now < before.since + LASTS_S else None
 
 
-def confirmed(session: Session, asked: Requested | Ended) -> bool:
+def confirmed(session: LiftSession, asked: LiftRequested | EndRequested) -> bool:
     """Does the robot itself ask for the destination that was doubted?"""
-    if session.doubted is None or isinstance(asked, Ended):
+    if session.doubted is None or isinstance(asked, EndRequested):
         return False
     return asked.destination == session.doubted.destination

@@ -4,9 +4,9 @@ import msgspec
 from msgspec.structs import replace
 
 from bridges.kinds.lift import drive, forgotten
-from bridges.kinds.lift.memory import LiftLimits, Memory, Session
+from bridges.kinds.lift.memory import LiftLimits, LiftMemory, LiftSession
 from bridges.kinds.lift.relays import Relays
-from bridges.kinds.lift.sensing import View
+from bridges.kinds.lift.sensing import BelievedLift
 from bridges.kinds.lift.signals import Hazard, LiftOutputs, Motion
 from bridges.kinds.shared.decision import Fault
 from bridges.messages.definitions import LiftDoor, LiftMode, LiftMotion
@@ -48,8 +48,8 @@ class LiftReport(msgspec.Struct, frozen=True):
 
 
 def report(
-    memory: Memory,
-    view: View,
+    memory: LiftMemory,
+    view: BelievedLift,
     wanted: LiftOutputs,
     faults: tuple[Fault, ...],
     now: float,
@@ -88,9 +88,9 @@ def _worn(relays: Relays, wanted: LiftOutputs, now: float, limits: LiftLimits) -
 
 
 def _waits(
-    session: Session,
+    session: LiftSession,
     relays: Relays,
-    view: View,
+    view: BelievedLift,
     wanted: LiftOutputs,
     faults: tuple[Fault, ...],
     now: float,
@@ -116,7 +116,7 @@ def _waits(
 
 
 def _may_enter(
-    memory: Memory,
+    memory: LiftMemory,
     floor: str,
     mode: LiftMode,
     wanted: LiftOutputs,
@@ -142,7 +142,7 @@ def _may_enter(
     return session.boarded or (served and not hinders)
 
 
-def _mode(view: View, faults: tuple[Fault, ...], relays: Relays) -> LiftMode:
+def _mode(view: BelievedLift, faults: tuple[Fault, ...], relays: Relays) -> LiftMode:
     """RMF's mode. If no AGV mode status is wired, our own request for it counts as the status."""
     codes = {fault.code for fault in faults}
     if codes & {"FIRE", "FIRE_LATCHED"}:
@@ -158,7 +158,7 @@ def _mode(view: View, faults: tuple[Fault, ...], relays: Relays) -> LiftMode:
 
 
 def _door(
-    session: Session | None, view: View, floor: str, limits: LiftLimits
+    session: LiftSession | None, view: BelievedLift, floor: str, limits: LiftLimits
 ) -> tuple[LiftDoor, bool]:
     """The door as the inputs show it, and whether that is an estimate.
 
@@ -179,7 +179,7 @@ def _door(
     return (LiftDoor.DOOR_CLOSED if closed else LiftDoor.DOOR_MOVING), estimated
 
 
-def _motion(view: View, door: LiftDoor) -> LiftMotion:
+def _motion(view: BelievedLift, door: LiftDoor) -> LiftMotion:
     """From the motion lines. Without them, a car with an open door at a floor is stopped."""
     if not view.fresh:
         return LiftMotion.MOTION_UNKNOWN

@@ -23,8 +23,8 @@ from collections.abc import Iterator, Sequence
 import msgspec
 from msgspec.structs import replace
 
-from bridges.kinds.lift.memory import LiftLimits, Position, Senses
-from bridges.kinds.lift.signals import Door, Hazard, LiftSample, Motion, Side
+from bridges.kinds.lift.memory import CarPosition, LiftLimits, LiftSenses
+from bridges.kinds.lift.signals import DoorReading, Hazard, LiftSample, Motion, Side
 from bridges.kinds.shared.debounce import Settled, forget, settle
 from bridges.kinds.shared.decision import Fault
 from bridges.kinds.shared.durations import AGES_AGO, NEVER
@@ -47,7 +47,7 @@ class DoorSeen(msgspec.Struct, frozen=True):
     settles_at: float = NEVER
 
 
-class View(msgspec.Struct, frozen=True):
+class BelievedLift(msgspec.Struct, frozen=True):
     """The inputs as they are believed at one instant.
 
     `blind`: why no input can be believed, "" when all can. `settling`: the only reason is that they
@@ -81,13 +81,13 @@ class View(msgspec.Struct, frozen=True):
         return self.rear or DoorSeen(open=False, closed=False)
 
 
-def take(senses: Senses, sample: LiftSample, now: float, limits: LiftLimits) -> Senses:
+def take(senses: LiftSenses, sample: LiftSample, now: float, limits: LiftLimits) -> LiftSenses:
     """Add one reading."""
     if now >= stale_at(senses, limits):
         senses = unsure(senses, now)
     hold = limits.debounce_s
     code = settle(senses.code, (sample.level, sample.code_fault), now, hold("floor"))
-    return Senses(
+    return LiftSenses(
         read_at=now,
         code=code,
         doors=(
@@ -104,9 +104,9 @@ def take(senses: Senses, sample: LiftSample, now: float, limits: LiftLimits) -> 
     )
 
 
-def gap(senses: Senses, now: float) -> Senses:
+def gap(senses: LiftSenses, now: float) -> LiftSenses:
     """A read has failed: the debounce starts again, and the car may have moved."""
-    return Senses(
+    return LiftSenses(
         senses.read_at,
         forget(senses.code),
         (forget(senses.doors[0]), forget(senses.doors[1])),
@@ -117,12 +117,12 @@ def gap(senses: Senses, now: float) -> Senses:
     )
 
 
-def unsure(senses: Senses, now: float) -> Senses:
+def unsure(senses: LiftSenses, now: float) -> LiftSenses:
     """After a long time without a reading: forget everything but the last landing."""
-    return Senses(position=replace(senses.position, moved_at=now))
+    return LiftSenses(position=replace(senses.position, moved_at=now))
 
 
-def trust(senses: Senses) -> Senses:
+def trust(senses: LiftSenses) -> LiftSenses:
     """An operator says that the floor code is right."""
     position = senses.position
     if position.suspect is None:
@@ -131,7 +131,7 @@ def trust(senses: Senses) -> Senses:
     return replace(senses, position=position)
 
 
-def look(senses: Senses, now: float, limits: LiftLimits) -> View:
+def look(senses: LiftSenses, now: float, limits: LiftLimits) -> BelievedLift:
     """What is believed now."""
     stale = now >= stale_at(senses, limits)
     motion = senses.motion.value if senses.motion else None
@@ -143,7 +143,7 @@ def look(senses: Senses, now: float, limits: LiftLimits) -> View:
     due = [stale_at(senses, limits), front.settles_at, rear.settles_at if rear else NEVER]
     for wait in unsettled:
         due += [wait.due_at, wait.torn_at]
-    return View(
+    return BelievedLift(
         blind=_blind(senses, unsettled, now, limits),
         settling=_settling(unsettled, now),
         level=code[0] if code and code[0] == senses.position.trusted else None,
@@ -159,7 +159,7 @@ def look(senses: Senses, now: float, limits: LiftLimits) -> View:
     )
 
 
-def stale_at(senses: Senses, limits: LiftLimits) -> float:
+def stale_at(senses: LiftSenses, limits: LiftLimits) -> float:
     """When the last reading becomes stale (s); -inf before the first."""
     return AGES_AGO if senses.read_at is None else senses.read_at + limits.t.stale_after_s
 
@@ -180,18 +180,18 @@ def _hazard_hold_s(
 
 
 def _locate(
-    before: Position,
+    before: CarPosition,
     code: Settled[tuple[str | None, str]],
     sample: LiftSample,
     now: float,
     limits: LiftLimits,
-) -> Position:
+) -> CarPosition:
     """Follow the car from floor to floor. A floor that it cannot have reached is only suspected."""
     if sample.motion is not Motion.STOPPED:
         before = replace(before, moved_at=now)
     level = code.value[0] if code.value else None
     if level is None and not sample.floor_valid:
-        return Position(moved_at=before.moved_at)
+        return CarPosition(moved_at=before.moved_at)
     if level is None or level == before.suspect:
         return before
     if level == before.trusted or _can_have_come(before, level, now, limits):
@@ -199,7 +199,7 @@ def _locate(
     return replace(before, suspect=level)
 
 
-def _can_have_come(before: Position, level: str, now: float, limits: LiftLimits) -> bool:
+def _can_have_come(before: CarPosition, level: str, now: float, limits: LiftLimits) -> bool:
     if before.trusted is None:
         return True
     memory_s = MOTION_MEMORY_S + limits.debounce_s("floor")
@@ -216,20 +216,22 @@ def _stands(motion: Settled[Motion | None] | None) -> bool:
     return (motion.candidate if motion.value is None else motion.value) in (None, Motion.STOPPED)
 
 
-def _wired(seen: Settled[Door | None] | None) -> bool:
+def _wired(seen: Settled[DoorReading | None] | None) -> bool:
     return seen is not None and seen.candidate is not None
 
 
-def _door(seen: Settled[Door | None] | None, now: float, limits: LiftLimits) -> DoorSeen:
+def _door(seen: Settled[DoorReading | None] | None, now: float, limits: LiftLimits) -> DoorSeen:
     value = seen.value if seen else None
-    if value in (Door.OPEN, Door.CLOSED):
-        return DoorSeen(open=value is Door.OPEN, closed=value is Door.CLOSED)
-    if seen is None or value not in (Door.NOT_OPEN, Door.NOT_CLOSED):
+    if value in (DoorReading.OPEN, DoorReading.CLOSED):
+        return DoorSeen(open=value is DoorReading.OPEN, closed=value is DoorReading.CLOSED)
+    if seen is None or value not in (DoorReading.NOT_OPEN, DoorReading.NOT_CLOSED):
         return DoorSeen(open=False, closed=False)
     there_at = seen.since + limits.t.door_travel_s
     if now < there_at:
         return DoorSeen(open=False, closed=False, settles_at=there_at)
-    return DoorSeen(open=value is Door.NOT_CLOSED, closed=value is Door.NOT_OPEN, estimated=True)
+    return DoorSeen(
+        open=value is DoorReading.NOT_CLOSED, closed=value is DoorReading.NOT_OPEN, estimated=True
+    )
 
 
 class Unsettled(msgspec.Struct, frozen=True):
@@ -244,7 +246,7 @@ class Unsettled(msgspec.Struct, frozen=True):
     new: bool = False
 
 
-def _unsettled(senses: Senses, limits: LiftLimits) -> Iterator[Unsettled]:
+def _unsettled(senses: LiftSenses, limits: LiftLimits) -> Iterator[Unsettled]:
     hold = limits.debounce_s
     plain: list[tuple[str, Settled[object] | None]] = [
         ("floor", senses.code),
@@ -270,7 +272,9 @@ def _wait(name: str, seen: Settled[object] | None, hold_s: float, most_s: float)
     return Unsettled(name, seen.due_at(hold_s), torn_at, new=seen.steady_at is None)
 
 
-def _blind(senses: Senses, unsettled: Sequence[Unsettled], now: float, limits: LiftLimits) -> str:
+def _blind(
+    senses: LiftSenses, unsettled: Sequence[Unsettled], now: float, limits: LiftLimits
+) -> str:
     if senses.read_at is None:
         return "not read yet"
     if now >= stale_at(senses, limits):
@@ -285,7 +289,7 @@ def _settling(unsettled: Sequence[Unsettled], now: float) -> bool:
     return first and not any(now >= wait.torn_at for wait in unsettled)
 
 
-def _faults(senses: Senses) -> tuple[Fault, ...]:
+def _faults(senses: LiftSenses) -> tuple[Fault, ...]:
     found = []
     code = senses.code.value if senses.code else None
     if code and code[1]:
@@ -295,9 +299,9 @@ def _faults(senses: Senses) -> tuple[Fault, ...]:
             Fault("POSITION_LOST", f"{code[0]} cannot follow {senses.position.trusted} like this")
         )
     for name, seen in zip(("door", "rear door"), senses.doors, strict=True):
-        if seen and seen.value is Door.BOTH:
+        if seen and seen.value is DoorReading.BOTH:
             found.append(Fault("DOOR_CONTACTS_CONTRADICT", f"{name} reads open and closed"))
-        if seen and seen.value is Door.UNKNOWN:
+        if seen and seen.value is DoorReading.UNKNOWN:
             found.append(Fault("DOOR_CODE_ILLEGAL", f"the {name}'s number means nothing"))
     if senses.motion and senses.motion.value is Motion.CONTRADICTORY:
         found.append(Fault("MOTION_CONTRADICTORY", "the motion lines cannot all be true"))

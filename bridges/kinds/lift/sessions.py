@@ -10,8 +10,8 @@ from typing import Final
 from msgspec.structs import replace
 
 from bridges.kinds.lift import forgotten, replayed
-from bridges.kinds.lift.memory import Grace, LiftLimits, Memory, Session
-from bridges.kinds.lift.signals import Ended, Requested
+from bridges.kinds.lift.memory import Grace, LiftLimits, LiftMemory, LiftSession
+from bridges.kinds.lift.signals import EndRequested, LiftRequested
 from bridges.kinds.shared.decision import RELEASED_LATELY
 from bridges.kinds.shared.durations import AGES_AGO
 
@@ -19,8 +19,8 @@ LEFT_IN_CAR: Final = "released in mid-ride"
 
 
 def ask(
-    memory: Memory, request: Requested, now: float, why_not: Callable[[], str]
-) -> tuple[Memory, str]:
+    memory: LiftMemory, request: LiftRequested, now: float, why_not: Callable[[], str]
+) -> tuple[LiftMemory, str]:
     """Take a request of `lift_requests`; also why it is refused, "" if it is not. `why_not`: why nobody
     gets the lift now."""
     held, grace = memory.session, memory.grace
@@ -37,11 +37,13 @@ def ask(
         return replace(memory, session=_heed(memory, session, request, now), grace=None), ""
     if refused := why_not():
         return memory, refused
-    session = Session(request.session_id, request.agv, request.destination, now)
+    session = LiftSession(request.session_id, request.agv, request.destination, now)
     return replace(memory, session=forgotten.granted(session, request.stamp), grace=None), ""
 
 
-def _heed(memory: Memory, session: Session, request: Requested, now: float) -> Session:
+def _heed(
+    memory: LiftMemory, session: LiftSession, request: LiftRequested, now: float
+) -> LiftSession:
     """The session once `lift_requests` asks for it."""
     own = memory.own.get(session.id, "")
     held_open = memory.relays.hold.on is not None
@@ -51,8 +53,8 @@ def _heed(memory: Memory, session: Session, request: Requested, now: float) -> S
 
 
 def hear_adapter(
-    memory: Memory, asked: Requested | Ended, now: float, limits: LiftLimits
-) -> Memory:
+    memory: LiftMemory, asked: LiftRequested | EndRequested, now: float, limits: LiftLimits
+) -> LiftMemory:
     """A robot's own request: it counts for the session that has the lift, if that is forgotten or
     disowned, or if it settles a doubt; and for a robot that was left in the car."""
     held = memory.session
@@ -64,12 +66,12 @@ def hear_adapter(
     session, obeyed = forgotten.heard(held, asked, now)
     if not (obeyed or replayed.confirmed(session, asked)):
         return replace(memory, session=session)
-    if isinstance(asked, Requested):
+    if isinstance(asked, LiftRequested):
         return replace(memory, session=_refresh(session, asked, now))
     return _let_go(memory, session, asked.by_person, now, limits)
 
 
-def _come_back(memory: Memory, asked: Requested | Ended, now: float) -> Memory:
+def _come_back(memory: LiftMemory, asked: LiftRequested | EndRequested, now: float) -> LiftMemory:
     """A robot that may have been left in the car asks again by itself, within the grace."""
     grace = memory.grace
     if grace is None or not grace.in_car or now >= grace.until:
@@ -77,13 +79,13 @@ def _come_back(memory: Memory, asked: Requested | Ended, now: float) -> Memory:
     if grace.session.id != asked.session_id:
         return memory
     session = forgotten.heard(grace.session, asked, now)[0]
-    if isinstance(asked, Ended) or session.robot == grace.session.robot:
+    if isinstance(asked, EndRequested) or session.robot == grace.session.robot:
         return replace(memory, grace=replace(grace, session=session))
     session = _refresh(forgotten.disowned(_anew(session, now), now), asked, now)
     return replace(memory, session=session, grace=None)
 
 
-def _refresh(session: Session, request: Requested, now: float) -> Session:
+def _refresh(session: LiftSession, request: LiftRequested, now: float) -> LiftSession:
     """A repeat only shows that RMF is alive. A different destination or mode is a new request."""
     if (request.agv, request.destination) == (session.agv, session.destination):
         return replace(session, asked_at=now)
@@ -91,9 +93,9 @@ def _refresh(session: Session, request: Requested, now: float) -> Session:
     return replace(fresh, forgotten=session.forgotten)
 
 
-def _anew(session: Session, now: float) -> Session:
+def _anew(session: LiftSession, now: float) -> LiftSession:
     """The session as if it were granted now, but for what is known of its robot."""
-    return Session(
+    return LiftSession(
         session.id,
         session.agv,
         session.destination,
@@ -104,7 +106,9 @@ def _anew(session: Session, now: float) -> Session:
     )
 
 
-def end(memory: Memory, ended: Ended, now: float, limits: LiftLimits) -> tuple[Memory, str]:
+def end(
+    memory: LiftMemory, ended: EndRequested, now: float, limits: LiftLimits
+) -> tuple[LiftMemory, str]:
     """Take an END of `lift_requests`; also why it is refused, "" if it is not."""
     held, grace = memory.session, memory.grace
     if held is None and grace and ended.by_person and ended.session_id == grace.session.id:
@@ -122,7 +126,7 @@ def end(memory: Memory, ended: Ended, now: float, limits: LiftLimits) -> tuple[M
     return _let_go(memory, session, ended.by_person, now, limits), ""
 
 
-def lapse(memory: Memory, now: float, limits: LiftLimits) -> Memory:
+def lapse(memory: LiftMemory, now: float, limits: LiftLimits) -> LiftMemory:
     """A disowned session ends when its robot has been silent for too long."""
     held = memory.session
     if held is None or now < forgotten.lapses_at(held):
@@ -131,8 +135,8 @@ def lapse(memory: Memory, now: float, limits: LiftLimits) -> Memory:
 
 
 def _let_go(
-    memory: Memory, held: Session, by_person: bool, now: float, limits: LiftLimits
-) -> Memory:
+    memory: LiftMemory, held: LiftSession, by_person: bool, now: float, limits: LiftLimits
+) -> LiftMemory:
     """The session is over, and its grace begins."""
     grace = None
     if memory.relays.agv.on or held.boarded:

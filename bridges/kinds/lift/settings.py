@@ -24,7 +24,7 @@ class Floor(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     side: Annotated[Side, tells("which of the car's doors opens there.")] = Side.FRONT
 
 
-class Durations(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class LiftDurations(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Durations and counts of a lift."""
 
     stale_after_s: Annotated[
@@ -91,7 +91,7 @@ class LiftSettings(DeviceSettings, frozen=True, kw_only=True, forbid_unknown_fie
         tells("""how AGV mode is switched on. `requested`: by an output that is held. `by_call`: by
         a call; it stays on while the call is served and the door is held."""),
     ] = "requested"
-    limits: Annotated[Durations, tells("what differs from the defaults.")] = Durations()
+    limits: Annotated[LiftDurations, tells("what differs from the defaults.")] = LiftDurations()
     fire_reset: Annotated[
         Literal["auto", "manual"],
         tells("""RMF may use the lift again when the alarm clears (`auto`), or only after

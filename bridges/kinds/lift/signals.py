@@ -7,7 +7,7 @@ import msgspec
 from bridges.kinds.shared.decision import IoFailed, OperatorReset, RivalSeen, Sampled
 
 
-class Door(Enum):
+class DoorReading(Enum):
     """What the door contacts say at one instant.
 
     With two contacts: OPEN, CLOSED, BETWEEN (neither) or BOTH (a fault). With one that proves open:
@@ -56,9 +56,9 @@ class LiftSample(msgspec.Struct, frozen=True):
     """
 
     level: str | None
-    door: Door
+    door: DoorReading
     code_fault: str = ""
-    rear_door: Door | None = None
+    rear_door: DoorReading | None = None
     motion: Motion | None = None
     agv: bool | None = None
     hazards: frozenset[Hazard] = frozenset()
@@ -90,7 +90,7 @@ class LiftOutputs(msgspec.Struct, frozen=True):
     hold_door: Side | None = None
 
 
-class Requested(msgspec.Struct, frozen=True):
+class LiftRequested(msgspec.Struct, frozen=True):
     """A well-formed LiftRequest for AGV or HUMAN mode, for this lift and a floor that it serves.
 
     `stamp`: its request_time (ns), by its sender's clock; 0 without one.
@@ -102,7 +102,7 @@ class Requested(msgspec.Struct, frozen=True):
     stamp: int = 0
 
 
-class Ended(msgspec.Struct, frozen=True):
+class EndRequested(msgspec.Struct, frozen=True):
     """A LiftRequest for END_SESSION, whatever its floor says. `by_person`: a person has sent it, with
     `rmf-bridge send` or `release`."""
 
@@ -114,10 +114,10 @@ class Ended(msgspec.Struct, frozen=True):
 class FromAdapter(msgspec.Struct, frozen=True):
     """A robot's own request, as its fleet adapter sends it to RMF's supervisor."""
 
-    asked: Requested | Ended
+    asked: LiftRequested | EndRequested
 
 
-Asked = Requested | Ended | FromAdapter
+Asked = LiftRequested | EndRequested | FromAdapter
 """What requests become."""
 
 Event = Sampled[LiftSample] | IoFailed | RivalSeen | OperatorReset | Asked

@@ -1,25 +1,25 @@
 """The lift supervisor: replaces RMF's own, between the fleet adapters and any number of lifts."""
 
 from bridges.kinds.lift_supervisor import core, memory, messages, report, signals
-from bridges.kinds.lift_supervisor.memory import Limits, Memory
+from bridges.kinds.lift_supervisor.memory import LiftSupervisorLimits, SupervisedLift
 from bridges.kinds.lift_supervisor.report import SupervisorReport
-from bridges.kinds.lift_supervisor.settings import Settings, speaks_of
-from bridges.kinds.lift_supervisor.signals import Ended, Requested, StateHeard
+from bridges.kinds.lift_supervisor.settings import LiftSupervisorSettings, speaks_of
+from bridges.kinds.lift_supervisor.signals import LiftStateHeard, RideEnded, RideRequested
 from bridges.kinds.shared.fields import quiet_s
 from bridges.kinds.shared.graph_kind import GraphKind
 from bridges.kinds.shared.recorded import Recorded
 from bridges.messages.topics import ADAPTER_LIFT_REQUESTS, LIFT_REQUESTS, LIFT_STATES
 
 KIND: GraphKind[
-    Settings,
-    Limits,
-    Memory,
-    Requested | Ended | StateHeard,
+    LiftSupervisorSettings,
+    LiftSupervisorLimits,
+    SupervisedLift,
+    RideRequested | RideEnded | LiftStateHeard,
     SupervisorReport,
 ] = GraphKind(
     name="lift_supervisor",
     devices_key="supervisor",
-    settings=Settings,
+    settings=LiftSupervisorSettings,
     requests={
         ADAPTER_LIFT_REQUESTS: messages.accept_request,
         LIFT_STATES: messages.accept_state,
@@ -28,7 +28,7 @@ KIND: GraphKind[
     sole=(LIFT_REQUESTS,),
     device_name=messages.device_name,
     quiet_s=quiet_s,
-    limits=Limits.of,
+    limits=LiftSupervisorLimits.of,
     initial=core.initial,
     decide=core.decide,
     stamped=messages.stamped,
@@ -42,12 +42,12 @@ KIND: GraphKind[
 )
 
 RECORDED: Recorded = {
-    "lift_supervisor.memory.Claim": memory.Claim,
-    "lift_supervisor.memory.Memory": memory.Memory,
+    "lift_supervisor.memory.Claim": memory.SessionClaim,
+    "lift_supervisor.memory.Memory": memory.SupervisedLift,
     "lift_supervisor.memory.Turn": memory.Turn,
     "lift_supervisor.report.SupervisorReport": report.SupervisorReport,
-    "lift_supervisor.signals.Ended": signals.Ended,
-    "lift_supervisor.signals.Requested": signals.Requested,
-    "lift_supervisor.signals.StateHeard": signals.StateHeard,
+    "lift_supervisor.signals.Ended": signals.RideEnded,
+    "lift_supervisor.signals.Requested": signals.RideRequested,
+    "lift_supervisor.signals.StateHeard": signals.LiftStateHeard,
     "lift_supervisor.signals.Target": signals.Target,
 }

@@ -31,9 +31,14 @@ from typing import Final
 
 from msgspec.structs import replace
 
-from bridges.kinds.lift_supervisor.memory import Claim, Limits, Memory, Turn
+from bridges.kinds.lift_supervisor.memory import (
+    LiftSupervisorLimits,
+    SessionClaim,
+    SupervisedLift,
+    Turn,
+)
 from bridges.kinds.lift_supervisor.report import SupervisorReport, alarms, report
-from bridges.kinds.lift_supervisor.signals import Ended, Event, Requested, StateHeard
+from bridges.kinds.lift_supervisor.signals import Event, LiftStateHeard, RideEnded, RideRequested
 from bridges.kinds.shared.decision import Decision
 from bridges.kinds.shared.durations import FORGOTTEN_S, NEVER, SILENT_S, due_at
 from bridges.kinds.shared.freshness import hear
@@ -46,15 +51,15 @@ MAX_CLAIMS: Final = 100
 END: Final = LiftRequestType.REQUEST_END_SESSION
 AGV: Final = LiftRequestType.REQUEST_AGV_MODE
 
-Decided = Decision[Memory, None, SupervisorReport]
+Decided = Decision[SupervisedLift, None, SupervisorReport]
 
 
-def initial(lift: str, started_at: float) -> Memory:
+def initial(lift: str, started_at: float) -> SupervisedLift:
     """Nothing has been heard, and we may not publish yet."""
-    return Memory(lift, started_at)
+    return SupervisedLift(lift, started_at)
 
 
-def idle(memory: Memory, now: float) -> bool:
+def idle(memory: SupervisedLift, now: float) -> bool:
     """May this lift be forgotten? No session requests it, and it has been silent for a while.
 
     If the lift comes back, its states show again a session that is still to be ended. A robot that
@@ -66,7 +71,9 @@ def idle(memory: Memory, now: float) -> bool:
     return now >= heard_at + (long_s if memory.claims else FORGOTTEN_S)
 
 
-def decide(memory: Memory, event: Event, now: float, limits: Limits) -> Decided:
+def decide(
+    memory: SupervisedLift, event: Event, now: float, limits: LiftSupervisorLimits
+) -> Decided:
     """Take the event in, decide whose turn it is, and send what is due: at most one message."""
     memory, refused = _take(memory, event, now, limits)
     memory = _forget_silent(memory, now, limits)
@@ -89,16 +96,18 @@ def decide(memory: Memory, event: Event, now: float, limits: Limits) -> Decided:
 # --- what is heard -----------------------------------------------------------------------------
 
 
-def _take(memory: Memory, event: Event, now: float, limits: Limits) -> tuple[Memory, str]:
+def _take(
+    memory: SupervisedLift, event: Event, now: float, limits: LiftSupervisorLimits
+) -> tuple[SupervisedLift, str]:
     match event:
-        case Requested() | Ended():
+        case RideRequested() | RideEnded():
             memory, refused = _listen(memory, event, now, limits)
             if refused:
                 return memory, refused
-            if isinstance(event, Ended):
+            if isinstance(event, RideEnded):
                 return _end(memory, event, now), ""
             return _ask(memory, event, now)
-        case StateHeard():
+        case LiftStateHeard():
             return _see(memory, event, now), ""
         case MaySpeak(yes, waits=passive):
             return _speak(memory, yes, passive), ""
@@ -107,8 +116,11 @@ def _take(memory: Memory, event: Event, now: float, limits: Limits) -> tuple[Mem
 
 
 def _listen(
-    memory: Memory, event: Requested | Ended, now: float, limits: Limits
-) -> tuple[Memory, str]:
+    memory: SupervisedLift,
+    event: RideRequested | RideEnded,
+    now: float,
+    limits: LiftSupervisorLimits,
+) -> tuple[SupervisedLift, str]:
     """Does this request count?"""
     requesters, refused = hear(
         memory.requesters,
@@ -117,13 +129,13 @@ def _listen(
         now,
         memory.rules(now, limits),
         age_s=event.age_s,
-        ends=isinstance(event, Ended),
+        ends=isinstance(event, RideEnded),
         holders={claim.session for claim in memory.claims},
     )
     return replace(memory, heard_at=now, requesters=requesters), refused
 
 
-def _ask(memory: Memory, request: Requested, now: float) -> tuple[Memory, str]:
+def _ask(memory: SupervisedLift, request: RideRequested, now: float) -> tuple[SupervisedLift, str]:
     """Enter the queue, or repeat or change the request without losing the place in it."""
     before = memory.claim(request.session)
     served = memory.shown.floors if memory.shown else ()
@@ -132,24 +144,26 @@ def _ask(memory: Memory, request: Requested, now: float) -> tuple[Memory, str]:
     if before is None and len(memory.claims) == MAX_CLAIMS:
         return memory, "queue full"
     since = before.since if before else now
-    claim = Claim(request.session, request.target, since, now)
+    claim = SessionClaim(request.session, request.target, since, now)
     turn = memory.turn
     holds = turn is not None and turn.session == request.session and not turn.ends
     return replace(_with(memory, before, claim), prompted=memory.prompted or holds), ""
 
 
-def _still_there(memory: Memory, before: Claim | None, now: float) -> Memory:
+def _still_there(memory: SupervisedLift, before: SessionClaim | None, now: float) -> SupervisedLift:
     """A request that cannot be obeyed still shows that its requester is alive."""
     return memory if before is None else _with(memory, before, replace(before, heard_at=now))
 
 
-def _with(memory: Memory, before: Claim | None, claim: Claim) -> Memory:
+def _with(
+    memory: SupervisedLift, before: SessionClaim | None, claim: SessionClaim
+) -> SupervisedLift:
     if before is None:
         return replace(memory, claims=(*memory.claims, claim))
     return replace(memory, claims=tuple(claim if c is before else c for c in memory.claims))
 
 
-def _end(memory: Memory, ended: Ended, now: float) -> Memory:
+def _end(memory: SupervisedLift, ended: RideEnded, now: float) -> SupervisedLift:
     """The session leaves the queue. If it has the lift or its turn, the node is sent END."""
     session = ended.session
     memory, turn = _without(memory, session), memory.turn
@@ -159,11 +173,11 @@ def _end(memory: Memory, ended: Ended, now: float) -> Memory:
     return _begin(memory, Turn(session, now, ends=True, by_person=ended.by_person))
 
 
-def _without(memory: Memory, session: str) -> Memory:
+def _without(memory: SupervisedLift, session: str) -> SupervisedLift:
     return replace(memory, claims=tuple(c for c in memory.claims if c.session != session))
 
 
-def _see(memory: Memory, shown: StateHeard, now: float) -> Memory:
+def _see(memory: SupervisedLift, shown: LiftStateHeard, now: float) -> SupervisedLift:
     """A state: it may confirm an END, call for a repeat, or show another session."""
     flowed = now <= memory.shown_at + SILENT_S
     same = flowed and shown.session == memory.session_shown
@@ -187,7 +201,7 @@ def _see(memory: Memory, shown: StateHeard, now: float) -> Memory:
     )
 
 
-def _speak(memory: Memory, yes: bool, passive: str) -> Memory:
+def _speak(memory: SupervisedLift, yes: bool, passive: str) -> SupervisedLift:
     """While we may not publish nobody has a turn. Later the lift's states show who has the lift."""
     turn = memory.turn if yes else None
     return replace(memory, may_speak=yes, passive=passive, turn=turn)
@@ -196,7 +210,9 @@ def _speak(memory: Memory, yes: bool, passive: str) -> Memory:
 # --- whose turn it is --------------------------------------------------------------------------
 
 
-def _forget_silent(memory: Memory, now: float, limits: Limits) -> Memory:
+def _forget_silent(
+    memory: SupervisedLift, now: float, limits: LiftSupervisorLimits
+) -> SupervisedLift:
     """Drop the claims of silent sessions that wait. A holder leaves by END only."""
     holder = memory.turn.session if memory.turn and not memory.turn.ends else ""
     staying = tuple(
@@ -207,11 +223,11 @@ def _forget_silent(memory: Memory, now: float, limits: Limits) -> Memory:
     return replace(memory, claims=staying)
 
 
-def _begin(memory: Memory, turn: Turn) -> Memory:
+def _begin(memory: SupervisedLift, turn: Turn) -> SupervisedLift:
     return replace(memory, turn=turn, sent=None, prompted=False)
 
 
-def _take_turns(memory: Memory, now: float, limits: Limits) -> Memory:
+def _take_turns(memory: SupervisedLift, now: float, limits: LiftSupervisorLimits) -> SupervisedLift:
     turn, shown = memory.turn, memory.session_shown
     if not memory.may_speak or (turn and turn.ends):
         return memory
@@ -224,7 +240,9 @@ def _take_turns(memory: Memory, now: float, limits: Limits) -> Memory:
     return memory
 
 
-def _obey_the_lift(memory: Memory, shown: str, now: float, limits: Limits) -> Memory:
+def _obey_the_lift(
+    memory: SupervisedLift, shown: str, now: float, limits: LiftSupervisorLimits
+) -> SupervisedLift:
     """The lift shows a session without a turn: after our restart, or after another node's request."""
     if memory.claim(shown):
         return _begin(memory, Turn(shown, now, seen=True))
@@ -233,7 +251,9 @@ def _obey_the_lift(memory: Memory, shown: str, now: float, limits: Limits) -> Me
     return memory
 
 
-def _let_go(memory: Memory, turn: Turn, now: float, limits: Limits) -> Memory:
+def _let_go(
+    memory: SupervisedLift, turn: Turn, now: float, limits: LiftSupervisorLimits
+) -> SupervisedLift:
     """End a silent holder's turn: after `silent_after_s` if the lift never took it, else after
     `holder_ttl_s`."""
     claim = memory.claim(turn.session)
@@ -247,7 +267,7 @@ def _let_go(memory: Memory, turn: Turn, now: float, limits: Limits) -> Memory:
 # --- what is sent ------------------------------------------------------------------------------
 
 
-def wanted(memory: Memory) -> LiftRequest | None:
+def wanted(memory: SupervisedLift) -> LiftRequest | None:
     """The request that the lift's node should have now, without its stamp."""
     turn = memory.turn
     if turn is None:
@@ -271,7 +291,7 @@ def wanted(memory: Memory) -> LiftRequest | None:
     )
 
 
-def _due_at(memory: Memory, message: LiftRequest | None) -> float:
+def _due_at(memory: SupervisedLift, message: LiftRequest | None) -> float:
     """When to send this request. An END that names another floor is a repeat, not a new one."""
     if message is None:
         return NEVER
@@ -280,7 +300,9 @@ def _due_at(memory: Memory, message: LiftRequest | None) -> float:
     return due_at(memory.sent_at, new=new and not said, again=memory.prompted or said)
 
 
-def _wake_at(memory: Memory, due: list[float], now: float, limits: Limits) -> float:
+def _wake_at(
+    memory: SupervisedLift, due: list[float], now: float, limits: LiftSupervisorLimits
+) -> float:
     """When the decision may change without an event."""
     if memory.shown is not None and memory.flows(now):
         due.append(math.nextafter(memory.shown_at + SILENT_S, NEVER))

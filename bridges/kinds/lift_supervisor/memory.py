@@ -4,8 +4,8 @@ from typing import Final
 
 import msgspec
 
-from bridges.kinds.lift_supervisor.settings import Settings
-from bridges.kinds.lift_supervisor.signals import StateHeard, Target
+from bridges.kinds.lift_supervisor.settings import LiftSupervisorSettings
+from bridges.kinds.lift_supervisor.signals import LiftStateHeard, Target
 from bridges.kinds.shared.durations import AGES_AGO, NEVER, SILENT_S
 from bridges.kinds.shared.freshness import FUTURE_S, Requesters, Rules
 from bridges.kinds.shared.graph_kind import LISTENS
@@ -15,7 +15,7 @@ NOBODY_IS_SENT: Final = (LiftMode.MODE_FIRE, LiftMode.MODE_EMERGENCY, LiftMode.M
 """The modes in which no robot is sent to a lift."""
 
 
-class Limits(msgspec.Struct, frozen=True):
+class LiftSupervisorLimits(msgspec.Struct, frozen=True):
     """The durations (s) that the site has set, and whether its clocks agree."""
 
     silent_after_s: float = 10.0
@@ -26,7 +26,7 @@ class Limits(msgspec.Struct, frozen=True):
     max_request_age_s: float = 10.0
 
     @classmethod
-    def of(cls, settings: Settings) -> "Limits":
+    def of(cls, settings: LiftSupervisorSettings) -> "LiftSupervisorLimits":
         """From the YAML."""
         ttl_s = settings.holder_ttl_s
         return cls(
@@ -39,7 +39,7 @@ class Limits(msgspec.Struct, frozen=True):
         )
 
 
-class Claim(msgspec.Struct, frozen=True):
+class SessionClaim(msgspec.Struct, frozen=True):
     """A session that wants the lift: its last request, and when its first and last requests came."""
 
     session: str
@@ -59,7 +59,7 @@ class Turn(msgspec.Struct, frozen=True):
     by_person: bool = False
 
 
-class Memory(msgspec.Struct, frozen=True):
+class SupervisedLift(msgspec.Struct, frozen=True):
     """Everything that outlives an event.
 
     `passive`: what those wait for that wait for us, while we may not publish.
@@ -74,9 +74,9 @@ class Memory(msgspec.Struct, frozen=True):
     started_at: float
     may_speak: bool = False
     passive: str = LISTENS
-    claims: tuple[Claim, ...] = ()
+    claims: tuple[SessionClaim, ...] = ()
     turn: Turn | None = None
-    shown: StateHeard | None = None
+    shown: LiftStateHeard | None = None
     shown_at: float = AGES_AGO
     session_since: float = AGES_AGO
     flowing_since: float = AGES_AGO
@@ -87,7 +87,7 @@ class Memory(msgspec.Struct, frozen=True):
     sent_at: float = AGES_AGO
     prompted: bool = False
 
-    def claim(self, session: str) -> Claim | None:
+    def claim(self, session: str) -> SessionClaim | None:
         """The claim of this session; None where it has none."""
         return next((claim for claim in self.claims if claim.session == session), None)
 
@@ -105,13 +105,13 @@ class Memory(msgspec.Struct, frozen=True):
         """Do the lift's states come? True before the first one."""
         return self.shown is None or now <= self.shown_at + SILENT_S
 
-    def gone_at(self, claim: Claim, now: float, after_s: float) -> float:
+    def gone_at(self, claim: SessionClaim, now: float, after_s: float) -> float:
         """When this requester will have been silent for `after_s`; NEVER while the lift is silent."""
         if not self.flows(now):
             return NEVER
         return max(claim.heard_at, self.flowing_since) + after_s
 
-    def rules(self, now: float, limits: Limits) -> Rules:
+    def rules(self, now: float, limits: LiftSupervisorLimits) -> Rules:
         """How the stamps of adapters' requests are judged now."""
         if limits.clock_synchronised:
             return Rules(limits.max_request_age_s, known_clocks=False)

@@ -6,8 +6,8 @@ from typing import Final
 from msgspec.structs import replace
 
 from bridges.kinds.lift_supervisor.report import SupervisorReport
-from bridges.kinds.lift_supervisor.settings import Settings
-from bridges.kinds.lift_supervisor.signals import Ended, Requested, StateHeard, Target
+from bridges.kinds.lift_supervisor.settings import LiftSupervisorSettings
+from bridges.kinds.lift_supervisor.signals import LiftStateHeard, RideEnded, RideRequested, Target
 from bridges.kinds.shared.decision import RequestRefused
 from bridges.kinds.shared.freshness import SECOND_NS, in_ns
 from bridges.kinds.shared.names import check_length, check_listed
@@ -22,7 +22,9 @@ from bridges.messages.definitions import (
 MAX_FLOORS: Final = 1000
 
 
-def accept_request(request: LiftRequest, settings: Settings, wall: float) -> Requested | Ended:
+def accept_request(
+    request: LiftRequest, settings: LiftSupervisorSettings, wall: float
+) -> RideRequested | RideEnded:
     """An adapter's request as an event; `wall` is our clock (s since the epoch). Raises RequestRefused.
 
     Of an END_SESSION only the session counts: fleet adapters send no floor with it
@@ -35,7 +37,7 @@ def accept_request(request: LiftRequest, settings: Settings, wall: float) -> Req
     stamp = in_ns(request.request_time) / SECOND_NS
     if request.request_type == LiftRequestType.REQUEST_END_SESSION:
         by_person = request.door_state == LiftRequestDoor.DOOR_OPEN
-        return Ended(request.session_id, stamp, wall - stamp, by_person)
+        return RideEnded(request.session_id, stamp, wall - stamp, by_person)
     if request.request_type not in set(LiftRequestType):
         raise RequestRefused("unknown request_type", str(request.request_type))
     if request.door_state not in set(LiftRequestDoor):
@@ -44,10 +46,10 @@ def accept_request(request: LiftRequest, settings: Settings, wall: float) -> Req
     if agv and not request.destination_floor:
         raise RequestRefused("no destination_floor", f"{request.session_id} wants to go nowhere")
     target = Target(request.request_type, request.destination_floor, request.door_state)
-    return Requested(request.session_id, target, stamp, wall - stamp)
+    return RideRequested(request.session_id, target, stamp, wall - stamp)
 
 
-def accept_state(state: LiftState, settings: Settings, wall: float) -> StateHeard:
+def accept_state(state: LiftState, settings: LiftSupervisorSettings, wall: float) -> LiftStateHeard:
     """A lift's state as an event. Raises RequestRefused."""
     check_listed("lift", state.lift_name, settings.lifts)
     check_length(
@@ -58,7 +60,7 @@ def accept_state(state: LiftState, settings: Settings, wall: float) -> StateHear
     )
     if len(state.available_floors) > MAX_FLOORS:
         raise RequestRefused("impossible available_floors", f"{len(state.available_floors)} floors")
-    return StateHeard(
+    return LiftStateHeard(
         session=state.session_id,
         floor=state.current_floor,
         destination=state.destination_floor,
@@ -73,9 +75,9 @@ def device_name(message: LiftRequest | LiftState) -> str:
     return message.lift_name
 
 
-def requester(event: Requested | Ended | StateHeard) -> str:
+def requester(event: RideRequested | RideEnded | LiftStateHeard) -> str:
     """The session of this request; "" for a state."""
-    return "" if isinstance(event, StateHeard) else event.session
+    return "" if isinstance(event, LiftStateHeard) else event.session
 
 
 def stamped(message: LiftRequest, time: Time) -> LiftRequest:

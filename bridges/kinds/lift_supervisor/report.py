@@ -5,7 +5,7 @@ from typing import Final
 
 import msgspec
 
-from bridges.kinds.lift_supervisor.memory import Limits, Memory
+from bridges.kinds.lift_supervisor.memory import LiftSupervisorLimits, SupervisedLift
 from bridges.kinds.shared.decision import Fault
 from bridges.kinds.shared.durations import SILENT_S
 from bridges.messages.definitions import LiftMode
@@ -37,7 +37,7 @@ class SupervisorReport(msgspec.Struct, frozen=True):
         return self.shown, self.holder, self.ending, tuple(session for session, _ in self.waiting)
 
 
-def report(memory: Memory, faults: Iterable[Fault]) -> SupervisorReport:
+def report(memory: SupervisedLift, faults: Iterable[Fault]) -> SupervisorReport:
     """The lift as it is now, with these faults."""
     turn, faults = memory.turn, tuple(faults)
     waiting = tuple(
@@ -57,7 +57,7 @@ def report(memory: Memory, faults: Iterable[Fault]) -> SupervisorReport:
     )
 
 
-def _waits(memory: Memory, faults: tuple[Fault, ...], *, queued: bool) -> str:
+def _waits(memory: SupervisedLift, faults: tuple[Fault, ...], *, queued: bool) -> str:
     """What the first in the queue waits for; without a queue, the one whose turn it is."""
     turn, shown = memory.turn, memory.session_shown
     if not memory.claims:
@@ -78,7 +78,9 @@ def _waits(memory: Memory, faults: tuple[Fault, ...], *, queued: bool) -> str:
     return f"for END of {turn.session}" if turn and queued else ""
 
 
-def alarms(memory: Memory, now: float, limits: Limits) -> Iterator[tuple[float, Fault]]:
+def alarms(
+    memory: SupervisedLift, now: float, limits: LiftSupervisorLimits
+) -> Iterator[tuple[float, Fault]]:
     """Each fault that may come, and when it will if nothing changes."""
     turn = memory.turn
     if not memory.flows(now):

@@ -8,7 +8,7 @@ from bridges.kinds.shared.kind import Place
 from bridges.kinds.shared.remarks import Remarks
 
 
-class Settings(GraphSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class LiftSupervisorSettings(GraphSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """The lift supervisor's policy."""
 
     lifts: Annotated[
@@ -52,7 +52,7 @@ class Settings(GraphSettings, frozen=True, kw_only=True, forbid_unknown_fields=T
             yield ("lifts",), "is empty: name the lifts, or leave it out to serve every lift"
 
 
-def speaks_of(settings: Settings) -> Iterable[Place]:
+def speaks_of(settings: LiftSupervisorSettings) -> Iterable[Place]:
     """The lifts that it is to serve."""
     for i, name in enumerate(settings.lifts or ()):
         yield ("lifts", str(i)), "lift", name

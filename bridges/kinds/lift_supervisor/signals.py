@@ -14,7 +14,7 @@ class Target(msgspec.Struct, frozen=True):
     door: int
 
 
-class Requested(msgspec.Struct, frozen=True):
+class RideRequested(msgspec.Struct, frozen=True):
     """An adapter's request for AGV or HUMAN mode; `stamp` is by its clock (s), `age_s` by ours."""
 
     session: str
@@ -23,7 +23,7 @@ class Requested(msgspec.Struct, frozen=True):
     age_s: float
 
 
-class Ended(msgspec.Struct, frozen=True):
+class RideEnded(msgspec.Struct, frozen=True):
     """An END_SESSION of an adapter or an operator, whatever its floor says. `by_person`: it has
     DOOR_OPEN, which the lift's node takes for a person's."""
 
@@ -33,7 +33,7 @@ class Ended(msgspec.Struct, frozen=True):
     by_person: bool = False
 
 
-class StateHeard(msgspec.Struct, frozen=True):
+class LiftStateHeard(msgspec.Struct, frozen=True):
     """A LiftState."""
 
     session: str
@@ -53,4 +53,4 @@ class StateHeard(msgspec.Struct, frozen=True):
         )
 
 
-Event = Requested | Ended | StateHeard | MaySpeak | Woken | OperatorReset
+Event = RideRequested | RideEnded | LiftStateHeard | MaySpeak | Woken | OperatorReset

@@ -11,7 +11,7 @@ from typing import Any, Final, Generic, Union
 from msgspec import Struct
 
 from bridges.kinds.shared.decision import Decision, M, OperatorReset, R
-from bridges.kinds.shared.kind import Answer, AnyDeviceKind, E, L, Place, S
+from bridges.kinds.shared.kind import AnyDeviceKind, E, L, Place, RefusalAnswer, S
 from bridges.kinds.shared.remarks import Remarks
 from bridges.kinds.shared.table import Table
 from bridges.messages.definitions import Message, Time
@@ -101,7 +101,7 @@ class GraphKind(Struct, Generic[S, L, M, E, R], frozen=True):
     yields: tuple[Topic[Message], ...] = ()
     shown_by: Topic[Message] | None = None
     reserved: Callable[[S], Collection[str]] = lambda settings: ()
-    answer: Callable[[object, str], Answer | None] = lambda request, reason: None
+    answer: Callable[[object, str], RefusalAnswer | None] = lambda request, reason: None
     requester: Callable[[E], str] = lambda event: ""
     requesters: Callable[[M], Collection[str]] = lambda memory: ()
 

@@ -8,13 +8,13 @@ from msgspec import Meta
 Text = Annotated[str, Meta(min_length=1)]
 
 
-class Record(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+class Kept(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """The content of a kind's file. `version`: the version of its layout."""
 
     version: int
 
 
-R = TypeVar("R", bound=Record)
+R = TypeVar("R", bound=Kept)
 
 
 def read(kept: bytes, record: type[R], version: int, what: str) -> R:

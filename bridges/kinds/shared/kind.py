@@ -40,7 +40,7 @@ Place = tuple[tuple[str, ...], str, str]
 """A setting that names something on RMF's map: its path, what it is (`FLOOR`, …), the name."""
 
 
-class Answer(NamedTuple):
+class RefusalAnswer(NamedTuple):
     """The answer to a refused request: its topic, the message, and the same for the status file."""
 
     topic: Topic[Message]
@@ -82,8 +82,8 @@ class Kind(Struct, Generic[S, L, M, X, E, O, R], frozen=True):
     summary: Callable[[R], Mapping[str, str]]
     published: Callable[[M, R], M] = lambda memory, report: memory
     publishes: Callable[[S], tuple[Topic[Message], ...]] = lambda settings: ()
-    answer: Callable[[str, object, str, R], Answer | None] = lambda name, request, reason, report: (
-        None
+    answer: Callable[[str, object, str, R], RefusalAnswer | None] = (
+        lambda name, request, reason, report: None
     )
     on_map: Callable[[S], Iterable[Place]] = lambda settings: ()
     attended_by: Topic[Message] | None = None

@@ -13,7 +13,7 @@ Space = Annotated[float, Meta(ge=1, le=100_000, extra={"unit": "MB"})]
 Patience = Annotated[float, Meta(ge=10, le=86400, extra={"unit": "s"})]
 
 
-class Recording(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class RecordingSettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """What is recorded of the daemon's work. Nothing is written to a disk while all is well."""
 
     keep: Annotated[

@@ -22,7 +22,7 @@ from bridges.messages.releases import Release
 from bridges.messages.rihs01 import type_hash
 from bridges.messages.topics import AnyTopic
 from bridges.transports import notices
-from bridges.transports.dds.idl import Sample, sample_type
+from bridges.transports.dds.idl import IdlSample, sample_type
 from bridges.transports.peers import Peers
 from bridges.transports.transport import Receive, TransportError
 
@@ -48,7 +48,7 @@ class DdsPublisher:
         self._reader_thread = reader_thread
         depth = topic.publish.depth if topic.publish.durability == "transient_local" else 0
         self._retained: deque[Message] = deque(maxlen=depth)
-        self._sample: type[Sample] | None = None
+        self._sample: type[IdlSample] | None = None
 
     watched = DDSStatus.OfferedIncompatibleQos
 

@@ -18,7 +18,7 @@ from bridges.messages.releases import NEWEST, Release
 from bridges.messages.rihs01 import type_hash
 
 
-class Sample(Protocol):
+class IdlSample(Protocol):
     """One message in cyclonedds; an instance of a class that is made here."""
 
     message: Message
@@ -26,11 +26,11 @@ class Sample(Protocol):
     def __init__(self, message: Message) -> None: ...
 
 
-_made: dict[str, type[Sample]] = {}
+_made: dict[str, type[IdlSample]] = {}
 """By the type's hash: releases with the same message share its class."""
 
 
-def sample_type(message_type: type, release: Release = NEWEST) -> type[Sample]:
+def sample_type(message_type: type, release: Release = NEWEST) -> type[IdlSample]:
     """The one class for a message type in cyclonedds, with its name in DDS as ROS has it.
 
     cyclonedds sets `sample_info` on the instances that it has read.
@@ -41,7 +41,7 @@ def sample_type(message_type: type, release: Release = NEWEST) -> type[Sample]:
     return _made[key]
 
 
-def _make(message_type: type, release: Release) -> type[Sample]:
+def _make(message_type: type, release: Release) -> type[IdlSample]:
     def body(namespace: dict[str, object]) -> None:
         namespace["__annotations__"] = {
             name: _idl(kind, release) for name, kind in release.fields(message_type).items()
@@ -51,23 +51,23 @@ def _make(message_type: type, release: Release) -> type[Sample]:
     # In cyclonedds a dot stands for the `::` of IDL.
     typename = f"{PACKAGES[message_type]}.msg.dds_.{message_type.__name__}_"
     made = types.new_class(typename, (IdlStruct,), {"typename": typename}, body)
-    final: type[Sample] = annotations.final(made)  # as ROS's types: no other kind matches them
+    final: type[IdlSample] = annotations.final(made)  # as ROS's types: no other kind matches them
     return final
 
 
 def _calls(message_type: type, release: Release) -> dict[str, object]:
     """The methods that cyclonedds calls. `options` name the encoding; each sample states it too."""
 
-    def __init__(self: Sample, message: Message) -> None:
+    def __init__(self: IdlSample, message: Message) -> None:
         self.message = message
 
-    def serialize(self: Sample, **options: object) -> bytes:
+    def serialize(self: IdlSample, **options: object) -> bytes:
         return cdr.encode(message_type, self.message, release)
 
-    def deserialize(cls: type[Sample], sample: bytes, /, **options: object) -> Sample:
+    def deserialize(cls: type[IdlSample], sample: bytes, /, **options: object) -> IdlSample:
         return cls(cdr.decode(message_type, sample, release))
 
-    def deserialize_key(cls: type[Sample], sample: bytes, /, **options: object) -> None:
+    def deserialize_key(cls: type[IdlSample], sample: bytes, /, **options: object) -> None:
         """Called when a writer has gone, never for a message. RMF's types have no keys."""
 
     return {

@@ -12,17 +12,17 @@ Only link.py and sdo.py import a library, and they are imported when a bus or a 
 
 from drivers.hal import BusType
 from drivers.hal.can.bus import CanBus
-from drivers.hal.can.frames import EXTENDED, Frame, Wanted, named
-from drivers.hal.can.settings import Settings, Slcan, describe, needs, warnings, where
+from drivers.hal.can.frames import EXTENDED, Frame, FrameFilter, named
+from drivers.hal.can.settings import CanSettings, Slcan, describe, needs, warnings, where
 
 __all__ = [
     "BUS",
     "EXTENDED",
     "CanBus",
+    "CanSettings",
     "Frame",
-    "Settings",
+    "FrameFilter",
     "Slcan",
-    "Wanted",
     "describe",
     "named",
     "warnings",
@@ -30,7 +30,7 @@ __all__ = [
 
 
 BUS = BusType(
-    settings=Settings,
+    settings=CanSettings,
     open_bus=CanBus,
     fake="hal_fakes.can",
     where=where,

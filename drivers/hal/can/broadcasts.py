@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from drivers.hal import HalError
 from drivers.hal.can.bus import CanBus
-from drivers.hal.can.frames import EXTENDED, Frame, Wanted, named
+from drivers.hal.can.frames import EXTENDED, Frame, FrameFilter, named
 
 NEVER = float("-inf")
 
@@ -64,7 +64,9 @@ class Broadcasts:
         self._odd: dict[str, str] = {}
         self._sent_at: dict[int, float] = {}
         for name, said in frames.items():
-            bus.listen([Wanted(said.id, said.mask | EXTENDED)], self._hearer(name, said.length))
+            bus.listen(
+                [FrameFilter(said.id, said.mask | EXTENDED)], self._hearer(name, said.length)
+            )
 
     def read(self) -> dict[str, float]:
         """The values of every fresh frame, by Frame.Signal. Raises HalError, and what `decode` raises.

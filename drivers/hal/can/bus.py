@@ -17,8 +17,8 @@ from typing import TYPE_CHECKING, Final
 
 from drivers.hal import Bus, HalError
 from drivers.hal.backoff import Backoff
-from drivers.hal.can.frames import Frame, Hear, LinkDown, Trouble, Wanted, named
-from drivers.hal.can.settings import Settings
+from drivers.hal.can.frames import Frame, FrameFilter, Hear, LinkDown, Trouble, named
+from drivers.hal.can.settings import CanSettings
 
 if TYPE_CHECKING:
     from drivers.hal.can.link import Link, Vendor
@@ -38,7 +38,7 @@ class CanBus(Bus):
 
     def __init__(
         self,
-        settings: Settings,
+        settings: CanSettings,
         clock: Callable[[], float] = time.monotonic,
         jitter: Callable[[], float] = random.random,
         vendor: "Vendor | None" = None,
@@ -49,7 +49,7 @@ class CanBus(Bus):
         self._link = _link(settings, self.where, vendor)
         self._jitter = jitter
         self._backoffs = [Backoff(clock, jitter)]
-        self._wanted: list[tuple[Wanted, Hear]] = []
+        self._wanted: list[tuple[FrameFilter, Hear]] = []
         self._routes: dict[int, tuple[Hear, ...]] = {}
         self._others: dict[int, float] = {}
         self._trouble = Trouble("", bus_off=False)
@@ -64,7 +64,7 @@ class CanBus(Bus):
         self._backoffs.append(made)
         return made
 
-    def listen(self, wanted: Iterable[Wanted], hear: Hear) -> None:
+    def listen(self, wanted: Iterable[FrameFilter], hear: Hear) -> None:
         """Call `hear` with each of these frames, until the bus is closed."""
         self._wanted += [(one, hear) for one in wanted]
         self._routes.clear()
@@ -194,7 +194,7 @@ class CanBus(Bus):
         return self._backoffs[0].failed(text)
 
 
-def _link(settings: Settings, where: str, vendor: "Vendor | None") -> "Link":
+def _link(settings: CanSettings, where: str, vendor: "Vendor | None") -> "Link":
     """The link to the bus. Only this function imports python-can."""
     from drivers.hal.can.link import Link, slcan, socketcan
 

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Final, TypeVar
 from drivers.hal import HalError
 from drivers.hal.backoff import Backoff
 from drivers.hal.can.bus import CanBus
-from drivers.hal.can.frames import Frame, Wanted
+from drivers.hal.can.frames import Frame, FrameFilter
 
 if TYPE_CHECKING:
     from drivers.hal.can.sdo import Client
@@ -62,8 +62,8 @@ class CanOpenNode:
         self._odd_beat = ""
         self._late_until = float("-inf")
         self._client = _client(self)
-        bus.listen([Wanted(HEARTBEAT + node)], self._hear_beat)
-        bus.listen([Wanted(SDO_FROM_NODE + node)], self._hear_reply)
+        bus.listen([FrameFilter(HEARTBEAT + node)], self._hear_beat)
+        bus.listen([FrameFilter(SDO_FROM_NODE + node)], self._hear_reply)
 
     def alive(self) -> None:
         """Take new frames. Raises HalError if there is no heartbeat, or the node is not operational."""

@@ -25,7 +25,7 @@ class LinkDown(Exception):
     """The interface cannot be used now. The text says what to check."""
 
 
-class Wanted(NamedTuple):
+class FrameFilter(NamedTuple):
     """The frames whose id equals `id` in the bits of `mask`; without a mask, in all bits."""
 
     id: int

@@ -63,7 +63,7 @@ def socketcan(interface: str) -> BusABC:
 
 def slcan(settings: Slcan) -> BusABC:
     """An adapter on a serial port, which no other program may open meanwhile."""
-    return Adapter(
+    return SlcanAdapter(
         settings.port,
         tty_baudrate=settings.baudrate,
         bitrate=settings.bitrate,
@@ -72,7 +72,7 @@ def slcan(settings: Slcan) -> BusABC:
     )
 
 
-class Adapter(slcanBus):
+class SlcanAdapter(slcanBus):
     """python-can's adapter, but exclusive, and with a time limit for writes."""
 
     def _write(self, string: str) -> None:

@@ -44,7 +44,7 @@ class Slcan(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     ] = 115_200
 
 
-class Settings(BusSettings, frozen=True, kw_only=True, forbid_unknown_fields=True, tag="can"):
+class CanSettings(BusSettings, frozen=True, kw_only=True, forbid_unknown_fields=True, tag="can"):
     """One CAN bus: either `socketcan` or `slcan`."""
 
     socketcan: Annotated[
@@ -72,7 +72,7 @@ class Settings(BusSettings, frozen=True, kw_only=True, forbid_unknown_fields=Tru
             yield ("slcan", "bitrate"), f"slcan adapters know {known}"
 
 
-def warnings(settings: Settings) -> Remarks:
+def warnings(settings: CanSettings) -> Remarks:
     """Valid settings that deserve a second look: (path, text)."""
     if settings.slcan and not settings.slcan.port.startswith("/dev/serial/by-"):
         port = settings.slcan.port
@@ -80,19 +80,19 @@ def warnings(settings: Settings) -> Remarks:
         yield ("slcan", "port"), text
 
 
-def where(settings: Settings) -> Where:
+def where(settings: CanSettings) -> Where:
     """The kernel's interface, which many may use, or an adapter's port."""
     if settings.slcan:
         return Where(settings.slcan.port, local=True, clients="one")
     return Where(str(settings.socketcan), local=True)
 
 
-def needs(settings: Settings) -> Needs:
+def needs(settings: CanSettings) -> Needs:
     """CAN's own sockets, or an adapter's port."""
     return serial_port.needs(settings.slcan.port) if settings.slcan else Needs(family="AF_CAN")
 
 
-def describe(settings: Settings) -> str:
+def describe(settings: CanSettings) -> str:
     """Where the bus is, for `check`."""
     if settings.slcan:
         return f"{settings.slcan.port}, {settings.slcan.bitrate // 1000} kbit/s"

@@ -34,7 +34,7 @@ __all__ = [
     "BUS",
     "J8",
     "GpioBus",
-    "Settings",
+    "GpioSettings",
     "boot_level",
     "canonical",
     "describe",
@@ -44,7 +44,7 @@ __all__ = [
 ]
 
 
-class Settings(BusSettings, frozen=True, kw_only=True, forbid_unknown_fields=True, tag="gpio"):
+class GpioSettings(BusSettings, frozen=True, kw_only=True, forbid_unknown_fields=True, tag="gpio"):
     """The header's pins."""
 
     chip: Annotated[
@@ -54,19 +54,21 @@ class Settings(BusSettings, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     scan_s: Annotated[Period, tells("how often every input is read.")] = 0.05
 
 
-def where(settings: Settings) -> Where:
+def where(settings: GpioSettings) -> Where:
     """The header, or another chip."""
     return Where("the header" if settings.chip is None else f"gpiochip{settings.chip}", local=True)
 
 
-def needs(settings: Settings) -> Needs:
+def needs(settings: GpioSettings) -> Needs:
     """That chip; all of them where the header's is found by its label, which means to open each."""
     chip = "char-gpiochip" if settings.chip is None else f"/dev/gpiochip{settings.chip}"
     return Needs((chip,), group="gpio")
 
 
 def open_bus(
-    settings: Settings, factory: Factory | None = None, clock: Callable[[], float] = time.monotonic
+    settings: GpioSettings,
+    factory: Factory | None = None,
+    clock: Callable[[], float] = time.monotonic,
 ) -> "GpioBus":
     """The header's pins. Raises HalError that says what to check.
 
@@ -79,7 +81,7 @@ def open_bus(
     return GpioBus(factory, clock)
 
 
-def open_to_switch_off(settings: Settings) -> "GpioBus":
+def open_to_switch_off(settings: GpioSettings) -> "GpioBus":
     """The same pins without gpiozero. Raises HalError."""
     with _with_lgpio():
         from drivers.hal.gpio.bare import BareFactory
@@ -101,7 +103,7 @@ def _with_lgpio() -> Iterator[None]:
 
 
 BUS = BusType(
-    settings=Settings,
+    settings=GpioSettings,
     open_bus=open_bus,
     open_to_switch_off=open_to_switch_off,
     where=where,

@@ -9,7 +9,7 @@ from typing import Protocol
 from bridges.host.log import pairs
 from drivers.hal import Bus, HalError
 from drivers.hal.every import Every
-from drivers.hal.gpio.dead_man import AFTER_S, DeadMan
+from drivers.hal.gpio.dead_man import AFTER_S, GpioDeadMan
 from drivers.hal.gpio.header import canonical, describe
 from drivers.hal.points import Pull
 
@@ -63,7 +63,7 @@ class GpioBus(Bus):
         self.factory = factory
         self._wake: Callable[[], None] | None = None
         self._devices: list[GpioLines] = []
-        self._dead_man = DeadMan(self._drop, clock)
+        self._dead_man = GpioDeadMan(self._drop, clock)
 
     def lines(self, inputs: Mapping[str, Pull | None], outputs: Mapping[str, bool]) -> "GpioLines":
         """Canonical inputs with their pull, outputs with their safe level (True is high)."""

@@ -12,7 +12,7 @@ from collections.abc import Callable
 AFTER_S = 2.0
 
 
-class DeadMan:
+class GpioDeadMan:
     """Calls `drop` once, from its own thread, when `fed` has not been called for AFTER_S seconds."""
 
     def __init__(

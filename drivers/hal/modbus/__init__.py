@@ -1,6 +1,6 @@
 """Modbus: the coils, discrete inputs and registers of units, over TCP or on a serial line (RTU).
 
-    settings.py   settings of the YAML; connections.py: address or line; watchdog.py: the modules' watchdogs
+    settings.py   settings of the YAML; connections.py: address or line; watchdog.py: modules' watchdogs
     points.py     spelling of contacts and relays; registers.py: spelling of a map's places
     bus.py        the units of one connection or line: retries, pauses
     lines.py      one device's coils and registers: claim, read, write, read back, release. Two masters
@@ -15,13 +15,20 @@ from drivers.hal import BusType
 from drivers.hal.modbus.bus import ModbusBus
 from drivers.hal.modbus.connections import Serial, Tcp
 from drivers.hal.modbus.points import canonical, describe, wire_problems
-from drivers.hal.modbus.settings import Settings, needs, unreachable, unwatched, warnings, where
+from drivers.hal.modbus.settings import (
+    ModbusSettings,
+    needs,
+    unreachable,
+    unwatched,
+    warnings,
+    where,
+)
 
 __all__ = [
     "BUS",
     "ModbusBus",
+    "ModbusSettings",
     "Serial",
-    "Settings",
     "Tcp",
     "canonical",
     "describe",
@@ -31,7 +38,7 @@ __all__ = [
 
 
 BUS = BusType(
-    settings=Settings,
+    settings=ModbusSettings,
     open_bus=ModbusBus,
     fake="hal_fakes.modbus",
     where=where,

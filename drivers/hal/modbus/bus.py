@@ -24,22 +24,22 @@ from typing import Final
 
 from drivers.hal import Bus, HalError
 from drivers.hal.backoff import Backoff
-from drivers.hal.modbus.dead_man import Guard, Watchdogs
-from drivers.hal.modbus.lines import Image, Lines
+from drivers.hal.modbus.dead_man import DeviceWatchdogs, Watchdogs
+from drivers.hal.modbus.lines import Image, ModbusLines
 from drivers.hal.modbus.points import Point, Range, canonical, parse
-from drivers.hal.modbus.settings import Settings
+from drivers.hal.modbus.settings import ModbusSettings
 from drivers.hal.modbus.wire import (
     COIL_ON,
     EXCEPTIONS,
     READS,
     UNDEFINED,
     WRITES,
-    Answer,
     NoReply,
-    Question,
-    Refused,
+    UnitException,
+    UnitReply,
+    UnitRequest,
+    UnitWire,
     Unreachable,
-    Wire,
 )
 from drivers.hal.points import Pull
 
@@ -59,7 +59,7 @@ class ModbusBus(Bus):
 
     def __init__(
         self,
-        settings: Settings,
+        settings: ModbusSettings,
         clock: Callable[[], float] = time.monotonic,
         jitter: Callable[[], float] = random.random,
     ) -> None:
@@ -72,15 +72,15 @@ class ModbusBus(Bus):
         self._turn_at = -math.inf
         self._watchdogs = Watchdogs(self, settings.module_watchdog, clock)
 
-    def lines(self, inputs: Mapping[str, Pull | None], outputs: Mapping[str, bool]) -> Lines:
+    def lines(self, inputs: Mapping[str, Pull | None], outputs: Mapping[str, bool]) -> ModbusLines:
         """Canonical inputs, and coils with their safe level (True is 1)."""
-        return Lines(
+        return ModbusLines(
             self, {n: parse(n) for n in inputs}, {n: parse(n) for n in outputs}, dict(outputs)
         )
 
     def read(self, asked: Range, safe: bool = False) -> dict[Point, int]:
         """These bits (0 or 1) or registers, by one request. Raises HalError."""
-        question = Question(asked.unit, READS[asked.table], asked.start, asked.count)
+        question = UnitRequest(asked.unit, READS[asked.table], asked.start, asked.count)
         found = self._ask(f"read {asked}", question, safe)
         return dict(zip(asked.points(), found.values, strict=True))
 
@@ -93,7 +93,7 @@ class ModbusBus(Bus):
         coil = point.table == "coil"
         sent = (COIL_ON if value else 0) if coil else value
         what = f"write {'coil' if coil else 'register'} {point.address}"
-        self._ask(what, Question(point.unit, WRITES[point.table], point.address, sent), safe)
+        self._ask(what, UnitRequest(point.unit, WRITES[point.table], point.address, sent), safe)
 
     def flash(self, place: Point, on_s: float) -> None:
         """Have the module time a pulse, by "flash on" of Waveshare's Modbus RTU Relay boards.
@@ -103,10 +103,10 @@ class ModbusBus(Bus):
         protocol V2: `01 05 02 00 00 07 8D B0` switches relay 0 of unit 1 on for 0.7 s. A repeat would
         restart the time, so it is sent once. Raises HalError; then there may be a pulse.
         """
-        question = Question(place.unit, WRITES["coil"], place.address, round(on_s * 10))
+        question = UnitRequest(place.unit, WRITES["coil"], place.address, round(on_s * 10))
         self._ask(f"flash at coil {place.address:#x}", question, once=True)
 
-    def guard(self, units: Iterable[int]) -> Guard:
+    def guard(self, units: Iterable[int]) -> DeviceWatchdogs:
         """The modules' own watchdogs, for a device with outputs at these units."""
         return self._watchdogs.guard(units)
 
@@ -123,7 +123,9 @@ class ModbusBus(Bus):
         """Close the connection or port."""
         self._wire.close()
 
-    def _ask(self, what: str, question: Question, safe: bool = False, once: bool = False) -> Answer:
+    def _ask(
+        self, what: str, question: UnitRequest, safe: bool = False, once: bool = False
+    ) -> UnitReply:
         """The unit's good answer. `once`: a repeat would change something. Raises HalError."""
         unit = question.unit
         backoff = self._units.setdefault((unit, safe), self._backoff())
@@ -145,7 +147,7 @@ class ModbusBus(Bus):
         backoff.mended()
         return answer
 
-    def _tried(self, question: Question, tries: int) -> tuple[Answer | None, str]:
+    def _tried(self, question: UnitRequest, tries: int) -> tuple[UnitReply | None, str]:
         """An answer, or why there was none in so many tries. Raises HalError without a connection."""
         reason = ""
         for _ in range(tries):
@@ -169,15 +171,15 @@ class ModbusBus(Bus):
         text += f"exception {code}, {EXCEPTIONS.get(code, UNDEFINED)}"
         if code not in (1, 2, 3):
             backoff.failed(text)
-        return Refused(text, code)
+        return UnitException(text, code)
 
 
-def _way(settings: Settings) -> tuple[Wire, str]:
+def _way(settings: ModbusSettings) -> tuple[UnitWire, str]:
     """The wire to the units, and its name for texts. Only this function imports the libraries."""
     if settings.serial:
-        from drivers.hal.modbus.rtu import Line
+        from drivers.hal.modbus.rtu import SerialLine
 
-        return Line(settings.serial, settings.timeout_s), settings.serial.port
+        return SerialLine(settings.serial, settings.timeout_s), settings.serial.port
     from drivers.hal.modbus.tcp import Connection
 
     assert settings.tcp  # or `problems` has said so

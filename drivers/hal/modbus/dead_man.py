@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Final
 
 from drivers.hal import HalError
 from drivers.hal.modbus.registers import at
-from drivers.hal.modbus.watchdog import Habits, Shows, Watchdog, Write
+from drivers.hal.modbus.watchdog import Habits, RegisterWrite, Shows, Watchdog
 
 if TYPE_CHECKING:
     from drivers.hal.modbus.bus import ModbusBus
@@ -78,12 +78,12 @@ class UnitWatchdog:
         image = self._bus.cells(places)
         return [image[place] in values for place, values in places.items()]
 
-    def _write_all(self, writes: Iterable[Write]) -> None:
+    def _write_all(self, writes: Iterable[RegisterWrite]) -> None:
         for one in writes:
             self._bus.write(at(self._unit, one.at), one.value)
 
 
-class Guard:
+class DeviceWatchdogs:
     """One device's view of its units' watchdogs."""
 
     def __init__(self, watchdogs: Iterable[UnitWatchdog]) -> None:
@@ -112,9 +112,11 @@ class Watchdogs:
             habits = settings.chosen()
             self._units = {unit: UnitWatchdog(bus, unit, habits) for unit in settings.units}
 
-    def guard(self, units: Iterable[int]) -> Guard:
+    def guard(self, units: Iterable[int]) -> DeviceWatchdogs:
         """The view of a device with outputs at these units."""
-        return Guard(self._units[unit] for unit in sorted(set(units)) if unit in self._units)
+        return DeviceWatchdogs(
+            self._units[unit] for unit in sorted(set(units)) if unit in self._units
+        )
 
     def refused(self, unit: int, code: int) -> None:
         """A unit has answered with this exception."""

@@ -29,7 +29,7 @@ from pymodbus.pdu.register_message import (
     WriteSingleRegisterResponse,
 )
 
-from drivers.hal.modbus.wire import Answer, BadReply, Question
+from drivers.hal.modbus.wire import BadReply, UnitReply, UnitRequest
 
 logging.getLogger("pymodbus.logging").setLevel(logging.CRITICAL)  # our HalErrors say it all
 
@@ -37,7 +37,7 @@ FAILURES: Final = (ModbusException, struct.error, IndexError, ValueError)
 """What pymodbus raises for bytes that are not a reply."""
 
 
-class CoilRequest(WriteSingleCoilRequest):
+class AnyCoilRequest(WriteSingleCoilRequest):
     """Function 5 with any value. Some modules take a time there instead of on and off."""
 
     def encode(self) -> bytes:
@@ -50,7 +50,7 @@ REQUESTS: Final[dict[int, type[ModbusPDU]]] = {
     2: ReadDiscreteInputsRequest,
     3: ReadHoldingRegistersRequest,
     4: ReadInputRegistersRequest,
-    5: CoilRequest,
+    5: AnyCoilRequest,
     6: WriteSingleRegisterRequest,
 }
 
@@ -115,12 +115,12 @@ TCP: Final = FramerSocket(DECODER)
 RTU: Final = FramerRTU(DECODER)
 
 
-def tcp_request(question: Question, number: int) -> bytes:
+def tcp_request(question: UnitRequest, number: int) -> bytes:
     """The request's frame on TCP. `number`: the transaction's, not 0. Raises BadReply."""
     return TCP.buildFrame(_request(question, number))
 
 
-def tcp_answer(question: Question, number: int, heard: bytes) -> tuple[int, Answer | None]:
+def tcp_answer(question: UnitRequest, number: int, heard: bytes) -> tuple[int, UnitReply | None]:
     """How many bytes were used, and the answer once it is complete. Raises BadReply.
 
     Replies to other requests and of other units are dropped. pymodbus alone would take a reply numbered
@@ -138,12 +138,12 @@ def tcp_answer(question: Question, number: int, heard: bytes) -> tuple[int, Answ
             return used, _decoded(question, content)
 
 
-def rtu_request(question: Question) -> bytes:
+def rtu_request(question: UnitRequest) -> bytes:
     """The request's frame on a serial line. Raises BadReply."""
     return RTU.buildFrame(_request(question))
 
 
-def rtu_answer(question: Question, frame: bytes) -> Answer:
+def rtu_answer(question: UnitRequest, frame: bytes) -> UnitReply:
     """The answer in a frame whose CRC is right. Raises BadReply."""
     return _decoded(question, frame[1:-2])
 
@@ -167,14 +167,14 @@ def crc_fits(frame: bytes) -> bool:
     return len(frame) >= 4 and FramerRTU.check_CRC(frame[:-2], crc)
 
 
-def _request(question: Question, number: int = 0) -> ModbusPDU:
+def _request(question: UnitRequest, number: int = 0) -> ModbusPDU:
     function, where = question.function, (question.unit, number, question.address)
     if function in (5, 6):
         return REQUESTS[function](*where, registers=[question.value])
     return REQUESTS[function](*where, count=question.value)
 
 
-def _decoded(question: Question, content: bytes) -> Answer:
+def _decoded(question: UnitRequest, content: bytes) -> UnitReply:
     """The answer in a frame's function and data. Raises BadReply."""
     try:
         reply = DECODER.decode(content)
@@ -185,19 +185,19 @@ def _decoded(question: Question, content: bytes) -> Answer:
     return _answer(question, reply)
 
 
-def _answer(question: Question, reply: ModbusPDU) -> Answer:
+def _answer(question: UnitRequest, reply: ModbusPDU) -> UnitReply:
     """The reply's answer. Raises BadReply if it does not belong to the request."""
     function, asked = question.function, question.value
     if reply.function_code & 0x7F != function:
         raise BadReply(f"function {reply.function_code} instead of {function}")
     if reply.isError():
-        return Answer(exception=reply.exception_code)
+        return UnitReply(exception=reply.exception_code)
     if function in (5, 6):
         if (reply.address, reply.registers) != (question.address, [asked]):
             raise BadReply("the echo of another write")
-        return Answer((asked,))
+        return UnitReply((asked,))
     found = reply.bits if function in (1, 2) else reply.registers
     if len(found) != (-(-asked // 8) * 8 if function in (1, 2) else asked):
         sort = "bits" if function in (1, 2) else "registers"
         raise BadReply(f"{len(found)} {sort} for {asked}")
-    return Answer(tuple(int(value) for value in found[:asked]))
+    return UnitReply(tuple(int(value) for value in found[:asked]))

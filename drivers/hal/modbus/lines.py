@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Final
 from drivers.hal import HalError
 from drivers.hal.every import Every
 from drivers.hal.modbus.points import Point, Range, parse, pieces, ranges
-from drivers.hal.modbus.wire import ILLEGAL_ADDRESS, Refused
+from drivers.hal.modbus.wire import ILLEGAL_ADDRESS, UnitException
 from drivers.hal.points import Flash
 
 if TYPE_CHECKING:
@@ -51,7 +51,7 @@ class Image:
         """One request. If the module lacks addresses in a gap, later requests leave the gap out."""
         try:
             return self._units.read(part, safe)
-        except Refused as refusal:
+        except UnitException as refusal:
             parts = pieces(part, self._points)
             if refusal.code != ILLEGAL_ADDRESS or len(parts) == 1:
                 raise
@@ -94,7 +94,7 @@ class Rivals:
                 )
 
 
-class Lines:
+class ModbusLines:
     """One device's inputs and outputs by name (`drivers.hal.points.Lines`).
 
     `safe`: each output's safe value. `readable`: outputs can be read back. Other outputs are written in

@@ -41,7 +41,7 @@ class InRegister(Placed, frozen=True, kw_only=True, forbid_unknown_fields=True):
     at: Annotated[Place, tells("`input register N` or `holding register N`.")]
 
 
-class Written(Placed, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class WrittenPlace(Placed, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """What is written."""
 
     TABLES: ClassVar[Collection[str]] = WRITABLE
@@ -59,7 +59,7 @@ class RegisterBit(InRegister, frozen=True, kw_only=True, forbid_unknown_fields=T
         return bool(word >> self.bit & 1)
 
 
-class Levels(Written, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class WrittenLevels(WrittenPlace, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """A command that is on or off. `ON`, `OFF`: the keys of the two values."""
 
     ON: ClassVar[str]

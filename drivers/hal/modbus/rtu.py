@@ -28,7 +28,7 @@ import serial
 from drivers.hal.deadline import Deadline
 from drivers.hal.modbus import frames
 from drivers.hal.modbus.connections import Serial
-from drivers.hal.modbus.wire import Answer, BadReply, NoReply, Question, Unreachable
+from drivers.hal.modbus.wire import BadReply, NoReply, UnitReply, UnitRequest, Unreachable
 
 LATE: Final = 3.0
 PARITY: Final = {"none": "N", "even": "E", "odd": "O"}
@@ -45,7 +45,7 @@ class Noise(BadReply):
     """The bytes are no frame. The reply may still come."""
 
 
-class Line:
+class SerialLine:
     """One serial port, opened again when it is needed, and for us alone."""
 
     def __init__(self, settings: Serial, timeout_s: float) -> None:
@@ -75,7 +75,7 @@ class Line:
                 raise Unreachable(self._unreachable(error)) from error
         self._deadline.start(self._timeout_s)
 
-    def ask(self, question: Question) -> Answer:
+    def ask(self, question: UnitRequest) -> UnitReply:
         """Send this request, and return its answer. Raises NoReply."""
         try:
             frame = self.exchange(frames.rtu_request(question))

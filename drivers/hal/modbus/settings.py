@@ -15,7 +15,9 @@ from drivers.hal.modbus.watchdog import Watchdog
 Timeout = Annotated[float, msgspec.Meta(ge=0.05, le=5, extra={"unit": "s"})]
 
 
-class Settings(BusSettings, frozen=True, kw_only=True, forbid_unknown_fields=True, tag="modbus"):
+class ModbusSettings(
+    BusSettings, frozen=True, kw_only=True, forbid_unknown_fields=True, tag="modbus"
+):
     """A module, or a gateway or serial line with several units: `tcp` or `serial`, one of the two."""
 
     tcp: Annotated[Tcp | None, tells("where the module or gateway listens.")] = None
@@ -53,7 +55,7 @@ class Settings(BusSettings, frozen=True, kw_only=True, forbid_unknown_fields=Tru
         return self.module_watchdog.units if self.module_watchdog else ()
 
 
-def warnings(settings: Settings) -> Remarks:
+def warnings(settings: ModbusSettings) -> Remarks:
     """Valid settings that deserve a second look: (path, text)."""
     for path, text in settings.serial.warnings() if settings.serial else ():
         yield ("serial", *path), text
@@ -61,7 +63,7 @@ def warnings(settings: Settings) -> Remarks:
         yield ("module_watchdog", *path), text
 
 
-def unwatched(settings: Settings, places: Iterable[str]) -> UnwatchedOutputs:
+def unwatched(settings: ModbusSettings, places: Iterable[str]) -> UnwatchedOutputs:
     """The written units whose outputs nothing drops but this daemon."""
     written = {int(place.split()[1]) for place in places}
     bare = sorted(written.difference(settings.watched(), settings.without_watchdog))
@@ -86,7 +88,7 @@ def _bare(units: Sequence[int]) -> str:
     )
 
 
-def unreachable(settings: Settings, point: str) -> str | None:
+def unreachable(settings: ModbusSettings, point: str) -> str | None:
     """Why this bus cannot reach the point: a line has units 1 to 247 (Modbus over Serial Line 2.2)."""
     unit = int(point.split()[1])
     if settings.serial is None or 1 <= unit <= 247:
@@ -95,7 +97,7 @@ def unreachable(settings: Settings, point: str) -> str | None:
     return f"unit {unit} {why}: units on a serial line are 1 to 247"
 
 
-def where(settings: Settings) -> Where:
+def where(settings: ModbusSettings) -> Where:
     """The gateway or module, or the line's port, which only one daemon can open."""
     if settings.serial:
         return Where(settings.serial.port, local=True, clients="one")
@@ -103,7 +105,7 @@ def where(settings: Settings) -> Where:
     return Where(f"{settings.tcp.host}:{settings.tcp.port}", local=False, clients=None)
 
 
-def needs(settings: Settings) -> Needs:
+def needs(settings: ModbusSettings) -> Needs:
     """The line's port, or the module's address."""
     if settings.serial:
         return serial_port.needs(settings.serial.port)

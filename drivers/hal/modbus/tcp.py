@@ -5,7 +5,7 @@ from typing import Final
 
 from drivers.hal.deadline import Dialler, Resolve
 from drivers.hal.modbus import frames
-from drivers.hal.modbus.wire import Answer, BadReply, NoReply, Question, Unreachable
+from drivers.hal.modbus.wire import BadReply, NoReply, UnitReply, UnitRequest, Unreachable
 
 NUMBERS: Final = 0xFFFF
 """Transactions are numbered 1 to this. 0 is what a gateway sends that numbers no reply."""
@@ -39,7 +39,7 @@ class Connection:
             except OSError as error:
                 raise Unreachable(self._unreachable(error)) from error
 
-    def ask(self, question: Question) -> Answer:
+    def ask(self, question: UnitRequest) -> UnitReply:
         """Send this request, and return its answer. Without one, close and raise NoReply."""
         try:
             return self._answer(question)
@@ -53,7 +53,7 @@ class Connection:
         if connection is not None:
             connection.close()
 
-    def _answer(self, question: Question) -> Answer:
+    def _answer(self, question: UnitRequest) -> UnitReply:
         """Send the request, and read replies until one belongs to it. Raises OSError, BadReply."""
         assert self._socket is not None
         self._number = self._number % NUMBERS + 1

@@ -10,18 +10,18 @@ import msgspec
 
 from bridges.kinds.shared.fields import Name, Period, tells
 from bridges.kinds.shared.remarks import Remarks
-from drivers.hal.modbus.map_parts import Placed, Written
+from drivers.hal.modbus.map_parts import Placed, WrittenPlace
 from drivers.hal.modbus.registers import Unit, Word
 from drivers.profiles import Profile
 
 
-class Write(Written, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class RegisterWrite(WrittenPlace, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """One write."""
 
     value: Annotated[Word, tells("what is written.")]
 
 
-class Refresh(Written, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class Refresh(WrittenPlace, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """What keeps the watchdog from tripping."""
 
     values: Annotated[
@@ -41,14 +41,16 @@ class Habits(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     """How a make's watchdog is used."""
 
     time_s: Annotated[Period, tells("the time that `arm` gives the module.")]
-    arm: Annotated[list[Write], msgspec.Meta(min_length=1), tells("the writes that start it.")]
+    arm: Annotated[
+        list[RegisterWrite], msgspec.Meta(min_length=1), tells("the writes that start it.")
+    ]
     armed: Annotated[
         list[Shows], msgspec.Meta(min_length=1), tells("places that all read so while it is armed.")
     ]
     refresh: Annotated[Refresh, tells("what keeps it from tripping.")]
     refresh_s: Annotated[Period, tells("how often that is done; at most half of `time_s`.")]
     tripped: Annotated[list[Shows], tells("places of which any reads like this after a trip.")] = []
-    rearm: Annotated[list[Write], tells("the writes that end a trip, before `arm`.")] = []
+    rearm: Annotated[list[RegisterWrite], tells("the writes that end a trip, before `arm`.")] = []
 
     def problems(self) -> Remarks:
         """A refresh that comes too late."""

@@ -36,7 +36,7 @@ UNDEFINED: Final = "which Modbus does not define: the unit is at fault; ask its 
 ILLEGAL_ADDRESS: Final = 2
 
 
-class Question(Struct, frozen=True):
+class UnitRequest(Struct, frozen=True):
     """One request. `value`: how many bits or registers are read, or what is sent to be written."""
 
     unit: int
@@ -45,7 +45,7 @@ class Question(Struct, frozen=True):
     value: int
 
 
-class Answer(NamedTuple):
+class UnitReply(NamedTuple):
     """A unit's reply: bits or registers as numbers, or the number of an exception, which may be 0."""
 
     values: tuple[int, ...] = ()
@@ -64,7 +64,7 @@ class BadReply(Exception):
     """The reply does not belong to the request."""
 
 
-class Refused(HalError):
+class UnitException(HalError):
     """The unit answered with an exception; `code` is its number."""
 
     def __init__(self, text: str, code: int) -> None:
@@ -72,7 +72,7 @@ class Refused(HalError):
         self.code = code
 
 
-class Wire(Protocol):
+class UnitWire(Protocol):
     """The connection or line to some units. It is opened again when it is needed."""
 
     def owes(self, unit: int) -> bool:
@@ -84,7 +84,7 @@ class Wire(Protocol):
     def connect(self) -> None:
         """Connect if necessary, and start the time of one try. Raises Unreachable."""
 
-    def ask(self, question: Question) -> Answer:
+    def ask(self, question: UnitRequest) -> UnitReply:
         """Send this request, and return its answer. Raises NoReply."""
 
     def close(self) -> None:

@@ -14,7 +14,7 @@ from msgspec.structs import replace
 
 from bridges.blackbox.incident import Incident, Note, part
 from bridges.blackbox.mcap_write import write
-from bridges.blackbox.ring import Read
+from bridges.blackbox.ring import RingContent
 from bridges.blackbox.value_codec import tree
 from bridges.runtime import record
 from bridges.settings.load import load
@@ -78,7 +78,7 @@ def _day(folder: Path) -> None:
 
 def _ring(path: Path, ring: Path) -> None:
     path.with_suffix(".ring.gz").write_bytes(gzip.compress(ring.read_bytes(), mtime=0))
-    read = Read(ring)
+    read = RingContent(ring)
     entries = list(read.entries())
     end = entries[-1].at
     last = part(entries, end - LAST_S, end)

@@ -18,7 +18,7 @@ from hal_fakes.fake import Fake
 from hal_fakes.plants.charger import ChargerPlant
 from hal_fakes.plants.plant import FailureMode, Plant
 from hal_fakes.realtime import RealTime
-from hal_fakes.wiring import Wiring
+from hal_fakes.wiring import PlantWiring
 from tests.drivers import benches
 from tests.drivers.benches import Contract
 from tests.drivers.hal.modbus.module import Time
@@ -76,7 +76,7 @@ def behind(driver: Any, settings: Any, canonical: Callable[[str], str] = str) ->
     world = RealTime({"a": plant})
     if fake.station:
         return world, fake.station(world.plants["a"], settings)
-    return world, Wiring(world.plants["a"], table, canonical)
+    return world, PlantWiring(world.plants["a"], table, canonical)
 
 
 def news(driver: Any, settings: Any, bus: Bus) -> Callable[[OnDeath], ChargerDriver]:

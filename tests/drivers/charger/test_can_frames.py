@@ -13,10 +13,10 @@ from bridges.kinds.charger import core
 from bridges.kinds.charger.memory import ChargerLimits
 from bridges.kinds.charger.signals import (
     Activity,
+    ChargeRequested,
     ChargerOutputs,
     ChargerSample,
     Measured,
-    Requested,
 )
 from bridges.kinds.shared.decision import Sampled
 from bridges.settings.load import SettingsError, load
@@ -24,8 +24,8 @@ from drivers import DriverError
 from drivers.charger import dbc
 from drivers.charger.can_frames import (
     DRIVER,
+    FrameChargerSettings,
     FrameDriver,
-    Settings,
     create,
     describe,
     frame_tables,
@@ -52,7 +52,7 @@ class Charger:
         self.far.react = self._hear
         self.got: list[tuple[int, str]] = []
         self.bus = self.far.bus()
-        settings = Settings(profile="wiferion", setpoints=SETPOINTS)
+        settings = FrameChargerSettings(profile="wiferion", setpoints=SETPOINTS)
         self.driver: FrameDriver = create("c", settings, self.bus)
 
     def _hear(self, message: can.Message) -> list[can.Message]:
@@ -91,7 +91,7 @@ def charger() -> Iterator[Charger]:
 
 def test_the_driver_stands_on_can_and_has_no_wires() -> None:
     assert DRIVER.buses == ("can",)
-    assert list(DRIVER.wires(Settings(profile="wiferion", setpoints=SETPOINTS))) == []
+    assert list(DRIVER.wires(FrameChargerSettings(profile="wiferion", setpoints=SETPOINTS))) == []
 
 
 def test_a_published_status_frame_is_what_it_says(charger: Charger) -> None:
@@ -131,7 +131,7 @@ def test_height_and_range_are_signals_of_the_map_and_without_them_there_is_no_re
     charger = Charger()
     pad = {"range_ok": "MobileErrors.FanSlow", "at_height": "MobileErrors.GridDerating"}
     found = msgspec.structs.replace(PROFILE.load("wiferion"), **pad)
-    charger.driver = create("c", Settings(map=found, setpoints=SETPOINTS), charger.bus)
+    charger.driver = create("c", FrameChargerSettings(map=found, setpoints=SETPOINTS), charger.bus)
     charger.bus.take()
     charger.status()
     with pytest.raises(DriverError, match="MobileErrors"):
@@ -214,7 +214,7 @@ def test_a_charger_with_an_error_bit_is_sent_off_and_neither_volts_nor_amps(
     charger: Charger,
 ) -> None:
     limits, memory = ChargerLimits(), core.initial(ChargerLimits(), 0.0)
-    request = Requested("r1", "tinyRobot", "r1")
+    request = ChargeRequested("r1", "tinyRobot", "r1")
     memory = core.decide(memory, Sampled(_idle(charger)), 0.0, limits).memory
     memory = core.decide(memory, request, 0.1, limits).memory
     charger.says(0x1FFD2304, "0000000000000800")
@@ -360,8 +360,8 @@ def test_frames_of_others_are_named(charger: Charger) -> None:
 
 
 def test_a_scan_that_cannot_keep_the_pace_is_refused() -> None:
-    bus = hal.CanBus(hal.Settings(socketcan="can0", scan_s=1.0))
-    driver = create("c", Settings(profile="wiferion", setpoints=SETPOINTS), bus)
+    bus = hal.CanBus(hal.CanSettings(socketcan="can0", scan_s=1.0))
+    driver = create("c", FrameChargerSettings(profile="wiferion", setpoints=SETPOINTS), bus)
     assert failure(driver.open) == (
         "ChargerControl must be sent every 0.5 s, and a scan is every 1 s: set the bus's scan_s"
         " to 0.5 or less"
@@ -373,7 +373,7 @@ def test_a_scan_that_cannot_keep_the_pace_is_refused() -> None:
 
 def problems(**changed: Any) -> list[tuple[tuple[str, ...], str]]:
     made = {"profile": "wiferion", "setpoints": SETPOINTS} | changed
-    return list(msgspec.convert(made, Settings).problems())
+    return list(msgspec.convert(made, FrameChargerSettings).problems())
 
 
 def test_the_example_is_right_and_says_what_is_untried() -> None:
@@ -490,8 +490,8 @@ def test_two_chargers_that_send_the_same_frames_need_two_buses(tmp_path: Path) -
 
 
 def test_check_prints_frames_bytes_and_meanings() -> None:
-    settings = Settings(profile="wiferion", setpoints=SETPOINTS)
-    rows = describe(settings, hal.Settings(socketcan="can0"))
+    settings = FrameChargerSettings(profile="wiferion", setpoints=SETPOINTS)
+    rows = describe(settings, hal.CanSettings(socketcan="can0"))
     assert ("state", "ChargerStatus.ChargerState (0x18FF50E5)") in rows
     assert ("state charging", "1, 2, 3, 4, 5") in rows
     sent, read = frame_tables(settings)
@@ -516,7 +516,9 @@ def test_a_map_without_a_receiver_verifies_nobody() -> None:
     plain = msgspec.to_builtins(PROFILE.load("wiferion")) | {"receiver": None}
     limits = {"peer_internal_timeout_s": 2}
     made = {"map": plain, "setpoints": SETPOINTS, "receivers": {"7": "tiny/r1"}, "limits": limits}
-    assert [path for path, _ in warnings(msgspec.convert(made, Settings))] == [("receivers",)]
+    assert [path for path, _ in warnings(msgspec.convert(made, FrameChargerSettings))] == [
+        ("receivers",)
+    ]
 
 
 # ---- DBC files

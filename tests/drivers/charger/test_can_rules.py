@@ -9,7 +9,13 @@ import msgspec
 import pytest
 
 from bridges.kinds.charger.signals import Activity
-from drivers.charger.can_frames import FrameDriver, Settings, create, describe, frame_tables
+from drivers.charger.can_frames import (
+    FrameChargerSettings,
+    FrameDriver,
+    create,
+    describe,
+    frame_tables,
+)
 from drivers.charger.can_map import FrameMap
 from drivers.hal import can as hal
 from tests.drivers.charger.test_contract_can import Frames
@@ -41,7 +47,7 @@ MAP: dict[str, Any] = {
     "send": [{"frame": "Command", "every_s": 0.5, "on": {"Enable": 1}, "off": {"Enable": 0}}],
 }
 BOTH = "too hot; no receiver answers"
-SETTINGS = msgspec.convert({"map": MAP}, Settings)
+SETTINGS = msgspec.convert({"map": MAP}, FrameChargerSettings)
 
 
 class Charger:
@@ -100,7 +106,7 @@ def test_without_a_frame_that_rules_need_there_is_no_reading(charger: Charger) -
 
 
 def test_check_tells_rules_numbers_and_bits() -> None:
-    rows = describe(SETTINGS, hal.Settings(socketcan="can0"))
+    rows = describe(SETTINGS, hal.CanSettings(socketcan="can0"))
     assert ("rule 1", "Status.Current above 0.5 is charging") in rows
     assert ("station's error", "Status.Fault 17: foreign object") in rows
     assert ("robot's error", "Status.Flags bit 3: battery") in rows

@@ -9,10 +9,10 @@ import pytest
 
 from bridges.kinds.charger.signals import Activity, ChargerOutputs
 from drivers.charger import can_frames
-from drivers.charger.can_frames import Settings, claims, create, frame_tables
+from drivers.charger.can_frames import FrameChargerSettings, claims, create, frame_tables
 from drivers.charger.can_map import FrameMap
 from drivers.hal.can import CanBus
-from drivers.hal.can import Settings as BusSettings
+from drivers.hal.can import CanSettings as BusSettings
 from hal_fakes.can.side import VirtualBus
 from tests.drivers.charger.contract import ON
 from tests.drivers.charger.test_can_rules import MAP
@@ -34,7 +34,7 @@ class Sleeper:
         self.got: list[tuple[float, tuple[int, str]]] = []
         self.awake = False
         self.bus = self.far.bus()
-        self.driver = create("c", msgspec.convert({"map": WOKEN}, Settings), self.bus)
+        self.driver = create("c", msgspec.convert({"map": WOKEN}, FrameChargerSettings), self.bus)
         self.bus.take()
         self.driver.open()
 
@@ -127,19 +127,19 @@ def test_the_period_of_what_wakes_it_is_bounded(every_s: float) -> None:
 
 def test_a_scan_too_slow_to_wake_it_in_time_is_refused() -> None:
     slow = {**MAP, "send": [MAP["send"][0] | {"every_s": 5}]}
-    settings = msgspec.convert({"map": {**slow, "wake": [WAKE]}}, Settings)
+    settings = msgspec.convert({"map": {**slow, "wake": [WAKE]}}, FrameChargerSettings)
     bus = CanBus(BusSettings(socketcan="can0", scan_s=2.0))
     assert failure(create("c", settings, bus).open).startswith("NmtStart must be sent every 1 s")
 
 
 def test_another_device_may_send_nmt_frames_too_but_no_other_frame_that_wakes() -> None:
     poke = {"frame": "Poke", "every_s": 1, "says": {"Byte": 1}}
-    settings = msgspec.convert({"map": {**MAP, "wake": [WAKE, poke]}}, Settings)
+    settings = msgspec.convert({"map": {**MAP, "wake": [WAKE, poke]}}, FrameChargerSettings)
     places = [place for place, _ in claims(settings)]
     assert ("frame 0x301" in places, "frame 0x000" in places) == (True, False)
 
 
 def test_check_prints_what_wakes_it() -> None:
-    sent, _ = frame_tables(msgspec.convert({"map": WOKEN}, Settings))
+    sent, _ = frame_tables(msgspec.convert({"map": WOKEN}, FrameChargerSettings))
     woken = ("NmtStart", "0x000", "it is silent", "1 s", "01 0A", "Command 1, Node 10")
     assert sent.rows[-1] == woken

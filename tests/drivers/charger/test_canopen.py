@@ -11,7 +11,7 @@ from bridges.settings.load import SettingsError, load
 from drivers.charger import xnergy
 from drivers.charger.canopen import (
     DRIVER,
-    Settings,
+    CanOpenChargerSettings,
     create,
     describe,
     warnings,
@@ -39,7 +39,7 @@ class Receiver:
 
     def made(self, on_death: str = "stop") -> xnergy.Receiver:
         """Another driver of it."""
-        return create("c", Settings(node=10, on_death=on_death), self.bus)  # type: ignore[arg-type]
+        return create("c", CanOpenChargerSettings(node=10, on_death=on_death), self.bus)  # type: ignore[arg-type]
 
     def answer(self, request: can.Message) -> list[can.Message]:
         asked = bytes(request.data)
@@ -78,7 +78,7 @@ def receiver() -> Iterator[Receiver]:
 
 def test_the_canopen_driver_stands_on_can_and_has_no_wires() -> None:
     assert DRIVER.buses == ("can",)
-    assert list(DRIVER.wires(Settings(node=10))) == []
+    assert list(DRIVER.wires(CanOpenChargerSettings(node=10))) == []
 
 
 def test_a_reading_is_the_published_objects(receiver: Receiver) -> None:
@@ -188,13 +188,13 @@ def test_the_canopen_example_is_right_and_says_what_is_untried() -> None:
 
 
 def test_facts_that_the_yaml_cannot_supply_are_warned_of() -> None:
-    made = Settings(node=10, heartbeat="none", receivers={"7": "tiny/r1"})
+    made = CanOpenChargerSettings(node=10, heartbeat="none", receivers={"7": "tiny/r1"})
     paths = [path for path, _ in warnings(made)]
     assert paths == [(), (), ("heartbeat",), ("receivers",)]
 
 
 def test_check_prints_objects_and_meanings() -> None:
-    rows = dict(describe(Settings(node=10), hal.Settings(socketcan="can0")))
+    rows = dict(describe(CanOpenChargerSettings(node=10), hal.CanSettings(socketcan="can0")))
     assert rows["bus"] == "can0, at the bitrate that `ip link` gave it; node 10"
     assert rows["heartbeat"] == "each 0.1 s, lost after 0.5 s"
     assert rows["volts"] == "read SDO 0x2002:06"

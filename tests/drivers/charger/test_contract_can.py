@@ -12,7 +12,7 @@ from bridges.kinds.charger.signals import CURRENT_FLOWS, Activity, ChargerOutput
 from drivers import DriverError
 from drivers.charger import can_frames as charger_can_frames
 from drivers.charger import canopen as charger_canopen
-from drivers.hal.can import CanBus, Settings, Slcan
+from drivers.hal.can import CanBus, CanSettings, Slcan
 from hal_fakes.can.side import CanFarSide, Medium, VirtualBus
 from hal_fakes.can.slcan_port import SlcanPort
 from tests.drivers.charger.contract import (
@@ -75,7 +75,7 @@ class PadBench(Bench):
 @contextmanager
 def on_a_bus(driver: Any, plain: dict[str, Any], medium: Medium, bus: CanBus) -> Iterator[PadBench]:
     """A bench whose station is on this medium."""
-    settings = msgspec.convert(plain, driver.Settings)
+    settings = msgspec.convert(plain, driver.DRIVER.settings)
     world, station = behind(driver, settings)
     side = CanFarSide(medium, [station], slow_s=2 * TIMEOUT_S)
 
@@ -113,7 +113,7 @@ class CanContract(ChargerContract):
         """On python-can's virtual bus."""
         name = channel()
         vendor: Callable[[], can.BusABC] = lambda: can.Bus(name, interface="virtual")  # noqa: E731
-        settings = Settings(socketcan="can0", timeout_s=TIMEOUT_S, scan_s=0.1)
+        settings = CanSettings(socketcan="can0", timeout_s=TIMEOUT_S, scan_s=0.1)
         bus = CanBus(settings, Clock(), lambda: 0.0, vendor)
         with on_a_bus(self.driver, self.settings, VirtualBus(name), bus) as bench:
             yield bench
@@ -190,7 +190,7 @@ class OnAnAdapter(CanContract):
     def pads(self) -> Iterator[PadBench]:
         port = SlcanPort()
         place = msgspec.convert(port.replace["slcan"], Slcan)
-        settings = Settings(slcan=place, timeout_s=TIMEOUT_S, scan_s=0.1)
+        settings = CanSettings(slcan=place, timeout_s=TIMEOUT_S, scan_s=0.1)
         bus = CanBus(settings, Clock(), lambda: 0.0)
         with on_a_bus(self.driver, self.settings, port, bus) as bench:
             yield bench

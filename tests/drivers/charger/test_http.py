@@ -10,13 +10,13 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from bridges.kinds.charger import core
-from bridges.kinds.charger.memory import ChargerLimits, Memory
+from bridges.kinds.charger.memory import ChargerLimits, ChargerMemory
 from bridges.kinds.charger.signals import Activity, ChargerOutputs, ChargerSample
 from bridges.kinds.shared.decision import Sampled
 from bridges.messages.definitions import ChargerStateValue as State
 from bridges.settings.load import load
 from drivers import DriverError
-from drivers.charger.http import DRIVER, Settings, create, describe, warnings
+from drivers.charger.http import DRIVER, HttpChargerSettings, create, describe, warnings
 from drivers.charger.http_fields import Fields
 from drivers.charger.state_codes import Codes
 from drivers.hal import HalError
@@ -25,7 +25,7 @@ from drivers.http_call import Call
 from tests.depth import examples
 
 CODES = Codes(idle=[0], handshake=[1, 2], charging=[5], stopping=[11], released=[7], error=[238])
-SETTINGS = Settings(codes=CODES)
+SETTINGS = HttpChargerSettings(codes=CODES)
 EXAMPLE = Path(__file__).parents[3] / "config" / "charger_http.yaml"
 
 
@@ -82,7 +82,7 @@ def test_every_code_of_a_byte_has_a_state_in_rmf_and_none_is_passed_on_raw() -> 
     states: dict[State, set[int]] = {state: set() for state in State}
     for code in range(256):
         sample = create("a", made, Station({"state": code, "error_msg": ""})).read()
-        shown = core.decide(Memory(), Sampled(sample), 0.0, ChargerLimits.of(made)).report
+        shown = core.decide(ChargerMemory(), Sampled(sample), 0.0, ChargerLimits.of(made)).report
         states[shown.state].add(code)
         assert ("unknown vendor state" in shown.error_message) == (
             sample.activity is Activity.UNKNOWN
@@ -141,7 +141,7 @@ def test_the_stations_words_are_an_error_whatever_its_state_says(code: int) -> N
     )
 
 
-SIDED = Settings(
+SIDED = HttpChargerSettings(
     codes=Codes(idle=[0], charging=[5], error=[238], station_error=[239], robot_error=[240]),
     fields=Fields(error_texts={"OK": "none", "coil hot": "station", "too far": "robot"}),
 )
@@ -172,7 +172,7 @@ def test_whose_an_error_is_comes_from_its_text_or_its_code_and_the_station_comes
 
 
 def test_check_says_what_texts_and_codes_of_a_side_mean() -> None:
-    rows = describe(SIDED, bus_file.Settings(api_base="192.168.1.60/api"))
+    rows = describe(SIDED, bus_file.HttpSettings(api_base="192.168.1.60/api"))
     assert [row for row in rows if "error" in row[1] or "'s error" in row[0]] == [
         ("clear error", "POST http://192.168.1.60/api/clear_error, when an operator resets"),
         ("field error_text", "error_msg"),
@@ -270,7 +270,7 @@ def test_power_and_the_end_of_the_daemon_send_nothing_to_a_station_that_cannot_b
 
 
 def test_the_paths_are_the_settings() -> None:
-    made = Settings(codes=CODES, state_path="/v2/state", clear_error_path="/v2/clear")
+    made = HttpChargerSettings(codes=CODES, state_path="/v2/state", clear_error_path="/v2/clear")
     station = Station({"state": 0})
     driver = create("a", made, station)
     driver.read()
@@ -321,13 +321,13 @@ def test_a_code_table_that_cannot_be_right_is_refused(
 
 
 def test_a_table_without_errors_is_worth_a_warning() -> None:
-    [_, (path, text)] = warnings(Settings(codes=Codes(idle=[0], charging=[5])))
+    [_, (path, text)] = warnings(HttpChargerSettings(codes=Codes(idle=[0], charging=[5])))
     assert path == ("codes",)
     assert text == "no code means error: each of them will be shown as an unknown state"
 
 
 def test_check_prints_addresses_and_meanings() -> None:
-    bus = bus_file.Settings(api_base="tpu:8080/api", scan_s=2.0)
+    bus = bus_file.HttpSettings(api_base="tpu:8080/api", scan_s=2.0)
     assert describe(SETTINGS, bus) == [
         ("state", "GET http://tpu:8080/api/state every 2 s"),
         ("clear error", "POST http://tpu:8080/api/clear_error, when an operator resets"),
@@ -342,10 +342,12 @@ def test_check_prints_addresses_and_meanings() -> None:
 
 
 def test_check_says_how_often_errors_are_cleared_and_which_meaning_has_no_code() -> None:
-    from bridges.kinds.charger.settings import Durations
+    from bridges.kinds.charger.settings import ChargerDurations
 
-    made = Settings(codes=Codes(idle=[0], charging=[5]), limits=Durations(clear_errors_per_h=2))
-    rows = dict(describe(made, bus_file.Settings(api_base="tpu")))
+    made = HttpChargerSettings(
+        codes=Codes(idle=[0], charging=[5]), limits=ChargerDurations(clear_errors_per_h=2)
+    )
+    rows = dict(describe(made, bus_file.HttpSettings(api_base="tpu")))
     assert rows["clear error"] == (
         "POST http://tpu/clear_error, when an operator resets, and by itself at most 2 times an hour"
     )

@@ -12,18 +12,18 @@ from bridges.kinds.charger.settings import robot
 from bridges.kinds.charger.signals import Activity, ChargerOutputs, ChargerSample, Measured
 from bridges.settings.load import load
 from drivers import DriverError, json_fields
-from drivers.charger.http import Settings, create, describe, warnings
+from drivers.charger.http import HttpChargerSettings, create, describe, warnings
 from drivers.charger.http_fields import Fields
 from drivers.charger.state_codes import Codes
 from drivers.hal import HalError
 from drivers.http_call import Call
-from drivers.json_fields import Flag
+from drivers.json_fields import JsonFlag
 from tests.depth import examples
 from tests.drivers.charger.test_http import Station
 from tests.settings.reading import changed, problems_of
 
 EXAMPLE = Path(__file__).parents[3] / "config" / "charger_http_full.yaml"
-FULL: Settings = load(EXAMPLE).devices["charger_b"]
+FULL: HttpChargerSettings = load(EXAMPLE).devices["charger_b"]
 START, STOP = 'PUT /output {"enabled": true}', "POST /output/off"
 
 
@@ -35,7 +35,7 @@ def answer(state: Any = "READY", **pad: Any) -> dict[str, Any]:
     }
 
 
-def read(said: Any, made: Settings = FULL) -> ChargerSample:
+def read(said: Any, made: HttpChargerSettings = FULL) -> ChargerSample:
     return create("a", made, Station(said)).read()
 
 
@@ -72,7 +72,9 @@ def test_a_robots_error_is_distinguished_from_the_stations_and_an_unknown_word_i
 
 
 def test_a_range_may_be_a_number() -> None:
-    fields = msgspec.structs.replace(FULL.fields, in_range=Flag(field="pad.aligned", when=[1, 3]))
+    fields = msgspec.structs.replace(
+        FULL.fields, in_range=JsonFlag(field="pad.aligned", when=[1, 3])
+    )
     made = msgspec.structs.replace(FULL, fields=fields)
     seen = [read(answer(aligned=value), made).measured.in_range for value in (1, 3, 0, True, "1")]
     assert seen == [True, True, False, False, False]
@@ -293,7 +295,9 @@ def test_a_profile_that_cannot_be_right_is_refused(
 def test_keep_needs_a_station_that_can_be_stopped_and_serve_known_needs_receivers(
     tmp_path: Path,
 ) -> None:
-    seed = Settings(codes=Codes(idle=[0], charging=[5]), on_death="keep", unrequested="serve_known")
+    seed = HttpChargerSettings(
+        codes=Codes(idle=[0], charging=[5]), on_death="keep", unrequested="serve_known"
+    )
     assert list(seed.problems()) == [
         (("unrequested",), "serve_known needs receivers: whom does the station know?"),
         (("on_death",), "this station cannot be stopped: leave this out"),
@@ -307,7 +311,7 @@ def test_a_whole_profile_has_no_warning_and_each_gap_has_its_own() -> None:
         "receiver_id is read, but without receivers nobody is verified",
         "9 is not in codes: an unknown state",
     ]
-    only_stop = Settings(codes=FULL.codes, stop=Call(path="/off"))
+    only_stop = HttpChargerSettings(codes=FULL.codes, stop=Call(path="/off"))
     assert [text for _, text in warnings(only_stop)] == [
         "without receiver_id, the robot on the pad is not verified, a robot at the wrong station is"
         " not refused"
@@ -315,7 +319,9 @@ def test_a_whole_profile_has_no_warning_and_each_gap_has_its_own() -> None:
 
 
 def test_check_prints_every_place_word_and_receiver() -> None:
-    fields = msgspec.structs.replace(FULL.fields, in_range=Flag(field="pad.aligned", when=[1, 3]))
+    fields = msgspec.structs.replace(
+        FULL.fields, in_range=JsonFlag(field="pad.aligned", when=[1, 3])
+    )
     made = msgspec.structs.replace(FULL, fields=fields)
     assert describe(made, load(EXAMPLE).buses["tpu"])[:14] == [
         ("state", "GET http://192.168.1.61:8080/api/v2/status every 0.5 s"),
@@ -365,5 +371,5 @@ def test_an_error_is_the_stations_where_the_robots_have_codes_of_their_own(
     codes: Codes, said: str, side: str
 ) -> None:
     fields = Fields(error_texts={"too far": "robot"})
-    made = Settings(codes=codes, fields=fields)
+    made = HttpChargerSettings(codes=codes, fields=fields)
     assert read({"state": 5, "error_msg": said}, made).side == side

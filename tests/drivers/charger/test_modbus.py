@@ -7,16 +7,16 @@ import pytest
 
 from bridges.kinds.charger.signals import ChargerOutputs
 from bridges.settings.load import load
-from drivers.charger.modbus import Settings, claims, create, describe, warnings
+from drivers.charger.modbus import ModbusChargerSettings, claims, create, describe, warnings
 from drivers.hal import HalError
 from drivers.hal.modbus import ModbusBus
-from drivers.hal.modbus import Settings as BusSettings
+from drivers.hal.modbus import ModbusSettings as BusSettings
 from hal_fakes.modbus import ModbusServer
 from hal_fakes.plants.xnergy_rcu import ModbusRcu, rcu_plant
 from tests.drivers.hal.modbus.module import Time
 
 EXAMPLE = Path(__file__).parents[3] / "config" / "charger_modbus.yaml"
-SETTINGS = Settings(unit=16)
+SETTINGS = ModbusChargerSettings(unit=16)
 
 
 def test_check_names_every_register_and_coil() -> None:

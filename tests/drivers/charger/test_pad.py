@@ -10,10 +10,10 @@ import pytest
 from bridges.kinds.charger.signals import Activity
 from bridges.settings.load import SettingsError, load
 from drivers.charger.dry_contact import decode
-from drivers.charger.http_fields import Number as HttpNumber
-from drivers.charger.register_map import Number
+from drivers.charger.http_fields import JsonNumber as HttpNumber
+from drivers.charger.register_map import RegisterNumber
 from drivers.hal.points import Input
-from drivers.json_fields import Flag
+from drivers.json_fields import JsonFlag
 from tests.drivers.charger import test_contract as switched
 from tests.drivers.charger.contract import OFF, Bench, MovingPadContract
 
@@ -25,8 +25,8 @@ class _Http(switched.TestAnotherMakeOnHttp):
         settings = super().settings()
         fields = msgspec.structs.replace(
             settings.fields,
-            range_ok=Flag(field="pad.gap", when=["ok"]),
-            at_height=Flag(field="pad.raised"),
+            range_ok=JsonFlag(field="pad.gap", when=["ok"]),
+            at_height=JsonFlag(field="pad.raised"),
             temperatures={"coil": HttpNumber(field="pad.decidegrees", scale=0.1)},
         )
         return msgspec.structs.replace(settings, fields=fields)
@@ -36,9 +36,9 @@ class _Registers(switched.TestAnyMakeOnRegisters):
     def settings(self) -> Any:
         settings = super().settings()
         values = {
-            "range_ok": Number(at="discrete input 1"),
-            "at_height": Number(at="input register 8", bit=3),
-            "coil": Number(at="input register 9", scale=0.1, signed=True),
+            "range_ok": RegisterNumber(at="discrete input 1"),
+            "at_height": RegisterNumber(at="input register 8", bit=3),
+            "coil": RegisterNumber(at="input register 9", scale=0.1, signed=True),
         }
         found = settings.map
         changed = msgspec.structs.replace(

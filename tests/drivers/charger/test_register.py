@@ -8,12 +8,12 @@ import pytest
 
 from bridges.kinds.charger.signals import Activity, ChargerSample, Measured
 from bridges.settings.load import load
-from drivers.charger.register import Settings, decode, tables
-from drivers.charger.register_map import ChargerMap, Number
+from drivers.charger.register import RegisterChargerSettings, decode, tables
+from drivers.charger.register_map import ChargerMap, RegisterNumber
 from tests.settings.reading import changed, texts_of
 
 EXAMPLE = Path(__file__).parents[3] / "config" / "charger_register.yaml"
-SETTINGS: Settings = load(EXAMPLE).devices["charger_f"]
+SETTINGS: RegisterChargerSettings = load(EXAMPLE).devices["charger_f"]
 WELL = {
     "state": 0.0,
     "fault": 0.0,
@@ -28,21 +28,23 @@ WELL = {
 @pytest.mark.parametrize(
     ("number", "words", "value"),
     [
-        (Number(at="input register 1"), [65535], 65535),
-        (Number(at="input register 1", signed=True, scale=0.01), [65286], -2.5),
-        (Number(at="input register 1", words=2, scale=0.001), [1, 34464], 100.0),
-        (Number(at="input register 1", words=2, signed=True), [65535, 65534], -2),
-        (Number(at="input register 1", bit=3), [8], 1),
-        (Number(at="coil 1"), [1], 1),
+        (RegisterNumber(at="input register 1"), [65535], 65535),
+        (RegisterNumber(at="input register 1", signed=True, scale=0.01), [65286], -2.5),
+        (RegisterNumber(at="input register 1", words=2, scale=0.001), [1, 34464], 100.0),
+        (RegisterNumber(at="input register 1", words=2, signed=True), [65535, 65534], -2),
+        (RegisterNumber(at="input register 1", bit=3), [8], 1),
+        (RegisterNumber(at="coil 1"), [1], 1),
     ],
 )
-def test_words_are_read_and_written_alike(number: Number, words: list[int], value: float) -> None:
+def test_words_are_read_and_written_alike(
+    number: RegisterNumber, words: list[int], value: float
+) -> None:
     assert number.value(words) == value
     assert number.encoded(value) == words
 
 
 def test_the_low_word_may_be_the_first_of_two() -> None:
-    number = Number(at="holding register 8", words=2, low_first=True)
+    number = RegisterNumber(at="holding register 8", words=2, low_first=True)
     assert number.places() == ["holding register 9", "holding register 8"]
 
 
@@ -127,14 +129,14 @@ def test_without_power_it_is_only_observed() -> None:
         "unit": 1,
         "map": {"values": {"state": {"at": "coil 0"}}, "codes": {"idle": [0], "charging": [1]}},
     }
-    made = msgspec.convert(plain, Settings)
+    made = msgspec.convert(plain, RegisterChargerSettings)
     assert not made.can_stop()
     assert isinstance(made.map, ChargerMap)
 
 
 def test_the_table_says_what_each_registers_number_means() -> None:
-    wide = Number(at="input register 9", words=2, low_first=True, scale=0.001)
-    flag = Number(at="input register 2", bit=3)
+    wide = RegisterNumber(at="input register 9", words=2, low_first=True, scale=0.001)
+    flag = RegisterNumber(at="input register 2", bit=3)
     assert SETTINGS.map
     found = msgspec.structs.replace(
         SETTINGS.map, values={**SETTINGS.map.values, "volts": wide, "flags": flag}

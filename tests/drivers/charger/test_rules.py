@@ -9,22 +9,22 @@ import pytest
 from bridges.kinds.charger.signals import Activity, ChargerOutputs, ChargerSample
 from bridges.settings.load import load
 from drivers import DriverError
-from drivers.charger.http import Settings, create
-from drivers.charger.rules import ErrorBits, ErrorNumber, Errors
+from drivers.charger.http import HttpChargerSettings, create
+from drivers.charger.rules import ErrorBits, ErrorNumber, StationErrors
 from drivers.charger.rules import Test as Condition  # pytest would collect a class named Test
 from hal_fakes.charger_values import values
 from tests.drivers.charger.test_http import Station
 from tests.settings.reading import changed, texts_of
 
 EXAMPLE = Path(__file__).parents[3] / "config" / "charger_relay.yaml"
-RELAY: Settings = load(EXAMPLE).devices["charger_d"]
+RELAY: HttpChargerSettings = load(EXAMPLE).devices["charger_d"]
 
 
 def answer(watts: float = 0.0, on: bool = False, degrees: float = 40.5) -> dict[str, Any]:
     return {"apower": watts, "output": on, "temperature": {"tC": degrees}}
 
 
-def read(said: Any, settings: Settings = RELAY) -> tuple[Activity, int | str, str, str]:
+def read(said: Any, settings: HttpChargerSettings = RELAY) -> tuple[Activity, int | str, str, str]:
     sample: ChargerSample = create("a", settings, Station(said)).read()
     return sample.activity, sample.code, sample.error_text, sample.side
 
@@ -49,8 +49,8 @@ def test_a_rule_about_a_missing_value_gives_no_reading() -> None:
         read({"apower": 0.0, "output": False})
 
 
-def made(**also: Any) -> Settings:
-    return msgspec.convert(also, Settings)
+def made(**also: Any) -> HttpChargerSettings:
+    return msgspec.convert(also, HttpChargerSettings)
 
 
 def test_what_no_rule_and_no_code_names_is_unknown() -> None:
@@ -163,4 +163,4 @@ def test_the_fake_shows_what_the_rules_then_read() -> None:
     charging = shown[Activity.CHARGING]
     assert charging is not None
     assert charging["apower"] == 600.0
-    assert Errors().found(charging.__getitem__) == []
+    assert StationErrors().found(charging.__getitem__) == []

@@ -5,7 +5,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bridges.kinds.charger import core
-from bridges.kinds.charger.memory import ChargerLimits, Memory
+from bridges.kinds.charger.memory import ChargerLimits, ChargerMemory
 from bridges.kinds.charger.signals import Activity, ChargerOutputs, ChargerSample, Measured
 from bridges.kinds.shared.decision import Sampled
 from bridges.messages.definitions import ChargerStateValue as State
@@ -24,7 +24,7 @@ def test_every_code_of_a_byte_has_a_state_in_rmf() -> None:
     states: dict[State, set[int]] = {state: set() for state in State}
     for code in range(256):
         made = xnergy.sample(words(state=code))
-        shown = core.decide(Memory(), Sampled(made), 0.0, ChargerLimits()).report
+        shown = core.decide(ChargerMemory(), Sampled(made), 0.0, ChargerLimits()).report
         states[shown.state].add(code)
         unknown = "unknown vendor state" in shown.error_message
         assert unknown == (made.activity is Activity.UNKNOWN) == (code not in xnergy.CODES)

@@ -9,16 +9,16 @@ import msgspec
 from drivers.door import dry_contact as door_dry_contact
 from drivers.door import register as door_register
 from drivers.hal import modbus
-from hal_fakes.modbus.register_door import RegisterDoor, contacts
+from hal_fakes.modbus.register_door import FakeRegisterDoor, contacts
 from hal_fakes.realtime import RealTime
-from hal_fakes.wiring import Wiring
+from hal_fakes.wiring import PlantWiring
 from tests.drivers.benches import RS485, on_modbus, on_pins
 from tests.drivers.door.contract import Bench, DoorContract, WiredDoorContract, quick
 
 
 def dry(
     points: tuple[str, str, str], flash: dict[str, str] | None = None, **pull: str
-) -> door_dry_contact.Settings:
+) -> door_dry_contact.DryContactDoorSettings:
     """A door on contacts at these points: opened, closed, hold."""
     opened, closed, hold = points
     pulse = {"pulse": {"on_s": 300.0, "every_s": 600.0}} if flash else {}
@@ -30,7 +30,7 @@ def dry(
         "outputs": {"hold_open": {"point": hold, "active": "high", **(flash or {})}},
         **pulse,
     }
-    return msgspec.convert(plain, door_dry_contact.Settings)
+    return msgspec.convert(plain, door_dry_contact.DryContactDoorSettings)
 
 
 class TestDryContactsOnModbus(WiredDoorContract):
@@ -43,7 +43,7 @@ class TestDryContactsOnModbus(WiredDoorContract):
         settings = dry(points, self.flash)
         wires = door_dry_contact.wires(settings)
         world = RealTime({"door": quick("door", wires)})
-        wiring = Wiring(world.plants["door"], wires, modbus.canonical)
+        wiring = PlantWiring(world.plants["door"], wires, modbus.canonical)
         with on_modbus(world, [wiring], self.serial) as (bus, clock):
             yield Bench(door_dry_contact.create("door", settings, bus), wiring.plant, clock)
 
@@ -79,9 +79,9 @@ class RegisterContract(WiredDoorContract):
 
     @contextmanager
     def benches(self) -> Iterator[Bench]:
-        settings = msgspec.convert(self.settings, door_register.Settings)
+        settings = msgspec.convert(self.settings, door_register.RegisterDoorSettings)
         world = RealTime({"door": quick("door", contacts(settings))})
-        door = RegisterDoor(world.plants["door"], settings)
+        door = FakeRegisterDoor(world.plants["door"], settings)
         with on_modbus(world, [door], self.serial) as (bus, clock):
             yield Bench(door_register.create("door", settings, bus), door.plant, clock)
 

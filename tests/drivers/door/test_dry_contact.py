@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from bridges.kinds.door.memory import DoorLimits
-from bridges.kinds.door.settings import Durations, Pulse
+from bridges.kinds.door.settings import DoorDurations, Pulse
 from bridges.kinds.door.signals import DoorOutputs, DoorSample
 from bridges.settings.load import load
 from drivers.door.dry_contact import create, debounce, warnings, wires
@@ -231,7 +231,7 @@ def test_the_cores_limits_are_those_of_the_yaml() -> None:
         inputs={"fire": FIRE}, on_fire="open", pulse={"on_s": 0.5, "every_s": 3.0}, limits={}
     )
     assert DoorLimits.of(door, debounce(door)) == DoorLimits(
-        t=Durations(),
+        t=DoorDurations(),
         debounce={"opened": 0.0625, "closed": 0.0625, "fire": 0.0625},
         on_fire="open",
         pulse=Pulse(on_s=0.5, every_s=3.0),

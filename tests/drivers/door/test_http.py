@@ -12,9 +12,9 @@ from bridges.kinds.door.signals import DoorOutputs, DoorSample
 from bridges.settings.load import load
 from drivers import DriverError
 from drivers.door import http as door_http
-from drivers.door.http import Settings, create
+from drivers.door.http import HttpDoorSettings, create
 from drivers.hal import HalError, http
-from hal_fakes.http_door import PARTS, HttpDoor, contacts
+from hal_fakes.http_door import PARTS, FakeHttpDoor, contacts
 from hal_fakes.plants.door import DoorPlant
 from hal_fakes.plants.plant import FailureMode
 from hal_fakes.realtime import RealTime
@@ -24,7 +24,7 @@ from tests.settings.reading import changed, texts_of
 from tests.waiting import wait_until
 
 EXAMPLE = Path(__file__).parents[3] / "config" / "door_http.yaml"
-SETTINGS: Settings = load(EXAMPLE).devices["side_door"]
+SETTINGS: HttpDoorSettings = load(EXAMPLE).devices["side_door"]
 ON = "GET /rpc/Switch.Set?id=0&on=true&toggle_after=10"
 OFF = "GET /rpc/Switch.Set?id=0&on=false"
 
@@ -36,7 +36,7 @@ class HttpContract(WiredDoorContract):
     def benches(self) -> Iterator[Bench]:
         plant = DoorPlant("door", contacts(self.settings), parts=PARTS, **QUICK)
         world = RealTime({"door": plant})
-        station = HttpDoor(world.plants["door"], self.settings)
+        station = FakeHttpDoor(world.plants["door"], self.settings)
         with on_http(world, station, timeout_s=0.3) as (bus, clock):
             yield Bench(create("door", self.settings, bus), station.plant, clock)
 
@@ -69,7 +69,7 @@ class TestARelayThatSaysNumbersAndWordsAndHasNoTimer(HttpContract):
             "release": {"path": "/relay/0", "body": '{"turn": "off"}'},
             "accept_unsafe": {"hold_open": "the operator lets go by itself after a minute"},
         },
-        Settings,
+        HttpDoorSettings,
     )
 
 
@@ -189,6 +189,6 @@ def test_a_relay_without_a_timer_is_taken_with_a_reason(tmp_path: Path) -> None:
 
 
 def test_check_says_that_nothing_closes_the_door() -> None:
-    rows = dict(door_http.describe(SETTINGS, http.Settings(api_base="relay")))
+    rows = dict(door_http.describe(SETTINGS, http.HttpSettings(api_base="relay")))
     assert rows["closing"].startswith("nothing is driven: a released door stays open unless")
     assert DoorOutputs.__struct_fields__ == ("hold_open", "between_pulses")

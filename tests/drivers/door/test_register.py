@@ -13,7 +13,7 @@ from bridges.kinds.door.signals import DoorSample
 from bridges.kinds.shared.decision import Sampled
 from bridges.messages.definitions import DoorModeValue
 from bridges.settings.load import SettingsError, load
-from drivers.door.register import PROFILE, Settings, decode, door_map, points, tables
+from drivers.door.register import PROFILE, RegisterDoorSettings, decode, door_map, points, tables
 from drivers.door.register_map import DoorMap
 from drivers.hal.modbus.points import Point
 from drivers.profiles.texts import FOLDER
@@ -134,7 +134,7 @@ def test_the_controllers_errors_are_one_fault_and_change_no_state() -> None:
 
 def test_a_device_gives_the_unit_and_a_base_for_every_address() -> None:
     settings = msgspec.convert(
-        {"unit": 3, "profile": "generic-register-door", "base_address": 100}, Settings
+        {"unit": 3, "profile": "generic-register-door", "base_address": 100}, RegisterDoorSettings
     )
     assert points(settings) == {
         "status": Point(3, "input register", 100),
@@ -153,7 +153,7 @@ CHANGED: dict[str, dict[str, object]] = {
 
 def test_a_device_may_change_parts_of_its_profiles_map() -> None:
     plain = {"unit": 1, "profile": "generic-register-door", "changes": CHANGED}
-    changed = msgspec.convert(plain, Settings)
+    changed = msgspec.convert(plain, RegisterDoorSettings)
     assert msgspec.to_builtins(door_map(changed)) == {
         **msgspec.to_builtins(GENERIC),
         "command": {**CHANGED["command"], "read_back": True},

@@ -10,18 +10,18 @@ from collections.abc import Callable
 
 import pytest
 
-from bridges.kinds.lift.signals import Door, Hazard, LiftOutputs, LiftSample, Motion, Side
+from bridges.kinds.lift.signals import DoorReading, Hazard, LiftOutputs, LiftSample, Motion, Side
 from drivers import DriverError
-from hal_fakes.plants.lift import Pace
+from hal_fakes.plants.lift import LiftPace
 from hal_fakes.plants.plant import FailureMode
 from tests.drivers import benches
 from tests.drivers.benches import Contract
 from tests.waiting import wait_until
 
-QUICK = Pace(floor_s=0.2, door_s=0.05, agv_s=0.02, dwell_s=0.1)
+QUICK = LiftPace(floor_s=0.2, door_s=0.05, agv_s=0.02, dwell_s=0.1)
 """A lift so quick that no test has to wait for it."""
 
-IDLE = LiftSample("B1", Door.CLOSED, motion=Motion.STOPPED, agv=False)
+IDLE = LiftSample("B1", DoorReading.CLOSED, motion=Motion.STOPPED, agv=False)
 OFF, AGV = LiftOutputs(), LiftOutputs(agv_request=True)
 CALL, HOLD = LiftOutputs(True, call="1"), LiftOutputs(True, hold_door=Side.FRONT)
 
@@ -47,7 +47,7 @@ class Bench(benches.Bench[LiftSample, LiftOutputs]):
         self.write(CALL)
         seen = self.until(lambda sample: sample.level == "1", "it is there")
         self.write(HOLD)
-        return seen + self.until(lambda sample: sample.door is Door.OPEN, "its door is open")
+        return seen + self.until(lambda sample: sample.door is DoorReading.OPEN, "its door is open")
 
 
 class LiftContract(Contract[Bench]):
@@ -60,7 +60,7 @@ class LiftContract(Contract[Bench]):
     def test_a_call_brings_the_car_and_the_door_is_held_open_there(self, bench: Bench) -> None:
         bench.open()
         seen = bench.rides()
-        assert {sample.level for sample in seen if sample.door is Door.OPEN} == {"1"}
+        assert {sample.level for sample in seen if sample.door is DoorReading.OPEN} == {"1"}
         assert bench.relays() == [
             ("agv_mode_request", True),
             ("call_1", True),
@@ -78,7 +78,7 @@ class LiftContract(Contract[Bench]):
         bench.write(CALL)
         way = bench.until(lambda sample: sample.motion is Motion.MOVING, "it moves")
         way += bench.until(lambda sample: sample.level is None, "between landings")
-        assert {sample.door for sample in way} == {Door.CLOSED}
+        assert {sample.door for sample in way} == {DoorReading.CLOSED}
 
     def test_another_call_goes_on_after_the_one_before_it_is_off(self, bench: Bench) -> None:
         bench.open()
@@ -124,7 +124,7 @@ class LiftContract(Contract[Bench]):
         [
             ("fire_alarm", lambda sample: sample.hazards == {Hazard.FIRE}),
             ("agv_mode", lambda sample: sample.agv is False),
-            ("door_opened", lambda sample: sample.door is Door.BETWEEN),
+            ("door_opened", lambda sample: sample.door is DoorReading.BETWEEN),
             ("floor_1", lambda sample: sample.level is None),
         ],
     )

@@ -8,21 +8,23 @@ from hypothesis import strategies as st
 
 from bridges.kinds.lift.signals import Hazard
 from drivers.lift.broken_lines import floor_warnings
-from drivers.lift.dry_contact import Settings, debounce, wires
+from drivers.lift.dry_contact import DryContactLiftSettings, debounce, wires
 from tests.drivers.lift.test_checks import found, warned
 from tests.drivers.lift.test_decode import sample
 from tests.drivers.lift.wirings import alarm, bits, inputs, line
 from tests.drivers.lift.wirings import settings as wired
 
 
-def service(codes: dict[int, str], lines: list[dict[str, Any]] | None = None) -> Settings:
+def service(
+    codes: dict[int, str], lines: list[dict[str, Any]] | None = None
+) -> DryContactLiftSettings:
     """A lift whose AGV mode and hazards are a code."""
     width = max(codes).bit_length()
     code = {"bits": lines or bits(width, 60), "codes": codes}
     return wired(inputs=inputs(agv_mode=None, fire_alarm=None, service=code))
 
 
-def motion(codes: dict[int, str]) -> Settings:
+def motion(codes: dict[int, str]) -> DryContactLiftSettings:
     return wired(inputs=inputs(motion={"bits": bits(2, 40), "codes": codes}))
 
 

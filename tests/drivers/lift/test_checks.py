@@ -7,17 +7,17 @@ import pytest
 
 from bridges.kinds.lift.signals import Hazard
 from bridges.settings.load import load
-from drivers.lift.dry_contact import Settings, notes, warnings
+from drivers.lift.dry_contact import DryContactLiftSettings, notes, warnings
 from tests.drivers.lift.wirings import alarm, bits, coil, inputs, line, settings, whole
 
 CONFIG = Path(__file__).parents[3] / "config" / "lift_dry_contact.yaml"
 
 
-def found(wired: Settings) -> list[tuple[str, str]]:
+def found(wired: DryContactLiftSettings) -> list[tuple[str, str]]:
     return [(".".join(path), text) for path, text in wired.problems()]
 
 
-def warned(wired: Settings) -> list[tuple[str, str]]:
+def warned(wired: DryContactLiftSettings) -> list[tuple[str, str]]:
     return [(".".join(path), text) for path, text in warnings(wired)]
 
 

@@ -9,11 +9,11 @@ import msgspec
 
 from drivers.hal import modbus
 from drivers.lift import register
-from drivers.lift.dry_contact import Settings, create, wires
+from drivers.lift.dry_contact import DryContactLiftSettings, create, wires
 from hal_fakes.modbus import register_lift
 from hal_fakes.plants.lift import LiftPlant
 from hal_fakes.realtime import RealTime
-from hal_fakes.wiring import Wiring
+from hal_fakes.wiring import PlantWiring
 from tests.drivers.benches import RS485, on_modbus, on_pins
 from tests.drivers.lift.contract import QUICK, Bench, LiftContract, WiredLiftContract
 from tests.drivers.lift.wirings import FLOORS, inputs, line, whole
@@ -28,9 +28,9 @@ class TestDryContactsOnModbus(WiredLiftContract):
 
     @contextmanager
     def benches(self) -> Iterator[Bench]:
-        settings = msgspec.convert(self.wired(), Settings)
+        settings = msgspec.convert(self.wired(), DryContactLiftSettings)
         world = RealTime({"lift": LiftPlant("lift", settings, QUICK)})
-        wiring = Wiring(world.plants["lift"], wires(settings), modbus.canonical)
+        wiring = PlantWiring(world.plants["lift"], wires(settings), modbus.canonical)
         with on_modbus(world, [wiring], self.serial) as (bus, clock):
             yield Bench(create("lift", settings, bus), wiring.plant, clock)
 
@@ -65,10 +65,10 @@ class TestRegistersWithCallsAsNumbers(WiredLiftContract):
     @contextmanager
     def benches(self) -> Iterator[Bench]:
         plain = {"floors": FLOORS, "unit": 3, "map": {**NUMBERS, "commands": self.commands}}
-        settings = msgspec.convert(plain, register.Settings)
+        settings = msgspec.convert(plain, register.RegisterLiftSettings)
         assert list(settings.problems()) == []
         world = RealTime({"lift": register_lift.build("lift", settings, QUICK)})
-        far_side = register_lift.RegisterLift(world.plants["lift"], settings)
+        far_side = register_lift.FakeRegisterLift(world.plants["lift"], settings)
         with on_modbus(world, [far_side]) as (bus, clock):
             yield Bench(register.create("lift", settings, bus), far_side.plant, clock)
 
@@ -127,7 +127,7 @@ class TestDryContactsOnGpio(LiftContract):
     @contextmanager
     def benches(self) -> Iterator[Bench]:
         plain = on_header(whole(inputs=inputs(moving=line(4))), count(4))
-        settings = msgspec.convert(plain, Settings)
+        settings = msgspec.convert(plain, DryContactLiftSettings)
         world = RealTime({"lift": LiftPlant("lift", settings, QUICK)})
         plant = world.plants["lift"]
         with on_pins(world, plant, wires(settings)) as bus:

@@ -5,20 +5,20 @@ from typing import Any
 
 import pytest
 
-from bridges.kinds.lift.signals import Door, Hazard, LiftOutputs, LiftSample, Motion, Side
-from drivers.lift.dry_contact import Settings, debounce, decode, encode, wires
+from bridges.kinds.lift.signals import DoorReading, Hazard, LiftOutputs, LiftSample, Motion, Side
+from drivers.lift.dry_contact import DryContactLiftSettings, debounce, decode, encode, wires
 from drivers.lift.table import conditional
 from tests.drivers.lift.wirings import bits, coil, inputs, line, settings, whole
 
 
-def sample(wired: Settings, *asserted: str) -> LiftSample:
+def sample(wired: DryContactLiftSettings, *asserted: str) -> LiftSample:
     shown = {w.signal: w.signal in asserted for w in wires(wired) if w.direction == "in"}
     assert set(asserted) <= shown.keys()
     return decode(wired, shown, conditional(wired))
 
 
 def test_without_an_asserted_line_the_car_is_between_floors() -> None:
-    assert sample(settings()) == LiftSample(level=None, door=Door.BETWEEN, agv=False)
+    assert sample(settings()) == LiftSample(level=None, door=DoorReading.BETWEEN, agv=False)
 
 
 def test_a_sample_with_every_line_asserted() -> None:
@@ -28,7 +28,7 @@ def test_a_sample_with_every_line_asserted() -> None:
     asserted = ("agv_mode", "door_opened", "floor_G", "down", "overload", "code_blue")
     assert sample(wired, *asserted) == LiftSample(
         level="G",
-        door=Door.OPEN,
+        door=DoorReading.OPEN,
         motion=Motion.DOWN,
         agv=True,
         hazards=frozenset({Hazard.OVERLOAD, Hazard.CODE_BLUE}),
@@ -53,21 +53,21 @@ def test_two_contacts_tell_four_door_positions(prefix: str) -> None:
         one = sample(wired, *asserted)
         seen[states] = one.door if prefix == "door" else one.rear_door
     assert seen == {
-        (False, False): Door.BETWEEN,
-        (False, True): Door.CLOSED,
-        (True, False): Door.OPEN,
-        (True, True): Door.BOTH,
+        (False, False): DoorReading.BETWEEN,
+        (False, True): DoorReading.CLOSED,
+        (True, False): DoorReading.OPEN,
+        (True, True): DoorReading.BOTH,
     }
 
 
 def test_one_contact_tells_one_end() -> None:
-    def ends(proves: str) -> tuple[Door, Door]:
+    def ends(proves: str) -> tuple[DoorReading, DoorReading]:
         one = inputs(door_opened=None, door_closed=None, door=line(9, proves=proves))
         wired = settings(inputs=one)
         return sample(wired).door, sample(wired, "door").door
 
-    assert ends("open") == (Door.NOT_OPEN, Door.OPEN)
-    assert ends("closed") == (Door.NOT_CLOSED, Door.CLOSED)
+    assert ends("open") == (DoorReading.NOT_OPEN, DoorReading.OPEN)
+    assert ends("closed") == (DoorReading.NOT_CLOSED, DoorReading.CLOSED)
 
 
 def test_a_lift_without_a_rear_door_says_nothing_of_one() -> None:
@@ -132,7 +132,7 @@ def test_a_service_code_without_agv_mode_does_not_show_it() -> None:
     two = {"bits": bits(1, 50), "codes": {0: "normal", 1: "manual_mode"}}
     wired = settings(inputs=inputs(agv_mode=None, service=two))
     assert sample(wired, "service_bit0") == LiftSample(
-        level=None, door=Door.BETWEEN, agv=None, hazards=frozenset({Hazard.MANUAL})
+        level=None, door=DoorReading.BETWEEN, agv=None, hazards=frozenset({Hazard.MANUAL})
     )
 
 
@@ -152,7 +152,7 @@ def test_lines_that_count_only_in_agv_mode_are_not_known_outside_it() -> None:
     asserted = ("door_opened", "moving", "overload", "code_blue", "floor_G", "floor_1")
     assert sample(wired, *asserted) == LiftSample(
         level=None,
-        door=Door.BETWEEN,
+        door=DoorReading.BETWEEN,
         code_fault="",
         motion=None,
         agv=False,
@@ -161,7 +161,7 @@ def test_lines_that_count_only_in_agv_mode_are_not_known_outside_it() -> None:
     )
     assert sample(wired, "agv_mode", *asserted) == LiftSample(
         level=None,
-        door=Door.OPEN,
+        door=DoorReading.OPEN,
         code_fault="the lines of G and 1 are on at once",
         motion=Motion.MOVING,
         agv=True,

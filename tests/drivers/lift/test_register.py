@@ -6,17 +6,17 @@ from typing import Any
 import msgspec
 import pytest
 
-from bridges.kinds.lift.signals import Door, Hazard, LiftOutputs, LiftSample, Motion, Side
+from bridges.kinds.lift.signals import DoorReading, Hazard, LiftOutputs, LiftSample, Motion, Side
 from bridges.settings.load import load
-from drivers.lift.register import Settings, decode, encode, tables, warnings
+from drivers.lift.register import RegisterLiftSettings, decode, encode, tables, warnings
 from tests.settings.reading import problems_of
 
 CONFIG = Path(__file__).parents[3] / "config" / "lift_gateway.yaml"
 
 
-def shipped() -> Settings:
+def shipped() -> RegisterLiftSettings:
     settings = load(CONFIG).devices["Lift1"]
-    assert isinstance(settings, Settings)
+    assert isinstance(settings, RegisterLiftSettings)
     return settings
 
 
@@ -26,7 +26,7 @@ def sample(**words: int) -> LiftSample:
     return decode(shipped().map, plain | words)
 
 
-AT_L1 = LiftSample("L1", Door.CLOSED, motion=Motion.STOPPED, agv=True)
+AT_L1 = LiftSample("L1", DoorReading.CLOSED, motion=Motion.STOPPED, agv=True)
 
 
 def test_a_car_at_a_landing_is_read_from_its_registers() -> None:
@@ -41,9 +41,9 @@ def test_a_car_at_a_landing_is_read_from_its_registers() -> None:
         ({"floor": 0xFF03}, {"level": "L3"}),
         ({"motion": 0x0100}, {"motion": Motion.UP}),
         ({"motion": 0x0300}, {"motion": Motion.CONTRADICTORY}),
-        ({"door": 2}, {"door": Door.OPEN}),
-        ({"door": 3}, {"door": Door.BETWEEN}),
-        ({"door": 9}, {"door": Door.UNKNOWN}),
+        ({"door": 2}, {"door": DoorReading.OPEN}),
+        ({"door": 3}, {"door": DoorReading.BETWEEN}),
+        ({"door": 9}, {"door": DoorReading.UNKNOWN}),
         ({"overload": 1}, {"hazards": frozenset({Hazard.OVERLOAD})}),
         ({"overload": 0xFFFE}, {}),
     ],
@@ -61,7 +61,7 @@ def test_each_number_means_what_the_map_says_and_others_are_faults(
 def test_outside_agv_mode_the_floor_means_nothing(service: int, hazards: set[Hazard]) -> None:
     assert sample(service=service) == LiftSample(
         None,
-        Door.CLOSED,
+        DoorReading.CLOSED,
         motion=Motion.STOPPED,
         agv=False,
         hazards=frozenset(hazards),
@@ -147,7 +147,7 @@ def test_a_map_that_cannot_be_right_is_refused_where_it_stands(
 def test_commands_that_cannot_be_read_back_are_warned_of() -> None:
     plain = msgspec.to_builtins(shipped(), str_keys=True)
     plain["map"]["commands"]["read_back"] = False
-    settings = msgspec.convert(plain, Settings, strict=False)
+    settings = msgspec.convert(plain, RegisterLiftSettings, strict=False)
     assert list(warnings(shipped())) == []
     assert list(warnings(settings)) == [
         (

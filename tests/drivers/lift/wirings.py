@@ -4,7 +4,7 @@ from typing import Any
 
 import msgspec
 
-from drivers.lift.dry_contact import Settings
+from drivers.lift.dry_contact import DryContactLiftSettings
 
 FLOORS = ["B1", "G", "1"]
 
@@ -43,8 +43,8 @@ def whole(**changes: Any) -> dict[str, Any]:
     }
 
 
-def settings(**changes: Any) -> Settings:
-    return msgspec.convert(whole(**changes), Settings)
+def settings(**changes: Any) -> DryContactLiftSettings:
+    return msgspec.convert(whole(**changes), DryContactLiftSettings)
 
 
 def inputs(**more: Any) -> dict[str, Any]:

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from hal_fakes.demo.daemons import Daemon, Wrong, stop_all
+from hal_fakes.demo.daemons import DaemonProcess, DemoFailed, stop_all
 from hal_fakes.wire import Wire, runs_here, wire
 from tests.processes import RUN, running
 from tests.waiting import PATIENCE_S, wait_until
@@ -71,10 +71,10 @@ def test_a_failure_makes_it_wrong_with_the_reason_the_last_states_and_the_logs(
 
 
 def test_a_part_that_a_plant_does_not_have_is_wrong(domain: int, directory: Path) -> None:
-    daemon = Daemon(CONFIG / "door_modbus.yaml", directory, domain)
+    daemon = DaemonProcess(CONFIG / "door_modbus.yaml", directory, domain)
     try:
         with pytest.raises(
-            Wrong, match=r"^fail ward_door flux_capacitor off: error ward_door has no"
+            DemoFailed, match=r"^fail ward_door flux_capacitor off: error ward_door has no"
         ):
             daemon.order("fail ward_door flux_capacitor off")
     finally:
@@ -101,7 +101,7 @@ def test_ctrl_c_stops_every_process_and_leaves_nothing_behind(directory: Path) -
 def test_a_daemon_that_cannot_start_is_noticed_and_its_log_says_why(
     domain: int, directory: Path
 ) -> None:
-    daemon = Daemon(CONFIG / "none_such.yaml", directory, domain)
+    daemon = DaemonProcess(CONFIG / "none_such.yaml", directory, domain)
     try:
         wait_until(lambda: died(daemon), "the death is noticed")
         assert "none_such.yaml" in daemon.tail()
@@ -109,16 +109,16 @@ def test_a_daemon_that_cannot_start_is_noticed_and_its_log_says_why(
         stop_all([daemon])
 
 
-def died(daemon: Daemon) -> bool:
+def died(daemon: DaemonProcess) -> bool:
     try:
         daemon.check()
-    except Wrong:
+    except DemoFailed:
         return True
     return False
 
 
 def test_a_daemon_that_hangs_is_killed_with_its_fake(domain: int, directory: Path) -> None:
-    daemon = Daemon(CONFIG / "door_modbus.yaml", directory, domain)
+    daemon = DaemonProcess(CONFIG / "door_modbus.yaml", directory, domain)
     try:
         wait_until(lambda: "ready " in daemon.tail(), "the daemon is ready")
         assert len(running(directory)) == 2

@@ -7,21 +7,21 @@ from typing import Any
 from msgspec.structs import replace
 
 from bridges.kinds.charger import core
-from bridges.kinds.charger.memory import ChargerLimits, Memory
+from bridges.kinds.charger.memory import ChargerLimits, ChargerMemory
 from bridges.kinds.charger.report import ChargerReport
-from bridges.kinds.charger.settings import Durations, robot
+from bridges.kinds.charger.settings import ChargerDurations, robot
 from bridges.kinds.charger.signals import (
     Activity,
     Cancelled,
+    ChargeRequested,
     ChargerOutputs,
     ChargerSample,
     Event,
     Measured,
-    Requested,
 )
 from bridges.kinds.shared.decision import IoFailed, OperatorReset, RivalSeen, Sampled
 
-DURATIONS = Durations(misses=3, start_timeout_s=60.0, released_s=2.0)
+DURATIONS = ChargerDurations(misses=3, start_timeout_s=60.0, released_s=2.0)
 LIMITS = ChargerLimits(DURATIONS, can_stop=False)
 """A station that can only be observed."""
 RECEIVERS = {"rx-1": robot("tiny/AMR01"), "rx-2": robot("tiny/AMR02")}
@@ -33,7 +33,7 @@ FULL = ChargerLimits(DURATIONS, RECEIVERS)
 
 def observed(**durations: Any) -> ChargerLimits:
     """Such a station with these durations, and the defaults."""
-    return ChargerLimits(Durations(**durations), can_stop=False)
+    return ChargerLimits(ChargerDurations(**durations), can_stop=False)
 
 
 A = Activity
@@ -58,8 +58,8 @@ SCANS: dict[str, Event] = {
     "silent": SILENT,
 }
 
-AMR1 = Requested("req-1", "tiny", "AMR01")
-AMR2 = Requested("req-2", "tiny", "AMR02")
+AMR1 = ChargeRequested("req-1", "tiny", "AMR01")
+AMR2 = ChargeRequested("req-2", "tiny", "AMR02")
 CANCEL_1 = Cancelled("req-1")
 
 
@@ -72,7 +72,7 @@ class Story:
 
     limits: ChargerLimits = LIMITS
     now: float = 0.0
-    memory: Memory = field(default_factory=lambda: core.initial(LIMITS, 0.0))
+    memory: ChargerMemory = field(default_factory=lambda: core.initial(LIMITS, 0.0))
     told: list[tuple[float, str, str]] = field(default_factory=list)
     refused: list[tuple[float, str]] = field(default_factory=list)
     faults: list[str] = field(default_factory=list)

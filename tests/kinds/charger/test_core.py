@@ -3,15 +3,15 @@
 import pytest
 
 from bridges.kinds.charger import core
-from bridges.kinds.charger.memory import Memory
+from bridges.kinds.charger.memory import ChargerMemory
 from bridges.kinds.charger.report import ChargerReport
 from bridges.kinds.charger.signals import (
     Activity,
     Cancelled,
+    ChargeRequested,
     ChargerOutputs,
     ChargerSample,
     Measured,
-    Requested,
 )
 from bridges.kinds.shared.decision import Fault, Sampled
 from bridges.messages.definitions import ChargerStateValue as State
@@ -111,7 +111,7 @@ def test_a_repeat_does_not_prolong_the_start_timeout() -> None:
 
 
 def test_the_same_request_id_for_another_robot_is_refused() -> None:
-    story = Story().polls("idle 1").event(AMR1).event(Requested("req-1", "tiny", "AMR02"))
+    story = Story().polls("idle 1").event(AMR1).event(ChargeRequested("req-1", "tiny", "AMR02"))
     assert story.refused == [(1.0, "request_id of another robot")]
     assert story.report is not None
     assert story.report.robot == "AMR01"
@@ -127,7 +127,7 @@ def test_a_second_robot_is_refused_while_the_first_has_the_station(doing: str) -
 
 
 def test_a_second_request_of_the_same_robot_is_refused_while_the_first_stands() -> None:
-    story = Story().polls("idle 1").event(AMR1).event(Requested("req-3", "tiny", "AMR01"))
+    story = Story().polls("idle 1").event(AMR1).event(ChargeRequested("req-3", "tiny", "AMR01"))
     assert story.refused == [(1.0, "charger occupied")]
 
 
@@ -140,7 +140,9 @@ def test_a_late_repeat_of_a_request_that_is_over_does_not_start_it_again() -> No
 def test_only_the_last_few_requests_are_remembered() -> None:
     story = Story().polls("idle 1")
     for n in range(20):
-        story.event(Requested(f"r{n}", "tiny", "AMR01")).event(Cancelled(f"r{n}")).polls("idle 3")
+        story.event(ChargeRequested(f"r{n}", "tiny", "AMR01")).event(Cancelled(f"r{n}")).polls(
+            "idle 3"
+        )
     assert story.memory.over == tuple(f"r{n}" for n in range(12, 20))
 
 
@@ -155,7 +157,7 @@ def test_a_station_in_error_or_not_read_yet_takes_no_request(before: str) -> Non
 
 
 def test_a_request_that_does_not_charge_in_its_time_is_released_with_a_fault() -> None:
-    asked = Requested("req-1", "tiny", "AMR01", start_timeout_s=5.0)
+    asked = ChargeRequested("req-1", "tiny", "AMR01", start_timeout_s=5.0)
     story = Story().polls("idle 1").event(asked).polls("idle 10")
     assert story.told == [
         (0.0, "IDLE", ""),
@@ -507,7 +509,7 @@ def test_of_two_nodes_for_a_charger_neither_clears_an_error() -> None:
 
 
 def test_the_core_asks_to_be_woken_when_the_rival_is_due_to_be_gone() -> None:
-    seen = core.decide(Memory(), RIVAL, 7.0, LIMITS)
+    seen = core.decide(ChargerMemory(), RIVAL, 7.0, LIMITS)
     later = core.decide(seen.memory, IDLE, 12.0, LIMITS)
     assert (seen.wake_at, later.wake_at) == (12.0, float("inf"))
 

@@ -6,8 +6,8 @@ from msgspec.structs import replace
 from bridges.kinds.charger import KIND
 from bridges.kinds.charger.memory import ChargerLimits
 from bridges.kinds.charger.report import ChargerReport
-from bridges.kinds.charger.settings import ChargerSettings, Durations
-from bridges.kinds.charger.signals import Cancelled, Measured, Requested
+from bridges.kinds.charger.settings import ChargerDurations, ChargerSettings
+from bridges.kinds.charger.signals import Cancelled, ChargeRequested, Measured
 from bridges.kinds.shared.decision import RequestRefused
 from bridges.messages.definitions import (
     ChargerCancel,
@@ -19,7 +19,7 @@ from bridges.messages.definitions import (
 )
 from bridges.messages.topics import CHARGER_CANCELS, CHARGER_REQUESTS
 
-SETTINGS = ChargerSettings(limits=Durations(misses=5))
+SETTINGS = ChargerSettings(limits=ChargerDurations(misses=5))
 RIGHT = ChargerRequest("charger_a", "tiny", "AMR01", Duration(30, 500_000_000), "coordinator-7")
 
 
@@ -29,7 +29,7 @@ def asked(**changes: object) -> object:
 
 
 def test_a_request_becomes_an_event_with_its_start_timeout_in_seconds() -> None:
-    assert asked() == Requested("coordinator-7", "tiny", "AMR01", 30.5)
+    assert asked() == ChargeRequested("coordinator-7", "tiny", "AMR01", 30.5)
 
 
 def test_a_cancel_becomes_an_event() -> None:
@@ -74,7 +74,9 @@ def test_a_cancel_without_a_request_id_is_refused_by_name() -> None:
 
 
 def test_a_name_of_256_letters_of_any_script_is_taken() -> None:
-    assert asked(robot_name="充" * 256) == Requested("coordinator-7", "tiny", "充" * 256, 30.5)
+    assert asked(robot_name="充" * 256) == ChargeRequested(
+        "coordinator-7", "tiny", "充" * 256, 30.5
+    )
 
 
 def test_a_charging_station_is_reported_as_rmf_reads_it() -> None:
@@ -117,7 +119,7 @@ def test_the_kind_finds_the_charger_in_each_of_its_messages() -> None:
 
 
 def test_the_limits_are_those_of_the_settings() -> None:
-    assert KIND.limits(SETTINGS, {}) == ChargerLimits(Durations(misses=5))
+    assert KIND.limits(SETTINGS, {}) == ChargerLimits(ChargerDurations(misses=5))
 
 
 def test_the_summary_says_that_a_robot_is_not_verified() -> None:

@@ -5,14 +5,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bridges.kinds.charger.pad import Misplaced, misplaced_in
-from bridges.kinds.charger.report import Diagnosis, diagnosis, error_text
-from bridges.kinds.charger.settings import Robot
+from bridges.kinds.charger.report import FaultCause, diagnosis, error_text
+from bridges.kinds.charger.settings import RobotName
 from bridges.kinds.charger.signals import Activity, ChargerSample
 from tests.depth import examples
 
 ODD = st.sampled_from([*' ,"/\\\n', "stands here", " is expected", "unknown receiver ", ""])
 NAMES = st.one_of(st.text(), st.lists(st.one_of(ODD, st.text(max_size=3))).map("".join))
-ROBOTS = st.builds(Robot, NAMES, NAMES)
+ROBOTS = st.builds(RobotName, NAMES, NAMES)
 EXPECTED = st.none() | ROBOTS
 MISPLACED = st.one_of(
     st.builds(Misplaced, ROBOTS, expected=EXPECTED),
@@ -24,11 +24,11 @@ MISPLACED = st.one_of(
 @given(MISPLACED)
 def test_every_receiver_id_survives_the_error_text(misplaced: Misplaced) -> None:
     assert misplaced_in(misplaced.text) == misplaced
-    assert diagnosis(misplaced.text) is Diagnosis.PAD
+    assert diagnosis(misplaced.text) is FaultCause.PAD
 
 
 def test_plain_ids_are_written_as_they_are_and_others_quoted() -> None:
-    one, odd = Robot("tiny", "AMR01"), Robot("tiny", "AMR 1, spare")
+    one, odd = RobotName("tiny", "AMR01"), RobotName("tiny", "AMR 1, spare")
     assert [
         Misplaced(one).text,
         Misplaced(one, expected=odd).text,
@@ -43,7 +43,7 @@ def test_plain_ids_are_written_as_they_are_and_others_quoted() -> None:
 
 
 def test_names_of_any_script_are_readable_in_an_error() -> None:
-    assert Misplaced(Robot("Räumer", "Wäsche 1")).text == (
+    assert Misplaced(RobotName("Räumer", "Wäsche 1")).text == (
         'wrong docking: Räumer/"Wäsche 1" is not assigned here'
     )
 
@@ -62,4 +62,4 @@ def test_a_text_of_another_form_names_no_robot(text: str) -> None:
 )
 def test_a_stations_own_words_are_not_taken_for_the_daemons(words: str) -> None:
     told = error_text(ChargerSample(Activity.ERROR, 9, words))
-    assert (told, diagnosis(told)) == (f"the charger says: {words}", Diagnosis.UNCLEAR)
+    assert (told, diagnosis(told)) == (f"the charger says: {words}", FaultCause.UNCLEAR)

@@ -7,7 +7,7 @@ from msgspec.structs import replace
 
 from bridges.kinds.charger import KIND
 from bridges.kinds.charger.memory import ChargerLimits
-from bridges.kinds.charger.refusals import Refusal, read
+from bridges.kinds.charger.refusals import ChargerRefusal, read
 from bridges.kinds.charger.settings import ChargerSettings
 from bridges.kinds.charger.signals import Activity, ChargerOutputs, ChargerSample
 from bridges.messages import topics
@@ -27,7 +27,7 @@ from tests.accepted import accepted
 
 FIRST = ChargerRequest("a", "tiny", "AMR01", Duration(60), "req-1")
 SECOND = ChargerRequest("a", "tiny", "AMR02", Duration(60), "req-2")
-REFUSED = Refusal(
+REFUSED = ChargerRefusal(
     request_id="req-2",
     charger="a",
     robot="tiny/AMR02",
@@ -78,7 +78,7 @@ class Station:
         self.now += after_s
         return self
 
-    def refusals(self) -> list[Refusal | None]:
+    def refusals(self) -> list[ChargerRefusal | None]:
         return [read(m) for topic, m in self.said if topic == topics.CHARGER_REFUSALS.name]
 
     def states(self) -> list[tuple[int, str]]:
@@ -132,7 +132,7 @@ def test_a_malformed_request_is_answered_by_the_next_scan_with_what_is_wrong_abo
     long = replace(FIRST, robot_name="x" * 5000)
     it.hears(long)
     first, second = it.refusals()
-    assert first == Refusal(
+    assert first == ChargerRefusal(
         request_id="req-1",
         charger="a",
         robot="tiny/AMR01",

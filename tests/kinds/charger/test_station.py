@@ -7,14 +7,14 @@ from msgspec.structs import replace
 from bridges.kinds.charger.core import CLEARED_WITHIN_S
 from bridges.kinds.charger.memory import ChargerLimits
 from bridges.kinds.charger.report import ChargerReport
-from bridges.kinds.charger.settings import Durations
+from bridges.kinds.charger.settings import ChargerDurations
 from bridges.kinds.charger.signals import Activity as A
 from bridges.kinds.charger.signals import (
     Cancelled,
+    ChargeRequested,
     ChargerOutputs,
     ChargerSample,
     Measured,
-    Requested,
 )
 from bridges.kinds.shared.decision import Fault, Sampled, WriteFailed
 from bridges.messages.definitions import ChargerStateValue as State
@@ -90,7 +90,7 @@ def test_power_is_given_when_the_right_receiver_is_seen_and_taken_when_the_batte
 
 
 def test_a_battery_is_full_at_the_configured_level() -> None:
-    limits = replace(FULL, t=Durations(full_percent=80.0))
+    limits = replace(FULL, t=ChargerDurations(full_percent=80.0))
     it = story(limits).event(AMR1).sees((A.CHARGING, ONE, 1), battery_percent=79.9)
     assert it.outputs.power is True
     it.sees((A.CHARGING, ONE, 1), battery_percent=80.0)
@@ -108,8 +108,8 @@ def test_a_released_station_is_not_free_before_the_pad_is_clear() -> None:
 
 def test_a_robot_still_on_the_pad_may_ask_again_once_released_was_shown() -> None:
     it = docked().sees((A.IDLE, ONE, 1))
-    it.event(Requested("req-9", "tiny", "AMR01")).sees((A.IDLE, ONE, 2))
-    it.event(Requested("req-9", "tiny", "AMR01")).sees((A.CHARGING, ONE, 1)).event(AMR1)
+    it.event(ChargeRequested("req-9", "tiny", "AMR01")).sees((A.IDLE, ONE, 2))
+    it.event(ChargeRequested("req-9", "tiny", "AMR01")).sees((A.CHARGING, ONE, 1)).event(AMR1)
     assert it.told[-2:] == [(8.0, "ASSIGNED", "req-9"), (8.0, "CHARGING", "req-9")]
     assert it.refused == [(6.0, "charger occupied"), (9.0, "request is over")]
 
@@ -174,7 +174,7 @@ def test_a_robot_already_on_the_pad_is_charged_when_it_asks() -> None:
 
 
 def test_the_start_timeout_of_an_ad_hoc_request_counts_from_its_acceptance() -> None:
-    asked = Requested("req-1", "tiny", "AMR01", start_timeout_s=5.0)
+    asked = ChargeRequested("req-1", "tiny", "AMR01", start_timeout_s=5.0)
     it = story().sees((A.IDLE, ONE, 10)).event(asked).sees((A.IDLE, ONE, 6))
     assert it.told[-1] == (16.0, "RELEASED", "req-1")
     assert it.faults[-1] == "START_TIMEOUT: tiny/AMR01 did not start to charge in time"
@@ -318,7 +318,7 @@ def test_a_robot_that_drives_onto_the_pad_as_the_first_one_leaves_is_refused() -
 
 
 def test_a_robot_without_a_receiver_here_is_not_granted() -> None:
-    it = story().event(Requested("req-7", "tiny", "AMR07"))
+    it = story().event(ChargeRequested("req-7", "tiny", "AMR07"))
     assert it.refused == [(1.0, "robot has no receiver here")]
 
 
@@ -513,7 +513,7 @@ def test_a_cancel_while_the_station_is_lost_takes_the_power_as_soon_as_it_is_hea
 
 
 def test_an_operator_frees_a_lost_station_only_when_it_must_have_switched_off_by_itself() -> None:
-    limits = replace(FULL, t=Durations(peer_internal_timeout_s=15.0))
+    limits = replace(FULL, t=ChargerDurations(peer_internal_timeout_s=15.0))
     it = story(limits).event(AMR1).sees((A.CHARGING, ONE, 1)).all([SILENT] * 3)
     it.now = 15.9
     it.event(RESET)

@@ -4,7 +4,7 @@ import pytest
 from msgspec.structs import replace
 
 from bridges.kinds.charger.memory import ChargerLimits
-from bridges.kinds.charger.signals import Requested
+from bridges.kinds.charger.signals import ChargeRequested
 from tests.depth import depth
 from tests.kinds.charger.invariants import check
 from tests.kinds.charger.walk import SITES, Step, World, moved, walker
@@ -100,7 +100,7 @@ def _mended(world: World, limits: ChargerLimits) -> World:
 
 def _charged(world: World, limits: ChargerLimits) -> World:
     """The first robot asks, comes and is charged."""
-    asked = Requested("req-new", "tiny", "A")
+    asked = ChargeRequested("req-new", "tiny", "A")
     world = moved(world, lambda before: (before, [asked]), limits, check)
     world = walker(limits).path(world, "A docks", 2.0, seen=check)
     assert shown(world, limits) == ("ASSIGNED", "req-new", True)

@@ -12,17 +12,17 @@ import msgspec
 from msgspec.structs import replace
 
 from bridges.kinds.charger.core import decide
-from bridges.kinds.charger.memory import ChargerLimits, Memory
+from bridges.kinds.charger.memory import ChargerLimits, ChargerMemory
 from bridges.kinds.charger.report import ChargerReport
-from bridges.kinds.charger.settings import Durations, Robot, robot
+from bridges.kinds.charger.settings import ChargerDurations, RobotName, robot
 from bridges.kinds.charger.signals import (
     Activity,
     Cancelled,
+    ChargeRequested,
     ChargerOutputs,
     ChargerSample,
     Event,
     Measured,
-    Requested,
 )
 from bridges.kinds.shared.decision import (
     Decision,
@@ -34,7 +34,7 @@ from bridges.kinds.shared.decision import (
 )
 from tests.walk import Walker
 
-LIMITS = Durations(
+LIMITS = ChargerDurations(
     misses=2, start_timeout_s=8.0, stop_timeout_s=4.0, released_s=2.0, peer_internal_timeout_s=16.0
 )
 RECEIVERS = {"1": robot("tiny/A"), "2": robot("tiny/B")}
@@ -47,7 +47,7 @@ SITES = {
     "refuses": ChargerLimits(LIMITS, RECEIVERS),
     "serves": ChargerLimits(LIMITS, RECEIVERS, "serve_known"),
     "clears by itself": ChargerLimits(
-        Durations(misses=2, start_timeout_s=8.0, clear_errors_per_h=60), RECEIVERS
+        ChargerDurations(misses=2, start_timeout_s=8.0, clear_errors_per_h=60), RECEIVERS
     ),
 }
 
@@ -62,7 +62,7 @@ class Ledger(msgspec.Struct, frozen=True):
     """
 
     granted: str | None = None
-    robot: Robot | None = None
+    robot: RobotName | None = None
     spoiled: bool = False
     read_at: float | None = None
     misses: int = 0
@@ -75,7 +75,7 @@ class Ledger(msgspec.Struct, frozen=True):
 class World(msgspec.Struct, frozen=True):
     """Memory and ledger at time 0, the station, and whether it can be read and commanded."""
 
-    memory: Memory = Memory()
+    memory: ChargerMemory = ChargerMemory()
     ledger: Ledger = Ledger()
     sample: ChargerSample = ChargerSample(Activity.IDLE, 0, measured=Measured(receiver_id=""))
     seen: ChargerSample | None = None
@@ -90,7 +90,7 @@ class Step(msgspec.Struct, frozen=True):
     event: Event
     now: float
     limits: ChargerLimits
-    decision: Decision[Memory, ChargerOutputs, ChargerReport]
+    decision: Decision[ChargerMemory, ChargerOutputs, ChargerReport]
     ledger: Ledger
     seen: ChargerSample | None
 
@@ -140,7 +140,7 @@ def _event(event: Event) -> Move:
 
 
 MOVES: dict[str, Move] = {
-    **{f"{who} asks": _event(Requested(f"req-{who}", "tiny", who)) for who in "AB"},
+    **{f"{who} asks": _event(ChargeRequested(f"req-{who}", "tiny", who)) for who in "AB"},
     **{f"{who} cancels": _event(Cancelled(f"req-{who}")) for who in "AB"},
     **{str(a): _station(activity=a) for a in Activity},
     "robot's error": _station(activity=Activity.ERROR, side="robot"),
@@ -209,7 +209,9 @@ def noted(world: World, event: Event, now: float, limits: ChargerLimits, decisio
     elif isinstance(event, RivalSeen):
         ledger = replace(ledger, rival_at=now)
     elif (
-        isinstance(event, Requested) and not decision.refused and event.request_id != ledger.granted
+        isinstance(event, ChargeRequested)
+        and not decision.refused
+        and event.request_id != ledger.granted
     ):
         ledger = replace(
             ledger, granted=event.request_id, robot=event.who, spoiled=False, adopted=False
@@ -248,7 +250,7 @@ def _held(ledger: Ledger, decision: Any) -> Ledger:
     shown = decision.report
     if decision.memory.holder is None:
         return replace(ledger, granted=None, robot=None, spoiled=False)
-    who = Robot(shown.fleet, shown.robot)
+    who = RobotName(shown.fleet, shown.robot)
     if not shown.request_id and (ledger.granted != "" or who != ledger.robot):
         # served without a request
         return replace(ledger, granted="", robot=who, spoiled=False, adopted=False)
@@ -258,7 +260,7 @@ def _held(ledger: Ledger, decision: Any) -> Ledger:
 # ---- states with their times relative to now
 
 
-def alike(memory: Memory, now: float, limits: ChargerLimits) -> Memory:
+def alike(memory: ChargerMemory, now: float, limits: ChargerLimits) -> ChargerMemory:
     """The same memory at time 0, equal for those that cannot behave differently."""
     holder = memory.holder
     if holder:

@@ -2,16 +2,16 @@
 
 from typing import Any
 
-from bridges.kinds.charger.settings import Robot
+from bridges.kinds.charger.settings import RobotName
 from bridges.kinds.charger_coordinator import core
 from bridges.kinds.charger_coordinator.memory import (
     CHARGING,
     IDLE,
-    Memory,
-    Site,
+    SiteLimits,
+    SiteMemory,
 )
 from bridges.kinds.charger_coordinator.report import SiteReport
-from bridges.kinds.charger_coordinator.signals import Event, FleetSeen, Sighting, StateHeard
+from bridges.kinds.charger_coordinator.signals import ChargerStateHeard, Event, FleetSeen, Sighting
 from bridges.kinds.shared.graph_kind import Woken
 from bridges.messages import definitions as d
 from tests.kinds.charger_coordinator.virtual_site import settings
@@ -20,19 +20,19 @@ from tests.kinds.shared import alone
 SETTINGS = settings()
 
 
-ONE, TWO, THREE = (Robot("tiny", f"AMR0{i}") for i in (1, 2, 3))
+ONE, TWO, THREE = (RobotName("tiny", f"AMR0{i}") for i in (1, 2, 3))
 
 
 A, B = "charger_a", "charger_b"
 
 
-class Alone(alone.Alone[Memory, Event, Site, SiteReport]):
+class Alone(alone.Alone[SiteMemory, Event, SiteLimits, SiteReport]):
     """`shows`: what each station does, told once a second; `seen`: the robots that a fleet shows."""
 
     def __init__(self) -> None:
-        self.shows = {name: StateHeard(name, IDLE) for name in (A, B)}
-        self.seen: dict[Robot, Sighting] = {}
-        super().__init__(core.initial("site", 0.0), core.decide, Site.of(SETTINGS), True)
+        self.shows = {name: ChargerStateHeard(name, IDLE) for name in (A, B)}
+        self.seen: dict[RobotName, Sighting] = {}
+        super().__init__(core.initial("site", 0.0), core.decide, SiteLimits.of(SETTINGS), True)
 
     def words(self, message: d.Message) -> str:
         """Words to the stations are noted."""
@@ -59,7 +59,7 @@ class Alone(alone.Alone[Memory, Event, Site, SiteReport]):
             self.hears(Woken())
         return self.sent[said:]
 
-    def wants(self, who: Robot, place: str | None = None, percent: float = 40.0) -> None:
+    def wants(self, who: RobotName, place: str | None = None, percent: float = 40.0) -> None:
         """Its fleet shows it so from now on."""
         place = f"wait_{who.name[-1]}" if place is None else place
         self.seen[who] = Sighting(who, True, place, percent, f"task of {who.name}")
@@ -67,9 +67,11 @@ class Alone(alone.Alone[Memory, Event, Site, SiteReport]):
     def does(self, station: str, state: Any, error: str = "") -> None:
         """The station goes on so with the request that it was sent last."""
         grant = self.memory.grants[station]
-        self.shows[station] = StateHeard(station, state, grant.request_id, grant.robot, error)
+        self.shows[station] = ChargerStateHeard(
+            station, state, grant.request_id, grant.robot, error
+        )
 
 
-def busy(station: str) -> StateHeard:
+def busy(station: str) -> ChargerStateHeard:
     """A station that serves somebody who is none of ours."""
-    return StateHeard(station, CHARGING, "somebody-1", Robot("other", "robot"))
+    return ChargerStateHeard(station, CHARGING, "somebody-1", RobotName("other", "robot"))

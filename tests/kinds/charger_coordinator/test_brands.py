@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from bridges.kinds.charger.settings import Robot
+from bridges.kinds.charger.settings import RobotName
 from bridges.kinds.charger_coordinator import messages
 from bridges.kinds.charger_coordinator.signals import ReceiverHeard
 from bridges.messages import definitions as d
@@ -71,7 +71,7 @@ def test_a_robot_of_the_other_brand_at_the_wrong_station_is_sent_on_in_its_own_w
 def test_a_robots_own_receiver_is_not_a_station(state: int, error: str) -> None:
     told = d.ChargerState(charger_name="rcu_b01", state=state, error_message=error)
     heard = messages.accept_state(told, two_brands(), 0.0)
-    assert heard == ReceiverHeard(Robot("big", "B01"), error)
+    assert heard == ReceiverHeard(RobotName("big", "B01"), error)
 
 
 def test_a_robots_own_receiver_is_never_asked_and_its_errors_are_shown() -> None:

@@ -5,8 +5,8 @@ import dataclasses
 import pytest
 from msgspec.structs import replace
 
-from bridges.kinds.charger.report import LOST, Diagnosis, diagnosis
-from bridges.kinds.charger.settings import Robot
+from bridges.kinds.charger.report import LOST, FaultCause, diagnosis
+from bridges.kinds.charger.settings import RobotName
 from bridges.kinds.charger_coordinator.memory import (
     ASSIGNED,
     CHARGING,
@@ -14,16 +14,16 @@ from bridges.kinds.charger_coordinator.memory import (
     IDLE,
     RELEASED,
     Grant,
-    Site,
+    SiteLimits,
     Wish,
 )
 from bridges.kinds.charger_coordinator.signals import (
+    ChargerStateHeard,
+    ChargeWanted,
     Dedicated,
     Event,
     FleetSeen,
     Sighting,
-    StateHeard,
-    Wanted,
 )
 from bridges.kinds.charger_coordinator.wrong_pad import on_pad
 from bridges.kinds.shared.decision import OperatorReset
@@ -60,7 +60,7 @@ def test_a_robot_that_is_full_gives_its_station_up_and_comes_back_only_when_it_i
     assert site_.run(1) == [(4.0, "charger_a: cancel")]
     site_.does(A, RELEASED)
     site_.run(1)
-    site_.shows[A] = StateHeard(A, IDLE)
+    site_.shows[A] = ChargerStateHeard(A, IDLE)
     site_.wants(ONE, "charger_a", 90.0)
     assert site_.run(30) == []
     site_.wants(ONE, "charger_a", 89.9)
@@ -74,7 +74,7 @@ def test_a_station_that_ends_a_charge_early_is_not_asked_again_until_the_battery
     for state in (CHARGING, RELEASED):
         site_.does(A, state)
         site_.run(1)
-    site_.shows[A] = StateHeard(A, IDLE)
+    site_.shows[A] = ChargerStateHeard(A, IDLE)
     assert site_.run(30) == []
     site_.wants(ONE, "charger_a", 89.0)
     assert site_.run(1) == [(34.0, "charger_a: AMR01")]
@@ -85,7 +85,7 @@ def test_a_station_that_ends_a_charge_early_is_not_asked_again_until_the_battery
 
 def test_a_full_robot_that_an_operator_asked_for_makes_room() -> None:
     site_ = Alone()
-    site_.hears(Wanted(ONE, "", "op-1", 0.0))
+    site_.hears(ChargeWanted(ONE, "", "op-1", 0.0))
     site_.run(1)
     site_.does(A, CHARGING)
     site_.run(1)
@@ -103,11 +103,11 @@ def answer(site_: Alone, event: Event) -> str:
 
 def test_an_operator_may_send_a_robot_that_has_a_station_to_another_one() -> None:
     site_ = Alone()
-    site_.hears(Wanted(ONE, "", "op-1", 0.0))
+    site_.hears(ChargeWanted(ONE, "", "op-1", 0.0))
     site_.run(1)
     site_.does(A, ASSIGNED)
     site_.run(1)
-    assert answer(site_, Wanted(ONE, B, "op-2", 0.0)) == ""
+    assert answer(site_, ChargeWanted(ONE, B, "op-2", 0.0)) == ""
     site_.run(1)
     assert site_.sent == [
         (1.0, "charger_a: AMR01"),
@@ -166,14 +166,14 @@ def test_a_station_that_takes_no_request_is_passed_over_and_its_request_is_queue
     ],
 )
 def test_a_request_that_a_station_drops_is_made_again_until_its_robot_should_have_started(
-    after_s: int, failed: dict[Robot, tuple[str, ...]], said: list[tuple[float, str]]
+    after_s: int, failed: dict[RobotName, tuple[str, ...]], said: list[tuple[float, str]]
 ) -> None:
     site_ = Alone()
     site_.wants(ONE, "charger_a")
     site_.run(1)
     site_.does(A, ASSIGNED)
     site_.run(after_s)
-    site_.shows[A] = StateHeard(A, IDLE)
+    site_.shows[A] = ChargerStateHeard(A, IDLE)
     assert site_.run(1) == said
     assert site_.memory.strikes == failed
 
@@ -183,14 +183,14 @@ def test_a_request_that_a_station_drops_is_made_again_until_its_robot_should_hav
     [(ERROR, TWO, True), (CHARGING, TWO, True), (CHARGING, ONE, False), (ERROR, ONE, False)],
 )
 def test_a_request_is_given_up_when_the_station_will_not_take_it(
-    state: d.ChargerStateValue, robot: Robot, gone: bool
+    state: d.ChargerStateValue, robot: RobotName, gone: bool
 ) -> None:
     site_ = Alone()
     site_.wants(ONE)
     site_.run(1)
     text = f"wrong docking: {robot} is not assigned here" if state is ERROR else ""
     before = site_.memory.grants[A].request_id
-    site_.hears(StateHeard(A, state, "unrequested/charger_a", robot, text))
+    site_.hears(ChargerStateHeard(A, state, "unrequested/charger_a", robot, text))
     assert (before not in [g.request_id for g in site_.memory.grants.values()]) is gone
 
 
@@ -230,19 +230,19 @@ def test_a_robot_that_fails_at_both_stations_a_moment_after_the_charge_begins_is
         for state, error in ((CHARGING, ""), (ERROR, "robot: communication lost")):
             site_.does(station, state, error)
             site_.run(2)
-        site_.shows[station] = StateHeard(station, IDLE)
+        site_.shows[station] = ChargerStateHeard(station, IDLE)
     assert site_.run(60) == [(11.0, "charger_b: cancel")]
     assert site_.faults == [
         "ROBOT_FAULTY: tiny/AMR01 failed at charger_a and at charger_b: not tried again"
     ]
 
 
-# ---- COORDINATOR-5, COORDINATOR-ASTRAY-3: robots astray
+# ---- COORDINATOR-5, COORDINATOR-WRONG-PAD-3: robots astray
 
 
 def test_a_strayed_robot_in_a_task_cannot_be_told_so_a_person_is_at_once() -> None:
     site_ = Alone()
-    site_.hears(Wanted(ONE, "", "op-1", 0.0))
+    site_.hears(ChargeWanted(ONE, "", "op-1", 0.0))
     site_.run(1)
     site_.does(A, ASSIGNED)
     site_.seen[ONE] = Sighting(ONE, False, None, 40.0, "work")
@@ -316,7 +316,7 @@ def test_a_charge_beside_it_does_not_keep_a_request_that_nobody_takes() -> None:
 
 def test_a_robot_whose_fleet_is_not_heard_is_charged_in_no_task() -> None:
     site_ = Alone()
-    site_.hears(Wanted(ONE, "", "op-1", 0.0))
+    site_.hears(ChargeWanted(ONE, "", "op-1", 0.0))
     site_.run(1)
     for state in SERVED:
         site_.does(A, state)
@@ -334,13 +334,13 @@ def test_a_robot_with_one_station_is_tried_there_twice_and_no_more() -> None:
         assert [text for _, text in site_.run(1)][-1:] == ["charger_b: AMR03"]
         site_.does(B, ERROR, "robot: handshake timeout")
         assert [text for _, text in site_.run(1)][-1:] == ["charger_b: cancel"]
-        site_.shows[B] = StateHeard(B, IDLE)
+        site_.shows[B] = ChargerStateHeard(B, IDLE)
     site_.run(1)
     assert site_.run(60) == []
     assert site_.faults == [
         "ROBOT_FAULTY: tiny/AMR03 failed at charger_b and at charger_b: not tried again"
     ]
-    site_.hears(Wanted(THREE, "", "op-1", 0.0))
+    site_.hears(ChargeWanted(THREE, "", "op-1", 0.0))
     assert site_.run(1) != []
 
 
@@ -352,14 +352,14 @@ def test_a_robot_with_one_station_is_tried_there_twice_and_no_more() -> None:
     ],
 )
 def test_a_charge_that_an_idle_station_has_not_released_is_over_if_its_robot_has_left(
-    place: str, said: list[tuple[float, str]], served: dict[Robot, str]
+    place: str, said: list[tuple[float, str]], served: dict[RobotName, str]
 ) -> None:
     site_ = Alone()
     site_.wants(ONE, "charger_a", 95.0)
     site_.run(1)
     site_.does(A, CHARGING)
     site_.run(1)
-    site_.shows[A] = StateHeard(A, IDLE)
+    site_.shows[A] = ChargerStateHeard(A, IDLE)
     site_.wants(ONE, place, 95.0)
     site_.hears(FleetSeen((site_.seen[ONE],)))
     assert site_.run(2) == said
@@ -371,7 +371,7 @@ def test_a_robot_that_has_a_station_does_not_get_another_by_a_strangers_request(
     site_.wants(ONE)
     site_.run(1)
     site_.does(A, ASSIGNED)
-    site_.shows[B] = StateHeard(B, ASSIGNED, "somebody-1", ONE)
+    site_.shows[B] = ChargerStateHeard(B, ASSIGNED, "somebody-1", ONE)
     assert site_.run(5) == []
     assert site_.memory.station_of(ONE) == A
     assert list(site_.memory.grants) == [A]
@@ -380,7 +380,7 @@ def test_a_robot_that_has_a_station_does_not_get_another_by_a_strangers_request(
 def test_another_nodes_request_for_our_robot_is_adopted_with_the_charge_that_it_has() -> None:
     for state, started in ((ASSIGNED, False), (CHARGING, True)):
         site_ = Alone()
-        site_.shows[A] = StateHeard(A, state, "somebody-1", ONE)
+        site_.shows[A] = ChargerStateHeard(A, state, "somebody-1", ONE)
         assert site_.run(3) == []
         assert site_.memory.grants == {
             A: Grant(ONE, "somebody-1", 1.0, shown=True, started=started)
@@ -393,7 +393,7 @@ def test_another_nodes_request_gives_a_robot_that_waits_no_second_wish() -> None
     site_.shows = {A: busy(A), B: busy(B)}
     site_.wants(ONE)
     site_.run(1)
-    site_.shows[A] = StateHeard(A, ASSIGNED, "somebody-1", ONE)
+    site_.shows[A] = ChargerStateHeard(A, ASSIGNED, "somebody-1", ONE)
     site_.run(1)
     assert [(w.robot, w.by) for w in site_.memory.wishes] == [(ONE, "fleet")]
 
@@ -403,7 +403,7 @@ def test_a_second_station_that_still_shows_an_earlier_request_of_ours_is_told_to
     site_.wants(ONE)
     site_.run(1)
     site_.does(A, ASSIGNED)
-    site_.shows[B] = StateHeard(B, ASSIGNED, "charger_coordinator/tiny/AMR01/0", ONE)
+    site_.shows[B] = ChargerStateHeard(B, ASSIGNED, "charger_coordinator/tiny/AMR01/0", ONE)
     site_.run(1)
     assert site_.sent[-1] == (2.0, "charger_b: cancel")
     assert (site_.memory.station_of(ONE), len(site_.memory.wishes)) == (A, 1)
@@ -469,30 +469,30 @@ def test_a_request_made_before_a_rival_came_keeps_its_age_once_it_is_shown() -> 
 @pytest.mark.parametrize(
     ("text", "whose"),
     [
-        ("robot: authentication timeout", Diagnosis.ROBOT),
-        ("station: fan", Diagnosis.STATION),
-        ("out of service after: station: fan", Diagnosis.STATION),
-        ("Charger unreachable", Diagnosis.LOST),
-        ("Charger takes no commands", Diagnosis.LOST),
-        ("two nodes for one device", Diagnosis.LOST),
-        ("wrong docking: tiny/AMR01 is not assigned here", Diagnosis.PAD),
-        ("unknown receiver RX-1", Diagnosis.PAD),
-        ("unknown vendor state 99", Diagnosis.UNCLEAR),
-        ("", Diagnosis.UNCLEAR),
+        ("robot: authentication timeout", FaultCause.ROBOT),
+        ("station: fan", FaultCause.STATION),
+        ("out of service after: station: fan", FaultCause.STATION),
+        ("Charger unreachable", FaultCause.LOST),
+        ("Charger takes no commands", FaultCause.LOST),
+        ("two nodes for one device", FaultCause.LOST),
+        ("wrong docking: tiny/AMR01 is not assigned here", FaultCause.PAD),
+        ("unknown receiver RX-1", FaultCause.PAD),
+        ("unknown vendor state 99", FaultCause.UNCLEAR),
+        ("", FaultCause.UNCLEAR),
     ],
 )
-def test_the_side_at_fault_is_what_the_station_says(text: str, whose: Diagnosis) -> None:
+def test_the_side_at_fault_is_what_the_station_says(text: str, whose: FaultCause) -> None:
     assert diagnosis(text) is whose
 
 
 def test_the_fixed_texts_of_our_own_chargers_say_nothing_against_a_robot() -> None:
-    assert {diagnosis(text) for text in LOST.values()} == {Diagnosis.LOST}
+    assert {diagnosis(text) for text in LOST.values()} == {FaultCause.LOST}
 
 
 def test_who_stands_on_a_pad_is_read_from_its_error() -> None:
-    robots = dict.fromkeys((ONE, TWO, Robot("tiny", "AMR0")), ())
+    robots = dict.fromkeys((ONE, TWO, RobotName("tiny", "AMR0")), ())
     ours = dataclasses.replace(
-        Site.of(SETTINGS), robots=robots, receivers={**RECEIVERS, "RX, 1": TWO}
+        SiteLimits.of(SETTINGS), robots=robots, receivers={**RECEIVERS, "RX, 1": TWO}
     )
     texts = {
         "wrong docking: tiny/AMR02 stands here, tiny/AMR01 is expected": TWO,

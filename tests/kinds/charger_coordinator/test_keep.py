@@ -9,9 +9,9 @@ from bridges.kinds.charger_coordinator.memory import (
     ERROR,
 )
 from bridges.kinds.charger_coordinator.signals import (
+    ChargeUnwanted,
+    ChargeWanted,
     Dedicated,
-    Unwanted,
-    Wanted,
 )
 from tests.kinds.charger_coordinator.alone import ONE, SETTINGS, THREE, TWO, A, Alone, B
 from tests.kinds.charger_coordinator.virtual_site import settings
@@ -61,9 +61,9 @@ def test_a_restart_remembers_everything_that_it_keeps() -> None:
     site_.run(1)
     site_.does(A, ERROR, "over temperature")
     site_.run(1)
-    site_.hears(Wanted(TWO, B, "op-1", 33.0))
-    site_.hears(Unwanted("op-1"))
-    site_.hears(Wanted(TWO, A, "op-2", 44.0))
+    site_.hears(ChargeWanted(TWO, B, "op-1", 33.0))
+    site_.hears(ChargeUnwanted("op-1"))
+    site_.hears(ChargeWanted(TWO, A, "op-2", 44.0))
     site_.wants(THREE)
     site_.run(1)
     before = replace(site_.memory, served={THREE: "task of AMR03"})

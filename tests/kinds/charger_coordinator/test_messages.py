@@ -6,10 +6,10 @@ from typing import Any
 import pytest
 from msgspec.structs import replace
 
-from bridges.kinds.charger.settings import Robot
+from bridges.kinds.charger.settings import RobotName
 from bridges.kinds.charger_coordinator import KIND, messages
 from bridges.kinds.charger_coordinator.memory import CHARGING
-from bridges.kinds.charger_coordinator.signals import Dedicated, Sighting, StateHeard
+from bridges.kinds.charger_coordinator.signals import ChargerStateHeard, Dedicated, Sighting
 from bridges.kinds.shared.decision import RequestRefused
 from bridges.messages import definitions as d
 from bridges.settings.load import SettingsError, load
@@ -17,7 +17,7 @@ from tests.kinds.charger_coordinator.virtual_site import settings
 
 SETTINGS = settings(near_m=2.5)
 CONFIG = Path(__file__).parents[3] / "config" / "charger_coordinator.yaml"
-ONE = Robot("tiny", "AMR01")
+ONE = RobotName("tiny", "AMR01")
 
 
 def robot(x: float, y: float, level: str = "L1", mode: int = 1) -> Sighting:
@@ -60,7 +60,7 @@ STATE = d.ChargerState(d.Time(), 3, "charger_a", "", "id", "tiny", "AMR01")
 
 
 def test_a_charger_state_is_read_field_by_field() -> None:
-    shown = StateHeard("charger_a", CHARGING, "id", ONE)
+    shown = ChargerStateHeard("charger_a", CHARGING, "id", ONE)
     assert messages.accept_state(STATE, SETTINGS, 0.0) == shown
 
 
@@ -74,7 +74,7 @@ def test_assignments_by_others_count_if_they_are_to_one_of_our_chargers() -> Non
             d.ChargingAssignment("stranger", "dock_b", 0),
         ),
     )
-    two, three = Robot("tiny", "AMR02"), Robot("tiny", "AMR03")
+    two, three = RobotName("tiny", "AMR02"), RobotName("tiny", "AMR03")
     dedicated = Dedicated(((ONE, "charger_b"), (two, ""), (three, "")))
     assert messages.accept_assignments(message, SETTINGS, 0.0) == dedicated
 

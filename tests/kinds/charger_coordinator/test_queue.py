@@ -8,10 +8,10 @@ from bridges.kinds.charger_coordinator.memory import (
     IDLE,
 )
 from bridges.kinds.charger_coordinator.signals import (
+    ChargerStateHeard,
     Dedicated,
     FleetSeen,
     Sighting,
-    StateHeard,
 )
 from tests.kinds.charger_coordinator.alone import ONE, THREE, TWO, A, Alone, B, busy
 
@@ -22,7 +22,7 @@ def test_the_queue_is_first_come_first_served() -> None:
     for who in (TWO, ONE, THREE):
         site_.wants(who)
         site_.run(1)
-    site_.shows[B] = StateHeard(B, IDLE)
+    site_.shows[B] = ChargerStateHeard(B, IDLE)
     assert site_.run(1) == [(4.0, "charger_b: AMR02")]
 
 
@@ -63,7 +63,7 @@ def test_a_dedicated_station_comes_before_the_yamls_first_and_after_where_the_ro
 
 def test_a_robot_that_is_charged_unasked_where_it_stands_has_that_station() -> None:
     site_ = Alone()
-    site_.shows[A] = StateHeard(A, CHARGING, "unrequested/charger_a")
+    site_.shows[A] = ChargerStateHeard(A, CHARGING, "unrequested/charger_a")
     site_.wants(ONE, "charger_a")
     assert site_.run(10) == []
     assert site_.memory.station_of(ONE) == A
@@ -74,7 +74,7 @@ def test_only_a_robot_refused_as_unasked_may_have_the_station_where_it_stands() 
         site_ = Alone()
         site_.shows[B] = busy(B)
         text = "wrong docking: tiny/AMR01 is not assigned here"
-        site_.shows[A] = StateHeard(A, ERROR, request_id, ONE, text)
+        site_.shows[A] = ChargerStateHeard(A, ERROR, request_id, ONE, text)
         site_.wants(ONE, "charger_a")
         assert [words for _, words in site_.run(1)] == said
 
@@ -82,7 +82,7 @@ def test_only_a_robot_refused_as_unasked_may_have_the_station_where_it_stands() 
 def test_only_the_robot_that_stands_there_may_have_a_station_in_error() -> None:
     site_ = Alone()
     text = "wrong docking: tiny/AMR02 is not assigned here"
-    site_.shows = {A: StateHeard(A, ERROR, "unrequested/charger_a", TWO, text), B: busy(B)}
+    site_.shows = {A: ChargerStateHeard(A, ERROR, "unrequested/charger_a", TWO, text), B: busy(B)}
     site_.wants(ONE)
     assert site_.run(5) == []
 
@@ -94,7 +94,7 @@ def test_a_robot_waits_for_a_station_where_it_has_not_failed() -> None:
     site_.run(1)
     site_.does(A, ERROR, "robot: handshake timeout")
     site_.run(1)
-    site_.shows[A] = StateHeard(A, IDLE)
+    site_.shows[A] = ChargerStateHeard(A, IDLE)
     assert site_.run(5) == []
-    site_.shows[B] = StateHeard(B, IDLE)
+    site_.shows[B] = ChargerStateHeard(B, IDLE)
     assert site_.run(1) == [(8.0, "charger_b: AMR01")]

@@ -2,17 +2,17 @@
 
 from msgspec.structs import replace
 
-from bridges.kinds.charger.settings import Robot
+from bridges.kinds.charger.settings import RobotName
 from bridges.kinds.charger_coordinator.memory import (
     ASSIGNED,
     CHARGING,
     ERROR,
     IDLE,
     Grant,
-    Memory,
-    Seen,
-    Site,
+    SiteLimits,
+    SiteMemory,
     Standing,
+    StationSeen,
     Wish,
 )
 from bridges.kinds.charger_coordinator.reasons import queued, reasons
@@ -21,23 +21,23 @@ from bridges.kinds.charger_coordinator.signals import Sighting
 from bridges.messages.definitions import ChargerStateValue
 from tests.kinds.charger_coordinator.virtual_site import settings
 
-ONE, TWO, THREE = (Robot("tiny", f"AMR0{i}") for i in (1, 2, 3))
-X, Y = Robot("big", "X"), Robot("big", "Y")
+ONE, TWO, THREE = (RobotName("tiny", f"AMR0{i}") for i in (1, 2, 3))
+X, Y = RobotName("big", "X"), RobotName("big", "Y")
 
 
-def site(stations: int) -> Site:
+def site(stations: int) -> SiteLimits:
     """So many stations, and each suits everybody."""
     names = tuple(f"s{i + 1}" for i in range(stations))
     robots = dict.fromkeys((ONE, TWO, THREE), names)
     places: dict[str, dict[str, str]] = {name: {} for name in names}
-    return Site(robots, {}, places, {}, 60.0, 100.0, 90.0, 60.0)
+    return SiteLimits(robots, {}, places, {}, 60.0, 100.0, 90.0, 60.0)
 
 
-def shows(state: ChargerStateValue, full_in_s: float = 0.0) -> Seen:
-    return Seen(state, "", None, "", 10.0, 0.0, full_in_s)
+def shows(state: ChargerStateValue, full_in_s: float = 0.0) -> StationSeen:
+    return StationSeen(state, "", None, "", 10.0, 0.0, full_in_s)
 
 
-BUSY = Memory(
+BUSY = SiteMemory(
     may_speak=True,
     wishes=tuple(Wish(who, "fleet") for who in (ONE, THREE, TWO)),
     grants={
@@ -70,7 +70,7 @@ def test_each_waiting_robot_is_told_what_is_in_its_way_and_which_station_it_will
 def test_the_station_where_it_stands_comes_first_and_its_own_robot_is_not_in_its_way() -> None:
     last_two = {name: BUSY.stations[name] for name in ("s5", "s6")}
     stands_there = Standing(Sighting(ONE, False, "p6", 50.0, ""), 10.0)
-    memory = Memory(
+    memory = SiteMemory(
         may_speak=True,
         wishes=BUSY.wishes[:1],
         stations=last_two,
@@ -78,7 +78,7 @@ def test_the_station_where_it_stands_comes_first_and_its_own_robot_is_not_in_its
         robots={ONE: stands_there},
     )
     places = {"s5": {"tiny": "p5"}, "s6": {"tiny": "p6"}}
-    two = Site({ONE: ("s5", "s6")}, {}, places, {}, 60.0, 100.0, 90.0, 60.0)
+    two = SiteLimits({ONE: ("s5", "s6")}, {}, places, {}, 60.0, 100.0, 90.0, 60.0)
     assert [list(reasons(memory, now, two)) for now in (12.0, 13.0)] == [
         ["tiny/AMR01 by the robot: s6 takes no request, s5 is out of service"],
         ["tiny/AMR01 by the robot: s6 is not free yet, s5 is out of service"],
@@ -93,9 +93,9 @@ def test_while_it_may_not_publish_no_station_is_what_they_wait_for() -> None:
     ]
 
 
-def said(now: float, seen: Seen, *robots: Robot) -> str:
+def said(now: float, seen: StationSeen, *robots: RobotName) -> str:
     """What AMR01 hears of its only station, at which these robots stand."""
-    one = Site({ONE: ("s1",)}, {}, {"s1": {"tiny": "p1"}}, {}, 60.0, 100.0, 90.0, 60.0)
+    one = SiteLimits({ONE: ("s1",)}, {}, {"s1": {"tiny": "p1"}}, {}, 60.0, 100.0, 90.0, 60.0)
     there = {who: Standing(Sighting(who, False, "p1", 50.0, ""), 10.0) for who in robots}
     memory = replace(BUSY, wishes=BUSY.wishes[:1], grants={}, stations={"s1": seen}, robots=there)
     (text,) = reasons(memory, now, one)
@@ -117,7 +117,7 @@ def test_the_remaining_time_of_a_charge_is_shown_in_seconds_or_minutes() -> None
 
 
 def test_a_robot_without_any_station_waits_for_the_schedule() -> None:
-    memory = Memory(may_speak=True, wishes=BUSY.wishes[:1], alone=False)
+    memory = SiteMemory(may_speak=True, wishes=BUSY.wishes[:1], alone=False)
     assert list(reasons(memory, 12.0, site(2))) == [
         "tiny/AMR01 by the robot: the charging schedule has no station for it"
     ]
@@ -127,16 +127,16 @@ def test_a_robot_without_any_station_waits_for_the_schedule() -> None:
 
 
 def test_a_station_is_silent_five_seconds_after_its_last_state() -> None:
-    memory = Memory(stations={"s1": shows(IDLE)})
+    memory = SiteMemory(stations={"s1": shows(IDLE)})
     assert [memory.speaks("s1", now) for now in (14.9, 15.0)] == [True, False]
     assert memory.speaks("s2", 0.0) is False
 
 
 def test_the_last_eight_requests_that_are_over_are_remembered() -> None:
-    memory = Memory(over=tuple("abcdefgh"), wishes=(Wish(ONE, "operator", request_id="i"),))
-    assert memory.without_wish(ONE) == Memory(over=tuple("bcdefghi"))
+    memory = SiteMemory(over=tuple("abcdefgh"), wishes=(Wish(ONE, "operator", request_id="i"),))
+    assert memory.without_wish(ONE) == SiteMemory(over=tuple("bcdefghi"))
 
 
 def test_the_site_follows_the_yamls_schedule() -> None:
     night = Charging(at="22:00", until="05:00")
-    assert Site.of(settings(schedule=[night])).schedule == (night,)
+    assert SiteLimits.of(settings(schedule=[night])).schedule == (night,)

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from msgspec.structs import replace
 
-from bridges.kinds.charger.refusals import Refusal, read
+from bridges.kinds.charger.refusals import ChargerRefusal, read
 from bridges.kinds.charger_coordinator import KIND
 from bridges.messages import topics
 from bridges.messages.definitions import ChargerRequest, Duration
@@ -23,7 +23,7 @@ class Office:
     """The coordinator's node on a graph, and an operator who hears its refusals."""
 
     now: float = 0.0
-    heard: list[Refusal | None] = field(default_factory=list)
+    heard: list[ChargerRefusal | None] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         network = MemoryNetwork()
@@ -41,8 +41,8 @@ class Office:
             self.now += 0.25
 
 
-def refused(reason: str, charger: str = "charger_a", robot: str = "tiny/AMR03") -> Refusal:
-    return Refusal(request_id="wish-1", charger=charger, robot=robot, reason=reason)
+def refused(reason: str, charger: str = "charger_a", robot: str = "tiny/AMR03") -> ChargerRefusal:
+    return ChargerRefusal(request_id="wish-1", charger=charger, robot=robot, reason=reason)
 
 
 def test_a_wish_for_a_station_that_does_not_suit_the_robot_is_answered() -> None:

@@ -7,17 +7,17 @@ from bridges.kinds.charger_coordinator.memory import (
     CHARGING,
     ERROR,
     IDLE,
-    Site,
+    SiteLimits,
 )
 from bridges.kinds.charger_coordinator.signals import (
-    StateHeard,
-    Unwanted,
+    ChargerStateHeard,
+    ChargeUnwanted,
 )
 from bridges.kinds.shared.graph_kind import MaySpeak, Woken
 from bridges.messages import definitions as d
 from tests.kinds.charger_coordinator.alone import ONE, SETTINGS, A, Alone, B
 
-SITE = Site.of(SETTINGS)
+SITE = SiteLimits.of(SETTINGS)
 
 
 # ---- COORDINATOR-REPORT-2, COORDINATOR-REPORT-3: what is shown and told
@@ -25,7 +25,7 @@ SITE = Site.of(SETTINGS)
 
 def test_the_report_names_each_station_with_its_state_and_robot() -> None:
     site_ = Alone()
-    site_.shows = {A: StateHeard(A, IDLE)}
+    site_.shows = {A: ChargerStateHeard(A, IDLE)}
     site_.wants(ONE)
     site_.run(1)
     site_.does(A, CHARGING)
@@ -33,7 +33,7 @@ def test_the_report_names_each_station_with_its_state_and_robot() -> None:
     shown = report.report(site_.memory, site_.now, SITE)
     assert shown.read_at == 2.0
     assert shown.stations == ((A, "CHARGING tiny/AMR01, by the robot"), (B, "?"))
-    site_.hears(Unwanted(site_.memory.grants[A].request_id))
+    site_.hears(ChargeUnwanted(site_.memory.grants[A].request_id))
     assert report.report(site_.memory, site_.now, SITE).stations[0] == (A, "CHARGING")
 
 
@@ -46,7 +46,7 @@ def test_the_report_names_each_station_with_its_state_and_robot() -> None:
 )
 def test_a_stranger_on_a_pad_is_named_as_far_as_it_is_known(error: str, who: str) -> None:
     site_ = Alone()
-    site_.shows[A] = StateHeard(A, ERROR, "unrequested/charger_a", None, error)
+    site_.shows[A] = ChargerStateHeard(A, ERROR, "unrequested/charger_a", None, error)
     site_.run(1)
     assert site_.faults == [f"WRONG_STATION: {who} stands at charger_a, but nobody requested that"]
 
@@ -56,7 +56,7 @@ def test_a_fault_is_an_alert_with_its_title_its_reason_and_its_rank() -> None:
     site_.run(1)
     alerts = []
     for station, error in ((A, "station: fan"), (B, "unknown receiver RX-99")):
-        heard = StateHeard(station, ERROR, f"unrequested/{station}", None, error)
+        heard = ChargerStateHeard(station, ERROR, f"unrequested/{station}", None, error)
         decided = core.decide(site_.memory, heard, site_.now, SITE)
         site_.memory = decided.memory
         alerts += [message for _, message in decided.publish]

@@ -4,14 +4,14 @@ from pathlib import Path
 
 import pytest
 
-from bridges.kinds.charger.settings import Robot
+from bridges.kinds.charger.settings import RobotName
 from bridges.kinds.charger_coordinator import messages
 from bridges.kinds.charger_coordinator.schedule import DAYS, Charging, LocalTime, target
 from bridges.settings.load import SettingsError, load
 from tests.kinds.charger_coordinator.virtual_site import settings
 
 CONFIG = Path(__file__).parents[3] / "config" / "charger_coordinator.yaml"
-ONE, TWO = Robot("tiny", "AMR01"), Robot("tiny", "AMR02")
+ONE, TWO = RobotName("tiny", "AMR01"), RobotName("tiny", "AMR02")
 MON, TUE, SUN = 0, 1, 6
 
 

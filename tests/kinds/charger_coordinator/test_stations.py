@@ -4,7 +4,7 @@ hand, and whole memories afterwards."""
 import pytest
 from msgspec.structs import replace
 
-from bridges.kinds.charger.settings import Robot
+from bridges.kinds.charger.settings import RobotName
 from bridges.kinds.charger_coordinator import stations
 from bridges.kinds.charger_coordinator.memory import (
     ASSIGNED,
@@ -14,54 +14,54 @@ from bridges.kinds.charger_coordinator.memory import (
     RELEASED,
     By,
     Grant,
-    Memory,
-    Seen,
-    Site,
+    SiteLimits,
+    SiteMemory,
     Standing,
+    StationSeen,
     Wish,
 )
-from bridges.kinds.charger_coordinator.signals import Sighting, StateHeard
+from bridges.kinds.charger_coordinator.signals import ChargerStateHeard, Sighting
 from bridges.kinds.shared.durations import AGES_AGO, NEVER
 from tests.kinds.charger_coordinator.virtual_site import settings
 
-SITE = Site.of(settings())
-ONE, TWO = Robot("tiny", "AMR01"), Robot("tiny", "AMR02")
+SITE = SiteLimits.of(settings())
+ONE, TWO = RobotName("tiny", "AMR01"), RobotName("tiny", "AMR02")
 A, B = "charger_a", "charger_b"
 WISHES = (Wish(ONE, "fleet"), Wish(TWO, "fleet"))
 GRANT = Grant(ONE, "r1", 10.0, 60.0, shown=True, sent_at=10.0)
 LOST, MISPLACED = "Charger unreachable", "wrong docking: tiny/AMR02 is not assigned here"
 
 
-def at(who: Robot, place: str | None, since: float = AGES_AGO) -> Standing:
+def at(who: RobotName, place: str | None, since: float = AGES_AGO) -> Standing:
     """A robot without a task, as its fleet showed it last."""
     return Standing(Sighting(who, False, place, 50.0, ""), 20.0, since, since)
 
 
-def site(**changes: object) -> Memory:
+def site(**changes: object) -> SiteMemory:
     """AMR01 has charger_a, and AMR02 waits; both stand at their places."""
     robots = {ONE: at(ONE, "wait_1"), TWO: at(TWO, "wait_2")}
     known = {"may_speak": True, "wishes": WISHES, "grants": {A: GRANT}, "robots": robots}
-    return Memory(**{**known, **changes})  # type: ignore[arg-type]
+    return SiteMemory(**{**known, **changes})  # type: ignore[arg-type]
 
 
-def shows(state: int, error: str = "", since: float = 10.0, heard: float = 20.0) -> Seen:
-    return Seen(StateHeard(A, state).state, "r1", ONE, error, heard, since)  # type: ignore[arg-type]
+def shows(state: int, error: str = "", since: float = 10.0, heard: float = 20.0) -> StationSeen:
+    return StationSeen(ChargerStateHeard(A, state).state, "r1", ONE, error, heard, since)  # type: ignore[arg-type]
 
 
-def after(memory: Memory, state: int, error: str = "", request_id: str = "r1") -> Memory:
+def after(memory: SiteMemory, state: int, error: str = "", request_id: str = "r1") -> SiteMemory:
     """The memory once charger_a has shown this at 30 s, but for the state itself."""
-    heard = StateHeard(A, state, request_id, ONE, error)  # type: ignore[arg-type]
+    heard = ChargerStateHeard(A, state, request_id, ONE, error)  # type: ignore[arg-type]
     return replace(stations.heard(memory, heard, 30.0, SITE), stations=memory.stations)
 
 
 def test_a_stations_state_is_remembered_with_since_when_and_how_long_it_will_take() -> None:
-    heard = StateHeard(B, CHARGING, "r9", TWO, "", 720.0)
-    first = stations.heard(Memory(), heard, 30.0, SITE)
-    assert first.stations == {B: Seen(CHARGING, "r9", TWO, "", 30.0, 30.0, 720.0)}
+    heard = ChargerStateHeard(B, CHARGING, "r9", TWO, "", 720.0)
+    first = stations.heard(SiteMemory(), heard, 30.0, SITE)
+    assert first.stations == {B: StationSeen(CHARGING, "r9", TWO, "", 30.0, 30.0, 720.0)}
     again = stations.heard(first, replace(heard, full_in_s=719.0), 31.0, SITE)
-    assert again.stations == {B: Seen(CHARGING, "r9", TWO, "", 31.0, 30.0, 719.0)}
-    error = stations.heard(again, StateHeard(B, ERROR, "r9", TWO, "fan"), 32.0, SITE)
-    assert error.stations == {B: Seen(ERROR, "r9", TWO, "fan", 32.0, 32.0, 0.0)}
+    assert again.stations == {B: StationSeen(CHARGING, "r9", TWO, "", 31.0, 30.0, 719.0)}
+    error = stations.heard(again, ChargerStateHeard(B, ERROR, "r9", TWO, "fan"), 32.0, SITE)
+    assert error.stations == {B: StationSeen(ERROR, "r9", TWO, "fan", 32.0, 32.0, 0.0)}
 
 
 # ---- COORDINATOR-STATIONS-1, COORDINATOR-STATIONS-2: how a request ends
@@ -85,7 +85,10 @@ def test_a_request_that_the_station_shows_is_taken_and_is_begun_when_it_charges(
     ],
 )
 def test_a_robot_that_was_let_go_uncharged_did_not_come_or_has_failed_where_it_stands(
-    by: By, place: str | None, queue: tuple[Robot, ...], strikes: dict[Robot, tuple[str, ...]]
+    by: By,
+    place: str | None,
+    queue: tuple[RobotName, ...],
+    strikes: dict[RobotName, tuple[str, ...]],
 ) -> None:
     wishes = (Wish(ONE, by), Wish(TWO, "fleet"))
     memory = site(wishes=wishes, robots={ONE: at(ONE, place), TWO: at(TWO, "wait_2")})
@@ -118,8 +121,8 @@ def test_a_charge_that_ends_is_a_wish_fulfilled() -> None:
 )
 def test_after_an_error_the_station_is_told_to_let_go_and_the_robot_keeps_its_place(
     error: str,
-    before: dict[Robot, tuple[str, ...]],
-    strikes: dict[Robot, tuple[str, ...]],
+    before: dict[RobotName, tuple[str, ...]],
+    strikes: dict[RobotName, tuple[str, ...]],
     waits: bool,
 ) -> None:
     memory = site(strikes=before)
@@ -144,7 +147,7 @@ def test_an_unnamed_charge_is_that_of_a_robot_that_waits_there_without_a_station
     state: int, started: bool
 ) -> None:
     robots = {who: at(who, "charger_a") for who in (ONE, TWO)}
-    seen = Seen(shows(state).state, "r9", None, "", 20.0, 10.0)
+    seen = StationSeen(shows(state).state, "r9", None, "", 20.0, 10.0)
     memory = site(grants={B: GRANT}, robots=robots, stations={A: seen})
     granted = Grant(TWO, "r9", 30.0, shown=True, started=started)
     assert stations.adopted(memory, 30.0, SITE).grants == {B: GRANT, A: granted}
@@ -167,7 +170,7 @@ def test_an_unnamed_charge_is_that_of_a_robot_that_waits_there_without_a_station
     ],
 )
 def test_a_station_is_hopeless_when_it_is_silent_lost_or_blocked_for_long(
-    seen: Seen | None, timeout_s: float, at_: float
+    seen: StationSeen | None, timeout_s: float, at_: float
 ) -> None:
     known = {B: shows(ERROR, LOST, since=1.0, heard=1.0)} | ({A: seen} if seen else {})
     grant = replace(GRANT, start_timeout_s=timeout_s)
@@ -242,7 +245,7 @@ def test_a_charge_under_way_or_over_is_left_alone_and_the_next_request_is_not() 
     ],
 )
 def test_a_station_that_names_its_own_side_has_not_been_failed_by_anybody(
-    state: int, error: str, strikes: dict[Robot, tuple[str, ...]]
+    state: int, error: str, strikes: dict[RobotName, tuple[str, ...]]
 ) -> None:
     memory = site(grants={}, strikes={ONE: (A, B), TWO: (B,)})
     assert after(memory, state, error).strikes == strikes

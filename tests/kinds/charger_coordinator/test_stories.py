@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 from msgspec.structs import replace
 
-from bridges.kinds.charger.settings import Robot
+from bridges.kinds.charger.settings import RobotName
 from bridges.kinds.shared.decision import OperatorReset
 from bridges.messages import definitions as d
 from bridges.messages import topics
@@ -438,7 +438,7 @@ def test_a_robot_on_its_way_to_a_station_that_falls_silent_is_sent_to_another() 
 def test_a_station_whose_daemon_takes_no_request_is_passed_over() -> None:
     site = yard(drive_s=20.0)
     a = site.chargers["charger_a"]
-    a.limits = replace(a.limits, receivers={"RX-9": Robot("other", "robot")})
+    a.limits = replace(a.limits, receivers={"RX-9": RobotName("other", "robot")})
     site.fleet.charge("AMR01", site.now)
     assert site.run(18.0) == [
         (7.25, "charger_a <- charge AMR01"),

@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
 
-from bridges.kinds.charger.settings import Robot
+from bridges.kinds.charger.settings import RobotName
 from bridges.kinds.charger_coordinator import core, keep
 from bridges.kinds.charger_coordinator.memory import (
     ASSIGNED,
@@ -21,16 +21,16 @@ from bridges.kinds.charger_coordinator.memory import (
     IDLE,
     RELEASED,
     STATION_SILENT_S,
-    Memory,
-    Site,
+    SiteLimits,
+    SiteMemory,
 )
 from bridges.kinds.charger_coordinator.signals import (
+    ChargerStateHeard,
+    ChargeUnwanted,
+    ChargeWanted,
     Dedicated,
     FleetSeen,
     Sighting,
-    StateHeard,
-    Unwanted,
-    Wanted,
 )
 from bridges.kinds.shared.decision import OperatorReset
 from bridges.kinds.shared.graph_kind import MaySpeak, Woken
@@ -40,8 +40,8 @@ from tests.kinds.charger_coordinator.virtual_site import settings
 from tests.walk import histories
 
 SETTINGS = settings()
-SITE = Site.of(SETTINGS)
-ONE, TWO = Robot("tiny", "AMR01"), Robot("tiny", "AMR02")
+SITE = SiteLimits.of(SETTINGS)
+ONE, TWO = RobotName("tiny", "AMR01"), RobotName("tiny", "AMR02")
 A, B = "charger_a", "charger_b"
 WAYPOINTS = set(SETTINGS.fleets["tiny"].waypoints)
 STEP_S = 1.25
@@ -53,13 +53,13 @@ class Node:
 
     def __init__(self) -> None:
         self.state = IDLE
-        self.holder: tuple[str, Robot] | None = None
+        self.holder: tuple[str, RobotName] | None = None
         self.error = ""
         self.ends = False
-        self.on_pad: Robot | None = None
+        self.on_pad: RobotName | None = None
         self.known: set[str] = set()
 
-    def takes(self, who: Robot) -> bool:
+    def takes(self, who: RobotName) -> bool:
         """May this robot have it?"""
         return self.state is IDLE or (self.holder is None and self.on_pad == who)
 
@@ -71,7 +71,7 @@ class Node:
 
     def hears(self, message: Any) -> None:
         if isinstance(message, d.ChargerRequest):
-            who = Robot(message.fleet_name, message.robot_name)
+            who = RobotName(message.fleet_name, message.robot_name)
             if self.takes(who) and message.request_id not in self.known:
                 self.known.add(message.request_id)
                 self.state, self.holder, self.ends = ASSIGNED, (message.request_id, who), False
@@ -98,11 +98,11 @@ class Node:
     def fails(self, error: str) -> None:
         self.state, self.error = ERROR, error
 
-    def shown(self, name: str) -> StateHeard:
+    def shown(self, name: str) -> ChargerStateHeard:
         request_id, who = self.holder or ("", self.on_pad)
         if not request_id and self.state is not IDLE:
             request_id = f"unrequested/{name}"
-        return StateHeard(name, self.state, request_id, who, self.error)
+        return ChargerStateHeard(name, self.state, request_id, who, self.error)
 
 
 class Ledger:
@@ -111,7 +111,7 @@ class Ledger:
     def __init__(self) -> None:
         self.now = 0.0
         self.speaks = False
-        self.memory: Memory = core.initial("site", 0.0)
+        self.memory: SiteMemory = core.initial("site", 0.0)
         self.nodes = {A: Node(), B: Node()}
         self.wants = {ONE: False, TWO: False}
         self.charged = {ONE: 0, TWO: 0}
@@ -168,7 +168,7 @@ class Ledger:
     def _check(self, message: Any) -> None:
         match message:
             case d.ChargerRequest(charger_name=name):
-                node, who = self.nodes[name], Robot(message.fleet_name, message.robot_name)
+                node, who = self.nodes[name], RobotName(message.fleet_name, message.robot_name)
                 if message.request_id in node.known:
                     return  # a repeat
                 assert node.takes(who), "asked for a station that is not free"
@@ -184,7 +184,7 @@ class Ledger:
         live = self._live()
         assert len(set(live)) == len(live), "one robot, two stations"
 
-    def _live(self) -> list[Robot]:
+    def _live(self) -> list[RobotName]:
         """The robots that have a station, and are not to leave it."""
         return [
             node.holder[1]
@@ -208,7 +208,7 @@ class Ledger:
         self.hears(MaySpeak(True))
 
 
-def flip(who: Robot) -> Any:
+def flip(who: RobotName) -> Any:
     def move(ledger: Ledger) -> None:
         ledger.wants[who] = not ledger.wants[who]
         ledger.passes()
@@ -227,7 +227,7 @@ MOVES: list[Any] = [
     lambda ledger: ledger.hears(MaySpeak(not ledger.speaks)),
     lambda ledger: ledger.restarts(),
     lambda ledger: ledger.nodes[A].restarts(),
-    lambda ledger: ledger.hears(Wanted(TWO, A, "op-1", 0.0)),
+    lambda ledger: ledger.hears(ChargeWanted(TWO, A, "op-1", 0.0)),
 ]
 
 
@@ -258,7 +258,7 @@ def test_every_long_history_ends_well(history: list[int]) -> None:
     ledger.check_all_are_charged_in_the_end()
 
 
-ROBOTS = st.sampled_from([ONE, TWO, Robot("tiny", "AMR03")])
+ROBOTS = st.sampled_from([ONE, TWO, RobotName("tiny", "AMR03")])
 STATIONS = st.sampled_from([A, B])
 TEXTS = st.sampled_from(
     [
@@ -282,7 +282,7 @@ IDS = st.sampled_from(
 )
 EVENTS = st.one_of(
     st.builds(
-        StateHeard,
+        ChargerStateHeard,
         STATIONS,
         st.sampled_from([IDLE, ASSIGNED, CHARGING, RELEASED, ERROR]),
         IDS,
@@ -298,9 +298,13 @@ EVENTS = st.one_of(
         st.sampled_from(["", "task"]),
     ).map(lambda sighting: FleetSeen((sighting,))),
     st.builds(
-        Wanted, ROBOTS, st.sampled_from(["", A, B]), st.sampled_from(["op-1", "op-2"]), st.just(9.0)
+        ChargeWanted,
+        ROBOTS,
+        st.sampled_from(["", A, B]),
+        st.sampled_from(["op-1", "op-2"]),
+        st.just(9.0),
     ),
-    st.builds(Unwanted, st.sampled_from(["op-1", "op-2", "somebody-1"])),
+    st.builds(ChargeUnwanted, st.sampled_from(["op-1", "op-2", "somebody-1"])),
     st.tuples(ROBOTS, STATIONS).map(lambda pair: Dedicated((pair,))),
     st.booleans().map(MaySpeak),
     st.just(OperatorReset()),

@@ -3,18 +3,25 @@
 import pytest
 from msgspec.structs import replace
 
-from bridges.kinds.charger.settings import Robot
+from bridges.kinds.charger.settings import RobotName
 from bridges.kinds.charger_coordinator import wishes
-from bridges.kinds.charger_coordinator.memory import By, Grant, Memory, Site, Standing, Wish
+from bridges.kinds.charger_coordinator.memory import (
+    By,
+    Grant,
+    SiteLimits,
+    SiteMemory,
+    Standing,
+    Wish,
+)
 from bridges.kinds.charger_coordinator.schedule import Charging, LocalTime
-from bridges.kinds.charger_coordinator.signals import Sighting, Wanted
+from bridges.kinds.charger_coordinator.signals import ChargeWanted, Sighting
 from bridges.kinds.shared.durations import AGES_AGO
 from tests.kinds.charger_coordinator.virtual_site import settings
 
 NIGHT = Charging(at="22:00", until="05:00", robots=["tiny/AMR01"], percent=95.0)
-SITE = Site.of(settings())
-SCHEDULED = Site.of(settings(schedule=[NIGHT]))
-ONE, TWO = Robot("tiny", "AMR01"), Robot("tiny", "AMR02")
+SITE = SiteLimits.of(settings())
+SCHEDULED = SiteLimits.of(settings(schedule=[NIGHT]))
+ONE, TWO = RobotName("tiny", "AMR01"), RobotName("tiny", "AMR02")
 A, B = "charger_a", "charger_b"
 CALLED = Grant(ONE, "r1", 10.0, shown=True)
 AT_NIGHT, AT_NOON = LocalTime(0, 23 * 60), LocalTime(0, 12 * 60)
@@ -27,7 +34,9 @@ def seen(
     return Sighting(ONE, charges, place, percent, task)
 
 
-def after(memory: Memory, sighting: Sighting, now: float, site: Site = SITE) -> Memory:
+def after(
+    memory: SiteMemory, sighting: Sighting, now: float, site: SiteLimits = SITE
+) -> SiteMemory:
     """The memory once a fleet has shown it, but for what is remembered of the sighting itself."""
     return replace(wishes.sighted(memory, sighting, now, site), robots=memory.robots)
 
@@ -36,25 +45,25 @@ def after(memory: Memory, sighting: Sighting, now: float, site: Site = SITE) -> 
 
 
 def test_an_operators_request_counts_once_and_not_again_when_it_is_over() -> None:
-    asked = Wanted(ONE, B, "op-1", 30.0)
+    asked = ChargeWanted(ONE, B, "op-1", 30.0)
     wish = Wish(ONE, "operator", "", False, B, "op-1", 30.0)
-    taken = Memory(wishes=(Wish(TWO, "fleet"), wish), strikes={TWO: (A,)})
+    taken = SiteMemory(wishes=(Wish(TWO, "fleet"), wish), strikes={TWO: (A,)})
     before = replace(taken, wishes=taken.wishes[:1], strikes={TWO: (A,), ONE: (B,)})
     assert wishes.wanted(before, asked, SITE) == (taken, "")
     again = replace(taken, strikes={ONE: (B,)})
     assert wishes.wanted(again, asked, SITE) == (again, "")
     over = replace(before, over=("op-1",))
     assert wishes.wanted(over, asked, SITE) == (over, "request is over")
-    three = Robot("tiny", "AMR03")
+    three = RobotName("tiny", "AMR03")
     unsuited = (before, "station does not suit the robot")
-    assert wishes.wanted(before, Wanted(three, A, "op-2", 0.0), SITE) == unsuited
+    assert wishes.wanted(before, ChargeWanted(three, A, "op-2", 0.0), SITE) == unsuited
 
 
 def test_an_operators_newer_request_takes_the_robot_from_a_station_that_it_does_not_name() -> None:
     wish = Wish(ONE, "operator", request_id="op-1")
-    memory = Memory(wishes=(wish, Wish(TWO, "fleet")), grants={A: CALLED})
+    memory = SiteMemory(wishes=(wish, Wish(TWO, "fleet")), grants={A: CALLED})
     for station, grant in ((A, CALLED), ("", CALLED), (B, replace(CALLED, over=True))):
-        changed, refused = wishes.wanted(memory, Wanted(ONE, station, "op-2", 0.0), SITE)
+        changed, refused = wishes.wanted(memory, ChargeWanted(ONE, station, "op-2", 0.0), SITE)
         newer = Wish(ONE, "operator", station=station, request_id="op-2")
         assert (changed.wishes, refused) == ((newer, Wish(TWO, "fleet")), "")
         assert changed.grants == {A: grant}
@@ -62,7 +71,7 @@ def test_an_operators_newer_request_takes_the_robot_from_a_station_that_it_does_
 
 def test_a_withdrawal_is_by_the_operators_id_or_by_the_one_that_the_station_shows() -> None:
     wish = Wish(ONE, "operator", request_id="op-1")
-    memory = Memory(wishes=(wish, Wish(TWO, "fleet")), grants={A: CALLED}, over=("op-0",))
+    memory = SiteMemory(wishes=(wish, Wish(TWO, "fleet")), grants={A: CALLED}, over=("op-0",))
     left = replace(memory, wishes=memory.wishes[1:], grants={A: replace(CALLED, over=True)})
     withdrawn = replace(left, over=("op-0", "op-1"))
     assert wishes.unwanted(memory, "op-1") == (withdrawn, "")
@@ -93,20 +102,20 @@ def test_a_robot_stays_away_if_it_has_no_task_and_has_not_left_its_place_since_i
     place: str | None, since: float, task: str, by: By, stays: bool
 ) -> None:
     standing = Standing(seen(place, task=task), 60.0, since, since)
-    memory = Memory(robots={ONE: standing}, wishes=(Wish(ONE, by),), grants={A: CALLED})
+    memory = SiteMemory(robots={ONE: standing}, wishes=(Wish(ONE, by),), grants={A: CALLED})
     assert wishes.stays_away(memory, A, CALLED, SITE) is stays
 
 
 def test_a_robot_that_is_not_seen_or_wants_nothing_does_not_stay_away() -> None:
     standing = Standing(seen(), 60.0)
-    for memory in (Memory(wishes=(Wish(ONE, "fleet"),)), Memory(robots={ONE: standing})):
+    for memory in (SiteMemory(wishes=(Wish(ONE, "fleet"),)), SiteMemory(robots={ONE: standing})):
         assert wishes.stays_away(memory, A, CALLED, SITE) is False
 
 
 def test_a_robot_that_did_not_come_loses_station_and_wish_and_is_not_called_for_ten_minutes() -> (
     None
 ):
-    memory = Memory(
+    memory = SiteMemory(
         wishes=(Wish(TWO, "fleet"), Wish(ONE, "fleet")),
         grants={A: replace(CALLED, sent_at=60.0)},
         absent={TWO: 300.0},
@@ -122,9 +131,9 @@ def test_a_robot_that_did_not_come_loses_station_and_wish_and_is_not_called_for_
 # ---- COORDINATOR-WISHES-2, COORDINATOR-WISHES-3: it was charged
 
 
-def charged(by: By = "fleet", **changes: object) -> Memory:
+def charged(by: By = "fleet", **changes: object) -> SiteMemory:
     """AMR01 charges at charger_a; it failed before, and waits at a pad in the task "t1"."""
-    return Memory(
+    return SiteMemory(
         wishes=(Wish(ONE, by, "t1"), Wish(TWO, "fleet")),
         grants={A: Grant(ONE, "r1", 10.0, shown=True, started=True, sent_at=10.0)},
         strikes={ONE: (B,), TWO: (A,)},
@@ -164,7 +173,7 @@ def test_a_robot_that_leaves_before_it_is_full_was_not_served() -> None:
 
 def test_a_charge_of_the_schedule_rests_its_robot_until_the_time_is_over() -> None:
     memory = charged("schedule", when=AT_NIGHT)
-    for site, rested in ((SCHEDULED, frozenset({ONE})), (SITE, frozenset[Robot]())):
+    for site, rested in ((SCHEDULED, frozenset({ONE})), (SITE, frozenset[RobotName]())):
         assert wishes.fulfilled(memory, ONE, site).rested == rested
     by_day = replace(memory, when=AT_NOON, rested=frozenset({TWO}))
     assert wishes.fulfilled(by_day, ONE, SCHEDULED).rested == {TWO}
@@ -185,7 +194,7 @@ def test_a_charge_of_the_schedule_rests_its_robot_until_the_time_is_over() -> No
     ],
 )
 def test_a_rested_robot_is_rested_until_it_works(sighting: Sighting, rests: bool) -> None:
-    memory = Memory(when=AT_NIGHT, rested=frozenset({ONE, TWO}))
+    memory = SiteMemory(when=AT_NIGHT, rested=frozenset({ONE, TWO}))
     rested = after(memory, sighting, 30.0, SCHEDULED).rested
     assert rested == ({ONE, TWO} if rests else {TWO})
 
@@ -197,9 +206,9 @@ def test_a_robot_that_is_full_enough_is_rested_only_while_the_schedule_says_so()
         (AT_NOON, 100.0, {TWO}),
         (None, 100.0, {TWO}),
     ):
-        memory = Memory(when=when, rested=frozenset({TWO}))
+        memory = SiteMemory(when=when, rested=frozenset({TWO}))
         assert after(memory, seen(percent=percent), 30.0, SCHEDULED).rested == rested
-    over = Memory(when=AT_NOON, rested=frozenset({ONE, TWO}))
+    over = SiteMemory(when=AT_NOON, rested=frozenset({ONE, TWO}))
     assert after(over, seen(), 30.0, SCHEDULED).rested == {TWO}
 
 
@@ -213,9 +222,9 @@ def test_a_robot_that_is_full_enough_is_rested_only_while_the_schedule_says_so()
     ],
 )
 def test_a_robot_that_has_left_in_another_task_was_served_long_ago(
-    sighting: Sighting, served: dict[Robot, str]
+    sighting: Sighting, served: dict[RobotName, str]
 ) -> None:
-    memory = Memory(served={ONE: "t1", TWO: "t9"})
+    memory = SiteMemory(served={ONE: "t1", TWO: "t9"})
     assert after(memory, sighting, 30.0).served == served
 
 
@@ -240,7 +249,7 @@ def test_a_task_that_begins_soon_after_the_call_is_the_drive_to_the_station(
     wish: Wish, changed: dict[str, bool], now: float, then: Wish | None
 ) -> None:
     two = Wish(TWO, "fleet")
-    memory = Memory(wishes=(two, wish), grants={A: replace(CALLED, **changed)})
+    memory = SiteMemory(wishes=(two, wish), grants={A: replace(CALLED, **changed)})
     found = after(memory, seen(None, task="t2"), now).wishes
     assert found == (two, then) if then else found == (two,)
 
@@ -249,7 +258,7 @@ def test_a_task_that_begins_soon_after_the_call_is_the_drive_to_the_station(
 
 
 def test_a_wish_begins_once_the_robot_has_stood_there_for_two_seconds() -> None:
-    memory = Memory(
+    memory = SiteMemory(
         robots={ONE: Standing(seen(), 12.0, 11.0, 11.0)},
         served={ONE: "t0"},
         absent={ONE: 5.0, TWO: 99.0},
@@ -271,7 +280,7 @@ def test_a_wish_begins_once_the_robot_has_stood_there_for_two_seconds() -> None:
 def test_how_long_a_robot_has_stood_there_and_done_the_same_is_remembered(
     changed: Sighting, since: float, here_since: float
 ) -> None:
-    memory = Memory(robots={ONE: Standing(seen("wait_1", 50.0, "t1", True), 8.0, 5.0, 4.0)})
+    memory = SiteMemory(robots={ONE: Standing(seen("wait_1", 50.0, "t1", True), 8.0, 5.0, 4.0)})
     found = wishes.sighted(memory, changed, 9.0, SITE).robots
     assert found == {ONE: Standing(changed, 9.0, since, here_since)}
 
@@ -309,7 +318,7 @@ def test_how_long_a_robot_has_stood_there_and_done_the_same_is_remembered(
 def test_battery_task_and_schedule_say_whether_a_robot_that_stands_there_wants_to_be_charged(
     sighting: Sighting, changes: dict[str, object], by: By | None
 ) -> None:
-    before = Memory(robots={ONE: Standing(sighting, 29.0)}, **changes)  # type: ignore[arg-type]
+    before = SiteMemory(robots={ONE: Standing(sighting, 29.0)}, **changes)  # type: ignore[arg-type]
     found = wishes.sighted(before, sighting, 30.0, SCHEDULED).wishes
     assert found == (() if by is None else (Wish(ONE, by, sighting.task_id),))
 
@@ -321,7 +330,7 @@ def test_a_served_robots_mode_is_believed_after_five_minutes_in_another_task(
     task: str, now: float, believed: bool
 ) -> None:
     sighting = seen("charger_a", 95.0, task, True)
-    memory = Memory(robots={ONE: Standing(sighting, 10.0, 10.0, 5.0)}, served={ONE: "t1"})
+    memory = SiteMemory(robots={ONE: Standing(sighting, 10.0, 10.0, 5.0)}, served={ONE: "t1"})
     found = (Wish(ONE, "fleet", task),) if believed else ()
     assert after(memory, sighting, now).wishes == found
 
@@ -353,14 +362,14 @@ def test_a_wish_lasts_while_the_robot_stands_there_so_or_drives_there(
     wish: Wish, sighting: Sighting, station: str, lasts: bool
 ) -> None:
     grants = {station: replace(CALLED, made_at=-99.0)} if station else {}
-    memory = Memory(wishes=(wish,), grants=grants, when=AT_NIGHT)
+    memory = SiteMemory(wishes=(wish,), grants=grants, when=AT_NIGHT)
     assert wishes.sighted(memory, sighting, 30.0, SCHEDULED).wishes[:1] == (
         (wish,) if lasts else ()
     )
 
 
 def test_after_its_time_a_schedules_wish_lasts_until_the_battery_is_not_low() -> None:
-    memory = Memory(wishes=(Wish(ONE, "schedule"),), when=AT_NOON)
+    memory = SiteMemory(wishes=(Wish(ONE, "schedule"),), when=AT_NOON)
     for percent, left in ((89.9, memory.wishes), (90.0, ())):
         assert after(memory, seen(percent=percent), 30.0, SCHEDULED).wishes == left
     without_schedule = after(memory, seen(percent=99.9), 30.0, SITE)

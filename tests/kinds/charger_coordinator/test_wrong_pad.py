@@ -5,7 +5,7 @@ from collections.abc import Mapping
 import pytest
 from msgspec.structs import replace
 
-from bridges.kinds.charger.settings import Robot
+from bridges.kinds.charger.settings import RobotName
 from bridges.kinds.charger_coordinator import wrong_pad
 from bridges.kinds.charger_coordinator.memory import (
     ASSIGNED,
@@ -13,21 +13,21 @@ from bridges.kinds.charger_coordinator.memory import (
     ERROR,
     IDLE,
     Grant,
-    Memory,
     Nudge,
-    Seen,
-    Site,
+    SiteLimits,
+    SiteMemory,
     Standing,
+    StationSeen,
     Wish,
 )
 from bridges.kinds.charger_coordinator.signals import Sighting
-from bridges.kinds.charger_coordinator.wrong_pad import Astray
+from bridges.kinds.charger_coordinator.wrong_pad import OnWrongPad
 from bridges.kinds.shared.durations import NEVER
 from bridges.messages.definitions import ChargerStateValue
 from tests.kinds.charger_coordinator.virtual_site import settings
 
-SITE = Site.of(settings())
-ONE, TWO, THREE = (Robot("tiny", f"AMR0{i}") for i in (1, 2, 3))
+SITE = SiteLimits.of(settings())
+ONE, TWO, THREE = (RobotName("tiny", f"AMR0{i}") for i in (1, 2, 3))
 A, B = "charger_a", "charger_b"
 AT = {A: "charger_a", B: "dock_b"}
 """Station -> its waypoint."""
@@ -35,33 +35,33 @@ PAD = "wrong docking: tiny/AMR01 is not assigned here"
 
 
 def at(
-    who: Robot, place: str | None, since: float, task: str = "", heard: float = 85.0
+    who: RobotName, place: str | None, since: float, task: str = "", heard: float = 85.0
 ) -> Standing:
     """A robot at one of our waypoints since then, as its fleet showed it last at `heard`."""
     return Standing(Sighting(who, False, place, 50.0, task), heard, since, since)
 
 
-def shows(state: ChargerStateValue = IDLE, since: float = 0.0, error: str = "") -> Seen:
+def shows(state: ChargerStateValue = IDLE, since: float = 0.0, error: str = "") -> StationSeen:
     """A station's state since then."""
-    return Seen(state, "", None, error, 85.0, since)
+    return StationSeen(state, "", None, error, 85.0, since)
 
 
-def site(*robots: Standing, **changes: object) -> Memory:
+def site(*robots: Standing, **changes: object) -> SiteMemory:
     """Both stations are idle, and we assign."""
     found: Mapping[str, object] = {
         "may_speak": True,
         "robots": {standing.sighting.who: standing for standing in robots},
         "stations": {A: shows(), B: shows()},
     }
-    return Memory(**{**found, **changes})  # type: ignore[arg-type]
+    return SiteMemory(**{**found, **changes})  # type: ignore[arg-type]
 
 
-def found(memory: Memory, *times: float) -> list[list[Astray]]:
+def found(memory: SiteMemory, *times: float) -> list[list[OnWrongPad]]:
     """Who is astray at each of these times."""
     return [list(wrong_pad.found(memory, now, SITE).values()) for now in times]
 
 
-# ---- COORDINATOR-ASTRAY-1: who has a station, and stands at another
+# ---- COORDINATOR-WRONG-PAD-1: who has a station, and stands at another
 
 EXPECTED = {A: Grant(ONE, "r1", 10.0, shown=True)}
 
@@ -71,7 +71,7 @@ def test_a_robot_that_came_after_its_call_is_astray_soon_and_one_that_was_there_
     came_at: float, since: float
 ) -> None:
     memory = site(at(ONE, AT[B], came_at), grants=EXPECTED)
-    one = Astray(ONE, B, since, "r1", 2, expected=A)
+    one = OnWrongPad(ONE, B, since, "r1", 2, expected=A)
     assert found(memory, since - 0.1, since, NEVER) == [[], [one], [one]]
 
 
@@ -83,7 +83,7 @@ def test_a_robot_at_its_own_station_or_at_none_is_not_astray() -> None:
 def test_a_robot_that_was_charged_or_has_lost_its_station_is_not_astray_and_the_next_still_is() -> (
     None
 ):
-    two = Astray(TWO, A, 22.0, "r2", 2, expected=B)
+    two = OnWrongPad(TWO, A, 22.0, "r2", 2, expected=B)
     for first in (replace(EXPECTED[A], started=True), replace(EXPECTED[A], over=True)):
         grants = {A: first, B: Grant(TWO, "r2", 10.0, shown=True)}
         memory = site(at(ONE, AT[B], 20.0), at(TWO, AT[A], 20.0), grants=grants)
@@ -91,13 +91,15 @@ def test_a_robot_that_was_charged_or_has_lost_its_station_is_not_astray_and_the_
 
 
 def test_the_stations_own_word_for_who_is_on_its_pad_counts_at_once_and_only_in_error() -> None:
-    for state, strays in ((ERROR, [Astray(ONE, B, 15.0, "r1", 2, expected=A)]), (IDLE, [])):
+    for state, strays in ((ERROR, [OnWrongPad(ONE, B, 15.0, "r1", 2, expected=A)]), (IDLE, [])):
         stations = {A: shows(), B: shows(state, 15.0, PAD)}
         memory = site(at(ONE, None, 12.0), grants=EXPECTED, stations=stations)
         assert found(memory, 15.0) == [strays]
 
 
-def history(memory: Memory, *times: float) -> list[tuple[float, dict[Robot, Nudge], bool, bool]]:
+def history(
+    memory: SiteMemory, *times: float
+) -> list[tuple[float, dict[RobotName, Nudge], bool, bool]]:
     """(s, who was told so far, whether ONE is told now, whether a person must come), as time passes."""
     lines = []
     for now in times:
@@ -109,7 +111,7 @@ def history(memory: Memory, *times: float) -> list[tuple[float, dict[Robot, Nudg
     return lines
 
 
-# ---- COORDINATOR-ASTRAY-1, COORDINATOR-ASTRAY-4: what it is told
+# ---- COORDINATOR-WRONG-PAD-1, COORDINATOR-WRONG-PAD-4: what it is told
 
 
 def test_a_stray_is_told_twice_for_one_request_and_then_a_person_is() -> None:
@@ -137,7 +139,7 @@ def test_a_stray_is_told_again_for_a_new_request_and_the_count_lasts_on_its_way(
     assert wrong_pad.nudged(left, 60.0, SITE).nudges == {ONE: Nudge("r1", 1, 22.0)}
 
 
-# ---- COORDINATOR-ASTRAY-3, COORDINATOR-ASTRAY-4: who cannot be told
+# ---- COORDINATOR-WRONG-PAD-3, COORDINATOR-WRONG-PAD-4: who cannot be told
 
 
 @pytest.mark.parametrize("why", ["it works", "another node assigns", "we may not speak"])
@@ -160,18 +162,18 @@ def test_the_core_wakes_for_every_step_with_a_robot_astray() -> None:
     assert dues == [[22.0, 22.0, NEVER], [22.0, 23.0, 37.0, NEVER], [22.0, 38.0, 52.0, NEVER]]
 
 
-# ---- COORDINATOR-ASTRAY-2: who has no station, and stands on a pad that another waits for
+# ---- COORDINATOR-WRONG-PAD-2: who has no station, and stands on a pad that another waits for
 
 WAITS = (Wish(ONE, "fleet"),)
-BLOCKS = Astray(TWO, A, 90.0, A, 1, waiter=ONE)
+BLOCKS = OnWrongPad(TWO, A, 90.0, A, 1, waiter=ONE)
 
 
-def blocks(station: str) -> Astray:
+def blocks(station: str) -> OnWrongPad:
     """TWO blocks this one."""
     return BLOCKS._replace(station=station, why=station)
 
 
-def blocked(came_at: float = 30.0, **changes: object) -> Memory:
+def blocked(came_at: float = 30.0, **changes: object) -> SiteMemory:
     """TWO stands at charger_a, where nobody charges it, and ONE waits."""
     return site(at(TWO, AT[A], came_at), **{"wishes": WAITS, **changes})
 

@@ -6,18 +6,23 @@ from typing import Any
 from bridges.kinds.charger import core as charger
 from bridges.kinds.charger import messages as charger_messages
 from bridges.kinds.charger.memory import ChargerLimits
-from bridges.kinds.charger.settings import ChargerSettings, Durations, Robot
+from bridges.kinds.charger.settings import ChargerDurations, ChargerSettings, RobotName
 from bridges.kinds.charger.signals import Activity, ChargerSample, FaultSide, Measured
 from bridges.kinds.charger_coordinator import KIND
-from bridges.kinds.charger_coordinator.settings import Fleet as FleetSettings
-from bridges.kinds.charger_coordinator.settings import RobotSettings, Settings, Station, Waypoint
+from bridges.kinds.charger_coordinator.settings import (
+    CoordinatorSettings,
+    RobotSettings,
+    StationSettings,
+    Waypoint,
+)
+from bridges.kinds.charger_coordinator.settings import FleetSettings as FleetSettings
 from bridges.kinds.shared.decision import IoFailed, RequestRefused, Sampled
 from bridges.messages import definitions as d
 from bridges.messages import topics, words
 from bridges.messages.stamps import duration
 from bridges.runtime.graph_node import GraphNode
 from tests.runtime.virtual_graph import EPOCH, Disk, Served, Ticking, World, in_order
-from workbench.rmf_model.fleet import Finishing, Fleet
+from workbench.rmf_model.fleet import Finishing, FleetAdapter
 
 STEP_S = 0.25
 GRAPH = {
@@ -40,11 +45,11 @@ PLACES = {
     "charger_b": {"tiny": "dock_b", "big": "station_2"},
 }
 NO_ERROR: tuple[FaultSide, str] = ("", "")
-RECEIVERS = {f"RX-{i}": Robot("tiny", f"AMR0{i}") for i in (1, 2, 3)}
-BIG = {"RX-9": Robot("big", "B01")}
+RECEIVERS = {f"RX-{i}": RobotName("tiny", f"AMR0{i}") for i in (1, 2, 3)}
+BIG = {"RX-9": RobotName("big", "B01")}
 
 
-def settings(**changes: Any) -> Settings:
+def settings(**changes: Any) -> CoordinatorSettings:
     """Two stations, three robots that may use both; `AMR03` charger_b only."""
     robots = {
         who.name: RobotSettings(
@@ -60,14 +65,17 @@ def settings(**changes: Any) -> Settings:
         if name != "ward"
     }
     known: dict[str, Any] = {
-        "stations": {"charger_a": Station(), "charger_b": Station(waypoint="dock_b")},
+        "stations": {
+            "charger_a": StationSettings(),
+            "charger_b": StationSettings(waypoint="dock_b"),
+        },
         "fleets": {"tiny": FleetSettings(waypoints=waypoints, robots=robots)},
         "start_timeout_s": 60.0,
     }
-    return Settings(**(known | changes))
+    return CoordinatorSettings(**(known | changes))
 
 
-def two_brands() -> Settings:
+def two_brands() -> CoordinatorSettings:
     """The same two stations, and a fleet of another brand beside the first."""
     tiny = settings().fleets["tiny"]
     waypoints = {
@@ -78,8 +86,8 @@ def two_brands() -> Settings:
     )
     big = FleetSettings(waypoints=waypoints, robots={"B01": robot})
     stations = {
-        "charger_a": Station(waypoints={"big": "station_1"}),
-        "charger_b": Station(waypoint="dock_b", waypoints={"big": "station_2"}),
+        "charger_a": StationSettings(waypoints={"big": "station_1"}),
+        "charger_b": StationSettings(waypoint="dock_b", waypoints={"big": "station_2"}),
     }
     return settings(stations=stations, fleets={"tiny": tiny, "big": big})
 
@@ -94,7 +102,7 @@ class Charger:
     def __init__(self, name: str, knows: bool = True) -> None:
         receivers = RECEIVERS | BIG if knows else {}
         self.name = name
-        self.limits = ChargerLimits(Durations(misses=3, released_s=1.0), receivers)
+        self.limits = ChargerLimits(ChargerDurations(misses=3, released_s=1.0), receivers)
         self.memory = charger.initial(self.limits, 0.0)
         self.pad = ""
         self.percent = 0.0
@@ -173,7 +181,7 @@ class Yard:
 
     def __init__(
         self,
-        site: Settings | None = None,
+        site: CoordinatorSettings | None = None,
         *,
         knows: bool = True,
         fills: float = 5.0,
@@ -187,8 +195,8 @@ class Yard:
         self.story: list[tuple[float, str]] = []
         self.chargers = {name: Charger(name, knows) for name in PLACES}
         homes = {f"AMR0{i}": f"wait_{i}" for i in (1, 2, 3)}
-        self.fleet = Fleet("tiny", GRAPH, homes, drive_s, finishing, jazzy)
-        self.big = Fleet("big", BIG_GRAPH, {"B01": "bay_1"}, drive_s, finishing, jazzy)
+        self.fleet = FleetAdapter("tiny", GRAPH, homes, drive_s, finishing, jazzy)
+        self.big = FleetAdapter("big", BIG_GRAPH, {"B01": "bay_1"}, drive_s, finishing, jazzy)
         self.adapters = [self.fleet, self.big][: len(self.settings.fleets)]
         self.rmf = Ticking(self.world, "rmf", STEP_S, self._step).transport
         self.states = self.rmf.publisher(topics.CHARGER_STATES)

@@ -6,7 +6,7 @@ Judged from the event, the inputs, the outputs and the walk's ledger; the core's
 from typing import Any
 
 from bridges.kinds.door.core import decide
-from bridges.kinds.door.memory import DoorLimits, Memory
+from bridges.kinds.door.memory import DoorLimits, DoorMemory
 from bridges.kinds.door.signals import OpenRequested
 from bridges.kinds.shared.decision import Sampled, WriteFailed
 from bridges.messages.definitions import DoorModeValue
@@ -107,7 +107,7 @@ def nothing_changes_before_wake_at(world: World, limits: DoorLimits) -> None:
     assert later.report.news() == now.report.news()
 
 
-def _scan(world: World, memory: Memory, now: float, limits: DoorLimits) -> Any:
+def _scan(world: World, memory: DoorMemory, now: float, limits: DoorLimits) -> Any:
     decision = decide(memory, reading(world), now, limits)
     if world.writable:
         return decision

@@ -7,7 +7,7 @@ from msgspec.structs import replace
 
 from bridges.kinds.door.memory import DoorLimits
 from bridges.kinds.door.report import DoorReport
-from bridges.kinds.door.settings import Durations, Pulse
+from bridges.kinds.door.settings import DoorDurations, Pulse
 from bridges.kinds.door.signals import CloseRequested, DoorOutputs, DoorSample, Event, OpenRequested
 from bridges.kinds.shared.decision import (
     Fault,
@@ -22,13 +22,13 @@ from bridges.kinds.shared.durations import RIVAL_QUIET_S
 from bridges.messages.definitions import DoorModeValue
 from tests.kinds.door.virtual import BETWEEN, BOTH, CLOSED, DEBOUNCED, OPEN, CoreAlone
 
-ESTIMATED = DoorLimits(t=Durations(open_delay_s=4.0, travel_s=6.0), estimated=True)
-STALE_S = Durations().stale_after_s
+ESTIMATED = DoorLimits(t=DoorDurations(open_delay_s=4.0, travel_s=6.0), estimated=True)
+STALE_S = DoorDurations().stale_after_s
 OPENS, CLOSES = OpenRequested("door_supervisor"), CloseRequested("door_supervisor")
 
 
 def limits(**durations: float) -> DoorLimits:
-    return DoorLimits(t=Durations(**durations), debounce=DEBOUNCED)
+    return DoorLimits(t=DoorDurations(**durations), debounce=DEBOUNCED)
 
 
 # ---- DOOR-5: without a fresh reading
@@ -530,7 +530,9 @@ def test_between_two_pulses_the_door_is_still_held() -> None:
 
 
 def test_the_core_wakes_at_the_edges_of_each_pulse() -> None:
-    core = CoreAlone(DoorLimits(t=Durations(stale_after_s=9.0), pulse=Pulse(on_s=0.5, every_s=3.0)))
+    core = CoreAlone(
+        DoorLimits(t=DoorDurations(stale_after_s=9.0), pulse=Pulse(on_s=0.5, every_s=3.0))
+    )
     core.hears(OPENS)
     core.hears(Sampled(OPEN))
     wakes = []
@@ -546,7 +548,7 @@ def test_the_core_wakes_at_the_edges_of_each_pulse() -> None:
 
 
 def test_without_contacts_a_door_is_estimated_by_its_travel_time_and_marked_so() -> None:
-    core = CoreAlone(DoorLimits(t=Durations(open_delay_s=4.0, travel_s=6.0), estimated=True))
+    core = CoreAlone(DoorLimits(t=DoorDurations(open_delay_s=4.0, travel_s=6.0), estimated=True))
     core.sees(DoorSample(), until=10.0)
     core.hears(OPENS)
     opened = core.sees(DoorSample(), until=15.0)
@@ -564,7 +566,7 @@ def test_without_contacts_a_door_is_estimated_by_its_travel_time_and_marked_so()
 
 
 def test_an_estimate_begins_again_after_a_failed_reading() -> None:
-    core = CoreAlone(DoorLimits(t=Durations(open_delay_s=4.0), estimated=True))
+    core = CoreAlone(DoorLimits(t=DoorDurations(open_delay_s=4.0), estimated=True))
     core.hears(OPENS)
     core.sees(DoorSample(), until=5.0)
     core.sees(IoFailed("no reply"), until=5.5)
@@ -621,7 +623,9 @@ def test_without_open_delay_s_a_door_is_never_estimated_open() -> None:
 
 
 def test_with_one_contact_only_the_other_end_is_estimated() -> None:
-    core = CoreAlone(DoorLimits(t=Durations(open_delay_s=2.0), debounce=DEBOUNCED, estimated=True))
+    core = CoreAlone(
+        DoorLimits(t=DoorDurations(open_delay_s=2.0), debounce=DEBOUNCED, estimated=True)
+    )
     closed = core.sees(DoorSample(closed=True), until=1.0)
     core.hears(OPENS)
     core.sees(DoorSample(closed=True), until=5.0)

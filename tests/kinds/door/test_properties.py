@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 
 from bridges.kinds.door.core import decide
 from bridges.kinds.door.memory import DoorLimits
-from bridges.kinds.door.settings import Durations, Pulse
+from bridges.kinds.door.settings import DoorDurations, Pulse
 from tests.depth import examples
 from tests.kinds.door.invariants import check, nothing_changes_before_wake_at
 from tests.kinds.door.virtual import DEBOUNCED
@@ -15,7 +15,7 @@ HISTORIES = st.lists(st.sampled_from([*MOVES, 0.0625, 0.125, 0.5, 1.0, 3.0, 12.0
 LIMITS = st.builds(
     DoorLimits,
     t=st.builds(
-        Durations,
+        DoorDurations,
         close_grace_s=st.sampled_from([0.0, 3.0]),
         open_delay_s=st.sampled_from([None, 4.0]),
         max_hold_s=st.sampled_from([None, 5.0]),

@@ -5,13 +5,13 @@ from typing import Any
 import msgspec
 
 from bridges.kinds.door.core import decide, initial
-from bridges.kinds.door.memory import DoorLimits, Memory
+from bridges.kinds.door.memory import DoorLimits, DoorMemory
 from bridges.kinds.door.report import DoorReport
 from bridges.kinds.door.signals import CloseRequested, DoorOutputs, DoorSample, Event, OpenRequested
 from bridges.kinds.shared.decision import Decision, IoFailed, Sampled, WriteFailed
 from bridges.messages.definitions import DoorModeValue
 from drivers import DriverError
-from drivers.door.dry_contact import DryContactDoor, Settings, create, debounce, wires
+from drivers.door.dry_contact import DryContactDoor, DryContactDoorSettings, create, debounce, wires
 from hal_fakes.plants.door import build
 from tests.drivers.far import PointsFar
 
@@ -26,7 +26,7 @@ BOTH = DoorSample(opened=True, closed=True)
 
 DEBOUNCED = dict.fromkeys(("opened", "closed", "obstruction", "fire"), DEBOUNCE_S)
 
-Decided = Decision[Memory, DoorOutputs, DoorReport]
+Decided = Decision[DoorMemory, DoorOutputs, DoorReport]
 
 
 def word(mode: DoorModeValue) -> str:
@@ -67,7 +67,7 @@ class CoreAlone:
         return tuple(str(fault) for fault in self.last.report.faults)
 
 
-def settings(**changes: Any) -> Settings:
+def settings(**changes: Any) -> DryContactDoorSettings:
     """A door on a Modbus module, as its YAML would have it, with these keys changed."""
     inputs = changes.pop("inputs", {})
     plain = {
@@ -80,7 +80,7 @@ def settings(**changes: Any) -> Settings:
         **changes,
     }
     plain["inputs"] = {key: value for key, value in plain["inputs"].items() if value}
-    return msgspec.convert(plain, Settings)
+    return msgspec.convert(plain, DryContactDoorSettings)
 
 
 def _input(address: int, active: str) -> dict[str, Any]:

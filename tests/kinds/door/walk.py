@@ -12,8 +12,8 @@ import msgspec
 from msgspec.structs import replace
 
 from bridges.kinds.door.core import decide, initial
-from bridges.kinds.door.memory import DoorLimits, Memory
-from bridges.kinds.door.settings import Durations
+from bridges.kinds.door.memory import DoorLimits, DoorMemory
+from bridges.kinds.door.settings import DoorDurations
 from bridges.kinds.door.signals import CloseRequested, DoorSample, Event, OpenRequested
 from bridges.kinds.shared.debounce import Settled
 from bridges.kinds.shared.decision import IoFailed, OperatorReset, RivalSeen, Sampled, WriteFailed
@@ -30,7 +30,7 @@ DURATIONS: dict[str, float] = {"stale_after_s": 60.0, "max_hold_s": 30.0}
 
 def limits_of(durations: dict[str, float] | None = None, **facts: Any) -> DoorLimits:
     """The default durations, except these."""
-    return DoorLimits(t=Durations(**{**DURATIONS, **(durations or {})}), **facts)
+    return DoorLimits(t=DoorDurations(**{**DURATIONS, **(durations or {})}), **facts)
 
 
 class Ledger(msgspec.Struct, frozen=True):
@@ -60,7 +60,7 @@ UNLIKE = ("opened", "obstruction", "fire")
 class World(msgspec.Struct, frozen=True):
     """Memory and ledger at time 0, and the building: whether it can be read, and written to."""
 
-    memory: Memory
+    memory: DoorMemory
     sample: DoorSample
     ledger: Ledger = Ledger()
     readable: bool = True
@@ -152,7 +152,7 @@ Seen = Callable[["Step"], None]
 class Step(msgspec.Struct, frozen=True):
     """One decision, at time `now` after the state began. `ledger`: with this step in it."""
 
-    before: Memory
+    before: DoorMemory
     event: Event
     decision: Decided
     world: World
@@ -284,7 +284,7 @@ def _unlike(
 # ---- states with their times relative to now
 
 
-def shifted(memory: Memory, by: float, limits: DoorLimits) -> Memory:
+def shifted(memory: DoorMemory, by: float, limits: DoorLimits) -> DoorMemory:
     """The same memory with every time moved by so much, and old ones cut off."""
     t, senses = limits.t, memory.senses
     return replace(

@@ -1,21 +1,28 @@
 """The supervisor's core alone, for one door, in virtual time: told by hand, its words written down."""
 
 from bridges.kinds.door_supervisor import core
-from bridges.kinds.door_supervisor.memory import Limits, Memory
+from bridges.kinds.door_supervisor.memory import DoorSupervisorLimits, SupervisedDoor
 from bridges.kinds.door_supervisor.report import DoorHoldReport
-from bridges.kinds.door_supervisor.signals import CloseRequested, Event, OpenRequested, StateHeard
+from bridges.kinds.door_supervisor.signals import (
+    DoorStateHeard,
+    Event,
+    RequesterCloses,
+    RequesterOpens,
+)
 from bridges.messages.definitions import DoorModeValue, DoorRequest, Message
 from tests.kinds.shared import alone
 
 SECOND_NS = 10**9
 
 
-class Alone(alone.Alone[Memory, Event, Limits, DoorHoldReport]):
+class Alone(alone.Alone[SupervisedDoor, Event, DoorSupervisorLimits, DoorHoldReport]):
     """With one door. `faults`: (s, texts), each time that they differ."""
 
-    def __init__(self, limits: Limits | None = None, *, speaks: bool = True) -> None:
+    def __init__(self, limits: DoorSupervisorLimits | None = None, *, speaks: bool = True) -> None:
         self.faults: list[tuple[float, tuple[str, ...]]] = []
-        super().__init__(core.initial("ward", 0.0), core.decide, limits or Limits(), speaks)
+        super().__init__(
+            core.initial("ward", 0.0), core.decide, limits or DoorSupervisorLimits(), speaks
+        )
 
     def words(self, message: Message) -> str:
         assert isinstance(message, DoorRequest)
@@ -30,21 +37,21 @@ class Alone(alone.Alone[Memory, Event, Limits, DoorHoldReport]):
 
     def opens(self, who: str = "a", *, aged: float = 0.0) -> None:
         """A requester's OPEN, sent `aged` s ago by its own clock."""
-        self.hears(OpenRequested(who, self.stamp(aged)))
+        self.hears(RequesterOpens(who, self.stamp(aged)))
 
     def closes(self, who: str = "a", *, aged: float = 0.0) -> None:
         """A requester's CLOSE."""
-        self.hears(CloseRequested(who, self.stamp(aged)))
+        self.hears(RequesterCloses(who, self.stamp(aged)))
 
     def stamp(self, aged: float) -> int:
         return round(self.stamped(aged) * SECOND_NS)
 
     def shows(self, mode: str, until: float | None = None) -> None:
         """A DoorState; with `until`, one each second from now until then."""
-        self.hears(StateHeard(DoorModeValue[f"MODE_{mode}"]))
+        self.hears(DoorStateHeard(DoorModeValue[f"MODE_{mode}"]))
         while until is not None and self.now + 1.0 <= until:
             self.until(self.now + 1.0)
-            self.hears(StateHeard(DoorModeValue[f"MODE_{mode}"]))
+            self.hears(DoorStateHeard(DoorModeValue[f"MODE_{mode}"]))
         if until is not None:
             self.until(until)
 

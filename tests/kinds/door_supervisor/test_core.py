@@ -6,9 +6,9 @@ import pytest
 from msgspec.structs import replace
 
 from bridges.kinds.door_supervisor import core
-from bridges.kinds.door_supervisor.memory import VISIT_S, Holder, Limits
+from bridges.kinds.door_supervisor.memory import VISIT_S, DoorSupervisorLimits, Holder
 from bridges.kinds.door_supervisor.report import DoorHoldReport
-from bridges.kinds.door_supervisor.signals import CloseRequested, OpenRequested
+from bridges.kinds.door_supervisor.signals import RequesterCloses, RequesterOpens
 from bridges.kinds.shared.graph_kind import MaySpeak
 from bridges.messages.definitions import DoorModeValue
 from tests.kinds.door_supervisor.alone import Alone
@@ -43,7 +43,7 @@ def test_a_request_that_counts_is_not_refused() -> None:
 
 
 def test_silence_and_time_close_nothing() -> None:
-    desk = Alone(Limits(open_alarm_s=86400.0))
+    desk = Alone(DoorSupervisorLimits(open_alarm_s=86400.0))
     desk.opens()
     desk.shows("OPEN", until=4000.0)
     assert desk.sent == [(float(s), "OPEN") for s in range(6)]
@@ -217,8 +217,8 @@ def test_each_requester_has_a_clock_of_its_own() -> None:
 
 def test_a_requester_without_stamps_is_believed_in_the_order_of_arrival() -> None:
     desk = Alone()
-    words: list[type[OpenRequested | CloseRequested]] = [OpenRequested, OpenRequested]
-    words += [CloseRequested, OpenRequested, CloseRequested]
+    words: list[type[RequesterOpens | RequesterCloses]] = [RequesterOpens, RequesterOpens]
+    words += [RequesterCloses, RequesterOpens, RequesterCloses]
     for at, word in enumerate(words):
         desk.until(float(at))
         desk.hears(word("terminal", 0))
@@ -264,7 +264,7 @@ def test_late_messages_with_a_break_or_the_same_stamp_are_never_taken_for_a_cloc
         desk.closes(aged=50.0)
     for second in range(12, 40):
         desk.until(float(second))
-        desk.hears(CloseRequested("a", 1))
+        desk.hears(RequesterCloses("a", 1))
     assert desk.holders == ["a"]
 
 
@@ -352,7 +352,7 @@ def test_beside_another_supervisor_it_sends_nothing_and_keeps_its_table() -> Non
 
 
 def test_a_door_that_one_requester_has_held_for_too_long_is_a_fault_and_nothing_else() -> None:
-    desk = Alone(Limits(open_alarm_s=20.0))
+    desk = Alone(DoorSupervisorLimits(open_alarm_s=20.0))
     desk.opens("web")
     desk.shows("OPEN", until=15.0)
     desk.opens("a")
@@ -370,7 +370,7 @@ def test_a_door_that_one_requester_has_held_for_too_long_is_a_fault_and_nothing_
 
 
 def test_repeats_do_not_put_off_the_alarm_but_another_visit_restarts_its_time() -> None:
-    desk = Alone(Limits(open_alarm_s=20.0))
+    desk = Alone(DoorSupervisorLimits(open_alarm_s=20.0))
     for second in range(45):
         desk.until(float(second))
         desk.closes() if second == 15 else desk.opens()
@@ -379,7 +379,7 @@ def test_repeats_do_not_put_off_the_alarm_but_another_visit_restarts_its_time() 
 
 
 def test_the_alarm_needs_no_message_to_go_off() -> None:
-    desk = Alone(Limits(open_alarm_s=20.0))
+    desk = Alone(DoorSupervisorLimits(open_alarm_s=20.0))
     desk.opens()
     desk.until(100.0)
     silent, held = "DOOR_SILENT: no DoorState comes", "DOOR_HELD_OPEN: longer than 20 s by a"

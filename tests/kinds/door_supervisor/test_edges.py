@@ -3,17 +3,17 @@
 import pytest
 
 from bridges.kinds.door_supervisor import KIND, core, keep, messages, report
-from bridges.kinds.door_supervisor.memory import Holder, Limits, Memory
+from bridges.kinds.door_supervisor.memory import DoorSupervisorLimits, Holder, SupervisedDoor
 from bridges.kinds.door_supervisor.report import DoorHoldReport
-from bridges.kinds.door_supervisor.settings import Settings
-from bridges.kinds.door_supervisor.signals import CloseRequested, OpenRequested, StateHeard
+from bridges.kinds.door_supervisor.settings import DoorSupervisorSettings
+from bridges.kinds.door_supervisor.signals import DoorStateHeard, RequesterCloses, RequesterOpens
 from bridges.kinds.shared.decision import RequestRefused
 from bridges.kinds.shared.fields import quiet_s
 from bridges.kinds.shared.freshness import Requester
 from bridges.messages import definitions as d
 from bridges.messages import topics
 
-ANY = Settings()
+ANY = DoorSupervisorSettings()
 AT = d.Time(5, 7)
 
 
@@ -23,7 +23,7 @@ def request(
     return d.DoorRequest(time, who, door, d.DoorMode(mode))
 
 
-def refused(message: d.DoorRequest, settings: Settings = ANY) -> str:
+def refused(message: d.DoorRequest, settings: DoorSupervisorSettings = ANY) -> str:
     with pytest.raises(RequestRefused) as refusal:
         messages.accept_request(message, settings, 0.0)
     return str(refusal.value)
@@ -31,8 +31,8 @@ def refused(message: d.DoorRequest, settings: Settings = ANY) -> str:
 
 def test_open_and_close_are_taken_with_their_senders_stamp_to_the_nanosecond() -> None:
     late = d.Time(2**31 - 1, 999_999_999)
-    assert messages.accept_request(request(), ANY, 0.0) == OpenRequested("fleet/a", 5_000_000_007)
-    assert messages.accept_request(request(0, time=late), ANY, 0.0) == CloseRequested(
+    assert messages.accept_request(request(), ANY, 0.0) == RequesterOpens("fleet/a", 5_000_000_007)
+    assert messages.accept_request(request(0, time=late), ANY, 0.0) == RequesterCloses(
         "fleet/a", 2_147_483_647_999_999_999
     )
 
@@ -65,9 +65,9 @@ def test_half_filled_and_impossible_requests_are_refused(message: d.DoorRequest,
 
 
 def test_a_list_of_doors_keeps_the_others_out() -> None:
-    mine = Settings(doors=["ward", "lab"])
+    mine = DoorSupervisorSettings(doors=["ward", "lab"])
     assert refused(request(door="gate"), mine) == "not ours: 'gate' is not one of ward, lab"
-    assert messages.accept_request(request(door="lab"), mine, 0.0) == OpenRequested(
+    assert messages.accept_request(request(door="lab"), mine, 0.0) == RequesterOpens(
         "fleet/a", 5_000_000_007
     )
     with pytest.raises(RequestRefused, match="not ours"):
@@ -77,7 +77,7 @@ def test_a_list_of_doors_keeps_the_others_out() -> None:
 def test_a_state_is_taken_whatever_its_age_and_refused_with_a_mode_that_does_not_exist() -> None:
     for mode in d.DoorModeValue:
         state = d.DoorState(d.Time(), "ward", d.DoorMode(int(mode)))
-        assert messages.accept_state(state, ANY, 0.0) == StateHeard(mode)
+        assert messages.accept_state(state, ANY, 0.0) == DoorStateHeard(mode)
     with pytest.raises(RequestRefused, match="unknown current_mode: 9"):
         messages.accept_state(d.DoorState(d.Time(), "ward", d.DoorMode(9)), ANY, 0.0)
 
@@ -100,10 +100,13 @@ def test_the_summary_says_who_holds_the_door_and_for_how_long() -> None:
 
 
 def test_the_settings_reach_the_core_and_the_quiet_start() -> None:
-    settings = Settings(quiet_start_s=5.0, open_alarm_s=60.0)
-    assert (Limits.of(settings), quiet_s(settings)) == (Limits(60.0), 5.0)
+    settings = DoorSupervisorSettings(quiet_start_s=5.0, open_alarm_s=60.0)
+    assert (DoorSupervisorLimits.of(settings), quiet_s(settings)) == (
+        DoorSupervisorLimits(60.0),
+        5.0,
+    )
     assert list(ANY.problems()) == []
-    assert [path for path, _ in Settings(doors=[]).problems()] == [("doors",)]
+    assert [path for path, _ in DoorSupervisorSettings(doors=[]).problems()] == [("doors",)]
 
 
 def test_the_daemon_uses_the_names_and_topics_of_rmfs_own_supervisor() -> None:
@@ -115,8 +118,10 @@ def test_the_daemon_uses_the_names_and_topics_of_rmfs_own_supervisor() -> None:
 # --- the table ---------------------------------------------------------------------------------
 
 
-def held(door: str, **stamps: int) -> Memory:
-    return Memory(door, holders=tuple(Holder(who, 0.0, 0.0, at, at) for who, at in stamps.items()))
+def held(door: str, **stamps: int) -> SupervisedDoor:
+    return SupervisedDoor(
+        door, holders=tuple(Holder(who, 0.0, 0.0, at, at) for who, at in stamps.items())
+    )
 
 
 def test_the_heartbeat_lists_doors_and_holders_in_the_order_of_names() -> None:
@@ -136,12 +141,14 @@ def test_the_file_changes_when_holders_come_or_go_and_not_when_they_repeat_thems
     memory = core.initial("ward", 0.0)
     written = []
     for second in range(10):
-        memory = core.decide(memory, OpenRequested("a", second), float(second), Limits()).memory
+        memory = core.decide(
+            memory, RequesterOpens("a", second), float(second), DoorSupervisorLimits()
+        ).memory
         written.append(keep.persist({"ward": memory}))
     assert set(written) == {b'{"version":1,"doors":{"ward":{"a":0}}}'}
-    memory = core.decide(memory, OpenRequested("a", 13), 13.0, Limits()).memory
+    memory = core.decide(memory, RequesterOpens("a", 13), 13.0, DoorSupervisorLimits()).memory
     assert keep.persist({"ward": memory}) == b'{"version":1,"doors":{"ward":{"a":13}}}'
-    memory = core.decide(memory, CloseRequested("a", 14), 14.0, Limits()).memory
+    memory = core.decide(memory, RequesterCloses("a", 14), 14.0, DoorSupervisorLimits()).memory
     assert keep.persist({"ward": memory}) == b'{"version":1,"doors":{}}'
 
 
@@ -149,9 +156,9 @@ def test_after_a_restart_the_holders_are_known_and_older_requests_are_stale() ->
     kept = keep.persist(
         {"ward": held("ward", b=5, a=7), "lab": held("lab"), "gate": held("gate", c=1)}
     )
-    restored = keep.restore(kept, Settings(doors=["ward", "lab"]), 50.0)
+    restored = keep.restore(kept, DoorSupervisorSettings(doors=["ward", "lab"]), 50.0)
     assert restored == {
-        "ward": Memory(
+        "ward": SupervisedDoor(
             "ward",
             holders=(
                 Holder("a", 50.0, 50.0, 7, 7, restored=True),
@@ -160,7 +167,7 @@ def test_after_a_restart_the_holders_are_known_and_older_requests_are_stale() ->
             requesters={"a": Requester(7, heard_at=50.0), "b": Requester(5, heard_at=50.0)},
         )
     }
-    stale = core.decide(restored["ward"], CloseRequested("a", 6), 51.0, Limits())
+    stale = core.decide(restored["ward"], RequesterCloses("a", 6), 51.0, DoorSupervisorLimits())
     assert stale.refused == "stale request"
     assert set(keep.restore(kept, ANY, 50.0)) == {"ward", "gate"}
 
@@ -187,4 +194,4 @@ def test_a_table_that_is_cut_or_damaged_is_refused_as_a_whole(kept: bytes) -> No
 
 def test_a_file_that_is_not_a_table_is_refused_with_what_it_should_be() -> None:
     with pytest.raises(ValueError, match=r"^not a table of who holds which door: "):
-        keep.restore(b"[]", Settings(), 0.0)
+        keep.restore(b"[]", DoorSupervisorSettings(), 0.0)

@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 
 from bridges.kinds.door_supervisor import KIND
-from bridges.kinds.door_supervisor.settings import Settings
+from bridges.kinds.door_supervisor.settings import DoorSupervisorSettings
 from bridges.messages import definitions as d
 from bridges.messages import topics
 from bridges.messages.stamps import stamp
@@ -37,7 +37,7 @@ class Graph:
     def starts(self) -> None:
         self.transport = MemoryTransport(self.network, "ours")
         clock = Clock(lambda: self.now, lambda: 1e6 + self.now)
-        self.node = GraphNode(KIND, Settings(), self.transport, clock, kept=self.disk)
+        self.node = GraphNode(KIND, DoorSupervisorSettings(), self.transport, clock, kept=self.disk)
         self.node.subscribe()
 
     def asks(self, who: str, mode: int, door: str = "ward") -> None:

@@ -14,16 +14,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bridges.kinds.door_supervisor import core, keep
-from bridges.kinds.door_supervisor.memory import OPEN, Limits, Memory
-from bridges.kinds.door_supervisor.settings import Settings
-from bridges.kinds.door_supervisor.signals import CloseRequested, OpenRequested, StateHeard
+from bridges.kinds.door_supervisor.memory import OPEN, DoorSupervisorLimits, SupervisedDoor
+from bridges.kinds.door_supervisor.settings import DoorSupervisorSettings
+from bridges.kinds.door_supervisor.signals import DoorStateHeard, RequesterCloses, RequesterOpens
 from bridges.kinds.shared.durations import GAP_S, REPEAT_S
 from bridges.kinds.shared.graph_kind import MaySpeak, Woken
 from bridges.messages.definitions import DoorModeValue, DoorRequest
 from tests.depth import depth, examples
 from tests.walk import histories
 
-LIMITS = Limits(open_alarm_s=30.0)
+LIMITS = DoorSupervisorLimits(open_alarm_s=30.0)
 CLOCK_AHEAD = 1000
 STEP_S = 0.75
 
@@ -32,7 +32,7 @@ class Ledger:
     """The table by RMF's rules, as if requests came in order; and what must hold at each message."""
 
     def __init__(self, *, speaks: bool) -> None:
-        self.memory: Memory = core.initial("ward", 0.0)
+        self.memory: SupervisedDoor = core.initial("ward", 0.0)
         self.holders: set[str] = set()
         self.newest: dict[str, int] = {}
         self.speaks = False
@@ -73,10 +73,10 @@ class Ledger:
 
     def _note(self, event: Any) -> None:
         match event:
-            case OpenRequested(who, stamp) if stamp >= self.newest.get(who, 0):
+            case RequesterOpens(who, stamp) if stamp >= self.newest.get(who, 0):
                 self.newest[who] = stamp
                 self.holders.add(who)
-            case CloseRequested(who, stamp) if stamp >= self.newest.get(who, 0):
+            case RequesterCloses(who, stamp) if stamp >= self.newest.get(who, 0):
                 self.newest[who] = stamp
                 self.holders.discard(who)
             case MaySpeak(yes):
@@ -112,23 +112,23 @@ def asked(ledger: Ledger, move: tuple[Any, str]) -> Ledger:
 
 
 def test_every_history_of_two_requesters_keeps_the_rules() -> None:
-    words = list(product((OpenRequested, CloseRequested), "ab"))
+    words = list(product((RequesterOpens, RequesterCloses), "ab"))
     for ledger, history in histories(Ledger(speaks=True), words, depth(5, 7), asked):
         ledger.until(6.0)
         last = {who: word for word, who in history}
-        held = OpenRequested in last.values()
+        held = RequesterOpens in last.values()
         words_sent = [word for _, word in ledger.sent]
-        opened = any(word is OpenRequested for word, _ in history)
+        opened = any(word is RequesterOpens for word, _ in history)
         assert words_sent[-1:] == ([2] if held else [0] if opened else [])
 
 
 def test_every_history_of_late_requests_and_states_keeps_the_rules() -> None:
     events: list[Callable[[float], Any]] = [
-        lambda now: OpenRequested("a", stamp(now)),
-        lambda now: CloseRequested("a", stamp(now)),
-        lambda now: CloseRequested("a", stamp(now, aged=1.0)),
-        lambda now: OpenRequested("a", stamp(now, aged=1.0)),
-        lambda now: StateHeard(DoorModeValue.MODE_OPEN),
+        lambda now: RequesterOpens("a", stamp(now)),
+        lambda now: RequesterCloses("a", stamp(now)),
+        lambda now: RequesterCloses("a", stamp(now, aged=1.0)),
+        lambda now: RequesterOpens("a", stamp(now, aged=1.0)),
+        lambda now: DoorStateHeard(DoorModeValue.MODE_OPEN),
         lambda now: MaySpeak(int(now / STEP_S) % 2 == 1),
     ]
     for ledger, _ in histories(Ledger(speaks=False), events, depth(4, 5), after):
@@ -137,11 +137,11 @@ def test_every_history_of_late_requests_and_states_keeps_the_rules() -> None:
 
 EVENTS = st.one_of(
     st.tuples(
-        st.sampled_from([OpenRequested, CloseRequested]),
+        st.sampled_from([RequesterOpens, RequesterCloses]),
         st.sampled_from("abc"),
         st.sampled_from([0, 0, 2, 5]),
     ),
-    st.sampled_from(list(DoorModeValue)).map(StateHeard),
+    st.sampled_from(list(DoorModeValue)).map(DoorStateHeard),
     st.booleans().map(MaySpeak),
     st.just(Woken()),
 )
@@ -165,7 +165,7 @@ def told(history: list[tuple[float, Any]]) -> Ledger:
 def _would_be_believed(ledger: Ledger, event: Any) -> bool:
     """Would this old request count? Long after the last one it means that a clock was set back, or that
     its requester was forgotten; test_core has stories of both."""
-    if not isinstance(event, OpenRequested | CloseRequested) or event.stamp >= ledger.newest.get(
+    if not isinstance(event, RequesterOpens | RequesterCloses) or event.stamp >= ledger.newest.get(
         event.requester, 0
     ):
         return False
@@ -189,7 +189,7 @@ def test_after_every_history_a_restart_knows_exactly_who_holds_the_door(
 ) -> None:
     ledger = told(history)
     kept = keep.persist({"ward": ledger.memory})
-    restored = keep.restore(kept, Settings(), 0.0)
+    restored = keep.restore(kept, DoorSupervisorSettings(), 0.0)
     holders = {h.requester for memory in restored.values() for h in memory.holders}
     assert holders == ledger.holders
     assert keep.persist(restored) == kept
@@ -204,7 +204,7 @@ def test_after_every_history_a_restart_knows_exactly_who_holds_the_door(
 @given(st.binary(max_size=60))
 def test_a_damaged_table_of_holders_is_refused_as_a_whole(kept: bytes) -> None:
     try:
-        restored = keep.restore(kept, Settings(), 0.0)
+        restored = keep.restore(kept, DoorSupervisorSettings(), 0.0)
     except ValueError:
         return
     assert all(memory.door == name for name, memory in restored.items())

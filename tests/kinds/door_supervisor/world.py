@@ -8,14 +8,14 @@ from typing import Any
 
 from bridges.kinds.door import messages as door_messages
 from bridges.kinds.door_supervisor import KIND, keep
-from bridges.kinds.door_supervisor.settings import Settings
+from bridges.kinds.door_supervisor.settings import DoorSupervisorSettings
 from bridges.messages import definitions as d
 from bridges.messages import topics
 from bridges.messages.stamps import stamp
 from tests.kinds.door.virtual import SCAN_S, Door
 from tests.runtime.virtual_graph import EPOCH, NEVER, Disk, Served, StandIn, World, say
 from workbench.rmf_model.phases import DoorClose, DoorOpen
-from workbench.rmf_model.robot import Phase, Robot
+from workbench.rmf_model.robot import Phase, RobotContext
 from workbench.rmf_model.supervisors import DoorSupervisor
 
 WARD = "ward"
@@ -23,7 +23,7 @@ WARD = "ward"
 
 def holds(disk: Disk, who: str) -> bool:
     """Would a supervisor that starts now know that this requester holds the door?"""
-    found = keep.restore(disk.kept, Settings(), 0.0) if disk.kept else {}
+    found = keep.restore(disk.kept, DoorSupervisorSettings(), 0.0) if disk.kept else {}
     return WARD in found and found[WARD].holder(who) is not None
 
 
@@ -33,7 +33,9 @@ class OurSupervisor(Served):
     disk: Disk
 
     def __init__(self, world: World, disk: Disk | None = None, **changes: Any) -> None:
-        super().__init__(world, KIND, Settings(**changes), "supervisor", disk=disk or Disk())
+        super().__init__(
+            world, KIND, DoorSupervisorSettings(**changes), "supervisor", disk=disk or Disk()
+        )
 
 
 class RmfsSupervisor(StandIn):
@@ -106,7 +108,7 @@ class Walker:
         self.name = name
         self.world = world
         self.skew = EPOCH + skew
-        self.robot = Robot(name)
+        self.robot = RobotContext(name)
         self.passing = False
         self.visits = 0
         self.log: list[tuple[float, str]] = []
@@ -114,7 +116,7 @@ class Walker:
         self._stay_s = 0.0
         self._next_at = 0.0
         self._plan_next()
-        world.add(self, *Robot.subscribes)
+        world.add(self, *RobotContext.subscribes)
 
     def hear(self, topic: topics.Topic[Any], message: Any) -> None:
         """The robot's own rules, then what comes next in its day."""
@@ -133,7 +135,7 @@ class Walker:
 
     def restart(self) -> None:
         """The fleet adapter dies and is back: it knows of no door."""
-        self.robot, self.passing = Robot(self.name), False
+        self.robot, self.passing = RobotContext(self.name), False
         self._note("restarted")
         self._plan_next()
 

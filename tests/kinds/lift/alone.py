@@ -5,14 +5,14 @@ from typing import Any
 from msgspec.structs import replace
 
 from bridges.kinds.lift.core import decide
-from bridges.kinds.lift.memory import LiftLimits, Memory
-from bridges.kinds.lift.settings import Durations, Floor, LiftSettings
+from bridges.kinds.lift.memory import LiftLimits, LiftMemory
+from bridges.kinds.lift.settings import Floor, LiftDurations, LiftSettings
 from bridges.kinds.lift.signals import (
-    Door,
+    DoorReading,
     Hazard,
+    LiftRequested,
     LiftSample,
     Motion,
-    Requested,
     Side,
 )
 from bridges.kinds.shared.decision import (
@@ -23,13 +23,13 @@ from bridges.kinds.shared.decision import (
 DEBOUNCE = {"floor": 0.08, "door": 0.03, "rear_door": 0.04, "agv_mode": 0.05, Hazard.FIRE: 0.06}
 
 
-AT_L1 = LiftSample("L1", Door.OPEN, motion=Motion.STOPPED, agv=True)
+AT_L1 = LiftSample("L1", DoorReading.OPEN, motion=Motion.STOPPED, agv=True)
 
 
-CLOSED = replace(AT_L1, door=Door.CLOSED)
+CLOSED = replace(AT_L1, door=DoorReading.CLOSED)
 
 
-ASKED = Requested("A", True, "L1")
+ASKED = LiftRequested("A", True, "L1")
 
 
 class Alone:
@@ -41,12 +41,12 @@ class Alone:
         floors = {"L1": Floor(), "L2": Floor(side=Side.REAR), "L3": Floor()}
         settings = LiftSettings(
             floors=floors,
-            limits=Durations(**limits),
+            limits=LiftDurations(**limits),
             fire_reset="manual",
             agv_mode="by_call" if by_call else "requested",
         )
         self.limits = LiftLimits.of(settings, debounce or {})
-        self.memory = Memory()
+        self.memory = LiftMemory()
 
     def __call__(self, now: float, *events: Any) -> "Alone":
         for event in events:

@@ -7,16 +7,16 @@ import math
 from typing import Any
 
 from bridges.kinds.lift.core import decide
-from bridges.kinds.lift.memory import LiftLimits, Memory
+from bridges.kinds.lift.memory import LiftLimits, LiftMemory
 from bridges.kinds.lift.report import LiftReport
 from bridges.kinds.lift.signals import (
-    Door,
-    Ended,
+    DoorReading,
+    EndRequested,
     FromAdapter,
     Hazard,
     LiftOutputs,
+    LiftRequested,
     Motion,
-    Requested,
 )
 from bridges.kinds.shared.decision import IoFailed, Sampled, WriteFailed
 from bridges.messages.definitions import LiftDoor
@@ -92,14 +92,14 @@ def sessions_end_by_end_alone(step: Step) -> None:
         assert after is None or (after == before and _is_asked_for(event, before))
     elif before and _is_its_end(step, event):
         assert after is None
-    elif before is None and isinstance(event, Requested):
+    elif before is None and isinstance(event, LiftRequested):
         assert after in (None, event.session_id)
         assert (after is None) == bool(step.decision.refused)
         assert after is None or not _is_kept_for_another(step, after)
     elif before is None and isinstance(event, FromAdapter):
         grace = step.before.grace
         waits = grace is not None and grace.in_car and step.now < grace.until
-        given_back = waits and isinstance(event.asked, Requested)
+        given_back = waits and isinstance(event.asked, LiftRequested)
         assert after is None or (given_back and not _is_kept_for_another(step, after))
     else:
         assert after == before
@@ -115,7 +115,7 @@ def _is_kept_for_another(step: Step, session: str) -> bool:
 
 def _is_asked_for(event: object, session: str) -> bool:
     asked = event.asked if isinstance(event, FromAdapter) else event
-    return isinstance(asked, Requested) and asked.session_id == session
+    return isinstance(asked, LiftRequested) and asked.session_id == session
 
 
 def _fell_silent(step: Step) -> bool:
@@ -134,8 +134,8 @@ def _is_its_end(step: Step, event: object) -> bool:
     forgotten, robot, ends = session.forgotten, session.robot, session.ends
     if isinstance(event, FromAdapter):
         heard_once = forgotten is not None and (forgotten.ended or forgotten.disowned)
-        return heard_once and event.asked == Ended(session.id)
-    if not isinstance(event, Ended) or event.session_id != session.id:
+        return heard_once and event.asked == EndRequested(session.id)
+    if not isinstance(event, EndRequested) or event.session_id != session.id:
         return False
     if 0 < event.stamp < ends.newest * 1e9 and step.now < ends.doubted_since + 1.0:
         return False
@@ -154,7 +154,7 @@ def open_is_the_truth(step: Step) -> None:
     sample, session = step.world.sample, step.decision.memory.session
     assert step.now < step.decision.memory.senses.read_at + step.limits.t.stale_after_s
     if _sampled(step):
-        assert sample.door is Door.OPEN
+        assert sample.door is DoorReading.OPEN
         assert sample.motion in (None, Motion.STOPPED)
         assert shown.floor == sample.level != ""
     if session and step.decision.outputs.agv_request and shown.mode.name == "MODE_AGV":
@@ -177,7 +177,7 @@ def a_request_that_waits_has_a_reason(step: Step) -> None:
     event = step.event
     waits = session is not None and (
         shown.open_at != session.destination
-        or (isinstance(event, Requested) and event.session_id == session.id
+        or (isinstance(event, LiftRequested) and event.session_id == session.id
             and event.destination != session.destination)
     )  # fmt: skip
     assert bool(shown.waits) >= waits, shown
@@ -213,7 +213,7 @@ def nothing_changes_before_wake_at(world: World, limits: LiftLimits) -> None:
     assert later.report.faults == now.report.faults
 
 
-def _scan(world: World, memory: Memory, now: float, limits: LiftLimits) -> Any:
+def _scan(world: World, memory: LiftMemory, now: float, limits: LiftLimits) -> Any:
     decision = decide(memory, reading(world), now, limits)
     if world.writable:
         return decision
@@ -226,5 +226,5 @@ def _sampled(step: Step) -> bool:
     return step.exact and (read or isinstance(step.event, Sampled))
 
 
-def _id(memory: Memory) -> str | None:
+def _id(memory: LiftMemory) -> str | None:
     return memory.session.id if memory.session else None

@@ -8,7 +8,7 @@ from bridges.messages.topics import ADAPTER_LIFT_REQUESTS, LIFT_REQUESTS, LIFT_S
 from tests.kinds.lift.story import WALL, Story
 from workbench.rmf_model import Party, Said
 from workbench.rmf_model.phases import EndLiftSession, RequestLift
-from workbench.rmf_model.robot import Robot
+from workbench.rmf_model.robot import RobotContext
 from workbench.rmf_model.supervisors import LiftSupervisor
 
 STEP_S = 0.25
@@ -24,7 +24,7 @@ class World:
     The robots hear each state before the supervisor when `adapters_first`.
     """
 
-    def __init__(self, story: Story, *robots: Robot, adapters_first: bool = False) -> None:
+    def __init__(self, story: Story, *robots: RobotContext, adapters_first: bool = False) -> None:
         self.story = story
         self.robots = list(robots)
         self.supervisor = LiftSupervisor()
@@ -45,15 +45,15 @@ class World:
             if arrived:
                 self.story.request(*arrived)
 
-    def asks(self, robot: Robot, floor: str, *, inside: bool = False) -> None:
+    def asks(self, robot: RobotContext, floor: str, *, inside: bool = False) -> None:
         """A robot's task comes to RequestLift."""
         self._say(robot.begin(RequestLift("Lift1", floor, inside=inside), self._now))
 
-    def releases(self, robot: Robot) -> None:
+    def releases(self, robot: RobotContext) -> None:
         """A robot has left the car: EndLiftSession."""
         self._say(robot.begin(EndLiftSession("Lift1"), self._now))
 
-    def rides(self, robot: Robot, start: str, end: str) -> None:
+    def rides(self, robot: RobotContext, start: str, end: str) -> None:
         """A whole ride of one robot, from request to release."""
         self.asks(robot, start)
         self.until_done(robot)
@@ -66,14 +66,14 @@ class World:
         self.releases(robot)
         self.until_done(robot)
 
-    def until_done(self, robot: Robot, within: float = 60.0) -> None:
+    def until_done(self, robot: RobotContext, within: float = 60.0) -> None:
         """Until the robot's phase is complete."""
         end = self.story.now + within
         while not robot.done:
             assert self.story.now < end, f"not within {within} s: {self.story.state}"
             self.run(self.story.now + STEP_S)
 
-    def restart_supervisor(self, first: Robot | None = None) -> None:
+    def restart_supervisor(self, first: RobotContext | None = None) -> None:
         """A new one, which the fleet adapters' retained requests reach first, those of `first` before
         the others'."""
         self.supervisor = LiftSupervisor()
@@ -83,20 +83,20 @@ class World:
                 self._deliver(self.supervisor.hear(request, self._now))
         self._arrive()
 
-    def finds_again(self, robot: Robot, apart_s: float = 0.02) -> None:
+    def finds_again(self, robot: RobotContext, apart_s: float = 0.02) -> None:
         """The supervisor finds an adapter again that was cut off, and hears what it has retained."""
         for request in self.asked_by(robot):
             self._deliver(self.supervisor.hear(request, self._now))
             self._arrive()
             self.run(self.story.now + apart_s)
 
-    def asked_by(self, robot: Robot) -> list[LiftRequest]:
+    def asked_by(self, robot: RobotContext) -> list[LiftRequest]:
         """What its adapter has retained."""
         return self._history[robot.requester_id][-REPLAYED:]
 
-    def restart_adapter(self, robot: Robot) -> Robot:
+    def restart_adapter(self, robot: RobotContext) -> RobotContext:
         """A new fleet adapter for the same robot, which has no task and holds no lift."""
-        fresh = Robot(robot.requester_id)
+        fresh = RobotContext(robot.requester_id)
         fresh.on_task = False
         self.robots[self.robots.index(robot)] = fresh
         self._history.pop(robot.requester_id, None)

@@ -12,8 +12,8 @@ from msgspec.structs import replace
 
 from bridges.kinds.lift import KIND
 from bridges.kinds.lift.memory import LiftLimits
-from bridges.kinds.lift.settings import Durations, Floor, LiftSettings
-from bridges.kinds.lift.signals import Door, Hazard, LiftOutputs, LiftSample, Motion
+from bridges.kinds.lift.settings import Floor, LiftDurations, LiftSettings
+from bridges.kinds.lift.signals import DoorReading, Hazard, LiftOutputs, LiftSample, Motion
 from bridges.kinds.shared.decision import OperatorReset, RivalSeen
 from bridges.kinds.shared.kind import AnyDeviceKind
 from bridges.messages.definitions import (
@@ -47,7 +47,7 @@ AGV, HUMAN, END = (
 
 OUTPUTS = ("agv_request", "call", "hold_door")
 
-STANDING = LiftSample("L1", Door.CLOSED, motion=Motion.STOPPED, agv=False)
+STANDING = LiftSample("L1", DoorReading.CLOSED, motion=Motion.STOPPED, agv=False)
 """At L1, closed, in nobody's service."""
 
 
@@ -164,8 +164,10 @@ class Controller(Building):
         nearest = round(self.height)
         return self.floors[nearest] if abs(self.height - nearest) < 0.25 else None
 
-    def _door(self) -> Door:
-        return {0.0: Door.CLOSED, 1.0: Door.OPEN}.get(self.openness, Door.BETWEEN)
+    def _door(self) -> DoorReading:
+        return {0.0: DoorReading.CLOSED, 1.0: DoorReading.OPEN}.get(
+            self.openness, DoorReading.BETWEEN
+        )
 
     def _motion(self) -> Motion:
         if self.goal is None or self.openness:
@@ -204,7 +206,7 @@ class Story:
         self.building = building or Building()
         self.settings = LiftSettings(
             floors=floors or FLOORS,
-            limits=Durations(**limits),
+            limits=LiftDurations(**limits),
             fire_reset=fire_reset,
             alarm=alarm,
             alarm_on=list(alarm_on),

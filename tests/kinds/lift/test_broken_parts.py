@@ -16,7 +16,7 @@ from hal_fakes.plants.plant import FailureMode
 from tests.depth import part
 from tests.kinds.lift.rmf_world import World
 from tests.kinds.lift.wired import WiredStory, shipped
-from workbench.rmf_model.robot import Robot
+from workbench.rmf_model.robot import RobotContext
 
 LATE_S = 0.3
 """Debounce, a scan, and states that may not follow each other faster: how old a truth may be."""
@@ -53,7 +53,7 @@ class Witness:
 def ride(broken: str, mode: FailureMode, broken_at: float) -> WiredStory:
     """A robot's ride to L3 on a lift that breaks; it is mended, the robot gives up, another rides."""
     story = WiredStory(scan_s=0.1, agv_timeout_s=5, floor_timeout_s=10, door_timeout_s=5)
-    robot, other = Robot("fleet/a"), Robot("fleet/b")
+    robot, other = RobotContext("fleet/a"), RobotContext("fleet/b")
     rmf = World(story, robot, other)
     witness = Witness(story)
     to_rmf = story.hear

@@ -7,7 +7,7 @@ import pytest
 from msgspec.structs import replace
 
 from bridges.kinds.lift.signals import (
-    Door,
+    DoorReading,
     Hazard,
     LiftOutputs,
     LiftSample,
@@ -15,7 +15,7 @@ from bridges.kinds.lift.signals import (
     Side,
 )
 from bridges.settings.load import load
-from drivers.lift.dry_contact import Settings
+from drivers.lift.dry_contact import DryContactLiftSettings
 from tests.depth import depth
 from tests.kinds.lift.alone import ASKED, CLOSED, Alone
 from tests.kinds.lift.invariants import check, nothing_changes_before_wake_at
@@ -30,7 +30,7 @@ CONFIG = Path(__file__).parents[3] / "config" / "lift_by_call.yaml"
 def simulator() -> WiredStory:
     """The open simulator's lift, as `config/lift_by_call.yaml` is wired to it."""
     settings = load(CONFIG).devices["Lift1"]
-    assert isinstance(settings, Settings)
+    assert isinstance(settings, DryContactLiftSettings)
     story = WiredStory(settings)
     story.run(1.0)
     return story
@@ -112,7 +112,7 @@ def test_agv_mode_may_end_between_two_destinations() -> None:
     story.run(5.0)
     building.set(level="L3", motion=Motion.STOPPED)
     story.run(6.0)
-    building.set(door=Door.OPEN)
+    building.set(door=DoorReading.OPEN)
     story.run(7.0)
     story.asks(A, "L1")
     building.set(agv=False)

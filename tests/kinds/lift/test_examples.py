@@ -19,9 +19,9 @@ A = "fleet/a"
 def in_service(name: str) -> Story:
     """The lift of an example."""
     settings: Any = load(CONFIG / name).devices["Lift1"]
-    if isinstance(settings, dry_contact.Settings):
+    if isinstance(settings, dry_contact.DryContactLiftSettings):
         return WiredStory(settings)
-    assert isinstance(settings, register.Settings)
+    assert isinstance(settings, register.RegisterLiftSettings)
     return Story(
         GatewayBuilding(settings),
         floors=settings.floors,

@@ -6,10 +6,10 @@ import pytest
 from msgspec.structs import replace
 
 from bridges.kinds.lift.signals import (
-    Door,
+    DoorReading,
     Hazard,
+    LiftRequested,
     Motion,
-    Requested,
 )
 from bridges.kinds.shared.decision import (
     Fault,
@@ -35,19 +35,19 @@ FAULTS: dict[str, tuple[list[tuple[float, Any]], Fault]] = {
         Fault("FLOOR_CODE_ILLEGAL", "two lines at once"),
     ),
     "a door that is both": (
-        [(0.0, replace(AT_L1, door=Door.BOTH))],
+        [(0.0, replace(AT_L1, door=DoorReading.BOTH))],
         Fault("DOOR_CONTACTS_CONTRADICT", "door reads open and closed"),
     ),
     "a rear door that is both": (
-        [(0.0, replace(AT_L1, rear_door=Door.BOTH))],
+        [(0.0, replace(AT_L1, rear_door=DoorReading.BOTH))],
         Fault("DOOR_CONTACTS_CONTRADICT", "rear door reads open and closed"),
     ),
     "a door whose number means nothing": (
-        [(0.0, replace(AT_L1, door=Door.UNKNOWN))],
+        [(0.0, replace(AT_L1, door=DoorReading.UNKNOWN))],
         Fault("DOOR_CODE_ILLEGAL", "the door's number means nothing"),
     ),
     "a rear door whose number means nothing": (
-        [(0.0, replace(AT_L1, rear_door=Door.UNKNOWN))],
+        [(0.0, replace(AT_L1, rear_door=DoorReading.UNKNOWN))],
         Fault("DOOR_CODE_ILLEGAL", "the rear door's number means nothing"),
     ),
     "up and down at once": (
@@ -63,7 +63,7 @@ FAULTS: dict[str, tuple[list[tuple[float, Any]], Fault]] = {
         Fault("AGV_MODE_NOT_GRANTED", "no AGV mode status after 0.5 s"),
     ),
     "a car that does not come": (
-        [(0.0, AT_L1), (0.1, Requested("A", True, "L3")), (0.8, AT_L1)],
+        [(0.0, AT_L1), (0.1, LiftRequested("A", True, "L3")), (0.8, AT_L1)],
         Fault("RUNTIME_LIMIT_EXCEEDED", "not at L3 after 0.6 s"),
     ),
     "a door that does not open": (
@@ -80,7 +80,8 @@ FAULTS: dict[str, tuple[list[tuple[float, Any]], Fault]] = {
     ),
     "nothing read yet": ([(0.0, ASKED)], Fault("INPUTS_NOT_FRESH", "not read yet")),
     "inputs that never keep still": (
-        [(0.1 * i, replace(AT_L1, agv=bool(i % 2), rear_door=(Door.OPEN, Door.CLOSED)[i % 2]))
+        [(0.1 * i, replace(AT_L1, agv=bool(i % 2),
+                           rear_door=(DoorReading.OPEN, DoorReading.CLOSED)[i % 2]))
          for i in range(2, 30)],
         Fault("INPUTS_NOT_FRESH", "not steady: rear_door, agv_mode"),
     ),
@@ -93,7 +94,7 @@ def test_a_fault_says_what_is_wrong(what: str) -> None:
     debounce = {"rear_door": 0.5, "agv_mode": 0.5} if "still" in what else {}
     alone = Alone(debounce, agv_timeout_s=0.5, floor_timeout_s=0.6, door_timeout_s=0.7)
     if debounce:
-        settled = replace(AT_L1, rear_door=Door.CLOSED)
+        settled = replace(AT_L1, rear_door=DoorReading.CLOSED)
         alone(-0.5, settled)(0.0, settled)
     for now, event in happenings:
         alone(now, event)

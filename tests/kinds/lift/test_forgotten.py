@@ -15,11 +15,13 @@ from bridges.messages.stamps import stamp
 from tests.kinds.lift.rmf_world import World
 from tests.kinds.lift.story import AGV, END, WALL, Building, Controller, Story
 from tests.kinds.lift.test_with_rmf import A, B, ons, sessions, world
-from workbench.rmf_model.robot import Robot
+from workbench.rmf_model.robot import RobotContext
 
 
-def one_inside_one_waiting(adapters_first: bool = False) -> tuple[World, Robot, Robot]:
-    a, b = Robot(A), Robot(B)
+def one_inside_one_waiting(
+    adapters_first: bool = False,
+) -> tuple[World, RobotContext, RobotContext]:
+    a, b = RobotContext(A), RobotContext(B)
     rmf = world(a, b, adapters_first=adapters_first)
     rmf.asks(a, "L2")
     rmf.until_done(a)
@@ -50,7 +52,7 @@ def test_a_supervisor_that_restarts_and_takes_up_the_waiting_robot_locks_nobody_
 
 
 def test_a_robot_that_still_waits_outside_is_served_too_and_then_the_other_one() -> None:
-    a, b = Robot(A), Robot(B)
+    a, b = RobotContext(A), RobotContext(B)
     rmf = world(a, b)
     rmf.asks(a, "L4")
     rmf.run(3.0)

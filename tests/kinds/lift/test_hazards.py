@@ -6,12 +6,12 @@ from msgspec.structs import replace
 from bridges.kinds.lift.messages import alarm_topics
 from bridges.kinds.lift.settings import LiftSettings
 from bridges.kinds.lift.signals import (
-    Door,
+    DoorReading,
     Hazard,
     LiftOutputs,
+    LiftRequested,
     LiftSample,
     Motion,
-    Requested,
     Side,
 )
 from bridges.kinds.shared.decision import (
@@ -22,8 +22,8 @@ from bridges.messages.topics import EMERGENCY_SIGNAL, FIRE_ALARM_TRIGGER, RETAIN
 from tests.kinds.lift.alone import AT_L1, CLOSED, Alone
 from tests.kinds.lift.story import Building, Controller, Story
 
-CLOSED_AT_L1 = LiftSample("L1", Door.CLOSED, motion=Motion.STOPPED, agv=True)
-OPEN_AT_L1 = replace(CLOSED_AT_L1, door=Door.OPEN)
+CLOSED_AT_L1 = LiftSample("L1", DoorReading.CLOSED, motion=Motion.STOPPED, agv=True)
+OPEN_AT_L1 = replace(CLOSED_AT_L1, door=DoorReading.OPEN)
 HELD = LiftOutputs(agv_request=True, hold_door=Side.FRONT)
 
 MODES = [
@@ -64,7 +64,7 @@ def test_a_hazard_before_boarding_switches_off_within_a_scan_and_offers_no_open_
 ) -> None:
     story = waiting()
     story.building.hazard(hazard)
-    story.building.set(door=Door.OPEN, agv=False)
+    story.building.set(door=DoorReading.OPEN, agv=False)
     story.run(5.0)
     assert story.edges[2:] == [(2.1, "hold_door", None), (2.1, "agv_request", False)]
     assert story.state == f"{mode}, moving at L1, A to L1"
@@ -85,7 +85,7 @@ def test_after_boarding_the_true_door_is_shown_so_that_the_robot_gets_out(
     story.asks("A", "L3")
     story.run(3.0)
     building.hazard(hazard)
-    building.set(agv=False, door=Door.CLOSED)
+    building.set(agv=False, door=DoorReading.CLOSED)
     story.run(4.0)
     building.set(level=None, motion=Motion.DOWN)
     story.run(5.0)
@@ -93,9 +93,9 @@ def test_after_boarding_the_true_door_is_shown_so_that_the_robot_gets_out(
     story.run(6.0)
     assert story.state == f"{mode}, closed at L2, A to L3"
     story.asks("A", "L2")
-    building.set(door=Door.BETWEEN)
+    building.set(door=DoorReading.BETWEEN)
     story.run(7.0)
-    building.set(door=Door.OPEN)
+    building.set(door=DoorReading.OPEN)
     story.run(8.0)
     assert story.outputs == LiftOutputs()
     assert story.states[-2:] == [
@@ -146,7 +146,7 @@ def test_a_hazard_on_the_way_cancels_the_call_and_the_ride_resumes_afterwards() 
 
 def test_a_pulsed_call_that_a_hazard_cut_short_is_given_again_when_it_is_over() -> None:
     alone = Alone(stale_after_s=900.0, call_pulse_s=2.0, hazard_clear_s=1.0)
-    alone(0.0, CLOSED)(1.0, Requested("A", True, "L3"))
+    alone(0.0, CLOSED)(1.0, LiftRequested("A", True, "L3"))
     assert alone.decision.outputs.call == "L3"
     alone(2.0, replace(CLOSED, hazards=frozenset({Hazard.EMERGENCY})))
     assert alone.decision.outputs == LiftOutputs()
@@ -261,7 +261,7 @@ def test_a_car_that_a_hazard_has_left_between_floors_is_called_again() -> None:
     story = inside()
     building = story.building
     building.hazard(Hazard.CODE_BLUE)
-    building.set(level=None, motion=Motion.DOWN, door=Door.CLOSED)
+    building.set(level=None, motion=Motion.DOWN, door=DoorReading.CLOSED)
     story.run(4.0)
     building.hazard()
     building.set(motion=Motion.STOPPED)
@@ -272,7 +272,7 @@ def test_a_car_that_a_hazard_has_left_between_floors_is_called_again() -> None:
 def test_an_overloaded_lift_is_not_offered_for_boarding() -> None:
     story = waiting()
     story.building.hazard(Hazard.OVERLOAD)
-    story.building.set(door=Door.OPEN)
+    story.building.set(door=DoorReading.OPEN)
     story.run(4.0)
     assert story.state == "AGV, moving at L1, A to L1"
     story.building.hazard()

@@ -4,18 +4,20 @@ import pytest
 from msgspec.structs import replace
 
 from bridges.kinds.lift.relays import Channel, Relays
-from bridges.kinds.lift.settings import Durations
-from bridges.kinds.lift.signals import Door, Hazard, LiftOutputs, LiftSample, Motion, Side
+from bridges.kinds.lift.settings import LiftDurations
+from bridges.kinds.lift.signals import DoorReading, Hazard, LiftOutputs, LiftSample, Motion, Side
 from tests.kinds.lift.story import Building, Controller, Story
 
-AT_L1 = LiftSample("L1", Door.OPEN, motion=Motion.STOPPED, agv=True)
+AT_L1 = LiftSample("L1", DoorReading.OPEN, motion=Motion.STOPPED, agv=True)
 
 
-def limits(**changes: float) -> Durations:
-    return Durations(**changes)  # type: ignore[arg-type]
+def limits(**changes: float) -> LiftDurations:
+    return LiftDurations(**changes)  # type: ignore[arg-type]
 
 
-def driven(relays: Relays, wishes: list[tuple[float, LiftOutputs]], rules: Durations) -> list[str]:
+def driven(
+    relays: Relays, wishes: list[tuple[float, LiftOutputs]], rules: LiftDurations
+) -> list[str]:
     """What is on after each wish: `A` for AGV mode, the called floor, the held door."""
     shown = []
     for now, wish in wishes:
@@ -154,20 +156,20 @@ def test_a_burst_of_changing_requests_does_not_wear_the_relays() -> None:
 
 @pytest.mark.parametrize("inside", [False, True])
 def test_a_door_that_is_only_open_for_its_own_dwell_time_is_not_offered(inside: bool) -> None:
-    closed = replace(AT_L1, door=Door.CLOSED)
+    closed = replace(AT_L1, door=DoorReading.CLOSED)
     story = Story(Building(closed), max_cycles_per_min=2, request_timeout_s=99)
     story.run(1.0)
     story.asks("A", "L1")
     if inside:
-        story.building.set(door=Door.OPEN)
+        story.building.set(door=DoorReading.OPEN)
         story.until(lambda: story.state == "AGV, open at L1, A to L1")
-        story.building.set(door=Door.CLOSED)
+        story.building.set(door=DoorReading.CLOSED)
     for motion in (Motion.UP, Motion.STOPPED) * 2:  # a loose contact: the hold's relay must rest
         story.run(story.now + 1.0)
         story.building.set(motion=motion)
     story.run(8.0)
     assert story.outputs == LiftOutputs(agv_request=True)
-    story.building.set(door=Door.OPEN)
+    story.building.set(door=DoorReading.OPEN)
     story.run(9.0)
     assert (story.faults, story.state) == (["RELAY_RESTS"], "AGV, moving at L1, A to L1")
     story.until(lambda: story.outputs.hold_door)
@@ -175,7 +177,7 @@ def test_a_door_that_is_only_open_for_its_own_dwell_time_is_not_offered(inside: 
 
 
 def test_a_lift_that_stands_because_a_relay_came_on_too_often_says_so() -> None:
-    story = Story(Building(replace(AT_L1, door=Door.CLOSED)), max_cycles_per_min=3)
+    story = Story(Building(replace(AT_L1, door=DoorReading.CLOSED)), max_cycles_per_min=3)
     story.run(1.0)
     for at, floor in enumerate(["L3", "L4", "L3", "L4"]):
         story.run(2.0 + at)

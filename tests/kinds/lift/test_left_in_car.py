@@ -14,16 +14,18 @@ from tests.kinds.lift.rmf_world import World
 from tests.kinds.lift.story import AGV, END, WALL
 from tests.kinds.lift.test_forgotten import Overheard
 from tests.kinds.lift.test_with_rmf import A, B, ons, sessions, world
-from workbench.rmf_model.robot import Robot
+from workbench.rmf_model.robot import RobotContext
 from workbench.rmf_model.supervisors import LiftSupervisor
 
 SILENT_S = 5.0
 LEFT_S = 60.0
 
 
-def riding(jazzy: bool = False, adapters_first: bool = False) -> tuple[World, Robot, Robot]:
+def riding(
+    jazzy: bool = False, adapters_first: bool = False
+) -> tuple[World, RobotContext, RobotContext]:
     """A is between L2 and L4, B waits at L1."""
-    a, b = Robot(A, jazzy), Robot(B, jazzy)
+    a, b = RobotContext(A, jazzy), RobotContext(B, jazzy)
     rmf = world(a, b, adapters_first=adapters_first)
     rmf.supervisor = LiftSupervisor(jazzy)
     rmf.asks(a, "L2")
@@ -184,7 +186,7 @@ def test_a_robot_that_waits_outside_or_was_never_heard_is_ended_as_ever() -> Non
     unheard = Overheard()
     unheard.story.ends(A)
     assert sessions(unheard.story) == ["", A, ""]
-    outside = world(Robot(A))
+    outside = world(RobotContext(A))
     outside.asks(outside.robots[0], "L4")
     outside.run(outside.story.now + 2.0)
     outside.robots.clear()

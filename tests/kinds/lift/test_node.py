@@ -4,12 +4,12 @@ import logging
 
 import pytest
 
-from bridges.kinds.lift.signals import Door, LiftOutputs, LiftSample, Motion
+from bridges.kinds.lift.signals import DoorReading, LiftOutputs, LiftSample, Motion
 from bridges.messages.definitions import LiftState, Time
 from bridges.messages.stamps import in_seconds
 from tests.kinds.lift.story import WALL, Building, Controller, Story
 
-OPEN_AT_L1 = LiftSample("L1", Door.OPEN, motion=Motion.STOPPED, agv=True)
+OPEN_AT_L1 = LiftSample("L1", DoorReading.OPEN, motion=Motion.STOPPED, agv=True)
 
 
 def times(story: Story) -> list[float]:
@@ -37,7 +37,7 @@ def test_a_change_is_published_at_once_and_many_changes_ten_times_a_second() -> 
     story.run(1.6)
     assert times(story)[-1] == 1.56
     for i in range(200):
-        story.building.set(door=(Door.OPEN, Door.CLOSED)[i % 2])
+        story.building.set(door=(DoorReading.OPEN, DoorReading.CLOSED)[i % 2])
         story.run(story.now + 0.01)
     assert 18 <= len([at for at in times(story) if at > 1.6]) <= 21
     gaps = [round(b - a, 2) for a, b in zip(times(story), times(story)[1:], strict=False)]
@@ -47,10 +47,10 @@ def test_a_change_is_published_at_once_and_many_changes_ten_times_a_second() -> 
 def test_a_change_that_is_over_before_its_state_is_due_is_not_published() -> None:
     story = Story(Building(OPEN_AT_L1), scan_s=0.01, debounce={})
     story.run(1.55)
-    for door in (Door.CLOSED, Door.OPEN, Door.CLOSED):
+    for door in (DoorReading.CLOSED, DoorReading.OPEN, DoorReading.CLOSED):
         story.building.set(door=door)
         story.run(story.now + 0.02)
-    story.building.set(door=Door.CLOSED)
+    story.building.set(door=DoorReading.CLOSED)
     story.run(3.5)
     assert [state for at, state in story.states if at > 1.5] == ["AGV, closed at L1"]
 

@@ -8,7 +8,7 @@ from bridges.messages.definitions import LiftRequest
 from tests.kinds.lift.rmf_world import World
 from tests.kinds.lift.story import END, Controller, Story
 from tests.kinds.lift.test_with_rmf import A, B, world
-from workbench.rmf_model.robot import Robot
+from workbench.rmf_model.robot import RobotContext
 from workbench.rmf_model.supervisors import LiftSupervisor
 
 
@@ -32,7 +32,7 @@ def test_a_start_with_a_robot_that_already_asks_warns_of_nothing(
 def test_a_handover_warns_only_that_the_other_one_asked_too_early(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
-    a, b = Robot(A), Robot(B)
+    a, b = RobotContext(A), RobotContext(B)
     rmf = world(a, b)
     rmf.asks(a, "L2")
     rmf.until_done(a)
@@ -47,7 +47,7 @@ def test_a_handover_warns_only_that_the_other_one_asked_too_early(
 def test_an_end_without_a_session_is_ignored_and_not_logged(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
-    a = Robot(A, jazzy=True)
+    a = RobotContext(A, jazzy=True)
     rmf = World(Story(Controller()), a)
     rmf.supervisor = LiftSupervisor(jazzy=True)
     rmf.run(10.0)

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from msgspec.structs import replace
 
 from bridges.kinds.lift import KIND, core
-from bridges.kinds.lift.signals import Door, Hazard, LiftSample, Motion
+from bridges.kinds.lift.signals import DoorReading, Hazard, LiftSample, Motion
 from bridges.kinds.shared.decision import Sampled
 from bridges.messages.definitions import LiftDoor, LiftRequest, LiftState
 from tests.depth import examples
@@ -17,7 +17,7 @@ from tests.kinds.lift.invariants import check
 from tests.kinds.lift.rmf_world import World as Rmf
 from tests.kinds.lift.story import AGV, END, HUMAN, Building, Controller, Story
 from tests.kinds.lift.walk import Step, World
-from workbench.rmf_model.robot import Robot
+from workbench.rmf_model.robot import RobotContext
 
 FEW = settings(max_examples=examples(60))
 STORMS = settings(max_examples=examples(40))
@@ -36,7 +36,7 @@ class Judge:
         building = self.building
         around = World(memory, building.sample, not building.unreadable, not building.unwritable)
         check(Step(memory, event, decision, around, now, limits, exact=False))
-        if isinstance(event, Sampled) and event.sample.door is Door.OPEN:
+        if isinstance(event, Sampled) and event.sample.door is DoorReading.OPEN:
             self.open_seen_at = now
         if decision.report.door is LiftDoor.DOOR_OPEN:
             assert now <= self.open_seen_at + limits.debounce_s("door") + limits.t.stale_after_s
@@ -53,7 +53,7 @@ def judged(building: Building, **options: Any) -> tuple[Story, Judge]:
 SAMPLES = st.builds(
     LiftSample,
     level=st.sampled_from(["L1", "L2", "L3", None]),
-    door=st.sampled_from([Door.OPEN, Door.CLOSED, Door.BETWEEN, Door.BOTH]),
+    door=st.sampled_from([DoorReading.OPEN, DoorReading.CLOSED, DoorReading.BETWEEN, DoorReading.BOTH]),
     motion=st.sampled_from([Motion.STOPPED, Motion.UP, Motion.CONTRADICTORY]),
     agv=st.booleans(),
     hazards=st.sampled_from([frozenset(), frozenset(), frozenset(), frozenset({Hazard.FIRE}),
@@ -105,7 +105,7 @@ def test_whatever_has_happened_the_lift_comes_back_and_serves(
         story.run(story.now + wait_s)
     building = story.building
     building.unreadable = building.unwritable = ""
-    building.sample = LiftSample("L1", Door.OPEN, motion=Motion.STOPPED, agv=True)
+    building.sample = LiftSample("L1", DoorReading.OPEN, motion=Motion.STOPPED, agv=True)
     story.run(story.now + 6.0)
     story.resets()
     for session in "AB":
@@ -132,7 +132,7 @@ FATES = st.lists(
 )
 
 
-def trouble(rmf: Rmf, robot: Robot, what: str) -> Robot:
+def trouble(rmf: Rmf, robot: RobotContext, what: str) -> RobotContext:
     """One party restarts, or the building acts up for half a second."""
     story = rmf.story
     if what == "supervisor":
@@ -162,7 +162,7 @@ def test_a_robot_rides_through_loss_delay_doubling_and_restarts(
     adapters_first: bool,
 ) -> None:
     story, _ = judged(Controller())
-    robot = Robot("fleet/a")
+    robot = RobotContext("fleet/a")
     rmf = Rmf(story, robot, adapters_first=adapters_first)
     count = [0, 0]
 

@@ -4,21 +4,21 @@ from collections.abc import Mapping
 
 import pytest
 
-from bridges.kinds.lift.memory import Doubted, Session
+from bridges.kinds.lift.memory import Doubted, LiftSession
 from bridges.kinds.lift.replayed import LASTS_S, MOST, doubt, noted
-from bridges.kinds.lift.signals import Door, Ended, LiftSample, Motion, Requested
+from bridges.kinds.lift.signals import DoorReading, EndRequested, LiftRequested, LiftSample, Motion
 from tests.kinds.lift.rmf_world import World
 from tests.kinds.lift.story import AGV, END, Building
 from tests.kinds.lift.test_forgotten import Overheard
 from tests.kinds.lift.test_with_rmf import A, B, ons, sessions, world
-from workbench.rmf_model.robot import Robot
+from workbench.rmf_model.robot import RobotContext
 
 OPEN_FOR_A = "AGV, open at L2, fleet/a to L2"
 
 
-def on_its_threshold(rides_before: int) -> tuple[World, Robot]:
+def on_its_threshold(rides_before: int) -> tuple[World, RobotContext]:
     """A robot goes into the car at L3, and has had so many rides just before."""
-    robot = Robot(A)
+    robot = RobotContext(A)
     rmf = world(robot)
     for _ in range(rides_before):
         rmf.rides(robot, "L2", "L1")
@@ -61,7 +61,7 @@ def test_a_robot_that_is_cut_off_before_it_gets_the_lift_is_as_safe_when_it_is_f
     None
 ):
     """It was cut off at 12.6 h of that day, and had the lift only afterwards."""
-    first, robot = Robot(B), Robot(A)
+    first, robot = RobotContext(B), RobotContext(A)
     rmf = world(first, robot)
     rmf.rides(robot, "L2", "L1")
     rmf.asks(first, "L1")
@@ -84,7 +84,7 @@ def test_an_earlier_ride_that_rmf_hears_again_shows_a_robot_no_door_that_was_let
 ) -> None:
     """As a robot's next ride began where the last one had ended, while RMF's real supervisor was dead:
     it went in on the earlier ride's state, and the door closed."""
-    lift = Overheard(Building(LiftSample("L2", Door.OPEN, motion=Motion.STOPPED, agv=True)))
+    lift = Overheard(Building(LiftSample("L2", DoorReading.OPEN, motion=Motion.STOPPED, agv=True)))
     assert lift.story.state == OPEN_FOR_A
     lift.story.ends(A)
     ended_at = lift.story.now
@@ -118,8 +118,8 @@ def test_a_floor_that_only_the_supervisor_asks_for_counts_after_a_while() -> Non
 
 def test_a_doubt_lasts_exactly_three_seconds() -> None:
     doubted = Doubted("L4", 10.0)
-    session = Session(A, True, "L2", 0.0, doubted=doubted)
-    request = Requested(A, True, "L4")
+    session = LiftSession(A, True, "L2", 0.0, doubted=doubted)
+    request = LiftRequested(A, True, "L4")
     lasts = [doubt(session, request, "L2", True, now) for now in (12.9, 13.0)]
     assert lasts == [doubted, None]
 
@@ -168,7 +168,7 @@ def test_a_robot_that_has_ended_or_was_never_heard_raises_no_doubt() -> None:
 def test_of_more_robots_than_any_site_has_those_heard_first_are_forgotten() -> None:
     own: Mapping[str, str] = {}
     for number in range(MOST + 1):
-        own = noted(own, Requested(f"robot{number}", True, "L1"))
-    own = noted(noted(own, Requested("robot1", True, "L2")), Ended("robot2"))
+        own = noted(own, LiftRequested(f"robot{number}", True, "L1"))
+    own = noted(noted(own, LiftRequested("robot1", True, "L2")), EndRequested("robot2"))
     assert list(own) == [*(f"robot{n}" for n in range(3, MOST + 1)), "robot1"]
     assert own["robot1"] == "L2"

@@ -5,7 +5,7 @@ from msgspec.structs import replace
 
 from bridges.kinds.lift import messages
 from bridges.kinds.lift.settings import Floor, LiftSettings
-from bridges.kinds.lift.signals import Door, LiftOutputs, LiftSample, Motion, Side
+from bridges.kinds.lift.signals import DoorReading, LiftOutputs, LiftSample, Motion, Side
 from bridges.kinds.shared.decision import RequestRefused
 from bridges.messages.definitions import LiftMode, LiftMotion, LiftRequest, LiftState, Time
 from bridges.messages.stamps import in_seconds
@@ -15,7 +15,9 @@ SUMMARY = ("mode", "floor", "door", "motion", "session", "boarded", "destination
 IDLE_AT_L1 = [(0.0, "OFFLINE, moving at ?"), (0.1, "HUMAN, closed at L1")]
 
 
-def at(level: str | None, door: Door = Door.CLOSED, *, agv: bool = True) -> LiftSample:
+def at(
+    level: str | None, door: DoorReading = DoorReading.CLOSED, *, agv: bool = True
+) -> LiftSample:
     """A standing car."""
     return LiftSample(level, door, motion=Motion.STOPPED, agv=agv)
 
@@ -203,7 +205,7 @@ def test_human_mode_requested_by_a_stranger_is_a_session_without_outputs() -> No
 
 
 def test_an_open_door_in_human_mode_is_not_offered_for_boarding() -> None:
-    story = Story(Building(at("L1", Door.OPEN, agv=False)))
+    story = Story(Building(at("L1", DoorReading.OPEN, agv=False)))
     story.run(1.0)
     assert story.state == "HUMAN, open at L1"
     story.asks("A", "L1", HUMAN)
@@ -258,7 +260,7 @@ def test_relays_rest_between_two_calls_when_the_destination_changes_on_the_way()
 
 
 def test_another_destination_while_the_door_is_held_lets_it_go_and_then_calls() -> None:
-    story = Story(Building(at("L1", Door.OPEN)))
+    story = Story(Building(at("L1", DoorReading.OPEN)))
     story.run(1.0)
     story.asks("A", "L1")
     story.run(3.0)
@@ -310,7 +312,7 @@ def test_a_car_that_has_drifted_from_its_destination_is_called_again(pulse_s: fl
 
 
 def test_without_an_agv_status_line_agv_mode_counts_as_soon_as_it_is_requested() -> None:
-    story = Story(Building(replace(at("L1", Door.OPEN), agv=None)))
+    story = Story(Building(replace(at("L1", DoorReading.OPEN), agv=None)))
     story.run(1.0)
     assert story.state == "HUMAN, open at L1"
     story.asks("A", "L1")
@@ -320,10 +322,10 @@ def test_without_an_agv_status_line_agv_mode_counts_as_soon_as_it_is_requested()
 
 
 def test_without_motion_lines_a_car_with_an_open_door_at_a_floor_counts_as_standing() -> None:
-    building = Building(replace(at("L1", Door.OPEN), motion=None))
+    building = Building(replace(at("L1", DoorReading.OPEN), motion=None))
     story = Story(building)
     story.run(1.0)
-    building.set(door=Door.CLOSED)
+    building.set(door=DoorReading.CLOSED)
     story.run(2.0)
     assert story.motions == [
         LiftMotion.MOTION_UNKNOWN,
@@ -336,20 +338,20 @@ TWO_DOORS = {"L1": Floor(), "L2": Floor(), "L2_rear": Floor(level="L2", side=Sid
 
 
 def test_each_of_the_two_floor_names_of_a_landing_holds_and_shows_its_own_door() -> None:
-    building = Building(replace(at("L2", agv=False), rear_door=Door.CLOSED))
+    building = Building(replace(at("L2", agv=False), rear_door=DoorReading.CLOSED))
     story = Story(building, floors=TWO_DOORS)
     story.run(1.0)
     assert story.state == "HUMAN, closed at L2"
     building.set(agv=True)
     story.asks("A", "L2_rear")
     story.run(2.0)
-    building.set(rear_door=Door.OPEN)
+    building.set(rear_door=DoorReading.OPEN)
     story.run(3.0)
     assert story.state == "AGV, open at L2_rear, A to L2_rear"
     story.asks("A", "L2")
     story.run(4.0)
     assert story.state == "AGV, closed at L2, A to L2"
-    building.set(rear_door=Door.CLOSED, door=Door.OPEN)
+    building.set(rear_door=DoorReading.CLOSED, door=DoorReading.OPEN)
     story.run(5.0)
     assert story.state == "AGV, open at L2, A to L2"
     assert story.edges == [
@@ -361,7 +363,7 @@ def test_each_of_the_two_floor_names_of_a_landing_holds_and_shows_its_own_door()
 
 
 def test_a_door_without_wires_is_never_shown_open() -> None:
-    story = Story(Building(at("L2", Door.OPEN)), floors=TWO_DOORS)
+    story = Story(Building(at("L2", DoorReading.OPEN)), floors=TWO_DOORS)
     story.run(1.0)
     story.asks("A", "L2_rear")
     story.run(3.0)
@@ -369,11 +371,11 @@ def test_a_door_without_wires_is_never_shown_open() -> None:
 
 
 def test_without_a_session_either_open_door_is_shown() -> None:
-    building = Building(replace(at("L2"), rear_door=Door.OPEN))
+    building = Building(replace(at("L2"), rear_door=DoorReading.OPEN))
     story = Story(building, floors=TWO_DOORS)
     story.run(1.0)
     assert story.state == "AGV, open at L2"
-    building.set(rear_door=Door.BETWEEN)
+    building.set(rear_door=DoorReading.BETWEEN)
     story.run(2.0)
     assert story.state == "AGV, moving at L2"
 
@@ -401,7 +403,7 @@ def test_an_impossible_request_to_a_lift_is_refused_by_name(
 
 
 def test_a_person_reads_the_state_in_a_few_words() -> None:
-    story = Story(Building(replace(STANDING, door=Door.NOT_OPEN)), door_travel_s=2.0)
+    story = Story(Building(replace(STANDING, door=DoorReading.NOT_OPEN)), door_travel_s=2.0)
     status = story.node.status()
     assert {key: status[key] for key in SUMMARY} == {
         "mode": "OFFLINE",

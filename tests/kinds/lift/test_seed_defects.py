@@ -10,12 +10,12 @@ import pytest
 
 from bridges.kinds.lift import KIND, messages
 from bridges.kinds.lift.settings import LiftSettings
-from bridges.kinds.lift.signals import Door, Hazard, LiftOutputs, LiftSample, Motion
+from bridges.kinds.lift.signals import DoorReading, Hazard, LiftOutputs, LiftSample, Motion
 from bridges.kinds.shared.decision import RequestRefused
 from bridges.messages.definitions import LiftRequest, Time
 from tests.kinds.lift.story import AGV, HUMAN, Building, Controller, Story
 
-OPEN_AT_L1 = LiftSample("L1", Door.OPEN, motion=Motion.STOPPED, agv=True)
+OPEN_AT_L1 = LiftSample("L1", DoorReading.OPEN, motion=Motion.STOPPED, agv=True)
 
 
 def test_defect_a_a_request_for_another_lift_changed_this_ones_session_and_destination() -> None:
@@ -112,7 +112,7 @@ def test_defect_g_a_floor_was_the_last_character_of_its_name() -> None:
 def test_defect_h_no_code_read_as_the_lowest_floor_and_a_passing_code_as_another(
     level: str | None, shown: str
 ) -> None:
-    story = Story(Building(LiftSample(level, Door.CLOSED, motion=Motion.UP, agv=True)))
+    story = Story(Building(LiftSample(level, DoorReading.CLOSED, motion=Motion.UP, agv=True)))
     story.run(1.0)
     story.building.set(level="L3")  # two bits do not change at the same instant
     story._scan()
@@ -147,7 +147,7 @@ def test_defect_i_alarms_were_not_filtered_never_cleared_and_stopped_nothing() -
 def test_defect_j_a_door_was_open_or_closed_and_never_in_between() -> None:
     story = Story(Building(OPEN_AT_L1))
     story.run(1.0)
-    story.building.set(door=Door.BETWEEN)
+    story.building.set(door=DoorReading.BETWEEN)
     story.run(2.0)
     assert story.state == "AGV, moving at L1"
 

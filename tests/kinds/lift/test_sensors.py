@@ -4,15 +4,15 @@ import pytest
 from msgspec.structs import replace
 
 from bridges.kinds.lift.core import decide
-from bridges.kinds.lift.memory import Memory
+from bridges.kinds.lift.memory import LiftMemory
 from bridges.kinds.lift.sensing import MOTION_MEMORY_S
 from bridges.kinds.lift.signals import (
-    Door,
+    DoorReading,
     Hazard,
     LiftOutputs,
+    LiftRequested,
     LiftSample,
     Motion,
-    Requested,
 )
 from bridges.kinds.shared.decision import (
     Fault,
@@ -26,7 +26,7 @@ from bridges.messages.stamps import in_seconds
 from tests.kinds.lift.alone import AT_L1, DEBOUNCE, Alone
 from tests.kinds.lift.story import WALL, Building, Controller, Story
 
-OPEN_AT_L1 = LiftSample("L1", Door.OPEN, motion=Motion.STOPPED, agv=True)
+OPEN_AT_L1 = LiftSample("L1", DoorReading.OPEN, motion=Motion.STOPPED, agv=True)
 
 
 def boarding(**inputs: object) -> Story:
@@ -48,10 +48,10 @@ def test_an_open_door_is_offered_when_every_input_confirms_it() -> None:
 @pytest.mark.parametrize(
     ("inputs", "state", "faults"),
     [
-        ({"door": Door.BOTH}, "AGV, moving at L1", ["DOOR_CONTACTS_CONTRADICT"]),
-        ({"door": Door.UNKNOWN}, "AGV, moving at L1", ["DOOR_CODE_ILLEGAL"]),
-        ({"door": Door.BETWEEN}, "AGV, moving at L1", []),
-        ({"door": Door.NOT_OPEN}, "AGV, moving at L1", []),
+        ({"door": DoorReading.BOTH}, "AGV, moving at L1", ["DOOR_CONTACTS_CONTRADICT"]),
+        ({"door": DoorReading.UNKNOWN}, "AGV, moving at L1", ["DOOR_CODE_ILLEGAL"]),
+        ({"door": DoorReading.BETWEEN}, "AGV, moving at L1", []),
+        ({"door": DoorReading.NOT_OPEN}, "AGV, moving at L1", []),
         ({"level": None}, "AGV, moving at ?", []),
         (
             {"level": None, "code_fault": "the lines of L1 and L3 are on at once"},
@@ -99,28 +99,28 @@ def test_motion_is_read_from_the_motion_lines(motion: Motion, told: LiftMotion) 
 
 
 def test_a_door_contact_that_glitches_on_the_way_never_reads_as_open() -> None:
-    building = Building(replace(OPEN_AT_L1, door=Door.CLOSED))
+    building = Building(replace(OPEN_AT_L1, door=DoorReading.CLOSED))
     story = Story(building)
     story.run(1.0)
     story.asks("A", "L3")
     for level in (None, "L2", None):
         building.set(level=level, motion=Motion.UP)
         story.run(story.now + 0.5)
-        building.set(door=Door.OPEN)
+        building.set(door=DoorReading.OPEN)
         story.run(story.now + 0.05)
-        building.set(door=Door.CLOSED)
+        building.set(door=DoorReading.CLOSED)
         story.run(story.now + 0.5)
     assert [state for _, state in story.states if "open" in state] == []
     assert [edge for edge in story.edges if edge[1] == "hold_door"] == []
 
 
 def test_a_short_door_contact_glitch_at_the_destination_does_not_read_as_an_open_door() -> None:
-    story = boarding(door=Door.CLOSED)
+    story = boarding(door=DoorReading.CLOSED)
     story.run(2.01)
-    story.building.set(door=Door.OPEN)
+    story.building.set(door=DoorReading.OPEN)
     story._scan()
     story.run(2.03)
-    story.building.set(door=Door.CLOSED)
+    story.building.set(door=DoorReading.CLOSED)
     story.run(4.0)
     assert [state for _, state in story.states if "open" in state] == []
 
@@ -275,7 +275,7 @@ def test_without_motion_lines_the_next_floor_is_believed_but_a_jump_is_not() -> 
 
 
 def test_a_fast_car_may_skip_the_code_of_a_floor_that_it_has_had_time_to_pass() -> None:
-    story = boarding(door=Door.CLOSED)
+    story = boarding(door=DoorReading.CLOSED)
     story.building.set(level=None, motion=Motion.UP)
     story.run(3.0)
     story.building.set(level="L3", motion=Motion.STOPPED)
@@ -294,18 +294,18 @@ def test_a_car_may_pass_a_floor_unseen_in_exactly_its_least_travel_time() -> Non
 
 
 def test_lines_that_have_a_meaning_only_in_agv_mode_are_believed_there() -> None:
-    building = Building(LiftSample(None, Door.BETWEEN, motion=None, agv=False))
+    building = Building(LiftSample(None, DoorReading.BETWEEN, motion=None, agv=False))
     story = Story(building)
     story.run(1.0)
     for floor in ("L1", "L3"):
         story.asks("A", floor)
         story.run(story.now + 1.0)
-        building.set(agv=True, level=floor, door=Door.OPEN, motion=Motion.STOPPED)
+        building.set(agv=True, level=floor, door=DoorReading.OPEN, motion=Motion.STOPPED)
         story.run(story.now + 1.0)
         assert story.state == f"AGV, open at {floor}, A to {floor}"
         story.ends("A")
         story.run(story.now + 3.0)
-        building.set(agv=False, level=None, door=Door.BETWEEN, motion=None)
+        building.set(agv=False, level=None, door=DoorReading.BETWEEN, motion=None)
         story.run(story.now + 9.0)
         assert story.state == "HUMAN, moving at ?"
     assert story.edges == [
@@ -321,7 +321,7 @@ def test_lines_that_have_a_meaning_only_in_agv_mode_are_believed_there() -> None
 
 
 def test_a_movement_counts_at_once_when_the_motion_lines_had_no_meaning_before() -> None:
-    building = Building(LiftSample("L1", Door.OPEN, motion=None, agv=True))
+    building = Building(LiftSample("L1", DoorReading.OPEN, motion=None, agv=True))
     story = Story(building, debounce={"motion": 5.0})
     story.run(7.0)
     building.set(motion=Motion.UP)
@@ -358,7 +358,7 @@ def test_without_readings_the_lift_is_offline_with_outputs_off_and_still_publish
 
 
 def test_a_reading_no_longer_counts_at_the_very_instant_at_which_it_is_too_old() -> None:
-    burning = replace(AT_L1, door=Door.BOTH, hazards=frozenset({Hazard.EMERGENCY}))
+    burning = replace(AT_L1, door=DoorReading.BOTH, hazards=frozenset({Hazard.EMERGENCY}))
     alone = Alone(stale_after_s=2.0)(0.0, burning)(2.0, IoFailed("timeout"))
     assert alone.faults == (Fault("INPUTS_NOT_FRESH", "timeout"),)
 
@@ -397,7 +397,7 @@ def test_what_was_believed_before_the_readings_stopped_is_not_believed_afterward
     story.run(12.0)
     told = len(story.told)
     story.building.unreadable = ""
-    story.building.set(level="L3", door=Door.CLOSED)
+    story.building.set(level="L3", door=DoorReading.CLOSED)
     story.run(14.0)
     back = [state for at, state in story.states if at >= 12.0]
     assert back == ["AGV, closed at L3, A to L1"]
@@ -438,14 +438,14 @@ def test_a_floor_that_was_reached_in_a_short_gap_is_believed() -> None:
 
 
 def test_a_glitch_that_a_gap_cuts_in_half_changes_nothing() -> None:
-    story = boarding(door=Door.CLOSED)
-    story.building.set(door=Door.OPEN)
+    story = boarding(door=DoorReading.CLOSED)
+    story.building.set(door=DoorReading.OPEN)
     story._scan()
     story.building.unreadable = "timeout"
     story.run(2.5)
     story.building.unreadable = ""
     story.run(2.51)
-    story.building.set(door=Door.CLOSED)
+    story.building.set(door=DoorReading.CLOSED)
     story.run(4.0)
     assert [state for _, state in story.states if "open" in state] == []
 
@@ -483,7 +483,7 @@ def test_a_fire_loop_that_chatters_takes_the_lift_away() -> None:
 def test_a_door_that_never_settles_at_the_start_is_never_believed() -> None:
     story = Story(Building(OPEN_AT_L1))
     for i in range(100):
-        story.building.set(door=(Door.OPEN, Door.CLOSED)[i % 2])
+        story.building.set(door=(DoorReading.OPEN, DoorReading.CLOSED)[i % 2])
         story.run(0.02 * (i + 1))
         story._scan()
     assert [state for _, state in story.states] == ["OFFLINE, moving at ?"]
@@ -500,16 +500,16 @@ def test_without_any_debounce_the_first_reading_counts() -> None:
 
 
 def test_a_contact_for_open_proves_nothing_about_closed() -> None:
-    story = Story(Building(replace(OPEN_AT_L1, door=Door.NOT_OPEN)), door_travel_s=4.0)
+    story = Story(Building(replace(OPEN_AT_L1, door=DoorReading.NOT_OPEN)), door_travel_s=4.0)
     story.run(3.0)
     assert story.state == "AGV, moving at L1"
     story.run(5.0)
     assert story.state == "AGV, closed at L1"
     assert story.node.status()["door"] == "closed (estimated)"
-    story.building.set(door=Door.OPEN)
+    story.building.set(door=DoorReading.OPEN)
     story.run(6.0)
     assert story.node.status()["door"] == "open"
-    story.building.set(door=Door.NOT_OPEN)
+    story.building.set(door=DoorReading.NOT_OPEN)
     story.run(12.0)
     assert [state for _, state in story.states[-3:]] == [
         "AGV, open at L1",
@@ -520,10 +520,10 @@ def test_a_contact_for_open_proves_nothing_about_closed() -> None:
 
 
 def test_with_only_a_closed_contact_an_open_door_is_estimated_and_marked() -> None:
-    story = Story(Building(replace(OPEN_AT_L1, door=Door.CLOSED)), door_travel_s=4.0)
+    story = Story(Building(replace(OPEN_AT_L1, door=DoorReading.CLOSED)), door_travel_s=4.0)
     story.run(1.0)
     story.asks("A", "L1")
-    story.building.set(door=Door.NOT_CLOSED)
+    story.building.set(door=DoorReading.NOT_CLOSED)
     story.run(7.0)
     assert story.states[-1][1] == "AGV, open at L1, A to L1"
     assert story.states[-1][0] == 5.05
@@ -533,39 +533,41 @@ def test_with_only_a_closed_contact_an_open_door_is_estimated_and_marked() -> No
 @pytest.mark.parametrize(
     ("front", "rear", "shown"),
     [
-        (Door.CLOSED, Door.CLOSED, "closed"),
-        (Door.CLOSED, Door.NOT_OPEN, "closed (estimated)"),
-        (Door.BETWEEN, Door.NOT_OPEN, "moving"),
-        (Door.OPEN, Door.NOT_OPEN, "open"),
-        (Door.OPEN, Door.NOT_CLOSED, "open"),
-        (Door.CLOSED, Door.NOT_CLOSED, "open (estimated)"),
+        (DoorReading.CLOSED, DoorReading.CLOSED, "closed"),
+        (DoorReading.CLOSED, DoorReading.NOT_OPEN, "closed (estimated)"),
+        (DoorReading.BETWEEN, DoorReading.NOT_OPEN, "moving"),
+        (DoorReading.OPEN, DoorReading.NOT_OPEN, "open"),
+        (DoorReading.OPEN, DoorReading.NOT_CLOSED, "open"),
+        (DoorReading.CLOSED, DoorReading.NOT_CLOSED, "open (estimated)"),
     ],
 )
-def test_of_two_doors_only_the_estimated_one_is_marked(front: Door, rear: Door, shown: str) -> None:
+def test_of_two_doors_only_the_estimated_one_is_marked(
+    front: DoorReading, rear: DoorReading, shown: str
+) -> None:
     story = Story(Building(replace(OPEN_AT_L1, door=front, rear_door=rear)))
     story.run(9.0)
     assert story.node.status()["door"] == shown
 
 
 def test_an_estimated_door_that_is_not_offered_is_shown_as_moving() -> None:
-    story = Story(Building(replace(OPEN_AT_L1, door=Door.NOT_CLOSED, agv=False)))
+    story = Story(Building(replace(OPEN_AT_L1, door=DoorReading.NOT_CLOSED, agv=False)))
     story.run(9.0)
     story.asks("A", "L1")
     assert story.node.status()["door"] == "moving"
 
 
 def test_a_door_that_is_not_shown_open_is_not_marked_as_estimated() -> None:
-    sample = replace(AT_L1, door=Door.NOT_CLOSED, motion=Motion.UP)
+    sample = replace(AT_L1, door=DoorReading.NOT_CLOSED, motion=Motion.UP)
     alone = Alone(door_travel_s=1.0, stale_after_s=60.0)(0.0, sample)(2.0, sample)
     shown = alone.decision.report
     assert (shown.door.name, shown.estimated) == ("DOOR_MOVING", False)
 
 
 def test_an_estimated_door_that_starts_to_move_is_no_longer_at_its_end() -> None:
-    story = Story(Building(replace(OPEN_AT_L1, door=Door.NOT_CLOSED)), door_travel_s=4.0)
+    story = Story(Building(replace(OPEN_AT_L1, door=DoorReading.NOT_CLOSED)), door_travel_s=4.0)
     story.run(6.0)
     assert story.state == "AGV, open at L1"
-    story.building.set(door=Door.CLOSED)
+    story.building.set(door=DoorReading.CLOSED)
     story._scan()
     assert story.node.status()["door"] == "moving"
 
@@ -575,18 +577,18 @@ def test_an_estimated_door_that_starts_to_move_is_no_longer_at_its_end() -> None
 
 def test_the_core_wakes_when_an_input_seen_for_the_first_time_has_settled() -> None:
     rules = Story(Building(OPEN_AT_L1)).limits
-    before = decide(Memory(), Requested("A", True, "L1"), 0.0, rules)
+    before = decide(LiftMemory(), LiftRequested("A", True, "L1"), 0.0, rules)
     assert [fault.detail for fault in before.report.faults] == ["not read yet"]
     first = decide(before.memory, Sampled(OPEN_AT_L1), 10.0, rules)
     assert first.wake_at == 10.0 + rules.debounce_s("door")
 
 
 def test_each_input_has_its_own_debounce_and_the_core_wakes_when_it_is_over() -> None:
-    settled = replace(AT_L1, rear_door=Door.CLOSED)
+    settled = replace(AT_L1, rear_door=DoorReading.CLOSED)
     for change, due_s in (
         ({"level": "L2"}, 0.08),
-        ({"door": Door.CLOSED}, 0.03),
-        ({"rear_door": Door.OPEN}, 0.04),
+        ({"door": DoorReading.CLOSED}, 0.03),
+        ({"rear_door": DoorReading.OPEN}, 0.04),
         ({"agv": False}, 0.05),
         ({"hazards": frozenset({Hazard.FIRE})}, 0.06),
     ):
@@ -600,24 +602,27 @@ def test_the_core_wakes_when_its_first_reading_has_settled() -> None:
 
 def test_the_core_wakes_when_either_door_is_estimated_to_have_arrived() -> None:
     rules = Story(Building(OPEN_AT_L1), debounce={}, door_travel_s=0.7).limits
-    for front, rear in ((Door.NOT_OPEN, Door.OPEN), (Door.OPEN, Door.NOT_CLOSED)):
+    for front, rear in (
+        (DoorReading.NOT_OPEN, DoorReading.OPEN),
+        (DoorReading.OPEN, DoorReading.NOT_CLOSED),
+    ):
         sample = LiftSample("L1", front, rear_door=rear)
-        assert decide(Memory(), Sampled(sample), 10.0, rules).wake_at == 10.7
+        assert decide(LiftMemory(), Sampled(sample), 10.0, rules).wake_at == 10.7
 
 
 @pytest.mark.parametrize("where", ["door", "rear_door"])
 def test_a_door_with_one_contact_wakes_the_core_when_it_has_come_to_its_other_end(
     where: str,
 ) -> None:
-    sample = replace(AT_L1, door=Door.CLOSED, rear_door=Door.CLOSED)
+    sample = replace(AT_L1, door=DoorReading.CLOSED, rear_door=DoorReading.CLOSED)
     alone = Alone(door_travel_s=3.0, stale_after_s=60.0)(0.0, sample)
-    alone(1.0, replace(sample, **{where: Door.NOT_CLOSED}))
+    alone(1.0, replace(sample, **{where: DoorReading.NOT_CLOSED}))
     assert alone.decision.wake_at == 4.0
 
 
 def test_a_new_fault_is_news_but_a_change_of_its_words_is_not() -> None:
     rules = Story(Building(OPEN_AT_L1), debounce={}).limits
-    first = decide(Memory(), Sampled(OPEN_AT_L1), 0.0, rules).report
+    first = decide(LiftMemory(), Sampled(OPEN_AT_L1), 0.0, rules).report
     lost = [replace(first, faults=(Fault("INPUTS_NOT_FRESH", f"timeout {i}"),)) for i in (1, 2)]
     assert lost[0].news() == lost[1].news() != first.news()
     assert replace(first, read_at=9.0).news() == first.news()

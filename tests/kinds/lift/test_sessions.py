@@ -7,13 +7,13 @@ import pytest
 from bridges.kinds.lift import KIND
 from bridges.kinds.lift.core import decide
 from bridges.kinds.lift.signals import (
-    Door,
-    Ended,
+    DoorReading,
+    EndRequested,
     Hazard,
     LiftOutputs,
+    LiftRequested,
     LiftSample,
     Motion,
-    Requested,
     Side,
 )
 from bridges.kinds.shared.decision import (
@@ -26,7 +26,7 @@ from bridges.messages.definitions import LiftRequest, LiftState
 from tests.kinds.lift.alone import ASKED, AT_L1, Alone
 from tests.kinds.lift.story import HUMAN, Building, Controller, Story
 
-OPEN_AT_L1 = LiftSample("L1", Door.OPEN, motion=Motion.STOPPED, agv=True)
+OPEN_AT_L1 = LiftSample("L1", DoorReading.OPEN, motion=Motion.STOPPED, agv=True)
 
 
 def boarded() -> Story:
@@ -63,7 +63,9 @@ def test_a_message_names_the_lift_that_it_is_for() -> None:
     assert KIND.device_name(LiftState(lift_name="Lift3")) == "Lift3"
 
 
-@pytest.mark.parametrize("event", [Ended("A"), IoFailed("timeout"), OperatorReset(), RivalSeen()])
+@pytest.mark.parametrize(
+    "event", [EndRequested("A"), IoFailed("timeout"), OperatorReset(), RivalSeen()]
+)
 def test_an_event_that_is_not_a_request_is_not_refused(event: Any) -> None:
     assert Alone()(0.0, AT_L1, event).decision.refused == ""
 
@@ -99,7 +101,7 @@ def test_the_same_session_back_within_the_grace_finds_everything_as_it_was() -> 
 def test_an_event_that_is_only_noted_is_not_refused() -> None:
     alone = Alone(release_grace_s=2.0)(0.0, AT_L1)(0.1, WriteFailed("timeout"))
     assert alone.decision.refused == ""
-    alone(0.2, AT_L1, ASKED)(1.0, AT_L1, Ended("A"))(1.5, ASKED)
+    alone(0.2, AT_L1, ASKED)(1.0, AT_L1, EndRequested("A"))(1.5, ASKED)
     assert (alone.decision.refused, alone.decision.report.session) == ("", "A")
 
 
@@ -122,9 +124,9 @@ def test_nobody_else_is_granted_a_session_within_the_grace_and_anybody_afterward
 
 
 def test_anybody_may_have_the_lift_in_the_instant_in_which_the_grace_ends() -> None:
-    alone = Alone(release_grace_s=2.0)(0.0, AT_L1)(0.1, ASKED)(1.0, Ended("A"))
+    alone = Alone(release_grace_s=2.0)(0.0, AT_L1)(0.1, ASKED)(1.0, EndRequested("A"))
     alone(2.9, AT_L1)
-    alone(3.0, Requested("B", True, "L1"))
+    alone(3.0, LiftRequested("B", True, "L1"))
     assert alone.decision.refused == ""
     assert alone.decision.report.session == "B"
 
@@ -134,13 +136,13 @@ def test_the_grace_ends_at_its_time_even_for_a_request_that_comes_before_the_sca
     story.ends("A")
     story.run(6.9)
     memory, rules = story.node.subject.memory, story.limits
-    assert decide(memory, Requested("B", True, "L2"), 6.99, rules).refused
-    granted = decide(memory, Requested("B", True, "L2"), 7.0, rules)
+    assert decide(memory, LiftRequested("B", True, "L2"), 6.99, rules).refused
+    granted = decide(memory, LiftRequested("B", True, "L2"), 7.0, rules)
     assert (granted.report.session, granted.memory.grace) == ("B", None)
 
 
 def test_even_a_short_grace_lasts_its_time() -> None:
-    alone = Alone(release_grace_s=0.5)(0.0, AT_L1)(0.1, ASKED)(1.0, AT_L1, Ended("A"))
+    alone = Alone(release_grace_s=0.5)(0.0, AT_L1)(0.1, ASKED)(1.0, AT_L1, EndRequested("A"))
     assert alone.decision.outputs == LiftOutputs(agv_request=True, hold_door=Side.FRONT)
     assert alone(1.5, AT_L1).decision.outputs == LiftOutputs()
 

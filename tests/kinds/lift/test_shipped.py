@@ -4,7 +4,7 @@ from pathlib import Path
 
 from msgspec.structs import replace
 
-from bridges.kinds.lift.signals import Door
+from bridges.kinds.lift.signals import DoorReading
 from bridges.settings.load import load
 from drivers.lift.dry_contact import debounce
 from tests.kinds.lift.story import STANDING, Building, Story
@@ -14,25 +14,25 @@ CONFIG = Path(__file__).parents[3] / "config" / "lift_dry_contact.yaml"
 
 def test_a_contact_that_bounces_for_50_ms_on_the_way_past_a_floor_is_not_an_open_door() -> None:
     shipped = dict(debounce(load(CONFIG).devices["Lift1"]))
-    building = Building(replace(STANDING, door=Door.CLOSED, motion=None))
+    building = Building(replace(STANDING, door=DoorReading.CLOSED, motion=None))
     story = Story(building, debounce=shipped)
     story.run(1.0)
     for level in (None, "L2", None):
         building.set(level=level)
         story.run(story.now + 0.5)
-        building.set(door=Door.OPEN)
+        building.set(door=DoorReading.OPEN)
         story._scan()  # the edge wakes the loop
         story.run(story.now + 0.05)
-        building.set(door=Door.CLOSED)
+        building.set(door=DoorReading.CLOSED)
         story.run(story.now + 0.5)
     assert [state for _, state in story.states if "open" in state] == []
 
 
 def test_a_door_that_stays_open_reads_as_open_all_the_same() -> None:
     shipped = dict(debounce(load(CONFIG).devices["Lift1"]))
-    building = Building(replace(STANDING, door=Door.CLOSED, motion=None))
+    building = Building(replace(STANDING, door=DoorReading.CLOSED, motion=None))
     story = Story(building, debounce=shipped)
     story.run(1.0)
-    building.set(door=Door.OPEN)
+    building.set(door=DoorReading.OPEN)
     story.run(1.3)
     assert "open" in story.states[-1][1]

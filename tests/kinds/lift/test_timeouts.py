@@ -6,7 +6,7 @@ import pytest
 from msgspec.structs import replace
 
 from bridges.kinds.lift.signals import (
-    Door,
+    DoorReading,
     LiftOutputs,
     LiftSample,
     Motion,
@@ -24,7 +24,7 @@ HELD = LiftOutputs(agv_request=True, hold_door=Side.FRONT)
 OFF = LiftOutputs()
 
 
-def lift(level: str, door: Door, *, agv: bool, **limits: object) -> Story:
+def lift(level: str, door: DoorReading, *, agv: bool, **limits: object) -> Story:
     """A standing car, scanned twice a second, and a request for L1 at 1 s."""
     building = Building(LiftSample(level, door, motion=Motion.STOPPED, agv=agv))
     story = Story(building, scan_s=0.5, **limits)  # type: ignore[arg-type]
@@ -46,9 +46,15 @@ def tries(story: Story, output: str) -> list[float]:
 
 
 CASES = [
-    ("AGV_MODE_NOT_GRANTED", ("L2", Door.CLOSED, False), "agv_timeout_s", 600.0, "agv_request"),
-    ("RUNTIME_LIMIT_EXCEEDED", ("L2", Door.CLOSED, True), "floor_timeout_s", 120.0, "call"),
-    ("DOOR_OPENING_FAULT", ("L1", Door.CLOSED, True), "door_timeout_s", 10.0, "hold_door"),
+    (
+        "AGV_MODE_NOT_GRANTED",
+        ("L2", DoorReading.CLOSED, False),
+        "agv_timeout_s",
+        600.0,
+        "agv_request",
+    ),
+    ("RUNTIME_LIMIT_EXCEEDED", ("L2", DoorReading.CLOSED, True), "floor_timeout_s", 120.0, "call"),
+    ("DOOR_OPENING_FAULT", ("L1", DoorReading.CLOSED, True), "door_timeout_s", 10.0, "hold_door"),
 ]
 
 
@@ -57,7 +63,7 @@ CASES = [
 
 @pytest.mark.parametrize(("fault", "inputs", "limit", "default_s", "output"), CASES)
 def test_a_step_that_times_out_is_a_fault_with_outputs_off(
-    fault: str, inputs: tuple[str, Door, bool], limit: str, default_s: float, output: str
+    fault: str, inputs: tuple[str, DoorReading, bool], limit: str, default_s: float, output: str
 ) -> None:
     story = lift(inputs[0], inputs[1], agv=inputs[2])
     keep_asking(story, 1.0 + default_s - 0.5)
@@ -71,7 +77,7 @@ def test_a_step_that_times_out_is_a_fault_with_outputs_off(
 
 @pytest.mark.parametrize(("fault", "inputs", "limit", "default_s", "output"), CASES)
 def test_a_failed_step_is_tried_three_times_more_and_then_latched(
-    fault: str, inputs: tuple[str, Door, bool], limit: str, default_s: float, output: str
+    fault: str, inputs: tuple[str, DoorReading, bool], limit: str, default_s: float, output: str
 ) -> None:
     story = lift(inputs[0], inputs[1], agv=inputs[2], **{limit: 4.0})
     keep_asking(story, 500.0)
@@ -83,7 +89,7 @@ def test_a_failed_step_is_tried_three_times_more_and_then_latched(
 
 def latched() -> Story:
     """The door at L1 has not opened in four tries."""
-    story = lift("L1", Door.CLOSED, agv=True, door_timeout_s=4.0)
+    story = lift("L1", DoorReading.CLOSED, agv=True, door_timeout_s=4.0)
     keep_asking(story, 200.0)
     assert (story.faults, story.outputs) == (["DOOR_OPENING_FAULT"], OFF)
     return story
@@ -99,16 +105,16 @@ def test_a_latched_fault_ends_with_the_session() -> None:
 
 def test_a_latched_fault_ends_with_an_end_though_the_same_session_is_back_at_once() -> None:
     """An operator ends the session, and the fleet adapter asks again within a second."""
-    story = lift("L1", Door.OPEN, agv=True, door_timeout_s=4.0)
+    story = lift("L1", DoorReading.OPEN, agv=True, door_timeout_s=4.0)
     story.run(3.0)
-    story.building.set(door=Door.CLOSED)
+    story.building.set(door=DoorReading.CLOSED)
     keep_asking(story, 200.0)
     assert (story.faults, story.outputs) == (["DOOR_OPENING_FAULT"], OFF)
     story.ends("A")
     story.run(200.5)
     story.asks("A", "L1")
     assert (story.faults, story.outputs) == ([], HELD)
-    story.building.set(agv=False, door=Door.OPEN)  # and it is still known to be inside
+    story.building.set(agv=False, door=DoorReading.OPEN)  # and it is still known to be inside
     story.run(202.0)
     assert story.state == "HUMAN, open at L1, A to L1"
 
@@ -149,19 +155,19 @@ def test_a_reset_during_a_retry_lets_the_request_wait_for_agv_mode_again() -> No
 
 def test_in_a_fault_an_open_door_is_not_offered() -> None:
     story = latched()
-    story.building.set(door=Door.OPEN)
+    story.building.set(door=DoorReading.OPEN)
     keep_asking(story, 210.0)
     assert story.state == "AGV, moving at L1, A to L1"
 
 
 def test_a_later_try_that_succeeds_ends_the_fault_and_resets_the_count() -> None:
-    story = lift("L1", Door.CLOSED, agv=True, door_timeout_s=4.0)
+    story = lift("L1", DoorReading.CLOSED, agv=True, door_timeout_s=4.0)
     keep_asking(story, 16.0)
     assert story.faults == ["DOOR_OPENING_FAULT"]
-    story.building.set(door=Door.OPEN)
+    story.building.set(door=DoorReading.OPEN)
     keep_asking(story, 17.0)
     assert (story.faults, story.state) == ([], "AGV, open at L1, A to L1")
-    story.building.set(door=Door.CLOSED)
+    story.building.set(door=DoorReading.CLOSED)
     keep_asking(story, 200.0)
     starts = tries(story, "hold_door")
     assert [round(b - a, 1) for a, b in pairwise(starts[2:])] == [34.0, 64.0]
@@ -175,7 +181,7 @@ def test_the_end_of_a_wait_for_the_lift_wakes_the_core() -> None:
 
 
 def test_agv_mode_lost_on_the_way_switches_outputs_off_and_is_requested_again() -> None:
-    story = Story(Building(LiftSample("L2", Door.CLOSED, motion=Motion.STOPPED, agv=True)))
+    story = Story(Building(LiftSample("L2", DoorReading.CLOSED, motion=Motion.STOPPED, agv=True)))
     story.run(1.0)
     story.asks("A", "L1")
     story.run(2.0)
@@ -196,7 +202,7 @@ def test_agv_mode_lost_on_the_way_switches_outputs_off_and_is_requested_again() 
 
 
 def test_agv_mode_lost_with_the_robot_at_the_open_door_shows_the_true_door() -> None:
-    story = lift("L1", Door.OPEN, agv=True)
+    story = lift("L1", DoorReading.OPEN, agv=True)
     story.run(5.0)
     story.building.set(agv=False)
     story.run(6.0)
@@ -206,17 +212,17 @@ def test_agv_mode_lost_with_the_robot_at_the_open_door_shows_the_true_door() -> 
 
 def test_the_call_stays_on_while_people_take_the_car_first() -> None:
     """Without an AGV status line nothing keeps people from stealing the car."""
-    building = Building(LiftSample("L2", Door.CLOSED, motion=Motion.STOPPED, agv=None))
+    building = Building(LiftSample("L2", DoorReading.CLOSED, motion=Motion.STOPPED, agv=None))
     story = Story(building)
     story.run(1.0)
     story.asks("A", "L1")
     building.set(level=None, motion=Motion.UP)
     story.run(3.0)
-    building.set(level="L4", motion=Motion.STOPPED, door=Door.OPEN)
+    building.set(level="L4", motion=Motion.STOPPED, door=DoorReading.OPEN)
     story.run(6.0)
     assert story.state == "AGV, open at L4, A to L1"
     assert story.outputs == LiftOutputs(agv_request=True, call="L1")
-    building.set(level=None, motion=Motion.DOWN, door=Door.CLOSED)
+    building.set(level=None, motion=Motion.DOWN, door=DoorReading.CLOSED)
     story.run(9.0)
     building.set(level="L1", motion=Motion.STOPPED)
     story.run(10.0)
@@ -234,7 +240,7 @@ def test_the_call_stays_on_while_people_take_the_car_first() -> None:
 
 
 def test_rmf_silent_with_the_robot_outside_lets_the_lift_go_and_keeps_the_session() -> None:
-    story = lift("L1", Door.CLOSED, agv=True, door_timeout_s=600)
+    story = lift("L1", DoorReading.CLOSED, agv=True, door_timeout_s=600)
     story.run(30.5)
     assert story.outputs == HELD
     story.run(31.0)
@@ -251,7 +257,7 @@ def test_rmf_silent_with_the_robot_outside_lets_the_lift_go_and_keeps_the_sessio
 
 
 def test_rmf_silent_with_a_robot_inside_holds_and_warns() -> None:
-    story = lift("L1", Door.OPEN, agv=True)
+    story = lift("L1", DoorReading.OPEN, agv=True)
     story.run(300.0)
     assert (story.outputs, story.faults) == (HELD, ["RMF_SILENT"])
     assert story.state == "AGV, open at L1, A to L1"
@@ -272,7 +278,7 @@ def test_the_core_wakes_for_rmfs_silence_and_for_the_next_try() -> None:
 
 
 def test_outputs_that_cannot_be_written_soon_become_a_fault_with_all_outputs_off() -> None:
-    story = lift("L1", Door.OPEN, agv=True)
+    story = lift("L1", DoorReading.OPEN, agv=True)
     story.run(5.0)
     story.building.unwritable = "no answer from the relay module"
     story.run(6.0)
@@ -294,7 +300,7 @@ def test_outputs_that_cannot_be_written_soon_become_a_fault_with_all_outputs_off
 
 
 def test_a_failed_write_is_repaired_by_the_next_one() -> None:
-    story = lift("L1", Door.OPEN, agv=True)
+    story = lift("L1", DoorReading.OPEN, agv=True)
     story.run(5.0)
     for _ in range(10):
         story.building.unwritable = "timeout"
@@ -327,8 +333,8 @@ def test_unwritten_outputs_are_judged_by_their_age_when_a_request_comes() -> Non
 @pytest.mark.parametrize("step_s", [3600.0, -3600.0])
 def test_a_jump_of_the_wall_clock_changes_neither_timeouts_nor_ages(step_s: float) -> None:
     straight, jumped = (
-        lift("L1", Door.CLOSED, agv=True, door_timeout_s=4.0),
-        lift("L1", Door.CLOSED, agv=True, door_timeout_s=4.0),
+        lift("L1", DoorReading.CLOSED, agv=True, door_timeout_s=4.0),
+        lift("L1", DoorReading.CLOSED, agv=True, door_timeout_s=4.0),
     )
     for story in (straight, jumped):
         story.run(3.0)

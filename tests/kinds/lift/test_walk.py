@@ -5,7 +5,7 @@ from math import inf
 import pytest
 from msgspec.structs import replace
 
-from bridges.kinds.lift.signals import Door, LiftOutputs, Motion
+from bridges.kinds.lift.signals import DoorReading, LiftOutputs, Motion
 from tests.depth import depth
 from tests.kinds.lift.invariants import check, nothing_changes_before_wake_at
 from tests.kinds.lift.walk import IDLE, World, limits_of, start, walker
@@ -89,7 +89,7 @@ def serves(world: World) -> bool:
     """Somebody new asks, AGV mode comes, the car comes, the door opens."""
     world = WALKER.path(world, "B asks L1", seen=check)
     wanted = WALKER.path(world, 1.0, seen=check).memory.relays.outputs()
-    sample = replace(IDLE, agv=True, door=Door.OPEN, motion=Motion.STOPPED)
+    sample = replace(IDLE, agv=True, door=DoorReading.OPEN, motion=Motion.STOPPED)
     world = WALKER.path(replace(world, sample=sample), 1.0, seen=check)
     session = world.memory.session
     return wanted.agv_request and session is not None and session.boarded

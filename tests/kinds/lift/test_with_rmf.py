@@ -6,12 +6,12 @@ from bridges.kinds.lift.signals import Hazard, LiftOutputs
 from bridges.messages.definitions import LiftRequest, Time
 from tests.kinds.lift.rmf_world import World
 from tests.kinds.lift.story import AGV, END, Controller, Story
-from workbench.rmf_model.robot import Robot
+from workbench.rmf_model.robot import RobotContext
 
 A, B = "fleet/a", "fleet/b"
 
 
-def world(*robots: Robot, adapters_first: bool = False) -> World:
+def world(*robots: RobotContext, adapters_first: bool = False) -> World:
     started = World(Story(Controller()), *robots, adapters_first=adapters_first)
     started.run(1.0)
     return started
@@ -30,7 +30,7 @@ def sessions(story: Story) -> list[str]:
 
 @pytest.mark.parametrize("adapters_first", [False, True])
 def test_a_whole_ride_completes_without_a_surplus_relay_edge(adapters_first: bool) -> None:
-    robot = Robot(A)
+    robot = RobotContext(A)
     rmf = world(robot, adapters_first=adapters_first)
     rmf.rides(robot, "L3", "L1")
     rmf.run(rmf.story.now + 10.0)
@@ -65,7 +65,7 @@ def test_a_hundred_requests_a_second_cause_no_additional_state() -> None:
 
 @pytest.mark.parametrize("adapters_first", [False, True])
 def test_a_robot_that_waits_is_served_after_the_one_that_rides(adapters_first: bool) -> None:
-    a, b = Robot(A), Robot(B)
+    a, b = RobotContext(A), RobotContext(B)
     rmf = world(a, b, adapters_first=adapters_first)
     rmf.asks(a, "L2")
     rmf.until_done(a)
@@ -86,7 +86,7 @@ def test_a_robot_that_waits_is_served_after_the_one_that_rides(adapters_first: b
 def test_without_grace_the_next_robot_has_the_lift_within_three_states(
     adapters_first: bool,
 ) -> None:
-    a, b = Robot(A), Robot(B)
+    a, b = RobotContext(A), RobotContext(B)
     rmf = World(Story(Controller(), release_grace_s=0), a, b, adapters_first=adapters_first)
     rmf.run(1.0)
     rmf.asks(a, "L2")
@@ -102,7 +102,7 @@ def test_without_grace_the_next_robot_has_the_lift_within_three_states(
 
 @pytest.mark.parametrize("times", [1, 10])
 def test_a_lost_end_is_repeated_until_it_is_heard(times: int) -> None:
-    robot = Robot(A)
+    robot = RobotContext(A)
     rmf = world(robot)
     rmf.asks(robot, "L2")
     rmf.until_done(robot)
@@ -127,7 +127,7 @@ def test_a_lost_end_is_repeated_until_it_is_heard(times: int) -> None:
 def test_a_supervisor_that_restarts_with_a_robot_in_the_car_does_not_end_its_session(
     adapters_first: bool,
 ) -> None:
-    robot = Robot(A)
+    robot = RobotContext(A)
     rmf = world(robot, adapters_first=adapters_first)
     rmf.asks(robot, "L2")
     rmf.until_done(robot)
@@ -146,7 +146,7 @@ def test_a_supervisor_that_restarts_with_a_robot_in_the_car_does_not_end_its_ses
 
 
 def test_a_supervisor_that_restarts_on_the_way_costs_one_call_and_never_agv_mode() -> None:
-    robot = Robot(A)
+    robot = RobotContext(A)
     rmf = world(robot)
     rmf.asks(robot, "L4")
     rmf.run(4.0)
@@ -158,7 +158,7 @@ def test_a_supervisor_that_restarts_on_the_way_costs_one_call_and_never_agv_mode
 
 
 def test_a_supervisor_that_restarts_in_a_fire_does_not_lock_the_robot_in() -> None:
-    robot = Robot(A)
+    robot = RobotContext(A)
     rmf = world(robot)
     rmf.asks(robot, "L2")
     rmf.until_done(robot)
@@ -196,7 +196,7 @@ def test_the_replay_of_a_hundred_old_requests_switches_agv_mode_once() -> None:
 
 
 def test_a_fleet_adapter_that_restarts_ends_the_session_that_it_no_longer_wants() -> None:
-    robot = Robot(A)
+    robot = RobotContext(A)
     rmf = world(robot)
     rmf.asks(robot, "L3")
     rmf.run(10.0)
@@ -207,7 +207,7 @@ def test_a_fleet_adapter_that_restarts_ends_the_session_that_it_no_longer_wants(
 
 
 def test_a_restarted_node_starts_dark_and_grants_the_session_from_the_next_request() -> None:
-    robot = Robot(A)
+    robot = RobotContext(A)
     rmf = world(robot)
     rmf.asks(robot, "L3")
     rmf.run(4.0)
@@ -223,7 +223,7 @@ def test_a_restarted_node_starts_dark_and_grants_the_session_from_the_next_reque
 
 
 def test_a_robot_rides_again_and_again_while_supervisor_and_node_restart() -> None:
-    robot = Robot(A)
+    robot = RobotContext(A)
     rmf = world(robot)
     for ride in range(6):
         rmf.asks(robot, "L3")

@@ -12,18 +12,18 @@ import msgspec
 from msgspec.structs import replace
 
 from bridges.kinds.lift.core import decide, initial, published
-from bridges.kinds.lift.memory import Forgotten, LiftLimits, Memory, OwnWords
+from bridges.kinds.lift.memory import ForgottenSession, LiftLimits, LiftMemory, OwnWords
 from bridges.kinds.lift.relays import Channel
-from bridges.kinds.lift.settings import Durations, LiftSettings
+from bridges.kinds.lift.settings import LiftDurations, LiftSettings
 from bridges.kinds.lift.signals import (
-    Door,
-    Ended,
+    DoorReading,
+    EndRequested,
     Event,
     FromAdapter,
     Hazard,
+    LiftRequested,
     LiftSample,
     Motion,
-    Requested,
 )
 from bridges.kinds.shared.debounce import Settled
 from bridges.kinds.shared.decision import IoFailed, OperatorReset, RivalSeen, Sampled, WriteFailed
@@ -41,7 +41,7 @@ def limits_of(
     """The default durations, but readings stay fresh for a minute: the walk then needs fewer scans."""
     settings = LiftSettings(
         floors=["L1", "L2", "L3"],
-        limits=Durations(**{"stale_after_s": 60.0, **changes}),
+        limits=LiftDurations(**{"stale_after_s": 60.0, **changes}),
         fire_reset="manual",
         alarm="fire_alarm_trigger",
         agv_mode=agv_mode,
@@ -52,13 +52,13 @@ def limits_of(
 class World(msgspec.Struct, frozen=True):
     """Memory at time 0, and the building: its inputs; whether it can be read, and written to."""
 
-    memory: Memory
+    memory: LiftMemory
     sample: LiftSample
     readable: bool = True
     writable: bool = True
 
 
-IDLE = LiftSample("L1", Door.CLOSED, motion=Motion.STOPPED, agv=False)
+IDLE = LiftSample("L1", DoorReading.CLOSED, motion=Motion.STOPPED, agv=False)
 
 
 def start(limits: LiftLimits) -> World:
@@ -110,24 +110,24 @@ def reading(world: World) -> Event:
 
 MOVES: dict[str, Move] = {
     **{
-        f"{who} asks {floor}": _event(Requested(who, True, floor, stamp=2 * 10**9))
+        f"{who} asks {floor}": _event(LiftRequested(who, True, floor, stamp=2 * 10**9))
         for who in ("A", "B")
         for floor in ("L1", "L3")
     },
-    "A ends, stamped": _event(Ended("A", stamp=3 * 10**9)),
-    "A ends, long ago": _event(Ended("A", stamp=10**9)),
-    "a person ends A": _event(Ended("A", by_person=True)),
-    "A asks human": _event(Requested("A", False, "L1")),
-    "A ends": _event(Ended("A")),
-    "B ends": _event(Ended("B")),
-    "A's adapter asks L3": _event(FromAdapter(Requested("A", True, "L3", 1))),
-    "A's adapter ends": _event(FromAdapter(Ended("A"))),
+    "A ends, stamped": _event(EndRequested("A", stamp=3 * 10**9)),
+    "A ends, long ago": _event(EndRequested("A", stamp=10**9)),
+    "a person ends A": _event(EndRequested("A", by_person=True)),
+    "A asks human": _event(LiftRequested("A", False, "L1")),
+    "A ends": _event(EndRequested("A")),
+    "B ends": _event(EndRequested("B")),
+    "A's adapter asks L3": _event(FromAdapter(LiftRequested("A", True, "L3", 1))),
+    "A's adapter ends": _event(FromAdapter(EndRequested("A"))),
     "agv on": _inputs(agv=True),
     "agv off": _inputs(agv=False),
     **{f"at {level}": _inputs(level=level, code_fault="") for level in ("L1", "L2", "L3", None)},
     "illegal code": _inputs(level=None, code_fault="parity"),
-    "door open": _inputs(door=Door.OPEN),
-    "door closed": _inputs(door=Door.CLOSED),
+    "door open": _inputs(door=DoorReading.OPEN),
+    "door closed": _inputs(door=DoorReading.CLOSED),
     "moving": _inputs(motion=Motion.MOVING),
     "standing": _inputs(motion=Motion.STOPPED),
     **{hazard: _hazard(hazard) for hazard in (Hazard.FIRE, Hazard.MANUAL, Hazard.OVERLOAD)},
@@ -147,7 +147,7 @@ Seen = Callable[["Step"], None]
 class Step(msgspec.Struct, frozen=True):
     """One decision, at time `now` after the state began. `exact`: no input is debounced."""
 
-    before: Memory
+    before: LiftMemory
     event: Event
     decision: Any
     world: World
@@ -186,7 +186,7 @@ def _decided(world: World, event: Event, now: float, limits: LiftLimits, seen: S
 
 
 def _step(
-    world: World, before: Memory, event: Event, now: float, limits: LiftLimits, seen: Seen
+    world: World, before: LiftMemory, event: Event, now: float, limits: LiftLimits, seen: Seen
 ) -> Step:
     step = Step(before, event, decide(before, event, now, limits), world, now, limits)
     seen(step)
@@ -210,7 +210,7 @@ AGES = {
 """Beyond this age (s) a time's distance makes no difference any more."""
 
 
-def shifted(memory: Memory, by: float) -> Memory:
+def shifted(memory: LiftMemory, by: float) -> LiftMemory:
     """The same memory with every time moved by so much, and old ones cut off."""
     senses, session, grace = memory.senses, memory.session, memory.grace
     return replace(
@@ -278,7 +278,7 @@ def _session(session: Any, by: float) -> Any:
     )
 
 
-def _forgotten(forgotten: Forgotten, by: float) -> Forgotten:
+def _forgotten(forgotten: ForgottenSession, by: float) -> ForgottenSession:
     return replace(forgotten, since=max(_at(forgotten.since, by), -4.0))
 
 

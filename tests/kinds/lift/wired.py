@@ -10,7 +10,7 @@ from bridges.settings.load import load
 from drivers import Driver
 from drivers.hal.modbus import ModbusBus
 from drivers.lift import register
-from drivers.lift.dry_contact import Settings, create, debounce, wires
+from drivers.lift.dry_contact import DryContactLiftSettings, create, debounce, wires
 from hal_fakes.modbus import register_lift
 from hal_fakes.plants.lift import LiftPlant
 from hal_fakes.plants.plant import FailureMode
@@ -20,10 +20,10 @@ from tests.kinds.lift.story import Building, Story
 SHIPPED = Path(__file__).parents[3] / "config" / "lift_dry_contact.yaml"
 
 
-def shipped() -> Settings:
+def shipped() -> DryContactLiftSettings:
     """The shipped example of `config/`."""
     settings = load(SHIPPED).devices["Lift1"]
-    assert isinstance(settings, Settings)
+    assert isinstance(settings, DryContactLiftSettings)
     return settings
 
 
@@ -48,7 +48,7 @@ class Driven(Building):
 class WiredBuilding(Driven):
     """The plant at the far ends of the wires."""
 
-    def __init__(self, settings: Settings) -> None:
+    def __init__(self, settings: DryContactLiftSettings) -> None:
         super().__init__()
         self.plant = LiftPlant("Lift1", settings)
         self._driver = create("Lift1", settings, PointsFar(self, self.plant, wires(settings)))
@@ -63,10 +63,10 @@ class WiredBuilding(Driven):
 class GatewayBuilding(Driven):
     """The plant behind a gateway's registers."""
 
-    def __init__(self, settings: register.Settings) -> None:
+    def __init__(self, settings: register.RegisterLiftSettings) -> None:
         super().__init__()
         self.plant = register_lift.build("Lift1", settings)
-        bus = RegisterFar(self, register_lift.RegisterLift(self.plant, settings))
+        bus = RegisterFar(self, register_lift.FakeRegisterLift(self.plant, settings))
         self._driver = register.create("Lift1", settings, cast(ModbusBus, bus))
 
 
@@ -75,7 +75,7 @@ class WiredStory(Story):
 
     building: WiredBuilding
 
-    def __init__(self, settings: Settings | None = None, **limits: Any) -> None:
+    def __init__(self, settings: DryContactLiftSettings | None = None, **limits: Any) -> None:
         settings = settings or shipped()
         super().__init__(
             WiredBuilding(settings),

@@ -1,9 +1,15 @@
 """The supervisor's core alone, for one lift, in virtual time: told by hand, its words written down."""
 
 from bridges.kinds.lift_supervisor import core
-from bridges.kinds.lift_supervisor.memory import Limits, Memory
+from bridges.kinds.lift_supervisor.memory import LiftSupervisorLimits, SupervisedLift
 from bridges.kinds.lift_supervisor.report import SupervisorReport
-from bridges.kinds.lift_supervisor.signals import Ended, Event, Requested, StateHeard, Target
+from bridges.kinds.lift_supervisor.signals import (
+    Event,
+    LiftStateHeard,
+    RideEnded,
+    RideRequested,
+    Target,
+)
 from bridges.messages.definitions import LiftMode, LiftRequest, Message
 from tests.kinds.shared import alone
 
@@ -17,11 +23,13 @@ def words(message: LiftRequest) -> str:
     return f"{name} {message.session_id} {message.destination_floor}".rstrip()
 
 
-class Alone(alone.Alone[Memory, Event, Limits, SupervisorReport]):
+class Alone(alone.Alone[SupervisedLift, Event, LiftSupervisorLimits, SupervisorReport]):
     """With one lift."""
 
-    def __init__(self, limits: Limits | None = None, *, speaks: bool = True) -> None:
-        super().__init__(core.initial("Lift1", 0.0), core.decide, limits or Limits(), speaks)
+    def __init__(self, limits: LiftSupervisorLimits | None = None, *, speaks: bool = True) -> None:
+        super().__init__(
+            core.initial("Lift1", 0.0), core.decide, limits or LiftSupervisorLimits(), speaks
+        )
         self.skew = 0.0
 
     def words(self, message: Message) -> str:
@@ -32,12 +40,12 @@ class Alone(alone.Alone[Memory, Event, Limits, SupervisorReport]):
         """An adapter's request, sent `aged` s ago by its own clock."""
         stamp = self.stamped(aged)
         door = 2 if kind == 1 else 0
-        self.hears(Requested(session, Target(kind, floor, door), stamp, self.now - stamp))
+        self.hears(RideRequested(session, Target(kind, floor, door), stamp, self.now - stamp))
 
     def ends(self, session: str, *, aged: float = 0.0) -> None:
         """An adapter's END."""
         stamp = self.stamped(aged)
-        self.hears(Ended(session, stamp, self.now - stamp))
+        self.hears(RideEnded(session, stamp, self.now - stamp))
 
     def shows(
         self,
@@ -51,7 +59,7 @@ class Alone(alone.Alone[Memory, Event, Limits, SupervisorReport]):
     ) -> None:
         """A LiftState."""
         door = 2 if open else 0
-        self.hears(StateHeard(session, floor, to, door, MODES[mode], floors))
+        self.hears(LiftStateHeard(session, floor, to, door, MODES[mode], floors))
 
     def ride(self, session: str = "a") -> None:
         """The lift is there, for this session: nothing is left to ask for."""

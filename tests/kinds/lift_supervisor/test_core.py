@@ -5,8 +5,8 @@ import math
 import pytest
 
 from bridges.kinds.lift_supervisor import core
-from bridges.kinds.lift_supervisor.memory import Limits, Memory
-from bridges.kinds.lift_supervisor.signals import StateHeard, Target
+from bridges.kinds.lift_supervisor.memory import LiftSupervisorLimits, SupervisedLift
+from bridges.kinds.lift_supervisor.signals import LiftStateHeard, Target
 from bridges.kinds.shared.decision import Fault
 from bridges.kinds.shared.durations import FORGOTTEN_S, REPEAT_S, SILENT_S
 from bridges.kinds.shared.freshness import MAX_REQUESTERS
@@ -47,14 +47,14 @@ def test_each_state_that_does_not_show_the_request_causes_a_repeat_at_1_hz_at_mo
 @pytest.mark.parametrize(
     "mismatch",
     [
-        StateHeard("", "L3", "", 2, 2),
-        StateHeard("a", "L1", "", 2, 2),
-        StateHeard("a", "L3", "L1", 2, 2),
-        StateHeard("a", "L1", "L3", 0, 2),
-        StateHeard("a", "L1", "L3", 1, 2),
+        LiftStateHeard("", "L3", "", 2, 2),
+        LiftStateHeard("a", "L1", "", 2, 2),
+        LiftStateHeard("a", "L3", "L1", 2, 2),
+        LiftStateHeard("a", "L1", "L3", 0, 2),
+        LiftStateHeard("a", "L1", "L3", 1, 2),
     ],
 )
-def test_any_difference_between_request_and_state_causes_a_repeat(mismatch: StateHeard) -> None:
+def test_any_difference_between_request_and_state_causes_a_repeat(mismatch: LiftStateHeard) -> None:
     desk = Alone()
     desk.asks("a")
     desk.until(1.0)
@@ -63,9 +63,9 @@ def test_any_difference_between_request_and_state_causes_a_repeat(mismatch: Stat
 
 
 @pytest.mark.parametrize(
-    "match", [StateHeard("a", "L3", "", 2, 2), StateHeard("a", "L1", "L3", 2, 2)]
+    "match", [LiftStateHeard("a", "L3", "", 2, 2), LiftStateHeard("a", "L1", "L3", 2, 2)]
 )
-def test_a_state_that_shows_the_request_causes_no_repeat(match: StateHeard) -> None:
+def test_a_state_that_shows_the_request_causes_no_repeat(match: LiftStateHeard) -> None:
     desk = Alone()
     desk.asks("a")
     desk.until(1.0)
@@ -132,7 +132,7 @@ def test_human_mode_needs_no_served_floor() -> None:
 
 
 def test_a_holder_that_asks_for_an_unserved_floor_keeps_its_request_and_counts_as_alive() -> None:
-    desk = Alone(Limits(holder_alarm_s=20.0))
+    desk = Alone(LiftSupervisorLimits(holder_alarm_s=20.0))
     desk.asks("a")
     for second in range(1, 30):
         desk.until(float(second))
@@ -327,7 +327,7 @@ def test_a_robot_that_waits_in_silence_for_10_s_leaves_the_queue_and_comes_back_
 
 def test_requesters_may_be_silent_while_the_lift_is_silent() -> None:
     """Fleet adapters repeat themselves at its states, and at nothing else."""
-    desk = Alone(Limits(holder_ttl_s=70.0))
+    desk = Alone(LiftSupervisorLimits(holder_ttl_s=70.0))
     desk.asks("a")
     desk.asks("b")
     desk.ride("a")
@@ -363,8 +363,8 @@ def test_the_core_wakes_when_the_lift_counts_as_silent_and_says_so() -> None:
 
 
 def test_states_count_as_flowing_until_exactly_three_seconds_after_the_last() -> None:
-    state = StateHeard("", "L1", "", 0, 2)
-    memory = Memory("Lift1", 0.0, shown=state, shown_at=10.0)
+    state = LiftStateHeard("", "L1", "", 0, 2)
+    memory = SupervisedLift("Lift1", 0.0, shown=state, shown_at=10.0)
     assert [memory.flows(now) for now in (13.0, 13.1)] == [True, False]
 
 
@@ -555,7 +555,7 @@ def test_a_silent_holder_keeps_the_lift_and_raises_an_alarm_after_a_minute() -> 
 
 
 def test_where_the_site_wants_it_a_silent_holder_is_ended_after_its_time() -> None:
-    desk = Alone(Limits(holder_ttl_s=120.0))
+    desk = Alone(LiftSupervisorLimits(holder_ttl_s=120.0))
     desk.asks("a")
     desk.ride("a")
     for second in range(1, 122):
@@ -565,7 +565,7 @@ def test_where_the_site_wants_it_a_silent_holder_is_ended_after_its_time() -> No
 
 
 def test_a_silent_holder_whose_turn_is_ended_does_not_wait_in_the_queue() -> None:
-    desk = Alone(Limits(holder_ttl_s=5.0, holder_alarm_s=2.0))
+    desk = Alone(LiftSupervisorLimits(holder_ttl_s=5.0, holder_alarm_s=2.0))
     desk.asks("a")
     for second in range(6):
         desk.until(float(second))
@@ -596,12 +596,12 @@ def shown_each_second(desk: Alone, session: str, until: int) -> tuple[Fault, ...
 
 
 def test_each_alarm_says_which_session_it_is_about() -> None:
-    never_taken = Alone(Limits(silent_after_s=60.0))
+    never_taken = Alone(LiftSupervisorLimits(silent_after_s=60.0))
     never_taken.asks("a")
     assert shown_each_second(never_taken, "", 30) == (
         Fault("NOT_GRANTED", "the lift does not take a"),
     )
-    desk = Alone(Limits(holder_alarm_s=20.0))
+    desk = Alone(LiftSupervisorLimits(holder_alarm_s=20.0))
     desk.asks("a")
     assert shown_each_second(desk, "a", 20) == (Fault("HOLDER_SILENT", "no request from a"),)
     desk.ends("a")

@@ -4,9 +4,9 @@ import pytest
 from msgspec.structs import replace
 
 from bridges.kinds.lift_supervisor import core
-from bridges.kinds.lift_supervisor.memory import Claim, Limits, Memory
+from bridges.kinds.lift_supervisor.memory import LiftSupervisorLimits, SessionClaim, SupervisedLift
 from bridges.kinds.lift_supervisor.report import SupervisorReport
-from bridges.kinds.lift_supervisor.signals import Requested, Target
+from bridges.kinds.lift_supervisor.signals import RideRequested, Target
 from bridges.kinds.shared.durations import NEVER
 from bridges.kinds.shared.freshness import FUTURE_S, Rules
 from bridges.kinds.shared.graph_kind import MaySpeak
@@ -155,7 +155,7 @@ def test_a_request_older_than_its_requesters_newest_is_stale() -> None:
 
 
 def test_with_synchronised_clocks_a_young_request_from_before_our_start_counts_at_once() -> None:
-    desk = Alone(Limits(clock_synchronised=True))
+    desk = Alone(LiftSupervisorLimits(clock_synchronised=True))
     desk.asks("a", "L3", aged=9.0)
     desk.asks("b", "L3", aged=11.0)
     desk.until(60.0)
@@ -165,11 +165,11 @@ def test_with_synchronised_clocks_a_young_request_from_before_our_start_counts_a
 
 
 def test_a_request_may_be_as_old_as_our_uptime_or_as_the_yaml_says_if_clocks_agree() -> None:
-    memory = Memory("Lift1", started_at=100.0)
-    assert memory.rules(130.0, Limits()) == Rules(30.0, future_s=FUTURE_S)
-    speaks = Memory("Lift1", started_at=100.0, may_speak=True)
-    assert speaks.rules(130.0, Limits()) == Rules(30.0, future_s=NEVER)
-    agreed = Limits(clock_synchronised=True, max_request_age_s=7.0)
+    memory = SupervisedLift("Lift1", started_at=100.0)
+    assert memory.rules(130.0, LiftSupervisorLimits()) == Rules(30.0, future_s=FUTURE_S)
+    speaks = SupervisedLift("Lift1", started_at=100.0, may_speak=True)
+    assert speaks.rules(130.0, LiftSupervisorLimits()) == Rules(30.0, future_s=NEVER)
+    agreed = LiftSupervisorLimits(clock_synchronised=True, max_request_age_s=7.0)
     assert memory.rules(130.0, agreed) == Rules(7.0, known_clocks=False)
 
 
@@ -206,5 +206,5 @@ def test_the_report_says_who_holds_who_waits_and_since_when() -> None:
 
 def test_a_request_is_remembered_as_it_was_last_asked() -> None:
     desk = Alone()
-    desk.hears(Requested("a", TO_L3, 1.0, 0.0))
-    assert desk.memory.claims == (Claim("a", TO_L3, 0.0, 0.0),)
+    desk.hears(RideRequested("a", TO_L3, 1.0, 0.0))
+    assert desk.memory.claims == (SessionClaim("a", TO_L3, 0.0, 0.0),)

@@ -5,30 +5,30 @@ from msgspec.structs import replace
 
 from bridges.kinds.lift_supervisor import messages
 from bridges.kinds.lift_supervisor.report import SupervisorReport
-from bridges.kinds.lift_supervisor.settings import Settings
-from bridges.kinds.lift_supervisor.signals import Ended, Requested, StateHeard, Target
+from bridges.kinds.lift_supervisor.settings import LiftSupervisorSettings
+from bridges.kinds.lift_supervisor.signals import LiftStateHeard, RideEnded, RideRequested, Target
 from bridges.kinds.shared.decision import Fault, RequestRefused
 from bridges.messages.definitions import LiftRequest, LiftState, Time
 
-ANY = Settings()
+ANY = LiftSupervisorSettings()
 AGV = LiftRequest("Lift1", Time(100, 500_000_000), "fleet/a", 1, "L3", 2)
 
 
 def test_an_adapters_request_is_what_it_asks_with_its_stamp_and_age() -> None:
-    asked = Requested("fleet/a", Target(1, "L3", 2), 100.5, 0.5)
+    asked = RideRequested("fleet/a", Target(1, "L3", 2), 100.5, 0.5)
     assert messages.accept_request(AGV, ANY, 101.0) == asked
 
 
 def test_human_mode_may_be_requested_without_a_floor() -> None:
     human = replace(AGV, request_type=2, destination_floor="", door_state=0)
-    asked = Requested("fleet/a", Target(2, "", 0), 100.5, -0.5)
+    asked = RideRequested("fleet/a", Target(2, "", 0), 100.5, -0.5)
     assert messages.accept_request(human, ANY, 100.0) == asked
 
 
 def test_an_end_is_accepted_as_fleet_adapters_send_it_whatever_its_other_fields_say() -> None:
     bare = LiftRequest("Lift1", Time(100, 0), "fleet/a")
     odd = replace(bare, destination_floor="nowhere", door_state=77)
-    ended = Ended("fleet/a", 100.0, 1.0)
+    ended = RideEnded("fleet/a", 100.0, 1.0)
     assert [messages.accept_request(m, ANY, 101.0) for m in (bare, odd)] == [ended, ended]
 
 
@@ -52,16 +52,16 @@ def test_an_end_is_accepted_as_fleet_adapters_send_it_whatever_its_other_fields_
 def test_an_impossible_request_is_refused_by_name(changes: dict[str, object], kind: str) -> None:
     wrong = replace(AGV, **changes)
     with pytest.raises(RequestRefused) as refusal:
-        messages.accept_request(wrong, Settings(lifts=["Lift1"]), 101.0)
+        messages.accept_request(wrong, LiftSupervisorSettings(lifts=["Lift1"]), 101.0)
     assert refusal.value.kind == kind
 
 
 def test_a_lift_state_is_read_field_by_field() -> None:
     state = LiftState(Time(), "Lift1", ("L1", "L3"), "L1", "L3", 1, 1, (1, 2), 2, "fleet/a")
-    shown = StateHeard("fleet/a", "L1", "L3", 1, 2, ("L1", "L3"))
+    shown = LiftStateHeard("fleet/a", "L1", "L3", 1, 2, ("L1", "L3"))
     assert messages.accept_state(state, ANY, 0.0) == shown
     with pytest.raises(RequestRefused):
-        messages.accept_state(state, Settings(lifts=["Lift2"]), 0.0)
+        messages.accept_state(state, LiftSupervisorSettings(lifts=["Lift2"]), 0.0)
 
 
 @pytest.mark.parametrize(

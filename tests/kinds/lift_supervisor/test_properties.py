@@ -10,8 +10,12 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from bridges.kinds.lift_supervisor import core
-from bridges.kinds.lift_supervisor.memory import NOBODY_IS_SENT, Limits, Memory
-from bridges.kinds.lift_supervisor.signals import Ended, Requested, StateHeard, Target
+from bridges.kinds.lift_supervisor.memory import (
+    NOBODY_IS_SENT,
+    LiftSupervisorLimits,
+    SupervisedLift,
+)
+from bridges.kinds.lift_supervisor.signals import LiftStateHeard, RideEnded, RideRequested, Target
 from bridges.kinds.shared.durations import GAP_S, REPEAT_S
 from bridges.kinds.shared.graph_kind import MaySpeak, Woken
 from bridges.messages.definitions import LiftMode
@@ -111,13 +115,15 @@ def test_no_restart_of_ours_ends_a_ride_with_the_robot_in_the_car(
 
 # --- the core alone ----------------------------------------------------------------------------
 
-LIMITS = Limits(holder_alarm_s=15.0, holder_ttl_s=20.0)
+LIMITS = LiftSupervisorLimits(holder_alarm_s=15.0, holder_ttl_s=20.0)
 
 
 class Watched:
     """The core, with what must hold after each of its decisions."""
 
-    def __init__(self, memory: Memory, now: float, limits: Limits = LIMITS) -> None:
+    def __init__(
+        self, memory: SupervisedLift, now: float, limits: LiftSupervisorLimits = LIMITS
+    ) -> None:
         self.memory = memory
         self.now = now
         self.limits = limits
@@ -151,7 +157,7 @@ class Watched:
             assert self.now >= before.sent_at + REPEAT_S
         return text
 
-    def _check_turn(self, before: Memory, after: Memory, event: Any) -> None:
+    def _check_turn(self, before: SupervisedLift, after: SupervisedLift, event: Any) -> None:
         """A turn that has reached the lift ends by END, and an END by a state that came after it."""
         if not after.may_speak:
             assert after.turn is None
@@ -159,7 +165,7 @@ class Watched:
         if before.turn is None or (after.turn and after.turn.session == before.turn.session):
             return
         if before.turn.ends:
-            assert isinstance(event, StateHeard)
+            assert isinstance(event, LiftStateHeard)
             assert event.session != before.turn.session
             assert before.sent is not None
         else:
@@ -172,14 +178,14 @@ def events_at(now: float) -> list[Any]:
     """The events that may happen next."""
     agv, fire = LiftMode.MODE_AGV, LiftMode.MODE_FIRE
     return [
-        Requested("a", Target(1, "L3", 2), now, 0.0),
-        Requested("b", Target(1, "L1", 2), now, 0.0),
-        Ended("a", now, 0.0),
-        Ended("b", now, 0.0),
-        StateHeard("", "L1", "", 0, agv),
-        StateHeard("a", "L3", "L3", 2, agv),
-        StateHeard("b", "L1", "L3", 1, agv),
-        StateHeard("", "L1", "", 2, fire),
+        RideRequested("a", Target(1, "L3", 2), now, 0.0),
+        RideRequested("b", Target(1, "L1", 2), now, 0.0),
+        RideEnded("a", now, 0.0),
+        RideEnded("b", now, 0.0),
+        LiftStateHeard("", "L1", "", 0, agv),
+        LiftStateHeard("a", "L3", "L3", 2, agv),
+        LiftStateHeard("b", "L1", "L3", 1, agv),
+        LiftStateHeard("", "L1", "", 2, fire),
         MaySpeak(True),
         MaySpeak(False),
     ]
@@ -197,7 +203,7 @@ def test_every_order_of_events_to_this_depth_keeps_the_rules(
     memory = core.initial("Lift1", 0.0)
     memory = core.decide(memory, MaySpeak(may_speak), 0.0, LIMITS).memory
 
-    def neighbours(state: tuple[Memory, float]) -> Iterator[tuple[Memory, float]]:
+    def neighbours(state: tuple[SupervisedLift, float]) -> Iterator[tuple[SupervisedLift, float]]:
         before, then = state
         for now in (then + step_s for step_s in steps_s):
             for event in events_at(now):
@@ -242,8 +248,8 @@ def test_from_every_state_a_lift_that_obeys_is_granted_to_a_robot_that_asks(
     lift = desk.memory.session_shown
     for _ in range(60):
         desk.now += 1.0
-        lift = obeys(lift, desk.hears(Requested("c", Target(1, "L2", 2), desk.now, 0.0)))
-        shown = StateHeard(lift, "L2", "L2" * bool(lift), 2, LiftMode.MODE_AGV)
+        lift = obeys(lift, desk.hears(RideRequested("c", Target(1, "L2", 2), desk.now, 0.0)))
+        shown = LiftStateHeard(lift, "L2", "L2" * bool(lift), 2, LiftMode.MODE_AGV)
         lift = obeys(lift, desk.hears(shown))
     assert lift == "c"
 

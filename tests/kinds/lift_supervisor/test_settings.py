@@ -8,21 +8,21 @@ import pytest
 import yaml
 
 from bridges.kinds.lift_supervisor import KIND
-from bridges.kinds.lift_supervisor.memory import Limits
-from bridges.kinds.lift_supervisor.settings import Settings
+from bridges.kinds.lift_supervisor.memory import LiftSupervisorLimits
+from bridges.kinds.lift_supervisor.settings import LiftSupervisorSettings
 
 SHIPPED = Path(__file__).parents[3] / "config" / "lift_supervisor.yaml"
 
 
-def read(text: str) -> Settings:
-    return msgspec.convert(yaml.safe_load(text), Settings, strict=False)
+def read(text: str) -> LiftSupervisorSettings:
+    return msgspec.convert(yaml.safe_load(text), LiftSupervisorSettings, strict=False)
 
 
 def test_the_shipped_file_serves_every_lift_by_the_defaults() -> None:
     file = yaml.safe_load(SHIPPED.read_text())
     assert set(file) <= {"kind", "rmf", "supervisor"}
     assert file["kind"] == KIND.name
-    assert msgspec.convert(file[KIND.devices_key], KIND.settings) == Settings()
+    assert msgspec.convert(file[KIND.devices_key], KIND.settings) == LiftSupervisorSettings()
 
 
 def test_every_setting_reaches_the_core() -> None:
@@ -31,9 +31,9 @@ def test_every_setting_reaches_the_core() -> None:
         " holder_ttl_s: 90, clock_synchronised: true, max_request_age_s: 5}"
     )
     assert list(settings.problems()) == []
-    assert KIND.limits(settings) == Limits(20.0, 4.0, 30.0, 90.0, True, 5.0)
+    assert KIND.limits(settings) == LiftSupervisorLimits(20.0, 4.0, 30.0, 90.0, True, 5.0)
     assert KIND.quiet_s(settings) == 4.0
-    assert KIND.limits(Settings()) == Limits(holder_ttl_s=math.inf)
+    assert KIND.limits(LiftSupervisorSettings()) == LiftSupervisorLimits(holder_ttl_s=math.inf)
 
 
 @pytest.mark.parametrize("wrong", ["{quiet_start_s: 1}", "{silent_after_s: 0}", "{lift: [x]}"])

@@ -8,7 +8,7 @@ import pytest
 from msgspec.structs import replace
 
 from bridges.kinds.lift.signals import Hazard
-from bridges.kinds.lift_supervisor.settings import Settings
+from bridges.kinds.lift_supervisor.settings import LiftSupervisorSettings
 from bridges.messages.definitions import LiftRequest
 from bridges.messages.stamps import stamp
 from bridges.messages.topics import ADAPTER_LIFT_REQUESTS, LIFT_REQUESTS
@@ -21,7 +21,7 @@ from tests.kinds.lift_supervisor.world import (
     sessions,
 )
 from tests.runtime.virtual_graph import EPOCH, World
-from workbench.graph.requests import Seen
+from workbench.graph.requests import RequestProgress
 from workbench.graph.requests.lift import LiftEnd
 
 A, B, C = "fleet/a", "fleet/b", "fleet/c"
@@ -279,7 +279,7 @@ def test_an_operator_releases_the_lift_of_a_dead_robot_for_those_who_wait() -> N
     robots[0].die()
     world.run(600.0)
     assert shown(world) == [A]
-    end = LiftEnd("Lift1", A).message(Seen(0.0, 60.0))
+    end = LiftEnd("Lift1", A).message(RequestProgress(0.0, 60.0))
     assert end is not None
     end = replace(end, request_time=stamp(EPOCH + world.now - 60.0))
     world.send("operator", ADAPTER_LIFT_REQUESTS, end)
@@ -289,7 +289,7 @@ def test_an_operator_releases_the_lift_of_a_dead_robot_for_those_who_wait() -> N
 
 def test_where_the_site_wants_it_a_dead_robots_lift_goes_to_the_next_by_itself() -> None:
     world = World()
-    OurSupervisor(world, Settings(holder_ttl_s=90))
+    OurSupervisor(world, LiftSupervisorSettings(holder_ttl_s=90))
     LiftNode(world)
     robots = [Rider(world, A, UP), Rider(world, B, DOWN, starts_at=8.0)]
     world.run(14.0)

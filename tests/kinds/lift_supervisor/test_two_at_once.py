@@ -5,7 +5,7 @@ from collections.abc import Callable
 from typing import Any
 
 from bridges.kinds.lift_supervisor import KIND
-from bridges.kinds.lift_supervisor.settings import Settings
+from bridges.kinds.lift_supervisor.settings import LiftSupervisorSettings
 from bridges.messages.topics import Topic
 from bridges.runtime.clock import Clock
 from bridges.runtime.graph_node import GraphNode
@@ -52,7 +52,9 @@ def test_of_two_supervisors_that_start_at_once_exactly_one_serves_in_the_end() -
     network = MemoryNetwork()
     transports = [LateTransport(network, name) for name in ("one", "two")]
     clock = Clock(lambda: now, lambda: now)
-    nodes = [GraphNode(KIND, Settings(), transport, clock) for transport in transports]
+    nodes = [
+        GraphNode(KIND, LiftSupervisorSettings(), transport, clock) for transport in transports
+    ]
     for node in nodes:
         node.subscribe()
     speaking: list[int] = []

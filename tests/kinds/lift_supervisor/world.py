@@ -9,7 +9,7 @@ from typing import Any
 from bridges.kinds.lift import KIND as LIFT
 from bridges.kinds.lift.settings import LiftSettings
 from bridges.kinds.lift_supervisor import KIND as SUPERVISOR
-from bridges.kinds.lift_supervisor.settings import Settings
+from bridges.kinds.lift_supervisor.settings import LiftSupervisorSettings
 from bridges.messages.definitions import Message
 from bridges.messages.topics import LIFT_REQUESTS, LIFT_STATES, Topic
 from bridges.runtime.clock import Clock
@@ -19,7 +19,7 @@ from tests.kinds.lift.story import Controller
 from tests.kinds.lift_supervisor.alone import words
 from tests.runtime.virtual_graph import EPOCH, NEVER, Served, StandIn, World, say
 from workbench.rmf_model.phases import EndLiftSession, RequestLift
-from workbench.rmf_model.robot import Phase, Robot
+from workbench.rmf_model.robot import Phase, RobotContext
 from workbench.rmf_model.supervisors import LiftSupervisor
 
 FLOORS = ["L1", "L2", "L3"]
@@ -45,11 +45,11 @@ class OurSupervisor(Served):
     def __init__(
         self,
         world: World,
-        settings: Settings | None = None,
+        settings: LiftSupervisorSettings | None = None,
         name: str = "supervisor",
         wall_skew: float = 0.0,
     ) -> None:
-        super().__init__(world, SUPERVISOR, settings or Settings(), name, wall_skew)
+        super().__init__(world, SUPERVISOR, settings or LiftSupervisorSettings(), name, wall_skew)
 
 
 class RmfsSupervisor(StandIn):
@@ -124,7 +124,7 @@ class Rider:
         self.skew = skew
         self.trips = list(trips)
         self.rode: list[tuple[float, tuple[str, str]]] = []
-        self.robot = Robot(name)
+        self.robot = RobotContext(name)
         self._step = 0
         self._next_at = starts_at
         world.add(self, LIFT_STATES)
@@ -136,7 +136,7 @@ class Rider:
     def restart(self) -> None:
         """A new fleet adapter, which sends its robot on the same trip once more, from the start."""
         self.world.retained.pop(self.name, None)
-        self.robot = Robot(self.name)
+        self.robot = RobotContext(self.name)
         self._step = 0
         self._next_at = NEVER if self.done else self.world.now + 2.0
 

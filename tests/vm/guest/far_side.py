@@ -14,14 +14,14 @@ from contextlib import suppress
 from pathlib import Path
 
 from bridges.settings.load import Config, load
-from drivers.hal.can import Settings as CanSettings
-from drivers.hal.modbus import Settings as ModbusSettings
+from drivers.hal.can import CanSettings as CanSettings
+from drivers.hal.modbus import ModbusSettings as ModbusSettings
 from hal_fakes.can.side import CanFarSide, VirtualBus, slow_s
 from hal_fakes.control import Control
 from hal_fakes.fake import plants_on, stations_on
 from hal_fakes.modbus.rtu import RtuLine
 from hal_fakes.realtime import RealTime
-from hal_fakes.wiring import Wiring
+from hal_fakes.wiring import PlantWiring
 from tests.vm.guest import header
 
 LOOK_S = 0.05
@@ -53,7 +53,7 @@ def _serve(config: Config, bus: str, stations: Sequence[object]) -> None:
         line = RtuLine(stations, settings.serial, 2 * settings.timeout_s, "/run")  # type: ignore[arg-type]
         _be_udev(line.adapter.path, Path(settings.serial.port))
     else:
-        _stand_at_header([s for s in stations if isinstance(s, Wiring)])
+        _stand_at_header([s for s in stations if isinstance(s, PlantWiring)])
 
 
 def _be_udev(adapter: Path, port: Path) -> None:
@@ -70,7 +70,7 @@ def _be_udev(adapter: Path, port: Path) -> None:
         time.sleep(LOOK_S)
 
 
-def _stand_at_header(wirings: Sequence[Wiring]) -> None:
+def _stand_at_header(wirings: Sequence[PlantWiring]) -> None:
     """Follow the outputs, and pull the inputs, also back from where a claim has pulled them.
 
     On gpio-sim a claimed input with a resistor reads as the resistor pulls; on a Pi the wire wins.

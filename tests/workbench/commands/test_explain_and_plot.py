@@ -15,7 +15,7 @@ from hal_fakes.wire import wire
 from tests.transports.memory import MemoryNetwork, MemoryTransport
 from tests.workbench.explain.situations import fire, held_by_another
 from tests.workbench.replay.written import MCAP, SQLITE, write
-from workbench.explain.heard_devices import Site
+from workbench.explain.heard_devices import HeardDevices
 from workbench.graph import live
 from workbench.replay.recordings import FIRST_OF_OTHERS, Sieve
 
@@ -163,7 +163,7 @@ def test_a_live_graph_is_heard_by_topic(heard: list[Heard]) -> None:
 
 
 def test_explain_says_that_nothing_was_heard_live() -> None:
-    site = Site("Lift1")
+    site = HeardDevices("Lift1")
     site.pass_time(100.0, 1_800_000_000.0)
     site.pass_time(105.0, 1_800_000_005.0)
     assert site.explain("lift", "Lift1", None).now == ("Nothing at all was heard.",)

@@ -16,7 +16,7 @@ from tests.workbench.graph.test_exchange import GRANTED, LIFT, ME
 from workbench.commands import send
 from workbench.graph.exchange import step
 from workbench.graph.join import CommandLine
-from workbench.graph.requests import Done, Failed, Seen
+from workbench.graph.requests import Failed, Fulfilled, RequestProgress
 from workbench.graph.requests.lift import LiftEnd
 
 LINE = CommandLine(("release", "Lift1"))
@@ -29,9 +29,9 @@ LOOK = (
 
 def told(
     request: LiftEnd, states: Iterable[d.LiftState], boarded: str, listeners: int = 1
-) -> tuple[list[tuple[int, str]], list[str], Done | Failed]:
+) -> tuple[list[tuple[int, str]], list[str], Fulfilled | Failed]:
     """Each second a state; when what was sent where, the hints, and the end."""
-    seen = Seen(0.0, 10.0, listeners, boarded=boarded)
+    seen = RequestProgress(0.0, 10.0, listeners, boarded=boarded)
     sent, hints = list[tuple[int, str]](), list[str]()
     for now, state in enumerate(states):
         seen = seen.hears(Heard(now, now, "", state), request.about)
@@ -49,7 +49,7 @@ def told(
 def test_the_supervisor_has_five_seconds_before_the_lifts_own_daemon_is_asked() -> None:
     sent, _, outcome = told(RELEASE, [GRANTED] * 6 + [LIFT], boarded="no")
     assert sent == [(n, "supervisor") for n in range(5)] + [(5, "direct")]
-    assert outcome == Done(f"Lift1 is no longer held by {ME}")
+    assert outcome == Fulfilled(f"Lift1 is no longer held by {ME}")
 
 
 @pytest.mark.parametrize("boarded", ["yes", ""])

@@ -16,7 +16,7 @@ import pytest
 from msgspec.structs import replace
 
 from bridges.cli import main
-from bridges.kinds.charger.refusals import Refusal
+from bridges.kinds.charger.refusals import ChargerRefusal
 from bridges.kinds.shared.rmf_section import Rmf, overridden
 from bridges.messages import definitions as d
 from bridges.messages import topics
@@ -31,7 +31,7 @@ from tests.waiting import LEASE_S, PATIENCE_S, wait_until
 from workbench.commands import send, watch
 from workbench.graph.join import Renamed, add_graph_arguments
 from workbench.graph.requests import Request
-from workbench.graph.requests.charger import Charge, ChargeCancel
+from workbench.graph.requests.charger import ChargeCancel, RobotCharge
 from workbench.graph.requests.door import DoorMove
 from workbench.graph.requests.lift import LiftEnd, LiftRide
 
@@ -109,7 +109,7 @@ BUSY = replace(CHARGER, state=3, request_id="r1")
         (topics.LIFT_STATES, LIFT, LiftRide("Lift1", "L3", ME, direct=True)),
         (topics.LIFT_STATES, HELD, LiftEnd("Lift1", "", direct=True)),
         (topics.DOOR_STATES, DOOR, DoorMove("ward", True, ME, direct=True)),
-        (topics.CHARGER_STATES, CHARGER, Charge("a", "fleet", "robot", "r1", 30)),
+        (topics.CHARGER_STATES, CHARGER, RobotCharge("a", "fleet", "robot", "r1", 30)),
         (topics.CHARGER_STATES, BUSY, ChargeCancel("a", "r1")),
     ],
 )
@@ -129,7 +129,7 @@ def test_a_refused_request_for_a_charger_ends_with_who_has_it(
 ) -> None:
     class Refusing(Device):
         def _obey(self, request: Any) -> None:
-            refusal = Refusal(
+            refusal = ChargerRefusal(
                 request_id=request.request_id,
                 charger="a",
                 robot="fleet/robot",
@@ -142,7 +142,7 @@ def test_a_refused_request_for_a_charger_ends_with_who_has_it(
             )
 
     device = Refusing(topics.CHARGER_STATES, topics.CHARGER_REQUESTS, BUSY)
-    wanted = Charge("a", "fleet", "robot", "r2", 30)
+    wanted = RobotCharge("a", "fleet", "robot", "r2", 30)
     assert send.send(Command(device), wanted, 60.0, io.StringIO()) == 1
     assert capsys.readouterr().err == (
         "rmf-bridge send: a refuses the request: charger occupied: fleet/other has it"
@@ -293,8 +293,8 @@ def test_a_proposed_command_names_the_graph_as_the_typed_one_did(options: str) -
 
 def test_a_request_id_is_new_each_time_and_begins_with_our_name() -> None:
     first, second = (send.request_of(parsed("charger a --robot f/r")) for _ in range(2))
-    assert isinstance(first, Charge)
-    assert isinstance(second, Charge)
+    assert isinstance(first, RobotCharge)
+    assert isinstance(second, RobotCharge)
     ids = [request.request_id for request in (first, second)]
     assert ids[0] != ids[1]
     assert all(i.startswith("rmf_bridge_send-") for i in ids)

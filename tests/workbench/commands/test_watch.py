@@ -15,7 +15,7 @@ from workbench.commands import watch
 from workbench.graph.board import (
     MOST_PLACES,
     Board,
-    Row,
+    BoardRow,
     change_line,
     changes,
     json_line,
@@ -47,10 +47,10 @@ def test_there_is_one_row_for_each_device_lifts_first_then_by_name() -> None:
     other = replace(LIFT, lift_name="A", session_id="")
     rows = board(CHARGER, DOOR, LIFT, other, LIFT).rows(100.2, WALL + 0.2)
     assert rows == [
-        Row("lift", "A", "car at L1, door open, mode AGV", age="0.2 s"),
-        Row("lift", "Lift1", "car at L1, door open, mode AGV", "fleet/robot", age="0.2 s"),
-        Row("door", "ward", "closed", age="0.2 s"),
-        Row("charger", "a", "idle", age="0.2 s"),
+        BoardRow("lift", "A", "car at L1, door open, mode AGV", age="0.2 s"),
+        BoardRow("lift", "Lift1", "car at L1, door open, mode AGV", "fleet/robot", age="0.2 s"),
+        BoardRow("door", "ward", "closed", age="0.2 s"),
+        BoardRow("charger", "a", "idle", age="0.2 s"),
     ]
 
 
@@ -257,8 +257,8 @@ def test_robots_are_shown_with_the_place_that_they_are_assigned_to_charge_or_to_
         (d.ChargingAssignment("AMR02", "wait_2", 1), d.ChargingAssignment("AMR01", "charger_a", 0)),
     )
     assert board(fleet).rows(100.0, WALL) == [
-        Row("robot", "tiny/AMR01", "charge at charger_a"),
-        Row("robot", "tiny/AMR02", "wait at wait_2"),
+        BoardRow("robot", "tiny/AMR01", "charge at charger_a"),
+        BoardRow("robot", "tiny/AMR02", "wait at wait_2"),
     ]
 
 
@@ -277,7 +277,7 @@ def test_a_simulation_is_marked_and_a_simulated_supervisor_does_not_make_its_lif
 
 
 def test_counting_seconds_are_not_a_change_and_a_new_word_is_one() -> None:
-    def said(detail: str) -> list[Row]:
+    def said(detail: str) -> list[BoardRow]:
         status = {"faults": [{"code": "OVERLOAD", "detail": detail}], "waiting": "fleet/b (3 s)"}
         told = diagnosis("node", "lift_supervisor", {}, {"Lift1": status}, d.Time())
         return board(LIFT, told).rows(100.0, WALL)
@@ -310,7 +310,7 @@ def test_the_coordinator_has_a_row_with_its_queue_its_faults_and_whether_it_assi
         daemon = {"passive": True, "faults": faults} if passive else {}
         return diagnosis("coordinator", "charger_coordinator", daemon, {"": site}, d.Time())
 
-    row = Row(
+    row = BoardRow(
         "coordinator",
         "coordinator",
         "assigns chargers",

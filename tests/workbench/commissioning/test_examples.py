@@ -10,7 +10,7 @@ from msgspec import inspect as mi
 
 from bridges.kinds.shared.rmf_section import Rmf
 from bridges.settings import names as named
-from bridges.yaml.nodes import Page
+from bridges.yaml.nodes import YamlFile
 from bridges.yaml.positions import Spot
 from bridges.yaml.values import Values
 from workbench.commissioning import reference
@@ -37,7 +37,7 @@ def fields(struct: type) -> tuple[mi.Field, ...]:
 
 def judged(struct: type, field: mi.Field) -> list[str]:
     """The problems of an example, as the loader finds them."""
-    page = Page("example")
+    page = YamlFile("example")
     root = yaml.compose(f"wanted: {{{example(struct, field)}}}")
     assert root is not None
     key, value = root.value[0][1].value[0]

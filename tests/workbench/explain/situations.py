@@ -9,7 +9,7 @@ from typing import Final
 from msgspec.structs import replace
 
 from bridges.kinds.charger.pad import Misplaced
-from bridges.kinds.charger.settings import Robot
+from bridges.kinds.charger.settings import RobotName
 from bridges.messages import definitions as d
 from bridges.messages import topics
 from bridges.messages.heard import Heard
@@ -269,7 +269,7 @@ def charger_refuses() -> Case:
 def wrong_station() -> Case:
     """A robot stands at a charger that is another's."""
     scene = Scene(diagnoses=False)
-    who, whose = Robot("fleet", "red"), Robot("fleet", "blue")
+    who, whose = RobotName("fleet", "red"), RobotName("fleet", "blue")
     text = Misplaced(who, "7", whose).text
     state = d.ChargerState(stamp(EPOCH), 200, "bay1", text, "r2", "fleet", "blue", d.Duration())
     for _ in range(10):

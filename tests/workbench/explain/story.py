@@ -29,7 +29,7 @@ from tests.site.daemons import (
 from tests.site.network import CLEAR, Air, Place
 from tests.site.timeline import EPOCH, Alarm, Timeline
 from workbench.rmf_model.phases import DoorClose, DoorOpen, EndLiftSession, RequestLift
-from workbench.rmf_model.robot import Phase, Robot
+from workbench.rmf_model.robot import Phase, RobotContext
 
 SUPERVISORS: dict[str, AnyGraphKind] = {
     "lift_supervisor": LIFT_SUPERVISOR,
@@ -41,7 +41,7 @@ class Guest:
     """A fleet adapter with one robot, on the air. `behind_s`: its clock's error."""
 
     def __init__(self, timeline: Timeline, air: Air, name: str) -> None:
-        self.robot = Robot(name)
+        self.robot = RobotContext(name)
         self.behind_s = 0.0
         self.place = Place(air, name, lambda: None)
         self._timeline = timeline

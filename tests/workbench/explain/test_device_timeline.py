@@ -13,7 +13,7 @@ from bridges.messages.stamps import stamp
 from tests.workbench.explain.story import Scene
 from workbench.explain.device_timeline import MOST_ROWS, Drawing, lanes
 from workbench.explain.rows import LONGEST_LABEL, MOST_SPANS
-from workbench.explain.timeline import Lane, Level, Mark, Span, Timeline
+from workbench.explain.timeline import Lane, LaneSpan, Level, Mark, Timeline
 
 WALL = 1_000_000.0
 STATE = d.LiftState(
@@ -34,7 +34,7 @@ def lane(timeline: Timeline, name: str, row: str = "") -> Lane:
     return found
 
 
-def told(spans: Sequence[Span]) -> list[tuple[float, float, str]]:
+def told(spans: Sequence[LaneSpan]) -> list[tuple[float, float, str]]:
     return [(round(span.from_s, 1), round(span.to_s, 1), span.label) for span in spans]
 
 
@@ -94,7 +94,10 @@ def test_a_session_lasts_until_a_state_shows_another() -> None:
     of_red, of_blue = replace(STATE, session_id="red"), replace(STATE, session_id="blue")
     states = [of_red, of_red, of_blue, STATE]
     drawn = lanes([heard(n, state) for n, state in enumerate(states)], "lift", "Lift1")
-    assert lane(drawn, "sessions").spans == (Span(0, 2, "red", "held"), Span(2, 3, "blue", "held"))
+    assert lane(drawn, "sessions").spans == (
+        LaneSpan(0, 2, "red", "held"),
+        LaneSpan(2, 3, "blue", "held"),
+    )
 
 
 def test_a_device_that_has_fallen_silent_is_shown_as_unknown() -> None:
@@ -119,7 +122,7 @@ def test_requests_have_a_row_for_each_requester_and_one_for_the_supervisor() -> 
     ]
     drawn = lanes(said, "lift", "Lift1")
     assert lane(drawn, "requests", "fleet/red") == Lane(
-        "requests", "fleet/red", (Span(0, 2, "L2", "asks"),), (Mark(2, "END", "asks"),)
+        "requests", "fleet/red", (LaneSpan(0, 2, "L2", "asks"),), (Mark(2, "END", "asks"),)
     )
     assert told(lane(drawn, "requests", "supervisor").spans) == [(0, 3, "L2 for fleet/red")]
 

@@ -9,7 +9,7 @@ from bridges.messages.stamps import stamp
 from bridges.messages.words import KINDS
 from bridges.observe.limits import MOST_DEVICES, MOST_REQUESTERS
 from workbench.explain.device import MOST_LINES
-from workbench.explain.heard_devices import Site
+from workbench.explain.heard_devices import HeardDevices
 from workbench.explain.lift_facts import LiftFacts
 from workbench.explain.text import lines
 
@@ -25,7 +25,7 @@ def heard(at: float, topic: str, message: d.Message) -> Heard:
 
 
 def test_a_flood_of_requesters_displaces_no_holder() -> None:
-    site = Site()
+    site = HeardDevices()
     ask = d.LiftRequest("Lift1", stamp(WALL), "fleet/red", 1, "L2", 2)
     site.take(heard(0, "adapter_lift_requests", ask))
     for n in range(10 * MOST_REQUESTERS):
@@ -44,7 +44,7 @@ def test_a_flood_of_requesters_displaces_no_holder() -> None:
 
 
 def test_a_flood_of_devices_is_bounded_and_the_first_ones_stay() -> None:
-    site = Site()
+    site = HeardDevices()
     for n in range(20 * MOST_DEVICES):
         site.take(heard(0, "lift_states", replace(STATE, lift_name=f"made up {n}")))
     assert len(site.devices()) == MOST_DEVICES
@@ -53,7 +53,7 @@ def test_a_flood_of_devices_is_bounded_and_the_first_ones_stay() -> None:
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_terminal_escapes_in_names_are_shown_and_have_no_effect(kind: str) -> None:
-    site = Site()
+    site = HeardDevices()
     name = f"x{ESCAPE}" + "y" * 5000
     said: dict[str, tuple[d.Message, d.Message]] = {
         "lift": (
@@ -81,14 +81,14 @@ def test_terminal_escapes_in_names_are_shown_and_have_no_effect(kind: str) -> No
 
 @pytest.mark.parametrize("wall", [-1e18, -1.0, 0.0, 1e18, float("inf"), float("nan")])
 def test_no_clock_in_a_recording_keeps_it_from_being_explained(wall: float) -> None:
-    site = Site()
+    site = HeardDevices()
     site.take(Heard(0.0, wall, "lift_states", STATE))
     site.take(Heard(1.0, wall, "lift_states", STATE))
     assert lines(site.explain("lift", "Lift1", None))[0].startswith("lift Lift1, heard from ")
 
 
 def test_a_clock_that_steps_changes_no_duration() -> None:
-    site = Site()
+    site = HeardDevices()
     for n in range(60):
         wall = WALL + n + (3600.0 if n >= 30 else 0.0)
         site.take(Heard(float(n), wall, "lift_states", replace(STATE, lift_time=stamp(wall))))

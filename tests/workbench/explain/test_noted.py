@@ -9,10 +9,10 @@ from bridges.messages import definitions as d
 from bridges.messages.heard import Heard, Own
 from bridges.runtime.diagnostics import diagnosis
 from workbench.explain.device_timeline import Drawing
-from workbench.explain.heard_devices import Site
+from workbench.explain.heard_devices import HeardDevices
 from workbench.explain.noted import MOST, Noted, levels, noted
 from workbench.explain.timeline import Level
-from workbench.replay.recordings import Span as Part
+from workbench.replay.recordings import RecordingSpan as Part
 from workbench.replay.recordings import told_between
 
 CORPUS = Path(__file__).parents[1] / "replay" / "corpus"
@@ -36,7 +36,7 @@ def test_an_incident_of_our_own_has_relays_inputs_and_faults() -> None:
 
 
 def test_an_incident_says_what_its_daemon_refused_and_which_fault_it_has() -> None:
-    site = Site("Lift1")
+    site = HeardDevices("Lift1")
     for one in told_between(CORPUS / "Lift1_1.mcap", Part(None, None), "test", "Lift1"):
         site.take(one)
     told = site.explain("lift", "Lift1", None)
@@ -45,7 +45,7 @@ def test_an_incident_says_what_its_daemon_refused_and_which_fault_it_has() -> No
 
 
 def test_a_fault_that_is_noted_and_then_published_on_the_graph_is_shown_once() -> None:
-    site = Site("Lift1")
+    site = HeardDevices("Lift1")
 
     def state(at: float) -> Heard:
         return Heard(

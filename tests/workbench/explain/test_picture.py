@@ -5,15 +5,15 @@ from xml.etree import ElementTree
 
 import pytest
 
-from workbench.explain.palette import DARK, LIGHT, TONES, Look
+from workbench.explain.palette import DARK, LIGHT, TONES, ToneStyle
 from workbench.explain.picture import svg
-from workbench.explain.timeline import Lane, Mark, Span, Timeline
+from workbench.explain.timeline import Lane, LaneSpan, Mark, Timeline
 
 WALL = 1_800_000_000.0  # 2027-01-15 08:00:00 UTC
 NS = "{http://www.w3.org/2000/svg}"
-SESSION = Lane("sessions", "", (Span(0, 30, "fleet/red", "held"),), ())
-DOOR = Lane("door", "", (Span(0, 10, "closed", "calm"), Span(10, 30, "open", "open")), ())
-FAULT = Lane("faults", "FIRE", (Span(20, 30, "FIRE", "wrong"),), (Mark(20, "FIRE", "wrong"),))
+SESSION = Lane("sessions", "", (LaneSpan(0, 30, "fleet/red", "held"),), ())
+DOOR = Lane("door", "", (LaneSpan(0, 10, "closed", "calm"), LaneSpan(10, 30, "open", "open")), ())
+FAULT = Lane("faults", "FIRE", (LaneSpan(20, 30, "FIRE", "wrong"),), (Mark(20, "FIRE", "wrong"),))
 
 
 def drawn(*lanes: Lane, to_s: float = 30, width: int = 1200) -> ElementTree.Element:
@@ -64,7 +64,9 @@ HOSTILE = "</text><script>alert(1)</script>&\"'<svg onload=x>"
 
 
 def test_a_hostile_name_is_text() -> None:
-    lane = Lane("sessions", HOSTILE, (Span(0, 30, HOSTILE, "held"),), (Mark(5, HOSTILE, "asks"),))
+    lane = Lane(
+        "sessions", HOSTILE, (LaneSpan(0, 30, HOSTILE, "held"),), (Mark(5, HOSTILE, "asks"),)
+    )
     picture = svg(Timeline("lift", HOSTILE, 0, 30, WALL, (lane,)), 4000, UTC)
     root = ElementTree.fromstring(picture)
     assert "<script" not in picture
@@ -83,15 +85,15 @@ def test_nothing_outside_the_file_is_asked_for() -> None:
 
 
 def test_a_label_that_does_not_fit_is_cut_and_its_hint_is_whole() -> None:
-    lane = Lane("mode", "", (Span(0, 2, "a very long label", "works"),), ())
+    lane = Lane("mode", "", (LaneSpan(0, 2, "a very long label", "works"),), ())
     root = drawn(lane, to_s=60, width=600)
     assert not any(text.startswith("a very long") for text in texts(root))
     assert "mode: a very long label, 08:00:00.0 to 08:00:02.0 (2.0 s)" in hints(root)
 
 
 def test_spans_too_narrow_to_be_seen_are_joined_and_what_is_wrong_shows() -> None:
-    spans = [Span(n / 10, (n + 1) / 10, f"L{n}", "calm") for n in range(1000)]
-    spans[500] = Span(50.0, 50.1, "?", "wrong")
+    spans = [LaneSpan(n / 10, (n + 1) / 10, f"L{n}", "calm") for n in range(1000)]
+    spans[500] = LaneSpan(50.0, 50.1, "?", "wrong")
     root = drawn(Lane("floors", "", tuple(spans), ()), to_s=36000)
     boxes = [one for one in root.iter(f"{NS}rect") if one.find(f"{NS}title") is not None]
     assert len(boxes) < 10
@@ -103,7 +105,7 @@ def test_an_empty_timeline_says_so() -> None:
 
 
 def test_a_picture_says_what_was_left_out() -> None:
-    root = drawn(Lane("floors", "", (Span(0, 9, "L1", "calm"),), (), left_out=12))
+    root = drawn(Lane("floors", "", (LaneSpan(0, 9, "L1", "calm"),), (), left_out=12))
     assert "from 2027-01-15 08:00:00, 30 s, 12 older parts left out" in texts(root)
 
 
@@ -119,12 +121,12 @@ def _luminance(colour: str) -> float:
     return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
 
 
-def contrast(look: Look) -> float:
+def contrast(look: ToneStyle) -> float:
     """By WCAG 2.2, 1.4.3: 4.5 is enough for text."""
     lighter, darker = sorted((_luminance(look.fill), _luminance(look.text)), reverse=True)
     return (lighter + 0.05) / (darker + 0.05)
 
 
 @pytest.mark.parametrize("looks", [LIGHT, DARK], ids=["light", "dark"])
-def test_labels_can_be_read_on_every_tone(looks: dict[str, Look]) -> None:
+def test_labels_can_be_read_on_every_tone(looks: dict[str, ToneStyle]) -> None:
     assert {tone: contrast(looks[tone]) >= 4.5 for tone in TONES} == dict.fromkeys(TONES, True)

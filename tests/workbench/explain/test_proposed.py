@@ -14,7 +14,7 @@ from bridges.messages.stamps import stamp
 from bridges.runtime.faults import for_explain
 from tests.workbench.explain.situations import SCENES
 from workbench.explain.explanation import Explanation
-from workbench.explain.heard_devices import Site
+from workbench.explain.heard_devices import HeardDevices
 from workbench.explain.phrases import JOINS, on_graph
 
 GRAPH = ("--config", "our site.yaml", "--domain-id", "7", "--transport", "zenoh", "--localhost")
@@ -59,7 +59,7 @@ def test_every_command_that_joins_a_graph_is_known() -> None:
 @pytest.mark.parametrize("name", SCENES)
 def test_a_situations_commands_name_the_graph(name: str) -> None:
     heard, kind, device = SCENES[name]()
-    site = Site(device, graph=GRAPH)
+    site = HeardDevices(device, graph=GRAPH)
     for one in heard:
         site.take(one)
     assert_all_name_it(texts_of(site.explain(kind, device, UTC, for_explain())))
@@ -71,14 +71,14 @@ def test_each_faults_remedy_names_the_graph() -> None:
 
 
 def test_nothing_heard_is_looked_into_on_that_graph() -> None:
-    site = Site("Lift1", graph=GRAPH)
+    site = HeardDevices("Lift1", graph=GRAPH)
     site.pass_time(100.0, 1_800_000_000.0)
     texts = texts_of(site.explain("lift", "Lift1", UTC, {}))
     assert [*proposed(texts)] == [["doctor", "FILE", *GRAPH[2:]]]
 
 
 def test_a_name_of_several_words_is_one_word_of_the_command() -> None:
-    site = Site("Lift; reboot", graph=GRAPH)
+    site = HeardDevices("Lift; reboot", graph=GRAPH)
     for n in range(9):
         state = d.LiftState(
             stamp(1e9 + n), "Lift; reboot", ("L1",), "L1", current_mode=2, session_id="a/b"

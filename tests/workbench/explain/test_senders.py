@@ -7,7 +7,7 @@ import pytest
 from bridges.messages import definitions as d
 from bridges.messages.heard import Heard
 from bridges.messages.stamps import stamp
-from workbench.explain.heard_devices import Site
+from workbench.explain.heard_devices import HeardDevices
 
 WALL = 1_800_000_000.0
 EITHER = "the supervisor, or a person with `send --direct`,"
@@ -15,7 +15,7 @@ EITHER = "the supervisor, or a person with `send --direct`,"
 
 def lift(*said: tuple[str, d.LiftRequest]) -> str:
     """What is told of Lift1, which fleet/red has, while these are repeated each second."""
-    site = Site("Lift1")
+    site = HeardDevices("Lift1")
     for n in range(20):
         state = d.LiftState(stamp(WALL + n), "Lift1", ("L1",), "L1", session_id="fleet/red")
         site.take(Heard(float(n), WALL + n, "lift_states", state))
@@ -55,7 +55,7 @@ def test_who_ends_a_session_on_lift_requests_alone_is_not_known() -> None:
     ("requester", "sender"), [("door_supervisor", "the supervisor"), ("me", "me")]
 )
 def test_a_doors_sender_is_named_by_its_requester_id(requester: str, sender: str) -> None:
-    site = Site("ward")
+    site = HeardDevices("ward")
     for n in range(9):
         mode = 2 if n > 5 else 0
         state = d.DoorState(stamp(WALL + n), "ward", d.DoorMode(0))

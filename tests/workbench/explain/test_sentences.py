@@ -10,7 +10,7 @@ import pytest
 
 from bridges.runtime.faults import remedies
 from tests.workbench.explain.situations import SCENES
-from workbench.explain.heard_devices import Site
+from workbench.explain.heard_devices import HeardDevices
 from workbench.explain.text import SCREEN_LINES, lines
 
 GOLDEN = Path(__file__).parent / "golden"
@@ -19,7 +19,7 @@ GOLDEN = Path(__file__).parent / "golden"
 def told(name: str) -> list[str]:
     """The situation's screen."""
     heard, kind, device = SCENES[name]()
-    site = Site(device)
+    site = HeardDevices(device)
     for one in heard:
         site.take(one)
     known = dict.fromkeys(remedies(), ("its cause", "its remedy"))

@@ -7,15 +7,15 @@ import msgspec
 import pytest
 from msgspec.structs import replace
 
-from bridges.kinds.charger.refusals import Refusal
+from bridges.kinds.charger.refusals import ChargerRefusal
 from bridges.messages import definitions as d
 from bridges.messages import topics, words
 from bridges.messages.heard import Heard
 from bridges.messages.topics import Topic
 from workbench.graph.exchange import step
 from workbench.graph.join import CommandLine
-from workbench.graph.requests import Done, Failed, Request, Seen
-from workbench.graph.requests.charger import Charge, ChargeCancel, QueuedCancel, QueuedCharge
+from workbench.graph.requests import Failed, Fulfilled, Request, RequestProgress
+from workbench.graph.requests.charger import ChargeCancel, QueuedCancel, QueuedCharge, RobotCharge
 from workbench.graph.requests.door import DoorMove
 from workbench.graph.requests.lift import LiftEnd, LiftRide
 
@@ -40,7 +40,7 @@ class Ran:
 
     sent: list[tuple[float, words.Requested]]
     hints: list[str]
-    outcome: Done | Failed
+    outcome: Fulfilled | Failed
     at: float
 
 
@@ -55,7 +55,7 @@ def tell(
 ) -> Ran:
     """Look every 0.1 s from 0 on; each message of the story arrives at its time."""
     left = sorted(story, key=lambda entry: entry[0])
-    seen, ran = Seen(0.0, timeout_s, graph=graph), Ran([], [], Done(""), 0.0)
+    seen, ran = RequestProgress(0.0, timeout_s, graph=graph), Ran([], [], Fulfilled(""), 0.0)
     for tick in range(10_000):
         now = round(tick * 0.1, 1)
         while left and left[0][0] <= now:
@@ -93,7 +93,7 @@ def test_a_lift_is_asked_for_as_fleets_ask_once_a_second_until_it_is_there() -> 
     assert ran == Ran(
         [(0.5, request), (1.5, request), (2.5, request)],
         [],
-        Done(
+        Fulfilled(
             "Lift1 is at L3, door open, held by fleet/robot;"
             " to end that: rmf-bridge send lift Lift1 --end --direct --localhost"
         ),
@@ -120,7 +120,7 @@ def test_nothing_is_sent_while_nobody_listens_and_a_supervisor_is_missed() -> No
 def test_a_listener_that_comes_late_is_served() -> None:
     ran = tell(RIDE, [(0.5, LIFT), (4.2, ARRIVED)], listen_from=4.0)
     assert [at for at, _ in ran.sent] == [4.0]
-    assert isinstance(ran.outcome, Done)
+    assert isinstance(ran.outcome, Fulfilled)
 
 
 @pytest.mark.parametrize(
@@ -136,7 +136,7 @@ def test_requests_go_to_the_supervisors_unless_direct(
     assert LiftRide("x", "L1", ME, direct=direct).topic == lift
     assert LiftEnd("x", "", direct=direct).topic == lift
     assert DoorMove("x", True, ME, direct=direct).topic == door
-    assert Charge("x", "f", "r", "id", 0).topic == topics.CHARGER_REQUESTS
+    assert RobotCharge("x", "f", "r", "id", 0).topic == topics.CHARGER_REQUESTS
     assert ChargeCancel("x", "id").topic == topics.CHARGER_CANCELS
 
 
@@ -166,7 +166,7 @@ def test_granted_only_is_content_with_the_session() -> None:
     request = LiftRide("Lift1", "L3", ME, True, direct=True)
     ran = tell(request, [(0.5, LIFT), (1.0, GRANTED)])
     assert ran.at == 1.0
-    assert isinstance(ran.outcome, Done)
+    assert isinstance(ran.outcome, Fulfilled)
 
 
 def test_a_floor_that_is_not_served_fails_at_once_with_the_nearest_name() -> None:
@@ -177,7 +177,7 @@ def test_a_floor_that_is_not_served_fails_at_once_with_the_nearest_name() -> Non
 
 def test_where_a_robot_may_be_in_the_car_the_remedy_asks_to_look_into_it() -> None:
     held = replace(LIFT, session_id=OTHER, current_mode=d.LiftMode(2))
-    seen = replace(Seen(0.0, 10.0), states=(held,), stated_at=1.0, boarded="yes")
+    seen = replace(RequestProgress(0.0, 10.0), states=(held,), stated_at=1.0, boarded="yes")
     assert next(iter(RIDE.obstacles(seen))).remedy == (
         "a robot may be in the car; if it is empty:"
         " rmf-bridge release Lift1 --car-empty --localhost"
@@ -291,7 +291,7 @@ def test_a_door_with_a_lifts_name_is_asked_all_the_same() -> None:
     request = DoorMove("Lift1", True, ME, direct=True)
     named = replace(DOOR, door_name="Lift1", current_mode=d.DoorMode(2))
     ran = tell(request, [*every_second(LIFT), *every_second(named)])
-    assert ran.outcome == Done("Lift1 is open")
+    assert ran.outcome == Fulfilled("Lift1 is open")
 
 
 def test_a_daemon_that_falls_silent_is_named_as_the_reason() -> None:
@@ -305,7 +305,7 @@ def test_end_takes_the_holder_from_the_first_state_and_tells_by_door_open_that_a
     ran = tell(LiftEnd("Lift1", "", direct=True), [(0.5, GRANTED), (1.2, GRANTED), (1.8, LIFT)])
     end = d.LiftRequest("Lift1", d.Time(), ME, 0, "", 2)
     assert ran == Ran(
-        [(0.5, end), (1.5, end)], [], Done("Lift1 is no longer held by fleet/robot"), 1.8
+        [(0.5, end), (1.5, end)], [], Fulfilled("Lift1 is no longer held by fleet/robot"), 1.8
     )
 
 
@@ -317,19 +317,19 @@ def test_end_without_a_state_sends_nothing_as_it_knows_no_holder() -> None:
 
 def test_end_of_a_free_lift_is_done_before_it_begins() -> None:
     ran = tell(LiftEnd("Lift1", "", direct=True), every_second(LIFT))
-    assert ran == Ran([], [], Done("Lift1 has no session: nothing to end"), 0.5)
+    assert ran == Ran([], [], Fulfilled("Lift1 has no session: nothing to end"), 0.5)
 
 
 def test_end_of_a_given_session_is_sent_once_even_to_a_lift_that_does_not_show_it() -> None:
     ran = tell(LiftEnd("Lift1", ME, direct=True), every_second(LIFT))
     assert [at for at, _ in ran.sent] == [0.5]
-    assert ran.outcome == Done("Lift1 is not held by fleet/robot: nothing to end")
+    assert ran.outcome == Fulfilled("Lift1 is not held by fleet/robot: nothing to end")
 
 
 def test_ending_a_session_that_does_not_have_the_lift_says_who_has_it() -> None:
     ran = tell(LiftEnd("Lift1", OTHER, direct=True), every_second(GRANTED))
     assert [at for at, _ in ran.sent] == [0.5]
-    assert ran.outcome == Done(
+    assert ran.outcome == Fulfilled(
         "Lift1 is not held by fleet/other: nothing to end; fleet/robot has it"
     )
 
@@ -345,13 +345,13 @@ def test_a_door_is_open_when_it_says_so_after_our_request() -> None:
     request = DoorMove("ward", True, ME, direct=True)
     ran = tell(request, [(0.5, moved(2)), (1.2, moved(1)), (1.9, moved(2))], listen_from=1.0)
     asked = d.DoorRequest(d.Time(), ME, "ward", d.DoorMode(2))
-    assert ran == Ran([(1.0, asked)], [], Done("ward is open"), 1.9)
+    assert ran == Ran([(1.0, asked)], [], Fulfilled("ward is open"), 1.9)
 
 
 def test_through_the_supervisor_an_open_door_counts_once_the_heartbeat_lists_us() -> None:
     request = DoorMove("ward", True, ME, direct=False)
     ran = tell(request, [*every_second(moved(2)), (2.2, heartbeat(OTHER)), (3.3, heartbeat(ME))])
-    assert (ran.outcome, ran.at) == (Done("ward is open"), 3.3)
+    assert (ran.outcome, ran.at) == (Fulfilled("ward is open"), 3.3)
     alone = tell(request, every_second(moved(2)))
     assert alone.outcome == Failed(
         "ward is open, but no heartbeat of a door supervisor confirms it (last state: open)"
@@ -362,7 +362,7 @@ def test_through_the_supervisor_a_closed_door_is_not_ours_while_the_heartbeat_li
     request = DoorMove("ward", False, ME, direct=False)
     story = [*every_second(moved(0)), (0.7, heartbeat(ME)), (2.2, heartbeat())]
     ran = tell(request, [(0.5, moved(2)), (0.6, moved(0)), *story])
-    assert (ran.outcome, ran.at) == (Done("ward is closed"), 2.2)
+    assert (ran.outcome, ran.at) == (Fulfilled("ward is closed"), 2.2)
 
 
 @pytest.mark.parametrize(
@@ -390,7 +390,7 @@ def test_a_door_that_stays_open_with_nobody_holding_it_is_blocked() -> None:
 
 # --- chargers ----------------------------------------------------------------------------------
 
-CHARGE = Charge("a", "fleet", "robot", "r1", 30)
+CHARGE = RobotCharge("a", "fleet", "robot", "r1", 30)
 
 
 @pytest.mark.parametrize("state", [2, 3, 4])
@@ -398,7 +398,7 @@ def test_a_charger_that_shows_our_request_has_taken_it(state: int) -> None:
     ran = tell(CHARGE, [(0.5, CHARGER), (1.6, replace(CHARGER, state=state, request_id="r1"))])
     request = d.ChargerRequest("a", "fleet", "robot", d.Duration(30), "r1")
     assert ran.sent == [(0.5, request), (1.5, request)]
-    assert isinstance(ran.outcome, Done)
+    assert isinstance(ran.outcome, Fulfilled)
 
 
 @pytest.mark.parametrize(
@@ -425,7 +425,7 @@ def test_a_charger_that_does_not_serve_us_says_why(state: d.ChargerState, reason
     assert [*ran.hints, ran.outcome.text] == reason.splitlines()
 
 
-REFUSAL = Refusal(
+REFUSAL = ChargerRefusal(
     request_id="r1",
     charger="a",
     robot="fleet/robot",
@@ -468,7 +468,7 @@ def test_a_cancel_is_done_when_the_charger_lets_go(after: d.ChargerState) -> Non
     ran = tell(ChargeCancel("a", "r1"), [(0.5, held), (1.2, held), (1.8, after)])
     cancel = d.ChargerCancel("a", "r1")
     assert ran == Ran(
-        [(0.5, cancel), (1.5, cancel)], [], Done("a no longer serves request r1"), 1.8
+        [(0.5, cancel), (1.5, cancel)], [], Fulfilled("a no longer serves request r1"), 1.8
     )
 
 
@@ -493,7 +493,7 @@ def test_a_request_for_any_charger_is_done_when_one_of_them_shows_the_robot() ->
     request = d.ChargerRequest("", "fleet", "robot", d.Duration(30), "r1")
     assert ran.sent == [(0.5, request)]
     assert ran.hints == []
-    assert ran.outcome == Done("b is assigned for fleet/robot")
+    assert ran.outcome == Fulfilled("b is assigned for fleet/robot")
 
 
 def test_a_robot_that_waits_is_said_to_wait_and_how_to_withdraw_it() -> None:
@@ -516,4 +516,4 @@ def test_a_chosen_charger_is_named_in_the_request() -> None:
 def test_a_withdrawal_is_done_when_it_is_sent() -> None:
     ran = tell(QueuedCancel("any", "r1"), [])
     assert ran.sent == [(2.0, d.ChargerCancel("", "r1"))]
-    assert ran.outcome == Done("the charger coordinator was told that request r1 is withdrawn")
+    assert ran.outcome == Fulfilled("the charger coordinator was told that request r1 is withdrawn")

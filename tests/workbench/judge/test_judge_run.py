@@ -14,16 +14,16 @@ from tests.workbench.judge.nodes.right_lift import RightLift
 from tests.workbench.judge.script import asks, lift
 from tests.workbench.judge.world import World, told
 from workbench.judge.judge import Judge
-from workbench.judge.judge_run import Stage
+from workbench.judge.judge_run import JudgeRun
 from workbench.judge.law import Verdict
 from workbench.judge.report import as_json, junit, report, text
-from workbench.judge.scenarios import Charge, Passages, Performance, Ride
+from workbench.judge.scenarios import ChargeScenario, PassageScenario, RideScenario, Scenario
 
 STATE = d.LiftState(stamp(EPOCH), "Lift1", ("L1", "L3"), "L1")
 
 
-def ride(through: bool = False) -> Ride:
-    return Ride("Lift1", ("L1", "L3"), 1, 60.0, through=through)
+def ride(through: bool = False) -> RideScenario:
+    return RideScenario("Lift1", ("L1", "L3"), 1, 60.0, through=through)
 
 
 def said_by_the_judge(world: World) -> list[tuple[str, d.Message]]:
@@ -64,58 +64,60 @@ def test_a_lift_that_is_not_idle_is_left_alone(node: RightLift, why: str) -> Non
     world = World()
     said = said_by_the_judge(world)
     world.add(node)
-    stage = world.judge("lift", "Lift1", ride())
-    assert (stage.note, said) == (why, [])
+    judging = world.judge("lift", "Lift1", ride())
+    assert (judging.note, said) == (why, [])
 
 
 def test_a_floor_that_is_not_served_is_not_ridden_to() -> None:
     world = World()
     world.add(RightLift())
-    stage = world.judge("lift", "Lift1", Ride("Lift1", ("L1", "L9"), 1, 60.0))
-    assert stage.note == "'L9': it serves 'L1', 'L2', 'L3'"
+    judging = world.judge("lift", "Lift1", RideScenario("Lift1", ("L1", "L9"), 1, 60.0))
+    assert judging.note == "'L9': it serves 'L1', 'L2', 'L3'"
 
 
 def test_a_device_that_is_not_there_is_waited_for_a_while_and_not_played_with() -> None:
     world = World()
     said = said_by_the_judge(world)
-    stage = world.judge("lift", "Lift1", ride())
-    assert (stage.done, said, world.timeline.now) == (True, [], 15.0)
+    judging = world.judge("lift", "Lift1", ride())
+    assert (judging.done, said, world.timeline.now) == (True, [], 15.0)
 
 
 def test_another_speaker_stops_the_play_before_it_begins() -> None:
-    stage = Stage(Judge("lift", "Lift1"), ride(), 60.0, lambda: "others publish on lift_requests")
-    stage.begin(0.0, EPOCH)
-    stage.hear(Heard(1.0, EPOCH + 1.0, "lift_states", STATE))
-    assert stage.turn(4.0, EPOCH + 4.0) == []
-    assert (stage.done, stage.note) == (True, "others publish on lift_requests")
+    judging = JudgeRun(
+        Judge("lift", "Lift1"), ride(), 60.0, lambda: "others publish on lift_requests"
+    )
+    judging.begin(0.0, EPOCH)
+    judging.hear(Heard(1.0, EPOCH + 1.0, "lift_states", STATE))
+    assert judging.turn(4.0, EPOCH + 4.0) == []
+    assert (judging.done, judging.note) == (True, "others publish on lift_requests")
 
 
-PLAYS: list[tuple[RightLift | RightDoor | RightCharger, Performance]] = [
+PLAYS: list[tuple[RightLift | RightDoor | RightCharger, Scenario]] = [
     (RightLift(), ride()),
-    (RightDoor(), Passages("ward", 3, 60.0)),
-    (RightCharger(), Charge("bay1", "fleet/red", "r1", 20.0)),
+    (RightDoor(), PassageScenario("ward", 3, 60.0)),
+    (RightCharger(), ChargeScenario("bay1", "fleet/red", "r1", 20.0)),
 ]
 
 
-@pytest.mark.parametrize(("node", "performance"), PLAYS)
+@pytest.mark.parametrize(("node", "scenario"), PLAYS)
 def test_an_interrupted_play_lets_the_device_go(
-    node: RightLift | RightDoor | RightCharger, performance: Performance
+    node: RightLift | RightDoor | RightCharger, scenario: Scenario
 ) -> None:
     world = World()
     world.add(node)
     kinds = {"Lift1": "lift", "ward": "door", "bay1": "charger"}
     said: list[str] = []
 
-    def interrupt(stage: Stage) -> None:
+    def interrupt(judging: JudgeRun) -> None:
         def stop() -> None:
-            said.extend(topic.name for topic, _ in stage.stop())
+            said.extend(topic.name for topic, _ in judging.stop())
 
         world.timeline.at(9.0, stop)
 
-    stage = world.judge(kinds[node.name], node.name, performance, also=interrupt)  # type: ignore[arg-type]
-    assert stage.note == "interrupted"
+    judging = world.judge(kinds[node.name], node.name, scenario, also=interrupt)  # type: ignore[arg-type]
+    assert judging.note == "interrupted"
     assert said
-    assert stage.done
+    assert judging.done
 
 
 def test_a_ride_that_another_robot_takes_ends_with_our_own_end_only() -> None:
@@ -129,8 +131,8 @@ def test_a_ride_that_another_robot_takes_ends_with_our_own_end_only() -> None:
         node.session = "fleet/red"
 
     world.timeline.at(9.0, steal)
-    stage = world.judge("lift", "Lift1", ride())
-    assert stage.note == "'fleet/red' has the lift now"
+    judging = world.judge("lift", "Lift1", ride())
+    assert judging.note == "'fleet/red' has the lift now"
     after = [m for _, m in said if isinstance(m, d.LiftRequest)][-2:]
     assert {(m.session_id, m.request_type) for m in after} == {("rmf_bridge_judge/robot1", 0)}
     assert node.session == "fleet/red"
@@ -142,8 +144,8 @@ def test_through_a_supervisor_only_the_adapters_are_played() -> None:
     from workbench.rmf_model.supervisors import LiftSupervisor
 
     world.add(RightLift(), LiftSupervisor())
-    stage = world.judge("lift", "Lift1", ride(through=True))
-    assert (told(stage, world.timeline.now)["broken"], stage.note) == (set(), "")
+    judging = world.judge("lift", "Lift1", ride(through=True))
+    assert (told(judging, world.timeline.now)["broken"], judging.note) == (set(), "")
     assert {topic for topic, _ in said} == {"adapter_lift_requests"}
 
 
@@ -166,10 +168,10 @@ def test_ten_thousand_made_up_lifts_and_requesters_are_bounded() -> None:
         *(lift(f"fleet/{n}", "", kind=0) for n in range(10_000)),
         *(lift("fleet/red", f"L{n}") for n in range(10_000)),
     )
-    scene = judge.scene
-    sizes = [len(getattr(scene, name)) for name in ("others", "asks", "elsewhere", "ended")]
+    history = judge.history
+    sizes = [len(getattr(history, name)) for name in ("others", "asks", "elsewhere", "ended")]
     assert max(sizes) <= 200
-    assert len(scene.asks["fleet/red"].floors) == 8  # type: ignore[attr-defined]
+    assert len(history.asks["fleet/red"].floors) == 8  # type: ignore[attr-defined]
 
 
 def test_names_of_the_network_are_shown_on_one_line_and_never_as_they_are() -> None:

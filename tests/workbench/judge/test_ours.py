@@ -6,26 +6,30 @@ from tests.site.building import CHARGERS, DOORS, LIFTS, devices
 from tests.site.daemons import DeviceDaemon
 from tests.workbench.judge.world import World, told
 from workbench.judge.judge import Kind
-from workbench.judge.scenarios import Charge, Passages, Performance, Ride
+from workbench.judge.scenarios import ChargeScenario, PassageScenario, RideScenario, Scenario
 
-CASES: list[tuple[Kind, str, Performance]] = [
+CASES: list[tuple[Kind, str, Scenario]] = [
     *(
-        ("lift", name, Ride(name, ("L1", "L3"), robots, 90.0, restarts=restarts))
+        ("lift", name, RideScenario(name, ("L1", "L3"), robots, 90.0, restarts=restarts))
         for name in LIFTS
         for robots in (1, 2)
         for restarts in (False, True)
     ),
-    *(("door", name, Passages(name, 3, 60.0, restarts=r)) for name in DOORS for r in (False, True)),
-    *(("charger", name, Charge(name, "fleet/red", "r1", 20.0)) for name in CHARGERS),
+    *(
+        ("door", name, PassageScenario(name, 3, 60.0, restarts=r))
+        for name in DOORS
+        for r in (False, True)
+    ),
+    *(("charger", name, ChargeScenario(name, "fleet/red", "r1", 20.0)) for name in CHARGERS),
 ]
 
 
-@pytest.mark.parametrize(("kind", "name", "performance"), CASES)
-def test_ours_keep_every_law(kind: Kind, name: str, performance: Performance) -> None:
+@pytest.mark.parametrize(("kind", "name", "scenario"), CASES)
+def test_ours_keep_every_law(kind: Kind, name: str, scenario: Scenario) -> None:
     world = World()
     daemon = DeviceDaemon(world.timeline, world.air, devices(world.timeline)[name])
     daemon.start()
-    stage = world.judge(kind, name, performance)
+    judging = world.judge(kind, name, scenario)
     daemon.kill()
-    found = told(stage, world.timeline.now)
-    assert (found["broken"], stage.note) == (set(), "")
+    found = told(judging, world.timeline.now)
+    assert (found["broken"], judging.note) == (set(), "")

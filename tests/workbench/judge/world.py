@@ -1,4 +1,4 @@
-"""The judge at work in virtual time, on the memory transport: nodes, RMF's parties, and its stage."""
+"""The judge at work in virtual time, on the memory transport: nodes, RMF's parties, and a run of it."""
 
 from collections.abc import Callable, Iterable
 from functools import partial
@@ -11,9 +11,9 @@ from bridges.transports.transport import Publisher
 from tests.site.network import CLEAR, Air, Place
 from tests.site.timeline import EPOCH, NEVER, Alarm, Timeline
 from workbench.judge.judge import Judge, Kind
-from workbench.judge.judge_run import Stage
+from workbench.judge.judge_run import JudgeRun
 from workbench.judge.law import Verdict
-from workbench.judge.scenarios import Charge, Passages, Performance, Ride
+from workbench.judge.scenarios import ChargeScenario, PassageScenario, RideScenario, Scenario
 from workbench.rmf_model import Party, Said
 
 HEARD: tuple[AnyTopic, ...] = (
@@ -84,13 +84,13 @@ class World:
         self,
         kind: Kind,
         name: str,
-        performance: Performance | None = None,
+        scenario: Scenario | None = None,
         for_s: float = NEVER,
         most_s: float = 600.0,
-        also: Callable[[Stage], None] = lambda stage: None,
-    ) -> Stage:
+        also: Callable[[JudgeRun], None] = lambda judging: None,
+    ) -> JudgeRun:
         """Listen, or play and leave; at most `most_s`."""
-        stage = Stage(Judge(kind, name), performance, for_s)
+        judging = JudgeRun(Judge(kind, name), scenario, for_s)
         place = Place(self.air, "judge", lambda: None)
         publishers: dict[AnyTopic, Publisher[Message]] = {}
 
@@ -99,19 +99,19 @@ class World:
                 if topic not in publishers:
                     publishers[topic] = place.publisher(topic)
                 publishers[topic].publish(message)
-            alarm.set(max(stage.wake_at(), self.timeline.now + 0.001))
+            alarm.set(max(judging.wake_at(), self.timeline.now + 0.001))
 
         def hear(topic: AnyTopic, message: Message) -> None:
-            if not stage.done:
+            if not judging.done:
                 now = self.timeline.now
-                say(stage.hear(Heard(now, EPOCH + now, topic.name, message)))
+                say(judging.hear(Heard(now, EPOCH + now, topic.name, message)))
 
         def turn() -> None:
-            if not stage.done:
-                say(stage.turn(self.timeline.now, EPOCH + self.timeline.now))
+            if not judging.done:
+                say(judging.turn(self.timeline.now, EPOCH + self.timeline.now))
 
         alarm = Alarm(self.timeline, turn)
-        stage.begin(self.timeline.now, EPOCH + self.timeline.now)
+        judging.begin(self.timeline.now, EPOCH + self.timeline.now)
         for topic in HEARD:
             place.subscribe(topic, partial(hear, topic), others_only=True)
         ends = [
@@ -120,21 +120,21 @@ class World:
         ]
         ends.append(place.subscribe(topics.LIFT_REQUESTS, lambda message: None, others_only=True))
         say([])
-        also(stage)
+        also(judging)
         until = self.timeline.now + most_s
-        while not stage.done and self.timeline.now < until:
+        while not judging.done and self.timeline.now < until:
             self.timeline.run(self.timeline.now + 0.5)
             publishing, retaining, supervisors = (end.matched() for end in ends)
             now = self.timeline.now
-            stage.judge.fire_ends(publishing, retaining, supervisors, now, EPOCH + now)
+            judging.judge.fire_ends(publishing, retaining, supervisors, now, EPOCH + now)
         place.close()
-        return stage
+        return judging
 
 
-def told(stage: Stage, now: float) -> Verdicts:
+def told(judging: JudgeRun, now: float) -> Verdicts:
     """The ids of the laws, by verdict."""
     found: Verdicts = {verdict.value: set() for verdict in Verdict}
-    for judged in stage.judge.end(now, EPOCH + now):
+    for judged in judging.judge.end(now, EPOCH + now):
         found[judged.verdict.value].add(judged.law.id)
     return found
 
@@ -145,30 +145,30 @@ def rides(
     """The verdict on a lift that robots ride from L1 to L3, and why, if they did not."""
     world = World()
     world.add(*nodes)
-    ride = Ride(name, ("L1", "L3"), robots, 60.0, restarts=restarts)
-    stage = world.judge("lift", name, ride)
-    return told(stage, world.timeline.now), stage.note
+    ride = RideScenario(name, ("L1", "L3"), robots, 60.0, restarts=restarts)
+    judging = world.judge("lift", name, ride)
+    return told(judging, world.timeline.now), judging.note
 
 
 def passes(*nodes: Party, times: int = 3, restarts: bool = False) -> tuple[Verdicts, str]:
     """The verdict on a door that a robot passes."""
     world = World()
     world.add(*nodes)
-    stage = world.judge("door", "ward", Passages("ward", times, 60.0, restarts=restarts))
-    return told(stage, world.timeline.now), stage.note
+    judging = world.judge("door", "ward", PassageScenario("ward", times, 60.0, restarts=restarts))
+    return told(judging, world.timeline.now), judging.note
 
 
 def charges(*nodes: Party) -> tuple[Verdicts, str]:
     """The verdict on a charger that is requested."""
     world = World()
     world.add(*nodes)
-    stage = world.judge("charger", "bay1", Charge("bay1", "fleet/red", "r1", 20.0))
-    return told(stage, world.timeline.now), stage.note
+    judging = world.judge("charger", "bay1", ChargeScenario("bay1", "fleet/red", "r1", 20.0))
+    return told(judging, world.timeline.now), judging.note
 
 
 def watched(kind: Kind, name: str, *parties: Party, for_s: float = 60.0) -> Verdicts:
     """The verdict on a device that the judge only listens to."""
     world = World()
     world.add(*parties)
-    stage = world.judge(kind, name, for_s=for_s, most_s=for_s + 1.0)
-    return told(stage, world.timeline.now)
+    judging = world.judge(kind, name, for_s=for_s, most_s=for_s + 1.0)
+    return told(judging, world.timeline.now)

@@ -8,7 +8,7 @@ from bridges import __version__
 from bridges.blackbox import mcap_write
 from bridges.blackbox.entries import AnyEntry, Clocks, Head, Spoken
 from bridges.blackbox.incident import Incident, Note
-from bridges.kinds.shared.recording_section import Recording
+from bridges.kinds.shared.recording_section import RecordingSettings
 from bridges.messages import cdr
 from bridges.messages import definitions as d
 from bridges.messages.definitions import Message
@@ -24,7 +24,9 @@ LIFT = d.LiftState(
 
 def write(path: Path, lift: str = "Lift1", seconds: int = 60) -> Path:
     """A robot rides from L1 to L3: states once a second, and the requests behind them."""
-    head = Head("run", 1, __version__, "lift", "/etc/a.yaml", b"", {}, True, {}, Recording())
+    head = Head(
+        "run", 1, __version__, "lift", "/etc/a.yaml", b"", {}, True, {}, RecordingSettings()
+    )
     entries: list[AnyEntry] = [Clocks(0.0, WALL)]
     for at in range(seconds):
         entries += [_spoken(at, True, "lift_states", _state(lift, at))]

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from workbench.page import access
-from workbench.page.access import Door, PasswordError, Sessions
+from workbench.page.access import LoginSessions, PasswordCheck, PasswordError
 
 
 @pytest.fixture(scope="module")
@@ -68,7 +68,7 @@ def test_a_file_that_cannot_be_used_says_where_and_why(
 
 
 def test_after_five_wrong_passwords_an_address_waits_a_minute(stored: str) -> None:
-    door = Door({"ann": stored})
+    door = PasswordCheck({"ann": stored})
     wrong = "wrong user or password"
     waits = "too many wrong passwords; wait a minute"
     tries = [("ann", "x"), ("ann", "y"), ("eve", "correct horse"), ("ann", ""), ("ann", "z" * 9999)]
@@ -86,7 +86,7 @@ def test_ten_thousand_addresses_are_not_all_remembered() -> None:
 
 
 def test_a_session_ends_after_an_idle_hour_or_twelve_hours_or_a_logout() -> None:
-    sessions = Sessions()
+    sessions = LoginSessions()
     idle, shift, out = (sessions.begin(user, 0.0) for user in ("ann", "bob", "eve"))
     sessions.end(out)
     assert sessions.find(out, 1.0) is None
@@ -102,7 +102,7 @@ def test_a_session_ends_after_an_idle_hour_or_twelve_hours_or_a_logout() -> None
 
 
 def test_sessions_are_bounded_and_the_newest_stay() -> None:
-    sessions = Sessions()
+    sessions = LoginSessions()
     first = sessions.begin("ann", 0.0)
     for _ in range(access.MOST_SESSIONS):
         last = sessions.begin("bob", 0.0)

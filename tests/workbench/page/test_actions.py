@@ -4,7 +4,7 @@ import pytest
 
 from bridges.cli import whole_parser
 from bridges.messages import definitions as d
-from workbench.graph.board import Row
+from workbench.graph.board import BoardRow
 from workbench.page.actions import Action, Local, actions, fail, press, queue
 from workbench.page.live_site import DeviceView
 
@@ -20,21 +20,21 @@ def parsed(action: Action) -> dict[str, object]:
 @pytest.mark.parametrize("name", ["Lift1", HOSTILE, "-h", "a b"])
 def test_a_held_lift_can_be_released_whatever_it_and_its_holder_are_called(name: str) -> None:
     state = d.LiftState(lift_name=name, session_id=name)
-    (action,) = actions(DeviceView(Row("lift", name, ""), state), None, GRAPH)
+    (action,) = actions(DeviceView(BoardRow("lift", name, ""), state), None, GRAPH)
     found = parsed(action)
     assert (found["command"], found["name"], found["session"]) == ("release", name, name)
     assert (found["domain_id"], found["config"], found["localhost"]) == (7, None, True)
 
 
 def test_a_free_lift_and_a_door_offer_no_action_on_the_graph() -> None:
-    assert actions(DeviceView(Row("lift", "a", ""), d.LiftState()), None, GRAPH) == []
-    assert actions(DeviceView(Row("door", "a", ""), d.DoorState()), None, GRAPH) == []
+    assert actions(DeviceView(BoardRow("lift", "a", ""), d.LiftState()), None, GRAPH) == []
+    assert actions(DeviceView(BoardRow("door", "a", ""), d.DoorState()), None, GRAPH) == []
 
 
 @pytest.mark.parametrize("name", ["pad", HOSTILE])
 def test_a_charge_can_be_cancelled_and_queued(name: str) -> None:
     state = d.ChargerState(charger_name=name, request_id=name)
-    (action,) = actions(DeviceView(Row("charger", name, ""), state), None, GRAPH)
+    (action,) = actions(DeviceView(BoardRow("charger", name, ""), state), None, GRAPH)
     found = parsed(action)
     assert (found["command"], found["name"], found["cancel"]) == ("send", name, name)
     found = parsed(queue(name, HOSTILE, GRAPH))
@@ -42,7 +42,7 @@ def test_a_charge_can_be_cancelled_and_queued(name: str) -> None:
 
 
 def test_a_daemon_on_this_machine_can_be_reset_and_its_simulation_pressed_and_failed() -> None:
-    (reset,) = actions(DeviceView(Row("door", "a", ""), d.DoorState()), LOCAL, GRAPH)
+    (reset,) = actions(DeviceView(BoardRow("door", "a", ""), d.DoorState()), LOCAL, GRAPH)
     assert str(parsed(reset)["file"]) == LOCAL.file
     pressed = parsed(press(LOCAL, HOSTILE, "robot", on=False))
     assert (pressed["device"], pressed["signal"], pressed["how"]) == (HOSTILE, "robot", "off")

@@ -8,9 +8,9 @@ from msgspec.structs import replace
 from bridges.messages.heard import Heard
 from bridges.transports.transport import Transport, TransportError
 from tests.workbench.page.test_live_site import LIFT, lift
-from workbench.page.cards import Gallery, place_of, script
+from workbench.page.cards import Cards, place_of, script
 from workbench.page.listener import Listener
-from workbench.page.live_site import Site
+from workbench.page.live_site import LiveSite
 
 HOSTILE = "</script>\u2028\"'`${1}"
 
@@ -36,15 +36,15 @@ def nowhere() -> Transport:
 
 
 def test_all_changes_of_a_turn_are_one_script_for_every_browser() -> None:
-    site, walls, now = Site(), [Wall(), Wall()], [100.0]
+    site, walls, now = LiveSite(), [Wall(), Wall()], [100.0]
     listener = Listener(site, nowhere)
-    gallery = Gallery(site, listener, lambda: now[0])
-    gallery.walls += walls
+    cards = Cards(site, listener, lambda: now[0])
+    cards.walls += walls
 
     def turn(*heard: Heard) -> None:
         for one in heard:
             listener.hear(one)
-        gallery.turn()
+        cards.turn()
         now[0] += 0.1
 
     first, second = lift(99.0), lift(99.0, "Lift2")

@@ -6,9 +6,9 @@ import pytest
 
 from bridges.messages import definitions as d
 from bridges.messages.words import Stated
-from workbench.graph.board import Row
+from workbench.graph.board import BoardRow
 from workbench.page import drawing
-from workbench.page.live_site import DeviceView, Robot, Stands
+from workbench.page.live_site import DeviceView, RobotShown, Stands
 
 HOSTILE = "<script>alert(1)</script>\"'&"
 LIFT = d.LiftState(
@@ -47,7 +47,7 @@ def test_a_lift_with_a_thousand_floors_is_described_in_words_only() -> None:
 
 @pytest.mark.parametrize("kind", ["lift", "door", "charger", "coordinator", "robot"])
 def test_a_name_is_shown_as_text_and_never_as_markup(kind: str) -> None:
-    row = Row(kind, HOSTILE, HOSTILE, HOSTILE, HOSTILE, HOSTILE, HOSTILE, True, HOSTILE)
+    row = BoardRow(kind, HOSTILE, HOSTILE, HOSTILE, HOSTILE, HOSTILE, HOSTILE, True, HOSTILE)
     states: dict[str, Stated] = {
         "lift": d.LiftState(available_floors=(HOSTILE,), current_floor=HOSTILE),
         "door": d.DoorState(door_name=HOSTILE),
@@ -63,7 +63,9 @@ def test_a_device_has_a_page_of_its_own_whatever_its_name() -> None:
 
 
 def test_an_old_state_says_that_it_is_old_and_how_old() -> None:
-    html = drawing.card(DeviceView(Row("door", "ward", "open", age="12.0 s", mark="SILENT 12 s")))
+    html = drawing.card(
+        DeviceView(BoardRow("door", "ward", "open", age="12.0 s", mark="SILENT 12 s"))
+    )
     text = "".join(well_formed(html).itertext())
     assert "OLD: silent 12 s, last reading 12.0 s old" in text
     assert "was" in text
@@ -80,13 +82,15 @@ def test_an_old_state_says_that_it_is_old_and_how_old() -> None:
     ],
 )
 def test_a_charger_says_how_long_its_robot_has_it(stands: Stands, told: str) -> None:
-    html = drawing.card(DeviceView(Row("charger", "pad", "charging", "fleet/R1"), stands=stands))
+    html = drawing.card(
+        DeviceView(BoardRow("charger", "pad", "charging", "fleet/R1"), stands=stands)
+    )
     texts = [one.text for one in well_formed(html).iter("dd")]
     assert texts == ["charging", "fleet/R1", told]
 
 
 def test_a_robot_whose_fleet_is_silent_is_old() -> None:
     state = d.RobotState("r1", battery_percent=250.0, location=d.Location(level_name="L1"))
-    root = well_formed(drawing.robots([Robot("fleet", state, 100.0)], now=120.0))
+    root = well_formed(drawing.robots([RobotShown("fleet", state, 100.0)], now=120.0))
     cells = [cell.text for cell in root.iter("td")]
     assert cells == ["fleet/r1", "idle (OLD: silent 20 s)", "L1", "100 %"]

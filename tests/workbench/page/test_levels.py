@@ -2,15 +2,15 @@
 
 from pathlib import Path
 
-from bridges.blackbox.entries import Step
+from bridges.blackbox.entries import Decided
 from bridges.blackbox.value_codec import tree
 from bridges.kinds.door.signals import DoorOutputs, DoorSample
 from bridges.kinds.shared.decision import IoFailed, Sampled
 from workbench.page.levels import Levels
 
 
-def step(event: object, *outputs: object) -> Step:
-    return Step(1.0, "ward_door", tree(event), None, outputs=[tree(one) for one in outputs])
+def step(event: object, *outputs: object) -> Decided:
+    return Decided(1.0, "ward_door", tree(event), None, outputs=[tree(one) for one in outputs])
 
 
 def test_the_last_sample_and_the_last_outputs_are_shown_in_words() -> None:

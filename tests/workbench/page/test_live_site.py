@@ -9,7 +9,7 @@ from bridges.messages.stamps import stamp
 from bridges.messages.topics import AnyTopic
 from bridges.observe.limits import FORGOTTEN_S, MOST_DEVICES
 from bridges.runtime.diagnostics import diagnosis
-from workbench.page.live_site import KEPT_S, MOST_ROBOTS, Site, Stands
+from workbench.page.live_site import KEPT_S, MOST_ROBOTS, LiveSite, Stands
 
 WALL = 1_700_000_000.0
 LIFT = d.LiftState(
@@ -26,12 +26,12 @@ def lift(at: float, name: str = "Lift1") -> Heard:
     return heard(at, topics.LIFT_STATES, state)
 
 
-def names(site: Site, now: float) -> list[str]:
+def names(site: LiveSite, now: float) -> list[str]:
     return [shown.row.name for shown in site.devices(now, WALL + now)]
 
 
 def test_a_device_is_shown_with_its_state_and_its_row() -> None:
-    site = Site()
+    site = LiveSite()
     site.take(lift(1.0))
     (shown,) = site.devices(1.2, WALL + 1.2)
     assert (shown.row.state, shown.row.age) == ("car at L1, door open, mode UNKNOWN", "0.2 s")
@@ -44,7 +44,7 @@ def charger(at: float, robot: str = "") -> Heard:
 
 
 def test_how_long_a_robot_has_had_a_charger_is_shown_as_far_as_it_was_seen() -> None:
-    site, told = Site(), []
+    site, told = LiveSite(), []
     for at in (0, 1, 2, 3, 4, 5, 6, 30, 31):  # silent from 6 to 30
         site.take(charger(float(at), "R1" if at < 3 else "" if at == 3 else "R2"))
         told.append(next(one.stands for one in site.changed(at, WALL + at)))
@@ -63,7 +63,7 @@ def test_how_long_a_robot_has_had_a_charger_is_shown_as_far_as_it_was_seen() -> 
 
 
 def test_only_devices_heard_since_the_last_drawing_are_drawn_again() -> None:
-    site = Site()
+    site = LiveSite()
     site.take(lift(1.0))
     site.take(lift(1.0, "Lift2"))
     assert len(site.changed(1.1, WALL)) == 2
@@ -73,7 +73,7 @@ def test_only_devices_heard_since_the_last_drawing_are_drawn_again() -> None:
 
 
 def test_ten_thousand_made_up_lifts_displace_no_known_one() -> None:
-    site = Site()
+    site = LiveSite()
     site.take(lift(0.0))
     for number in range(10_000):
         site.take(lift(0.001 * number, f"made up {number}"))
@@ -84,7 +84,7 @@ def test_ten_thousand_made_up_lifts_displace_no_known_one() -> None:
 
 
 def test_a_device_that_went_silent_gives_way_to_a_new_one() -> None:
-    site = Site()
+    site = LiveSite()
     for number in range(MOST_DEVICES):
         site.take(lift(0.0, f"old {number}"))
     later = FORGOTTEN_S + 1.0
@@ -96,7 +96,7 @@ def test_a_device_that_went_silent_gives_way_to_a_new_one() -> None:
 
 
 def test_a_lift_that_comes_after_made_up_ones_is_explained_and_they_leave_nothing() -> None:
-    site = Site()
+    site = LiveSite()
     for number in range(2 * MOST_DEVICES):
         site.take(lift(number * FORGOTTEN_S, f"made up {number}"))
     later = 2 * MOST_DEVICES * FORGOTTEN_S
@@ -111,7 +111,7 @@ def test_a_lift_that_comes_after_made_up_ones_is_explained_and_they_leave_nothin
 
 
 def test_requests_for_devices_that_nobody_has_seen_are_not_kept() -> None:
-    site = Site()
+    site = LiveSite()
     asked = heard(0.0, topics.LIFT_REQUESTS, d.LiftRequest("nowhere", session_id="a/b"))
     for _ in range(1000):
         site.take(asked)
@@ -120,14 +120,14 @@ def test_requests_for_devices_that_nobody_has_seen_are_not_kept() -> None:
 
 
 def test_made_up_robots_are_bounded() -> None:
-    site = Site()
+    site = LiveSite()
     robots = tuple(d.RobotState(f"r{n}") for n in range(10_000))
     site.take(heard(0.0, topics.FLEET_STATES, d.FleetState("fleet", robots)))
     assert len(site.robots()) == MOST_ROBOTS
 
 
 def test_the_timeline_has_the_sessions_and_requests_of_its_own_device_only() -> None:
-    site = Site()
+    site = LiveSite()
     held = replace(LIFT, session_id="fleet/a", lift_time=stamp(WALL))
     site.take(heard(0.0, topics.LIFT_STATES, held))
     asked = d.LiftRequest("Lift1", session_id="fleet/b", destination_floor="L2")
@@ -142,7 +142,7 @@ def test_the_timeline_has_the_sessions_and_requests_of_its_own_device_only() -> 
 
 
 def test_a_day_of_rides_takes_no_more_room_than_ten_minutes() -> None:
-    site = Site()
+    site = LiveSite()
     for at in range(0, 3600, 2):
         state = replace(LIFT, lift_time=stamp(WALL + at), session_id=f"fleet/robot{at}")
         site.take(heard(float(at), topics.LIFT_STATES, state))
@@ -153,7 +153,7 @@ def test_a_day_of_rides_takes_no_more_room_than_ten_minutes() -> None:
 
 
 def test_faults_and_simulations_come_from_the_daemons_diagnostics() -> None:
-    site = Site()
+    site = LiveSite()
     site.take(lift(0.0))
     fault = {"code": "OVERLOAD", "detail": "3 s"}
     status = {"Lift1": {"faults": [fault], "input_age_s": 0.1}}
@@ -164,7 +164,7 @@ def test_faults_and_simulations_come_from_the_daemons_diagnostics() -> None:
 
 
 def test_what_a_person_is_told_to_type_names_the_pages_graph() -> None:
-    site = Site(("--domain-id", "7"))
+    site = LiveSite(("--domain-id", "7"))
     for n in range(9):
         state = d.LiftState(stamp(WALL + n), "Lift1", ("L1",), "L1", session_id="fleet/red")
         site.take(heard(float(n), topics.LIFT_STATES, state))

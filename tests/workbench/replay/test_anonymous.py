@@ -10,7 +10,7 @@ from bridges.blackbox import mcap_write
 from bridges.blackbox.entries import Head, Spoken
 from bridges.blackbox.incident import Incident
 from bridges.kinds import lift
-from bridges.kinds.shared.recording_section import Recording
+from bridges.kinds.shared.recording_section import RecordingSettings
 from bridges.messages import cdr
 from bridges.messages.definitions import LiftState
 from bridges.messages.releases import KILTED
@@ -18,7 +18,7 @@ from tests.workbench.replay.test_replay import CORPUS
 from workbench.replay.anonymous import anonymous, our_words
 from workbench.replay.files import opened
 from workbench.replay.incidents import notes_in
-from workbench.replay.replayed import Cores, Replay, of_head
+from workbench.replay.replayed import Replay, ReplayedCores, of_head
 from workbench.replay.sources import Notes
 
 NAMES = (b"Lift1", b"Lift2", b"red", b"green", b"white", b"black", b"bay1", b"bay2", b"ward", b"L3")
@@ -38,7 +38,7 @@ def test_an_anonymous_incident_is_decided_as_before_and_names_nobody(
     written = tmp_path / "a.mcap"
     mcap_write.write(written, hidden)
     head, entries = opened(written, Notes())
-    replay = Replay(entries, Cores(of_head(head)))
+    replay = Replay(entries, ReplayedCores(of_head(head)))
 
     assert list(replay.differences()) == []
     assert replay.course.decisions > 40
@@ -55,7 +55,9 @@ def test_a_name_is_the_same_in_messages_and_decisions_and_comments_and_addresses
         b"# Saint Mary's\nkind: lift_supervisor\n"
         b"rmf: {zenoh: {connect: [tcp/mary.local:7447]}, transport: zenoh}\n"
     )
-    head = Head("r", 1, "1", "lift_supervisor", "/home/mary.yaml", yaml, {}, False, {}, Recording())
+    head = Head(
+        "r", 1, "1", "lift_supervisor", "/home/mary.yaml", yaml, {}, False, {}, RecordingSettings()
+    )
     state = LiftState(lift_name="East", current_floor="L1", session_id="fleet/joe")
     told = anonymous(Incident(head, [_spoken(state)]))
 

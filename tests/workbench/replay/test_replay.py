@@ -6,8 +6,8 @@ import pytest
 import yaml
 from msgspec.structs import replace
 
-from bridges.blackbox.entries import Known, Step
-from bridges.blackbox.ring import Read
+from bridges.blackbox.entries import Decided, Known
+from bridges.blackbox.ring import RingContent
 from bridges.blackbox.value_codec import value
 from bridges.kinds.lift import core as lift_core
 from bridges.kinds.shared.decision import Fault
@@ -15,7 +15,7 @@ from tests.blackbox.kept import keep
 from tests.depth import depth
 from tests.site.day import Site
 from workbench.replay.files import opened
-from workbench.replay.replayed import CONTEXT, Cores, Difference, Replay, of_head
+from workbench.replay.replayed import CONTEXT, Difference, Replay, ReplayedCores, of_head
 from workbench.replay.sources import Notes
 
 MB = 1_000_000
@@ -33,8 +33,8 @@ def test_whatever_happens_at_a_site_is_decided_again_in_the_same_way(
     site.run(depth(6, 20) / 60)
     found = {}
     for name, ring in rings.items():
-        read = Read(ring)
-        replay = Replay(read.entries(), Cores(of_head(read.head)))
+        read = RingContent(ring)
+        replay = Replay(read.entries(), ReplayedCores(of_head(read.head)))
         assert list(replay.differences()) == []
         found[name] = (replay.course.decisions > 30, replay.course.unusable)
 
@@ -48,8 +48,8 @@ def test_a_ring_that_has_turned_many_times_begins_where_all_is_known(tmp_path: P
     site.run(depth(6, 20) / 60)
 
     for name in ("Lift1", "ward", "bay1"):
-        read = Read(rings[name])
-        replay = Replay(read.entries(), Cores(of_head(read.head)))
+        read = RingContent(rings[name])
+        replay = Replay(read.entries(), ReplayedCores(of_head(read.head)))
         assert list(replay.differences()) == []
         assert (replay.course.subjects, replay.course.unusable) == ({name}, 0)
         assert min(read.segments) > 1
@@ -61,7 +61,7 @@ def test_each_incident_of_the_soak_is_decided_as_it_was_recorded(file: Path) -> 
     them."""
     notes = Notes()
     head, entries = opened(file, notes)
-    replay = Replay(entries, Cores(of_head(head)))
+    replay = Replay(entries, ReplayedCores(of_head(head)))
 
     assert [summary(one) for one in replay.differences()] == []
     assert (notes.damage, replay.course.unusable) == ("", 0)
@@ -73,7 +73,7 @@ def test_a_change_of_a_core_is_seen_with_what_led_to_it(monkeypatch: pytest.Monk
     monkeypatch.setattr(lift_core, "_faults", lambda memory, view, now, limits: ())
     head, entries = opened(HERE / "Lift1_1.mcap", Notes())
 
-    [found] = Replay(entries, Cores(of_head(head))).differences()
+    [found] = Replay(entries, ReplayedCores(of_head(head))).differences()
 
     recorded, today = value(found.recorded), value(found.today)
     assert (found.subject, found.what) == ("Lift1", "news")
@@ -92,7 +92,7 @@ def test_other_limits_show_what_they_would_have_changed_and_the_same_ones_nothin
         limits["dead_time_s"] = wait_s
         other = replace(head, yaml=yaml.safe_dump(content).encode())
         _, entries = opened(HERE / "Lift1_1.mcap", Notes())
-        changes = list(Replay(entries, Cores(of_head(other))).changes())
+        changes = list(Replay(entries, ReplayedCores(of_head(other))).changes())
         found[wait_s] = {one.what for one in changes}
 
     assert found.pop(3.0) >= {"outputs"}
@@ -102,7 +102,9 @@ def test_other_limits_show_what_they_would_have_changed_and_the_same_ones_nothin
 def test_what_cannot_be_replayed_is_counted(tmp_path: Path) -> None:
     """Entries before all is known, as a damaged beginning leaves them."""
     head, entries = opened(HERE / "bay1_1.mcap", Notes())
-    replay = Replay([one for one in entries if not isinstance(one, Known)], Cores(of_head(head)))
+    replay = Replay(
+        [one for one in entries if not isinstance(one, Known)], ReplayedCores(of_head(head))
+    )
 
     assert list(replay.differences()) == []
     assert (replay.course.decisions, replay.course.subjects) == (0, set())
@@ -112,7 +114,7 @@ def test_what_cannot_be_replayed_is_counted(tmp_path: Path) -> None:
 def recorded_faults() -> tuple[Fault, ...]:
     """The first fault that the recording of Lift1 shows."""
     _, entries = opened(HERE / "Lift1_1.mcap", Notes())
-    steps = [one for one in entries if isinstance(one, Step) and one.faults not in ([], [[]])]
+    steps = [one for one in entries if isinstance(one, Decided) and one.faults not in ([], [[]])]
     return tuple(value(steps[0].faults[0]))
 
 

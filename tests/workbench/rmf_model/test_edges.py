@@ -22,7 +22,7 @@ from tests.workbench.rmf_model.test_rmf_rules import (
     listing,
 )
 from workbench.rmf_model.phases import DoorClose, DoorOpen, EndLiftSession, RequestLift
-from workbench.rmf_model.robot import LiftDestination, Robot
+from workbench.rmf_model.robot import LiftDestination, RobotContext
 from workbench.rmf_model.supervisors import DoorSupervisor, LiftSupervisor
 
 OTHER_LIFT = replace(IDLE, lift_name="Lift2")
@@ -31,7 +31,7 @@ OTHER_LIFT = replace(IDLE, lift_name="Lift2")
 
 
 def test_jazzys_adapter_sends_end_at_once_with_the_floor_and_later_without_one() -> None:
-    robot = Robot(A, jazzy=True)
+    robot = RobotContext(A, jazzy=True)
     assert robot.begin(RequestLift("Lift1", "L3", inside=False), 1.0) == [adapter_lift(AGV, 1.0)]
     end_at_l3 = replace(END, destination_floor="L3")
     assert robot.begin(EndLiftSession("Lift1"), 2.0) == [adapter_lift(end_at_l3)]
@@ -41,18 +41,18 @@ def test_jazzys_adapter_sends_end_at_once_with_the_floor_and_later_without_one()
 
 def test_jazzys_adapter_repeats_its_request_at_every_lifts_state() -> None:
     for jazzy, said in ((True, [adapter_lift(AGV, 2.0)]), (False, [])):
-        robot = Robot(A, jazzy)
+        robot = RobotContext(A, jazzy)
         robot.begin(RequestLift("Lift1", "L3", inside=False), 1.0)
         assert robot.hear(OTHER_LIFT, 2.0) == said
 
 
 def test_jazzys_adapter_releases_a_cancelled_request_from_outside_at_the_next_state() -> None:
-    robot = Robot(A, jazzy=True)
+    robot = RobotContext(A, jazzy=True)
     robot.begin(RequestLift("Lift1", "L3", inside=False), 1.0)
     robot.phase = None
     assert robot.hear(OTHER_LIFT, 2.0) == [adapter_lift(replace(END, destination_floor="L3"))]
     assert robot.destination is None
-    inside = Robot(A, jazzy=True)
+    inside = RobotContext(A, jazzy=True)
     inside.begin(RequestLift("Lift1", "L3", inside=True), 1.0)
     inside.phase, inside.on_task = None, False
     assert inside.hear(OTHER_LIFT, 2.0) == [adapter_lift(AGV, 2.0)]
@@ -72,7 +72,7 @@ def test_jazzys_supervisor_passes_an_adopted_request_on_with_the_adapters_stamp(
 
 
 def test_a_lift_that_has_come_is_taken_as_if_from_inside() -> None:
-    robot = Robot(A)
+    robot = RobotContext(A)
     robot.begin(RequestLift("Lift1", "L3", inside=False), 1.0)
     robot.hear(ARRIVED, 2.0)
     again = RequestLift("Lift1", "L3", inside=False)
@@ -82,7 +82,7 @@ def test_a_lift_that_has_come_is_taken_as_if_from_inside() -> None:
 
 def test_a_lift_has_come_for_one_destination_and_until_it_is_released() -> None:
     def waits(lift_name: str, floor: str, *, released: bool = False, came: bool = True) -> bool:
-        robot = Robot(A)
+        robot = RobotContext(A)
         robot.begin(RequestLift("Lift1", "L3", inside=False), 1.0)
         if came:
             robot.hear(ARRIVED, 2.0)
@@ -99,7 +99,7 @@ def test_a_lift_has_come_for_one_destination_and_until_it_is_released() -> None:
 
 
 def test_a_new_destination_has_not_come_and_the_same_one_still_has() -> None:
-    robot = Robot(A)
+    robot = RobotContext(A)
     robot.begin(RequestLift("Lift1", "L3", inside=False), 1.0)
     robot.hear(ARRIVED, 2.0)
     for floor, arrived in (("L3", True), ("L2", False)):
@@ -108,7 +108,7 @@ def test_a_new_destination_has_not_come_and_the_same_one_still_has() -> None:
 
 
 def test_an_end_of_session_waits_for_the_state_of_its_own_lift() -> None:
-    robot = Robot(A)
+    robot = RobotContext(A)
     robot.begin(EndLiftSession("Lift1"), 1.0)
     done = []
     for state in (OTHER_LIFT, BOUND, IDLE):
@@ -121,7 +121,7 @@ def test_an_end_of_session_waits_for_the_state_of_its_own_lift() -> None:
 
 
 def test_a_robot_that_lets_one_door_go_still_holds_the_other() -> None:
-    robot = Robot(A)
+    robot = RobotContext(A)
     for held, left in (("ward", None), ("lab", "lab")):
         robot.begin(DoorOpen(held), 1.0)
         robot.begin(DoorClose("ward"), 2.0)
@@ -129,13 +129,13 @@ def test_a_robot_that_lets_one_door_go_still_holds_the_other() -> None:
 
 
 def test_a_robot_that_never_had_a_task_closes_what_it_is_listed_for() -> None:
-    robot = Robot(A)
+    robot = RobotContext(A)
     robot.on_task = False
     assert robot.hear(listing(A), 3.0) == [adapter_door(A, CLOSED, 3.0)]
 
 
 def test_a_door_is_asked_to_close_every_second_until_we_are_not_listed_for_it() -> None:
-    robot = Robot(A)
+    robot = RobotContext(A)
     assert robot.begin(DoorClose("ward"), 1.0) == [adapter_door(A, CLOSED, 1.0)]
     assert robot.wake_at() == 2.0
     assert robot.tick(2.0) == [adapter_door(A, CLOSED, 2.0)]

@@ -10,7 +10,7 @@ from bridges.messages import topics
 from bridges.messages.stamps import stamp
 from workbench.rmf_model import NEVER, Party, Said, door_request
 from workbench.rmf_model.phases import DoorClose, DoorOpen, EndLiftSession, RequestLift
-from workbench.rmf_model.robot import Robot
+from workbench.rmf_model.robot import RobotContext
 from workbench.rmf_model.supervisors import DoorSupervisor, LiftSupervisor
 
 A, B = "fleet/a", "fleet/b"
@@ -176,7 +176,7 @@ def test_a_request_for_moving_is_ignored() -> None:
 
 
 def test_a_lift_is_requested_at_once_and_again_at_each_of_its_states() -> None:
-    robot = Robot(A)
+    robot = RobotContext(A)
     assert robot.begin(RequestLift("Lift1", "L3", inside=False), 1.0) == [adapter_lift(AGV, 1.0)]
     assert heard(robot, IDLE, now=2.0) == [adapter_lift(AGV, 2.0)]
     assert heard(robot, replace(IDLE, lift_name="Lift2")) == []
@@ -195,7 +195,7 @@ def test_a_lift_is_requested_at_once_and_again_at_each_of_its_states() -> None:
 def test_a_lift_has_come_when_floor_door_and_session_are_right_whatever_the_mode(
     nearly: d.LiftState,
 ) -> None:
-    robot = Robot(A)
+    robot = RobotContext(A)
     robot.begin(RequestLift("Lift1", "L3", inside=True), 0.0)
     heard(robot, nearly)
     assert not robot.done
@@ -204,7 +204,7 @@ def test_a_lift_has_come_when_floor_door_and_session_are_right_whatever_the_mode
 
 
 def test_once_it_has_come_the_robot_asks_for_the_same_floor_again_as_if_from_inside() -> None:
-    robot = Robot(A)
+    robot = RobotContext(A)
     robot.begin(RequestLift("Lift1", "L3", inside=False), 0.0)
     assert heard(robot, ARRIVED) == [adapter_lift(AGV), adapter_lift(AGV)]
     assert robot.destination is not None
@@ -212,7 +212,7 @@ def test_once_it_has_come_the_robot_asks_for_the_same_floor_again_as_if_from_ins
 
 
 def test_a_lift_that_has_already_come_is_not_waited_for_again() -> None:
-    robot = Robot(A)
+    robot = RobotContext(A)
     robot.begin(RequestLift("Lift1", "L3", inside=False), 0.0)
     heard(robot, ARRIVED)
     robot.begin(RequestLift("Lift1", "L3", inside=False), 1.0)
@@ -220,7 +220,7 @@ def test_a_lift_that_has_already_come_is_not_waited_for_again() -> None:
 
 
 def test_end_is_sent_while_states_show_our_session_and_not_before_or_after() -> None:
-    robot = Robot(A)
+    robot = RobotContext(A)
     robot.begin(RequestLift("Lift1", "L3", inside=True), 0.0)
     assert robot.begin(EndLiftSession("Lift1"), 1.0) == []
     assert heard(robot, ARRIVED, ARRIVED, now=2.0) == [adapter_lift(END, 2.0)] * 2
@@ -230,12 +230,12 @@ def test_end_is_sent_while_states_show_our_session_and_not_before_or_after() -> 
 
 
 def test_a_restarted_fleet_adapter_ends_a_session_that_it_knows_nothing_of() -> None:
-    assert heard(Robot(A), ARRIVED) == [adapter_lift(END)]
-    assert heard(Robot(B), ARRIVED) == []
+    assert heard(RobotContext(A), ARRIVED) == [adapter_lift(END)]
+    assert heard(RobotContext(B), ARRIVED) == []
 
 
 def test_a_cancelled_request_from_outside_is_released_after_30_s() -> None:
-    robot = Robot(A)
+    robot = RobotContext(A)
     robot.begin(RequestLift("Lift1", "L3", inside=False), 0.0)
     heard(robot, IDLE, now=100.0)
     robot.phase = None
@@ -249,7 +249,7 @@ def test_a_cancelled_request_from_outside_is_released_after_30_s() -> None:
 def test_a_lift_asked_for_from_inside_is_kept_while_on_a_task_or_in_the_car(
     on_task: bool, in_car: bool
 ) -> None:
-    robot = Robot(A)
+    robot = RobotContext(A)
     robot.begin(RequestLift("Lift1", "L3", inside=True), 0.0)
     heard(robot, ARRIVED)
     robot.on_task, robot.in_car = on_task, in_car
@@ -266,7 +266,7 @@ def test_a_lift_asked_for_from_inside_is_kept_while_on_a_task_or_in_the_car(
 
 
 def test_a_door_is_asked_to_open_every_second_until_open_and_listed() -> None:
-    robot = Robot(A)
+    robot = RobotContext(A)
     assert robot.begin(DoorOpen("ward"), 0.0) == [adapter_door(A, OPENED)]
     assert robot.wake_at() == 1.0
     assert robot.tick(1.0) == [adapter_door(A, OPENED, 1.0)]
@@ -278,7 +278,7 @@ def test_a_door_is_asked_to_open_every_second_until_open_and_listed() -> None:
 
 
 def test_the_latest_state_of_another_door_keeps_a_door_open_phase_waiting() -> None:
-    robot = Robot(A)
+    robot = RobotContext(A)
     robot.begin(DoorOpen("ward"), 0.0)
     heard(robot, door_state(OPENED), door_state(OPENED, "other"), listing(A))
     assert not robot.done
@@ -287,7 +287,7 @@ def test_the_latest_state_of_another_door_keeps_a_door_open_phase_waiting() -> N
 
 
 def test_a_door_close_waits_for_the_heartbeat_and_not_for_the_door() -> None:
-    robot = Robot(A)
+    robot = RobotContext(A)
     assert robot.begin(DoorClose("ward"), 0.0) == [adapter_door(A, CLOSED)]
     assert robot.tick(1.0) == [adapter_door(A, CLOSED, 1.0)]
     heard(robot, door_state(CLOSED), door_state(OPENED))
@@ -297,7 +297,7 @@ def test_a_door_close_waits_for_the_heartbeat_and_not_for_the_door() -> None:
 
 
 def test_a_session_for_a_door_that_we_do_not_hold_is_closed() -> None:
-    robot = Robot(A)
+    robot = RobotContext(A)
     assert heard(robot, listing(A, B), now=3.0) == [adapter_door(A, CLOSED, 3.0)]
     robot.begin(DoorOpen("ward"), 0.0)
     assert heard(robot, listing(A)) == []
@@ -310,7 +310,7 @@ def test_a_session_for_a_door_that_we_do_not_hold_is_closed() -> None:
 
 
 def test_a_waiting_robot_costs_two_requests_for_each_state_and_one_after_arrival() -> None:
-    robot = Robot(A)
+    robot = RobotContext(A)
     parties: list[Party] = [LiftSupervisor(), robot]
     circulate(parties, robot.begin(RequestLift("Lift1", "L3", inside=True), 0.0), 0.0)
 
@@ -323,7 +323,7 @@ def test_a_waiting_robot_costs_two_requests_for_each_state_and_one_after_arrival
 
 def test_a_node_that_refuses_the_floorless_end_locks_two_robots_out_for_ever() -> None:
     """So RMF behaves: the supervisor forgets A at its END, adopts B, and drops A's repeats."""
-    supervisor, a, b = LiftSupervisor(), Robot(A), Robot(B)
+    supervisor, a, b = LiftSupervisor(), RobotContext(A), RobotContext(B)
     parties: list[Party] = [supervisor, a, b]
     circulate(parties, a.begin(RequestLift("Lift1", "L3", inside=True), 0.0), 0.0)
     circulate(parties, b.begin(RequestLift("Lift1", "L1", inside=False), 0.0), 0.0)
@@ -341,7 +341,7 @@ def test_a_node_that_refuses_the_floorless_end_locks_two_robots_out_for_ever() -
 
 
 def test_a_robot_opens_a_door_and_lets_it_go_through_the_supervisor() -> None:
-    supervisor, robot = DoorSupervisor(), Robot(A)
+    supervisor, robot = DoorSupervisor(), RobotContext(A)
     parties: list[Party] = [supervisor, robot]
     said = circulate(parties, robot.begin(DoorOpen("ward"), 0.0), 0.0)
     assert door(OPENED) in said

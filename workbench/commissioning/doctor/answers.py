@@ -109,13 +109,13 @@ def _nothing(config: Config, bus_name: str, bus: Bus, whole: bool) -> Iterator[F
 
 def _modbus(config: Config, bus_name: str, bus: Any, whole: bool) -> Iterator[Finding]:
     from drivers.hal.modbus.points import Range
-    from drivers.hal.modbus.wire import Refused
+    from drivers.hal.modbus.wire import UnitException
 
     def answering(unit: int) -> bool:
         bus.insist()
         try:
             bus.read(Range(unit, "holding register", 0, 1))
-        except Refused as refusal:
+        except UnitException as refusal:
             return refusal.code not in NO_PATH
         except HalError:
             return False

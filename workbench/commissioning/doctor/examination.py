@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from bridges.host import directories as kept
-from bridges.host.directories import Places
+from bridges.host.directories import Directories
 from bridges.runtime import runtime_directory
 from bridges.settings.load import Config
 from drivers.hal.gpio.header import canonical
@@ -16,7 +16,7 @@ from workbench.commissioning.doctor.answers import answers, numbers
 from workbench.commissioning.doctor.chips import line
 from workbench.commissioning.doctor.finding import Finding, note, ok, wrong
 from workbench.commissioning.doctor.machine import Machine
-from workbench.commissioning.doctor.served import DAEMON, NOT_ASKED, Served, served, unseen
+from workbench.commissioning.doctor.served import DAEMON, NOT_ASKED, ServingDaemon, served, unseen
 from workbench.commissioning.doctor.users import User, user, users
 from workbench.graph.join import CommandLine
 
@@ -65,12 +65,12 @@ def examined(
         yield from _way(config, name, machine, who, now)
     yield from _answering(config, places, now, options)
     if options.listen_s:
-        from workbench.commissioning.doctor.network import Look, graph
+        from workbench.commissioning.doctor.network import GraphLook, graph
 
         loopback = options.localhost or now.simulated
         simulated = ["--localhost"] if loopback and not options.localhost else []
         watch = options.line.other("watch", *simulated)
-        look = Look(loopback, options.listen_s, now.serving, watch, options.ros_args)
+        look = GraphLook(loopback, options.listen_s, now.serving, watch, options.ros_args)
         yield from graph(config, look)
     if options.kill_test:
         yield from _killed(config, machine, places, now, options)
@@ -92,7 +92,9 @@ def _file(config: Config, building: "BuildingMap | None") -> Iterator[Finding]:
         yield ok("file", f"same names as in {building.file}")
 
 
-def _way(config: Config, name: str, machine: Machine, who: User, now: Served) -> Iterator[Finding]:
+def _way(
+    config: Config, name: str, machine: Machine, who: User, now: ServingDaemon
+) -> Iterator[Finding]:
     """What this machine needs to reach the bus."""
     settings = config.buses[name]
     if config.bus_types[name] == "gpio":
@@ -105,7 +107,9 @@ def _way(config: Config, name: str, machine: Machine, who: User, now: Served) ->
         yield from can.interface(machine, interface, XNERGY_BITRATE if nodes else None)
 
 
-def _gpio(config: Config, name: str, machine: Machine, who: User, now: Served) -> Iterator[Finding]:
+def _gpio(
+    config: Config, name: str, machine: Machine, who: User, now: ServingDaemon
+) -> Iterator[Finding]:
     chip_number = config.buses[name].chip
     yield from gpio.gpio(machine, chip_number, who)
     chip = gpio.header(machine, chip_number)
@@ -117,7 +121,9 @@ def _gpio(config: Config, name: str, machine: Machine, who: User, now: Served) -
     yield from gpio.death(machine)
 
 
-def _answering(config: Config, places: Places, now: Served, options: Options) -> Iterator[Finding]:
+def _answering(
+    config: Config, places: Directories, now: ServingDaemon, options: Options
+) -> Iterator[Finding]:
     """Who answers, while nobody else can open the buses."""
     names = [name for name, kind in config.bus_types.items() if kind != "gpio"]
     if now.busy or not names:
@@ -135,7 +141,7 @@ def _answering(config: Config, places: Places, now: Served, options: Options) ->
 
 
 def _killed(
-    config: Config, machine: Machine, places: Places, now: Served, options: Options
+    config: Config, machine: Machine, places: Directories, now: ServingDaemon, options: Options
 ) -> Iterator[Finding]:
     from workbench.commissioning.doctor.kill_test import KILL_TEST, kill_test
     from workbench.commissioning.doctor.victim import step_called

@@ -18,7 +18,7 @@ from workbench.commissioning.doctor.machine import Machine
 ALL: Final = frozenset({"gpio", "modbus", "http", "can"})
 
 
-class Step(msgspec.Struct, frozen=True):
+class FormStep(msgspec.Struct, frozen=True):
     """One step of docs/how-to/hardware.md. `buses`: those that it is for. `seen`: what must be seen."""
 
     number: str
@@ -27,39 +27,43 @@ class Step(msgspec.Struct, frozen=True):
 
 
 STEPS: Final = (
-    Step("H1", frozenset({"gpio"}), "no relay moves from power-on until the daemon has claimed it"),
-    Step("H2", ALL, "off after `kill -9` with the output on; s until off; V on the pin afterwards"),
-    Step("H3", ALL, "off after SIGSTOP with the output on; s until off"),
-    Step(
+    FormStep(
+        "H1", frozenset({"gpio"}), "no relay moves from power-on until the daemon has claimed it"
+    ),
+    FormStep(
+        "H2", ALL, "off after `kill -9` with the output on; s until off; V on the pin afterwards"
+    ),
+    FormStep("H3", ALL, "off after SIGSTOP with the output on; s until off"),
+    FormStep(
         "H4", ALL, "the Pi's power is cut with the output on: off at once, or s after power is back"
     ),
-    Step(
+    FormStep(
         "H5",
         frozenset({"gpio"}),
         "the supply falls to 4.0 V in steps: no relay comes on; V of reset",
     ),
-    Step("H6", ALL, "the card is pulled with the output on, then `kill -9`: off; s until off"),
-    Step(
+    FormStep("H6", ALL, "the card is pulled with the output on, then `kill -9`: off; s until off"),
+    FormStep(
         "H7",
         frozenset({"modbus"}),
         "ms from request's end to A-B free and to the reply; none lost",
     ),
-    Step(
+    FormStep(
         "H8",
         frozenset({"modbus", "can"}),
         "the USB adapter is pulled, put back: fault, then served",
     ),
-    Step(
+    FormStep(
         "H9",
         frozenset({"modbus"}),
         "the line is cut with the output on: s until the module lets go",
     ),
-    Step(
+    FormStep(
         "H10",
         frozenset({"can"}),
         "CAN_H and CAN_L shorted for 1 s: fault, then served; no charge",
     ),
-    Step("H11", ALL, "24 h of service: faults in the log, hottest °C, bits of get_throttled"),
+    FormStep("H11", ALL, "24 h of service: faults in the log, hottest °C, bits of get_throttled"),
 )
 
 

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Final
 
-from bridges.host.directories import Places
+from bridges.host.directories import Directories
 from workbench.commissioning.doctor.finding import Finding, note, ok, warning, wrong
 from workbench.commissioning.doctor.machine import Machine
 from workbench.commissioning.doctor.users import User
@@ -59,7 +59,7 @@ def watchdog(machine: Machine) -> Iterator[Finding]:
         yield ok(subject, f"the hardware restarts this machine if systemd is silent for {fed}")
 
 
-def directories(machine: Machine, places: Places, who: User) -> Iterator[Finding]:
+def directories(machine: Machine, places: Directories, who: User) -> Iterator[Finding]:
     """The subject `disk`: can the daemon keep its files?"""
     for folder in places.folders:
         found = existing(machine.at(folder))

@@ -16,10 +16,10 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Final
 
-from bridges.host.directories import Places
+from bridges.host.directories import Directories
 from bridges.runtime.record import Records
 from workbench.commissioning.doctor.finding import Finding, ok, warning, wrong
-from workbench.commissioning.walk.core import Step
+from workbench.commissioning.walk.core import WalkStep
 
 KILL_TEST: Final = "kill test"
 STARTS_S: Final = 15.0
@@ -35,7 +35,12 @@ StillDriven = Callable[[], bool | None]
 
 
 def kill_test(
-    file: Path, device: str, step: Step, places: Places, runtime_dir: str | None, kept: StillDriven
+    file: Path,
+    device: str,
+    step: WalkStep,
+    places: Directories,
+    runtime_dir: str | None,
+    kept: StillDriven,
 ) -> Iterator[Finding]:
     """The subject `kill test`. Nobody else may serve the file."""
     name = f"{device} {step.name}"
@@ -113,7 +118,7 @@ def _ended(victim: "subprocess.Popen[bytes]") -> None:
     victim.wait()
 
 
-def _off_after(places: Places, file: Path, died_at: float) -> float | None:
+def _off_after(places: Directories, file: Path, died_at: float) -> float | None:
     """How long (s) until the record was gone, which `outputs-off` removes when all is verified off."""
     pause = threading.Event()
     while (after_s := time.monotonic() - died_at) < OFF_WITHIN_S:

@@ -40,7 +40,7 @@ LIBRARIES: Final = {"dds": "cyclonedds", "zenoh": "eclipse-zenoh"}
 
 
 @dataclass(frozen=True, slots=True)
-class Look:
+class GraphLook:
     """How to look. `listen_s`: how long. `serving`: our own daemon is on the graph too; None if
     unknown. `watch`: the command that shows this graph.
     """
@@ -59,7 +59,7 @@ class Look:
         )
 
 
-def graph(config: Config, look: Look) -> Iterator[Finding]:
+def graph(config: Config, look: GraphLook) -> Iterator[Finding]:
     """The subjects `network`, `RMF` and `messages`."""
     try:
         domain = domain_id(config.rmf, os.environ)
@@ -95,7 +95,7 @@ def _interface(domain: int, loopback: bool) -> Finding:
     return ok(NETWORK, text)
 
 
-def _heard(config: Config, transport: Transport, look: Look) -> Iterator[Finding]:
+def _heard(config: Config, transport: Transport, look: GraphLook) -> Iterator[Finding]:
     kind = kind_called(config.kind)
     ends = {
         topic.name: transport.subscribe(named_by(config, topic), _ignore) for topic in kind.requests
@@ -121,7 +121,7 @@ def _listened(ear: Ear, listen_s: float) -> list[Any]:
     return messages
 
 
-def _senders(topic: str, end: Subscription, look: Look) -> Finding:
+def _senders(topic: str, end: Subscription, look: GraphLook) -> Finding:
     nodes, who = end.matched(), SENDERS.get(topic)
     if nodes:
         return ok(GRAPH, f"{topic}: from {nodes} node{'s' if nodes > 1 else ''}")
@@ -140,7 +140,7 @@ def _rivals(ends: Sequence[Subscription], serving: bool | None) -> Iterator[Find
         yield warning(GRAPH, f"{rivals} other node(s) do the same", means, do)
 
 
-def _ours(devices: Sequence[str], heard: set[str], look: Look) -> Iterator[Finding]:
+def _ours(devices: Sequence[str], heard: set[str], look: GraphLook) -> Iterator[Finding]:
     serving = look.serving
     for name in devices:
         if name in heard and serving is False:

@@ -8,9 +8,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final
 
-from bridges.host.directories import Places
+from bridges.host.directories import Directories
 from bridges.runtime import holder
-from bridges.runtime.daemons import Daemon, daemons
+from bridges.runtime.daemons import DaemonStatus, daemons
 from bridges.runtime.faults import remedies
 from bridges.runtime.record import Records
 from bridges.runtime.subject import Status
@@ -21,7 +21,7 @@ NOT_ASKED: Final = "its buses are not asked, because a controller has one master
 
 
 @dataclass(frozen=True, slots=True)
-class Served:
+class ServingDaemon:
     """What is known of the daemon. `busy`: why its buses must not be opened; "" if they may be.
 
     `serving`: a daemon serves this file; None where that cannot be seen. `simulated`: on fake hardware,
@@ -34,7 +34,7 @@ class Served:
     simulated: bool = False
 
 
-def served(places: Places, file: Path, wall: float) -> Served:
+def served(places: Directories, file: Path, wall: float) -> ServingDaemon:
     """The subject `daemon`. `wall`: now, for the age of its status (s since the epoch)."""
     try:
         held_by = holder.look(places)
@@ -44,26 +44,26 @@ def served(places: Places, file: Path, wall: float) -> Served:
         return _nobody(places, file)
     if not held_by.serves:
         found = f"{held_by} uses it: walk, outputs-off or another doctor"
-        return Served([warning(DAEMON, found, NOT_ASKED, "wait until it has ended")], found)
+        return ServingDaemon([warning(DAEMON, found, NOT_ASKED, "wait until it has ended")], found)
     one = next(daemons([places.runtime], {}, wall))
     busy, simulated = f"process {held_by.pid} serves it", bool(one.status.get("simulated"))
-    return Served(list(_told(one)), busy, True, simulated)
+    return ServingDaemon(list(_told(one)), busy, True, simulated)
 
 
-def unseen(why: str) -> Served:
+def unseen(why: str) -> ServingDaemon:
     """This user cannot see whether a daemon runs."""
-    return Served([wrong(DAEMON, why, NOT_ASKED, "sudo before the command")], why, None)
+    return ServingDaemon([wrong(DAEMON, why, NOT_ASKED, "sudo before the command")], why, None)
 
 
-def _nobody(places: Places, file: Path) -> Served:
+def _nobody(places: Directories, file: Path) -> ServingDaemon:
     if Records(places, file).unreleased():
         found = "it has died, and may have left outputs on"
         do = f"rmf-bridge outputs-off {file}"
-        return Served([wrong(DAEMON, found, "a relay may hold a door or a call", do)], found)
-    return Served([ok(DAEMON, "none serves this file, so its buses are asked here")])
+        return ServingDaemon([wrong(DAEMON, found, "a relay may hold a door or a call", do)], found)
+    return ServingDaemon([ok(DAEMON, "none serves this file, so its buses are asked here")])
 
 
-def _told(one: Daemon) -> Iterator[Finding]:
+def _told(one: DaemonStatus) -> Iterator[Finding]:
     if one.state != "serving":
         do = "rmf-bridge log FILE; then restart it"
         age = "never" if one.age_s is None else f"{one.age_s:.0f} s ago"

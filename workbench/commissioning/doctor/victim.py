@@ -15,7 +15,7 @@ from bridges.settings.load import Config, SettingsError, load
 from drivers import Driver, DriverError
 from drivers.hal import Bus
 from workbench.commissioning.manual_control import guarded, not_off
-from workbench.commissioning.walk.core import Step
+from workbench.commissioning.walk.core import WalkStep
 from workbench.commissioning.walk.steps import steps
 
 ON_S: Final = 5.0
@@ -56,12 +56,12 @@ def _held(
     return 0 if off else 1
 
 
-def step_called(config: Config, device: str, name: str | None) -> Step | None:
+def step_called(config: Config, device: str, name: str | None) -> WalkStep | None:
     """The output of this name; the first one by default, None if there is no such."""
     return next((step for step in steps(config, device) if name in (None, step.name)), None)
 
 
-def _on_for_a_while(driver: Driver[Any, Any], bus: Bus, step: Step | None) -> bool:
+def _on_for_a_while(driver: Driver[Any, Any], bus: Bus, step: WalkStep | None) -> bool:
     """Switch it on, and off again if nobody has killed us. True when it was verified off."""
     assert step is not None  # or the kill test would not have started
     try:

@@ -12,8 +12,8 @@ import msgspec
 from drivers.charger import dry_contact as charger
 from drivers.door import dry_contact as door
 from drivers.lift import wiring
-from workbench.commissioning.init.answers import LIFT_INPUTS, Answers, Impossible
-from workbench.commissioning.init.points import Points, points_for
+from workbench.commissioning.init.answers import LIFT_INPUTS, DraftAnswers, Impossible
+from workbench.commissioning.init.points import FreePoints, points_for
 from workbench.commissioning.reference import meaning
 
 DRIVERS: Final = {"http": "http", "can": "canopen"}
@@ -68,7 +68,7 @@ CHARGER_CANOPEN: Final = """\
     on_death: stop                   # what the daemon's end means for a charge: stop, or keep"""
 
 
-def draft(answers: Answers) -> str:
+def draft(answers: DraftAnswers) -> str:
     """The whole file. Raises Impossible if these answers do not go together."""
     if answers.wiring not in WIRINGS[answers.kind]:
         raise Impossible(
@@ -95,7 +95,7 @@ def draft(answers: Answers) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _lift(answers: Answers, points: Points) -> Iterator[str]:
+def _lift(answers: DraftAnswers, points: FreePoints) -> Iterator[str]:
     """The lines below the name of a lift on contacts."""
     floors = [quoted(floor) for floor in answers.floors]
     if len(floors) < 2 or len(set(floors)) < len(floors):
@@ -109,17 +109,18 @@ def _lift(answers: Answers, points: Points) -> Iterator[str]:
     yield "      # Alarm loops are closed while all is well: an open contact or a cut wire is an alarm."
     for signal in LIFT_INPUTS:
         if signal in answers.signals:
-            yield f"      {_input(signal, answers, points)}   {_said(wiring.Inputs, signal)}"
+            yield f"      {_input(signal, answers, points)}   {_said(wiring.LiftInputWiring, signal)}"
     yield from _floor_code(answers, floors, points)
     yield "    outputs:"
     if "agv_mode" in answers.signals:
-        yield f"      agv_mode_request: {{{request}}}   {_said(wiring.Outputs, 'agv_mode_request')}"
-    yield f"      door_open: {{{hold}}}   {_said(wiring.Outputs, 'door_open')}"
+        said = _said(wiring.LiftOutputWiring, "agv_mode_request")
+        yield f"      agv_mode_request: {{{request}}}   {said}"
+    yield f"      door_open: {{{hold}}}   {_said(wiring.LiftOutputWiring, 'door_open')}"
     yield "    calls:                     # a car call for each floor"
     yield from calls
 
 
-def _input(signal: str, answers: Answers, points: Points) -> str:
+def _input(signal: str, answers: DraftAnswers, points: FreePoints) -> str:
     if signal in HAZARDS:
         return f"{signal}: {{{points.loop()}}}"
     if signal in DOOR_ENDS and not set(DOOR_ENDS) <= set(answers.signals):
@@ -127,7 +128,7 @@ def _input(signal: str, answers: Answers, points: Points) -> str:
     return f"{signal}: {{{points.contact()}}}"
 
 
-def _floor_code(answers: Answers, floors: list[str], points: Points) -> Iterator[str]:
+def _floor_code(answers: DraftAnswers, floors: list[str], points: FreePoints) -> Iterator[str]:
     yield "    floor_code:                # lines that say where the car is"
     yield f"      encoding: {answers.encoding}"
     if answers.encoding == "one_hot":
@@ -144,29 +145,29 @@ def _floor_code(answers: Answers, floors: list[str], points: Points) -> Iterator
     yield f"      codes: {{{codes}}}"
 
 
-def _door(answers: Answers, points: Points) -> Iterator[str]:
+def _door(answers: DraftAnswers, points: FreePoints) -> Iterator[str]:
     """The lines below the name of a door on contacts, or on a relay that answers HTTP."""
     if answers.wiring == "http":
         yield from SHELLY.splitlines()
         return
     yield "    inputs:"
     for end in ("opened", "closed"):
-        yield f"      {end}: {{{points.contact()}}}   {_said(door.Inputs, end)}"
+        yield f"      {end}: {{{points.contact()}}}   {_said(door.DoorInputWiring, end)}"
     yield "    outputs:"
-    yield f"      hold_open: {{{points.relay()}}}   {_said(door.Outputs, 'hold_open')}"
+    yield f"      hold_open: {{{points.relay()}}}   {_said(door.DoorOutputWiring, 'hold_open')}"
 
 
-def _charger(answers: Answers, points: Points) -> Iterator[str]:
+def _charger(answers: DraftAnswers, points: FreePoints) -> Iterator[str]:
     """The lines below the name of a charger on HTTP, on CANopen, or on contacts."""
     if answers.wiring in ("http", "can"):
         yield from (CHARGER_HTTP if answers.wiring == "http" else CHARGER_CANOPEN).splitlines()
         return
     yield "    inputs:"
     for signal in ("charging", "ready"):
-        yield f"      {signal}: {{{points.contact()}}}   {_said(charger.Inputs, signal)}"
+        yield f"      {signal}: {{{points.contact()}}}   {_said(charger.ChargerInputWiring, signal)}"
     yield f"      fault: {{{points.loop()}}}   # opens at a fault, as a cut wire does"
     yield "    outputs:"
-    yield f"      enable: {{{points.relay()}}}   {_said(charger.Outputs, 'enable')}"
+    yield f"      enable: {{{points.relay()}}}   {_said(charger.ChargerOutputWiring, 'enable')}"
 
 
 def _said(struct: type, key: str) -> str:

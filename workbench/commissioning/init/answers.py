@@ -21,7 +21,7 @@ class Impossible(Exception):
     """These answers do not go together. The text says why and what to do."""
 
 
-class Answers(msgspec.Struct, frozen=True, kw_only=True):
+class DraftAnswers(msgspec.Struct, frozen=True, kw_only=True):
     """What stands in front of the integrator.
 
     `address`: host, serial port or CAN interface; "" for the usual one. `floors`: RMF's names, from

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from itertools import count
 from typing import Final, Protocol
 
-from workbench.commissioning.init.answers import Answers, Impossible, Level
+from workbench.commissioning.init.answers import DraftAnswers, Impossible, Level
 
 REST_LOW: Final = (11, 13, 15, 16, 18, 22, 32, 33, 35, 36, 37, 38, 40, 12)
 REST_HIGH: Final = (7, 29, 31, 26, 24)
@@ -12,7 +12,7 @@ REST_HIGH: Final = (7, 29, 31, 26, 24)
 relay belongs where that keeps it off. Source: BCM2835 ARM Peripherals, table 6-31 (BCM0 to 8 high)."""
 
 
-class Points(Protocol):
+class FreePoints(Protocol):
     """Where the next signals are wired; each answer is the inside of a YAML mapping."""
 
     def contact(self) -> str:
@@ -25,7 +25,7 @@ class Points(Protocol):
         """A relay that works when it is on."""
 
 
-class Header:
+class PinHeader:
     """The Pi's 40-pin header. Its methods raise Impossible when its pins are used up."""
 
     def __init__(self, contacts: Level, relays: Level) -> None:
@@ -82,8 +82,8 @@ class Module:
         return f'point: "unit {self._unit} coil {next(self._coils)}", active: high'
 
 
-def points_for(answers: Answers) -> Points:
+def points_for(answers: DraftAnswers) -> FreePoints:
     """A fresh set of points for this wiring."""
     if answers.wiring == "gpio":
-        return Header(answers.contacts, answers.relays)
+        return PinHeader(answers.contacts, answers.relays)
     return Module(answers.unit)

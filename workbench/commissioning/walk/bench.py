@@ -12,14 +12,21 @@ from drivers import Driver, DriverError
 from drivers.hal.points import Wire
 from workbench.commissioning.manual_control import not_off
 from workbench.commissioning.walk import core
-from workbench.commissioning.walk.core import Event, Lost, Memory, Read, Step, Tick
+from workbench.commissioning.walk.core import (
+    Event,
+    InputsLost,
+    InputsRead,
+    Tick,
+    WalkMemory,
+    WalkStep,
+)
 from workbench.commissioning.walk.tap import Tap
 
 SCAN_S: Final = 0.05
 
 
 @dataclass(slots=True)
-class Input:
+class ContactReading:
     """One contact as it was read. `seen`: the meanings that it has shown so far."""
 
     wire: Wire
@@ -44,13 +51,13 @@ class Bench:
         self,
         driver: Driver[Any, Any],
         bus: Tap,
-        inputs: Sequence[Input],
-        steps: Sequence[Step],
+        inputs: Sequence[ContactReading],
+        steps: Sequence[WalkStep],
         off: object,
     ) -> None:
         self.inputs = inputs
         self.steps = steps
-        self.memory = Memory()
+        self.memory = WalkMemory()
         self.verified_off = False
         self._driver = driver
         self._bus = bus
@@ -95,7 +102,7 @@ class Bench:
                 outputs = core.output_of(self.memory, self.steps)
                 self._driver.write(self._off if outputs is None else outputs)
         except DriverError as error:
-            self._decide(Lost(str(error)))
+            self._decide(InputsLost(str(error)))
         self._bus.scanned()
 
     def _decide(self, event: Event) -> None:
@@ -108,19 +115,19 @@ class Bench:
                 self._opened = True
             sample = self._driver.read()
         except DriverError as error:
-            return Lost(str(error))
+            return InputsLost(str(error))
         now = time.monotonic()
         for one in self.inputs:
             level = self._bus.levels.get(one.point)
             if level is not None and level != one.level:
                 one.level, one.changed_at = level, now
                 one.seen |= {one.wire.asserted(level)}
-        return Read(sample)
+        return InputsRead(sample)
 
     def _make_safe(self) -> bool:
         """Without outputs to try, nothing was commanded, and a charge under way goes on."""
         if not self.steps:
             return True
         if why := not_off(self._driver, self._bus.insist):
-            self._decide(Lost(why))
+            self._decide(InputsLost(why))
         return not why

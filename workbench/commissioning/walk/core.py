@@ -16,7 +16,7 @@ STALE_S: Final = 1.0
 
 
 @dataclass(frozen=True, slots=True)
-class Step:
+class WalkStep:
     """One output to try. `outputs`: the driver's, with this one on. `expects`: what should be seen.
 
     `seen(sample)`: whether it is; None where no input shows it. `hindrance(sample)`: why the output
@@ -32,7 +32,7 @@ class Step:
 
 
 @dataclass(frozen=True, slots=True)
-class Memory:
+class WalkMemory:
     """What a walk knows. `on`: the step whose output is on. `off_at`: when it goes off (s).
 
     `waits`: the step whose feedback may still come, until `waits_until`. `results`: step -> what was
@@ -51,14 +51,14 @@ class Memory:
 
 
 @dataclass(frozen=True, slots=True)
-class Read:
+class InputsRead:
     """The inputs were read."""
 
     sample: Any
 
 
 @dataclass(frozen=True, slots=True)
-class Lost:
+class InputsLost:
     """Reading or writing failed."""
 
     why: str
@@ -83,15 +83,15 @@ class Tick:
     """Time has passed."""
 
 
-Event = Read | Lost | Switch | ByEye | Tick
+Event = InputsRead | InputsLost | Switch | ByEye | Tick
 
 
-def decide(memory: Memory, event: Event, now: float, steps: Sequence[Step]) -> Memory:
+def decide(memory: WalkMemory, event: Event, now: float, steps: Sequence[WalkStep]) -> WalkMemory:
     """The memory after this event."""
     match event:
-        case Read(sample):
+        case InputsRead(sample):
             memory = replace(memory, sample=sample, read_at=now, why_lost="")
-        case Lost(why):
+        case InputsLost(why):
             memory = replace(memory, why_lost=why)
         case Switch(step):
             memory = _switch(memory, step, now, steps)
@@ -101,12 +101,12 @@ def decide(memory: Memory, event: Event, now: float, steps: Sequence[Step]) -> M
     return _feedback(_limited(memory, now, steps), now, steps)
 
 
-def output_of(memory: Memory, steps: Sequence[Step]) -> Any:
+def output_of(memory: WalkMemory, steps: Sequence[WalkStep]) -> Any:
     """The outputs to write; None for all off."""
     return None if memory.on is None else steps[memory.on].outputs
 
 
-def _switch(memory: Memory, step: int, now: float, steps: Sequence[Step]) -> Memory:
+def _switch(memory: WalkMemory, step: int, now: float, steps: Sequence[WalkStep]) -> WalkMemory:
     if memory.on is not None:
         return _off(memory, "switched off")
     if why := _hindrance(memory, now, steps[step]):
@@ -129,7 +129,7 @@ def _switch(memory: Memory, step: int, now: float, steps: Sequence[Step]) -> Mem
     )
 
 
-def _limited(memory: Memory, now: float, steps: Sequence[Step]) -> Memory:
+def _limited(memory: WalkMemory, now: float, steps: Sequence[WalkStep]) -> WalkMemory:
     if memory.on is None:
         return memory
     if now >= memory.off_at:
@@ -138,11 +138,11 @@ def _limited(memory: Memory, now: float, steps: Sequence[Step]) -> Memory:
     return _off(memory, f"{steps[memory.on].name} went off: {why}") if why else memory
 
 
-def _off(memory: Memory, says: str) -> Memory:
+def _off(memory: WalkMemory, says: str) -> WalkMemory:
     return replace(memory, on=None, says=says)
 
 
-def _hindrance(memory: Memory, now: float, step: Step) -> str:
+def _hindrance(memory: WalkMemory, now: float, step: WalkStep) -> str:
     if memory.why_lost:
         return memory.why_lost
     if memory.read_at is None or now - memory.read_at > STALE_S:
@@ -150,7 +150,7 @@ def _hindrance(memory: Memory, now: float, step: Step) -> str:
     return step.hindrance(memory.sample)
 
 
-def _feedback(memory: Memory, now: float, steps: Sequence[Step]) -> Memory:
+def _feedback(memory: WalkMemory, now: float, steps: Sequence[WalkStep]) -> WalkMemory:
     """What the inputs show of the step that waits for them."""
     if memory.waits is None:
         return memory

@@ -13,7 +13,7 @@ from typing import Final, NamedTuple
 
 from bridges.host.columns import aligned, clipped, width, wrapped
 from bridges.host.paint import coloured, repainted
-from workbench.commissioning.walk.bench import Bench, Input
+from workbench.commissioning.walk.bench import Bench, ContactReading
 from workbench.commissioning.walk.core import ByEye, Switch
 from workbench.commissioning.walk.signed import NOT_TRIED
 
@@ -170,7 +170,7 @@ def _cut(text: str, columns: int) -> str:
     return text if width(text) <= columns else f"{clipped(text, columns - 1)}…"
 
 
-def _row(one: Input, now: float) -> tuple[str, ...]:
+def _row(one: ContactReading, now: float) -> tuple[str, ...]:
     if one.level is None or one.changed_at is None:
         return (one.wire.signal, one.wire.point, "?", "?", "", "")
     level = "high" if one.level else "low"

@@ -9,8 +9,8 @@ from typing import Any
 
 from bridges import VERSION
 from bridges.host.files import replace
-from workbench.commissioning.walk.bench import Input
-from workbench.commissioning.walk.core import Memory, Step
+from workbench.commissioning.walk.bench import ContactReading
+from workbench.commissioning.walk.core import WalkMemory, WalkStep
 
 NOT_TRIED = "not tried"
 
@@ -21,9 +21,9 @@ def record(
     by: str,
     at: datetime,
     *,
-    inputs: Sequence[Input],
-    steps: Sequence[Step],
-    memory: Memory,
+    inputs: Sequence[ContactReading],
+    steps: Sequence[WalkStep],
+    memory: WalkMemory,
     end: str,
     simulated: bool,
 ) -> dict[str, Any]:
@@ -52,7 +52,7 @@ def record(
     }
 
 
-def _seen(one: Input) -> str:
+def _seen(one: ContactReading) -> str:
     words = [word for value, word in ((True, "on"), (False, "off")) if value in one.seen]
     return " and ".join(words) or "never read"
 

@@ -6,17 +6,17 @@ from typing import Any, Final
 from bridges.kinds.charger.signals import CURRENT_FLOWS, ChargerOutputs, ChargerSample
 from bridges.kinds.door.signals import DoorOutputs, DoorSample
 from bridges.kinds.lift.settings import LiftSettings
-from bridges.kinds.lift.signals import Door, LiftOutputs, LiftSample, Motion, Side
+from bridges.kinds.lift.signals import DoorReading, LiftOutputs, LiftSample, Motion, Side
 from bridges.settings.load import Config
-from workbench.commissioning.walk.core import Step
+from workbench.commissioning.walk.core import WalkStep
 
 Wired = Collection[str] | None
 """The names of the output lines; None where the driver has no lines."""
 
 
-def _lift(settings: LiftSettings, wired: Wired) -> Iterator[Step]:
+def _lift(settings: LiftSettings, wired: Wired) -> Iterator[WalkStep]:
     if settings.agv_mode == "requested" and _has("agv_mode_request", wired):
-        yield Step(
+        yield WalkStep(
             "agv_mode_request",
             "asks the lift for AGV mode",
             LiftOutputs(agv_request=True),
@@ -25,7 +25,7 @@ def _lift(settings: LiftSettings, wired: Wired) -> Iterator[Step]:
             _hazard,
         )
     for level in settings.levels():
-        yield Step(
+        yield WalkStep(
             f"call {level}",
             f"calls the car to {level}",
             LiftOutputs(call=level),
@@ -35,7 +35,7 @@ def _lift(settings: LiftSettings, wired: Wired) -> Iterator[Step]:
         )
     for side in dict.fromkeys(stop.side for stop in settings.stops().values()):
         name = "door_open" if side is Side.FRONT else "rear_door_open"
-        yield Step(
+        yield WalkStep(
             name,
             f"opens the {side.value} door and holds it",
             LiftOutputs(hold_door=side),
@@ -66,14 +66,14 @@ def _arrived(level: str) -> Callable[[LiftSample], bool]:
 
 
 def _opened(side: Side) -> Callable[[LiftSample], bool]:
-    return lambda s: (s.door if side is Side.FRONT else s.rear_door) is Door.OPEN
+    return lambda s: (s.door if side is Side.FRONT else s.rear_door) is DoorReading.OPEN
 
 
-def _door(settings: object, wired: Wired) -> Iterator[Step]:
+def _door(settings: object, wired: Wired) -> Iterator[WalkStep]:
     def fire(sample: DoorSample) -> str:
         return "the fire alarm is on" if sample.fire else ""
 
-    yield Step(
+    yield WalkStep(
         "hold_open",
         "opens the door and holds it",
         DoorOutputs(hold_open=True),
@@ -83,14 +83,14 @@ def _door(settings: object, wired: Wired) -> Iterator[Step]:
     )
 
 
-def _charger(settings: object, wired: Wired) -> Iterator[Step]:
+def _charger(settings: object, wired: Wired) -> Iterator[WalkStep]:
     if wired is None:
         return  # a charge over HTTP, CAN or registers is a request: `rmf-bridge send charger`
 
     def at_fault(sample: ChargerSample) -> str:
         return f"the station shows an error {sample.error_text}".rstrip() if _fault(sample) else ""
 
-    yield Step(
+    yield WalkStep(
         "enable",
         "lets the station charge a robot on its pad",
         ChargerOutputs(power=True),
@@ -104,7 +104,7 @@ def _fault(sample: ChargerSample) -> bool:
     return sample.activity.value in ("error", "unknown")
 
 
-KINDS: Final[dict[str, Callable[[Any, Wired], Iterator[Step]]]] = {
+KINDS: Final[dict[str, Callable[[Any, Wired], Iterator[WalkStep]]]] = {
     "lift": _lift,
     "door": _door,
     "charger": _charger,
@@ -112,7 +112,7 @@ KINDS: Final[dict[str, Callable[[Any, Wired], Iterator[Step]]]] = {
 OFF: Final = {"lift": LiftOutputs(), "door": DoorOutputs(), "charger": ChargerOutputs(power=False)}
 
 
-def steps(config: Config, device: str) -> list[Step]:
+def steps(config: Config, device: str) -> list[WalkStep]:
     """Every output of a device, in the order in which they are tried."""
     wires = config.wires(device)
     wired = {wire.signal for wire in wires if wire.direction == "out"} if wires else None

@@ -14,7 +14,7 @@ from typing import ClassVar, Final, NamedTuple, TypeVar
 from msgspec import Struct
 from msgspec.structs import replace
 
-from bridges.kinds.charger.refusals import Refusal, read
+from bridges.kinds.charger.refusals import ChargerRefusal, read
 from bridges.messages import words
 from bridges.messages.definitions import DiagnosticStatus, SupervisorHeartbeat
 from bridges.messages.heard import Heard
@@ -26,7 +26,7 @@ State = TypeVar("State", bound=words.Stated)
 NEVER_AT: Final = float("-inf")
 
 
-class Seen(Struct, frozen=True):
+class RequestProgress(Struct, frozen=True):
     """What has happened since the command began; times are monotonic s.
 
     `listeners`: matched subscriptions of the request's topic. `states`: those that concern the
@@ -50,9 +50,9 @@ class Seen(Struct, frozen=True):
     heartbeat: SupervisorHeartbeat | None = None
     heartbeat_at: float = NEVER_AT
     boarded: str = ""
-    refusals: tuple[Refusal, ...] = ()
+    refusals: tuple[ChargerRefusal, ...] = ()
 
-    def hears(self, heard: Heard, about: Callable[[words.Stated], bool]) -> "Seen":
+    def hears(self, heard: Heard, about: Callable[[words.Stated], bool]) -> "RequestProgress":
         """Take a message that was heard. `about(state)`: does the state concern the request?"""
         message = heard.message
         if isinstance(message, SupervisorHeartbeat):
@@ -71,7 +71,7 @@ class Seen(Struct, frozen=True):
         """Every device of this kind that was heard, sorted."""
         return sorted(name for one, name in self.there if one == kind)
 
-    def sends(self, now: float) -> "Seen":
+    def sends(self, now: float) -> "RequestProgress":
         """The request is sent now."""
         first = now if self.first_sent_at is None else self.first_sent_at
         return replace(self, first_sent_at=first, last_sent_at=now)
@@ -101,7 +101,7 @@ WHERE: Final = (
 )
 
 
-class Done(Struct, frozen=True):
+class Fulfilled(Struct, frozen=True):
     """The request took effect."""
 
     text: str
@@ -145,15 +145,15 @@ class Request(ABC):
         return self.own if self.direct or self.adapter is None else self.adapter
 
     @abstractmethod
-    def message(self, seen: Seen) -> words.Requested | None:
+    def message(self, seen: RequestProgress) -> words.Requested | None:
         """The message to send, without its stamp; None while it cannot be made yet."""
 
     @abstractmethod
-    def outcome(self, seen: Seen) -> Done | Failed | None:
+    def outcome(self, seen: RequestProgress) -> Fulfilled | Failed | None:
         """The outcome, if the states show one."""
 
     @abstractmethod
-    def obstacles(self, seen: Seen) -> Iterable[Obstacle]:
+    def obstacles(self, seen: RequestProgress) -> Iterable[Obstacle]:
         """Why there is no effect, judged by the last state; the first `present` one counts."""
 
     @property
@@ -161,7 +161,7 @@ class Request(ABC):
         """The topic on which the supervisor speaks, if others hear adapters as it does."""
         return None
 
-    def goes_direct(self, seen: Seen, now: float) -> bool:
+    def goes_direct(self, seen: RequestProgress, now: float) -> bool:
         """Whether it is time to ask the device's own daemon, which the supervisor has not done."""
         return False
 
@@ -169,11 +169,11 @@ class Request(ABC):
         """Whether the state is of this device."""
         return (words.kind(state), words.device(state)) == (self.kind, self.name)
 
-    def ready(self, seen: Seen) -> bool:
+    def ready(self, seen: RequestProgress) -> bool:
         """Whether the device has been heard."""
         return bool(seen.states)
 
-    def misnamed(self, seen: Seen) -> str:
+    def misnamed(self, seen: RequestProgress) -> str:
         """Which other kind of device has this name; "" if none was heard."""
         if self.ready(seen):
             return ""
@@ -183,7 +183,7 @@ class Request(ABC):
         there = f"rmf-bridge send {kinds[0]} --help"
         return f"{self.name} is a {' and a '.join(kinds)}, not a {self.kind}; {there}"
 
-    def nobody(self, seen: Seen) -> Obstacle:
+    def nobody(self, seen: RequestProgress) -> Obstacle:
         """No supervisor or daemon subscribes to the request."""
         silence = f"no node subscribes to {self.topic.name}"
         if self.supervisor is not None:
@@ -197,7 +197,7 @@ class Request(ABC):
         there = self.line.again_with("--direct")
         return Obstacle(True, text, f"to ask the {self.kind}'s own daemon: {there}")
 
-    def unheard(self, seen: Seen) -> Obstacle:
+    def unheard(self, seen: RequestProgress) -> Obstacle:
         """The device has not been heard; perhaps another has a similar name."""
         topic, names = self.states.name, seen.names(self.kind)
         if not names:
@@ -205,7 +205,7 @@ class Request(ABC):
             return Obstacle(True, text, self._elsewhere(seen))
         return Obstacle(True, f"no '{self.name}' on {topic}; {self._hears(seen)}")
 
-    def _hears(self, seen: Seen) -> str:
+    def _hears(self, seen: RequestProgress) -> str:
         """Whom we hear: devices of the kind, else any; else where we listen."""
         if names := seen.names(self.kind):
             near = "" if self.name in names else nearest(self.name, names)
@@ -214,7 +214,7 @@ class Request(ABC):
             return f"heard: {', '.join(map(' '.join, sorted(seen.there)))}"
         return f"nothing is heard{seen.graph and f' by {seen.graph}'}"
 
-    def _elsewhere(self, seen: Seen) -> str:
+    def _elsewhere(self, seen: RequestProgress) -> str:
         """Where else the device may be: on loopback, in another domain, on another transport."""
         if self._loopback():
             return self._loopback()

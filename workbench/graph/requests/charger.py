@@ -9,7 +9,7 @@ from bridges.messages import definitions as d
 from bridges.messages import topics, words
 from bridges.messages.stamps import duration
 from bridges.messages.topics import AnyTopic
-from workbench.graph.requests import Done, Failed, Obstacle, Request, Seen
+from workbench.graph.requests import Failed, Fulfilled, Obstacle, Request, RequestProgress
 
 ANY: Final = "any"
 SERVING: Final = (
@@ -26,7 +26,7 @@ class _Charger(Request):
 
 
 @dataclass(frozen=True, slots=True)
-class Charge(_Charger):
+class RobotCharge(_Charger):
     """Assign the charger to a robot under our request id."""
 
     fleet: str
@@ -37,22 +37,22 @@ class Charge(_Charger):
     own: ClassVar[AnyTopic] = topics.CHARGER_REQUESTS
     answers: ClassVar[tuple[AnyTopic, ...]] = (topics.CHARGER_REFUSALS,)
 
-    def message(self, seen: Seen) -> d.ChargerRequest:
+    def message(self, seen: RequestProgress) -> d.ChargerRequest:
         """The request, always with the same id, so that a repeat is not a new request."""
         charger = "" if self.name == ANY else self.name
         limit = duration(self.start_timeout_s)
         return d.ChargerRequest(charger, self.fleet, self.robot, limit, self.request_id)
 
-    def outcome(self, seen: Seen) -> Done | Failed | None:
+    def outcome(self, seen: RequestProgress) -> Fulfilled | Failed | None:
         """Done when a state with our id shows that the charger serves the robot; Failed when the
         request is refused."""
         answer = seen.answer(d.ChargerState)
         if answer is None or answer.state not in SERVING or answer.request_id != self.request_id:
             return self._refused(seen)
         state = words.plain(d.ChargerStateValue, answer.state)
-        return Done(f"{self.name} is {state} for request {self.request_id}")
+        return Fulfilled(f"{self.name} is {state} for request {self.request_id}")
 
-    def _refused(self, seen: Seen) -> Failed | None:
+    def _refused(self, seen: RequestProgress) -> Failed | None:
         refusal = next((r for r in seen.refusals if r.request_id == self.request_id), None)
         if refusal is None:
             return None
@@ -62,7 +62,7 @@ class Charge(_Charger):
         cancel = ("send", "charger", refusal.charger, "--cancel", refusal.held_request)
         return Failed(f"{text}; to cancel that: {self.line.other(*cancel)}")
 
-    def obstacles(self, seen: Seen) -> Iterable[Obstacle]:
+    def obstacles(self, seen: RequestProgress) -> Iterable[Obstacle]:
         """An error, or another request."""
         state = seen.states_of(d.ChargerState)[-1]
         cancel = self.line.other("send", "charger", self.name, "--cancel", state.request_id)
@@ -90,17 +90,17 @@ class ChargeCancel(_Charger):
 
     own: ClassVar[AnyTopic] = topics.CHARGER_CANCELS
 
-    def message(self, seen: Seen) -> d.ChargerCancel:
+    def message(self, seen: RequestProgress) -> d.ChargerCancel:
         """The cancel of this request id."""
         return d.ChargerCancel(self.name, self.request_id)
 
-    def outcome(self, seen: Seen) -> Done | Failed | None:
+    def outcome(self, seen: RequestProgress) -> Fulfilled | Failed | None:
         """Done when the charger is released or shows another id; Failed if it never showed this one."""
         answer = seen.answer(d.ChargerState)
         if answer is None or self._holds(answer):
             return None
         if any(map(self._holds, seen.states_of(d.ChargerState))):
-            return Done(f"{self.name} no longer serves request {self.request_id}")
+            return Fulfilled(f"{self.name} no longer serves request {self.request_id}")
         state = words.described(answer)
         return Failed(f"{self.name} does not serve request '{self.request_id}' (state: {state})")
 
@@ -108,7 +108,7 @@ class ChargeCancel(_Charger):
         released = (d.ChargerStateValue.CHARGER_IDLE, d.ChargerStateValue.CHARGER_RELEASED)
         return state.request_id == self.request_id and state.state not in released
 
-    def obstacles(self, seen: Seen) -> Iterable[Obstacle]:
+    def obstacles(self, seen: RequestProgress) -> Iterable[Obstacle]:
         """The charger still serves the request."""
         text = f"{self.name} still serves request {self.request_id}: its daemon's log says why"
         return (Obstacle(True, text),)
@@ -118,7 +118,7 @@ COORDINATOR: Final = "charger coordinator"
 
 
 @dataclass(frozen=True, slots=True)
-class QueuedCharge(Charge):
+class QueuedCharge(RobotCharge):
     """Ask the coordinator for the charger of this `name`, or for any (ANY), for this robot."""
 
     own = topics.ADAPTER_CHARGER_REQUESTS
@@ -135,19 +135,19 @@ class QueuedCharge(Charge):
             (state.robot_fleet, state.robot_name) == (self.fleet, self.robot)
         )
 
-    def ready(self, seen: Seen) -> bool:
+    def ready(self, seen: RequestProgress) -> bool:
         """Whether any charger has been heard."""
         return bool(seen.names(self.kind))
 
-    def outcome(self, seen: Seen) -> Done | Failed | None:
+    def outcome(self, seen: RequestProgress) -> Fulfilled | Failed | None:
         """Done when a charger serves the robot; Failed when the coordinator refuses the request."""
         answer = seen.answer(d.ChargerState)
         if answer is None or answer.state not in SERVING:
             return self._refused(seen)
         state = words.plain(d.ChargerStateValue, answer.state)
-        return Done(f"{answer.charger_name} is {state} for {self.who}")
+        return Fulfilled(f"{answer.charger_name} is {state} for {self.who}")
 
-    def unheard(self, seen: Seen) -> Obstacle:
+    def unheard(self, seen: RequestProgress) -> Obstacle:
         """No charger shows the robot yet: it probably waits in the queue."""
         if not seen.names(self.kind):
             return super(QueuedCharge, self).unheard(seen)
@@ -160,7 +160,7 @@ class QueuedCharge(Charge):
             f"to withdraw the request: {self.line.other(*cancel)}",
         )
 
-    def obstacles(self, seen: Seen) -> Iterable[Obstacle]:
+    def obstacles(self, seen: RequestProgress) -> Iterable[Obstacle]:
         """The charger's error, or no charger assigned."""
         text = f"the {COORDINATOR} has not assigned {self.who} a charger: its log says why"
         return _error(seen.states_of(d.ChargerState)[-1]), Obstacle(True, text)
@@ -173,7 +173,7 @@ class QueuedCancel(ChargeCancel):
     own = topics.ADAPTER_CHARGER_CANCELS
     listener = COORDINATOR
 
-    def message(self, seen: Seen) -> d.ChargerCancel:
+    def message(self, seen: RequestProgress) -> d.ChargerCancel:
         """The cancel of this request id, for any charger."""
         return d.ChargerCancel("", self.request_id)
 
@@ -181,16 +181,16 @@ class QueuedCancel(ChargeCancel):
         """No state shows a queued request."""
         return False
 
-    def ready(self, seen: Seen) -> bool:
+    def ready(self, seen: RequestProgress) -> bool:
         """Whether any charger has been heard."""
         return bool(seen.names(self.kind))
 
-    def outcome(self, seen: Seen) -> Done | None:
+    def outcome(self, seen: RequestProgress) -> Fulfilled | None:
         """Done once the cancel has been sent."""
         if seen.first_sent_at is None:
             return None
-        return Done(f"the {COORDINATOR} was told that request {self.request_id} is withdrawn")
+        return Fulfilled(f"the {COORDINATOR} was told that request {self.request_id} is withdrawn")
 
-    def unheard(self, seen: Seen) -> Obstacle:
+    def unheard(self, seen: RequestProgress) -> Obstacle:
         """The cancel was never sent."""
         return Obstacle(True, f"the cancel was not sent: no {COORDINATOR} listens")

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from bridges.messages import definitions as d
 from bridges.messages import topics
-from workbench.graph.requests import Done, Obstacle, Request, Seen
+from workbench.graph.requests import Fulfilled, Obstacle, Request, RequestProgress
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,7 +29,7 @@ class DoorMove(Request):
         """The requested mode."""
         return d.DoorModeValue.MODE_OPEN if self.opened else d.DoorModeValue.MODE_CLOSED
 
-    def message(self, seen: Seen) -> d.DoorRequest:
+    def message(self, seen: RequestProgress) -> d.DoorRequest:
         """The request for that mode."""
         return d.DoorRequest(
             requester_id=self.requester,
@@ -37,20 +37,20 @@ class DoorMove(Request):
             requested_mode=d.DoorMode(int(self.mode)),
         )
 
-    def outcome(self, seen: Seen) -> Done | None:
+    def outcome(self, seen: RequestProgress) -> Fulfilled | None:
         """Done when the door has the mode and, on the adapter topic, the heartbeat agrees."""
         answer = seen.answer(d.DoorState)
         if answer is None or answer.current_mode.value != self.mode:
             return None
         if not self.direct and not self._heartbeat_agrees(seen):
             return None
-        return Done(f"{self.name} is {'open' if self.opened else 'closed'}")
+        return Fulfilled(f"{self.name} is {'open' if self.opened else 'closed'}")
 
-    def _heartbeat_agrees(self, seen: Seen) -> bool:
+    def _heartbeat_agrees(self, seen: RequestProgress) -> bool:
         requesters = seen.requesters(self.name)
         return requesters is not None and (self.requester in requesters) == self.opened
 
-    def obstacles(self, seen: Seen) -> Iterable[Obstacle]:
+    def obstacles(self, seen: RequestProgress) -> Iterable[Obstacle]:
         """Judged by the mode of the door."""
         mode, name = seen.states_of(d.DoorState)[-1].current_mode.value, self.name
         others = ", ".join(r for r in seen.requesters(name) or [] if r != self.requester)

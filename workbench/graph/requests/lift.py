@@ -8,7 +8,7 @@ from bridges.messages import definitions as d
 from bridges.messages import topics, words
 from bridges.messages.topics import AnyTopic
 from bridges.observe.lift import HAZARDS, request_lift
-from workbench.graph.requests import Done, Failed, Obstacle, Request, Seen, nearest
+from workbench.graph.requests import Failed, Fulfilled, Obstacle, Request, RequestProgress, nearest
 
 OBEYS_WITHIN_S: Final = 5.0
 """A supervisor that obeys ends a session within a few states."""
@@ -38,7 +38,7 @@ class LiftRide(_Lift):
     session: str
     granted_only: bool = False
 
-    def message(self, seen: Seen) -> d.LiftRequest:
+    def message(self, seen: RequestProgress) -> d.LiftRequest:
         """Always AGV_MODE with DOOR_OPEN: fleets send nothing else."""
         return d.LiftRequest(
             lift_name=self.name,
@@ -48,7 +48,7 @@ class LiftRide(_Lift):
             door_state=d.LiftRequestDoor.DOOR_OPEN,
         )
 
-    def outcome(self, seen: Seen) -> Done | Failed | None:
+    def outcome(self, seen: RequestProgress) -> Fulfilled | Failed | None:
         """Done when RequestLift's four fields match; an unserved floor fails at once."""
         states = seen.states_of(d.LiftState)
         served = states[-1].available_floors if states else ()
@@ -58,9 +58,11 @@ class LiftRide(_Lift):
         if not self._fulfilled(seen.answer(d.LiftState)):
             return None
         where = "" if self.granted_only else f" at {self.floor}, door open,"
-        return Done(f"{self.name} is{where} held by {self.session}; to end that: {self._release}")
+        return Fulfilled(
+            f"{self.name} is{where} held by {self.session}; to end that: {self._release}"
+        )
 
-    def _remedy(self, seen: Seen) -> str:
+    def _remedy(self, seen: RequestProgress) -> str:
         if seen.boarded != "yes":
             return f"to end that session: {self._release}"
         release = self.line.other("release", self.name, "--car-empty")
@@ -73,7 +75,7 @@ class LiftRide(_Lift):
         checks = request_lift(state.session_id, state.current_floor, door, self.session, self.floor)
         return self.granted_only or all(check.met for check in checks)
 
-    def obstacles(self, seen: Seen) -> Iterable[Obstacle]:
+    def obstacles(self, seen: RequestProgress) -> Iterable[Obstacle]:
         """The session, the mode, or the floor or door that the car has not reached."""
         state = seen.states_of(d.LiftState)[-1]
         name, session, mode = self.name, state.session_id, state.current_mode
@@ -111,11 +113,11 @@ class LiftEnd(_Lift):
     falls_back: bool = False
     car_empty: bool = False
 
-    def _ending(self, seen: Seen) -> str:
+    def _ending(self, seen: RequestProgress) -> str:
         first = (state.session_id for state in seen.states_of(d.LiftState))
         return self.session or next(first, "")
 
-    def message(self, seen: Seen) -> d.LiftRequest | None:
+    def message(self, seen: RequestProgress) -> d.LiftRequest | None:
         """END_SESSION without a floor, as fleets send it; DOOR_OPEN tells our lifts that a person ends
         it, who counts for more than a robot that goes on asking."""
         session = self._ending(seen)
@@ -128,27 +130,27 @@ class LiftEnd(_Lift):
             door_state=d.LiftRequestDoor.DOOR_OPEN,
         )
 
-    def outcome(self, seen: Seen) -> Done | None:
+    def outcome(self, seen: RequestProgress) -> Fulfilled | None:
         """Done when the state shows another session, or none."""
         session = self._ending(seen)
         if seen.states and not session:
-            return Done(f"{self.name} has no session: nothing to end")
+            return Fulfilled(f"{self.name} has no session: nothing to end")
         answer = seen.answer(d.LiftState)
         if answer is None or answer.session_id == session:
             return None
         if any(state.session_id == session for state in seen.states_of(d.LiftState)):
-            return Done(f"{self.name} is no longer held by {session}")
+            return Fulfilled(f"{self.name} is no longer held by {session}")
         holder = answer.session_id
         instead = f"; {holder} has it" if holder else ""
-        return Done(f"{self.name} is not held by {session}: nothing to end{instead}")
+        return Fulfilled(f"{self.name} is not held by {session}: nothing to end{instead}")
 
-    def goes_direct(self, seen: Seen, now: float) -> bool:
+    def goes_direct(self, seen: RequestProgress, now: float) -> bool:
         """The supervisor, if there is one, has had its time, and nobody is in the car."""
         asked_at = seen.began_at if seen.first_sent_at is None else seen.first_sent_at
         late = now >= asked_at + OBEYS_WITHIN_S
         return self.falls_back and not self.direct and late and self._outside(seen)
 
-    def nobody(self, seen: Seen) -> Obstacle:
+    def nobody(self, seen: RequestProgress) -> Obstacle:
         """Without a supervisor too, a robot may be in the car."""
         found = super(LiftEnd, self).nobody(seen)
         if self.direct or not self.falls_back or not seen.states:
@@ -157,10 +159,10 @@ class LiftEnd(_Lift):
             return found._replace(remedy="the lift's own daemon is asked instead")
         return found._replace(remedy=f"if the car is empty: {self.line.again_with('--car-empty')}")
 
-    def _outside(self, seen: Seen) -> bool:
+    def _outside(self, seen: RequestProgress) -> bool:
         return self.car_empty or seen.boarded == "no"
 
-    def obstacles(self, seen: Seen) -> Iterable[Obstacle]:
+    def obstacles(self, seen: RequestProgress) -> Iterable[Obstacle]:
         """The session is still shown."""
         if self.falls_back and not self._outside(seen):
             text = f"{self.name} still shows the session, and its robot may be in the car: look into it"

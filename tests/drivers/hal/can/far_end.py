@@ -9,7 +9,7 @@ from contextlib import contextmanager
 import can
 
 from drivers import DriverError
-from drivers.hal.can import CanBus, Settings
+from drivers.hal.can import CanBus, CanSettings
 from tests.drivers.hal.modbus.module import Time
 
 _numbers = itertools.count()
@@ -68,7 +68,7 @@ def bus_on(
     channel: str, clock: Callable[[], float] | None = None, *, timeout_s: float = 0.1
 ) -> CanBus:
     """Ours, whose pauses follow the clock and have no jitter."""
-    settings = Settings(socketcan="can0", timeout_s=timeout_s, scan_s=0.05)
+    settings = CanSettings(socketcan="can0", timeout_s=timeout_s, scan_s=0.05)
     vendor = lambda: can.Bus(channel, interface="virtual")  # noqa: E731
     return CanBus(settings, clock or time.monotonic, lambda: 0.0, vendor)
 
@@ -115,7 +115,7 @@ class Reactive(can.BusABC):
         self.coming.extend(self.react(msg))
 
     def bus(self) -> CanBus:
-        place = Settings(socketcan="can0", timeout_s=0.05, scan_s=0.05)
+        place = CanSettings(socketcan="can0", timeout_s=0.05, scan_s=0.05)
         return CanBus(place, lambda: self.now, lambda: 0.0, lambda: self)
 
     def shutdown(self) -> None:

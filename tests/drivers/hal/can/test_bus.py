@@ -7,7 +7,16 @@ from typing import Any
 import can
 import pytest
 
-from drivers.hal.can import EXTENDED, CanBus, Frame, Settings, Slcan, Wanted, named, warnings
+from drivers.hal.can import (
+    EXTENDED,
+    CanBus,
+    CanSettings,
+    Frame,
+    FrameFilter,
+    Slcan,
+    named,
+    warnings,
+)
 from tests.drivers.hal.can.far_end import Clock, FarEnd, bus_on, channel, failure, two_ends
 from tests.drivers.hal.modbus.module import Time
 from tests.waiting import PATIENCE_S
@@ -22,7 +31,7 @@ def ends() -> Iterator[Ends]:
         yield made
 
 
-def heard_by(bus: CanBus, *wanted: Wanted) -> list[Frame]:
+def heard_by(bus: CanBus, *wanted: FrameFilter) -> list[Frame]:
     """What comes of these, as it comes."""
     heard: list[Frame] = []
     bus.listen(wanted, lambda frame, at: heard.append(frame))
@@ -31,7 +40,7 @@ def heard_by(bus: CanBus, *wanted: Wanted) -> list[Frame]:
 
 def test_a_frame_goes_to_whoever_wants_its_id_and_to_nobody_else(ends: Ends) -> None:
     bus, far, _ = ends
-    seven, any_node = heard_by(bus, Wanted(0x707)), heard_by(bus, Wanted(0x700, 0x780))
+    seven, any_node = heard_by(bus, FrameFilter(0x707)), heard_by(bus, FrameFilter(0x700, 0x780))
     far.send(0x707, "05")
     far.send(0x70A, "7f")
     far.send(0x123, "01")
@@ -42,7 +51,7 @@ def test_a_frame_goes_to_whoever_wants_its_id_and_to_nobody_else(ends: Ends) -> 
 
 def test_a_29_bit_id_differs_from_the_same_11_bit_id(ends: Ends) -> None:
     bus, far, _ = ends
-    short, long = heard_by(bus, Wanted(0x123)), heard_by(bus, Wanted(0x123 | EXTENDED))
+    short, long = heard_by(bus, FrameFilter(0x123)), heard_by(bus, FrameFilter(0x123 | EXTENDED))
     far.send(0x123, "01")
     far.send(0x123, "02", extended=True)
     bus.take()
@@ -51,7 +60,7 @@ def test_a_29_bit_id_differs_from_the_same_11_bit_id(ends: Ends) -> None:
 
 def test_remote_frames_and_fd_frames_are_ignored(ends: Ends) -> None:
     bus, far, _ = ends
-    heard = heard_by(bus, Wanted(0x10))
+    heard = heard_by(bus, FrameFilter(0x10))
     far.put(can.Message(arbitration_id=0x10, is_extended_id=False, is_remote_frame=True))
     far.put(can.Message(arbitration_id=0x10, is_extended_id=False, is_fd=True, data=bytes(12)))
     bus.take()
@@ -67,7 +76,7 @@ def test_what_is_sent_is_on_the_bus_as_it_is(ends: Ends) -> None:
 
 def test_a_silent_bus_is_distinguished_from_one_on_which_others_speak(ends: Ends) -> None:
     bus, far, clock = ends
-    heard_by(bus, Wanted(0x70A))
+    heard_by(bus, FrameFilter(0x70A))
     assert bus.silence() == SILENT
     far.send(0x70B, "05")
     far.send(0x18FF50E5, "00", extended=True)
@@ -89,7 +98,7 @@ def test_others_are_remembered_up_to_a_bound(ends: Ends) -> None:
 
 def test_frames_that_came_while_we_hung_are_discarded_as_their_age_is_unknown(ends: Ends) -> None:
     bus, far, clock = ends
-    heard = heard_by(bus, Wanted(1))
+    heard = heard_by(bus, FrameFilter(1))
     far.send(1, "01")
     clock.now += 5
     bus.take()
@@ -101,7 +110,7 @@ def test_frames_that_came_while_we_hung_are_discarded_as_their_age_is_unknown(en
 
 def test_waiting_ends_when_it_is_heard_or_when_the_time_is_up() -> None:
     with two_ends(Clock()) as (bus, far, _):
-        heard = heard_by(bus, Wanted(1))
+        heard = heard_by(bus, FrameFilter(1))
         assert bus.wait(lambda: bool(heard), 0.02) is False
         far.send(1)
         assert bus.wait(lambda: bool(heard), PATIENCE_S) is True
@@ -129,7 +138,7 @@ def test_a_bus_off_is_named_and_pauses_the_bus(ends: Ends) -> None:
 
 def test_a_bus_off_is_over_when_a_frame_is_heard_again(ends: Ends) -> None:
     bus, far, clock = ends
-    heard = heard_by(bus, Wanted(1))
+    heard = heard_by(bus, FrameFilter(1))
     far.trouble(0x40)
     failure(bus.take)
     clock.now += 0.5
@@ -236,7 +245,7 @@ def test_an_interface_that_fails_is_named_with_what_to_do_and_paused(
         opened.append(1)
         return Broken(error, where)
 
-    bus = CanBus(Settings(socketcan="can0"), clock, lambda: 0.0, vendor)
+    bus = CanBus(CanSettings(socketcan="can0"), clock, lambda: 0.0, vendor)
 
     def use() -> None:
         bus.take()
@@ -266,7 +275,7 @@ def test_an_interface_that_is_not_there_is_found_when_it_comes() -> None:
             raise OSError(errno.ENODEV, "x")
         return can.Bus(name, interface="virtual")
 
-    bus = CanBus(Settings(socketcan="can0"), clock, lambda: 0.0, vendor)
+    bus = CanBus(CanSettings(socketcan="can0"), clock, lambda: 0.0, vendor)
     assert failure(bus.take)
     there = True
     assert failure(bus.take)
@@ -289,31 +298,31 @@ def test_closing_lets_go_and_may_be_done_twice() -> None:
 # ---- settings
 
 
-def problems(settings: Settings) -> list[tuple[tuple[str, ...], str]]:
+def problems(settings: CanSettings) -> list[tuple[tuple[str, ...], str]]:
     return list(settings.problems())
 
 
 def test_a_bus_is_one_of_the_two_sorts() -> None:
     place = Slcan(port="/dev/serial/by-id/x", bitrate=250_000)
-    assert problems(Settings(socketcan="can0")) == []
-    assert problems(Settings(slcan=place)) == []
-    [(nowhere, what)] = problems(Settings())
+    assert problems(CanSettings(socketcan="can0")) == []
+    assert problems(CanSettings(slcan=place)) == []
+    [(nowhere, what)] = problems(CanSettings())
     assert (nowhere, what[:18]) == ((), "needs an interface")
-    [(path, text)] = problems(Settings(socketcan="can0", slcan=place))
+    [(path, text)] = problems(CanSettings(socketcan="can0", slcan=place))
     assert (path, text[:37]) == (("slcan",), "a bus has either socketcan or slcan: ")
 
 
 def test_a_bitrate_that_no_adapter_knows_is_a_problem() -> None:
-    [(path, text)] = problems(Settings(slcan=Slcan(port="/dev/serial/by-id/x", bitrate=251_000)))
+    [(path, text)] = problems(CanSettings(slcan=Slcan(port="/dev/serial/by-id/x", bitrate=251_000)))
     assert path == ("slcan", "bitrate")
     assert text.startswith("slcan adapters know 10000, 20000, ")
 
 
 def test_a_port_whose_name_may_change_is_worth_a_warning() -> None:
-    [(path, text)] = warnings(Settings(slcan=Slcan(port="/dev/ttyACM0", bitrate=250_000)))
+    [(path, text)] = warnings(CanSettings(slcan=Slcan(port="/dev/ttyACM0", bitrate=250_000)))
     assert path == ("slcan", "port")
     assert text.startswith("/dev/ttyACM0 may be another adapter")
-    assert list(warnings(Settings(socketcan="can0"))) == []
+    assert list(warnings(CanSettings(socketcan="can0"))) == []
 
 
 def test_ids_are_written_as_people_write_them() -> None:

@@ -60,7 +60,7 @@ frames = st.lists(st.one_of(data_frames, data_frames, odd_frames), max_size=12)
 
 WIFERION = msgspec.convert(
     {"profile": "wiferion", "setpoints": {"max_volts": 29.4, "volts": 29.2, "amps": 30}},
-    charger_can_frames.Settings,
+    charger_can_frames.FrameChargerSettings,
 )
 
 
@@ -119,7 +119,7 @@ def test_every_number_of_a_status_frame_has_a_meaning() -> None:
 
 # ---- CANopen
 
-RCU = charger_canopen.Settings(node=10)
+RCU = charger_canopen.CanOpenChargerSettings(node=10)
 STATE_5 = bytes.fromhex("02200a0500")
 
 

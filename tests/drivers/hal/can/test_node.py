@@ -6,7 +6,7 @@ from collections.abc import Callable
 import can
 import pytest
 
-from drivers.hal.can import CanBus, Wanted
+from drivers.hal.can import CanBus, FrameFilter
 from drivers.hal.can.canopen import CanOpenNode
 from tests.drivers.hal.can.far_end import Reactive, data_frame, failure
 
@@ -253,7 +253,7 @@ def test_a_node_without_a_heartbeat_is_alive_as_long_as_it_answers() -> None:
     ours = CanOpenNode(bus, NODE, None)
     ours.alive()
     heard: list[object] = []
-    bus.listen([Wanted(1)], lambda frame, at: heard.append(frame))
+    bus.listen([FrameFilter(1)], lambda frame, at: heard.append(frame))
     far.say(1)
     ours.alive()
     assert len(heard) == 1

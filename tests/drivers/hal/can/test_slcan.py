@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import can
 import pytest
 
-from drivers.hal.can import EXTENDED, CanBus, Frame, Settings, Slcan, Wanted
+from drivers.hal.can import EXTENDED, CanBus, CanSettings, Frame, FrameFilter, Slcan
 from hal_fakes.can.side import CanFarSide, Send
 from hal_fakes.can.slcan_port import SlcanPort, decoded, encoded
 from hal_fakes.plants.charger import ChargerPlant
@@ -43,12 +43,12 @@ class Desk:
         self.clock = Clock()
         self.bus = self.opened()
         self.heard: list[Frame] = []
-        wanted = [Wanted(0x124), Wanted(0x18FF50E6 | EXTENDED)]
+        wanted = [FrameFilter(0x124), FrameFilter(0x18FF50E6 | EXTENDED)]
         self.bus.listen(wanted, lambda frame, at: self.heard.append(frame))
 
     def opened(self) -> CanBus:
         place = Slcan(port=str(self.port.adapter.path), bitrate=250_000)
-        return CanBus(Settings(slcan=place, timeout_s=0.3), self.clock, lambda: 0.0)
+        return CanBus(CanSettings(slcan=place, timeout_s=0.3), self.clock, lambda: 0.0)
 
     def passes(self) -> bool:
         """Does a frame come back?"""
@@ -132,7 +132,7 @@ def test_an_adapter_that_another_program_has_is_named(desk: Desk) -> None:
 def test_an_adapter_that_takes_nothing_costs_one_timeout() -> None:
     leader, follower = os.openpty()
     place = Slcan(port=os.ttyname(follower), bitrate=250_000)
-    bus = CanBus(Settings(slcan=place, timeout_s=0.05))
+    bus = CanBus(CanSettings(slcan=place, timeout_s=0.05))
     ended = threading.Event()
 
     def fill() -> None:
@@ -172,9 +172,9 @@ def test_whatever_an_adapter_says_is_a_frame_or_a_failure_and_never_breaks_us(
     leader, follower = os.openpty()
     place = Slcan(port=os.ttyname(follower), bitrate=250_000)
     clock = Clock()
-    bus = CanBus(Settings(slcan=place, timeout_s=0.05), clock, lambda: 0.0)
+    bus = CanBus(CanSettings(slcan=place, timeout_s=0.05), clock, lambda: 0.0)
     heard: list[Frame] = []
-    bus.listen([Wanted(0x321)], lambda frame, at: heard.append(frame))
+    bus.listen([FrameFilter(0x321)], lambda frame, at: heard.append(frame))
     bus.take()
     os.write(leader, junk)
 

@@ -4,11 +4,11 @@ from collections.abc import Iterator, Sequence
 
 import pytest
 
-from drivers.hal.gpio import GpioBus, Settings, canonical, open_bus
+from drivers.hal.gpio import GpioBus, GpioSettings, canonical, open_bus
 from drivers.hal.points import HalError, Points, Wire
 from hal_fakes.gpio import WiredFactory
-from hal_fakes.plants.machine import Machine
-from hal_fakes.wiring import Wiring
+from hal_fakes.plants.machine import WiredPlant
+from hal_fakes.wiring import PlantWiring
 
 WIRES = (
     Wire("alarm", "in", "J8:7", "low", "down"),
@@ -18,7 +18,7 @@ WIRES = (
 )
 
 
-class Contacts(Machine):
+class Contacts(WiredPlant):
     """A plant without physics."""
 
     def __init__(self, wires: Sequence[Wire] = WIRES) -> None:
@@ -40,8 +40,10 @@ class Bench:
     def __init__(self) -> None:
         self.now = 0.0
         self.plant = Contacts()
-        self.factory = WiredFactory([Wiring(self.plant, WIRES, canonical)], clock=lambda: self.now)
-        self.bus: GpioBus = open_bus(Settings(), self.factory, clock=lambda: self.now)
+        self.factory = WiredFactory(
+            [PlantWiring(self.plant, WIRES, canonical)], clock=lambda: self.now
+        )
+        self.bus: GpioBus = open_bus(GpioSettings(), self.factory, clock=lambda: self.now)
         self.points = Points(WIRES, self.bus)
 
     def relays(self) -> list[tuple[str, object]]:

@@ -2,7 +2,7 @@
 
 import pytest
 
-from drivers.hal.gpio.dead_man import AFTER_S, DeadMan
+from drivers.hal.gpio.dead_man import AFTER_S, GpioDeadMan
 from drivers.hal.points import HalError
 from tests.drivers.hal.gpio.test_bus import Bench
 from tests.waiting import wait_until
@@ -18,7 +18,7 @@ def bench() -> Bench:
 
 def test_outputs_drop_when_scans_stop_and_stay_dropped_until_an_operator_resets() -> None:
     now, drops = [0.0], []
-    dead_man = DeadMan(lambda: drops.append(now[0]), lambda: now[0])
+    dead_man = GpioDeadMan(lambda: drops.append(now[0]), lambda: now[0])
     assert not dead_man.check()  # nothing is watched before the first scan
     dead_man.fed()
     now[0] = AFTER_S

@@ -7,14 +7,14 @@ from pathlib import Path
 import pytest
 
 from drivers import DriverError
-from drivers.hal.gpio import GpioBus, Settings, open_bus
+from drivers.hal.gpio import GpioBus, GpioSettings, open_bus
 from drivers.hal.points import HalError, Points, Wire
 from tests.drivers.hal.gpio.conftest import forget
 from tests.drivers.hal.gpio.lgpio_stand_in import HANDLE, StandIn
 
 
 def header(chip: int = 0) -> GpioBus:
-    return open_bus(Settings(chip=chip))
+    return open_bus(GpioSettings(chip=chip))
 
 
 def test_an_active_low_output_is_claimed_once_at_high_and_never_clicks(lgpio: StandIn) -> None:

@@ -14,7 +14,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from drivers.hal import HalError
-from drivers.hal.http import BUS, HttpBus, Settings
+from drivers.hal.http import BUS, HttpBus, HttpSettings
 from tests.depth import examples
 from tests.drivers.hal.http.far_end import (
     Caller,
@@ -41,7 +41,7 @@ class Clock:
 
 
 def bus_to(port: int, timeout_s: float = 5.0, **more: Any) -> HttpBus:
-    made = Settings(api_base=f"127.0.0.1:{port}", timeout_s=timeout_s)
+    made = HttpSettings(api_base=f"127.0.0.1:{port}", timeout_s=timeout_s)
     return HttpBus(made, **{"clock": Clock()} | more)
 
 
@@ -407,7 +407,7 @@ def test_a_connection_that_is_never_made_is_left_at_the_deadline() -> None:
 
 
 def named(resolve: Any, timeout_s: float = 5.0) -> HttpBus:
-    return HttpBus(Settings(api_base="tpu.local", timeout_s=timeout_s), Clock(), resolve)
+    return HttpBus(HttpSettings(api_base="tpu.local", timeout_s=timeout_s), Clock(), resolve)
 
 
 def tcp(*address: object) -> tuple[Any, ...]:
@@ -554,7 +554,7 @@ def test_a_call_that_insists_is_not_held_back_by_the_pause_after_a_failure() -> 
 
 def test_a_bus_is_opened_without_sending_anything_and_may_be_closed_twice() -> None:
     with FarEnd(always(answer())) as far:
-        bus = BUS.open_bus(Settings(api_base=f"127.0.0.1:{far.port}"))
+        bus = BUS.open_bus(HttpSettings(api_base=f"127.0.0.1:{far.port}"))
         bus.on_edge(lambda: None)
         bus.close()
         bus.close()

@@ -18,7 +18,7 @@ from drivers.charger.state_codes import Codes
 from drivers.hal.http import HttpBus
 from hal_fakes.fake import plants_on, stations_on
 from hal_fakes.http import HttpServer, serve
-from hal_fakes.http_charger import HttpCharger as Station
+from hal_fakes.http_charger import FakeHttpCharger as Station
 from hal_fakes.plants.charger import ChargerPlant, Reading
 from hal_fakes.plants.plant import FailureMode
 from hal_fakes.realtime import RealTime

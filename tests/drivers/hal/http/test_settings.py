@@ -3,7 +3,7 @@
 import msgspec
 import pytest
 
-from drivers.hal.http import Base, Settings, base, warnings
+from drivers.hal.http import Base, HttpSettings, base, warnings
 
 
 @pytest.mark.parametrize(
@@ -43,19 +43,19 @@ def test_a_text_that_is_not_an_address_is_refused_with_its_fix(text: str, hint: 
 
 
 def test_a_wrong_address_is_a_problem_of_the_settings() -> None:
-    [(path, text)] = Settings(api_base="tpu:0").problems()
+    [(path, text)] = HttpSettings(api_base="tpu:0").problems()
     assert path == ("api_base",)
     assert text == "port 0 does not exist: ports are 1 to 65535"
-    assert list(Settings(api_base="tpu").problems()) == []
+    assert list(HttpSettings(api_base="tpu").problems()) == []
 
 
 def test_the_default_timeout_and_scan_are_a_second() -> None:
-    made = msgspec.convert({"type": "http", "api_base": "tpu"}, Settings)
-    assert made == Settings(api_base="tpu", timeout_s=1.0, scan_s=1.0, token_file=None)
+    made = msgspec.convert({"type": "http", "api_base": "tpu"}, HttpSettings)
+    assert made == HttpSettings(api_base="tpu", timeout_s=1.0, scan_s=1.0, token_file=None)
 
 
 def test_a_setting_without_effect_is_refused() -> None:
-    made = Settings(api_base="tpu", ca_file="/etc/ca.pem", token_header="X-API-Key")
+    made = HttpSettings(api_base="tpu", ca_file="/etc/ca.pem", token_header="X-API-Key")
     assert list(made.problems()) == [
         (("ca_file",), "is for https: write api_base: https://…, or leave this out"),
         (("token_header",), "needs token_file: the file with what the header says"),
@@ -63,6 +63,8 @@ def test_a_setting_without_effect_is_refused() -> None:
 
 
 def test_a_token_that_everybody_can_read_on_the_way_is_warned_of() -> None:
-    plain, tls = (Settings(api_base=f"{way}://tpu", token_file="t") for way in ("http", "https"))
+    plain, tls = (
+        HttpSettings(api_base=f"{way}://tpu", token_file="t") for way in ("http", "https")
+    )
     assert [path for path, _ in warnings(plain)] == [("token_file",)]
     assert list(warnings(tls)) == []

@@ -11,7 +11,7 @@ import pytest
 import trustme
 
 from drivers.hal import HalError
-from drivers.hal.http import HttpBus, Settings
+from drivers.hal.http import HttpBus, HttpSettings
 
 
 class Answers(BaseHTTPRequestHandler):
@@ -51,7 +51,7 @@ class Site:
     def bus(self, **also: Any) -> HttpBus:
         """A bus to it."""
         return HttpBus(
-            Settings(
+            HttpSettings(
                 **{"api_base": self.base, "ca_file": str(self.ca_file), "timeout_s": 5.0, **also}
             )
         )

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from drivers.hal import HalError
-from drivers.hal.http import HttpBus, Settings, warnings
+from drivers.hal.http import HttpBus, HttpSettings, warnings
 from tests.drivers.hal.http.far_end import FarEnd, always, answer
 from tests.drivers.hal.http.test_bus import Clock
 
@@ -15,7 +15,7 @@ def test_a_token_is_read_from_its_file_for_each_call(tmp_path: Path) -> None:
     file = tmp_path / "token"
     file.touch(mode=0o600)
     with FarEnd(always(answer())) as far:
-        bus = HttpBus(Settings(api_base=f"127.0.0.1:{far.port}", token_file=str(file)), Clock())
+        bus = HttpBus(HttpSettings(api_base=f"127.0.0.1:{far.port}", token_file=str(file)), Clock())
         for token in ("first", "second"):
             file.write_text(f"{token}\n")
             bus.get_json("/state")
@@ -32,7 +32,7 @@ def test_a_token_file_without_a_token_is_an_error_that_does_not_show_its_content
     if held is not None:
         file.touch(mode=0o600)
         file.write_bytes(held)
-    bus = HttpBus(Settings(api_base="127.0.0.1:1", token_file=str(file)), Clock())
+    bus = HttpBus(HttpSettings(api_base="127.0.0.1:1", token_file=str(file)), Clock())
     with pytest.raises(HalError, match="token_file") as caught:
         bus.get_json("/state")
     assert "words" not in str(caught.value)
@@ -41,7 +41,7 @@ def test_a_token_file_without_a_token_is_an_error_that_does_not_show_its_content
 def test_a_pipe_in_place_of_a_token_file_keeps_nobody_waiting(tmp_path: Path) -> None:
     file = tmp_path / "token"
     os.mkfifo(file, 0o600)
-    bus = HttpBus(Settings(api_base="127.0.0.1:1", token_file=str(file)), Clock())
+    bus = HttpBus(HttpSettings(api_base="127.0.0.1:1", token_file=str(file)), Clock())
     with pytest.raises(HalError) as caught:
         bus.get_json("/state")
     assert str(caught.value) == (
@@ -57,7 +57,7 @@ def test_a_token_file_that_others_can_read_or_write_is_refused_and_not_sent(
     file.write_text("secret\n")
     file.chmod(mode)
     with FarEnd(always(answer())) as far:
-        bus = HttpBus(Settings(api_base=f"127.0.0.1:{far.port}", token_file=str(file)), Clock())
+        bus = HttpBus(HttpSettings(api_base=f"127.0.0.1:{far.port}", token_file=str(file)), Clock())
         with pytest.raises(HalError) as caught:
             bus.get_json("/state")
         bus.close()
@@ -66,6 +66,6 @@ def test_a_token_file_that_others_can_read_or_write_is_refused_and_not_sent(
 
 
 def test_a_token_over_plain_http_is_worth_a_warning() -> None:
-    assert list(warnings(Settings(api_base="tpu"))) == []
-    [(path, text)] = warnings(Settings(api_base="tpu", token_file="/etc/rmf-bridges/tpu.token"))
+    assert list(warnings(HttpSettings(api_base="tpu"))) == []
+    [(path, text)] = warnings(HttpSettings(api_base="tpu", token_file="/etc/rmf-bridges/tpu.token"))
     assert (path, "unencrypted" in text) == (("token_file",), True)

@@ -13,7 +13,7 @@ from typing import Any
 import msgspec
 import pytest
 
-from drivers.hal.modbus import ModbusBus, Serial, Settings, Tcp
+from drivers.hal.modbus import ModbusBus, ModbusSettings, Serial, Tcp
 from drivers.hal.modbus.watchdog import Watchdog
 from drivers.hal.points import HalError
 from tests.waiting import at_last
@@ -180,7 +180,7 @@ def bus_to(
     module_watchdog: dict[str, Any] | None = None,
 ) -> ModbusBus:
     """A bus to this port of this machine, whose pauses follow the clock and have no jitter."""
-    settings = Settings(
+    settings = ModbusSettings(
         tcp=Tcp(host="127.0.0.1", port=port) if isinstance(port, int) else None,
         serial=serial(port, ignore_echo) if isinstance(port, str) else None,
         timeout_s=timeout_s,

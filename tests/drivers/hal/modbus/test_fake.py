@@ -7,7 +7,7 @@ import pytest
 
 from bridges.kinds.door.signals import DoorOutputs, DoorSample
 from drivers import DriverError
-from drivers.door.dry_contact import DryContactDoor, Settings, create, wires
+from drivers.door.dry_contact import DryContactDoor, DryContactDoorSettings, create, wires
 from drivers.hal import modbus
 from drivers.hal.points import HalError
 from hal_fakes.modbus import ModbusServer
@@ -15,7 +15,7 @@ from hal_fakes.modbus.rtu import RtuLine
 from hal_fakes.plants.door import DoorPlant
 from hal_fakes.plants.plant import FAILURE_MODES, FailureMode
 from hal_fakes.realtime import RealTime
-from hal_fakes.wiring import Wiring
+from hal_fakes.wiring import PlantWiring
 from tests.drivers.hal.modbus.module import Time
 from tests.waiting import at_last, wait_until
 
@@ -25,7 +25,7 @@ OPEN = DoorSample(opened=True, closed=False)
 HOLD, RELEASE = DoorOutputs(hold_open=True), DoorOutputs(hold_open=False)
 
 
-def door_at(unit: int) -> Settings:
+def door_at(unit: int) -> DryContactDoorSettings:
     """A door's settings at this unit."""
     return msgspec.convert(
         {
@@ -35,7 +35,7 @@ def door_at(unit: int) -> Settings:
             },
             "outputs": {"hold_open": {"point": f"unit {unit} coil 16", "active": "high"}},
         },
-        Settings,
+        DryContactDoorSettings,
     )
 
 
@@ -52,7 +52,7 @@ class Site:
         )
         self.plants = self.world.plants
         wired = [
-            Wiring(self.plants[name], wires(s), modbus.canonical)
+            PlantWiring(self.plants[name], wires(s), modbus.canonical)
             for name, s in self.settings.items()
         ]
         self.server = (
@@ -62,7 +62,7 @@ class Site:
         )
         plain = {"type": "modbus", "timeout_s": TIMEOUT_S, **self.server.replace}
         self.clock = Time()
-        self.bus = modbus.ModbusBus(msgspec.convert(plain, modbus.Settings), self.clock)
+        self.bus = modbus.ModbusBus(msgspec.convert(plain, modbus.ModbusSettings), self.clock)
         self.doors: dict[str, DryContactDoor] = {
             name: create(name, s, self.bus) for name, s in self.settings.items()
         }

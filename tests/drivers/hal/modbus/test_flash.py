@@ -16,12 +16,12 @@ from bridges.settings.load import load
 from bridges.settings.sheets.findings import findings
 from bridges.settings.sheets.text import lines
 from drivers import DriverError
-from drivers.door.dry_contact import DryContactDoor, Settings, create, debounce, wires
+from drivers.door.dry_contact import DryContactDoor, DryContactDoorSettings, create, debounce, wires
 from drivers.hal import gpio, modbus
 from drivers.hal.points import Flash, HalError, Wire
 from hal_fakes.plants.door import DoorPlant
 from hal_fakes.realtime import RealTime
-from hal_fakes.wiring import Wiring
+from hal_fakes.wiring import PlantWiring
 from tests.drivers.benches import RS485, on_modbus
 from tests.drivers.hal.modbus.line import SerialModule, rtu
 from tests.drivers.hal.modbus.module import Module, Time, bus_to, door, frame
@@ -36,7 +36,7 @@ PULSE, BETWEEN, RELEASE = DoorOutputs(True), DoorOutputs(between_pulses=True), D
 SCAN_S = 0.125
 
 
-def pulsed(on_s: float = 0.7, every_s: float = 3.0) -> Settings:
+def pulsed(on_s: float = 0.7, every_s: float = 3.0) -> DryContactDoorSettings:
     """A door whose operator is triggered by pulses, at relay 0 of unit 1."""
     plain = {
         "inputs": {
@@ -46,7 +46,7 @@ def pulsed(on_s: float = 0.7, every_s: float = 3.0) -> Settings:
         "outputs": {"hold_open": {"point": COIL, "active": "high", "flash": FLASH.point}},
         "pulse": {"on_s": on_s, "every_s": every_s},
     }
-    return msgspec.convert(plain, Settings)
+    return msgspec.convert(plain, DryContactDoorSettings)
 
 
 def claimed(module: Module, **settings: Any) -> DryContactDoor:
@@ -248,7 +248,7 @@ def site(serial: modbus.Serial | None, on_s: float) -> Iterator[tuple[DryContact
     settings = pulsed(on_s, every_s=600.0)
     plant = DoorPlant("door", wires(settings), open_s=0.05, close_s=0.05, auto_close_s=0.05)
     world = RealTime({"door": plant})
-    wired = [Wiring(plant, wires(settings), modbus.canonical)]
+    wired = [PlantWiring(plant, wires(settings), modbus.canonical)]
     with on_modbus(world, wired, serial, timeout_s=2.0) as (bus, _):
         driver = create("door", settings, bus)
         driver.open()

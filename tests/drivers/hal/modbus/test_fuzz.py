@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from bridges.kinds.door.signals import DoorOutputs
 from drivers import DriverError
-from drivers.door.dry_contact import DryContactDoor, Settings, create
+from drivers.door.dry_contact import DryContactDoor, DryContactDoorSettings, create
 from drivers.hal.modbus import ModbusBus
 from drivers.hal.modbus.points import Point
 from drivers.hal.points import HalError
@@ -28,7 +28,7 @@ DOOR = msgspec.convert(
         },
         "outputs": {"hold_open": {"point": "unit 1 coil 0", "active": "high"}},
     },
-    Settings,
+    DryContactDoorSettings,
 )
 
 Spoil = Callable[[bytes, bytes], bytes | None]

@@ -4,7 +4,7 @@ import struct
 
 import pytest
 
-from drivers.hal.modbus.lines import Lines
+from drivers.hal.modbus.lines import ModbusLines
 from drivers.hal.modbus.points import Point
 from drivers.hal.modbus.registers import REGISTERS, TABLES, WRITABLE, at, place
 from drivers.hal.modbus.wire import READS, WRITES
@@ -73,7 +73,7 @@ def test_the_echo_of_another_write_does_not_count_as_a_success(module: Module, p
 
 
 def test_closing_what_was_never_claimed_sends_nothing(module: Module) -> None:
-    Lines(bus_to(module.port), {}, {"command": H9}, {"command": 0}).close()
+    ModbusLines(bus_to(module.port), {}, {"command": H9}, {"command": 0}).close()
     assert module.asked == []
 
 

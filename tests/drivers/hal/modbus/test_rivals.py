@@ -8,11 +8,11 @@ import msgspec
 import pytest
 
 from bridges.kinds.door import core
-from bridges.kinds.door.memory import DoorLimits, Memory
+from bridges.kinds.door.memory import DoorLimits, DoorMemory
 from bridges.kinds.door.signals import DoorOutputs, OpenRequested
 from bridges.kinds.shared.decision import IoFailed, Sampled, WriteFailed
 from drivers import DriverError
-from drivers.door.dry_contact import Settings, create
+from drivers.door.dry_contact import DryContactDoorSettings, create
 from tests.drivers.hal.modbus.module import Module, Time, bus_to
 
 DOOR = msgspec.convert(
@@ -23,7 +23,7 @@ DOOR = msgspec.convert(
         },
         "outputs": {"hold_open": {"point": "unit 1 coil 0", "active": "high"}},
     },
-    Settings,
+    DryContactDoorSettings,
 )
 SCAN_S = 0.1
 NAMED = (
@@ -41,7 +41,7 @@ class Door:
         self.clock = Time()
         self.driver = create("front", DOOR, bus_to(module.port, self.clock))
         self.limits = DoorLimits()
-        self.memory: Memory = core.initial(self.limits, 0.0)
+        self.memory: DoorMemory = core.initial(self.limits, 0.0)
         self.rival: bool | None = None
         self.faults: list[str] = []
         self.driver.open()

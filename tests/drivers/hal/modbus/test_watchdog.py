@@ -27,10 +27,10 @@ from hal_fakes.modbus.dead_man import (
     TIME,
     TRIGGER,
     TRIPPED,
-    DeadMan,
+    ModuleWatchdog,
 )
 from hal_fakes.realtime import RealTime
-from hal_fakes.wiring import Wiring
+from hal_fakes.wiring import PlantWiring
 from tests.drivers.door.contract import CLOSED, HOLD, OPEN, Bench, quick
 from tests.drivers.door.test_contract import dry
 from tests.drivers.hal.modbus.module import Time
@@ -59,8 +59,8 @@ class Site:
         self.settings = dry(("unit 1 discrete input 0", "unit 1 discrete input 1", "unit 1 coil 0"))
         self.world = RealTime({"door": quick("door", wires(self.settings))})
         plant = self.world.plants["door"]
-        self.dead_men = [DeadMan(unit) for unit in units]
-        wiring = Wiring(plant, wires(self.settings), modbus.canonical)
+        self.dead_men = [ModuleWatchdog(unit) for unit in units]
+        wiring = PlantWiring(plant, wires(self.settings), modbus.canonical)
         self.server = ModbusServer([wiring, *self.dead_men], slow_s=1.0)
         self.dog: dict[str, Any] = {"units": [1], "habits": habits(time)}
         self.buses: list[modbus.ModbusBus] = []
@@ -70,7 +70,7 @@ class Site:
         """A new daemon."""
         plain = {"type": "modbus", "module_watchdog": self.dog, **self.server.replace}
         clock = Time()
-        self.bus = modbus.ModbusBus(msgspec.convert(plain, modbus.Settings), clock)
+        self.bus = modbus.ModbusBus(msgspec.convert(plain, modbus.ModbusSettings), clock)
         self.buses.append(self.bus)
         driver = create("door", self.settings, self.bus)
         self.bench = Bench(driver, self.world.plants["door"], clock)

@@ -13,9 +13,9 @@ import msgspec
 import pytest
 
 from bridges.settings.load import load
-from drivers.hal.modbus import Serial, Settings, Tcp, warnings
+from drivers.hal.modbus import ModbusSettings, Serial, Tcp, warnings
 from drivers.hal.modbus.tcp import Connection
-from drivers.hal.modbus.wire import NoReply, Question, Unreachable
+from drivers.hal.modbus.wire import NoReply, UnitRequest, Unreachable
 from tests.drivers.hal.modbus.module import Module, door
 
 
@@ -50,7 +50,7 @@ def test_a_reset_connection_does_not_count_as_a_reply() -> None:
         far_end.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
         far_end.close()
         with pytest.raises(NoReply, match="the connection broke"):
-            connection.ask(Question(1, 1, 0, 1))
+            connection.ask(UnitRequest(1, 1, 0, 1))
         connection.close()
 
 
@@ -85,7 +85,7 @@ LINE = {"port": "/dev/serial/by-id/a", "baudrate": 19200, "parity": "none", "sto
     ],
 )
 def test_a_bus_is_at_one_place(places: dict[str, Any], problems: list[str]) -> None:
-    settings = msgspec.convert({"type": "modbus", **places}, Settings)
+    settings = msgspec.convert({"type": "modbus", **places}, ModbusSettings)
     assert [text for _, text in settings.problems()] == problems
 
 
@@ -98,7 +98,7 @@ def test_a_serial_line_says_all_of_its_settings() -> None:
 def test_a_port_is_a_path_and_preferably_a_stable_one() -> None:
     def found(port: str) -> tuple[list[Any], list[Any]]:
         line = msgspec.convert({**LINE, "port": port}, Serial)
-        settings = Settings(serial=line)
+        settings = ModbusSettings(serial=line)
         return list(line.problems()), list(warnings(settings))
 
     text = (
@@ -142,7 +142,7 @@ def test_check_warns_of_a_port_that_may_become_another(tmp_path: Path) -> None:
 
 def test_the_defaults_bound_what_a_dead_module_can_cost() -> None:
     plain = {"type": "modbus", "tcp": {"host": "192.168.1.50"}}
-    assert msgspec.convert(plain, Settings) == Settings(
+    assert msgspec.convert(plain, ModbusSettings) == ModbusSettings(
         tcp=Tcp(host="192.168.1.50", port=502), timeout_s=0.3, retries=1, scan_s=0.1
     )
 
@@ -173,9 +173,9 @@ def test_the_first_request_loads_nothing_more_of_the_vendors_library(either: Mod
 def test_the_vendors_libraries_are_loaded_with_the_first_bus_and_their_server_never() -> None:
     before = "import drivers.hal.modbus as m, drivers.door.dry_contact, drivers.door.register"
     assert loaded(before) == set()
-    tcp = loaded(f"{before}; m.ModbusBus(m.Settings(tcp=m.Tcp(host='a')))")
+    tcp = loaded(f"{before}; m.ModbusBus(m.ModbusSettings(tcp=m.Tcp(host='a')))")
     line = "m.Serial(port='/dev/a', baudrate=9600, parity='none', stopbits=1)"
-    rtu = loaded(f"{before}; m.ModbusBus(m.Settings(serial={line}))")
+    rtu = loaded(f"{before}; m.ModbusBus(m.ModbusSettings(serial={line}))")
     assert "pymodbus.framer.socket" in tcp
     assert {m for m in tcp if m.startswith(("pymodbus.server", "aiohttp", "serial"))} == set()
     assert {m for m in rtu if m.startswith(("pymodbus.server", "aiohttp"))} == set()

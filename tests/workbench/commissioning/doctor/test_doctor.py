@@ -17,7 +17,7 @@ from typing import Any
 import pytest
 
 from bridges import cli
-from bridges.host.directories import Places
+from bridges.host.directories import Directories
 from bridges.messages.definitions import DoorMode, DoorModeValue, DoorState, Time
 from bridges.messages.topics import DOOR_REQUESTS, DOOR_STATES
 from bridges.runtime import record
@@ -156,7 +156,7 @@ def test_where_a_daemon_cannot_be_seen_no_bus_is_opened(
 def test_after_a_death_the_outputs_come_first(
     tapped: Tapped, module: Module, tmp_path: Path
 ) -> None:
-    places = Places(tmp_path / "run", tmp_path / "run")
+    places = Directories(tmp_path / "run", tmp_path / "run")
     Records(places, tapped.file).write(record.of(load(tapped.file)))
     code, found = doctor(tapped.file, tmp_path, "--listen", "0")
     assert (code, found["daemon"]) == (
@@ -187,7 +187,7 @@ def test_a_doctor_that_dies_in_its_kill_test_leaves_nothing_on(
         ended.send_signal(number)
         wait_until(lambda: module.relay() == [True, False], "the relay is off")
         assert ended.wait(PATIENCE_S) in (-number, 130)
-    places = Places(tmp_path / "run", tmp_path / "run")
+    places = Directories(tmp_path / "run", tmp_path / "run")
     wait_until(lambda: not Records(places, module.file).unreleased(), "it is verified off")
 
 
@@ -198,7 +198,7 @@ def test_the_kill_test_switches_nothing_on_a_dead_bus(module: Module, tmp_path: 
     assert level == "wrong"
     assert text.startswith("ward_door hold_open was not switched on: no Modbus TCP connection")
     module.tell("fail", "ward_door", "server", "ok")
-    places = Places(tmp_path / "run", tmp_path / "run")
+    places = Directories(tmp_path / "run", tmp_path / "run")
     wait_until(lambda: not Records(places, module.file).unreleased(), "its guard ends")
 
 
@@ -403,7 +403,7 @@ def test_a_name_that_is_not_on_the_map_is_wrong(module: Module, tmp_path: Path) 
 def test_a_simulation_is_named_and_looked_for_on_loopback(tmp_path: Path) -> None:
     told = {"simulated": True, "version": "1", "heard_by": {"lift_states": 0}, "devices": {}}
     with runtime.served(tmp_path / "lift_a", told) as folder:
-        found = served(Places(folder, folder), tmp_path / "lift_a.yaml", time.time())
+        found = served(Directories(folder, folder), tmp_path / "lift_a.yaml", time.time())
     assert found.simulated
     assert [(one.level, one.found) for one in found.findings][1:] == [
         ("note", "it is a SIMULATION")

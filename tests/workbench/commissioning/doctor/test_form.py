@@ -6,7 +6,7 @@ import pytest
 
 from bridges.settings.load import load
 from workbench.commissioning.doctor.finding import note, ok
-from workbench.commissioning.doctor.form import STEPS, Step, form
+from workbench.commissioning.doctor.form import STEPS, FormStep, form
 from workbench.commissioning.doctor.machine import Machine
 
 CONFIG = Path(__file__).parents[4] / "config"
@@ -31,5 +31,5 @@ def test_the_form_has_the_machine_the_findings_and_empty_steps_of_the_files_buse
 
 
 @pytest.mark.parametrize("step", STEPS, ids=lambda step: step.number)
-def test_each_step_is_on_the_page(step: Step) -> None:
+def test_each_step_is_on_the_page(step: FormStep) -> None:
     assert f"### {step.number}: " in PAGE.read_text(encoding="utf-8")

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from bridges.host.directories import Places
+from bridges.host.directories import Directories
 from tests.workbench.commissioning.doctor.made_up import OTHERS, OURS, MadeUp
 from workbench.commissioning.doctor import health
 from workbench.commissioning.doctor.can import interface
@@ -130,7 +130,7 @@ def test_a_disk_is_judged_by_what_is_free(found: os.statvfs_result, level: str) 
 def test_a_directory_that_the_user_may_not_write_is_wrong(tmp_path: Path) -> None:
     made = MadeUp(tmp_path, gids=[OTHERS])
     (tmp_path / "run").mkdir(mode=0o755)
-    places = Places(Path("/run/rmf-bridge/lift"), Path("/run/rmf-bridge/lift"))
+    places = Directories(Path("/run/rmf-bridge/lift"), Path("/run/rmf-bridge/lift"))
     found = list(health.directories(made.machine, places, made.user))
     assert [one.found for one in found if one.level == "wrong"] == [
         "pi may not write in /run, where /run/rmf-bridge/lift belongs"

@@ -6,12 +6,12 @@ from workbench.commissioning.walk.core import (
     ON_S,
     ByEye,
     Event,
-    Lost,
-    Memory,
-    Read,
-    Step,
+    InputsLost,
+    InputsRead,
     Switch,
     Tick,
+    WalkMemory,
+    WalkStep,
     decide,
     output_of,
 )
@@ -28,8 +28,8 @@ def _fire(sample: Sample) -> str:
 
 
 STEPS = [
-    Step("hold", "holds the door", "hold on", "the door is open", lambda s: s.open, _fire),
-    Step("lamp", "lights a lamp", "lamp on", "the lamp is lit", None, _fire),
+    WalkStep("hold", "holds the door", "hold on", "the door is open", lambda s: s.open, _fire),
+    WalkStep("lamp", "lights a lamp", "lamp on", "the lamp is lit", None, _fire),
 ]
 
 
@@ -38,7 +38,7 @@ class Walk:
 
     def __init__(self) -> None:
         self.now = 0.0
-        self.memory = Memory()
+        self.memory = WalkMemory()
         self.sample: Sample | None = Sample()
         self.history: list[tuple[float, str]] = []
         self.until(0.1)
@@ -52,7 +52,7 @@ class Walk:
     def until(self, at: float) -> None:
         while self.now < at:
             self.now = round(self.now + 0.1, 1)
-            self.does(Tick() if self.sample is None else Read(self.sample))
+            self.does(Tick() if self.sample is None else InputsRead(self.sample))
 
 
 def test_an_output_goes_off_by_itself() -> None:
@@ -78,7 +78,7 @@ def test_the_same_key_switches_it_off_and_never_two_are_on() -> None:
 
 def test_without_a_reading_nothing_is_switched_on() -> None:
     walk = Walk()
-    walk.does(Lost("no reply"))
+    walk.does(InputsLost("no reply"))
     walk.does(Switch(0))
     assert walk.history == [(0.1, "off")]
     assert walk.memory.says == "hold stays off: no reply"
@@ -89,7 +89,7 @@ def test_a_reading_that_fails_or_grows_old_switches_it_off() -> None:
     for walk in (lost, old):
         walk.does(Switch(0))
         walk.until(1.0)
-    lost.does(Lost("no reply"))
+    lost.does(InputsLost("no reply"))
     old.sample = None
     old.until(3.0)
     assert lost.history[-1] == (1.0, "off")

@@ -7,20 +7,22 @@ import pytest
 
 from bridges.host.columns import width
 from drivers.hal.points import Wire
-from workbench.commissioning.walk.bench import Bench, Input
-from workbench.commissioning.walk.core import Step, Switch, decide
+from workbench.commissioning.walk.bench import Bench, ContactReading
+from workbench.commissioning.walk.core import Switch, WalkStep, decide
 from workbench.commissioning.walk.screen import DOWN, Room, Screen, room
 
 FLOORS = [f"L{n}" for n in range(1, 13)]
 STEPS = [
-    Step(f"call {floor}", f"calls the car to {floor}", floor, f"the car is at {floor}", None, str)
+    WalkStep(
+        f"call {floor}", f"calls the car to {floor}", floor, f"the car is at {floor}", None, str
+    )
     for floor in FLOORS
 ]
 
 
-def inputs(count: int) -> list[Input]:
+def inputs(count: int) -> list[ContactReading]:
     found = [
-        Input(Wire(f"floor_parity{n}", "in", f"J8:{n}", active="high"), f"BCM{n}")
+        ContactReading(Wire(f"floor_parity{n}", "in", f"J8:{n}", active="high"), f"BCM{n}")
         for n in range(count)
     ]
     for n, one in enumerate(found):
@@ -28,7 +30,7 @@ def inputs(count: int) -> list[Input]:
     return found
 
 
-def screen(keys: str = "", count: int = 12, steps: list[Step] = STEPS) -> Screen:
+def screen(keys: str = "", count: int = 12, steps: list[WalkStep] = STEPS) -> Screen:
     nothing: Any = None
     bench = Bench(nothing, nothing, inputs(count), steps, "")
     found = Screen("Lift1", bench)

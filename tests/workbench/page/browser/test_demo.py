@@ -5,7 +5,7 @@ from urllib.parse import urlsplit
 
 import pytest
 
-from hal_fakes.demo.daemons import Page, stop_all
+from hal_fakes.demo.daemons import PageProcess, stop_all
 from tests.workbench.page.browser.test_safety import FORM, ask, form
 
 pytestmark = pytest.mark.browser
@@ -16,7 +16,7 @@ def test_the_printed_address_opens_whatever_the_page_logs_before_it(
 ) -> None:
     monkeypatch.setenv("PAGE_PORT", "0")
     monkeypatch.delenv("PYTEST_CURRENT_TEST")
-    page = Page(tmp_path, module_domain, "correct horse")
+    page = PageProcess(tmp_path, module_domain, "correct horse")
     try:
         said = page.address()
         assert said.startswith("the page is at http://127.0.0.1:")

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from bridges.blackbox.incident import Incident, part
 from bridges.blackbox.mcap_write import write
-from bridges.blackbox.ring import Read
+from bridges.blackbox.ring import RingContent
 from bridges.blackbox.triggers import FAULT, REFUSED, Triggers
 from tests.blackbox.kept import keep
 from tests.site.day import Site
@@ -27,7 +27,7 @@ BEFORE_S, AFTER_S = 5.0, 12.0
 
 def incident(ring: Path) -> Incident | None:
     """The first fault of a daemon, or else the first refusal; None if all was well."""
-    read = Read(ring)
+    read = RingContent(ring)
     entries = list(read.entries())
     triggers = Triggers(60.0)
     notes = [note for entry in entries for note in triggers.take(entry) if note.at > BEFORE_S]
