@@ -8,7 +8,8 @@ here: the recorder's triggers, `send`, `watch`, `explain`, `judge` and the page.
     requesters.py   who asks for one device, and whether they still do
     device.py       what all kinds share: states, their pace and age, since when a fact is so
     lift.py door.py charger.py      each kind's requests and holders, and RMF's phases
-    all_devices.py  all devices
+    diagnosis.py    what nodes of ours say of a device or of themselves, on /diagnostics
+    all_devices.py  all devices, and the daemons that speak of themselves
 
 Each message gives `News`: what it changed, as values. Durations are in `limits.py`.
 """

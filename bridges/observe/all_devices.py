@@ -1,5 +1,6 @@
 """All devices that were heard, in bounds, whatever names are made up."""
 
+from collections import deque
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any, ClassVar, Generic, TypeVar
 
@@ -7,10 +8,12 @@ from bridges.messages import definitions as d
 from bridges.messages import words
 from bridges.messages.heard import Heard, Own
 from bridges.observe.charger import ObservedCharger
-from bridges.observe.device import News, ObservedDevice
+from bridges.observe.device import ObservedDevice
+from bridges.observe.diagnosis import Diagnosis, about, of_node, report
 from bridges.observe.door import ObservedDoor
 from bridges.observe.lift import ObservedLift
-from bridges.observe.limits import FORGOTTEN_S, MOST_DEVICES, SILENT_S, STEP_S
+from bridges.observe.limits import FORGOTTEN_S, MOST_DAEMONS, MOST_DEVICES, SILENT_S, STEP_S
+from bridges.observe.news import News
 from bridges.observe.requesters import Moment
 
 AnyDevice = ObservedDevice[Any]
@@ -25,6 +28,7 @@ class ObservedGraph(Generic[D]):
     Where there is no room, one that was only asked for gives way to one that has states, and one whose
     states stopped FORGOTTEN_S ago to a new one; otherwise those heard first stay. `crowded`: the kinds
     of which some had no room. `steps`: when the listener's clock was stepped, and by how much (s).
+    `nodes`: what daemons and coordinators of ours say of themselves, by `<node>: <device>`.
     """
 
     makes: ClassVar[Mapping[words.Kind, Callable[[str, Moment], Any]]]
@@ -35,6 +39,7 @@ class ObservedGraph(Generic[D]):
         self.now = Moment(0.0, 0.0)
         self.steps: list[tuple[Moment, float]] = []
         self.crowded: set[words.Kind] = set()
+        self.nodes: dict[str, Diagnosis] = {}
         self._most = most
         self._offset: float | None = None
         self._heartbeat: Heard | None = None
@@ -46,8 +51,10 @@ class ObservedGraph(Generic[D]):
         topic = heard.topic.rpartition("/")[2]
         if isinstance(message, d.SupervisorHeartbeat):
             self._heartbeat = heard
-        about = [*self._about(message, moment)]
-        return [(device, device.hear(moment, topic, message)) for device in about]
+        if isinstance(message, d.DiagnosticArray):
+            return [*self._diagnosed(message, moment)]
+        found = [*self._about(message, moment)]
+        return [(device, device.hear(moment, topic, message)) for device in found]
 
     def moment(self, heard: Heard | Own) -> Moment:
         """Its time. One that a recording has in the wrong order counts as of now."""
@@ -76,6 +83,16 @@ class ObservedGraph(Generic[D]):
         """A device of which nothing was heard yet."""
         made: D = self.makes[kind](name, self.began or self.now)
         return made
+
+    def _diagnosed(
+        self, message: d.DiagnosticArray, moment: Moment
+    ) -> Iterator[tuple[D, list[News]]]:
+        for status in message.status:
+            if of_node(status):
+                if node := report(self.nodes, MOST_DAEMONS, status, moment):
+                    deque(node.take(moment, status), 0)
+            elif (key := about(status)) in self.known:
+                yield self.known[key], self.known[key].diagnose(moment, status)
 
     def _about(self, message: d.Message, moment: Moment) -> Iterator[D]:
         if isinstance(message, d.SupervisorHeartbeat):

@@ -5,8 +5,9 @@ from typing import Final
 
 from bridges.messages import definitions as d
 from bridges.messages import words
-from bridges.observe.device import News, ObservedDevice, Wait
+from bridges.observe.device import ObservedDevice, Wait
 from bridges.observe.limits import UNSEEN_S
+from bridges.observe.news import News
 from bridges.observe.requesters import Fact, Moment
 
 NOBODY: Final = "nobody"

@@ -3,44 +3,16 @@
 from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Iterator
-from dataclasses import dataclass
-from typing import ClassVar, Generic, Literal, NamedTuple, TypeVar
+from typing import ClassVar, Generic, NamedTuple, TypeVar
 
 from bridges.messages import definitions as d
 from bridges.messages import words
-from bridges.observe.limits import OLD_S, SILENT_S
+from bridges.observe.diagnosis import Diagnosis, report
+from bridges.observe.limits import MOST_NODES, OLD_S, SILENT_S
+from bridges.observe.news import News
 from bridges.observe.requesters import DeviceRequester, DeviceRequesters, Fact, Moment
 
 T = TypeVar("T", d.LiftState, d.DoorState, d.ChargerState)
-
-What = Literal[
-    "first state",  # of a device that was silent until then
-    "states again",  # `gap_s` after the one before
-    "read",  # the age of its readings is another now: `text`
-    "changed",  # facts in `changed` are others than in the state before
-    "asks",  # for something new; of a lift: in the mode `text`
-    "passed on",  # the supervisor asks for something new
-    "ends",  # a requester; `passed_on` by the supervisor
-    "has",  # a requester has it now
-    "lost",  # `text` had it until now
-    "met",  # RMF sees what a requester waits for
-    "gone",  # a requester asks no more, without END
-    "over",  # a requester's visit
-]
-
-
-@dataclass(frozen=True, slots=True)
-class News:
-    """One thing that a message changed. `who`: the requester, as a text; `requester`: its memory, if it
-    has asked. `text`: as `What` says; `gap_s`: how long that had lasted."""
-
-    what: What
-    at: Moment
-    who: str = ""
-    text: str = ""
-    requester: DeviceRequester | None = None
-    gap_s: float = 0.0
-    passed_on: bool = False
 
 
 class Check(NamedTuple):
@@ -74,6 +46,7 @@ class ObservedDevice(ABC, Generic[T]):
 
     `state`, `before`: the two latest states; `gap_s` lies between them. `first_state`, `last_state`:
     when the first and the latest came. `changed`: fact -> its value before the latest state.
+    `diagnoses`: what nodes of ours say of it, by `<node>: <device>`.
     """
 
     kind: ClassVar[words.Kind]
@@ -90,6 +63,7 @@ class ObservedDevice(ABC, Generic[T]):
         self.stamped_at = self.stamp_age_s = 0.0
         self.reading = Fact("", began)
         self.changed: dict[str, str] = {}
+        self.diagnoses: dict[str, Diagnosis] = {}
         self._back: deque[tuple[float, float]] = deque(maxlen=8)
 
     def hear(self, moment: Moment, topic: str, message: d.Message) -> list[News]:
@@ -97,6 +71,15 @@ class ObservedDevice(ABC, Generic[T]):
         if isinstance(message, words.Stated):
             return [*self._hear_state(moment, message)]  # type: ignore[arg-type]
         return [*self._hear_other(moment, topic, message)]
+
+    def diagnose(self, moment: Moment, status: d.DiagnosticStatus) -> list[News]:
+        """Take a status about it, of a node of ours."""
+        seen = status.name in self.diagnoses or moment.at - self.began.at > SILENT_S
+        moment = Moment(moment.at, moment.wall, seen)
+        said = report(self.diagnoses, MOST_NODES, status, moment)
+        if said is None:
+            return []
+        return list(said.take(moment, status, self.text))
 
     def text(self, name: str) -> str:
         """A name from the network as it is remembered; `explain` keeps what can be shown."""

@@ -6,8 +6,9 @@ from typing import Final
 
 from bridges.messages import definitions as d
 from bridges.messages import words
-from bridges.observe.device import Check, News, ObservedDevice, Wait
+from bridges.observe.device import Check, ObservedDevice, Wait
 from bridges.observe.limits import ASKS_WITHIN_S, MOST_HOLDERS
+from bridges.observe.news import News
 from bridges.observe.requesters import DeviceRequester, Fact, Moment
 
 OPEN: Final = "open"

@@ -24,6 +24,8 @@ OLD_S: Final = 3.0
 """A reading of this age is old: three polls were missed. One this far ahead is of another clock."""
 CLOCKS_DIFFER_S: Final = 5.0
 """A request whose stamp is this far off comes from another clock."""
+QUIET_S: Final = 60.0
+"""A refusal that comes again within this time is no news."""
 STEP_S: Final = 2.0
 """A wall clock that moves this much against the steady one was stepped."""
 
@@ -31,5 +33,12 @@ MOST_REQUESTERS: Final = 100
 """Of one device; a site has some dozens of robots."""
 MOST_HOLDERS: Final = 64
 """Of one door."""
+MOST_NODES: Final = 8
+"""Of ours, that speak of one device."""
+MOST_DAEMONS: Final = 500
+MOST_VALUES: Final = 100
+"""Of one diagnosis; ours have a third of it."""
+MOST_CODES: Final = 20
+"""Of faults and reasons in one diagnosis."""
 MOST_DEVICES: Final = 300
 """Of each kind; a large hospital has 200 doors."""

@@ -24,13 +24,11 @@ from bridges.messages.definitions import (
     KeyValue,
     Time,
 )
-from bridges.messages.words import KINDS, Kind
+from bridges.observe.diagnosis import PASSIVE, SIMULATED
 from bridges.runtime.subject import Status
 
 MOST: Final = 100
 """At most this many devices: a supervisor learns names from the network, which may flood it."""
-SIMULATED: Final = "SIMULATED"
-PASSIVE: Final = "PASSIVE"
 CONTACTS: Final = "contacts"
 """Only in the status file: on the graph they would be most of the traffic."""
 
@@ -42,24 +40,6 @@ def diagnosis(
     statuses = [_daemon(node, kind, daemon)]
     statuses += [_device(node, kind, *named) for named in islice(devices.items(), MOST)]
     return DiagnosticArray(Header(at), tuple(statuses))
-
-
-def faults(status: DiagnosticStatus) -> tuple[str, ...]:
-    """The codes of the faults in a device's status."""
-    shown = status.message if status.level == DiagnosticLevel.ERROR else ""
-    return tuple(code for code in shown.split(", ") if code)
-
-
-def kind_in(status: DiagnosticStatus) -> str:
-    """The kind of the daemon of ours that says it; "" for another's."""
-    return next((pair.value for pair in status.values if pair.key == "kind"), "")
-
-
-def about(status: DiagnosticStatus) -> tuple[Kind, str] | None:
-    """The device that a status of ours is about; of a supervisor: its lift or door."""
-    kind = kind_in(status).removesuffix("_supervisor")
-    found = next((known for known in KINDS if known == kind), None)
-    return (found, status.hardware_id) if found else None
 
 
 def _daemon(node: str, kind: str, status: Status) -> DiagnosticStatus:

@@ -6,7 +6,8 @@ import pytest
 
 from bridges.messages import definitions as d
 from bridges.messages.topics import DIAGNOSTICS, DOOR_STATES
-from bridges.runtime.diagnostics import MOST, diagnosis, faults
+from bridges.observe.diagnosis import faults
+from bridges.runtime.diagnostics import MOST, diagnosis
 from hal_fakes.wire import join
 from tests.runtime.site import PATIENT, SERVICE, Module, daemon
 from tests.waiting import wait_until

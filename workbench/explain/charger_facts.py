@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from bridges.kinds.charger import refusals
 from bridges.messages.stamps import in_seconds
 from bridges.observe.charger import NOBODY, ObservedCharger
-from bridges.observe.device import News
+from bridges.observe.news import News
 from bridges.observe.requesters import Moment
 from workbench.explain.device import Device
 from workbench.explain.rows import label

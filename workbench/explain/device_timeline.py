@@ -16,18 +16,26 @@ from bridges.messages import definitions as d
 from bridges.messages import words
 from bridges.messages.heard import Heard, Own
 from bridges.messages.words import Kind
+from bridges.observe.device import reading_age
+from bridges.observe.diagnosis import Diagnosis, about, report
 from bridges.observe.door import listed
-from bridges.observe.limits import ASKS_WITHIN_S, OLD_S, STEP_S
-from bridges.runtime import diagnostics
-from workbench.explain import state_tones
+from bridges.observe.limits import ASKS_WITHIN_S, MOST_NODES, STEP_S
+from bridges.observe.requesters import Moment
 from workbench.explain.noted import levels, noted
 from workbench.explain.rows import LaneRow, label
+from workbench.explain.state_tones import tone
 from workbench.explain.timeline import LANES, Lane, LaneName, Level, Timeline, Tone
 
 MOST_ROWS: Final = 12
 """The most rows of a lane: a flood of made-up requesters or faults must not fill a page."""
 STAMP: Final = "stamp"
 """The row of `faults` for states that are too old."""
+AGES: Final = {
+    "": "",
+    "was never read": "never read",
+    "is old": "the reading is old",
+    "is from the future": "the stamp is in the future",
+}
 SUPERVISOR: Final = "supervisor"
 """The row of `requests` for what the supervisor passes on to the device's own daemon."""
 
@@ -64,7 +72,7 @@ class Drawing:
         self._noted: set[str] = set()
         self._destination = ""
         self._on: dict[tuple[str, str], str] = {}
-        self._faulty: dict[str, frozenset[str]] = {}
+        self._said: dict[str, Diagnosis] = {}
 
     def take(self, heard: Heard | Level | Own) -> None:
         """Take the next one. One that a recording has in the wrong order counts as of now."""
@@ -123,9 +131,9 @@ class Drawing:
             rows[part] = LaneRow(keeps_s, fills=fills, past_s=self._past_s)
         return rows[part]
 
-    def _say(self, lane: LaneName, text: str, tone: Tone) -> None:
+    def _say(self, lane: LaneName, text: str, looks: Tone) -> None:
         """A lane of one row that a state fills."""
-        self._row(lane, fills=True).say(self._now, label(text), tone)
+        self._row(lane, fills=True).say(self._now, label(text), looks)
 
     # ---- what our daemon noted
 
@@ -133,9 +141,9 @@ class Drawing:
         if level.lane not in self._noted:  # more exact than diagnostics, which come once a second
             self._noted.add(level.lane)
             self._rows[level.lane].clear()
-        tone: Tone = "wrong" if level.lane == "faults" else "works"
+        looks: Tone = "wrong" if level.lane == "faults" else "works"
         row = self._row(level.lane, level.name, keeps_s=float("inf"))
-        row.say(self._now, label(level.value), tone)
+        row.say(self._now, label(level.value), looks)
 
     # ---- what was heard
 
@@ -165,32 +173,28 @@ class Drawing:
                 self._lift(state)
             case d.DoorState():
                 mode = state.current_mode.value
-                self._say("door", words.plain(d.DoorModeValue, mode), state_tones.door(mode))
+                self._say("door", words.plain(d.DoorModeValue, mode), tone(d.DoorModeValue, mode))
             case d.ChargerState():
                 said = words.plain(d.ChargerStateValue, state.state)
                 text = f"{said}: {state.error_message}" if state.error_message else said
                 self._say("sessions", words.holder(state), "held")
-                self._say("mode", text, state_tones.charger(state.state))
+                self._say("mode", text, tone(d.ChargerStateValue, state.state))
 
     def _age(self, stamped_at: float, wall: float) -> None:
         """A state whose reading is old, or from another clock, is shown as a fault of its own."""
-        text = "" if stamped_at else "never read"
-        if stamped_at and wall - stamped_at > OLD_S:
-            text = "the reading is old"
-        elif wall - stamped_at < -OLD_S:
-            text = "the stamp is in the future"
+        text = AGES[reading_age(stamped_at, wall)]
         if text or STAMP in self._rows["faults"]:
             self._row("faults", STAMP).say(self._now, text, "wrong")
 
     def _lift(self, state: d.LiftState) -> None:
         floor, door = state.current_floor, state.door_state
         motion, mode = state.motion_state, state.current_mode
-        runs = state_tones.motion(motion)
+        runs = tone(d.LiftMotion, motion)
         self._say("sessions", state.session_id, "held")
         self._say("floors", floor or "?", _floor(floor, runs))
-        self._say("door", words.plain(d.LiftDoor, door), state_tones.lift_door(door))
+        self._say("door", words.plain(d.LiftDoor, door), tone(d.LiftDoor, door))
         self._say("motion", words.plain(d.LiftMotion, motion), runs)
-        self._say("mode", words.word(d.LiftMode, mode), state_tones.lift_mode(mode))
+        self._say("mode", words.word(d.LiftMode, mode), tone(d.LiftMode, mode))
         if state.destination_floor not in ("", self._destination):
             to = label(f"to {state.destination_floor}")
             self._row("floors", fills=True).mark(self._now, to, "asks")
@@ -236,29 +240,28 @@ class Drawing:
                 row.say(self._now, "", "held")
 
     def _diagnosis(self, status: d.DiagnosticStatus) -> None:
-        if diagnostics.about(status) != (self._kind, self._device):
+        """A device and its supervisor may report the same fault; it lasts while either has it."""
+        now = Moment(self._now, self._wall + self._now)
+        ours = about(status) == (self._kind, self._device)
+        said = report(self._said, MOST_NODES, status, now) if ours else None
+        if said is None:
             return
-        values = {pair.key: pair.value for pair in status.values}
+        news = [*said.take(now, status)]
         if "faults" not in self._noted:
-            self._faults(status, values)
-        if "relays" not in self._noted and "outputs" in values:
-            on = dict(_outputs(values["outputs"]))
+            last = {code for one in self._said.values() for code in one.faults}
+            over = {one.text for one in news if one.what == "fault over"} - last
+            on = {code: said.values.get(code) or code for code in said.faults}
+            self._levels("faults", on, over)
+        if "relays" not in self._noted and "outputs" in said.values:
+            on = dict(_outputs(said.values["outputs"]))
             self._levels("relays", on, self._rows["relays"].keys() - on.keys())
 
-    def _faults(self, status: d.DiagnosticStatus, values: Mapping[str, str]) -> None:
-        """A device and its supervisor may report the same fault; it lasts while either has it."""
-        found = {code: values.get(code) or code for code in diagnostics.faults(status)}
-        before = self._faulty.get(status.name, frozenset())
-        if status.name in self._faulty or len(self._faulty) < MOST_ROWS:
-            self._faulty[status.name] = frozenset(found)
-        self._levels("faults", found, before - frozenset().union(*self._faulty.values()))
-
     def _levels(self, lane: LaneName, on: Mapping[str, str], over: Iterable[str]) -> None:
-        tone: Tone = "wrong" if lane == "faults" else "works"
+        looks: Tone = "wrong" if lane == "faults" else "works"
         for name, text in on.items():
-            self._row(lane, name).say(self._now, label(text), tone)
+            self._row(lane, name).say(self._now, label(text), looks)
         for name in over:
-            self._row(lane, name).say(self._now, "", tone)
+            self._row(lane, name).say(self._now, "", looks)
 
 
 def _floor(floor: str, runs: Tone) -> Tone:

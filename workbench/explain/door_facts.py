@@ -1,7 +1,7 @@
 """What was heard of one door, and its story."""
 
-from bridges.observe.device import News
 from bridges.observe.door import OPEN, SUPERVISOR, ObservedDoor
+from bridges.observe.news import News
 from bridges.observe.requesters import Moment
 from workbench.explain.device import Device
 from workbench.explain.lift_facts import moves

@@ -15,9 +15,9 @@ from bridges.messages import definitions as d
 from bridges.messages.heard import Heard, Own
 from bridges.messages.words import KINDS, Kind
 from bridges.observe.all_devices import Key, ObservedGraph
-from bridges.observe.limits import MOST_DEVICES, SILENT_S
+from bridges.observe.diagnosis import COORDINATOR
+from bridges.observe.limits import MOST_DEVICES
 from bridges.observe.requesters import Moment
-from bridges.runtime import diagnostics
 from workbench.explain import answer as common
 from workbench.explain import charger, door, lift
 from workbench.explain.answer import Answer, Remedies
@@ -58,7 +58,6 @@ class HeardDevices(ObservedGraph[Device]):
         self._name = name
         self._session = session
         self._others: dict[Kind, dict[str, None]] = {kind: {} for kind in KINDS}
-        self._coordinator: tuple[Moment, Mapping[str, str]] | None = None
 
     def take(self, heard: Heard | Own) -> None:
         """The next message, or the next text of our own recorder's."""
@@ -67,12 +66,8 @@ class HeardDevices(ObservedGraph[Device]):
             return
         self.messages += 1
         self.hear(heard)
-        match heard.message:
-            case d.DiagnosticStatus():
-                self._refusal(self.now, heard.message)
-            case d.DiagnosticArray():
-                for status in heard.message.status:
-                    self._diagnose(self.now, status)
+        if isinstance(heard.message, d.DiagnosticStatus):
+            self._refusal(self.now, heard.message)
 
     def story_from(self, at: float) -> None:
         """Leave everything before this time (s) out of the stories."""
@@ -165,17 +160,6 @@ class HeardDevices(ObservedGraph[Device]):
         if refusal is not None and isinstance(found, ChargerFacts):
             found.refused(moment, refusal)
 
-    def _diagnose(self, moment: Moment, status: d.DiagnosticStatus) -> None:
-        kind = diagnostics.kind_in(status)
-        of_daemon = status.name == f"{status.hardware_id}: daemon"
-        if kind == "charger_coordinator" and not of_daemon:
-            values = {pair.key: pair.value for pair in status.values}
-            self._coordinator = moment, values
-            return
-        about = diagnostics.about(status)
-        if about in self.known:
-            self.known[about].diagnose(moment, status, kind)
-
     def _note(self, moment: Moment, own: Own) -> None:
         note = noted(own.topic.rpartition("/")[2], own.text)
         for kind in KINDS:
@@ -183,9 +167,10 @@ class HeardDevices(ObservedGraph[Device]):
                 self.known[kind, note.subject].note(moment, note)
 
     def _coordinates(self) -> Mapping[str, str]:
-        if self._coordinator is None or self.now.at - self._coordinator[0].at > SILENT_S:
-            return {}
-        return self._coordinator[1]
+        found = [one for one in self.nodes.values() if one.kind == COORDINATOR]
+        said = [one for one in found if not one.name.endswith(": daemon")]
+        now = [one for one in said if one.is_current(self.now.at)]
+        return max(now, key=lambda one: one.last.at).values if now else {}
 
     def _stepped(self, clock: TimePhrases) -> tuple[str, ...]:
         return tuple(

@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 from typing import Final
 
-from bridges.observe.device import News
 from bridges.observe.lift import NO_FLOOR, NOBODY, ObservedLift
+from bridges.observe.news import News
 from bridges.observe.requesters import DeviceRequester, Moment
 from workbench.explain.device import Device
 from workbench.explain.explanation import StoryLine

@@ -9,7 +9,6 @@ from typing import Final
 
 from bridges.observe.requesters import Moment
 
-DAY_S = 86400.0
 JOINS: Final = re.compile(r"`(rmf-bridge (doctor|explain|judge|page|release|send|watch)\b[^`]*)`")
 """A command in a sentence that joins RMF's graph."""
 

@@ -7,11 +7,11 @@ RMF's states have no field for faults, queues and simulations. Our daemons publi
 import json
 import re
 import time
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from typing import Any, Final
 
 from msgspec import Struct
-from msgspec.structs import asdict, replace
+from msgspec.structs import asdict
 
 from bridges.host.columns import aligned, clipped, width
 from bridges.host.paint import repainted
@@ -19,17 +19,13 @@ from bridges.messages import definitions as d
 from bridges.messages import words
 from bridges.messages.heard import Heard
 from bridges.observe.all_devices import AnyDevice, ObservedGraph, PlainGraph
+from bridges.observe.diagnosis import COORDINATOR, PASSIVE, SIMULATED, Diagnosis
 from bridges.observe.door import ObservedDoor
 from bridges.observe.limits import SILENT_S
-from bridges.runtime import diagnostics
 
 SETTLES_S: Final = 1.5
 """A daemon's diagnostics come at 1 Hz."""
-COORDINATOR: Final = "charger_coordinator"
 HEADINGS: Final = ("kind", "name", "state", "held by", "waiting", "age", "", "faults")
-MOST_DIAGNOSES: Final = 2000
-MOST_VALUES: Final = 100
-"""Of one diagnosis; ours have a third of it."""
 MOST_PLACES: Final = 500
 """Of robots. Anybody can make names up, and the page listens for months."""
 SECONDS: Final = re.compile(r"\d+(\.\d+)? (s|min)\b")
@@ -75,43 +71,6 @@ class BoardRow(Struct, frozen=True):
         return (self.simulated, *(SECONDS.sub("", text) for text in told))
 
 
-class DeviceDiagnosis(Struct, frozen=True):
-    """A daemon's latest diagnostic status of one device, and when it arrived (monotonic s)."""
-
-    at: float
-    kind: str
-    status: d.DiagnosticStatus
-
-    def value(self, key: str) -> str:
-        """The value of this key; "" if it is missing or "-"."""
-        found = next((pair.value for pair in self.status.values if pair.key == key), "")
-        return "" if found == "-" else found
-
-    def is_current(self, now: float) -> bool:
-        """Whether it was said so lately that it counts."""
-        return now - self.at <= SILENT_S
-
-    def waiting(self) -> str:
-        """Who waits, and for what: `fleet/b (12 s): for END of fleet/a`."""
-        return ": ".join(filter(None, (self.value("waiting"), self.value("waits"))))
-
-    @property
-    def of_daemon(self) -> bool:
-        """Whether it is about the daemon itself, not about a device."""
-        return self.status.name == f"{self.status.hardware_id}: daemon"
-
-    @property
-    def device(self) -> Device:
-        """Kind and name of the device; for a supervisor those of its lift or door."""
-        return self.kind.removesuffix("_supervisor"), self.status.hardware_id
-
-    def faults(self) -> Iterator[str]:
-        """One text for each fault, such as `OVERLOAD (since 3 s)`."""
-        for code in diagnostics.faults(self.status):
-            detail = self.value(code)
-            yield f"{code} ({detail})" if detail else code
-
-
 class Board:
     """The latest state and diagnosis of each device."""
 
@@ -119,8 +78,6 @@ class Board:
         """`graph`: what is remembered of the devices, if others fill it."""
         self._graph = graph or PlainGraph()
         self._places: dict[str, str] = {}
-        self._diagnoses: dict[str, DeviceDiagnosis] = {}
-        self._full_until = float("-inf")
 
     def take(self, heard: Heard) -> None:
         """Take one message that was heard."""
@@ -129,34 +86,26 @@ class Board:
 
     def note(self, heard: Heard) -> None:
         """Take one message, but for what it says of a device's state."""
-        match heard.message:
-            case d.ChargingAssignments(fleet_name=fleet):
-                for one in heard.message.assignments:
-                    place = f"{words.plain(d.ChargingMode, one.mode)} at {one.waypoint_name}"
-                    who = words.printable(f"{fleet}/{one.robot_name}")
-                    if who in self._places or len(self._places) < MOST_PLACES:
-                        self._places[who] = place
-            case d.DiagnosticArray():
-                for status in heard.message.status:
-                    self._diagnose(status, heard.at)
+        if not isinstance(heard.message, d.ChargingAssignments):
+            return
+        for one in heard.message.assignments:
+            place = f"{words.plain(d.ChargingMode, one.mode)} at {one.waypoint_name}"
+            who = words.printable(f"{heard.message.fleet_name}/{one.robot_name}")
+            if who in self._places or len(self._places) < MOST_PLACES:
+                self._places[who] = place
 
     def unsettled(self, now: float) -> set[Device]:
         """Kind and name of devices heard only just now, whose daemon may yet say that it simulates."""
-        known = {(one.kind, one.status.hardware_id) for one in self._current(now)}
-        young = [
-            one
+        return {
+            (one.kind, words.printable(one.id))
             for one in self._graph.stated()
             if one.first_state and now - one.first_state.at < SETTLES_S
-        ]
-        return {(o.kind, words.printable(o.id)) for o in young if (o.kind, o.id) not in known}
+            if not any(said.kind == one.kind for said in _said(one, now))
+        }
 
     def rows_of(self, devices: Iterable[AnyDevice], now: float, wall: float) -> list[BoardRow]:
         """The rows of these devices, in their order; each has published a state."""
-        about: dict[Device, list[DeviceDiagnosis]] = {}
-        for one in self._current(now):
-            if not one.of_daemon:
-                about.setdefault(one.device, []).append(one)
-        return [self._device(one, about.get((one.kind, one.id), ()), now, wall) for one in devices]
+        return [self._device(one, now, wall) for one in devices]
 
     def rows(self, now: float, wall: float) -> list[BoardRow]:
         """The rows, sorted by kind and name. `now`: monotonic s; `wall`: the clock of the stamps."""
@@ -164,26 +113,8 @@ class Board:
         devices = self.rows_of(every, now, wall)
         return [*devices, *self._coordinators(now), *self._robots()]
 
-    def _diagnose(self, status: d.DiagnosticStatus, at: float) -> None:
-        """Keep a status of our daemons under `<node>: <device>`. Other nodes' have no `kind`."""
-        kind = diagnostics.kind_in(status)
-        diagnosis = DeviceDiagnosis(at, kind, status)
-        of_daemon = bool(kind) and diagnosis.of_daemon
-        ours = of_daemon or kind == COORDINATOR or diagnosis.device in self._graph.known
-        if ours and (status.name in self._diagnoses or self._room(at)):
-            kept = replace(status, values=status.values[:MOST_VALUES])
-            self._diagnoses[status.name] = DeviceDiagnosis(at, kind, kept)
-
-    def _room(self, now: float) -> bool:
-        """For one more diagnosis: anybody can make names up, and a silent one gives way."""
-        if len(self._diagnoses) >= MOST_DIAGNOSES and now > self._full_until:
-            self._diagnoses = {one.status.name: one for one in self._current(now)}
-            self._full_until = now + SILENT_S
-        return len(self._diagnoses) < MOST_DIAGNOSES
-
-    def _device(
-        self, one: AnyDevice, found: Sequence[DeviceDiagnosis], now: float, wall: float
-    ) -> BoardRow:
+    def _device(self, one: AnyDevice, now: float, wall: float) -> BoardRow:
+        found = _said(one, now)
         state: words.Stated = one.state  # type: ignore[assignment]
         held_by = words.holder(state)
         if isinstance(one, ObservedDoor):
@@ -193,7 +124,7 @@ class Board:
             words.printable(one.id),
             words.condition(state),
             held_by or "-",
-            words.printable(", ".join(filter(None, (one.waiting() for one in found)))),
+            words.printable(", ".join(filter(None, map(_waiting, found)))),
             _age(one.stamped_at, wall),
             _mark(one, now),
             any(said.kind == one.kind and self._simulated(said, now) for said in found),
@@ -201,15 +132,17 @@ class Board:
         )
 
     def _coordinators(self, now: float) -> Iterator[BoardRow]:
-        for diagnosis in self._current(now):
-            if diagnosis.kind != COORDINATOR or diagnosis.of_daemon:
+        for name, diagnosis in self._graph.nodes.items():
+            if diagnosis.kind != COORDINATOR or name.endswith(": daemon"):
+                continue
+            if not diagnosis.is_current(now):
                 continue
             daemon = self._daemon(diagnosis, now)
-            passive = daemon.value(diagnostics.PASSIVE) if daemon else ""
+            passive = daemon.value(PASSIVE) if daemon else ""
             queue = diagnosis.value("queue")
             yield BoardRow(
                 "coordinator",
-                words.printable(diagnosis.status.name.partition(": ")[0]),
+                words.printable(name.partition(": ")[0]),
                 words.printable(f"passive: {passive}") if passive else _coordinates(diagnosis),
                 waiting=words.printable(queue),
                 simulated=self._simulated(diagnosis, now),
@@ -220,20 +153,26 @@ class Board:
         for who, place in sorted(self._places.items()):
             yield BoardRow("robot", who, words.printable(place))
 
-    def _current(self, now: float) -> list[DeviceDiagnosis]:
-        return [one for one in self._diagnoses.values() if one.is_current(now)]
-
-    def _daemon(self, diagnosis: DeviceDiagnosis, now: float) -> DeviceDiagnosis | None:
-        node = diagnosis.status.name.partition(": ")[0]
-        daemon = self._diagnoses.get(f"{node}: daemon")
+    def _daemon(self, diagnosis: Diagnosis, now: float) -> Diagnosis | None:
+        daemon = self._graph.nodes.get(f"{diagnosis.name.partition(': ')[0]}: daemon")
         return daemon if daemon and daemon.is_current(now) else None
 
-    def _simulated(self, diagnosis: DeviceDiagnosis, now: float) -> bool:
+    def _simulated(self, diagnosis: Diagnosis, now: float) -> bool:
         daemon = self._daemon(diagnosis, now)
-        return daemon is not None and diagnostics.SIMULATED in daemon.status.message
+        return daemon is not None and SIMULATED in daemon.message
 
 
-def _coordinates(diagnosis: DeviceDiagnosis) -> str:
+def _said(device: AnyDevice, now: float) -> list[Diagnosis]:
+    """What nodes of ours say of it now."""
+    return [one for one in device.diagnoses.values() if one.is_current(now)]
+
+
+def _waiting(said: Diagnosis) -> str:
+    """Who waits, and for what: `fleet/b (12 s): for END of fleet/a`."""
+    return ": ".join(filter(None, (said.value("waiting"), said.value("waits"))))
+
+
+def _coordinates(diagnosis: Diagnosis) -> str:
     """What the coordinator does, and its schedule."""
     silent = diagnosis.value("assigns").startswith("no:")
     does = "asks for chargers that another node assigns" if silent else "assigns chargers"
@@ -241,8 +180,10 @@ def _coordinates(diagnosis: DeviceDiagnosis) -> str:
     return words.printable(f"{does}, schedule {schedule}" if schedule else does)
 
 
-def _faults(found: Iterable[DeviceDiagnosis]) -> str:
-    texts = [text for diagnosis in found for text in diagnosis.faults()]
+def _faults(found: Iterable[Diagnosis]) -> str:
+    """One text for each fault, such as `OVERLOAD (since 3 s)`."""
+    told = [(code, one.value(code)) for one in found for code in one.faults]
+    texts = [f"{code} ({detail})" if detail else code for code, detail in told]
     return words.printable("; ".join(dict.fromkeys(texts)))
 
 

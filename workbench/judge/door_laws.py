@@ -12,8 +12,6 @@ OPENS_WITHIN_S: Final = 30.0
 ASKED: Final = 5
 INSTANT: Final = 2
 SHUT: Final = 3
-REOPENED: Final = 3
-REOPENED_WITHIN_S: Final = 30.0
 BYPASS_S: Final = 5.0
 FLICKERS_S: Final = 0.9
 """No door can close and open again in this time."""
@@ -80,9 +78,8 @@ def _bypassed(history: DoorHistory) -> Finding:
 def _holds(history: DoorHistory) -> Finding:
     if history.new is None or not history.latched or history.mode != OPEN:
         return None
-    often = len(history.reopened) == REOPENED
-    if often and history.now - history.reopened[0] < REOPENED_WITHIN_S:
-        return f"open, not open and open again within 1 s, {REOPENED} times while it is held"
+    if history.often(history.reopened):
+        return "open, not open and open again within 1 s, 3 times while it is held"
     return KEPT
 
 

@@ -22,6 +22,7 @@ REMEMBERED: Final = 200
 BURST: Final = 20
 FROZEN_S: Final = 0.05
 ANSWERS_WITHIN_S: Final = 0.1
+OFTEN_S: Final = 30.0
 EARLY_S: Final = 0.15
 """A state this early (s) cannot be explained by a timer's jitter."""
 
@@ -98,6 +99,10 @@ class History(ABC, Generic[T]):
     def forget(self) -> None:
         """Forget what a silence may have ended."""
 
+    def often(self, times: deque[float]) -> bool:
+        """Are there as many times as are kept, all within OFTEN_S?"""
+        return len(times) == times.maxlen and self.now - times[0] < OFTEN_S
+
     def asked(self) -> None:
         """Note a request to this device."""
         self._asked_at = self.now
@@ -158,10 +163,4 @@ class History(ABC, Generic[T]):
 
 def _content(state: words.Stated) -> words.Stated:
     """All but the stamp."""
-    match state:
-        case d.LiftState():
-            return replace(state, lift_time=d.Time())
-        case d.DoorState():
-            return replace(state, door_time=d.Time())
-        case d.ChargerState():
-            return replace(state, charger_time=d.Time())
+    return replace(state, **{f"{words.kind(state)}_time": d.Time()})

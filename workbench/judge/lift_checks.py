@@ -16,10 +16,6 @@ GRANT_ASKED: Final = 10
 JUMPS_WITHIN_S: Final = 1.5
 REFUSED: Final = 3
 FOREIGN_S: Final = 2.0
-REOPENED: Final = 3
-REOPENED_WITHIN_S: Final = 30.0
-FALSE: Final = 3
-FALSE_WITHIN_S: Final = 30.0
 SETTLED_S: Final = 3.0
 """For this long after a node's first state it may still obey requests that we have not heard."""
 
@@ -211,9 +207,8 @@ def holds(history: LiftHistory) -> Finding:
     state = _is_open(history)
     if state is None or not state.session_id or not history.was_asked_to(state.current_floor):
         return None
-    often = len(history.reopened) == REOPENED
-    if often and history.now - history.reopened[0] < REOPENED_WITHIN_S:
-        return f"open, not open and open again within 1 s, {REOPENED} times in one stop"
+    if history.often(history.reopened):
+        return "open, not open and open again within 1 s, 3 times in one stop"
     return KEPT
 
 
@@ -275,9 +270,8 @@ def no_false(history: LiftHistory) -> Finding:
     """Only an operator calls an alarm off. With several lifts it is unknown which one published."""
     if not isinstance(history.news, d.Bool) or history.others:
         return None
-    often = len(history.false_alarms) == FALSE
-    if often and history.now - history.false_alarms[0] < FALSE_WITHIN_S:
-        return f"`false` {FALSE} times, with no alarm to call off"
+    if history.often(history.false_alarms):
+        return "`false` 3 times, with no alarm to call off"
     return KEPT
 
 

@@ -24,11 +24,10 @@ END: Final = d.LiftRequestType.REQUEST_END_SESSION
 
 @dataclass
 class Ask:
-    """The requests of one session. `at`: the latest. `direct_at`: the latest on lift_requests. `since`:
+    """The requests of one session. `direct_at`: the latest on lift_requests. `since`:
     when the present row of requests there, without a gap, began. `human`: it asked for HUMAN mode.
     `direct`: it was heard on lift_requests."""
 
-    at: float
     since: float
     floors: deque[str] = field(default_factory=lambda: deque(maxlen=FLOORS))
     times: int = 0
@@ -197,11 +196,11 @@ class LiftHistory(History[d.LiftState]):
 
     def _ask(self, message: d.LiftRequest, direct: bool) -> None:
         session = message.session_id
-        ask = self.asks.get(session) or Ask(self.now, self.now)
+        ask = self.asks.get(session) or Ask(self.now)
         if direct and (not ask.times or self.now - ask.direct_at > SLOWEST_S):
             ask.since = self.now
         ask.direct_at = self.now if direct else ask.direct_at
-        ask.at, ask.direct = self.now, ask.direct or direct
+        ask.direct = ask.direct or direct
         ask.times += direct
         ask.human |= message.request_type == d.LiftRequestType.REQUEST_HUMAN_MODE
         moved = message.destination_floor not in list(ask.floors)[-1:]

@@ -17,7 +17,8 @@ from bridges.messages.topics import AnyTopic
 from bridges.messages.words import KINDS, Kind, Requested, Stated
 from bridges.observe.all_devices import Key
 from bridges.observe.charger import NOBODY, ObservedCharger
-from bridges.runtime import diagnostics
+from bridges.observe.diagnosis import about, kind_in
+from bridges.runtime.diagnostics import MOST
 from workbench.explain import heard_devices
 from workbench.explain.answer import Remedies
 from workbench.explain.device import Device
@@ -55,12 +56,11 @@ HEARD: Final[tuple[AnyTopic, ...]] = (
 
 @dataclass(frozen=True, slots=True)
 class RobotShown:
-    """A robot, as its fleet says. `place`: where the charging schedule sends it."""
+    """A robot, as its fleet says."""
 
     fleet: str
     state: d.RobotState
     at: float
-    place: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -191,14 +191,13 @@ class LiveSite:
         known = {one.id for one in self._story.stated()}
         ours = [
             status
-            for status in message.status[: diagnostics.MOST + 1]
+            for status in message.status[: MOST + 1]
             if status.hardware_id in known or status.name.endswith(": daemon") or _is_graph(status)
         ]
         kept = replace(heard, message=replace(message, status=tuple(ours)))
-        self._board.note(kept)
         self._story.take(kept)
         for status in ours:
-            if device := diagnostics.about(status):
+            if device := about(status):
                 alone = replace(message, status=(status,))
                 self._remember(device, replace(heard, message=alone))
 
@@ -227,4 +226,4 @@ def _view(row: BoardRow, device: Device | None) -> DeviceView:
 
 
 def _is_graph(status: d.DiagnosticStatus) -> bool:
-    return diagnostics.kind_in(status).endswith(("supervisor", "coordinator"))
+    return kind_in(status).endswith(("supervisor", "coordinator"))

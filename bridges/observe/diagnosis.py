@@ -1,0 +1,107 @@
+"""What our nodes say on `/diagnostics` of a device, or of themselves: the latest of each."""
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Final
+
+from bridges.messages.definitions import DiagnosticLevel, DiagnosticStatus
+from bridges.messages.words import KINDS, Kind
+from bridges.observe.limits import MOST_CODES, MOST_VALUES, QUIET_S, SILENT_S
+from bridges.observe.news import News
+from bridges.observe.requesters import Moment
+
+SIMULATED: Final = "SIMULATED"
+PASSIVE: Final = "PASSIVE"
+COORDINATOR: Final = "charger_coordinator"
+REFUSED: Final = "refused "
+
+
+def faults(status: DiagnosticStatus) -> tuple[str, ...]:
+    """The codes of the faults in a device's status."""
+    shown = status.message if status.level == DiagnosticLevel.ERROR else ""
+    return tuple(code for code in shown.split(", ") if code)
+
+
+def kind_in(status: DiagnosticStatus) -> str:
+    """The kind of the daemon of ours that says it; "" for another's."""
+    return next((pair.value for pair in status.values if pair.key == "kind"), "")
+
+
+def about(status: DiagnosticStatus) -> tuple[Kind, str] | None:
+    """The device that a status of ours is about; of a supervisor: its lift or door."""
+    kind = kind_in(status).removesuffix("_supervisor")
+    found = next((known for known in KINDS if known == kind), None)
+    return (found, status.hardware_id) if found else None
+
+
+def of_node(status: DiagnosticStatus) -> bool:
+    """Is it about one of our daemons itself, or about all that a coordinator serves?"""
+    kind = kind_in(status)
+    return kind == COORDINATOR or (bool(kind) and status.name == f"{status.hardware_id}: daemon")
+
+
+@dataclass(slots=True)
+class Diagnosis:
+    """What one node says. `kind`: its daemon's. `name`: `<node>: <device>`. `last`: when it came last.
+    `faults`: code -> detail, and since when. `refused`: reason -> how often, and when last."""
+
+    kind: str
+    last: Moment
+    name: str = ""
+    message: str = ""
+    values: Mapping[str, str] = field(default_factory=dict)
+    faults: dict[str, tuple[str, Moment]] = field(default_factory=dict)
+    refused: dict[str, tuple[int, Moment]] = field(default_factory=dict)
+
+    def is_current(self, now: float) -> bool:
+        """Was it said so lately that it counts?"""
+        return now - self.last.at <= SILENT_S
+
+    def value(self, key: str) -> str:
+        """The value of this key; "" if it is missing or "-"."""
+        found = self.values.get(key, "")
+        return "" if found == "-" else found
+
+    def take(
+        self, moment: Moment, status: DiagnosticStatus, text: Callable[[str], str] = str
+    ) -> Iterator[News]:
+        """Its next status. `text`: a name from the network as it is remembered."""
+        self.kind, self.last, self.message = kind_in(status), moment, status.message
+        self.values = {pair.key: pair.value for pair in status.values[:MOST_VALUES]}
+        codes = faults(status)[:MOST_CODES]
+        yield from self.has(moment, {text(code): text(self.value(code)) for code in codes})
+        for key, value in self.values.items():
+            if key.startswith(REFUSED) and value.isdecimal() and len(value) <= 18:
+                yield from self.refuses(moment, text(key.removeprefix(REFUSED)), int(value))
+
+    def has(self, moment: Moment, codes: Mapping[str, str]) -> Iterator[News]:
+        """Its present faults, with their details."""
+        over, new = self.faults.keys() - codes.keys(), codes.keys() - self.faults.keys()
+        gone = [code for code in self.faults if code in over]
+        self.faults = {
+            code: (detail, self.faults[code][1] if code in self.faults else moment)
+            for code, detail in codes.items()
+        }
+        yield from (News("fault over", moment, self.name, code) for code in gone)
+        yield from (News("fault", moment, self.name, code) for code in codes if code in new)
+
+    def refuses(self, moment: Moment, reason: str, count: int | None = None) -> Iterator[News]:
+        """It has refused for this reason, `count` times, or once more."""
+        before, last = self.refused.get(reason, (0, None))
+        if (last is None and len(self.refused) >= MOST_CODES) or (last and before == count):
+            return
+        self.refused[reason] = before + 1 if count is None else count, moment
+        if moment.seen if last is None else moment.at - last.at > QUIET_S:
+            yield News("refused", moment, self.name, reason)
+
+
+def report(
+    known: dict[str, Diagnosis], most: int, status: DiagnosticStatus, moment: Moment
+) -> Diagnosis | None:
+    """The memory of who says this; a silent one gives way. None if there is no room."""
+    if status.name not in known:
+        silent = (name for name, one in known.items() if not one.is_current(moment.at))
+        if len(known) >= most and known.pop(next(silent, ""), None) is None:
+            return None
+        known[status.name] = Diagnosis(kind_in(status), moment, status.name)
+    return known[status.name]
