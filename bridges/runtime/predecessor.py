@@ -2,7 +2,8 @@
 
 A separate process does it, as after every death: if it hangs, this daemon does not, and it uses the
 profiles as the dead daemon had them. Devices that do not answer are reported and retried while we
-serve. Those of our own record are not: each is made safe as soon as it answers.
+serve. Those of our own record are not: each is made safe as soon as it answers. If a process has just
+tried them, after the death or at boot, none does so once more: that would only delay the start.
 """
 
 import logging
@@ -46,7 +47,8 @@ class Predecessor:
         found = self._records.unreleased()
         if found:
             log.warning(pairs("daemon_had_died", claimed=", ".join(r.name for r in found)))
-            self._start([record.name for record in found])
+        if names := [r.name for r in found if r.name != self._ours.name or not r.tried]:
+            self._start(names)
             give_up_at = time.monotonic() + PATIENCE_S
             while self._running() and time.monotonic() < give_up_at:
                 if wait(LOOK_EVERY_S):

@@ -47,12 +47,14 @@ class Claimed(msgspec.Struct, frozen=True):
     """`file`: the YAML's path. `yaml`: its text. `texts`: profiles and DBC files, by name.
 
     `safe`: the devices whose outputs have since been verified off. Every version can read this much.
+    `tried`: whether a process has come to the end of switching off the others.
     """
 
     file: str
     yaml: bytes
     texts: dict[str, bytes]
     safe: tuple[str, ...] = ()
+    tried: bool = False
 
 
 class ClaimRecord(Claimed, frozen=True):
@@ -63,7 +65,7 @@ class ClaimRecord(Claimed, frozen=True):
     @property
     def name(self) -> str:
         """The name of its file, a hash of what was claimed."""
-        claimed = msgspec.json.encode(msgspec.structs.replace(self, safe=()))
+        claimed = msgspec.json.encode(msgspec.structs.replace(self, safe=(), tried=False))
         return f"claimed-{hashlib.sha256(claimed).hexdigest()[:16]}.json"
 
     def config(self) -> Config:
@@ -163,7 +165,7 @@ class Records:
     def still_unsafe(self, record: ClaimRecord, devices: Collection[str], config: Config) -> None:
         """Note that these devices are not verified off, and all others are. Raises OSError."""
         safe = tuple(name for name in config.devices if name not in devices)
-        self.write(msgspec.structs.replace(record, safe=safe))
+        self.write(msgspec.structs.replace(record, safe=safe, tried=True))
 
     def release(self, record: ClaimRecord) -> None:
         """Remove a record whose outputs are all off. Raises OSError.

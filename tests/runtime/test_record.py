@@ -2,12 +2,14 @@
 
 from collections.abc import Iterator
 from pathlib import Path
+from threading import Event
 
 import pytest
 
+from bridges.host.directories import Directories
 from bridges.runtime import record
-from bridges.runtime.predecessor import SafeFirst
-from bridges.runtime.record import ClaimRecord
+from bridges.runtime.predecessor import Predecessor, SafeFirst
+from bridges.runtime.record import ClaimRecord, Records
 from bridges.settings.load import SettingsError, load
 from drivers import DriverError
 from drivers.charger import can_frames, dbc
@@ -90,3 +92,21 @@ def test_a_device_that_a_dead_daemon_left_on_is_made_safe_once_as_soon_as_it_ans
     driver.read()
     driver.open()
     assert silent.called == ["open", "open", "open", "make_safe", "read", "open"]
+
+
+@pytest.mark.parametrize("tried", [True, False])
+def test_a_start_has_another_process_switch_off_its_own_devices_unless_one_just_has_tried(
+    tmp_path: Path, tried: bool
+) -> None:
+    places = Directories(tmp_path / "run", tmp_path / "state")
+    places.runtime.mkdir()
+    config = load(CONFIG / "door_register.yaml")
+    ours = record.of(config)
+    records = Records(places, config.path)
+    records.write(ours)
+    if tried:
+        records.still_unsafe(ours, config.devices, config)
+    started = tmp_path / "started"
+    predecessor = Predecessor(records, ours, ["sh", "-c", f"touch {started}", "outputs-off"])
+    assert predecessor.make_safe(Event().wait) == set(config.devices)
+    assert (predecessor.left(), started.exists()) == ([], not tried)
