@@ -2,5 +2,5 @@
 
 __version__ = "0.1.0"
 BUILD = ""
-"""The commit, written by setup.py into what is installed; "" where it is not known."""
+"""The commit, written by setup.py into the installed package; "" if unknown."""
 VERSION = f"{__version__}+{BUILD}" if BUILD else __version__

@@ -1,5 +1,4 @@
-"""The command `rmf-bridge`. Each subcommand is a file in `bridges/commands/` or
-`workbench/commands/`."""
+"""The command `rmf-bridge`. A subcommand is a file in `bridges/commands/` or `workbench/commands/`."""
 
 import argparse
 import atexit
@@ -16,7 +15,7 @@ from bridges import VERSION, exit_codes
 from bridges.host.installed import NotInstalled, is_there, of_workbench
 
 EX_PIPE = 141
-"""The reader of our output has gone: what a shell shows for a program that SIGPIPE ended."""
+"""The exit code when the reader of our output has gone, as a shell shows after SIGPIPE."""
 
 COMMANDS = {
     "init": (
@@ -39,7 +38,7 @@ COMMANDS = {
     "schema": ("print the JSON Schema of a device YAML", "schema > rmf-bridge.json"),
     "watch": ("show lifts, doors and chargers live, as RMF sees them", "watch --localhost"),
     "page": (
-        "serve a web page of what is on RMF's graph, or of a recording",
+        "serve a web page of RMF's graph, or of a recording",
         "page --localhost",
     ),
     "status": (
@@ -66,7 +65,7 @@ COMMANDS = {
         "check any lift, door or charger node against RMF's contract",
         "judge lift Lift1 --active --ride L1 L3 --localhost",
     ),
-    "release": ("end the session of whoever holds a lift", "release Lift1"),
+    "release": ("end the session that holds a lift", "release Lift1"),
     "reset": ("tell a running daemon that its latched faults may clear", "reset my_lift.yaml"),
     "walk": (
         "try every wire of a device with the electrician, and sign what was seen",
@@ -102,17 +101,17 @@ COMMANDS = {
         "outputs-off my_lift.yaml",
     ),
 }
-"""What each subcommand does, and an example."""
+"""Subcommand -> (its purpose, an example)."""
 WORKBENCH = frozenset(
     {"init", "schema", "watch", "page", "doctor", "explain", "plot", "send"}
     | {"judge", "release", "walk", "press", "fail", "replay"}
 )
-"""Those of the workbench, which no daemon needs."""
+"""The workbench's subcommands, which no daemon needs."""
 
 
 def main(argv: list[str] | None = None) -> int:
     """Run one subcommand and return its exit code."""
-    # Python looks through all objects when a process ends: a fifth of the CPU of a short one.
+    # Else Python collects garbage at the end of a process: a fifth of a short process's CPU time.
     atexit.register(gc.freeze)
     if "_ARGCOMPLETE" in os.environ:  # set by the shell's completion; ends the process
         import argcomplete
@@ -120,11 +119,11 @@ def main(argv: list[str] | None = None) -> int:
         argcomplete.autocomplete(whole_parser())
     arguments, ros_args = split_ros_args(sys.argv[1:] if argv is None else argv)
     for argument in arguments:
-        # No log, JSON or message can have half a character.
+        # Logs, JSON and messages cannot hold bytes that are not UTF-8.
         if any("\ud800" <= one <= "\udfff" for one in argument):
             sys.stderr.write(f"rmf-bridge: {os.fsencode(argument)!r} is not UTF-8: rename it\n")
             return 2
-    # A terminal may have no sign for what is to be said.
+    # A terminal may lack a character.
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="backslashreplace")
     typed = argparse.Namespace(ros_args=ros_args, typed=arguments)
@@ -143,7 +142,7 @@ def main(argv: list[str] | None = None) -> int:
 
 class _Parser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
-        """Also name the choice that is nearest to a wrong one."""
+        """Report the error, with the choice nearest to an invalid one."""
         wrong = re.search(r"invalid choice: '(.*)' \(choose from (.*)\)", message)
         if wrong and (near := _nearest(wrong[1], wrong[2])):
             message = f"{message[: wrong.start()]}there is no '{wrong[1]}'; did you mean '{near}'?"
@@ -158,7 +157,7 @@ def _nearest(typed: str, listed: str) -> str:
 
 
 def parser(arguments: Sequence[str]) -> argparse.ArgumentParser:
-    """The parser for these arguments: the subcommand that they begin with, else all without options.
+    """Return the parser of the arguments' subcommand; without one, of all subcommands, without options.
 
     `outputs-off` is short of time, so no other subcommand is imported, or even described.
     """
@@ -168,8 +167,8 @@ def parser(arguments: Sequence[str]) -> argparse.ArgumentParser:
 
 
 def whole_parser() -> argparse.ArgumentParser:
-    """The parser with the options of every installed subcommand: for the manual page (`make man`) and
-    completion."""
+    """Return the parser with the options of every installed subcommand, for the manual page
+    (`make man`) and completion."""
     lacks = frozenset() if is_there("workbench") else WORKBENCH
     return _parser((name for name in COMMANDS if name not in lacks), whole=True)
 
@@ -193,7 +192,7 @@ def _parser(names: Iterable[str], whole: bool) -> argparse.ArgumentParser:
 
 
 def split_ros_args(argv: list[str]) -> tuple[list[str], list[str]]:
-    """Our own arguments, and ROS's: from each `--ros-args` to the next `--`, or to the end."""
+    """Return (our arguments, ROS's arguments: from each `--ros-args` to the next `--` or the end)."""
     ours, ros = list[str](), list[str]()
     into = ours
     for argument in argv:

@@ -1,6 +1,6 @@
 """The exit codes of each subcommand: for `--help`, the manual page and docs/reference/exit-codes.md.
 
-From 64 on they are those of sysexits.h.
+Codes from 64 on are those of sysexits.h.
 """
 
 from typing import Final
@@ -10,7 +10,7 @@ ALWAYS: Final = {
     69: "the package that has this command is not installed",
     141: "the reader of its output has gone",
 }
-"""What every subcommand may return besides its own."""
+"""Exit codes of every subcommand, besides its own."""
 YAML: Final = {78: "the YAML has an error"}
 ROOT: Final = {
     66: "the folder of `--root` is missing",
@@ -102,7 +102,7 @@ EXIT_CODES: Final[dict[str, dict[int, str]]] = {
     },
     "release": SENT,
     "reset": {
-        0: "the daemon was told",
+        0: "the reset was sent",
         1: "no daemon runs",
         69: "this user may not see or signal it",
     },
@@ -142,5 +142,5 @@ EXIT_CODES: Final[dict[str, dict[int, str]]] = {
 
 
 def told(command: str) -> str:
-    """One line for `--help`."""
+    """Return a subcommand's exit codes in one line, for `--help`."""
     return "; ".join(f"{code} {text}" for code, text in EXIT_CODES[command].items())

@@ -1,8 +1,7 @@
-"""`rmf-bridge check FILE...`: what is wrong with device YAMLs, or all that an electrician signs.
+"""`rmf-bridge check FILE...`: prints the errors of device YAMLs, or a wiring table to be signed.
 
-Each file is read and checked, then all of them together (`bridges/settings/cross_file_checks.py`).
-The findings about a file are gathered once (`sheets/findings.py` there), and printed as text, as
-JSON or as a sheet.
+Each file is checked alone, then all files together (`bridges/settings/cross_file_checks.py`). The
+findings about a file (`bridges/settings/sheets/findings.py`) are printed as text, JSON or a sheet.
 """
 
 import argparse
@@ -23,11 +22,11 @@ if TYPE_CHECKING:
     from bridges.settings.building_map import BuildingMap
 
 COORDINATOR = "charger_coordinator"
-NO_COORDINATOR = "this is compared with a charger coordinator's YAML, and no FILE is one"
+NO_COORDINATOR = "no FILE is a charger coordinator's YAML, to compare this with"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Options of `check`."""
+    """Add the options of `check`."""
     parser.add_argument("files", nargs="+", metavar="FILE", help="a device YAML")
     parser.add_argument(
         "-q", "--quiet", action="store_true", help="print problems only: no table, no warning"
@@ -51,7 +50,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="the files run on several machines: the same pin or port in two of them is no mistake",
     )
     parser.add_argument(
-        "--json", action="store_true", help="print the same as JSON, and that alone"
+        "--json", action="store_true", help="print the same as JSON, and nothing else"
     )
     parser.add_argument(
         "--sheet", metavar="FILE.html", help="write the commissioning sheet: a page per controller"
@@ -59,7 +58,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Check every file."""
+    """Check every file; return the exit code."""
     try:
         building = _building(args.building_map)
     except SettingsError as error:
@@ -83,7 +82,7 @@ def _building(file: str | None) -> "BuildingMap | None":
 def _read(
     files: Sequence[str], building: "BuildingMap | None"
 ) -> tuple[dict[str, tuple[Config, Findings]], dict[str, Findings]]:
-    """Each file, once: (the readable ones, the findings of all)."""
+    """Read each file once; return (the valid files, the findings of all files)."""
     right: dict[str, tuple[Config, Findings]] = {}
     found: dict[str, Findings] = {}
     for file in dict.fromkeys(files):
@@ -98,7 +97,7 @@ def _read(
 
 
 def _against(config: Config, building: "BuildingMap | None") -> tuple[list[Problem], list[str]]:
-    """Compare its names with the map's: (problems, notes)."""
+    """Compare a file's names with the map's; return (problems, notes)."""
     if building is None:
         return [], []
     from bridges.settings.map_names import mismatches, places
@@ -118,7 +117,7 @@ def _beside_fleet(
     found: Mapping[str, Findings],
     building: "BuildingMap | None",
 ) -> dict[str, Findings]:
-    """What is told of each coordinator, with what was found beside this fleet's configuration."""
+    """Return each coordinator's findings, extended by the comparison with this fleet's config."""
     from bridges.settings.fleet_config import load_fleet
     from bridges.settings.fleet_names import compared
 
@@ -153,7 +152,7 @@ def _more(
 
 
 def _with(file: Findings, together: Found) -> Findings:
-    """A file with what was found about it among the others."""
+    """Return a file's findings, extended by those of the comparison with the other files."""
     return _more(
         file,
         [p for p in together.errors if p.file == file.file],
@@ -162,7 +161,7 @@ def _with(file: Findings, together: Found) -> Findings:
 
 
 def _tell(files: Sequence[Findings], args: argparse.Namespace) -> int:
-    """Print the findings and write the sheet. Returns the exit code."""
+    """Print the findings and write the sheet; return the exit code."""
     errors = sum(len(file.errors) for file in files)
     code = os.EX_CONFIG if errors else 0
     if args.json:
@@ -189,7 +188,7 @@ def _print(file: Findings, quiet: bool) -> None:
 
 
 def _verdict(files: Sequence[Findings], quiet: bool) -> None:
-    """The last line: `OK`, or the number of errors."""
+    """Print the last line: `OK`, or the number of errors."""
     errors, warnings = _counts(files)
     also = f", {_many(warnings, 'warning')}" if warnings else ""
     if errors:
@@ -203,13 +202,13 @@ def _many(number: int, what: str) -> str:
 
 
 def _complain(lines: Iterable[str]) -> None:
-    """Write to stderr, after flushing stdout: the two often end in one log."""
+    """Write to stderr, after flushing stdout: both often go to one log."""
     sys.stdout.flush()
     sys.stderr.writelines(f"{line}\n" for line in lines)
 
 
 def _write_sheet(files: Sequence[Findings], path: str) -> int:
-    """Write the commissioning sheet. Returns 0, or another exit code if that fails."""
+    """Write the commissioning sheet; return 0, or another exit code after a failure."""
     from bridges.settings.sheets.html import page
 
     try:

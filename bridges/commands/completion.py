@@ -1,7 +1,5 @@
-"""`rmf-bridge completion SHELL`: the script with which a shell completes our commands and options.
-
-Also what completes names: of a file's devices, and of this machine's services.
-"""
+"""`rmf-bridge completion SHELL`: prints the script by which a shell completes our commands and options,
+a file's device names, and this machine's service names."""
 
 import argparse
 from typing import Final
@@ -17,14 +15,14 @@ where a shell looks for it:
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """The argument of `completion`."""
+    """Add the argument of `completion`."""
     parser.formatter_class = argparse.RawDescriptionHelpFormatter
     parser.description = f"{parser.description}\n\n{WHERE}"
     parser.add_argument("shell", choices=SHELLS)
 
 
 def run(args: argparse.Namespace) -> int:
-    """Print it."""
+    """Print the script."""
     from argcomplete.shell_integration import shellcode
 
     print(shellcode(["rmf-bridge"], shell=args.shell), end="")

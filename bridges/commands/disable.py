@@ -1,4 +1,4 @@
-"""`rmf-bridge disable NAME`: a service stops, outputs off, and starts no more. Its YAML stays."""
+"""`rmf-bridge disable NAME`: stops a service, outputs off, and disables it. Its YAML stays."""
 
 import argparse
 import os
@@ -21,13 +21,13 @@ from bridges.runtime.services import (
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """The options of `disable`."""
+    """Add the options of `disable`."""
     parser.add_argument("name", metavar="NAME", help="the service: a device YAML, or its name")
     add_root(parser)
 
 
 def run(args: argparse.Namespace) -> int:
-    """0 when it has stopped, outputs off; 77 for others than root."""
+    """Return 0 if the service has stopped, outputs off; 77 without root."""
     name = Path(args.name).name.removesuffix(".yaml")
     if not INSTANCE.fullmatch(name):
         print(NO_INSTANCE.format(name), file=sys.stderr)
@@ -36,7 +36,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def steps(name: str, root: Path) -> Iterator[Step]:
-    """All that is to be done, in turn."""
+    """Yield the steps in order."""
     yield Run(("systemctl", "stop", unit(name)), running_only=True)
     yield Run(("systemctl", "disable", unit(name)))
     yield switch_off(name)

@@ -1,9 +1,9 @@
 """`rmf-bridge enable FILE`: from a YAML to a running service.
 
-It validates the file, beside the files of this machine's other services; stops an instance that runs,
-so that its outputs are switched off while it may still reach the old relay; copies the file to
+It validates the file together with those of this machine's other services; stops a running instance,
+to switch its outputs off while it still has access to the old relay; copies the file to
 /etc/rmf-bridges; writes the instance's drop-in (`bridges/runtime/drop_in.py`); and starts it. If a step
-fails, what ran is started again as it is then.
+fails, an instance that ran before is started again, with the steps taken so far.
 """
 
 import argparse
@@ -33,17 +33,17 @@ from bridges.settings.load import Config, Problem, SettingsError, load
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """The options of `enable`."""
+    """Add the options of `enable`."""
     parser.add_argument("file", type=Path, metavar="FILE", help="the device YAML")
     parser.add_argument(
-        "--no-start", action="store_true", help="write and enable it, and start nothing now"
+        "--no-start", action="store_true", help="write and enable the service without starting it"
     )
-    parser.add_argument("--drop-in", action="store_true", help="print its drop-in, and no more")
+    parser.add_argument("--drop-in", action="store_true", help="only print the service's drop-in")
     add_root(parser)
 
 
 def run(args: argparse.Namespace) -> int:
-    """0 when the service runs; 78 for a file that cannot be right; 77 for others than root."""
+    """Return 0 if the service runs; 78 for an invalid file; 77 without root."""
     if not INSTANCE.fullmatch(args.file.stem):
         print(NO_INSTANCE.format(args.file.stem), file=sys.stderr)
         return os.EX_CONFIG
@@ -65,7 +65,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def steps(config: Config, root: Path, present: Collection[str]) -> Iterator[Step]:
-    """All that is to be done for a service of this file, in turn. `present`: groups."""
+    """Yield the steps for a service of this file, in order. `present`: the machine's groups."""
     name = config.path.stem
     target = root / CONFIG / f"{name}.yaml"
     yield Run(("systemctl", "stop", unit(name)), running_only=True)
@@ -79,7 +79,7 @@ def steps(config: Config, root: Path, present: Collection[str]) -> Iterator[Step
 
 
 def groups(root: Path) -> set[str]:
-    """The groups of this system that a service may be given."""
+    """Return this system's groups that a service may get."""
     with suppress(OSError):
         lines = (root / "etc/group").read_text("utf-8", "replace").splitlines()
         return {line.partition(":")[0] for line in lines} & set(GROUPS)
@@ -87,13 +87,13 @@ def groups(root: Path) -> set[str]:
 
 
 def _taken(config: Config, root: Path) -> Iterator[Problem]:
-    """What this file uses that another service's has for itself."""
+    """Return a problem for each resource of this file that another service's file uses."""
     others = list(_neighbours(root, config.path.stem))
     return (p for p in taken([*others, config]) if p.file == str(config.path))
 
 
 def _neighbours(root: Path, name: str) -> Iterator[Config]:
-    """The files of the other services, as far as they are right."""
+    """Yield the valid files of the other services."""
     for file in sorted((root / CONFIG).glob("*.yaml")):
         if file.stem != name:
             with suppress(SettingsError):

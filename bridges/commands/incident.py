@@ -1,4 +1,4 @@
-"""`rmf-bridge incident FILE`: a recording of a daemon's last minutes, because a person wants one."""
+"""`rmf-bridge incident FILE`: writes a recording of a daemon's last minutes on a person's request."""
 
 import argparse
 import os
@@ -18,7 +18,7 @@ from bridges.settings.load import SettingsError
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """The options of `incident`."""
+    """Add the options of `incident`."""
     parser.add_argument("file", type=Path, metavar="FILE", help="the device YAML of the daemon")
     parser.add_argument("--note", default="", metavar="TEXT", help="what you saw")
     parser.add_argument(
@@ -29,19 +29,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=float,
         default=AFTER_S,
         metavar="S",
-        help=f"how long to wait for what follows (default: {AFTER_S:g} s)",
+        help=f"wait this long to record later events too (default: {AFTER_S:g} s)",
     )
     parser.add_argument(
-        "--died", action="store_true", help="the run before this one, which did not end in order"
+        "--died", action="store_true", help="the previous run, which did not shut down cleanly"
     )
     parser.add_argument("--anonymous", action="store_true", help="without the site's names")
     parser.add_argument("--runtime-dir", metavar="DIR", help="the daemon's runtime directory")
 
 
 def run(args: argparse.Namespace) -> int:
-    """0 when the file is written; 65 if its YAML cannot be made anonymous; 69 without a ring that can
-    be read; 73 if the file cannot be written. Raises NotInstalled: only the workbench can make it
-    anonymous."""
+    """Return 0 if the file is written; 65 if its YAML cannot be made anonymous; 69 without a readable
+    ring; 73 if the file cannot be written. Raises NotInstalled if `--anonymous` lacks the workbench."""
     try:
         from bridges.blackbox import mcap_write
     except ImportError as error:
@@ -73,19 +72,20 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _anonymous(incident: Incident) -> Incident:
-    """Raises SettingsError."""
+    """Return the incident without the site's names. Raises SettingsError."""
     hidden: Incident = of_workbench("workbench.replay.anonymous").anonymous(incident)
     return hidden
 
 
 def _hint(*, died: bool) -> str:
     if died:
-        return "--died is the run before the last one; for the last one, leave it out"
+        return "--died asks for the run before the last; leave it out for the last run"
     return "Does its daemon run, and does its YAML keep a ring?"
 
 
 def _incident(ring: Path, args: argparse.Namespace, follows: bool) -> Incident:
-    """From 120 s before now on, and what `follows` from a daemon that runs. Raises RingError."""
+    """Return the last 120 s; if `follows`, also wait for later events of the running daemon. `--died`:
+    the last 120 s of the ring. Raises RingError."""
     before = RingContent(ring)
     if args.died:
         entries = list(before.entries())
@@ -95,7 +95,7 @@ def _incident(ring: Path, args: argparse.Namespace, follows: bool) -> Incident:
     if follows:
         _wait(args.after)
     else:
-        print(f"no daemon serves {args.file} now: nothing follows")
+        print(f"no daemon serves {args.file} now: not waiting for later events")
     try:
         after = RingContent(ring)
     except RingError:
@@ -109,10 +109,10 @@ def _notes(at: float, text: str) -> tuple[Note, ...]:
 
 
 def _wait(seconds: float) -> None:
-    """Ctrl-C ends the wait, not the command."""
+    """Wait; Ctrl-C ends only the wait, not the command."""
     try:
         if seconds > 0:
-            print(f"waiting {seconds:g} s for what follows; Ctrl-C to wait no longer")
+            print(f"waiting {seconds:g} s for later events; Ctrl-C ends the wait")
             time.sleep(seconds)
     except KeyboardInterrupt:
         print()

@@ -1,4 +1,4 @@
-"""`rmf-bridge log FILE`: the log of a device's service, from systemd's journal."""
+"""`rmf-bridge log FILE`: prints the log of a device's service from systemd's journal."""
 
 import argparse
 import os
@@ -18,22 +18,22 @@ ETC = Path("/") / CONFIG
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """The options of `log`."""
+    """Add the options of `log`."""
     file = parser.add_argument(
         "file", type=Path, metavar="FILE", help="the device YAML, or its service's name"
     )
     completed_by(file, service_names)
-    parser.add_argument("-f", "--follow", action="store_true", help="go on with what comes")
+    parser.add_argument("-f", "--follow", action="store_true", help="keep printing new lines")
     parser.add_argument("-n", "--lines", type=int, default=100, metavar="N", help="default: 100")
     parser.add_argument("--since", metavar="TIME", help="such as today, '1 hour ago', '09:30'")
-    device = parser.add_argument("--device", metavar="NAME", help="only what is about this device")
+    device = parser.add_argument("--device", metavar="NAME", help="only lines about this device")
     completed_by(device, device_names)
     parser.add_argument("--event", metavar="WORD", help="only this event: state, fault, refused …")
     parser.add_argument("--json", action="store_true", help="the journal's JSON, a line each")
 
 
 def run(args: argparse.Namespace) -> int:
-    """journalctl's exit code; 69 where there is no journal, or the daemon does not log to it."""
+    """Become journalctl; return 69 without a journal, or if the daemon does not log to it."""
     name = args.file.stem
     known = services()
     if name not in known and _runs_by_hand(name):
@@ -51,7 +51,7 @@ def run(args: argparse.Namespace) -> int:
     if name not in known:
         there = ", ".join(sorted(known)) or "none"
         print(
-            f"{name} is not a service here (services: {there}); what the journal still has of it:",
+            f"{name} is not a service here (services: {there}); its lines in the journal:",
             file=sys.stderr,
         )
     sys.stdout.flush()
@@ -59,7 +59,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def services() -> set[str]:
-    """The services of this machine: each has a YAML in /etc/rmf-bridges, or a unit."""
+    """Return this machine's services: those with a YAML in /etc/rmf-bridges, or a unit."""
     return {file.stem for file in ETC.glob("*.yaml")} | set(units())
 
 
@@ -69,12 +69,12 @@ def _runs_by_hand(name: str) -> bool:
 
 
 def _become(words: list[str]) -> NoReturn:
-    """journalctl takes our place, so that what ends us ends it."""
+    """Replace this process by journalctl, so that signals to us reach it."""
     os.execvp(words[0], words)
 
 
 def command(args: argparse.Namespace) -> list[str]:
-    """The journalctl command line."""
+    """Return the journalctl command line."""
     words = ["journalctl", f"--unit=rmf-bridge@{args.file.stem}", f"--lines={args.lines}"]
     words += ["--output=json"] if args.json else ["--output=short-iso", "--no-hostname"]
     words += ["--follow"] if args.follow else []
@@ -85,7 +85,7 @@ def command(args: argparse.Namespace) -> list[str]:
 
 
 def _pattern(event: str | None, device: str | None) -> str:
-    """A regular expression for a line of ours: `event key=value …`."""
+    """Return a regular expression for our log lines `event key=value …`."""
     parts = [f"^{_literal(event)}\\b"] if event else []
     if device:
         _, written = pairs("", device=device).split(" ", 1)

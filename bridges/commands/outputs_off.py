@@ -1,7 +1,7 @@
-"""`rmf-bridge outputs-off FILE`: every output off, from a new process, after any death of the daemon.
+"""`rmf-bridge outputs-off FILE`: switches every output off, from a new process, after a daemon's death.
 
-systemd runs it as ExecStopPost; so does the guard of a daemon started by hand. After a clean stop of a
-service, whose last mark says that all is off, it ends before it has loaded what it takes to switch.
+systemd runs it as ExecStopPost, the guard for a daemon started by hand. After a clean stop of a
+service, whose last mark says that all outputs are off, it ends without loading any driver.
 """
 
 import argparse
@@ -13,19 +13,19 @@ from bridges.runtime import last_mark
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """The options of `outputs-off`."""
+    """Add the options of `outputs-off`."""
     parser.add_argument("file", type=Path, nargs="?", metavar="FILE", help="the device YAML")
     parser.add_argument(
         "--all-records",
         action="store_true",
-        help="of every service that a power cut or a death has left a record of; 6 s at most",
+        help="the outputs of every service whose record a power cut or death left; 6 s at most",
     )
     parser.add_argument("--runtime-dir", metavar="DIR", help="the dead daemon's runtime directory")
     parser.add_argument("--record", action="append", default=[], help=argparse.SUPPRESS)
 
 
 def run(args: argparse.Namespace) -> int:
-    """0 when every output is verified off, 1 when not, 69 while the daemon lives or may live."""
+    """Return 0 if every output is verified off, 1 if not, 69 while the daemon lives or may live."""
     if last_mark.says_off(os.environ):
         print('nothing_to_switch_off reason="the daemon verified it"', file=sys.stderr)
         return 0

@@ -1,4 +1,4 @@
-"""`rmf-bridge recorder`: the process that turns the rings of this machine's daemons into files."""
+"""`rmf-bridge recorder`: turns the rings of this machine's daemons into recordings, as files."""
 
 import argparse
 import os
@@ -18,17 +18,17 @@ EVERY_S = 1.0
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """The options of `recorder`."""
+    """Add the options of `recorder`."""
     parser.add_argument(
         "-o", "--output", type=Path, metavar="DIR", help="default: the unit's, else the user's"
     )
 
 
 def run(args: argparse.Namespace) -> int:
-    """0 after SIGTERM or SIGINT; 69 where the library is missing."""
+    """Return 0 after SIGTERM or SIGINT; 69 if the library is missing."""
     log.start()
     try:
-        from bridges.blackbox import mcap_write  # noqa: F401 - later would be too late
+        from bridges.blackbox import mcap_write  # noqa: F401 - fails now, not at an incident
     except ImportError as error:
         print(f"the recorder needs {error.name}: {INSTALL}", file=sys.stderr)
         return os.EX_UNAVAILABLE
@@ -47,7 +47,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _folder() -> Path:
-    """Where recordings lie: in the unit's state directory, else in the user's."""
+    """Return the folder of recordings: in the unit's state directory, else in the user's."""
     given = os.environ.get("STATE_DIRECTORY", "").split(":")[0]
     return Path(given) if given else directories.state_base() / "recordings"
 

@@ -1,4 +1,4 @@
-"""`rmf-bridge reset FILE`: an operator says that latched faults may clear if their cause is gone."""
+"""`rmf-bridge reset FILE`: an operator lets latched faults clear if their cause is gone."""
 
 import argparse
 import os
@@ -12,13 +12,13 @@ from bridges.runtime.signals import RESET
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """The options of `reset`."""
+    """Add the options of `reset`."""
     parser.add_argument("file", type=Path, metavar="FILE", help="the device YAML of the daemon")
     parser.add_argument("--runtime-dir", metavar="DIR", help="the daemon's runtime directory")
 
 
 def run(args: argparse.Namespace) -> int:
-    """0 when the daemon was told, 1 when none runs, 69 if this user may not see or signal it."""
+    """Return 0 if the reset was sent, 1 if no daemon runs, 69 if this user may not see or signal it."""
     try:
         if not args.runtime_dir and not args.file.exists():
             print(f"{args.file} does not exist", file=sys.stderr)
@@ -33,7 +33,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _reset(file: Path, places: Directories) -> int:
     found = holder.look(places)
-    if found is None or not found.serves or not found.started:  # else the number may be another's
+    if found is None or not found.serves or not found.started:  # its pid may be another's
         why = f"{found}, which is not a daemon of this version" if found else "no process holds it"
         print(f"no daemon serves {file}: {places.runtime}: {why}", file=sys.stderr)
         return 1
@@ -42,5 +42,5 @@ def _reset(file: Path, places: Directories) -> int:
     except ProcessLookupError:
         print(f"the daemon of {file} has just ended", file=sys.stderr)
         return 1
-    print("reset sent; what remains: rmf-bridge status, or the log")
+    print("reset sent; for remaining faults see rmf-bridge status, or the log")
     return 0

@@ -1,4 +1,4 @@
-"""`rmf-bridge run FILE`: the daemon that systemd starts, and the same daemon on fake hardware."""
+"""`rmf-bridge run FILE`: runs the daemon, on real hardware or with `--simulate` on fake hardware."""
 
 import argparse
 import logging
@@ -21,7 +21,7 @@ from drivers.hal import HalError
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """The options of `run`."""
+    """Add the options of `run`."""
     parser.add_argument("file", type=Path, metavar="FILE", help="the device YAML")
     parser.add_argument(
         "--simulate",
@@ -48,8 +48,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Validate, claim, serve. Returns 78 for an invalid configuration. Raises NotInstalled: what
-    simulates is not part of the daemons."""
+    """Validate, claim, serve; return the exit code, 78 for an invalid configuration. Raises
+    NotInstalled if `--simulate` lacks the fakes, which are not part of the daemons."""
     log.start(args.log_level.upper(), json=args.log_format == "json")
     if args.simulate and os.environ.get("RMF_BRIDGE_SERVICE") == "1":
         logging.error("a service never simulates: --simulate is refused where RMF_BRIDGE_SERVICE=1")
@@ -67,7 +67,7 @@ def run(args: argparse.Namespace) -> int:
     if wrong := drop_in.misfit(config, os.environ) or too_slow(config, watchdog_s()):
         logging.error(wrong)
         return os.EX_CONFIG
-    end = signals.End()  # before the lock names our pid, which others then signal
+    end = signals.End()  # before other processes learn our pid from the lock, and signal it
     signals.ignore_reset()
     try:
         held = runtime.held(args.file, args.runtime_dir, serves=True, simulated=args.simulate)
@@ -84,7 +84,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def too_slow(config: Config, watchdog: float | None) -> str:
-    """Which bus may take longer for one call than systemd's watchdog (s) waits; "" for none."""
+    """Return the error for a bus whose call may take over half of systemd's watchdog (s); else ""."""
     for name, bus in config.buses.items():
         timeout_s: float = getattr(bus, "timeout_s", 0.0)
         if watchdog is not None and timeout_s > watchdog / 2:

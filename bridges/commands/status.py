@@ -1,4 +1,4 @@
-"""`rmf-bridge status`: every daemon on this machine, what it tells RMF, its faults and what to do.
+"""`rmf-bridge status`: prints every daemon on this machine: its state for RMF, its faults and remedies.
 
 It reads the daemons' status files and asks systemd; it opens no bus and joins no graph.
 """
@@ -25,16 +25,16 @@ NOT_TOLD: Final = ("contacts", "faults", "input_age_s", "outputs", "refused")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """The options of `status`."""
+    """Add the options of `status`."""
     parser.add_argument(
-        "name", nargs="?", metavar="NAME", help="only this one: a device YAML, or its name"
+        "name", nargs="?", metavar="NAME", help="only this daemon: a device YAML, or its name"
     )
     parser.add_argument("--json", action="store_true", help="for programs")
     parser.add_argument("--runtime-dir", metavar="DIR", help="only the daemon of this directory")
 
 
 def run(args: argparse.Namespace) -> int:
-    """0: all serve; 1: there are faults; 2: one has died or is silent; 3: none is here, or visible."""
+    """Return 0: all serve; 1: there are faults; 2: a daemon died or is silent; 3: no daemon visible."""
     folders = [Path(args.runtime_dir)] if args.runtime_dir else list(runtimes())
     found = list(daemons(folders, {} if args.runtime_dir else units(), time.time()))
     if args.name:
@@ -44,7 +44,7 @@ def run(args: argparse.Namespace) -> int:
             print(f"no daemon {Path(args.name).stem}; there is {', '.join(there)}", file=sys.stderr)
             if not args.json:
                 return NONE
-    else:  # what was started by hand once is no news
+    else:  # leave out stopped daemons that were started by hand
         found = [one for one in found if one.state != "stopped" or one.unit]
     if args.json:
         print(json.dumps([{**msgspec.to_builtins(one), "level": one.level} for one in found]))
@@ -54,7 +54,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def show(found: Iterable[DaemonStatus], out: TextIO) -> None:
-    """A block of lines for each daemon."""
+    """Print a block of lines for each daemon."""
     blocks = list(found)
     if not blocks:
         why = "" if os.geteuid() == 0 else " that this user may see (try sudo)"
@@ -129,7 +129,7 @@ def _told(device: Status) -> str:
 
 
 def _age(device: Status, snapshot_s: float) -> str:
-    """Counted from now: the status file itself is up to a second old."""
+    """Return the input's age from now: the status file itself is up to a second old."""
     age_s = device.get("input_age_s")
     return "never read" if age_s is None else f"read {age_s + snapshot_s:.1f} s ago"
 

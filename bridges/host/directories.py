@@ -1,10 +1,11 @@
-"""Where a daemon keeps its files, found by one rule for every command.
+"""A daemon's directories, found by one rule for every command.
 
-A directory given on the command line; else systemd's, in a unit; else the service's, if its lock or
-record names this file; else that of a daemon started by hand, for root also the sudo user's.
+The order: the directory given on the command line; else systemd's, in a unit; else the service's, if
+its lock or record names this file; else those of a daemon started by hand, for root also the sudo
+user's.
 
-`runtime` is lost at a reboot: lock and status. `state` survives it: the record of claimed outputs,
-because a Modbus relay outlives a power cut of the Pi. A given directory is both.
+`runtime`, with lock and status, is lost at a reboot. `state`, with the record of claimed outputs,
+survives it, because a Modbus relay outlives a power cut of the Pi. A given directory is used as both.
 """
 
 import grp
@@ -23,7 +24,7 @@ USERS_RUN = Path("/run/user")
 TMP = Path("/tmp")
 SERVICE_USER = "rmf-bridge"
 GROUPS = ("gpio", "dialout")
-"""The groups that a drop-in may give this user beside its own (`drop_in.py`)."""
+"""The additional groups that a drop-in may give this user (`drop_in.py`)."""
 
 
 class Directories(Struct, frozen=True):
@@ -34,17 +35,17 @@ class Directories(Struct, frozen=True):
 
     @property
     def folders(self) -> tuple[Path, ...]:
-        """Both, `state` first."""
+        """Both directories, `state` first."""
         return tuple(dict.fromkeys((self.state, self.runtime)))
 
 
 def named(file: Path) -> str:
-    """A file's canonical path, as locks and records name it."""
+    """Return a file's canonical path, as used in locks and records."""
     return os.path.realpath(file)
 
 
 def as_given(given: str | None) -> Directories | None:
-    """The directories that the command line or systemd's unit gives; None if neither does."""
+    """Return the directories given by the command line or systemd's unit; None if neither does."""
     if given:
         return Directories(Path(given).absolute(), Path(given).absolute())
     runtime = os.environ.get("RUNTIME_DIRECTORY", "").split(":")[0]
@@ -53,26 +54,26 @@ def as_given(given: str | None) -> Directories | None:
 
 
 def of_service(file: Path) -> Directories:
-    """The directories of `rmf-bridge@.service`."""
+    """Return the directories of `rmf-bridge@.service`."""
     return Directories(SERVICE_RUN / file.stem, SERVICE_STATE / file.stem)
 
 
 def by_hand(file: Path) -> Directories:
-    """The directories of a daemon that this user starts by hand."""
+    """Return the directories of a daemon started by hand by this user."""
     runtime = Path(os.environ.get("XDG_RUNTIME_DIR") or TMP / f"rmf-bridge-{os.getuid()}")
     return Directories(runtime / "rmf-bridge" / file.stem, state_base() / file.stem)
 
 
 def state_base() -> Path:
-    """This user's state directory; one below /tmp if there is no home."""
+    """Return this user's state directory; one below /tmp without a home."""
     home = os.path.expanduser("~")
     default = Path(home) / ".local/state" if os.path.isabs(home) else TMP / f"rmf-{os.getuid()}"
     return Path(os.environ.get("XDG_STATE_HOME") or default) / "rmf-bridge"
 
 
 def everywhere(file: Path) -> Iterator[Directories]:
-    """Where a daemon of this file may be: in the service's directories, or those of a daemon started by
-    hand; for root also those of the user who called sudo.
+    """Yield the possible directories of this file's daemon: the service's; for root those of the user
+    who called sudo; those of a daemon started by hand.
     """
     yield of_service(file)
     if os.geteuid() == 0 and (uid := os.environ.get("SUDO_UID", "")).isdecimal():
@@ -81,7 +82,7 @@ def everywhere(file: Path) -> Iterator[Directories]:
 
 
 def _of_user(uid: int, file: Path) -> Iterator[Directories]:
-    """The directories of this user, if they belong to that user."""
+    """Yield this user's directories, if the user owns them."""
     for base in (USERS_RUN / str(uid), TMP / f"rmf-bridge-{uid}"):
         runtime = base / "rmf-bridge" / file.stem
         try:
@@ -94,9 +95,7 @@ def _of_user(uid: int, file: Path) -> Iterator[Directories]:
 
 
 def runtimes() -> Iterator[Path]:
-    """Every runtime directory on this machine that this user may look for: the services', one's own;
-    for root those of all users.
-    """
+    """Yield this machine's runtime directories: the services' and this user's; for root, all users'."""
     bases = [SERVICE_RUN, by_hand(Path("any")).runtime.parent]
     if os.geteuid() == 0:
         bases += [*USERS_RUN.glob("*/rmf-bridge"), *TMP.glob("rmf-bridge-*/rmf-bridge")]
@@ -106,23 +105,23 @@ def runtimes() -> Iterator[Path]:
 
 
 class Distrusted(PermissionError):
-    """Somebody else has made a directory, or could put files into it. The text says which."""
+    """Another user made a directory, or could write into it. The text names the directory."""
 
 
 def cannot_be_seen(folder: Path, error: OSError) -> PermissionError:
-    """What to do where this user cannot look."""
+    """Return the error, with a remedy, for a folder that this user cannot read."""
     return PermissionError(
-        f"whether a daemon runs there cannot be seen: {folder}: {error.strerror or error}. It belongs"
+        f"cannot see whether a daemon runs in {folder}: {error.strerror or error}. The folder belongs"
         f" to {owner_of(folder)}: use sudo, or give another directory with --runtime-dir"
     )
 
 
 @contextmanager
 def opened(folder: Path, *, ours: bool = False, make: bool = False) -> Iterator[int]:
-    """A descriptor of a daemon's directory, made if it is missing and `make` says so.
+    """Yield a descriptor of a daemon's directory; make a missing directory if `make`.
 
-    Only its owner (`ours`: this user) or root can have made it, and nobody else can put anything into
-    it; the same holds, from the top down, for each directory above it. So what follows may use its
+    Only its owner (`ours`: must be this user) or root can have made it, and nobody else can write into
+    it; the same is checked, from the top down, for each directory above it. So the caller may use its
     path. Raises Distrusted, and other OSErrors.
     """
     folder = folder.absolute()
@@ -142,7 +141,7 @@ def opened(folder: Path, *, ours: bool = False, make: bool = False) -> Iterator[
 
 
 def _owner(folder: Path, *, ours: bool) -> int:
-    """Whose a directory is. Raises Distrusted if it is not this user's, but should be."""
+    """Return a directory's owner. Raises Distrusted if `ours` and the owner is another user."""
     try:
         owner = folder.lstat().st_uid
     except FileNotFoundError:
@@ -156,7 +155,7 @@ def _owner(folder: Path, *, ours: bool) -> int:
 
 
 def _distrusted(place: Path, owner: int, *, last: bool) -> str:
-    """Why others than the owner or root may have made a directory or a link; "" if not."""
+    """Return the reason to distrust a directory or link that a third user could have made; else ""."""
     found = place.lstat()
     if found.st_uid not in (Path("/").stat().st_uid, owner):
         return "belongs to another user"
@@ -169,10 +168,10 @@ def _distrusted(place: Path, owner: int, *, last: bool) -> str:
 
 
 def act_as_owner(places: Directories) -> None:
-    """Root permanently becomes the directories' owner, with the groups that the unit gives.
+    """Change permanently from root to the directories' owner, with the unit's groups.
 
-    Files in them can then do no more than their owner could. Raises PermissionError if somebody else
-    could have made them, or they are not this user's.
+    Files in them then have no more power than their owner. Raises PermissionError if another user
+    could have made the directories, or if we are not root and they are not ours.
     """
     for folder in places.folders:
         with suppress(FileNotFoundError, NotADirectoryError):
@@ -189,7 +188,7 @@ def _become(uid: int, gid: int) -> None:
 
 
 def _groups(uid: int, gid: int) -> list[int]:
-    """The user's groups; for the service's user also those that the unit gives."""
+    """Return the user's groups; for the service's user also the unit's."""
     try:
         user = pwd.getpwuid(uid)
     except KeyError:
@@ -201,7 +200,7 @@ def _groups(uid: int, gid: int) -> list[int]:
 
 
 def owner_of(path: Path) -> str:
-    """The owner's name, for messages."""
+    """Return the owner's name, for messages."""
     try:
         return pwd.getpwuid(path.lstat().st_uid).pw_name
     except (KeyError, OSError):

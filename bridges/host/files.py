@@ -1,13 +1,13 @@
-"""A daemon's own files. They are replaced as a whole: a reader sees either the old or the new one."""
+"""A daemon's own files. Each is replaced as a whole: a reader sees either the old or the new file."""
 
 import os
 from pathlib import Path
 
 
 def replace(path: Path, content: bytes) -> None:
-    """Replace a file and sync it and its folder to disk; makes the folder if needed.
+    """Replace a file, syncing it and its folder to disk; make the folder if needed.
 
-    Raises OSError, and then the old file remains.
+    Raises OSError; the old file then remains.
     """
     path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
     new = path.with_name(f".{path.name}.new")
@@ -29,9 +29,9 @@ def show(path: Path, content: bytes) -> None:
 
 
 def read(path: Path, longest: int) -> bytes:
-    """What such a file holds, or its first `longest` bytes. Raises OSError; for a link, too.
+    """Return the file's content, up to `longest` bytes. Raises OSError, also for a symbolic link.
 
-    A FIFO in its place is not waited for.
+    Does not wait for a FIFO in the file's place.
     """
     flags = os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC
     with open(os.open(path, flags), "rb") as source:

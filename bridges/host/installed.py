@@ -1,8 +1,8 @@
-"""The workbench, the fakes and the page's library may not be installed: no daemon needs them, and
-nothing of `bridges` imports them in any other way.
+"""Imports the optional packages: the workbench, the fakes and the page's library. No daemon needs them,
+and `bridges` imports them only by this module.
 
-A Debian package of ours has one version in its folder, and the daemons' tree has a `.pth` that names
-the folder of the tree's own version (deb/scripts/rmf-bridges.postinst). By pip it is one distribution.
+Each of our Debian packages has a folder for its version, and the daemons' tree has a `.pth` with the
+folder of the tree's own version (deb/scripts/rmf-bridges.postinst). For pip all are one distribution.
 """
 
 import importlib
@@ -11,27 +11,27 @@ from pathlib import Path
 from types import ModuleType
 
 SITE = Path(__file__).parents[2]
-"""Where `bridges` is installed."""
+"""The folder in which `bridges` is installed."""
 
 
 class NotInstalled(Exception):
-    """It is not on this machine. The text says what to install."""
+    """An optional package is not installed. The text says how to install it."""
 
 
 def is_there(package: str) -> bool:
-    """Whether `workbench` or `hal_fakes` is installed, in the version of these daemons."""
+    """Is `workbench` or `hal_fakes` installed, in the version of these daemons?"""
     return importlib.util.find_spec(package) is not None
 
 
 def of_workbench(name: str) -> ModuleType:
-    """A module of `workbench` or `hal_fakes`, by its whole name. Raises NotInstalled."""
+    """Import a module of `workbench` or `hal_fakes` by its full name. Raises NotInstalled."""
     if not is_there(name.partition(".")[0]):
         raise NotInstalled(f"not installed: {how_to_install('workbench')}")
     return importlib.import_module(name)
 
 
 def how_to_install(part: str, site: Path = SITE) -> str:
-    """What to do where the `workbench` or the `page` is missing."""
+    """Return the instruction to install the missing `workbench` or `page`."""
     package = f"rmf-bridges-{part}"
     try:
         place = Path((site / f"{package}.pth").read_text().strip())

@@ -13,12 +13,12 @@ from enum import Enum
 import msgspec
 
 ESCAPED = "unicode_escape"
-codecs.lookup(ESCAPED)  # at once: without a free descriptor it could not be loaded
+codecs.lookup(ESCAPED)  # loaded now, as loading later could fail for lack of a file descriptor
 _PRIORITY = {"DEBUG": 7, "INFO": 6, "WARNING": 4, "ERROR": 3, "CRITICAL": 2}
 
 
 class LogLine(str):
-    """A log line `event key=value …`, and what it was made of, for `--log-format json`."""
+    """A log line `event key=value …`, with its event and values for `--log-format json`."""
 
     __slots__ = ("event", "values")
     event: str
@@ -26,7 +26,7 @@ class LogLine(str):
 
 
 def pairs(event: str, **values: object) -> LogLine:
-    """One log line. Values with spaces, quotes or line breaks are quoted and escaped."""
+    """Return one log line. Values with spaces, quotes or line breaks are quoted and escaped."""
     shown = (f"{key}={_quoted(plain(value))}" for key, value in values.items())
     line = LogLine(" ".join([event, *shown]))
     line.event, line.values = event, values
@@ -34,9 +34,9 @@ def pairs(event: str, **values: object) -> LogLine:
 
 
 def plain(value: object) -> str:
-    """A value for people, not in Python's notation: `agv_request yes, call L3`.
+    """Return a value for people, not in Python's notation: `agv_request yes, call L3`.
 
-    Unset fields of a record are left out. None, or a record with nothing set, is `-`.
+    Unset fields of a record are left out. None, or a record without set fields, is `-`.
     """
     match value:
         case None:
@@ -72,7 +72,7 @@ def _quoted(text: str) -> str:
 
 
 class _Formatter(logging.Formatter):
-    """Under systemd `<6>text`, for its priority; on a terminal `12:34:56.789 INFO text`."""
+    """Under systemd `<6>text`, with journald's priority; on a terminal `12:34:56.789 INFO text`."""
 
     def __init__(self, journal: bool) -> None:
         super().__init__(
@@ -110,13 +110,13 @@ class _Json(logging.Formatter):
 
 
 def _as_json(value: object) -> object:
-    """Numbers and truth as they are; all else as the text log says it."""
+    """Return numbers, booleans and texts unchanged; other values as in the text log."""
     return value if isinstance(value, int | float | str) else plain(value)
 
 
 class _OthersOnce(logging.Filter):
-    """Lets each log call in a library through once: with bad frames or datagrams anybody could
-    trigger it endlessly. Our own code already logs each event once."""
+    """Passes each log call of a library once: with bad frames or datagrams anybody could trigger it
+    endlessly. Our own code already logs each event once."""
 
     OURS = ("root", "bridges", "drivers", "hal_fakes", "workbench")
 
@@ -129,7 +129,7 @@ class _OthersOnce(logging.Filter):
         if record.name.partition(".")[0] in self.OURS:
             return True
         record.exc_info = record.exc_text = None  # a library's traceback helps no operator
-        text = record.getMessage()  # it may quote anybody
+        text = record.getMessage()  # may quote untrusted input
         record.args = None
         record.msg = text if text.isprintable() else text.encode(ESCAPED).decode("ascii")
         first = place not in self._said
@@ -138,11 +138,11 @@ class _OthersOnce(logging.Filter):
 
 
 class Seldom(logging.Filter):
-    """Holds back a line that keeps coming: OFTEN times it passes, then once in AGAIN_S, with the number
-    of those left out. It keeps coming while never more than PAUSE_S lie between two.
+    """Limits repeated lines: passes the first OFTEN of a series, then one in AGAIN_S (s), with the
+    number of lines left out. A pause longer than PAUSE_S (s) ends the series.
 
-    A device that comes and goes each second would fill the disk. Lines are equal that differ only in
-    seconds. `now`: monotonic s.
+    Else a device that is lost and found each second would fill the disk. Lines that differ only in
+    seconds count as equal. `now`: monotonic s.
     """
 
     OFTEN, PAUSE_S, AGAIN_S, MOST = 6, 10.0, 600.0, 1000

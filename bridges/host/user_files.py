@@ -1,7 +1,7 @@
-"""Files that a user names: read whole, and only regular ones. Secrets have stricter rules.
+"""Files named by a user: only regular files are read, and as a whole. Secrets have stricter rules.
 
-A FIFO or a device in a file's place would make a daemon wait forever, or never end. A secret comes from
-a file that only the daemon's user can read, never from a YAML.
+A daemon would wait forever for a FIFO in a file's place, and a device might never end. A secret comes
+from a file that only the daemon's user can read, never from a YAML.
 """
 
 import errno
@@ -26,7 +26,8 @@ class Content(NamedTuple):
 
 
 def read(file: str | os.PathLike[str], longest: int) -> Content:
-    """The first `longest` + 1 bytes of a file, so that a longer one is noticed. Raises OSError."""
+    """Return up to `longest` + 1 bytes of a file, so that the caller notices a longer file. Raises
+    OSError."""
     descriptor = os.open(file, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
     with open(descriptor, "rb") as opened:
         mode = os.fstat(descriptor).st_mode
@@ -38,9 +39,9 @@ def read(file: str | os.PathLike[str], longest: int) -> Content:
 
 
 def secret_line(name: str, file: str, what: str) -> str:
-    """The secret in a file: one line of printable ASCII. Raises SecretError with what to do.
+    """Return the secret in a file: one line of printable ASCII. Raises SecretError with a remedy.
 
-    `name`: the setting that names the file. `what`: `token` or `password`, for the error.
+    `name`: the setting with the file's path. `what`: `token` or `password`, for the error.
     """
     line = secret(name, file).strip()
     if not re.fullmatch(rb"[!-~]{1,%d}" % LONGEST_SECRET, line):
@@ -49,7 +50,7 @@ def secret_line(name: str, file: str, what: str) -> str:
 
 
 def secret(name: str, file: str) -> bytes:
-    """The content of a private file, up to LONGEST_SECRET + 1 bytes. Raises SecretError."""
+    """Return the content of a private file, up to LONGEST_SECRET + 1 bytes. Raises SecretError."""
     try:
         content, mode = read(file, LONGEST_SECRET)
     except OSError as error:

@@ -1,4 +1,4 @@
-"""A file that a user wants written: why it cannot be, in one text and with one exit code."""
+"""The error text and exit code for a file that cannot be written on a user's request."""
 
 import errno
 import os
@@ -7,14 +7,14 @@ from pathlib import Path
 
 
 def no_folder(path: Path) -> str:
-    """Why nothing can be written there, as far as its folder shows; "" if it can."""
+    """Return the reason why the path's folder forbids writing; "" if it permits it."""
     if not path.parent.is_dir():
         return os.strerror(errno.ENOENT)
     return "" if os.access(path.parent, os.W_OK | os.X_OK) else os.strerror(errno.EACCES)
 
 
 def not_written(path: Path | str, why: str | None) -> int:
-    """Say so, after what was printed: the two often end in one log. Returns EX_CANTCREAT."""
+    """Print the error, after flushing stdout: both often go to one log. Return EX_CANTCREAT."""
     sys.stdout.flush()
     print(f"{path} cannot be written: {why}", file=sys.stderr)
     return os.EX_CANTCREAT

@@ -1,9 +1,9 @@
-"""`outputs-off --all-records`: what the services' records name is off before a daemon starts.
+"""`outputs-off --all-records`: switches off the outputs in the services' records before daemons start.
 
-The power was cut while they served. One process loads the program, and forks for each service: a wire
-that hangs delays no other, and each record has its own profiles. This machine's pins come first: they
-need no module that answers. All of it is bounded in time, as every daemon waits for it: what is left,
-a daemon makes safe when it starts.
+For the start after a power cut. One process loads the program and forks for each service: a wire that
+hangs delays no other service, and each record has its own profiles. This machine's pins come first, as
+they depend on no module. The time is bounded, because every daemon waits for this command; a daemon
+makes the remaining outputs safe when it starts.
 """
 
 import argparse
@@ -25,23 +25,23 @@ from bridges.yaml.problems import SettingsError
 from drivers.profiles import texts
 
 OWN_S, OTHERS_S = 4.0, 2.0
-"""For this machine's own pins, and then for all else: as long as the start of a daemon may take."""
+"""For this machine's own pins, then for all other outputs: as long as a daemon's start may take."""
 LOOK_EVERY_S = 0.01
 OWN_PINS = re.compile(rb"\btype: *[\"']?gpio\b")
-"""In a YAML; it decides only who comes first."""
+"""Found in a YAML whose outputs are this machine's pins; decides only the order."""
 
 
 def switch_off_all(
     state: Path = SERVICE_STATE, own_s: float = OWN_S, others_s: float = OTHERS_S
 ) -> int:
-    """0 when every output that a record names is verified off, 1 when not."""
+    """Return 0 if every output in the records is verified off, else 1."""
     log.start()
     own, others = list[Path](), list[Path]()
     for path in sorted(state.glob(f"*/{PATTERN}")):
         if record := read(path):
             file = Path(record.file)
-            with suppress(SettingsError):  # it is said where the record is used
-                record.config()  # what that imports, each child has
+            with suppress(SettingsError):  # logged where the record is used
+                record.config()  # each child inherits the modules imported here
             (own if OWN_PINS.search(record.yaml) else others).append(file)
     texts.give({})
     left = _off(own, own_s) | _off(set(others) - set(own), others_s)
@@ -51,7 +51,7 @@ def switch_off_all(
 
 
 def _off(files: Collection[Path], within_s: float) -> set[Path]:
-    """Switch these services' outputs off, side by side; returns those not verified off in time."""
+    """Switch these services' outputs off in parallel; return the files not verified off in time."""
     give_up_at = time.monotonic() + within_s
     running = {_forked(file): file for file in dict.fromkeys(files)}
     left = set(running.values())
@@ -68,7 +68,7 @@ def _off(files: Collection[Path], within_s: float) -> set[Path]:
 
 
 def _forked(file: Path) -> int:
-    """Switch a service's outputs off in a child, whose exit code is 0 when they are; its process id."""
+    """Switch a service's outputs off in a child, which exits with 0 on success; return its pid."""
     if pid := os.fork():
         return pid
     code = 1

@@ -1,4 +1,4 @@
-"""Refused requests that wait for an answer; bounded, so that a flood of requests causes no flood of
+"""Refused requests that wait for an answer; bounded, as a flood of requests must not cause a flood of
 answers."""
 
 from collections import deque
@@ -11,7 +11,7 @@ from bridges.runtime.clock import TELL_GAP_S
 from bridges.runtime.subject import Publish
 
 MOST: Final = 10
-"""At most this many are answered every TELL_GAP_S: the last ones."""
+"""At most this many requests, the latest, are answered every TELL_GAP_S."""
 
 
 class RefusalAnswers:
@@ -23,12 +23,12 @@ class RefusalAnswers:
         self._said_at = AGES_AGO
 
     def add(self, request: object, reason: str) -> None:
-        """A request was refused: the message or the event, and why. From any thread."""
+        """Note a refused request: the message or the event, and the reason. From any thread."""
         self._waiting.append((request, reason))
 
     @property
     def due_at(self) -> float:
-        """When the next answers are due (monotonic s); NEVER if none waits."""
+        """The time of the next answers (monotonic s); NEVER if none waits."""
         return self._said_at + TELL_GAP_S if self._waiting else NEVER
 
     def say(
@@ -45,5 +45,5 @@ class RefusalAnswers:
                 say(found.topic, found.message)
 
     def status(self) -> Mapping[str, Mapping[str, str]]:
-        """For the status file; nothing before the first."""
+        """Return the last refusal for the status file; empty before the first answer."""
         return {"last_refusal": self.last} if self.last else {}

@@ -21,9 +21,9 @@ class Clock(Struct, frozen=True):
     wall: Callable[[], float]
 
     def stamp(self, read_at: float | None) -> Time:
-        """The stamp of a reading taken at `read_at` (monotonic s); 0 for never.
+        """Return the stamp of a reading taken at `read_at` (monotonic s); 0 for None, no reading.
 
-        It is the current wall clock minus the monotonic age, so that a step of the wall clock distorts
+        The stamp is the current wall clock minus the monotonic age: a step of the wall clock distorts
         neither age nor order. Raises ClockError for a clock past 2038.
         """
         if read_at is None:
@@ -32,7 +32,7 @@ class Clock(Struct, frozen=True):
 
 
 def machine_s() -> float:
-    """Seconds since the machine's start, its sleep included."""
+    """Return the seconds since the machine's start, its sleep included."""
     return time.clock_gettime(time.CLOCK_BOOTTIME)
 
 
@@ -44,9 +44,9 @@ class PublishPace:
         self._told: object = None
 
     def due_at(self, news: object) -> float:
-        """When this is to be published (monotonic s)."""
+        """Return the time to publish `news` (monotonic s)."""
         return self.told_at + (TELL_EVERY_S if news == self._told else TELL_GAP_S)
 
     def published(self, news: object, now: float) -> None:
-        """Note that it has been published."""
+        """Note that `news` was published."""
         self._told, self.told_at = news, now

@@ -1,4 +1,4 @@
-"""What completes the names of devices and services in a shell."""
+"""Completes the names of devices and services in a shell."""
 
 import argparse
 from collections.abc import Callable
@@ -6,16 +6,16 @@ from contextlib import suppress
 from pathlib import Path
 
 Completer = Callable[..., list[str]]
-"""As argcomplete calls it: with the prefix and what was typed so far."""
+"""A function that argcomplete calls with the prefix and the arguments typed so far."""
 
 
 def completed_by(argument: argparse.Action, completer: Completer) -> None:
-    """Let a shell complete this argument by `completer`."""
+    """Let the shell complete this argument with `completer`."""
     argument.completer = completer  # type: ignore[attr-defined]  # argcomplete's way
 
 
 def device_names(prefix: str, parsed_args: argparse.Namespace, **_: object) -> list[str]:
-    """The devices of FILE; none if it is not a valid device YAML."""
+    """Return the devices of FILE; none if it is not a valid device YAML."""
     from bridges.settings.load import SettingsError, load
 
     with suppress(SettingsError, OSError, TypeError):
@@ -24,7 +24,7 @@ def device_names(prefix: str, parsed_args: argparse.Namespace, **_: object) -> l
 
 
 def service_names(prefix: str, parsed_args: argparse.Namespace, **_: object) -> list[str]:
-    """The services that have a YAML in /etc/rmf-bridges, and files that begin so."""
+    """Return the services with a YAML in /etc/rmf-bridges, and the files that begin with `prefix`."""
     from argcomplete.completers import FilesCompleter
 
     from bridges.runtime.services import CONFIG

@@ -1,8 +1,8 @@
 """Contains a driver's unexpected exceptions: they affect one device, and no other.
 
-Its outputs are switched off, the traceback is logged once, and the device is opened again after
-a pause that grows from 0.5 to 30 s. If its outputs are not verified off within OFF_WITHIN_S, the daemon
-ends, and `outputs-off` tries from a new process.
+The device's outputs are switched off, the traceback is logged once, and the device is opened again
+after a pause that grows from 0.5 to 30 s. If its outputs are not verified off within OFF_WITHIN_S, the
+daemon ends, and `outputs-off` tries from a new process.
 """
 
 import logging
@@ -29,13 +29,13 @@ class LeftOn(Exception):
 
 
 class Contained(Generic[X, O]):
-    """A device (`drivers.Driver`) that raises DriverError, or LeftOn, and nothing else."""
+    """A device (`drivers.Driver`) that raises only DriverError and LeftOn."""
 
     def __init__(self, name: str, driver: Driver[X, O], clock: Clock) -> None:
         self._name = name
         self._driver = driver
         self.contacts: Callable[[], Mapping[str, bool]] = dict
-        """`OnContacts.contacts`; none of a device without."""
+        """`OnContacts.contacts`; empty for a driver without contacts."""
         if isinstance(driver, OnContacts):
             self.contacts = driver.contacts
         self._clock = clock
@@ -51,16 +51,16 @@ class Contained(Generic[X, O]):
         self._call(self._driver.open)
 
     def read(self) -> X:
-        """Read every input; after a defect the device is claimed first."""
+        """Read every input; after a defect, claim the device first."""
         return self._call(self._read)
 
     def write(self, outputs: O) -> None:
-        """Bring every output to this level; then the device works again."""
+        """Set every output to its level; success ends a pause."""
         self._call(lambda: self._write(outputs))
         self._pause_s = 0.0
 
     def make_safe(self) -> None:
-        """Every output off."""
+        """Switch every output off."""
         try:
             self._driver.make_safe()
         except DriverError:
@@ -70,7 +70,7 @@ class Contained(Generic[X, O]):
         self._written, self._unsafe_since = False, None
 
     def close(self) -> None:
-        """Outputs off, and the points released."""
+        """Switch the outputs off and release the points."""
         try:
             self._driver.close()
         except Exception as error:  # noqa: BLE001 - logged by _broke
@@ -101,7 +101,7 @@ class Contained(Generic[X, O]):
         raise failure
 
     def _broke(self, error: Exception) -> DriverError:
-        """Say it once, with its traceback, until the device works again."""
+        """Log a defect, once until the device works again; return it as a DriverError."""
         self._failure = f"a defect of the driver: {type(error).__name__}: {error}"
         if not self._pause_s:
             log.error(pairs("defect", device=self._name, reason=self._failure), exc_info=error)
@@ -116,7 +116,7 @@ class Contained(Generic[X, O]):
             self._unsafe_since = now
 
     def _insist_on_off(self) -> None:
-        """Switch off what may be on. Raises DriverError, and LeftOn when that has failed too long."""
+        """Switch off outputs that may be on. Raises DriverError; after OFF_WITHIN_S, LeftOn."""
         if self._unsafe_since is None:
             return
         since = self._unsafe_since

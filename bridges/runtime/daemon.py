@@ -1,6 +1,6 @@
-"""The daemon that serves one YAML. It opens the transport, starts the loops and feeds systemd's
-watchdog. On SIGTERM, or any other signal that would end it, it switches every output off and leaves
-RMF's graph.
+"""The daemon that serves one YAML: opens the transport, starts the loops and feeds systemd's watchdog.
+
+On SIGTERM, or any other signal that would end it, it switches every output off and leaves RMF's graph.
 """
 
 import logging
@@ -41,11 +41,11 @@ STOP_WITHIN_S = 5.0
 STATUS_EVERY_S = 1.0
 ALIVE = "WATCHDOG=1"
 STARTING = "WATCHDOG=1\nEXTEND_TIMEOUT_USEC=30000000"
-"""A start with many silent units takes long, and is not a hang."""
+"""With many silent units a start takes long without being a hang."""
 
 
 class Daemon:
-    """Everything that one `rmf-bridge run` holds. `simulated`: shown in status and diagnostics."""
+    """One `rmf-bridge run`. `simulated`: shown in status and diagnostics."""
 
     def __init__(
         self,
@@ -59,7 +59,7 @@ class Daemon:
         ros_args: Sequence[str] = (),
         outputs_off: Sequence[str] = (),
     ) -> None:
-        """`outputs_off`: the command that switches the outputs off after this process has died.
+        """`outputs_off`: the command to switch the outputs off after the death of this process.
 
         Raises TransportError or HalError if a transport or bus cannot be opened.
         """
@@ -83,8 +83,8 @@ class Daemon:
         self._writer = self._writer_of(ours)
         self._service = service(config, self._transport, open_bus, kept, unsafe, self._writer)
         self._loops = self._service.loops
-        # Every bus is open, and no output is claimed before `serve`: a bus that cannot be opened leaves
-        # no record. `outputs-off` reads the record.
+        # `outputs-off` reads the record. It is written once every bus is open, so a bus that cannot be
+        # opened leaves none; and before `serve`, which claims the outputs.
         if config.buses and not simulated:
             self._convenience("mark", partial(last_mark.leave, name=last_mark.CLAIMED))
             runtime.claim(ours)
@@ -96,7 +96,7 @@ class Daemon:
             self._diagnostics = self._transport.publisher(self._health_topic)
 
     def _writer_of(self, record: ClaimRecord) -> NoWriter:
-        """Keeps what happens in a ring, unless the YAML says otherwise."""
+        """Return the writer of the ring recording; NOBODY if the YAML keeps nothing."""
         keep = self._config.recording
         if keep.keep == "nothing":
             return NOBODY
@@ -116,7 +116,7 @@ class Daemon:
         return RingWriter(make, clock_of(self._transport), lambda: self._transport.release)
 
     def serve(self) -> int:
-        """Run until a signal, and return the exit code: 0 when every output is off and verified."""
+        """Run until a signal; return the exit code, 0 if every output is verified off."""
         signals.on_reset(self._service.reset)
         self._service.subscribe()
         log.info(pairs("serving", file=self._config.path, kind=self._config.kind, **self._about()))
@@ -132,7 +132,7 @@ class Daemon:
         return 0 if safe else 1
 
     def _watch(self) -> None:
-        """Tell systemd that we are ready, and each time that every loop has finished scans."""
+        """Tell systemd when the daemon is ready; feed its watchdog while every loop finishes scans."""
         period_s = min(STATUS_EVERY_S, (watchdog_s() or 10.0) / 6)
         told_ready, tell_at = False, 0.0
         fed = [-1] * len(self._loops)
@@ -155,7 +155,7 @@ class Daemon:
                 self._convenience("status", self._tell)
 
     def _require_life(self) -> None:
-        """What has died cannot be restarted in here; systemd starts us again."""
+        """Raise SystemExit if the transport or a loop has died: systemd restarts the whole daemon."""
         if not self._transport.lives:
             log.critical(pairs("died", transport=self._transport.name))
             self._writer.died(f"transport {self._transport.name}")
@@ -186,7 +186,7 @@ class Daemon:
         return self._predecessor.left() if self._predecessor else []
 
     def _convenience(self, what: str, do: Callable[[], None]) -> None:
-        """A failure is logged once and tried again; the daemon runs on."""
+        """Call `do`; log a failure once and run on. The next call tries again."""
         try:
             do()
         except Exception as error:  # noqa: BLE001 - logged by Once
@@ -199,7 +199,7 @@ class Daemon:
         return about | ({"SIMULATED": "no hardware moves"} if self._simulated else {})
 
     def _apart(self) -> list[dict[str, str]]:
-        """The faults that keep this node and others from hearing each other."""
+        """Return the faults that keep this node and others from hearing each other."""
         return [{"code": code, "detail": detail} for code, detail in self._transport.faults()]
 
     def _tell(self) -> None:
@@ -232,5 +232,5 @@ class Daemon:
         except (
             TransportError,
             ClockError,
-        ) as error:  # when states cannot be published, that is logged as an error
+        ) as error:  # debug: unpublished states are logged as an error elsewhere
             log.debug(pairs("not_published", topic=DIAGNOSTICS.name, reason=error))

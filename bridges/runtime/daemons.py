@@ -1,4 +1,4 @@
-"""The daemons on this machine: found by their folders and units, and by what they say of themselves."""
+"""The daemons on this machine, found by their folders and units, with their status files."""
 
 import json
 import shutil
@@ -19,12 +19,12 @@ from bridges.runtime.subject import Status
 UNIT: Final = "rmf-bridge@"
 
 RUNS: Final = ("active (running)", "activating (start)", "deactivating (stop-sigterm)")
-"""What systemd says of a unit whose process is there."""
+"""systemd's states of a unit with a running process."""
 
 ASK_SYSTEMD_S: Final = 3.0
 
 WELL, FAULTY, DOWN, NONE = 0, 1, 2, 3
-"""Exit codes, as monitoring plugins have them: OK, WARNING, CRITICAL, UNKNOWN."""
+"""Exit codes of monitoring plugins: OK, WARNING, CRITICAL, UNKNOWN."""
 
 LEVEL_OF: Final = {
     "serving": WELL,
@@ -45,14 +45,14 @@ class FaultStatus(msgspec.Struct):
 
 
 class DeviceStatus(msgspec.Struct):
-    """What every device's status has; its other keys are the kind's own."""
+    """The keys of every device's status; further keys depend on the kind."""
 
     faults: list[FaultStatus] = []
     input_age_s: float | None = None
 
 
 class StatusFile(msgspec.Struct):
-    """What `status` relies on in a status file."""
+    """The keys of a status file that `status` relies on."""
 
     devices: dict[str, DeviceStatus] = {}
     faults: list[FaultStatus] = []
@@ -63,9 +63,9 @@ class StatusFile(msgspec.Struct):
 class DaemonStatus(msgspec.Struct, kw_only=True):
     """One daemon, or a unit without one.
 
-    `state`: `serving`; `old`: it writes no status any more; `died` without tidying up; `left on`: it
-    died with outputs that nobody has verified off; `failed`: systemd has given up; `stopped`;
-    `unknown`: this user may not see it. `unit`: what systemd says.
+    `state`: `serving`; `old`: runs, but its status is not fresh; `died`: left a status file behind;
+    `left on`: died, and its outputs are not verified off; `failed`: systemd has given up; `stopped`;
+    `unknown`: this user may not see it. `unit`: the unit's state in systemd.
     """
 
     name: str
@@ -78,12 +78,12 @@ class DaemonStatus(msgspec.Struct, kw_only=True):
 
     @property
     def devices(self) -> Mapping[str, Status]:
-        """Its devices' part of the status file."""
+        """The devices' part of the status file."""
         return cast(Mapping[str, Status], self.status.get("devices", {}))
 
     @property
     def level(self) -> int:
-        """Its exit code."""
+        """The exit code for this daemon."""
         level = LEVEL_OF[self.state]
         parts = (self.status, *self.devices.values())
         return max(level, FAULTY) if any(part.get("faults") for part in parts) else level
@@ -92,7 +92,7 @@ class DaemonStatus(msgspec.Struct, kw_only=True):
 def daemons(
     folders: Iterable[Path], found_units: Mapping[str, str], wall: float
 ) -> Iterator[DaemonStatus]:
-    """The daemon of each runtime directory, and each of systemd's units without one. `wall`: now."""
+    """Yield the daemon of each runtime directory, then systemd's units without one. `wall`: now."""
     rest = dict(found_units)
     for folder in folders:
         service = folder.parent == SERVICE_RUN
@@ -126,7 +126,7 @@ def _daemon(folder: Path, by: str, unit: str, wall: float) -> DaemonStatus:
 
 
 def _unreleased(folder: Path) -> str:
-    """What to do about outputs of a dead daemon that nobody has verified off; "" without a record."""
+    """Return the remedy for a dead daemon's outputs not verified off; "" without a record."""
     state = SERVICE_STATE if folder.parent == SERVICE_RUN else state_base()
     for path in paths(Directories(folder, state / folder.name)):
         if record := read(path):
@@ -142,7 +142,7 @@ def _without_directory(unit: str) -> str:
 
 
 def _read(path: Path, wall: float) -> tuple[dict[str, Any], float | None]:
-    """The status and its age (s); nothing if there is none, or it cannot be understood."""
+    """Return the status and its age (s); empty and None if it is missing or invalid."""
     try:
         written_at = path.lstat().st_mtime
         text = files.read(path, holder.STATUS_MAX)
@@ -156,7 +156,7 @@ def _read(path: Path, wall: float) -> tuple[dict[str, Any], float | None]:
 
 
 def units() -> dict[str, str]:
-    """State of each of our units by instance, such as `active (running)`; empty without systemd."""
+    """Return our units' states by instance, such as `active (running)`; empty without systemd."""
     if shutil.which("systemctl") is None:
         return {}
     ask = ("systemctl", "list-units", "--all", "--plain", "--output=json", f"{UNIT}*")

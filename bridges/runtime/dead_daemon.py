@@ -1,6 +1,6 @@
-"""The outputs of a dead daemon, off from a new process: what `rmf-bridge outputs-off` does.
+"""Switches off a dead daemon's outputs from a new process, for `rmf-bridge outputs-off`.
 
-The record that it wrote before it claimed anything takes precedence over the YAML, which may have been
+The daemon's record, written before its first claim, takes precedence over the YAML, which may have been
 edited since. A directory that is full, missing or read-only does not delay switching off.
 """
 
@@ -28,7 +28,7 @@ TIMEOUT_S = 5.0
 
 
 def switch_off(args: argparse.Namespace) -> int:
-    """0 when every output is verified off, 1 when not, 69 while the daemon lives or may live."""
+    """Return 0 if every output is verified off, 1 if not, 69 while the daemon lives or may live."""
     log.start()
     signals.ignore()
     file = args.file.absolute()
@@ -42,7 +42,7 @@ def switch_off(args: argparse.Namespace) -> int:
         return _off_by_yaml(file, {})
     answered = ages(places)
     records = Records(places, file)
-    if args.record:  # the daemon that asks holds the lock meanwhile (`runtime/predecessor.py`)
+    if args.record:  # the calling daemon holds the lock (`runtime/predecessor.py`)
         return _off_by_records(records, answered, args.record)
     claimed = last_mark.says_claimed(os.environ) and bool(records.unreleased())
     try:
@@ -64,9 +64,9 @@ def switch_off(args: argparse.Namespace) -> int:
 
 
 def _places(file: Path, given: str | None) -> Directories | None:
-    """The daemon's directories. None if they cannot be trusted and systemd says that it is dead.
+    """Return the daemon's directories; None if they are not trusted and systemd reports its death.
 
-    Raises PermissionError if it cannot be known whether a daemon runs there.
+    Raises PermissionError if a daemon may run there unseen.
     """
     try:
         places = runtime.find(file, given)
@@ -96,7 +96,7 @@ def _off_by_yaml(file: Path, answered: Mapping[str, float]) -> int:
 def _off_by_records(
     records: Records, answered: Mapping[str, float], names: list[str] | None = None
 ) -> int:
-    """Switch off what these records name; all records by default."""
+    """Switch off the outputs of the records in `names`; of all records by default."""
     found = [r for r in records.unreleased() if names is None or r.name in names]
     each_s = TIMEOUT_S / max(1, len(found))  # a dead bus of one leaves time for the others
     return _told(not [r for r in found if not _off_by_record(records, r, answered, each_s)])
@@ -108,7 +108,7 @@ def _off_by_record(
     try:
         config = record.config()
     except SettingsError as error:
-        _say(error)  # another version's YAML: that of now is all that there is to go by
+        _say(error)  # a YAML of another version: only the current file is left to use
         _off_by_yaml(Path(record.file), answered)
         return False
     unsafe = _unsafe(config, record.safe, answered, within_s)
@@ -137,8 +137,8 @@ class _StatusFile(msgspec.Struct):
 
 
 def ages(places: Directories) -> Mapping[str, float]:
-    """How long ago (s) each device had answered when the dead daemon wrote its last status, if that is
-    still there; those that never had are left out."""
+    """Return the age (s) of each device's last answer in the dead daemon's last status; empty without
+    a status. Devices without an answer are left out."""
     try:
         shown = msgspec.json.decode(read(places.runtime / STATUS, STATUS_MAX), type=_StatusFile)
     except (OSError, msgspec.MsgspecError, UnicodeDecodeError, RecursionError):

@@ -1,7 +1,7 @@
-"""One device in service: the scan of a driver around its subject.
+"""One device in service: scans its driver, and decides with its subject.
 
-A scan is a PLC's: read the inputs, decide, write every output, publish if it is due. The loop that
-owns the device's bus calls it; nothing here waits or keeps a thread.
+A scan is like a PLC's: read the inputs, decide, write every output, publish if due. The loop of the
+device's bus calls `scan`; nothing here waits or has a thread.
 """
 
 import logging
@@ -43,7 +43,7 @@ log = logging.getLogger(__name__)
 
 class Node(Generic[S, L, M, X, E, O, R]):
     """Serves one device. `publish(topic, message)` sends to RMF and does not raise.
-    `not_sent(topic, error)`: is told why a state cannot be."""
+    `not_sent(topic, error)` notes a state that cannot be sent."""
 
     def __init__(
         self,
@@ -86,21 +86,21 @@ class Node(Generic[S, L, M, X, E, O, R]):
 
     @property
     def ready(self) -> bool:
-        """Whether each input was read or timed out once, and the first state is published."""
+        """Has each input been read or timed out once, and is the first state published?"""
         return self._pace.told_at > AGES_AGO
 
     @property
     def answers(self) -> bool:
-        """Could the last scan read and write all of it?"""
+        """Did the last scan read every input and write every output?"""
         return self._has_read and not self._io_fault
 
     def refuse(self, message: Message, refusal: RequestRefused) -> None:
-        """Count a message that makes no event, and answer it. Called from any thread."""
+        """Count a refused message, and answer it. Called from any thread."""
         self._refusals.add(refusal.kind, refusal.detail, device=self.name)
         self._answers.add(message, str(refusal))
 
     def was_suspended(self, for_s: float) -> None:
-        """Nothing was scanned for this long (s): everything read before may be outdated."""
+        """Note a pause in scanning of `for_s` (s): earlier readings may be outdated."""
         self._decide(Suspended(f"nothing was read for {for_s:.1f} s"))
 
     def scan(self, events: Iterable[DeviceEvent[X, E]] = ()) -> None:
@@ -109,7 +109,7 @@ class Node(Generic[S, L, M, X, E, O, R]):
         self._bus_words.clear()
         self._decide(self._read())
         for event in events:
-            if isinstance(event, OperatorReset):  # a device that has failed is claimed again
+            if isinstance(event, OperatorReset):  # claims a failed device again
                 self._open = self._open and not self._io_fault
             self._decide(event)
         self._write()
@@ -119,7 +119,7 @@ class Node(Generic[S, L, M, X, E, O, R]):
         self._log()
 
     def make_safe(self) -> bool:
-        """Every output off; False, and a log line, when that could not be done or verified."""
+        """Switch every output off; log and return False if they are not verified off."""
         try:
             self._driver.make_safe()
         except DriverError as error:
@@ -128,7 +128,7 @@ class Node(Generic[S, L, M, X, E, O, R]):
         return True
 
     def close(self) -> None:
-        """Outputs off, and the points released."""
+        """Switch the outputs off and release the points."""
         self._driver.close()
 
     @property
@@ -137,7 +137,7 @@ class Node(Generic[S, L, M, X, E, O, R]):
         return self._refusals.counts()
 
     def status(self) -> Status:
-        """For the status file: what RMF is shown, outputs, faults, the inputs' age, contacts."""
+        """Return for the status file: the state shown to RMF, outputs, faults, input age, contacts."""
         decision = self.subject.decision
         if decision is None:
             return {}
@@ -158,7 +158,7 @@ class Node(Generic[S, L, M, X, E, O, R]):
         return Sampled(sample)
 
     def _write(self) -> None:
-        """Outputs are levels: the whole set each scan, and nothing before the first reading."""
+        """Write all outputs, as levels, in each scan; none before the first reading."""
         if not self._has_read or self.subject.decision is None:
             return
         try:
@@ -174,19 +174,19 @@ class Node(Generic[S, L, M, X, E, O, R]):
         self._logged_outputs = outputs if self._logged_outputs is None else self._logged_outputs
 
     def _tell(self) -> None:
-        """Publish if it is due; a request alone is no reason."""
+        """Publish the state if it is due; a request alone does not cause it."""
         subject, now = self.subject, self._clock.monotonic()
         assert subject.decision is not None
         report = subject.decision.report
         news = report.news()
         if now >= self._pace.due_at(news):
-            if self._send(report):  # a door that nobody was shown OPEN has let nobody in
+            if self._send(report):  # a door admits robots only after OPEN was published
                 subject.published(self._kind.published(subject.memory, report))
             self._pace.published(news, now)
         self.wake_at = min(subject.wake_at, self._pace.due_at(news))
 
     def _answer(self) -> None:
-        """Publish why requests were refused, and who has the device."""
+        """Publish answers to refused requests: the reason, and the device's holder."""
         self._answers.say(self._clock.monotonic(), self._answered, self._publish)
         self.wake_at = min(self.wake_at, self._answers.due_at)
 
@@ -196,7 +196,7 @@ class Node(Generic[S, L, M, X, E, O, R]):
         return self._kind.answer(self.name, request, reason, decision.report)
 
     def _send(self, report: R) -> bool:
-        """Publish the state; False if it was not sent."""
+        """Publish the state; return False if it was not sent."""
         try:
             at = self._clock.stamp(report.read_at)
         except ClockError as error:
@@ -206,19 +206,19 @@ class Node(Generic[S, L, M, X, E, O, R]):
         return self._publish(self._kind.states, state) is not False
 
     def _log(self) -> None:
-        """Comes last: a log line takes as long as a scan."""
+        """Log changes, as the last step of a scan: a log line takes as long as a scan."""
         decision = self.subject.decision
         assert decision is not None
         if decision.outputs != self._logged_outputs:
             log.info(pairs("outputs", device=self.name, outputs=decision.outputs))
         self._logged_outputs = decision.outputs
         self.subject.log(decision.report)
-        if self._io_fault and not self._failing:  # reading and writing
+        if self._io_fault and not self._failing:  # both reading and writing succeed again
             log.info(pairs("device_back", device=self.name))
             self._io_fault = ""
 
     def _failed(self, error: DriverError) -> str:
-        """Log once when a device is lost, not in each scan."""
+        """Note a failed scan and log the loss of the device once; return the error's text."""
         if not self._io_fault:
             log.error(pairs("device_lost", device=self.name, reason=error))
         self._failing = True
@@ -227,9 +227,9 @@ class Node(Generic[S, L, M, X, E, O, R]):
         return self._io_fault
 
     def _identity(self, fault: Fault) -> object:
-        """Code and detail; the code alone if the detail is a bus's error text, which varies."""
+        """Return the fault, or only its code if the detail is a bus's error text, which varies."""
         return fault.code if fault.detail in ("", *self._bus_words) else fault
 
 
 AnyNode = Node[Any, Any, Any, Any, Any, Any, Any]
-"""A node of a kind that was found by its name."""
+"""A node of a kind known only by its name."""

@@ -1,12 +1,12 @@
 """A daemon's diagnostics for ROS's `/diagnostics`, made from its status file.
 
-There is one status for the daemon and one for each device (of a supervisor: for each lift or door).
+There is one status for the daemon and one for each device (for a supervisor: each lift or door).
 `name` is `<node>: <device>`, as ROS's aggregator expects; `hardware_id` is the device's name; `message`
-names the faults. The values are the status file's, with each fault's detail under its code.
+names the faults. The values come from the status file, each fault's detail under its code.
 LiftState, DoorState and ChargerState have no fields for this.
 
     OK      the input is read, and there is no fault
-    WARN    the daemon: it is a simulation, or only listens in its quiet start
+    WARN    the daemon is a simulation, or still only listens in its quiet start
     ERROR   the device or the daemon has faults: it cannot publish, or another node does its work
     STALE   its input has not been read yet
 """
@@ -30,13 +30,13 @@ from bridges.runtime.subject import Status
 MOST: Final = 100
 """At most this many devices: a supervisor learns names from the network, which may flood it."""
 CONTACTS: Final = "contacts"
-"""Only in the status file: on the graph they would be most of the traffic."""
+"""Left out here, and only in the status file: they would be most of the traffic on the graph."""
 
 
 def diagnosis(
     node: str, kind: str, daemon: Status, devices: Mapping[str, Status], at: Time
 ) -> DiagnosticArray:
-    """The message. `daemon` and `devices` (by name): as in the status file. `at`: now."""
+    """Return the message. `daemon` and `devices` (by name): as in the status file. `at`: now."""
     statuses = [_daemon(node, kind, daemon)]
     statuses += [_device(node, kind, *named) for named in islice(devices.items(), MOST)]
     return DiagnosticArray(Header(at), tuple(statuses))

@@ -1,7 +1,7 @@
-"""The drop-in of a service: what this YAML needs of systemd, beside the unit for all of them.
+"""A service's drop-in: the systemd settings for its YAML, beside the unit common to all services.
 
-`rmf-bridge enable` writes it. The unit alone permits no device, and `run` refuses a drop-in that was
-written for other needs: a daemon that may not open its relay could only report that each second.
+`rmf-bridge enable` writes it. The unit alone permits no device, and `run` refuses a drop-in for other
+needs: a daemon that is not permitted to open its relay could only report this each second.
 """
 
 import hashlib
@@ -16,7 +16,7 @@ from bridges.transports.zenoh.config import mode
 from drivers.hal import Needs
 
 FITS: Final = "RMF_BRIDGE_FITS"
-"""The environment variable that says which needs the unit meets; `nothing` in the unit alone."""
+"""The environment variable with the `fits` word of the drop-in; `nothing` in the unit alone."""
 ROUND_S: Final = 1.25
 LEAST_S: Final = 3.0
 WITHOUT_OUTPUTS_S: Final = 10.0
@@ -24,7 +24,7 @@ LOCAL: Final = ("localhost", "multicast")
 
 
 def text(config: Config, groups: Collection[str]) -> str:
-    """The drop-in's text. `groups`: those of the machine; systemd starts no unit with another one."""
+    """Return the drop-in's text. `groups`: the machine's; a unit with an unknown one does not start."""
     head = (
         f"# Written by `rmf-bridge enable` for {config.path.name}. After a change enable it again."
     )
@@ -33,32 +33,32 @@ def text(config: Config, groups: Collection[str]) -> str:
 
 
 def fits(config: Config) -> str:
-    """A word for what this file needs; files with equal needs have the same."""
+    """Return a hash of this file's needs; equal needs have equal hashes."""
     needs = "\n".join([*_unit(config), *_service(config, GROUPS)])
     return hashlib.sha256(needs.encode()).hexdigest()[:16]
 
 
 def misfit(config: Config, environ: Mapping[str, str]) -> str:
-    """What is wrong if the unit that started us was written for other needs; "" if nothing is."""
+    """Return the error if our unit has no drop-in for this file's needs; "" if it fits."""
     met = environ.get(FITS, "")
-    if met in ("", fits(config)):  # none: no unit of ours
+    if met in ("", fits(config)):  # "": not started by a unit of ours
         return ""
     why = "has no drop-in" if met == "nothing" else "has a drop-in for other buses or durations"
     return f"{config.path}: the unit {why}: run `sudo rmf-bridge enable {config.path}`"
 
 
 def watchdog_s(config: Config) -> float:
-    """How long a hung daemon keeps its relays (s).
+    """Return the longest time (s) that a hung daemon keeps its relays.
 
-    A loop finishes something each second, when its states are due, or one call of its bus later.
-    A call may take half of this at most. Without outputs nothing hurries, and disks may be slow.
+    A loop finishes a step each second, when its states are due, or one bus call later. A call may take
+    at most half of this time. Without outputs the time is longer, as disks may be slow.
     """
     slowest = max((getattr(bus, "timeout_s", 0.0) for bus in config.buses.values()), default=0.0)
     return max(LEAST_S, 1.75 * slowest + ROUND_S) if config.buses else WITHOUT_OUTPUTS_S
 
 
 def _unit(config: Config) -> list[str]:
-    """Classes of devices must be known to the kernel when the unit starts."""
+    """Load the kernel modules before the unit starts: DeviceAllow needs known device classes."""
     units = " ".join(
         f"modprobe@{name}.service" for name in _each(n.modules for n in _needs(config))
     )
@@ -85,21 +85,21 @@ def _needs(config: Config) -> list[Needs]:
 
 
 def _each(found: Iterable[Iterable[str]]) -> list[str]:
-    """Every word once, without empty ones."""
+    """Return each word once, without empty ones."""
     return list(dict.fromkeys(word for words in found for word in words if word))
 
 
 def _hosts(rmf: Rmf, needs: Iterable[Needs]) -> list[str] | None:
-    """The addresses that it talks to; None if they cannot be known before it runs.
+    """Return the addresses that the daemon talks to; None if they are unknown before it runs.
 
-    Unknown are the nodes of a DDS site, the peers of a zenoh peer, and whatever a name stands for.
+    Unknown are the nodes of a DDS site, the peers of a zenoh peer, and the addresses of host names.
     """
     hosts = [*_graph_hosts(rmf), *_each([n.host] for n in needs)]
     return None if not all(map(_is_address, hosts)) else _each([LOCAL, hosts])
 
 
 def _graph_hosts(rmf: Rmf) -> list[str]:
-    """Where the other nodes are, by address; a name among them stands for any address."""
+    """Return the hosts of the other nodes; a host name among them, or "*", stands for any address."""
     if rmf.network == "localhost":
         return []
     zenoh = rmf.zenoh or Zenoh()

@@ -1,4 +1,4 @@
-"""What each fault means and what to do: faults.yaml, for `status` and for docs/reference/faults.md.
+"""Causes and remedies of faults, from faults.yaml, for `status` and docs/reference/faults.md.
 
 `python -m bridges.runtime.faults > docs/reference/faults.md` writes the page.
 """
@@ -17,8 +17,8 @@ QUOTED: Final = re.compile(r"`([^`]*)`")
 HEAD: Final = """\
 # Faults, by name
 
-What `rmf-bridge status`, `watch`, the log and ROS's `/diagnostics` call a fault, its likely cause
-and what to do. `rmf-bridge status` prints the same for the faults that are there now. Other symptoms:
+Faults by their names in `rmf-bridge status`, `watch`, the log and ROS's `/diagnostics`, with the likely
+cause and what to do. `rmf-bridge status` prints the same for the present faults. Other symptoms:
 [Troubleshoot](../how-to/troubleshoot.md).
 
 | fault | likely cause | do |
@@ -34,13 +34,13 @@ class Remedy(msgspec.Struct, frozen=True):
 
 
 def remedies() -> dict[str, Remedy]:
-    """Each fault's remedy, by its code."""
+    """Return each fault's remedy by its code."""
     text = Path(__file__).with_suffix(".yaml").read_text(encoding="utf-8")
     return msgspec.convert(yaml.safe_load(text), dict[str, Remedy])
 
 
 def values(file: str, device: str) -> dict[str, str]:
-    """What the YAML of a daemon sets for its device: key -> value; nothing if it cannot be read."""
+    """Return a device's settings from the daemon's YAML, key -> value; empty if it cannot be read."""
     from bridges.settings.load import SettingsError, load
 
     try:
@@ -57,7 +57,7 @@ def values(file: str, device: str) -> dict[str, str]:
 
 
 def here(remedy: Remedy, file: str, device: str, known: Mapping[str, str]) -> Remedy:
-    """The remedy for this device: its name, its file and its settings where only a word stood."""
+    """Return the remedy with this device's name, file and settings in place of FILE, NAME and keys."""
     names = {"FILE": shlex.quote(file)} if file else {}
     names |= (
         dict.fromkeys(("NAME", "LIFT", "DOOR", "CHARGER"), shlex.quote(device)) if device else {}
@@ -72,12 +72,12 @@ def here(remedy: Remedy, file: str, device: str, known: Mapping[str, str]) -> Re
 
 @cache
 def for_explain() -> dict[str, tuple[str, str]]:
-    """Each fault's likely cause and what to do, by its code, as `workbench/explain/` takes them."""
+    """Return each fault's (cause, remedy) by its code, for `workbench/explain/`."""
     return {code: (one.cause, one.do) for code, one in remedies().items()}
 
 
 def page() -> str:
-    """docs/reference/faults.md."""
+    """Return the text of docs/reference/faults.md."""
     rows = (f"| `{code}` | {one.cause} | {one.do} |" for code, one in remedies().items())
     return HEAD + "\n".join(rows) + "\n"
 

@@ -1,7 +1,7 @@
 """Serves a kind without hardware: a core memory for each subject, and its publishers on RMF's graph.
 
-A round takes the messages that arrived, wakes the subjects that are due and publishes their messages.
-A test calls it in virtual time; the daemon has a thread for it (`bridges/runtime/serving.py`).
+A round takes the arrived messages, wakes the subjects that are due and publishes their messages.
+Tests call rounds in virtual time; the daemon has a thread for them (`bridges/runtime/serving.py`).
 """
 
 import logging
@@ -31,18 +31,18 @@ from bridges.transports.transport import Subscription, Transport
 log = logging.getLogger(__name__)
 
 MAX_SUBJECTS = 1000
-"""More lifts or doors than any site has; more names must be invented ones."""
+"""More lifts or doors than any site has: further names must be invented."""
 MAX_UNSHOWN = 100
-"""At most this many names that only requests mention, without a state of such a lift or door."""
+"""The limit of names known only from requests, without a state of such a lift or door."""
 MAX_REQUESTERS = 10_000
-"""At most this many requesters of all lifts or doors that the YAML does not name: more than any site's
-robots at a time. A holder is never forgotten, so made-up ones would pile up.
+"""The limit of requesters at lifts or doors missing in the YAML, in total: more than any site's robots.
+A holder is never forgotten, so invented ones would pile up.
 """
 DEFECT = "a defect"
 
 
 def _core(kind: GraphKind[S, L, M, E, R], limits: L) -> SubjectCore[M, GraphEvent[E], None, R]:
-    """A fault is identified by code and detail: the detail says whose it is."""
+    """Return the kind's core. Faults are identified by code and detail: the detail names the owner."""
 
     def itself(fault: Fault) -> Fault:
         return fault
@@ -101,7 +101,7 @@ class GraphNode(Generic[S, L, M, E, R]):
             self._add(name, memory)
 
     def subscribe(self) -> None:
-        """Subscribe to every topic. Retained messages arrive at once."""
+        """Subscribe to every topic; retained messages arrive at once."""
         self.presence.listen(self._transport, map(self._named, self._kind.sole))
         if self.alone:
             self.alone.listen(self._transport, map(self._named, self._kind.yields))
@@ -113,30 +113,30 @@ class GraphNode(Generic[S, L, M, E, R]):
             )
 
     def reset(self) -> None:
-        """An operator says that latched faults may clear; from any thread."""
+        """Clear latched faults on an operator's order; from any thread."""
         self._reset = True
         self.inbox.wake()
 
     @property
     def finished(self) -> int:
-        """Nothing within a round."""
+        """Always 0: steps within a round are not counted."""
         return 0
 
     @property
     def ready(self) -> bool:
-        """Always: a passive node is ready too, as another one does its work."""
+        """Always true: a passive node is ready too, as another node does its work."""
         return True
 
     @property
     def wake_at(self) -> float:
-        """When the next round is due if no message arrives (monotonic s)."""
+        """The time of the next round if no message arrives (monotonic s)."""
         due = (subject.wake_at for subject in self.subjects.values())
         looks = [look.look_at for look in (self.presence, self.alone) if look]
         answers_at = self._answers.due_at if self.presence.may_speak else NEVER
         return min(*looks, self._keeper.wake_at, answers_at, *due)
 
     def round(self) -> None:
-        """Take the messages that arrived, wake the subjects that are due, publish."""
+        """Take the arrived messages, wake the subjects that are due, publish."""
         self._look_around()
         for name, events in self.inbox.take().items():
             for topic, event in events:
@@ -155,7 +155,7 @@ class GraphNode(Generic[S, L, M, E, R]):
         self._writer.flush()
 
     def end(self) -> bool:
-        """Nothing to switch off."""
+        """Return True: there is nothing to switch off."""
         return True
 
     @property
@@ -164,7 +164,7 @@ class GraphNode(Generic[S, L, M, E, R]):
         return self._refusals.counts()
 
     def status(self) -> Status:
-        """For the status file: whether it is passive, how many rivals there are, and who hears whom."""
+        """Return for the status file: passive or not, rivals, refusals, faults, connections."""
         return {
             "passive": not self.presence.may_speak,
             "other_publishers": self.presence.rivals,
@@ -179,11 +179,11 @@ class GraphNode(Generic[S, L, M, E, R]):
         return *self.presence.faults, *self._outlet.faults, *self._keeper.faults
 
     def devices(self) -> Mapping[str, Status]:
-        """For the status file, from any thread: each subject by name."""
+        """Return each subject's status by name, for the status file; from any thread."""
         return {subject.name: subject.status() for subject in list(self.subjects.values())}
 
     def _to_inbox(self, topic: Topic[Message]) -> Callable[[Message], None]:
-        """A callback for the transport's thread. Only what is accepted waits: it is not endless."""
+        """Return a callback for the transport's thread; only accepted messages enter the inbox."""
 
         heard_on = self._named(topic).name
 
@@ -197,8 +197,7 @@ class GraphNode(Generic[S, L, M, E, R]):
 
     @contextmanager
     def _counting(self, about: str, message: object = None) -> Iterator[None]:
-        """Count what is refused, or fails by a defect of ours. A core that fails has changed
-        nothing."""
+        """Count refusals and failures by a defect of ours. A core that fails has changed nothing."""
         try:
             yield
         except RequestRefused as refusal:
@@ -211,7 +210,7 @@ class GraphNode(Generic[S, L, M, E, R]):
             self._refusals.add(DEFECT, f"{type(error).__name__} about {about}")
 
     def _look_around(self) -> None:
-        """Declare our publishers when we may speak, and withdraw them when not."""
+        """Declare our publishers while we may speak; else withdraw them."""
         for look in filter(None, (self.presence, self.alone)):
             look.look(self._clock.monotonic())
         may = self._may_speak()
@@ -233,13 +232,13 @@ class GraphNode(Generic[S, L, M, E, R]):
         return MaySpeak(presence.may_speak, self._must_at_once(), alone, presence.waits)
 
     def _must_at_once(self) -> bool:
-        """Is there something that cannot wait for the end of the quiet start, and no rival?"""
+        """Is there no rival, and a subject too urgent to wait for the end of the quiet start?"""
         if self.presence.may_speak or self.presence.rivals:
             return False
         return any(self._kind.urgent(subject.memory) for subject in self.subjects.values())
 
     def _heard_by(self) -> dict[str, int]:
-        """By the topic: how many other nodes listen to what is sent."""
+        """Return the number of subscriptions that receive each topic, by its name."""
         names = {topic.name for topic in self._kind.publishes}
         return {name: n for name, n in self._outlet.heard_by().items() if name in names}
 
@@ -261,7 +260,7 @@ class GraphNode(Generic[S, L, M, E, R]):
             self._decide(subject, event)
 
     def _subject(self, name: str, shows_itself: bool) -> Subject[M, GraphEvent[E], None, R]:
-        """The subject of this name; made if it is new."""
+        """Return the subject of this name, made if new. Raises RequestRefused for too many names."""
         if name not in self.subjects and not self._has_room(name, shows_itself):
             raise RequestRefused("too many names", name)
         if shows_itself:
@@ -270,7 +269,7 @@ class GraphNode(Generic[S, L, M, E, R]):
         return found or self._add(name, self._kind.initial(name, self._started_at))
 
     def _has_room(self, name: str, shows_itself: bool) -> bool:
-        """Invented names must not displace those of the YAML, or those whose states were heard."""
+        """Is there room for this name? Invented ones must not displace names with a YAML or state."""
         if name in self._reserved:
             return True
         if shows_itself:
@@ -278,20 +277,20 @@ class GraphNode(Generic[S, L, M, E, R]):
         return len(self.subjects) - len(self._shown) < MAX_UNSHOWN
 
     def _require_room(self, subject: Subject[M, GraphEvent[E], None, R], who: str) -> None:
-        """Raises RequestRefused for a new requester where there are too many already."""
+        """Raise RequestRefused for a new requester beyond MAX_REQUESTERS."""
         full = who and self._requesters >= MAX_REQUESTERS and subject.name not in self._reserved
         if full and who not in self._kind.requesters(subject.memory):
             raise RequestRefused("too many requesters", f"{who} at {subject.name}")
 
     def _remembered(self, subject: Subject[M, GraphEvent[E], None, R]) -> int:
-        """How many requesters it remembers; those of the YAML's have a bound of their own."""
+        """Return the number of remembered requesters; 0 for a name in the YAML, bounded elsewhere."""
         if subject.name in self._reserved:
             return 0
         return len(self._kind.requesters(subject.memory))
 
     def _real(self, memories: Mapping[str, M]) -> Mapping[str, M]:
-        """Leave out names that never published a state, if they are a flood: it would be back at
-        the next start."""
+        """Leave out names without a published state if they are a flood, which would otherwise be
+        back at the next start."""
         if len(memories) - len(self._shown) < MAX_UNSHOWN:
             return memories
         real = self._shown | self._reserved
@@ -338,4 +337,4 @@ class GraphNode(Generic[S, L, M, E, R]):
 
 
 AnyGraphNode = GraphNode[Any, Any, Any, Any, Any]
-"""A node of a kind that was found by its name."""
+"""A node of a kind known only by its name."""

@@ -1,8 +1,8 @@
-"""The guard of a daemon that was started by hand: it switches off what a kill -9 has left on.
+"""The guard of a daemon started by hand: switches off the outputs that a kill -9 leaves on.
 
-It is a shell, because it only waits, in its own session, where neither Ctrl-C nor a closed terminal
-reaches it. It reads a pipe that only the daemon holds. A word on the pipe means that the outputs are
-off; the end of the pipe without a word, that the daemon is dead. Under systemd, ExecStopPost does this.
+The guard is a shell, because it only waits. It has its own session, which neither Ctrl-C nor a closed
+terminal reaches. It reads a pipe held only by the daemon: a word means that the outputs are off, the
+end of the pipe without a word that the daemon is dead. Under systemd, ExecStopPost does this.
 """
 
 import logging
@@ -32,19 +32,19 @@ while [ $pause -le 60 ]; do
     esac
 done
 """
-"""`outputs-off` ends with 1 while hardware does not answer: it is tried for some minutes, ever more
-seldom, for nobody starts this daemon again. EX_UNAVAILABLE: the dead daemon's lock was not free yet, or
-another daemon serves now, which switches off what was left on: one more try."""
+"""Exit code 1: hardware does not answer. `outputs-off` is repeated for minutes with growing pauses, as
+nobody restarts this daemon. EX_UNAVAILABLE: the dead daemon's lock was not free yet, or another daemon
+serves now and switches the leftover outputs off; one more try."""
 
 
 def command(file: Path, runtime_dir: str | None) -> list[str]:
-    """The command that switches off what this process may leave on."""
+    """Return the command that switches off outputs this process may leave on."""
     given = ["--runtime-dir", os.path.abspath(runtime_dir)] if runtime_dir else []
     return [sys.executable, "-P", "-m", "bridges.cli", "outputs-off", str(file.absolute()), *given]
 
 
 class Guard:
-    """The running guard. `command`: switches everything off."""
+    """The running guard. `command`: switches every output off."""
 
     def __init__(self, command: Sequence[str]) -> None:
         self._shell: subprocess.Popen[bytes] | None = None
@@ -58,7 +58,7 @@ class Guard:
             log.warning(pairs("no_guard", reason=error))
 
     def dismiss(self) -> None:
-        """The outputs are off: end the guard."""
+        """End the guard, as the outputs are off."""
         if self._shell is None or self._shell.stdin is None:
             return
         with suppress(OSError):
@@ -72,5 +72,5 @@ UNIT = ("NOTIFY_SOCKET", "RUNTIME_DIRECTORY", "RMF_BRIDGE_SERVICE")
 
 
 def needed(environ: Mapping[str, str] = os.environ) -> bool:
-    """Whether this daemon needs a guard: no unit would run `outputs-off` for it."""
+    """Does this daemon need a guard, because no unit runs `outputs-off` for it?"""
     return not any(environ.get(name) for name in UNIT)

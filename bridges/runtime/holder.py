@@ -1,6 +1,6 @@
-"""Who has a daemon's directory: the process that `holder.json` names, while it is that process.
+"""The holder of a daemon's directory: the process named in `holder.json`, while that process lives.
 
-A look takes no lock, so it hinders nobody; and it permits nothing. Only the lock does
+Looking takes no lock and hinders nobody, but gives no right to the directory; only the lock does
 (`runtime_directory.py`).
 """
 
@@ -25,10 +25,10 @@ BOOT: Final = Path("/proc/sys/kernel/random/boot_id")
 
 
 class LockHolder(msgspec.Struct, frozen=True):
-    """A process, the YAML's path, and whether it serves that as a daemon.
+    """A process and its YAML's path. `serves`: it is a daemon that serves this YAML.
 
-    `boot`, `started`: of which boot its number is, and when in it the process began (ticks); 0 if that
-    is not known. So a number that somebody else has by now names nobody.
+    `boot`: the id of the boot in which `pid` is valid; `started`: the process's start in ticks since
+    boot, 0 if unknown. They expose a `pid` that another process has taken over.
     """
 
     pid: int
@@ -42,35 +42,35 @@ class LockHolder(msgspec.Struct, frozen=True):
 
     @property
     def lives(self) -> bool:
-        """Whether that process is still there. Of others' processes /proc may not tell the start."""
+        """Is the process still there? /proc may hide the start of another user's process."""
         if self.boot != _boot() or not _is_there(self.pid):
             return False
         return _started(self.pid) in (self.started, 0)
 
 
 class _Shown(msgspec.Struct):
-    """What a status file says of its daemon."""
+    """The daemon's process in a status file."""
 
     pid: int = 0
     file: str = ""
 
 
 def ourselves(file: Path, *, serves: bool) -> LockHolder:
-    """This process."""
+    """Return this process as a holder."""
     return LockHolder(os.getpid(), named(file), serves, _boot(), _started(os.getpid()))
 
 
 def look(places: Directories) -> LockHolder | None:
-    """The process that has these directories; None if none lives. Raises PermissionError.
+    """Return the living holder of these directories, or None. Raises PermissionError.
 
-    On a read-only root the state directory keeps an old name: the runtime directory's comes first.
+    The runtime directory comes first, as on a read-only root the state directory has an old holder.
     """
     found = (written(folder) for folder in reversed(places.folders))
     return next((one for one in found if one and one.lives), None) or shown(places)
 
 
 def written(folder: Path) -> LockHolder | None:
-    """The last holder that a directory names, living or not. Raises PermissionError."""
+    """Return the last holder written in a directory, living or not. Raises PermissionError."""
     try:
         with opened(folder):
             return msgspec.json.decode(read(folder / HOLDER, LONGEST), type=LockHolder)
@@ -83,8 +83,8 @@ def written(folder: Path) -> LockHolder | None:
 
 
 def shown(places: Directories) -> LockHolder | None:
-    """The living daemon of a fresh status file: one that could not write its name, or whose version
-    wrote none."""
+    """Return the living daemon of a fresh status file, or None. Finds a daemon without `holder.json`:
+    unable to write it, or of an older version."""
     path = places.runtime / STATUS
     with suppress(OSError, msgspec.MsgspecError, UnicodeDecodeError), opened(places.runtime):
         fresh = abs(time.time() - path.lstat().st_mtime) < FRESH_S
@@ -105,7 +105,7 @@ def _is_there(pid: int) -> bool:
 
 
 def _started(pid: int) -> int:
-    """When a process began (ticks since boot); 0 if this user cannot see it, -1 if it is a zombie."""
+    """Return a process's start (ticks since boot); 0 if hidden from this user, -1 for a zombie."""
     try:
         told = Path(f"/proc/{pid}/stat").read_text("utf-8", "replace").rpartition(")")[2].split()
     except OSError:

@@ -1,4 +1,4 @@
-"""Events waiting for the devices or subjects of one thread, and the bell that wakes it."""
+"""Waiting events for the devices or subjects of one thread, and the bell that wakes the thread."""
 
 import queue
 import threading
@@ -9,16 +9,16 @@ INBOX_SIZE = 512
 """More events for one device between two scans are a flood: the oldest are dropped and counted."""
 
 MOST_NAMES = 2000
-"""More devices than anybody serves. Further names are made up, and dropped."""
+"""More devices than any site has. Further names must be invented, and are dropped."""
 
 T = TypeVar("T")
 
 
 class Inbox(Generic[T]):
-    """Every thread may put; the thread that serves takes.
+    """Every thread may put; the serving thread takes.
 
-    A request is a level, not a pulse: of several with the same `key` only the last one is kept, so that
-    a flood of repeats costs a scan no more than one of them. Events stay in order of arrival.
+    A request is a level, not a pulse: a new event replaces a waiting one with the same `key`, so a
+    flood of repeats costs a scan as much as one event. Events stay in order of arrival.
     """
 
     def __init__(self) -> None:
@@ -30,7 +30,7 @@ class Inbox(Generic[T]):
         self.closed = False
 
     def put(self, name: str, item: T, key: Hashable = None) -> None:
-        """Add one event for a device and wake the thread. An event without a key replaces none."""
+        """Add an event for a device and wake the thread. An event without a key replaces none."""
         with self._lock:
             if len(self._items) >= MOST_NAMES and name not in self._items:
                 self.dropped += 1
@@ -44,13 +44,13 @@ class Inbox(Generic[T]):
         self.wake()
 
     def wake(self) -> None:
-        """Wake the thread without an event; does nothing if the bell already rings."""
+        """Wake the thread without an event; do nothing if the bell already rings."""
         if not self._rung:
             self._rung = True
             self._bell.put(None)
 
     def close(self) -> None:
-        """Ask for no more rounds; the current one ends as soon as it can."""
+        """Ask the thread to end; the current round ends early if it can."""
         self.closed = True
         self.wake()
 
@@ -64,17 +64,17 @@ class Inbox(Generic[T]):
         return True
 
     def waiting(self) -> set[str]:
-        """The devices that have events waiting."""
+        """Return the devices with waiting events."""
         with self._lock:
             return set(self._items)
 
     def take_for(self, name: str) -> list[T]:
-        """Take the events waiting for one device, in order."""
+        """Take one device's waiting events, in order."""
         with self._lock:
             return list(self._items.pop(name, {}).values())
 
     def take(self) -> dict[str, list[T]]:
-        """Take all waiting events: by device, in order."""
+        """Take all waiting events, in order, by device."""
         with self._lock:
             taken, self._items = self._items, {}
         return {name: list(waiting.values()) for name, waiting in taken.items()}

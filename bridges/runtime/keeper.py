@@ -1,7 +1,7 @@
-"""The memory that a kind without hardware has on disk, and the message about all its subjects.
+"""The memory on disk of a kind without hardware, and the message about all its subjects.
 
-It writes to disk before it publishes, because others act on what is published. If writing fails, the
-kind goes on serving with the fault NOT_KEPT, and tries to write again each second.
+The memory is written before messages are published, because others act on these. If writing fails, the
+kind goes on serving with the fault NOT_KEPT, and writing is retried each second.
 """
 
 import logging
@@ -23,8 +23,8 @@ NOT_KEPT: Final = "NOT_KEPT"
 
 
 class MemoryStore(Protocol):
-    """The file that outlives the daemon; None before the first `write`, which replaces it as a whole.
-    Both may raise OSError."""
+    """A file that outlives the daemon. `read` returns None before the first `write`; `write` replaces
+    the whole file. Both may raise OSError."""
 
     def read(self) -> bytes | None: ...
 
@@ -32,7 +32,7 @@ class MemoryStore(Protocol):
 
 
 class Keeper(Generic[S, L, M, E, R]):
-    """The keeper of one node. `kept`: None to store nothing. `tell_at`: when to publish next."""
+    """The keeper of one node. `kept`: None to store nothing. `tell_at`: the next time to publish."""
 
     def __init__(
         self, kind: GraphKind[S, L, M, E, R], kept: MemoryStore | None, publish: Publish
@@ -47,7 +47,7 @@ class Keeper(Generic[S, L, M, E, R]):
         self._pace = PublishPace()
 
     def restore(self, settings: S, now: float) -> Mapping[str, M]:
-        """The memories on disk; an invalid file is logged and ignored."""
+        """Return the memories on disk, by subject; log and ignore an invalid file."""
         if self._kept is None or self._kind.restore is None:
             return {}
         try:
@@ -61,16 +61,16 @@ class Keeper(Generic[S, L, M, E, R]):
 
     @property
     def wake_at(self) -> float:
-        """When to publish next, or to try writing again."""
+        """The next time to publish or to retry writing (monotonic s)."""
         return min(self.tell_at, self._again_at if self._fault else NEVER)
 
     @property
     def faults(self) -> tuple[Fault, ...]:
-        """NOT_KEPT, while the last memories are not on disk."""
+        """NOT_KEPT while the latest memories are not on disk."""
         return (self._fault,) if self._fault else ()
 
     def keep(self, memories: Mapping[str, M], now: float) -> None:
-        """Write what must survive a restart, if it has changed."""
+        """Write the part of the memories that must survive a restart, if changed."""
         if (
             self._kept is None
             or self._kind.persist is None
@@ -101,7 +101,7 @@ class Keeper(Generic[S, L, M, E, R]):
         self._fault = None
 
     def tell(self, memories: Mapping[str, M], now: float, may_speak: bool) -> None:
-        """Publish the message about all subjects, if it is due."""
+        """Publish the message about all subjects if it is due."""
         if self._kind.together is None or not may_speak:
             self.tell_at = NEVER
             return

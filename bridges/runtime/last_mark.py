@@ -1,9 +1,8 @@
-"""What a run of a service says to the `outputs-off` that follows it: two marks.
+"""Two marks that a run of a service leaves for the `outputs-off` after it.
 
-`claimed`: it was about to claim outputs, so they are its own to switch off, whoever holds the lock.
-`all-off`, the last one: every output was verified off, and nothing is left to do. A mark names the one
-run that it is about (INVOCATION_ID, systemd.exec(5)), so an old one says nothing; nor does one that is
-missing or cannot be read.
+`claimed`: the run was about to claim outputs: `outputs-off` switches them off whichever process has the
+lock. `all-off`, the last mark: every output was verified off, and nothing is left to do. A mark holds
+its run's INVOCATION_ID (systemd.exec(5)); marks of older runs and unreadable ones are ignored.
 """
 
 import os
@@ -26,12 +25,12 @@ def leave(environ: Mapping[str, str] = os.environ, name: str = MARK) -> None:
 
 
 def says_off(environ: Mapping[str, str]) -> bool:
-    """Whether this process follows a service that stopped well and left the mark."""
+    """Did the service before this process stop well and leave the mark `all-off`?"""
     return environ.get("SERVICE_RESULT") == "success" and _is_left(environ, MARK)
 
 
 def says_claimed(environ: Mapping[str, str]) -> bool:
-    """Whether this process follows a service's run that was about to claim outputs."""
+    """Did the service before this process leave the mark `claimed`?"""
     return bool(environ.get("SERVICE_RESULT")) and _is_left(environ, CLAIMED)
 
 
@@ -52,6 +51,6 @@ def _is_left(environ: Mapping[str, str], name: str) -> bool:
 
 
 def _path(environ: Mapping[str, str], name: str) -> str:
-    """Where a mark of this run is; "" outside of a unit."""
+    """Return the path of this run's mark; "" outside of a unit."""
     folder = environ.get("RUNTIME_DIRECTORY", "").split(":")[0]
     return os.path.join(folder, name) if folder and environ.get("INVOCATION_ID") else ""

@@ -1,12 +1,11 @@
 """The loop: one bus and the devices on it.
 
-RMF callbacks and GPIO edges only put something into the inbox. A round scans each device that is due,
-has something in the inbox, or may have changed: first those that answered the last time, then the
-others, the longest overdue first. A round ends after a device that did not answer, so that silent
-devices are read one at a time between live ones: a live device's reading is never older than its
-period plus one silent device's timeout, even in the first rounds. A device that falls silent also
-costs its retries, once. At the end, whatever its cause, every output is made safe, those that
-answer first.
+RMF callbacks put events into the inbox, GPIO edges wake the loop. A round scans each device that is
+due, has events, or may have changed: first the devices that answered last time, then the others, the
+longest overdue first. A round ends after one silent device, so a live device's reading is never older
+than its period plus one silent device's timeout, even in the first rounds. A device that falls silent
+also costs its retries, once. At the end, for any cause, every output is made safe, first on the
+devices that answer.
 """
 
 import logging
@@ -24,11 +23,11 @@ from drivers.hal import Bus
 log = logging.getLogger(__name__)
 
 SUSPENDED_S = 0.5
-"""A loop that wakes this late (s), with no bus to wait for, was suspended."""
+"""A loop that wakes this late (s) without waiting for its bus was suspended."""
 
 
 class Loop:
-    """Scans the nodes of one bus, each every `scan_s` (s) and whenever it asks to be woken."""
+    """Scans each node of one bus every `scan_s` (s), and at the node's `wake_at`."""
 
     def __init__(
         self,
@@ -55,22 +54,21 @@ class Loop:
 
     @property
     def wake_at(self) -> float:
-        """When the next device is due."""
+        """The time at which the next device is due (monotonic s)."""
         return min(self._due.values())
 
     @property
     def finished(self) -> int:
-        """How much it has done so far: calls of its bus, good or bad, and scans. A call that hangs
-        does not count."""
+        """The number of scans and finished bus calls so far, failed calls included."""
         return self._scans + self._bus.calls
 
     @property
     def ready(self) -> bool:
-        """Whether every device has been tried once and has published its first state."""
+        """Has every device been tried once and published its first state?"""
         return all(node.ready for node in self.nodes)
 
     def round(self) -> None:
-        """Scan whatever is due."""
+        """Scan the devices that are due."""
         self._notice_suspension()
         self._take_edge()
         self._scan_in_turn(self.inbox.waiting())
@@ -81,7 +79,7 @@ class Loop:
         self._ran_at = self._clock.monotonic()
 
     def end(self) -> bool:
-        """Every output off, and the bus released."""
+        """Switch every output off and release the bus; return False if not all are verified off."""
         self._bus.insist()
         safe = [node.make_safe() for node in self._in_turn()]
         for node in self.nodes:
@@ -91,7 +89,7 @@ class Loop:
         return all(safe)
 
     def _notice_suspension(self) -> None:
-        """Has the process been stopped, or the machine slept, while nothing was to be done?"""
+        """Tell every node if the process was stopped or the machine slept while the loop was idle."""
         late_s = self._clock.monotonic() - max(self.wake_at, self._ran_at)
         if late_s > SUSPENDED_S:
             log.warning(pairs("suspended", bus=self._bus_name, for_s=f"{late_s:.1f}"))
@@ -99,7 +97,7 @@ class Loop:
                 node.was_suspended(late_s)
 
     def _scan_in_turn(self, asked: Collection[str]) -> None:
-        """Scan what is due or asked for, until a silent device has had its turn."""
+        """Scan the devices that are due or in `asked`, up to the first silent one."""
         for node in self._in_turn():
             if self.inbox.closed:
                 return
@@ -110,7 +108,7 @@ class Loop:
                     return
 
     def _in_turn(self) -> list[AnyNode]:
-        """Those that answer, as the YAML has them; then the others, the longest overdue first."""
+        """Return the nodes that answer, in the YAML's order, then the others, longest overdue first."""
         others = [node for node in self.nodes if not node.answers]
         others.sort(key=lambda node: self._due[node.name])
         return [node for node in self.nodes if node.answers] + others
@@ -130,7 +128,7 @@ class Loop:
         self.inbox.wake()
 
     def _take_edge(self) -> None:
-        """After an edge every device is due. One that comes meanwhile wakes the next round."""
+        """Make every device due after an edge. An edge during this round causes the next one."""
         if self._edge:
             self._edge = False
             self._due = dict.fromkeys(self._due, AGES_AGO)

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 
 def notify(state: str, environ: Mapping[str, str] = os.environ) -> None:
-    """Notify systemd; does nothing if NOTIFY_SOCKET is not set. A full socket drops the message.
+    """Notify systemd; do nothing if NOTIFY_SOCKET is not set. A full socket drops the message.
 
     Raises OSError if no file descriptor is left, or writing is not permitted.
     """
@@ -23,7 +23,7 @@ def notify(state: str, environ: Mapping[str, str] = os.environ) -> None:
 
 
 def watchdog_s(environ: Mapping[str, str] = os.environ) -> float | None:
-    """How often systemd wants to hear WATCHDOG=1, in seconds; None when it does not."""
+    """Return the longest time (s) between two WATCHDOG=1 for systemd; None without a watchdog."""
     usec = environ.get("WATCHDOG_USEC", "")
     ours = environ.get("WATCHDOG_PID", str(os.getpid())) == str(os.getpid())
     return int(usec) / 1e6 if usec.isdigit() and ours else None

@@ -22,8 +22,8 @@ Named = Callable[[Topic[Message]], Topic[Message]]
 class Outlet:
     """Publishers that are declared while their node may speak.
 
-    Where RMF's release lacks a topic's message, `bridges/messages/fallbacks.py` says what is sent.
-    An alarm and its end take the same way, even if the release changes in between.
+    `bridges/messages/fallbacks.py` has substitutes for messages that RMF's release lacks. An alarm and
+    its end go out in the same way, even if the release changes in between.
     """
 
     def __init__(self, transport: Transport, named: Named, writer: NoWriter = NOBODY) -> None:
@@ -36,13 +36,13 @@ class Outlet:
         self._lock = threading.Lock()
 
     def open(self, topics: Iterable[Topic[Message]]) -> None:
-        """Declare those that are not declared yet and that RMF's release has. Raises TransportError."""
+        """Declare publishers of the topics that RMF's release has. Raises TransportError."""
         for topic in topics:
             if self._transport.release.has(topic.type):
                 self._end(topic)
 
     def publish(self, topic: Topic[Message], message: Message) -> bool:
-        """Publish; False when it was not sent: a fault until the next one gets through."""
+        """Publish a message; return False if it was not sent, a fault until the next one is."""
         way, wanted = self._way(topic, message)
         if wanted is None:
             if isinstance(message, Alert):
@@ -58,19 +58,19 @@ class Outlet:
         return True
 
     def failed(self, topic: Topic[Message], error: Exception) -> None:
-        """Note that a message was not published; the first one is logged."""
+        """Note an unpublished message; log the first one."""
         self._once.failed(topic.name, error)
 
     @property
     def faults(self) -> tuple[Fault, ...]:
-        """NOT_PUBLISHED, for each topic whose last message was not; from any thread."""
+        """NOT_PUBLISHED for each topic whose last message was not sent; from any thread."""
         failing = sorted(self._once.wrong.copy().items())
         return tuple(Fault("NOT_PUBLISHED", f"{topic}: {why}") for topic, why in failing)
 
     def _way(
         self, topic: Topic[Message], message: Message
     ) -> tuple[Topic[Message], Message | None]:
-        """Where a message goes, and as what: None for one that only the log takes."""
+        """Return the topic and the message to send; None for a message that is only logged."""
         if self._transport.release.has(topic.type) and topic.name not in self._instead:
             return topic, message
         if topic.name in INSTEAD:
@@ -84,11 +84,11 @@ class Outlet:
             return self._ends[topic.name]
 
     def heard_by(self) -> dict[str, int]:
-        """The number of subscriptions that receive each topic, by the topic's name."""
+        """Return the number of subscriptions that receive each topic, by the topic's name."""
         return {name: end.matched() for name, end in self._ends.copy().items()}
 
     def close(self, topics: Iterable[Topic[Message]] | None = None) -> None:
-        """Withdraw these publishers; every one if none is named."""
+        """Withdraw the publishers of these topics; all by default."""
         names = list(self._ends) if topics is None else [topic.name for topic in topics]
         for end in [self._ends.pop(name, None) for name in names]:
             if end is not None:

@@ -1,9 +1,9 @@
-"""Switches off what a dead daemon has left on, before this daemon claims anything.
+"""Switches off the outputs that a dead daemon left on, before this daemon claims any.
 
-A separate process does it, as after every death: if it hangs, this daemon does not, and it uses the
-profiles as the dead daemon had them. Devices that do not answer are reported and retried while we
-serve. Those of our own record are not: each is made safe as soon as it answers. If a process has just
-tried them, after the death or at boot, none does so once more: that would only delay the start.
+A separate `outputs-off` process does it, as after every death: it can hang without hanging this daemon,
+and it uses the dead daemon's profiles. Devices that do not answer are reported and retried while we
+serve. Devices in our own record are not retried: `SafeFirst` makes each safe as soon as it answers. If
+a process has just tried, after the death or at boot, the start does not wait for another try.
 """
 
 import logging
@@ -20,7 +20,7 @@ from drivers import Driver
 log = logging.getLogger(__name__)
 
 PATIENCE_S = 15.0
-"""Time for a process that gives up after 5 s, on a slow machine."""
+"""Enough on a slow machine for `outputs-off`, which gives up after 5 s."""
 PAUSE_FIRST_S, PAUSE_MOST_S = 5.0, 60.0
 
 
@@ -28,7 +28,7 @@ LOOK_EVERY_S = 0.02
 
 
 class Predecessor:
-    """`ours`: this daemon's own record. `command`: the `outputs-off` of its file."""
+    """`ours`: this daemon's own record. `command`: `outputs-off` for its file."""
 
     def __init__(self, records: Records, ours: ClaimRecord, command: Sequence[str]) -> None:
         self._records = records
@@ -39,10 +39,10 @@ class Predecessor:
         self._next_at = math.inf
 
     def make_safe(self, wait: Callable[[float], bool]) -> frozenset[str]:
-        """Switch off what was left on, before anything is claimed.
+        """Switch off the leftover outputs, before anything is claimed.
 
-        Ends when everything is off, time is up, or `wait(s)` returns True because we are to end.
-        Returns the devices of our own record that are not verified off.
+        Ends when `outputs-off` has ended, time is up, or `wait(s)` returns True to end the daemon.
+        Return the devices of our own record that are not verified off.
         """
         found = self._records.unreleased()
         if found:
@@ -57,11 +57,11 @@ class Predecessor:
         return self._own_unsafe()
 
     def left(self) -> list[str]:
-        """The names of other records whose outputs are not verified off."""
+        """Return the names of other records whose outputs are not verified off."""
         return [r.name for r in self._records.unreleased() if r.name != self._ours.name]
 
     def tick(self, now: float) -> None:
-        """Call about once a second: retries what has not answered."""
+        """Retry the records not verified off, after a pause; called about once a second."""
         if self._child is not None and not self._running():
             self._judge(now)
         elif self._child is None and now >= self._next_at:
@@ -91,7 +91,7 @@ class Predecessor:
         return self._child is not None and self._child.poll() is None
 
     def _judge(self, now: float, unsafe: Collection[str] = ()) -> None:
-        """Note the result of a try. `unsafe`: the rest of our own record, which is not retried here."""
+        """Note the result of a try. `unsafe`: devices of our own record, not retried here."""
         self.close()
         if left := self.left():
             if self._next_at == math.inf:
@@ -105,8 +105,8 @@ class Predecessor:
 
 
 class SafeFirst:
-    """Wraps a driver whose device a dead daemon may have left on and that has not answered yet: makes
-    it safe as soon as it answers, before anything else.
+    """Wraps the driver of a silent device that a dead daemon may have left on: makes the device safe
+    as soon as it answers, before anything else.
     """
 
     def __init__(self, name: str, driver: Driver[Any, Any]) -> None:

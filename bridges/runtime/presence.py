@@ -1,7 +1,7 @@
-"""Decides whether a node without hardware may publish: only one serves a graph, any other only listens.
+"""Decides whether a node without hardware may publish: one node serves a graph, any other only listens.
 
-A node publishes after it has been alone on its topics for the kind's quiet time. Only then are its
-publishers declared, so that a waiting node is not counted as a rival.
+A node may publish once it was alone on its topics for the kind's quiet time. Its publishers are
+declared only then, so a waiting node does not count as a rival.
 """
 
 import logging
@@ -21,15 +21,15 @@ from bridges.transports.transport import Subscription, Transport
 log = logging.getLogger(__name__)
 
 LOOK_EVERY_S = 0.25
-"""How often to look for other nodes on the graph."""
+"""The pause between two looks for other nodes on the graph."""
 MOST_NAMED: Final = 3
 SPREAD_LEAST_S, SPREAD_MOST_S = 0.5, 3.0
 """Extra listening time after meeting a rival: longer than discovery takes, and random."""
 
 
 class Presence:
-    """Looks for rivals. `kind`: for the log. `rivals`: how many other nodes publish our topics.
-    `rivals_do`: who they are, and what they publish: `/desk publishes lift_requests`; "" for nobody."""
+    """Looks for rivals. `kind`: for the log. `rivals`: the number of others' publishers on our topics.
+    `rivals_do`: their names and topics, as in `/desk publishes lift_requests`; "" without rivals."""
 
     def __init__(self, kind: str, quiet_s: float) -> None:
         self.may_speak = False
@@ -49,18 +49,18 @@ class Presence:
 
     @property
     def waits(self) -> str:
-        """What those wait for that wait for us, while we may not speak."""
+        """The reason for our silence, shown to the requesters that wait for us."""
         return f"while {self.rivals_do}" if self.rivals else LISTENS
 
     @property
     def faults(self) -> tuple[Fault, ...]:
-        """PASSIVE, while a rival keeps us silent: it may be one that does nothing."""
+        """PASSIVE while a rival keeps us silent: the rival may do nothing else."""
         if not self.rivals:
             return ()
         return (Fault("PASSIVE", f"{self.rivals_do}, so this node only listens"),)
 
     def look(self, now: float) -> None:
-        """Look, if it is due."""
+        """Look for rivals if it is due."""
         if now < self.look_at:
             return
         self._count(now)
@@ -89,7 +89,7 @@ class Presence:
         return f"{who or 'another node'} publishes {' and '.join(heard)}"
 
     def _set(self, yes: bool) -> None:
-        """Two nodes that began at once both fall silent; by chance one returns before the other."""
+        """Start or stop speaking. Two nodes that began at once both stop, for a random time each."""
         if yes == self.may_speak:
             return
         self.may_speak = yes
@@ -100,4 +100,4 @@ class Presence:
 
 
 def _ignore(message: Message) -> None:
-    """The messages do not matter: rivals are only counted."""
+    """Ignore a rival's message: rivals are only counted."""

@@ -1,12 +1,12 @@
-"""The record of what a daemon claims, written before it claims: all that is needed to switch it off.
+"""The record of a daemon's claim, written before claiming: all data needed to switch the outputs off.
 
-It holds the YAML and the settings as they were validated, so that `outputs-off` need not load and
-check the YAML again. If the settings do not decode, for example those of another version, it does. What
-another version has added is passed over.
+It holds the YAML and the validated settings. `outputs-off` uses the settings, and loads and checks the
+YAML only if they do not decode, as those of another version may. Keys that another version has added
+are ignored.
 
-A record is a file named by its content, in the daemon's state directory, or in its runtime directory
-if that cannot be written. So a daemon that restarts on the same YAML finds its record, and one on
-another YAML overwrites none. Tokens are not in it: they are read from their files when used.
+A record is a file named by a hash of its content, in the daemon's state directory, or in its runtime
+directory if the former cannot be written. So a daemon restarted on the same YAML finds its record, and
+a daemon on another YAML overwrites none. Records hold no tokens: these are read from their files.
 """
 
 import hashlib
@@ -34,7 +34,7 @@ SIZE_MAX = 64 << 20
 
 
 class ClaimedSettings(msgspec.Struct, frozen=True):
-    """Validated settings, each as JSON. `version`: of the program that wrote them."""
+    """Validated settings, each as JSON. `version`: the version of the program that wrote them."""
 
     version: str
     kind: str
@@ -46,8 +46,8 @@ class ClaimedSettings(msgspec.Struct, frozen=True):
 class Claimed(msgspec.Struct, frozen=True):
     """`file`: the YAML's path. `yaml`: its text. `texts`: profiles and DBC files, by name.
 
-    `safe`: the devices whose outputs have since been verified off. Every version can read this much.
-    `tried`: whether a process has come to the end of switching off the others.
+    `safe`: the devices verified off so far. Every version can read these four fields.
+    `tried`: True once a process has finished a try to switch off the other devices.
     """
 
     file: str
@@ -64,14 +64,14 @@ class ClaimRecord(Claimed, frozen=True):
 
     @property
     def name(self) -> str:
-        """The name of its file, a hash of what was claimed."""
+        """The name of the record's file, a hash of the claim."""
         claimed = msgspec.json.encode(msgspec.structs.replace(self, safe=(), tried=False))
         return f"claimed-{hashlib.sha256(claimed).hexdigest()[:16]}.json"
 
     def config(self) -> Config:
-        """The Config that was claimed. Raises SettingsError.
+        """Return the claimed Config. Raises SettingsError.
 
-        From then on this process uses the record's profiles and DBC files, and no others.
+        Afterwards this process uses only the record's profiles and DBC files.
         """
         texts.give(self.texts)
         with suppress(msgspec.MsgspecError, ImportError, AttributeError):
@@ -83,7 +83,7 @@ class ClaimRecord(Claimed, frozen=True):
 
 
 def of(config: Config) -> ClaimRecord:
-    """The record of this config, which must be the only one that this process has loaded."""
+    """Return the record of this config, which must be the only one loaded in this process."""
     known = dict(sorted(texts.all_known().items()))
     return ClaimRecord(named(config.path), config.text, known, claim=_claim(config))
 
@@ -99,13 +99,13 @@ def _json(settings: msgspec.Struct) -> bytes:
 
 
 def _claimed(record: ClaimRecord, claim: ClaimedSettings) -> Config:
-    """The Config of these settings. Raises MsgspecError, ImportError or AttributeError."""
+    """Return the Config of these settings. Raises MsgspecError, ImportError or AttributeError."""
     return Config(
         path=Path(record.file),
         text=record.yaml,
         kind=claim.kind,
         driver=claim.driver,
-        rmf=Rmf(),  # who switches off talks to nobody
+        rmf=Rmf(),  # switching off needs no RMF
         buses={
             name: msgspec.json.decode(text, type=names.bus_called(kind).settings)
             for name, (kind, text) in claim.buses.items()
@@ -116,7 +116,7 @@ def _claimed(record: ClaimRecord, claim: ClaimedSettings) -> Config:
 
 
 def _device(claim: ClaimedSettings, text: bytes) -> msgspec.Struct:
-    """A device's settings, of its own driver or the file's."""
+    """Return a device's settings, decoded for its own driver or else the file's."""
     own = msgspec.json.decode(text, type=_OwnDriver).driver or claim.driver
     device: msgspec.Struct = msgspec.json.decode(
         text, type=names.driver_called(claim.kind, own).settings
@@ -136,7 +136,7 @@ class Records:
         self._file = named(file)
 
     def unreleased(self) -> list[ClaimRecord]:
-        """The records not yet released; unreadable ones are named, and left out like other files'."""
+        """Return this file's records not yet released; log and leave out unreadable ones."""
         by_name = dict[str, ClaimRecord]()
         for path in paths(self._places):
             if (record := read(path)) is None:
@@ -146,7 +146,7 @@ class Records:
         return list(by_name.values())
 
     def write(self, record: ClaimRecord) -> Path:
-        """Write a record; returns its path. Raises OSError if neither directory takes it."""
+        """Write a record; return its path. Raises OSError if neither directory can be written."""
         content = msgspec.json.encode(record)
         refused: OSError | None = None
         for folder in self._places.folders:
@@ -163,14 +163,14 @@ class Records:
         raise refused
 
     def still_unsafe(self, record: ClaimRecord, devices: Collection[str], config: Config) -> None:
-        """Note that these devices are not verified off, and all others are. Raises OSError."""
+        """Note that all devices but these are verified off. Raises OSError."""
         safe = tuple(name for name in config.devices if name not in devices)
         self.write(msgspec.structs.replace(record, safe=safe, tried=True))
 
     def release(self, record: ClaimRecord) -> None:
         """Remove a record whose outputs are all off. Raises OSError.
 
-        That of another version has the name which that version gave it.
+        The file's name may differ from the record's if another version wrote it.
         """
         for path in list(paths(self._places)):
             if path.name == record.name or ((found := read(path)) and found.name == record.name):
@@ -178,14 +178,14 @@ class Records:
 
 
 def paths(places: Directories) -> Iterator[Path]:
-    """Every file that may be a record."""
+    """Yield every file that may be a record."""
     for folder in places.folders:
         with suppress(OSError):
             yield from sorted(folder.glob(PATTERN))
 
 
 def read(path: Path) -> ClaimRecord | None:
-    """The record in a file; None if it is invalid, unreadable or a symbolic link."""
+    """Return the record in a file; None if it is invalid, unreadable or a symbolic link."""
     try:
         return _decoded(files.read(path, SIZE_MAX))
     except (OSError, msgspec.MsgspecError, UnicodeDecodeError, RecursionError):
@@ -193,7 +193,7 @@ def read(path: Path) -> ClaimRecord | None:
 
 
 def _decoded(content: bytes) -> ClaimRecord:
-    """Raises MsgspecError or UnicodeDecodeError."""
+    """Decode a record. Raises MsgspecError or UnicodeDecodeError."""
     try:
         return msgspec.json.decode(content, type=ClaimRecord)
     except msgspec.ValidationError:  # another version's claim: the YAML beside it is enough

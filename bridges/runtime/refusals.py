@@ -27,6 +27,6 @@ class Refusals:
             log.log(level, pairs("refused", **whose, kind=kind, detail=detail))
 
     def counts(self) -> dict[str, int]:
-        """Reason -> count."""
+        """Return the number of refusals by reason."""
         with self._lock:
             return dict(self._counts)

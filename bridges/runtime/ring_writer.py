@@ -1,8 +1,8 @@
-"""Writes what a daemon sees and does into its ring.
+"""Records a daemon's readings, decisions and messages in its ring.
 
-A scan only puts what happened into a queue, which takes less than a microsecond. After the outputs are
-written and the states are published, `flush` encodes the queue and appends it to the ring. A writer
-that fails loses entries; it never raises, and it delays no scan.
+A scan only puts events into a queue, which takes less than a microsecond. After the outputs are written
+and the states published, `flush` encodes the queue and appends it to the ring. A failing writer loses
+entries; it never raises, and it delays no scan.
 """
 
 import struct
@@ -26,59 +26,59 @@ from bridges.runtime.clock import Clock
 from bridges.runtime.runtime_directory import Once
 
 KNOWN_EVERY_S: Final = 60.0
-"""All that is known is written again this often (s), so that a recording can begin there."""
+"""The period (s) of writing all known state again: a recording can begin at any such point."""
 MOST_WAITING: Final = 20_000
 SAME_AT_ONCE: Final = 20
-"""This many unchanged readings make an entry; a kill loses no more than that."""
+"""The number of unchanged readings in one entry, and so the most that a kill loses."""
 LONGEST_SAME: Final = 400
-"""The size of such an entry (bytes)."""
+"""The largest size of such an entry (bytes)."""
 MOST_SPOKEN_PER_S: Final = 200.0
-"""More messages than this in a second are only counted: a flood must not delay a scan."""
+"""Messages beyond this rate are only counted: a flood must not delay a scan."""
 STEP_S: Final = 0.05
 AGAIN_S: Final = 10.0
-"""How long (s) a writer whose ring failed waits before it makes another."""
+"""The pause (s) between a ring's failure and the next attempt to make one."""
 
 
 class NoWriter:
-    """A daemon without a recording."""
+    """The writer of a daemon without a recording; the interface of `RingWriter`."""
 
     def decided(
         self, subject: str, before: object, event: object, now: float, decision: AnyDecision
     ) -> None:
-        """A core has decided. `before`: the subject's memory until then."""
+        """Note a core's decision. `before`: the subject's memory before it."""
 
     def published(self, subject: str, memory: object, now: float) -> None:
-        """A report was published. `memory`: as the core has it after that."""
+        """Note a published report. `memory`: the core's memory afterwards."""
 
     def forgotten(self, subject: str, now: float) -> None:
-        """A subject is no longer remembered."""
+        """Note that the daemon no longer remembers a subject."""
 
     def spoken(self, topic: str, message: Message, *, sent: bool) -> None:
-        """A message was heard, or sent, on this topic."""
+        """Note a message that was heard or sent on this topic."""
 
     def flush(self) -> None:
-        """Write down what has happened; called when nothing is urgent."""
+        """Write the noted events; called when nothing is urgent."""
 
     def look(self) -> None:
-        """Called each second, from the daemon's main thread."""
+        """Make a new ring if needed; called each second from the daemon's main thread."""
 
     def died(self, reason: str) -> None:
-        """A defect ends the daemon."""
+        """Note that a defect ends the daemon."""
 
     def ended(self, *, safe: bool) -> None:
-        """The daemon ends in good order."""
+        """Note that the daemon shuts down cleanly."""
 
 
 NOBODY: Final = NoWriter()
 
 
 class RingWriter(NoWriter):
-    """The ring's writer of one daemon. Every method may be called from any thread."""
+    """The writer of one daemon's ring. Every method may be called from any thread."""
 
     def __init__(
         self, make: Callable[[], Ring], clock: Clock, release: Callable[[], Release]
     ) -> None:
-        """`make`: makes the ring anew; it may raise OSError."""
+        """`make`: makes a new ring; it may raise OSError."""
         self._make = make
         self._clock = clock
         self._release = release
@@ -120,7 +120,7 @@ class RingWriter(NoWriter):
                 ring.close(ended=safe and not self._dead)
 
     def flush(self) -> None:
-        if self._lock.acquire(blocking=False):  # else another thread is at it
+        if self._lock.acquire(blocking=False):  # else another thread flushes
             try:
                 self._drain()
             except Exception as error:  # noqa: BLE001 - logged by _failed
@@ -156,7 +156,7 @@ class RingWriter(NoWriter):
                 ring.close(ended=True)  # the run goes on; only this ring ends
 
     def _fresh(self) -> None:
-        """Begin with an empty ring: nothing has been written yet."""
+        """Reset the writer's state for an empty ring."""
         self._subjects: dict[str, KnownSubject] = {}
         self._out = bytearray()
         self._same: dict[str, KnownSubject] = {}
@@ -176,7 +176,7 @@ class RingWriter(NoWriter):
         self._write()
 
     def _tell_time(self) -> None:
-        """Write what the wall clock shows, if it has stepped; now and then, all that is known."""
+        """Write the wall clock's time if it has stepped; every KNOWN_EVERY_S, all known state."""
         now = self._clock.monotonic()
         offset_s = self._clock.wall() - now
         stepped = abs(offset_s - self._offset_s) > STEP_S
@@ -219,7 +219,7 @@ class RingWriter(NoWriter):
             self._say_same(name)
 
     def _say_same(self, name: str) -> None:
-        """Write when the last reading came again. There is always room for that."""
+        """Write the times at which the last reading was repeated. Room for this is reserved."""
         subject = self._same.pop(name, None)
         if subject is not None:
             times, subject.times = subject.times, []
@@ -245,7 +245,7 @@ class RingWriter(NoWriter):
         self._put(Spoken(now, sent, topic, type_name(kind), release.name, sample))
 
     def _may_keep(self, now: float) -> bool:
-        """Whether there is room for one more message of this second."""
+        """Is the rate of messages low enough to record one more?"""
         gained = MOST_SPOKEN_PER_S * (now - self._spoken_at)
         self._may_speak = min(MOST_SPOKEN_PER_S, self._may_speak + gained)
         self._spoken_at = now
@@ -258,7 +258,7 @@ class RingWriter(NoWriter):
         return True
 
     def _last(self, entry: AnyEntry) -> None:
-        """Append the last entry, after those of repeated readings."""
+        """Append the last entry, after the entries of repeated readings."""
         self._say_all_same()
         self._put(entry)
 
@@ -267,7 +267,7 @@ class RingWriter(NoWriter):
             self._say_same(name)
 
     def _put(self, entry: AnyEntry) -> None:
-        """Append an entry; in the next segment, after all that is known, if this one is full."""
+        """Append an entry; if the segment is full, begin the next one first."""
         assert self._ring is not None
         content = entries.encode(entry)
         if len(content) > self._ring.room // 2:
@@ -290,7 +290,7 @@ class RingWriter(NoWriter):
         return self._ring.fits(len(self._out) + length + FRAME.size + reserved)
 
     def _know(self, now: float) -> None:
-        """Write down all that is known: here if there is room, else in the next segment."""
+        """Write all known state: in this segment if there is room, else in the next."""
         self._say_all_same()
         known = self._all_known(now)
         if not self._fits(sum(len(content) + FRAME.size for content in known)):
@@ -301,8 +301,7 @@ class RingWriter(NoWriter):
             self._frame(content)
 
     def _next_segment(self, now: float) -> None:
-        """Begin the next segment with all that is known. If that is more than half of it, the rest
-        of the subjects is left out."""
+        """Begin the next segment with the known state; subjects beyond half its room are left out."""
         assert self._ring is not None
         self._say_all_same()
         self._write()

@@ -17,7 +17,7 @@ __all__ = ["LaunchDescription", "daemon"]
 
 
 def daemon(kind: str) -> LaunchDescription:
-    """The launch description for one kind. A file of another kind starts nothing."""
+    """Return the launch description for one kind. A file of another kind starts nothing."""
     return LaunchDescription(
         [
             DeclareLaunchArgument("config", description=f"the YAML of the {kind}"),
@@ -40,7 +40,7 @@ def _actions(kind: str, context: LaunchContext) -> list[Node]:
 
 
 def _check(kind: str, file: str) -> None:
-    """Raises RuntimeError for a file of another kind; the daemon finds every other error."""
+    """Raise RuntimeError for a file of another kind; the daemon finds every other error."""
     try:
         settings = yaml.safe_load(Path(file).read_bytes())
     except (OSError, yaml.YAMLError) as error:

@@ -1,13 +1,13 @@
 """A daemon's files while it runs: its lock, its name, its status and its record.
 
-`holder.lock`   locked by the daemon, `outputs-off`, a walk; nobody else may open it, as whoever could
-                might lock it too, and so keep `outputs-off` from its work
-`holder.json`   who that is, for whoever looks: see `bridges/runtime/holder.py`
+`holder.lock`   locked by the daemon, `outputs-off` or a walk; other users may not open it, because they
+                could lock it and so block `outputs-off`
+`holder.json`   the name of the lock's holder, for other processes: see `bridges/runtime/holder.py`
 `status.json`   the state of every device, for people and scripts
 `claimed-….json`   see `bridges/runtime/record.py`
 
-None of them is vital. A file that cannot be written is logged once and tried again each second, also
-after its directory was removed; meanwhile the device is served.
+The daemon serves without them too. A failed write is logged once and retried each second, even after
+its directory was removed.
 """
 
 import fcntl
@@ -43,7 +43,7 @@ KEPT = "kept.json"
 KEPT_MAX = 64 << 20
 LOCK = "holder.lock"
 WAIT_S = 7.0
-"""How long a daemon that starts waits for `outputs-off`, which takes less."""
+"""The time (s) that a starting daemon waits for `outputs-off`, which takes less."""
 LOOK_EVERY_S = 0.05
 
 
@@ -52,7 +52,7 @@ class AlreadyRunning(Exception):
 
 
 def find(file: Path, given: str | None) -> Directories:
-    """The directories of this file's daemon, by the one rule (`bridges/host/directories.py`).
+    """Return the directories of this file's daemon, by the rule in `bridges/host/directories.py`.
 
     Raises PermissionError if the service's directory cannot be read.
     """
@@ -71,7 +71,7 @@ def _is_about(places: Directories, file: Path) -> bool:
 
 def _in_use(folder: Path, found: LockHolder | None) -> str:
     if found is None:
-        return f"{folder / LOCK} is locked by a program that has not said its name: end that"
+        return f"{folder / LOCK} is locked by an unnamed program: end that program"
     if not found.serves:
         used = "a walk, a kill test or outputs-off"
         return f"{folder} is in use by {found} ({used}): wait for its end"
@@ -85,7 +85,8 @@ def _in_use(folder: Path, found: LockHolder | None) -> str:
 
 
 def state_file(file: Path) -> Path:
-    """The file that outlives a daemon and a reboot: in systemd's state directory, else the user's."""
+    """Return the path of the file that outlives a daemon and a reboot: in systemd's state directory,
+    else in the user's."""
     given = os.environ.get("STATE_DIRECTORY", "").split(":")[0]
     return Path(given or state_base() / file.stem).absolute() / KEPT
 
@@ -93,7 +94,7 @@ def state_file(file: Path) -> Path:
 class MemoryFile:
     """A file that is replaced as a whole and is on disk when `write` returns.
 
-    `instead`: the path to use while the first cannot be written; a file there is the newer one.
+    `instead`: the path used while `path` cannot be written; a file there is the newer one.
     """
 
     def __init__(self, path: Path, instead: Path | None = None) -> None:
@@ -102,14 +103,14 @@ class MemoryFile:
         self._once = Once()
 
     def read(self) -> bytes | None:
-        """The file's bytes; None if there is no file. Raises OSError."""
+        """Return the file's bytes; None if there is no file. Raises OSError."""
         for path in filter(None, (self._instead, self._path)):
             with suppress(FileNotFoundError, NotADirectoryError), opened(path.parent):
                 return files.read(path, KEPT_MAX)
         return None
 
     def write(self, kept: bytes) -> None:
-        """Replace the file. Raises OSError if neither path can be written; the old one then remains."""
+        """Replace the file. Raises OSError, with the old file kept, if neither path can be written."""
         try:
             _replace(self._path, kept)
             if self._instead is not None:
@@ -129,9 +130,10 @@ def _replace(path: Path, content: bytes) -> None:
 
 
 class Once:
-    """Logs one line when a write fails, and one when it works again; the daemon runs on.
+    """Logs a repeated failure once, and once its end; the daemon runs on.
 
-    `fails`, `again`: the events; `key`: of what is written; `level`: of the first; `wrong`: it, why."""
+    `fails`, `again`: the log's two events; `key`: its key for the failing thing; `level`: of the first
+    event; `wrong`: failing thing -> error."""
 
     def __init__(
         self,
@@ -144,7 +146,7 @@ class Once:
         self._fails, self._again, self._key, self._level = fails, again, key, level
 
     def failed(self, what: str, error: Exception) -> None:
-        """Note a failed attempt; the caller will try again."""
+        """Note a failed attempt, which the caller will repeat."""
         if what not in self.wrong:
             log.log(self._level, pairs(self._fails, **{self._key: what}, reason=error))
         self.wrong[what] = str(error)
@@ -158,13 +160,13 @@ class Once:
 class RuntimeDirectory:
     """One process's lock, status and record.
 
-    `serves`: whether the process is a daemon, to which a reset may be sent.
+    `serves`: True if the process is a daemon, which accepts a reset.
     """
 
     def __init__(
         self, places: Directories, file: Path, *, serves: bool, wait_s: float = WAIT_S
     ) -> None:
-        """Take the locks; waits for an `outputs-off` that holds them.
+        """Take the locks; wait for an `outputs-off` that holds them.
 
         Raises AlreadyRunning, and PermissionError if a directory cannot be trusted.
         """
@@ -181,12 +183,12 @@ class RuntimeDirectory:
         self._sign(self._holder)
 
     def claim(self, record: ClaimRecord) -> None:
-        """Write the record of what this daemon is about to claim; a failure is tried again."""
+        """Write the record before this daemon claims outputs; `write_status` repeats a failed write."""
         self._record = record
         self._write_record()
 
     def released(self) -> None:
-        """Every output is off and released: remove the record."""
+        """Remove the record, as every output is off and released."""
         record, self._record = self._record, None
         if record is not None:
             try:
@@ -195,7 +197,7 @@ class RuntimeDirectory:
                 self._once.failed("record", error)
 
     def write_status(self, json: bytes) -> None:
-        """Replace the status file; also write again what failed before or was removed."""
+        """Replace the status file; also restore the other files if missing."""
         for folder in self.places.folders:
             self._lock(folder)
         self._sign(self._holder)
@@ -208,7 +210,7 @@ class RuntimeDirectory:
             self._once.works(STATUS)
 
     def close(self) -> None:
-        """Release the locks for another daemon, and remove the status, which is now outdated."""
+        """Release the locks for another daemon and remove the outdated status."""
         with suppress(OSError), opened(self.path):
             (self.path / STATUS).unlink(missing_ok=True)
         self._sign(msgspec.structs.replace(self._holder, pid=0))
@@ -216,13 +218,13 @@ class RuntimeDirectory:
 
     def _unlock(self) -> None:
         for lock in self._locks.values():
-            fcntl.flock(lock, fcntl.LOCK_UN)  # a process that another thread forks now has a copy
+            fcntl.flock(lock, fcntl.LOCK_UN)  # closing is not enough: a forked process has a copy
             os.close(lock)
         self._locks.clear()
 
     def _lock_by(self, folder: Path, deadline: float) -> None:
-        """Take the lock; wait while `outputs-off` holds it. A daemon of an older version, which has
-        another lock, shows its status."""
+        """Take the lock; wait while `outputs-off` holds it. A daemon of an older version has another
+        lock, and is noticed by its status."""
         while holder.shown(self.places) or not self._lock(folder):
             found = holder.look(self.places)
             if (found and found.serves) or time.monotonic() >= deadline:
@@ -231,7 +233,7 @@ class RuntimeDirectory:
             time.sleep(LOOK_EVERY_S)
 
     def _lock(self, folder: Path) -> bool:
-        """Hold the folder's lock; False while another process holds it. Raises Distrusted."""
+        """Take the folder's lock; return False only if another process has it. Raises Distrusted."""
         try:
             return self._has(folder) or self._take(folder)
         except Distrusted:
@@ -241,7 +243,7 @@ class RuntimeDirectory:
             return True
 
     def _has(self, folder: Path) -> bool:
-        """Whether the folder's lock file is the one that we hold."""
+        """Do we hold the lock file that is in the folder now?"""
         lock = self._locks.get(folder)
         try:
             return lock is not None and os.path.samestat(os.fstat(lock), os.lstat(folder / LOCK))
@@ -263,7 +265,7 @@ class RuntimeDirectory:
         return True
 
     def _sign(self, name: LockHolder) -> None:
-        """Write this name beside each lock that we hold, unless it stands there."""
+        """Write this name beside each lock that we hold, unless already written."""
         for folder in filter(self._has, self._locks):
             try:
                 if holder.written(folder) != name:
@@ -285,7 +287,7 @@ class RuntimeDirectory:
 
 
 def _lock_in(directory: int) -> int:
-    """Open the lock for writing, or read-only if that is not permitted: it can still be locked."""
+    """Open the lock file for writing, else read-only: it can still be locked."""
     flags = os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC
     try:
         return os.open(LOCK, flags | os.O_RDWR | os.O_CREAT, 0o600, dir_fd=directory)
@@ -296,7 +298,7 @@ def _lock_in(directory: int) -> int:
 def held(
     file: Path, given: str | None, *, serves: bool, simulated: bool = False
 ) -> RuntimeDirectory:
-    """The directories for this file, locked by us. A simulation never takes a service's.
+    """Lock and return the directories for this file. A simulation never takes a service's directories.
 
     Raises AlreadyRunning or PermissionError.
     """

@@ -1,6 +1,6 @@
-"""What one daemon serves: devices on buses, or a kind without hardware.
+"""The services of a daemon: devices on buses, or a kind without hardware.
 
-Either has threads, subscribes to RMF's topics for them, and reports their status.
+Either has threads, subscribes to RMF's topics, and reports a status.
 """
 
 import logging
@@ -37,7 +37,7 @@ OpenBus = Callable[[str], Bus]
 
 
 class Service(Protocol):
-    """Everything that a YAML asks a daemon to do."""
+    """The service of one YAML."""
 
     @property
     def loops(self) -> Sequence[Serving]:
@@ -47,25 +47,25 @@ class Service(Protocol):
         """Subscribe to RMF's topics."""
 
     def reset(self) -> None:
-        """An operator says that latched faults may clear."""
+        """Clear latched faults on an operator's order."""
 
     def look(self) -> None:
-        """Look who is on the graph; called each second."""
+        """Look for other nodes on the graph; called each second."""
 
     def status(self) -> Status:
-        """For the status file: the service as a whole."""
+        """Return the status of the whole service, for the status file."""
 
     def devices(self) -> Mapping[str, Status]:
-        """For the status file: each device, lift or door by name."""
+        """Return the status of each device, lift or door by name, for the status file."""
 
 
 def named_by(config: Config, topic: Topic[M_co]) -> Topic[M_co]:
-    """The topic, renamed if the YAML says so."""
+    """Return the topic, with the YAML's name if it renames it."""
     return topic.named(config.rmf.topics.get(topic.name, topic.name))
 
 
 def clock_of(transport: Transport) -> Clock:
-    """Durations by the machine's clock, stamps by RMF's."""
+    """Return a clock: durations from the machine's clock, stamps from RMF's."""
     return Clock(machine_s, transport.wall)
 
 
@@ -77,10 +77,10 @@ def service(
     unsafe: Collection[str] = (),
     writer: NoWriter = NOBODY,
 ) -> Service:
-    """The service for this YAML. Raises HalError when a bus cannot be opened.
+    """Return the service for this YAML. Raises HalError if a bus cannot be opened.
 
-    `kept`: where a kind without hardware keeps its memory across restarts; None to keep nothing.
-    `unsafe`: devices that a dead daemon may have left on. `writer`: is told what happens.
+    `kept`: the store for the memory of a kind without hardware across restarts; None for no store.
+    `unsafe`: devices that a dead daemon may have left on. `writer`: the recording's writer.
     """
     kind = kind_called(config.kind)
     named = partial(named_by, config)
@@ -102,7 +102,7 @@ class GraphService:
         self.devices = node.devices
 
     def look(self) -> None:
-        """Its node looks by itself."""
+        """Do nothing: the node looks by itself."""
 
 
 class Devices:
@@ -150,7 +150,7 @@ class Devices:
             loop.inbox.put(device, OperatorReset())
 
     def look(self) -> None:
-        """Tell each device when the nodes that may send it requests have come or gone."""
+        """Tell each device if the first node that may send requests has come, or the last has gone."""
         topic = self._kind.attended_by
         if topic is None:
             return
@@ -162,7 +162,7 @@ class Devices:
             loop.inbox.put(device, Attended(attended))
 
     def status(self) -> Status:
-        """For the status file."""
+        """Return the service's status, for the status file."""
         return {
             "requests_for_others": self._strangers["requests"],
             "events_dropped": sum(loop.inbox.dropped for loop in self._loops),
@@ -172,7 +172,7 @@ class Devices:
         }
 
     def devices(self) -> Mapping[str, Status]:
-        """For the status file."""
+        """Return each device's status, for the status file."""
         return {name: node.status() for name, (node, _) in self._placed.items()}
 
     def _topics(self) -> list[Topic[Message]]:
@@ -200,7 +200,8 @@ class Devices:
     def _to_inbox(
         self, topic: Topic[Message], accept: Callable[[Any, Any], object]
     ) -> Callable[[Message], None]:
-        """A callback for the transport's thread. States of others' devices are not counted."""
+        """Return a callback for the transport's thread. It counts requests for others' devices, not
+        their states."""
         states = topic == self._kind.states
         heard_on = self._named(topic).name
 

@@ -1,4 +1,4 @@
-"""What `enable` and `disable` do to a system, step by step; `--dry-run` prints the same steps."""
+"""The steps by which `enable` and `disable` change a system; `--dry-run` prints the same steps."""
 
 import argparse
 import os
@@ -17,37 +17,35 @@ from bridges.runtime.record import PATTERN
 
 CONFIG: Final = Path("etc/rmf-bridges")
 INSTANCE: Final = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]*")
-"""What a unit's instance may be called without escapes."""
+"""Names of a unit's instance that need no escapes."""
 NO_INSTANCE: Final = "{!r} is not a service name: use only letters, digits and _ . -"
 LEFT_ON: Final = (
-    "what {} had claimed is not verified off, and another drop-in may not let it be reached: mend"
-    " that and try again. If that hardware is gone, cut its supply, then: rm {}"
+    "the outputs of {} are not verified off, and a new drop-in may block access to them: mend that"
+    " and try again. If that hardware is gone, cut its supply, then: rm {}"
 )
 
 
 def add_root(parser: argparse.ArgumentParser) -> None:
-    """The options of `enable` and `disable`."""
+    """Add the options of `enable` and `disable`."""
     parser.add_argument(
-        "--root", type=Path, default=Path("/"), metavar="DIR", help="a system that is not running"
+        "--root", type=Path, default=Path("/"), metavar="DIR", help="a mounted system, not running"
     )
-    parser.add_argument(
-        "--dry-run", action="store_true", help="print what it would do, and no more"
-    )
+    parser.add_argument("--dry-run", action="store_true", help="only print the steps")
 
 
 def unit(name: str) -> str:
-    """The service of this name."""
+    """Return the full name of this service's unit."""
     return f"rmf-bridge@{name}.service"
 
 
 def drop_in_file(name: str) -> Path:
-    """Where the service's drop-in is, below the root."""
+    """Return the path of the service's drop-in, below the root."""
     return Path(f"etc/systemd/system/{unit(name)}.d/10-enable.conf")
 
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """A command. `running_only`: it means nothing to a system that is not running."""
+    """A command. `running_only`: True if it applies only to a running system."""
 
     words: tuple[str, ...]
     running_only: bool = False
@@ -55,7 +53,7 @@ class Run:
 
 @dataclass(frozen=True, slots=True)
 class SwitchOff:
-    """`outputs-off` of a service, if a dead daemon has left a record in its directory."""
+    """`outputs-off` for a service, if a dead daemon has left a record in its directory."""
 
     words: tuple[str, ...]
     state: Path
@@ -63,7 +61,7 @@ class SwitchOff:
 
 @dataclass(frozen=True, slots=True)
 class WriteFile:
-    """A file with this content, which everybody may read; a copy of `source` if there is one."""
+    """A file with this content, readable for everybody; a copy of `source` if given."""
 
     path: Path
     content: bytes
@@ -72,7 +70,7 @@ class WriteFile:
 
 @dataclass(frozen=True, slots=True)
 class Remove:
-    """A file that is to go, and its directory if it is empty then."""
+    """A file to remove, with its directory if that becomes empty."""
 
     path: Path
 
@@ -81,15 +79,15 @@ Step = Run | SwitchOff | WriteFile | Remove
 
 
 def switch_off(name: str) -> SwitchOff:
-    """Switch off what a service has left on."""
+    """Return the step that switches off a service's leftover outputs."""
     words = ("-P", "-m", "bridges.cli", "outputs-off", f"/{CONFIG}/{name}.yaml")
     return SwitchOff((sys.executable, *words), SERVICE_STATE / name)
 
 
 def carry_out(steps: Iterable[Step], args: argparse.Namespace, keeps: str = "") -> int:
-    """Take the steps in turn, up to the first that fails; or print them. Returns the exit code.
+    """Take or print the steps in turn, up to the first failure; return the exit code.
 
-    `keeps`: a unit that is started again after a step that has failed, if it ran before.
+    `keeps`: a unit to start again after a failed step, if it was running before.
     """
     live = args.root == Path("/")
     if live and not args.dry_run and os.geteuid() != 0:
@@ -134,7 +132,7 @@ def _show(step: Step) -> None:
 
 
 def _take(step: Step, root: Path) -> int:
-    """Returns 0 if it succeeded."""
+    """Take one step; return its exit code, 0 for success."""
     try:
         return _taken(step, root)
     except OSError as error:  # a full disk

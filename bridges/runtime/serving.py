@@ -14,13 +14,13 @@ from bridges.runtime.inbox import Inbox
 log = logging.getLogger(__name__)
 
 LEAST_GAP_S = 0.001
-"""The least time between rounds that no event has caused."""
+"""The shortest pause before a round without an event."""
 
 
 class Rounds(Protocol):
-    """What is served in rounds: the devices of a bus, or a kind without hardware.
+    """A bus's devices, or a kind without hardware, served in rounds.
 
-    Its thread is the only one that calls it, and tests call it without a thread, in their own time.
+    Only its own thread calls it; tests call it without a thread, in virtual time.
     """
 
     @property
@@ -29,29 +29,29 @@ class Rounds(Protocol):
 
     @property
     def inbox(self) -> Inbox[Any]:
-        """What wakes it before `wake_at`."""
+        """The inbox whose events cause a round before `wake_at`."""
 
     @property
     def wake_at(self) -> float:
-        """When the next round is due if no event comes (monotonic s)."""
+        """The time of the next round if no event comes (monotonic s)."""
 
     @property
     def finished(self) -> int:
-        """How many steps it has finished; counts within a round too."""
+        """The number of finished steps, counted within a round too."""
 
     @property
     def ready(self) -> bool:
-        """Whether it is in service."""
+        """Is it in service?"""
 
     def round(self) -> None:
-        """Take the waiting events, and do what is due."""
+        """Take the waiting events and do the due work."""
 
     def end(self) -> bool:
-        """Outputs off, and everything released. False if that could not be verified."""
+        """Switch the outputs off and release everything; False if the outputs are not verified off."""
 
 
 def stop(loops: Sequence["Serving"], within_s: float) -> bool:
-    """End all at once, so that none waits for another; False if one does not end, or not safely."""
+    """End all loops at the same time; return False if one does not end, or not safely."""
     for loop in loops:
         loop.close()
     deadline = time.monotonic() + within_s
@@ -60,7 +60,7 @@ def stop(loops: Sequence["Serving"], within_s: float) -> bool:
 
 
 class Serving:
-    """One thread of a service, as the daemon sees it. `died`: why it died; "" if it has not."""
+    """One thread of a service. `died`: the cause of its death; "" while it has none."""
 
     def __init__(self, serves: Rounds, clock: Clock) -> None:
         self._rounds = 0
@@ -75,23 +75,23 @@ class Serving:
         self._thread.start()
 
     def close(self) -> None:
-        """Ask for the end: after the current round, outputs off."""
+        """Ask the thread to end: after the current round it switches the outputs off."""
         self._serves.inbox.close()
 
     def ended(self, timeout_s: float) -> bool:
-        """Wait for the end; False if it does not come, or not safely."""
+        """Wait for the thread's end; return False if it does not end, or not safely."""
         if self._thread.ident is not None:  # else it was never started
             self._thread.join(timeout_s)
         return not self._thread.is_alive() and self._safe
 
     @property
     def alive(self) -> bool:
-        """False when it serves no more: stopped, or, even if it still switches off, by a defect."""
+        """Does the thread serve? False once stopped or, even while it switches off, after a defect."""
         return self._thread.is_alive() and not self.died
 
     @property
     def finished(self) -> int:
-        """Grows as long as it gets on with its work."""
+        """A count that grows while the thread makes progress."""
         return self._rounds + self._serves.finished
 
     @property
@@ -110,7 +110,7 @@ class Serving:
         except LeftOn as error:
             self.died = f"{serves.name}: {error}"
             log.critical(pairs("died", thread=serves.name, reason=error))
-        except Exception as error:  # a defect of ours: the daemon ends, and is started again
+        except Exception as error:  # a defect of ours: the daemon ends and is restarted
             self.died = f"{serves.name}: {type(error).__name__}: {error}"
             log.critical(pairs("died", thread=serves.name, reason=error), exc_info=True)
         finally:

@@ -1,9 +1,8 @@
-"""Signals: each one that would end or suspend a daemon makes it shut down, outputs off.
+"""Signals: those that by default end or suspend a process (signal(7)) shut a daemon down, outputs off.
 
-What counts is a signal's default action (signal(7)). Not caught: crashes, and SIGABRT from the
-watchdog; such a process cannot be trusted any more, and `outputs-off` follows. SIGPIPE and SIGXFSZ stay
-ignored, as Python sets them: an unread log or a full disk must not end a daemon, only fail the write.
-SIGKILL and SIGSTOP cannot be caught.
+Not caught: crashes, and SIGABRT from the watchdog; such a process cannot be trusted any more, and
+`outputs-off` follows. SIGPIPE and SIGXFSZ stay ignored, as set by Python: an unread log or a full disk
+must only fail the write, not end a daemon. SIGKILL and SIGSTOP cannot be caught.
 """
 
 import os
@@ -24,7 +23,7 @@ CRASHES: Final = {
     signal.SIGTRAP,
 }
 HARMLESS: Final = {signal.SIGCHLD, signal.SIGCONT, signal.SIGURG, signal.SIGWINCH}
-"""Their default action neither ends nor suspends a process."""
+"""Signals whose default action neither ends nor suspends a process."""
 WRITES: Final = {signal.SIGPIPE, signal.SIGXFSZ}
 RESET: Final = signal.SIGUSR1
 TERMINAL: Final = {signal.SIGTTIN, signal.SIGTTOU}
@@ -40,8 +39,8 @@ ENDING: Final = frozenset(signal.valid_signals()) - {
 
 
 class End:
-    """Set permanently by the first signal that ends us. (A threading.Event cannot be used: a signal
-    that came while its lock was held would wait forever.)
+    """Set permanently by the first signal of ENDING. (Not a threading.Event: a signal that arrives
+    while its lock is held would wait forever.)
     """
 
     def __init__(self) -> None:
@@ -52,13 +51,13 @@ class End:
                 signal.signal(number, self._on_signal)
 
     def wait(self, timeout_s: float) -> bool:
-        """Wait up to `timeout_s`; True once a signal has come."""
+        """Wait up to `timeout_s` (s); return True once a signal has come."""
         return bool(select.select([self._read], [], [], timeout_s)[0])
 
     def _on_signal(self, number: int, frame: FrameType | None) -> None:
-        for each in TERMINAL:  # else a background job's last log lines would raise it again
+        for each in TERMINAL:  # else the last log lines of a background job would raise them again
             signal.signal(each, signal.SIG_IGN)
-        with suppress(BlockingIOError):  # full of earlier ones
+        with suppress(BlockingIOError):  # the pipe is full of earlier signals
             os.write(self._write, b".")
 
 
@@ -68,7 +67,7 @@ def on_reset(reset: Callable[[], None]) -> None:
 
 
 def ignore() -> None:
-    """Let only SIGKILL end this process, which runs briefly and switches outputs off."""
+    """Let only SIGKILL end this short-lived process, which switches outputs off."""
     for number in ENDING | {RESET}:
         signal.signal(number, signal.SIG_IGN)
 

@@ -1,5 +1,5 @@
-"""One lift, door or charger (or a coordinator's site): holds its core's memory and acts on each
-decision: publishes messages, counts refusals, and logs states and faults when they change."""
+"""One lift, door or charger, or a coordinator's site: holds its core's memory, acts on each decision,
+publishes messages, counts refusals, and logs changes of states and faults."""
 
 import logging
 from collections.abc import Callable, Mapping
@@ -22,18 +22,18 @@ Status = Mapping[str, Any]
 """A part of the status file, as JSON values."""
 
 Publish = Callable[[Topic[Message], Message], bool | None]
-"""Sends to RMF, and does not raise. False: nobody can have heard it."""
+"""Sends to RMF without raising. False: the message was not sent."""
 
 V = TypeVar("V")
 """The events of a core."""
 
 
 class SubjectCore(Struct, Generic[M, V, O, R], frozen=True):
-    """A kind's core with its limits, as subjects need it.
+    """A kind's core, with its limits bound.
 
-    `word`: the key of a subject's name in the log. `decide(memory, event, now)`.
-    `summary(report, now)`: key -> value for the log and the status file. `identity(fault)`: two faults
-    with equal identity are the same one, logged once.
+    `word`: the key of a subject's name in the log. `decide(memory, event, now)`: one step.
+    `summary(report, now)`: key -> value for the log and the status file. `identity(fault)`: equal for
+    two reports of the same fault, which is logged once.
     """
 
     word: str
@@ -70,7 +70,7 @@ class Subject(Generic[M, V, O, R]):
         self._faults: Mapping[object, Fault] = {}
 
     def decide(self, event: V) -> Decision[M, O, R]:
-        """One step of the core."""
+        """Let the core decide on an event, and act on the decision."""
         before, now = self.memory, self._clock.monotonic()
         decision = self._core.decide(before, event, now)
         self._writer.decided(self.name, before, event, now, decision)
@@ -84,13 +84,13 @@ class Subject(Generic[M, V, O, R]):
         return decision
 
     def published(self, memory: M) -> None:
-        """Note that its report was published. `memory`: as the core has it after that."""
+        """Note that the subject's report was published. `memory`: the core's memory afterwards."""
         if memory is not self.memory:
             self.memory = memory
             self._writer.published(self.name, memory, self._clock.monotonic())
 
     def log(self, report: R) -> None:
-        """Log what has changed since the last report."""
+        """Log the changes since the last report."""
         news = report.news()
         if news != self._logged_news:
             self._logged_news = news
@@ -99,7 +99,7 @@ class Subject(Generic[M, V, O, R]):
             self._log_faults({self._core.identity(fault): fault for fault in report.faults})
 
     def status(self) -> Status:
-        """For the status file; from any thread."""
+        """Return the subject's status for the status file; from any thread."""
         decision = self.decision
         if decision is None:
             return {}

@@ -1,7 +1,7 @@
-"""Switches off every output of a YAML or record, from a new process. Imports no more than it needs.
+"""Switches off every output of a YAML or record, from a new process, with as few imports as possible.
 
 On each bus the devices that answered the dead daemon most recently come first: silent ones would use
-up the time. Each gets a short try, then those that failed are tried again.
+up the time. Each device gets a short try, then the failed ones are tried again.
 """
 
 import logging
@@ -26,8 +26,8 @@ def outputs_off(
 ) -> set[str]:
     """Switch off every output of a file, except those of the devices in `but`.
 
-    `ages`: how long ago (s) each device last answered the dead daemon; one that never did is missing.
-    Returns the devices that are verified off. Gives up after `timeout_s` in total.
+    `ages`: the age (s) of each device's last answer to the dead daemon; missing without an answer.
+    Return the devices verified off. Give up after `timeout_s` in total.
     """
     results: dict[str, bool] = {}
     left = [name for name in config.devices if name not in but]
@@ -93,7 +93,7 @@ def _device_off(
 
 
 def _failed(name: str, error: Exception) -> None:
-    """Say why; a defect of ours must not stop the other devices."""
+    """Log the failure, even a defect of ours, which must not stop the other devices."""
     if isinstance(error, DriverError):
         log.error(pairs("outputs_not_off", device=name, reason=error))
     else:

@@ -1,1 +1,1 @@
-"""The ways to RMF's graph: one that the YAML names is opened, with the same messages on each."""
+"""The ways to RMF's graph. The YAML selects one; all carry the same messages."""

@@ -1,25 +1,25 @@
-"""The addresses by which this machine can reach other machines; transports notice when they change."""
+"""The addresses by which this machine can reach other machines; transports watch them for changes."""
 
 import fcntl
 import socket
 import struct
 
 Addresses = frozenset[tuple[int, str]]
-"""(interface's number, its IPv4 address) of each interface that could reach another machine."""
+"""(number, IPv4 address) of each interface that could reach another machine."""
 
 GET_FLAGS, GET_ADDRESS = 0x8913, 0x8915
 UP, LOOPBACK, RUNNING = 0x1, 0x8, 0x40
 
 
 def addresses() -> Addresses:
-    """The addresses of all interfaces that are up and have a link, without loopback."""
+    """Return the addresses of all interfaces that are up and have a link, without loopback."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as asking:
         found = ((index, _address(asking, name)) for index, name in socket.if_nameindex())
         return frozenset((index, address) for index, address in found if address)
 
 
 def _address(asking: socket.socket, name: str) -> str:
-    """The IPv4 address of an interface; "" if it is down, has no link or address, or is loopback."""
+    """Return an interface's IPv4 address; "" if it is loopback, down, or without link or address."""
     request = struct.pack("256s", name.encode()[:15])
     try:
         flags = struct.unpack_from("H", fcntl.ioctl(asking, GET_FLAGS, request), 16)[0]

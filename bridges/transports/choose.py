@@ -1,6 +1,6 @@
-"""Which transport a daemon uses, in which ROS domain, on which network.
+"""Chooses a daemon's transport, ROS domain and network.
 
-The YAML decides. Where it says nothing, ROS's environment variables do, as for any ROS node. Each
+The YAML decides; for keys that it lacks, ROS's environment variables do, as for any ROS node. Each
 transport has a folder beside this file: `ros2/`, `dds/`, `zenoh/`.
 """
 
@@ -37,7 +37,7 @@ NO_ROS = (
 def open_transport(
     rmf: Rmf, node_name: str, *, localhost: bool = False, ros_args: Sequence[str] = ()
 ) -> Transport:
-    """Join the RMF graph as `node_name`. Raises TransportError with what to do about it.
+    """Join the RMF graph as `node_name`. Raises TransportError with a remedy.
 
     `localhost` keeps all traffic on this machine, whatever the YAML and the environment say.
     `ros_args`: `--ros-args` and the arguments after it on the command line.
@@ -65,7 +65,7 @@ def open_transport(
 
 
 def domain_id(rmf: Rmf, environ: Mapping[str, str]) -> int:
-    """The ROS domain: the YAML's, else ROS_DOMAIN_ID, else 0."""
+    """Return the ROS domain: the YAML's, else ROS_DOMAIN_ID, else 0. Raises TransportError."""
     if rmf.domain_id is not None:
         return rmf.domain_id
     text = environ.get("ROS_DOMAIN_ID", "") or "0"
@@ -75,10 +75,10 @@ def domain_id(rmf: Rmf, environ: Mapping[str, str]) -> int:
 
 
 def stays_on_loopback(rmf: Rmf, environ: Mapping[str, str], peers: Sequence[str] = ()) -> bool:
-    """Whether the YAML, ROS_LOCALHOST_ONLY or ROS_AUTOMATIC_DISCOVERY_RANGE keeps us on loopback.
+    """Does the YAML, ROS_LOCALHOST_ONLY or ROS_AUTOMATIC_DISCOVERY_RANGE keep us on loopback?
 
     As in ROS 2 Jazzy, the older ROS_LOCALHOST_ONLY=1 wins over the newer variable, and LOCALHOST
-    reaches static `peers` all the same.
+    still reaches static `peers`. Raises TransportError.
     """
     if rmf.network == "localhost" or environ.get("ROS_LOCALHOST_ONLY") == "1":
         return True
@@ -92,7 +92,7 @@ def stays_on_loopback(rmf: Rmf, environ: Mapping[str, str], peers: Sequence[str]
 
 
 def _choice(rmf: Rmf) -> tuple[str, str]:
-    """The transport, and why it was chosen."""
+    """Return the transport and the reason for its choice."""
     if rmf.transport in ("dds", "zenoh"):
         return rmf.transport, "configured"
     missing = missing_of_ros()
@@ -109,13 +109,13 @@ def _choice(rmf: Rmf) -> tuple[str, str]:
 
 
 def _best_without(ros: str) -> tuple[str, str]:
-    """What `auto` chooses without ROS. `ros`: what is missing of ROS."""
+    """Return `auto`'s choice without ROS, with its reason. `ros`: the missing part of ROS."""
     missing = missing_of_dds()
     return ("zenoh", f"{ros}; {missing}") if missing else ("dds", ros)
 
 
 def missing_of_dds() -> str:
-    """Why transport `dds` cannot be used here; "" if it can."""
+    """Return the reason why transport `dds` cannot be used here; "" if it can."""
     try:
         importlib.import_module("cyclonedds.core")
     except ImportError as error:
@@ -124,7 +124,7 @@ def missing_of_dds() -> str:
 
 
 def missing_of_ros() -> str:
-    """Why transport `ros2` cannot be used here; "" if it can."""
+    """Return the reason why transport `ros2` cannot be used here; "" if it can."""
     try:
         importlib.import_module("rclpy")
     except ImportError as error:

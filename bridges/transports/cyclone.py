@@ -16,22 +16,22 @@ INTERNAL: Final = (
     "<PrimaryReorderMaxSamples>1</PrimaryReorderMaxSamples>"
     "<SecondaryReorderMaxSamples>1</SecondaryReorderMaxSamples></Internal>"
 )
-"""A node leaves at once, also when its address has gone. Else Cyclone 0.10 ends its receive threads by
-a datagram to that address and waits for it, for minutes (q_receive.c, trigger_recv_threads), and every
-writer waits 1 s for acknowledgements that do not come. rclpy holds Python's lock meanwhile: the whole
-daemon stands still.
+"""Lets a node leave at once, even without its address. By default Cyclone 0.10 ends its receive threads
+with a datagram to that address and waits for it, for minutes (q_receive.c, trigger_recv_threads), and
+every writer waits 1 s for acknowledgements that do not come. Meanwhile rclpy holds Python's lock, and
+the whole daemon stands still.
 
-A longer sample is dropped at its first fragment. Of each writer in the network at most one sample in
-parts and one that came too early wait in memory (by default 16 and 128): after a loss the writer is
-asked again."""
+A sample longer than LONGEST is dropped at its first fragment. Memory holds for each writer at most one
+incomplete sample and one that came too early (by default 16 and 128); after a loss the writer is asked
+to repeat."""
 FOUND_AGAIN: Final = "<SPDPInterval>2 s</SPDPInterval>"
-"""How often a node announces itself, so that it is found soon after the network was away for longer
-than a lease (10 s). By default 0.10 does so each 8 s, 11 to a peer that it has lost each 30 s."""
+"""The period at which a node announces itself. It is found soon after a network failure longer than a
+lease (10 s). By default Cyclone 0.10 announces each 8 s, 11 each 30 s to a lost peer."""
 NEVER_FORGOTTEN: Final = (
     "<InitialLocatorPruneDelay>inf</InitialLocatorPruneDelay>"
     "<DiscoveredLocatorPruneDelay>inf</DiscoveredLocatorPruneDelay>"
 )
-"""Else 11 gives up a peer that it has not found for 30 s, or has lost for 60 s. 0.10 never does, and
+"""By default Cyclone 11 gives up a peer not found for 30 s, or lost for 60 s. 0.10 never gives up, and
 refuses these names."""
 LOOPBACK: Final = (
     "<CycloneDDS><Domain><General>"
@@ -45,11 +45,11 @@ LOOPBACK: Final = (
 
 
 def configuration(environ: Mapping[str, str]) -> str:
-    """The configuration of a node on the network: ours, then CYCLONEDDS_URI's.
+    """Return the configuration of a node on the network: ours, then CYCLONEDDS_URI's.
 
-    As rmw_cyclonedds makes it (ROS 2 Jazzy, rmw_node.cpp): static peers by unicast beside multicast,
-    and participant indices that peers can guess. LOCALHOST is without multicast: this machine and the
-    peers. SYSTEM_DEFAULT leaves to Cyclone who is found.
+    As in rmw_cyclonedds (ROS 2 Jazzy, rmw_node.cpp): static peers by unicast beside multicast, and
+    participant indices that peers can guess. LOCALHOST: this machine and the static peers, without
+    multicast. SYSTEM_DEFAULT: discovery is left to Cyclone.
     """
     own = environ.get("CYCLONEDDS_URI", "")
     wanted = environ.get("ROS_AUTOMATIC_DISCOVERY_RANGE")
@@ -71,7 +71,7 @@ def configuration(environ: Mapping[str, str]) -> str:
 
 
 def for_ros(environ: Mapping[str, str]) -> str:
-    """CYCLONEDDS_URI for a ROS node on the network: what all of ours have, then what is there."""
+    """Return CYCLONEDDS_URI for a ROS node on the network: our settings, then its present value."""
     ours, own = (
         f"<CycloneDDS><Domain>{INTERNAL}<Discovery>{FOUND_AGAIN}</Discovery></Domain></CycloneDDS>",
         environ.get("CYCLONEDDS_URI", ""),
@@ -80,6 +80,6 @@ def for_ros(environ: Mapping[str, str]) -> str:
 
 
 def static_peers(environ: Mapping[str, str]) -> list[str]:
-    """The hosts in ROS_STATIC_PEERS."""
+    """Return the hosts in ROS_STATIC_PEERS."""
     peers = (peer.strip() for peer in environ.get("ROS_STATIC_PEERS", "").split(";"))
     return [peer for peer in peers if peer]

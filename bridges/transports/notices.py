@@ -1,4 +1,4 @@
-"""What transports log about samples and peers: the same texts on every wire, once for each cause."""
+"""The transports' log lines about samples and peers: the same on every wire, once for each cause."""
 
 import logging
 
@@ -11,7 +11,7 @@ from bridges.transports.transport import Receive
 log = logging.getLogger(__name__)
 
 FAILURES = 5
-"""After so many failed reads in a row a transport ends its thread, and with it the daemon."""
+"""The number of failed reads in a row after which a transport ends its thread, and so the daemon."""
 NOT_HEARD = "a publisher is not heard"
 NOT_SERVED = "a subscription is not served"
 
@@ -24,7 +24,7 @@ def drop(dropped: dict[str, int], topic: AnyTopic, error: CdrError) -> None:
 
 
 def hand_on(dropped: dict[str, int], topic: AnyTopic, received: Receive, message: Message) -> None:
-    """Deliver a message to its subscriber. An exception there drops the message, not the thread."""
+    """Deliver a message to its subscriber. The callback's exceptions lose only this message."""
     try:
         received(message)
     except Exception as error:
@@ -36,5 +36,5 @@ def hand_on(dropped: dict[str, int], topic: AnyTopic, received: Receive, message
 
 
 def misfit(topic: AnyTopic, text: str, policy: str) -> None:
-    """Log which QoS policy keeps a peer from matching our end of a topic."""
+    """Log the QoS policy by which a peer does not match our end of a topic."""
     log.warning(pairs("misfit", topic=topic.name, reason=f"{text}: its {policy} does not fit ours"))

@@ -1,10 +1,10 @@
-"""The other nodes on the graph by the ends that they announce: which release of RMF is there, and whose
-types do not fit ours.
+"""The announced ends (publishers and subscriptions) of other nodes: show RMF's release, and types that
+do not fit ours.
 
 A fleet adapter shows the release: it publishes FleetState and, in newer releases, subscribes to
-EmergencySignal; our daemons do neither. With `auto` we speak the release of the fleet adapters: the
-default while there is none, and still the present one if there are two, which is a fault. The
-transports report the ends that they see.
+EmergencySignal; our daemons do neither. With `auto` we speak the fleet adapters' release; without an
+adapter the default; with adapters of two releases, a fault, the present one. The transports report the
+ends.
 """
 
 import logging
@@ -24,19 +24,19 @@ from bridges.transports import notices
 log = logging.getLogger(__name__)
 
 MOST: Final = 5000
-"""More ends of other nodes than any site has."""
+"""The limit of remembered ends: more than any site has."""
 WITNESSES: Final = {
     (type_name(FleetState), True),
     (type_name(EmergencySignal), False),
     (type_name(Alert), False),
 }
-"""(message, published): ends that only RMF's own nodes have."""
+"""(message's type, published): ends that only RMF's own nodes have."""
 MISFIT: Final = "TYPE_MISFIT"
 MIXED: Final = "TWO_RELEASES"
 
 
 class Announced(Struct, frozen=True):
-    """An end of any node. `topic`: without slash. `type`: package/msg/Name. `hash`: "" for none."""
+    """An end of any node. `topic`: without slash. `type`: package/msg/Name. `hash`: "" if unknown."""
 
     topic: str
     type: str
@@ -45,7 +45,7 @@ class Announced(Struct, frozen=True):
 
 
 class Peers:
-    """What others announce, and the release that follows from it. `wanted`: None for `auto`."""
+    """Other nodes' announced ends, and the release derived from them. `wanted`: None for `auto`."""
 
     def __init__(self, wanted: Release | None) -> None:
         self.release = wanted or DEFAULT
@@ -60,7 +60,7 @@ class Peers:
         self._ours[topic.name.strip("/"), publishes] = topic
 
     def seen(self, key: Hashable, end: Announced) -> None:
-        """Note that an end is there."""
+        """Note an end of another node."""
         if len(self._ends) < MOST or key in self._ends:
             self._ends[key] = end
 
@@ -69,11 +69,11 @@ class Peers:
         self._ends.pop(key, None)
 
     def clear(self) -> None:
-        """Forget all ends, because we join again."""
+        """Forget all ends, as we join again."""
         self._ends.clear()
 
     def settle(self) -> bool:
-        """Take over the release that RMF's nodes speak. True if ours has changed."""
+        """Take over the release of RMF's nodes; return True if ours has changed."""
         heard = self._heard()
         self._name_mixed(heard)
         if not self._auto or len(heard) != 1 or self.release in heard:
@@ -83,24 +83,24 @@ class Peers:
         return True
 
     def name_misfits(self) -> None:
-        """Log each topic on which others have another type, once."""
+        """Log once each topic on which other nodes have another type."""
         for end in list(self._ends.values()):
             if self._misfits(end):
                 self.name(self._ours[end.topic, not end.publishes], published=end.publishes)
 
     def name(self, topic: AnyTopic, *, published: bool) -> None:
-        """Log, once, that other nodes publish or subscribe to a topic with another type."""
+        """Log once that other nodes publish or subscribe to a topic with another type."""
         key = topic.name.strip("/"), published
         if key not in self._named:
             self._named.add(key)
             notices.misfit(topic, notices.NOT_HEARD if published else notices.NOT_SERVED, "type")
 
     def differs(self, topic: AnyTopic, before: Release) -> bool:
-        """Does this topic's message differ between the present release and that one?"""
+        """Does this topic's message differ between the present release and `before`?"""
         return _hash_of(topic, self.release) != _hash_of(topic, before)
 
     def faults(self) -> list[tuple[str, str]]:
-        """(code, detail) of what now keeps nodes from hearing each other."""
+        """Return (code, detail) of each fault that now keeps nodes from hearing each other."""
         heard = sorted(release.name for release in self._heard())
         found = [(MIXED, f"{' and '.join(heard)} are both on this graph")] if len(heard) > 1 else []
         counts = Counter(end.topic for end in list(self._ends.values()) if self._misfits(end))
@@ -123,7 +123,7 @@ class Peers:
         return end.type != type_name(ours.type) or not fits
 
     def _name_mixed(self, heard: set[Release]) -> None:
-        """Log two releases once, when the second appears."""
+        """Log once that two releases are on the graph, when the second appears."""
         if len(heard) > 1 and not self._mixed:
             names = " ".join(sorted(release.name for release in heard))
             log.warning(pairs("two_releases", on_this_graph=names, we_speak=self.release.name))
@@ -135,6 +135,6 @@ def _hash_of(topic: AnyTopic, release: Release) -> str:
 
 
 def _only(hashed: str) -> Iterator[Release]:
-    """The release of this hash, if only one has it."""
+    """Return the release with this hash; none if several have it."""
     found = releases_of(hashed)
     return iter(found if len(found) == 1 else ())

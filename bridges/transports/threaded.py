@@ -1,4 +1,4 @@
-"""What the transports with a thread of their own share: `dds`, `zenoh` and `ros2`."""
+"""The common base of the transports with a thread of their own: `dds`, `zenoh` and `ros2`."""
 
 import logging
 import math
@@ -17,31 +17,31 @@ from bridges.transports.transport import TransportError
 log = logging.getLogger(__name__)
 
 LOOK_EVERY_S: Final = 1.0
-"""How often (s) to look whether the machine's addresses have changed. No library does that: one that
-starts with only `lo` up stays there forever, and none notices a changed address."""
+"""The period (s) of checks for changed addresses of the machine. No library checks: one that starts
+with only `lo` up stays there forever, and none notices a changed address."""
 SET_BACK_S: Final = 1.0
-"""A smaller step back is slept through: Cyclone renews a lease of 10 s every 8 s."""
+"""A smaller step back (s) does no harm: Cyclone renews a lease of 10 s every 8 s."""
 
 
 class WallClock:
-    """Notices that the wall clock was set back, because Cyclone DDS waits by it.
+    """Notices that the wall clock was set back, as Cyclone DDS uses it to wait.
 
-    0.10.5 (ROS 2 Jazzy) always does (github.com/eclipse-cyclonedds/cyclonedds, issue 1995); 11.0.1 does
-    in the wheel on PyPI, which is built without pthread_condattr_setclock. When the clock is set back,
-    Cyclone's threads sleep longer by the size of the step. Meanwhile a node renews no lease, so that
-    others forget it after 10 s; it answers no new node, and asks for nothing that was lost. A node that
-    has joined since waits by the new time. A step forward wakes the threads early, which does no harm.
+    Cyclone 0.10.5 (ROS 2 Jazzy) always does (github.com/eclipse-cyclonedds/cyclonedds, issue 1995),
+    11.0.1 in the wheel on PyPI, which is built without pthread_condattr_setclock. When the clock is set
+    back, Cyclone's threads sleep longer by the size of the step. Meanwhile a node renews no lease, and
+    others forget it after 10 s; it answers no new node, and requests no lost samples again. A node that
+    joins later waits by the new time. A step forward wakes the threads early, which does no harm.
 
-    `ahead_s`, here and below: how far the wall clock is ahead of one that never steps (s).
+    `ahead_s`, here and below: the wall clock minus a clock that never steps (s).
     """
 
     def __init__(self, ahead_s: float) -> None:
         self._most_s = ahead_s
 
     def set_back_s(self, ahead_s: float) -> float:
-        """How far it was set back since a step was last found; 0 for SET_BACK_S or less.
+        """Return the step back (s) since the last one found; 0 for SET_BACK_S or less.
 
-        Small steps add up, because a thread may sleep through all of them.
+        Small steps add up, because one sleep of a thread may include several.
         """
         self._most_s = max(self._most_s, ahead_s)
         back_s = self._most_s - ahead_s
@@ -52,15 +52,14 @@ class WallClock:
 
 
 def ahead_s() -> float:
-    """How far the wall clock is ahead of the time since the machine's start, its sleep included (s)."""
+    """Return the wall clock minus the time since the machine's start, its sleep included (s)."""
     return time.time() - time.clock_gettime(time.CLOCK_BOOTTIME)
 
 
 class Threaded:
-    """A node on the graph, with one thread; on DDS another one looks at the clock. `refusals`: the
-    exceptions by which its library refuses.
+    """A node on the graph, with one thread, on DDS a second for the clock.
 
-    `release`: None to follow RMF's.
+    `refusals`: the library's exceptions. `release`: None to follow RMF's.
     """
 
     refusals: ClassVar[tuple[type[Exception], ...]]
@@ -81,20 +80,21 @@ class Threaded:
 
     @property
     def release(self) -> Release:
-        """The release of RMF's messages that it speaks now."""
+        """The release of RMF's messages that the node speaks now."""
         return self._peers.release
 
     def faults(self) -> list[tuple[str, str]]:
-        """(code, detail) of what now keeps it and others from hearing each other; from any thread."""
+        """Return (code, detail) of each fault that now keeps nodes from hearing each other; from any
+        thread."""
         return self._peers.faults()
 
     @property
     def lives(self) -> bool:
-        """Whether its thread runs; also true without a network, a router or a peer."""
+        """Does its thread run? True also without a network, a router or a peer."""
         return not self._closed and self._thread.is_alive()
 
     def wall(self) -> float:
-        """The wall clock (s since the epoch)."""
+        """Return the wall clock's time (s since the epoch)."""
         return time.time()
 
     def _start(self, run: Callable[[], None], wire: str) -> None:
@@ -102,9 +102,9 @@ class Threaded:
         self._thread.start()
 
     def _watch_clock(self) -> None:
-        """From now on set `_set_back` and wake our thread when the wall clock is set back.
+        """Start a thread that sets `_set_back` and wakes ours when the wall clock is set back.
 
-        It takes another thread, because ours may itself wait by the wall clock.
+        Our own thread cannot do this, as it may itself wait by the wall clock.
         """
         run, name = self._look_at_clock, f"{self.name}-clock"
         self._clock_thread = threading.Thread(target=run, name=name, daemon=True)
@@ -119,10 +119,10 @@ class Threaded:
                     self._wake()
 
     def _wake(self) -> None:
-        """End the wait of our thread, if it has joined; called with the lock."""
+        """End the wait of our thread if the node has joined; called with the lock held."""
 
     def _look_is_due(self) -> bool:
-        """Whether it is time to look at the network again."""
+        """Is it time to look at the network again? Plans the next look if so."""
         now = time.monotonic()
         if now < self._look_at:
             return False
@@ -130,7 +130,7 @@ class Threaded:
         return True
 
     def _network_changed(self) -> bool:
-        """Whether the machine's addresses have changed since the node joined; logs them."""
+        """Have the machine's addresses changed since the node joined? Logs the new ones."""
         found = addresses.addresses()
         if found == self._addresses:
             return False
@@ -139,7 +139,7 @@ class Threaded:
         return True
 
     def _join_thread(self) -> None:
-        """Wait until the threads have ended, unless ours is the one that asks."""
+        """Wait for the threads' end; not for our thread if it is the caller."""
         if self._clock_thread is not None:
             self._clock_thread.join()
         if threading.current_thread() is not self._thread:
@@ -147,7 +147,7 @@ class Threaded:
 
     @contextmanager
     def _reporting(self, text: str) -> Iterator[None]:
-        """Raise the library's exceptions as TransportError. `text`: what cannot be done."""
+        """Raise the library's exceptions as TransportError. `text`: the failure, for the error."""
         if self._closed:
             raise TransportError(f"{text}: {self.name} has left the graph")
         try:

@@ -1,6 +1,6 @@
 """The interface of every transport: `ros2`, `dds`, `zenoh`.
 
-Each has a file beside this one; `bridges/transports/choose.py` opens the one that the YAML names.
+Each has a folder beside this file; `bridges/transports/choose.py` opens the YAML's transport.
 """
 
 from collections.abc import Callable
@@ -19,9 +19,9 @@ Receive = Callable[[Message], None]
 
 
 def any_type(received: Callable[[M], None]) -> Receive:
-    """The callback of one subscription, as a transport stores it beside those of other types.
+    """Return a subscription's callback with the type that transports store for every topic.
 
-    A transport only gives it messages that were decoded as its own topic's type.
+    Safe, because a transport decodes each message as the type of the subscription's topic.
     """
     return cast(Receive, received)
 
@@ -34,10 +34,11 @@ class Publisher(Protocol[M_contra]):
     """The sending end of one topic."""
 
     def publish(self, message: M_contra) -> None:
-        """Send; never blocks longer than 20 ms. Raises TransportError when the wire is gone."""
+        """Send; block for at most 20 ms. Raises TransportError if the wire is gone."""
 
     def matched(self) -> int:
-        """How many subscriptions receive what is sent here, in any process; 0 after close."""
+        """Return the number of subscriptions that receive our messages, in any process; 0 after
+        close."""
 
     def close(self) -> None:
         """Take this publisher off the graph at once; the node stays. May be called twice."""
@@ -47,11 +48,11 @@ class Subscription(Protocol):
     """The receiving end of one topic."""
 
     def matched(self) -> int:
-        """How many publishers are heard here, in any process; 0 after close."""
+        """Return the number of publishers that are heard here, in any process; 0 after close."""
 
     def senders(self) -> list[str]:
-        """The nodes of these publishers, as `/namespace/name`, as far as the wire tells; from any
-        thread. Anybody can make a name up."""
+        """Return the nodes of these publishers, as `/namespace/name`, as far as the wire tells; from
+        any thread. Names can be forged."""
 
 
 class Transport(Protocol):
@@ -69,11 +70,11 @@ class Transport(Protocol):
 
     @property
     def release(self) -> Release:
-        """The release of RMF's messages that it speaks now."""
+        """The release of RMF's messages that the node speaks now."""
 
     def faults(self) -> list[tuple[str, str]]:
-        """(code, detail) of what now keeps this node and others from hearing each other; from any
-        thread."""
+        """Return (code, detail) of each fault that now keeps this node and others from hearing each
+        other; from any thread."""
 
     def publisher(self, topic: Topic[M]) -> Publisher[M]:
         """Declare a publisher with `topic.publish` QoS."""
@@ -83,15 +84,15 @@ class Transport(Protocol):
     ) -> Subscription:
         """Declare a subscription with `topic.subscribe` QoS.
 
-        `others_only`: what this same transport publishes on the topic is not delivered to it.
+        `others_only`: messages of this transport's own publishers are not delivered.
         """
 
     @property
     def lives(self) -> bool:
-        """Whether its thread runs. It also does without a network, a router or a peer."""
+        """Does its thread run? True also without a network, a router or a peer."""
 
     def wall(self) -> float:
-        """RMF's time, for stamps (s since the epoch): the wall clock, unless ROS simulates time."""
+        """Return RMF's time for stamps (s since the epoch): the wall clock, or ROS's simulated time."""
 
     def close(self) -> None:
         """Leave the graph at once, so that no ghost endpoint remains. May be called twice."""

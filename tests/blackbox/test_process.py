@@ -71,7 +71,7 @@ def test_a_person_records_an_incident_and_replays_it(
     other.write_text(lift.read_text())
 
     assert made.returncode == 0, made.stderr
-    assert late.stdout.splitlines()[0] == f"no daemon serves {lift} now: nothing follows"
+    assert late.stdout.splitlines()[0] == f"no daemon serves {lift} now: not waiting for later events"
     assert (late.returncode, (tmp_path / "late.mcap").exists()) == (0, True)
     assert [(note.code, note.text) for note in notes_in(file)] == [("OPERATOR", "it stood")]
     assert {one.topic for one in heard_in(file)} == {"lift_states", "diagnostics"}
@@ -126,7 +126,7 @@ def test_a_command_without_a_ring_or_a_recording_says_what_to_do(
     )
     assert died.stderr == (
         f"{none}/ring.died cannot be read: No such file or directory."
-        " --died is the run before the last one; for the last one, leave it out\n"
+        " --died asks for the run before the last; leave it out for the last run\n"
     )
     assert (nowhere.returncode, nowhere.stdout, nowhere.stderr) == (
         73,

@@ -85,7 +85,7 @@ def test_where_the_state_keeps_an_old_name_the_runtime_directory_says_who_it_is(
         RuntimeDirectory(both, FILE, serves=True, wait_s=0.0)
     (tmp_path / "run" / HOLDER).write_bytes(b"")
     assert look(both) is None
-    with pytest.raises(AlreadyRunning, match="a program that has not said its name"):
+    with pytest.raises(AlreadyRunning, match="by an unnamed program"):
         RuntimeDirectory(both, FILE, serves=True, wait_s=0.0)
     serving.close()
     assert look(both) is None
@@ -250,7 +250,7 @@ def test_a_name_that_is_a_symbolic_link_cannot_be_seen_and_nonsense_says_nothing
     tmp_path: Path,
 ) -> None:
     (tmp_path / HOLDER).symlink_to(tmp_path / "elsewhere")
-    with pytest.raises(PermissionError, match="cannot be seen"):
+    with pytest.raises(PermissionError, match="cannot see whether"):
         look(in_one(tmp_path))
     (tmp_path / HOLDER).unlink()
     for told in ('{"pid": "all", "file": 1}', f'{{"pid": {10**30}, "file": "x"}}', "[]", ""):

@@ -1,1 +1,1 @@
-"""ROS 2's wire without ROS, by cyclonedds."""
+"""ROS 2's wire without ROS, with cyclonedds."""

@@ -1,7 +1,7 @@
 """Makes our endpoints a named node on the ROS graph, by the topic `ros_discovery_info`.
 
 DDS has participants, readers and writers, but no nodes. On this topic each ROS participant publishes
-which node owns which of its readers and writers, retained for late joiners. Without that
+the owning node of each of its readers and writers, retained for late joiners. Without this topic
 `ros2 node list` shows our endpoints under `_CREATED_BY_BARE_DDS_APP_`.
 Source: ros2/rmw_dds_common, msg/*.msg, as rmw_cyclonedds and rmw_fastrtps publish them.
 """
@@ -24,7 +24,7 @@ from bridges.transports.peers import MOST
 MOST_PARTICIPANTS: Final = 200
 PACKAGE: Final = "rmw_dds_common.msg.dds_."
 TYPE_HASH: Final = "RIHS01_91a0593bacdcc50ea9bdcf849a938b128412cc1ea821245c663bcd26f83c295e"
-"""What Iron, Jazzy and later announce for ParticipantEntitiesInfo."""
+"""The type hash of ParticipantEntitiesInfo in ROS 2 Iron, Jazzy and later."""
 
 
 @annotations.final
@@ -50,7 +50,7 @@ class ParticipantEntitiesInfo(IdlStruct, typename=PACKAGE + "ParticipantEntities
 
 
 class NodeOnGraph:
-    """The one node of a participant; published again whenever its endpoints change."""
+    """The node of a participant, published again whenever its endpoints change."""
 
     def __init__(self, participant: DomainParticipant, node_name: str) -> None:
         self._node = NodeEntitiesInfo("/", node_name, [], [])
@@ -78,12 +78,12 @@ class NodeOnGraph:
         self.writer.write(self._info)
 
     def listen(self) -> DataReader:
-        """Begin to hear which node owns which writers: each participant retains its last word."""
+        """Begin to hear the owners of writers; each participant retains its last message."""
         self.reader = DataReader(self._participant, self.topic, qos=_qos(MOST_PARTICIPANTS))
         return self.reader
 
     def owners(self, writers: Iterable[bytes]) -> list[str]:
-        """The names of the nodes that own these writers (guids), as far as they were heard."""
+        """Return the nodes that own these writers (guids), as far as heard."""
         assert self.reader is not None
         for info in self.reader.take(MOST_PARTICIPANTS):
             for node in info.node_entities_info_seq:

@@ -1,6 +1,6 @@
 """The ends of the `dds` transport: its publishers and subscriptions.
 
-An end outlives its writer or reader: when the transport joins again, the end gets a new one.
+An end outlives its writer or reader: it gets a new one when the transport joins again.
 """
 
 import threading
@@ -34,7 +34,7 @@ POLICIES: Final = {2: "durability", 11: "reliability", 23: "data representation"
 
 
 class DdsPublisher:
-    """The publisher of one topic. `withdraw(publisher, writer)`: takes it off the graph."""
+    """The publisher of one topic. `withdraw(publisher, writer)` takes it off the graph."""
 
     def __init__(
         self,
@@ -55,23 +55,23 @@ class DdsPublisher:
     def create(
         self, participant: DomainParticipant, topic: DdsTopic, release: Release
     ) -> DataWriter:
-        """Make its writer; it replaces an earlier one."""
+        """Make and return the publisher's writer, in place of an earlier one."""
         qos = _writer_qos(self.topic.publish, type_hash(self.topic.type, release))
         self._sample = sample_type(self.topic.type, release)
         self._writer = DataWriter(participant, topic, qos=qos)
         return self._writer
 
     def drop(self) -> None:
-        """The writer has gone with its participant."""
+        """Note that the writer is gone, with its participant."""
         self._writer = None
 
     def send_retained(self) -> None:
-        """Send again what the earlier writer retained for late joiners."""
+        """Send again the messages that the earlier writer retained for late joiners."""
         for message in list(self._retained):
             self._write(message)
 
     def publish(self, message: Message) -> None:
-        """Send; blocks for 20 ms at most. Raises TransportError if it was not sent."""
+        """Send; block for at most 20 ms. Raises TransportError if the message was not sent."""
         if not self._reader_thread.is_alive():
             raise TransportError(f"topic {self.topic.name}: closed, or the reader has died")
         self._retained.append(message)  # goes out when the node joins again
@@ -84,7 +84,7 @@ class DdsPublisher:
             raise TransportError(f"topic {self.topic.name}: not sent: {error}") from error
 
     def matched(self) -> int:
-        """How many subscriptions are reached; 0 after close."""
+        """Return the number of matched subscriptions; 0 after close."""
         try:
             return len(self._writer.get_matched_subscriptions()) if self._writer else 0
         except DDSException:
@@ -132,25 +132,25 @@ class DdsSubscription:
     def create(
         self, participant: DomainParticipant, topic: DdsTopic, release: Release
     ) -> DataReader:
-        """Make its reader; it replaces an earlier one."""
+        """Make and return the subscription's reader, in place of an earlier one."""
         hashed = type_hash(self.topic.type, release)
         qos = _reader_qos(self.topic.subscribe, hashed, others_only=self._others_only)
         self._reader = DataReader(participant, topic, qos=qos)
         return self._reader
 
     def drop(self) -> None:
-        """The reader has gone with its participant."""
+        """Note that the reader is gone, with its participant."""
         self._reader = None
 
     def matched(self) -> int:
-        """How many publishers are heard; 0 after close."""
+        """Return the number of matched publishers; 0 after close."""
         try:
             return len(self._reader.get_matched_publications()) if self._reader else 0
         except DDSException:
             return 0
 
     def senders(self) -> list[str]:
-        """The nodes of these publishers; none at first, until other nodes' announcements have come."""
+        """Return the nodes of these publishers; none until other nodes' announcements have arrived."""
         reader = self._reader
         try:
             handles = reader.get_matched_publications() if reader else []
@@ -160,7 +160,7 @@ class DdsSubscription:
         return self._owners([writer.key.bytes for writer in found if writer])
 
     def take(self) -> bool:
-        """Deliver what has arrived; False if nothing had."""
+        """Deliver the arrived samples; return False if there were none."""
         if self._reader is None:
             return False
         for taken in range(AT_ONCE):
@@ -185,7 +185,7 @@ class DdsSubscription:
 
 
 class _Misfits(Protocol):
-    """Cyclone's status of an end that has met peers whose QoS does not fit."""
+    """Cyclone's status of an end with peers whose QoS does not fit."""
 
     last_policy_id: int
 
@@ -201,7 +201,7 @@ def _log_misfit(topic: AnyTopic, text: str, status: _Misfits, peers: Peers) -> N
 def _writer_qos(qos: topics.Qos, hashed: str) -> Qos:
     if qos.durability == "volatile":
         return Qos(Policy.Durability.Volatile, *_policies(qos, hashed))
-    # What a late joiner gets is the durability service's history, which is 1 deep by default.
+    # A late joiner gets the durability service's history, which is 1 deep by default.
     retained = Policy.DurabilityService(0, Policy.History.KeepLast(qos.depth), -1, -1, -1)
     return Qos(Policy.Durability.TransientLocal, retained, *_policies(qos, hashed))
 

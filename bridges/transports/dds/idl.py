@@ -1,8 +1,8 @@
 """The types of `definitions.py` for cyclonedds: a class for each, with its name and fields.
 
 cyclonedds announces these names and types to other nodes, and its C library refuses samples that do
-not fit them. It also calls these classes to encode and decode samples. They use `cdr.py` for that, so
-no message is converted to another Python object: that is five times faster.
+not fit them. It also calls these classes to encode and decode samples. The classes use `cdr.py`,
+because it is five times faster than converting each message to another Python object.
 """
 
 import types
@@ -19,7 +19,7 @@ from bridges.messages.rihs01 import type_hash
 
 
 class IdlSample(Protocol):
-    """One message in cyclonedds; an instance of a class that is made here."""
+    """One message in cyclonedds; an instance of a class made by `sample_type`."""
 
     message: Message
 
@@ -27,13 +27,13 @@ class IdlSample(Protocol):
 
 
 _made: dict[str, type[IdlSample]] = {}
-"""By the type's hash: releases with the same message share its class."""
+"""Type hash -> class: releases with the same message share its class."""
 
 
 def sample_type(message_type: type, release: Release = NEWEST) -> type[IdlSample]:
-    """The one class for a message type in cyclonedds, with its name in DDS as ROS has it.
+    """Return the one class for a message type in cyclonedds, named as in ROS's DDS.
 
-    cyclonedds sets `sample_info` on the instances that it has read.
+    cyclonedds sets `sample_info` on the instances that it reads.
     """
     key = type_hash(message_type, release)
     if key not in _made:
@@ -51,12 +51,12 @@ def _make(message_type: type, release: Release) -> type[IdlSample]:
     # In cyclonedds a dot stands for the `::` of IDL.
     typename = f"{PACKAGES[message_type]}.msg.dds_.{message_type.__name__}_"
     made = types.new_class(typename, (IdlStruct,), {"typename": typename}, body)
-    final: type[IdlSample] = annotations.final(made)  # as ROS's types: no other kind matches them
+    final: type[IdlSample] = annotations.final(made)  # ROS's types are final, and match only such
     return final
 
 
 def _calls(message_type: type, release: Release) -> dict[str, object]:
-    """The methods that cyclonedds calls. `options` name the encoding; each sample states it too."""
+    """Return the methods for cyclonedds. `options`: the encoding, which each sample states too."""
 
     def __init__(self: IdlSample, message: Message) -> None:
         self.message = message
@@ -68,7 +68,7 @@ def _calls(message_type: type, release: Release) -> dict[str, object]:
         return cls(cdr.decode(message_type, sample, release))
 
     def deserialize_key(cls: type[IdlSample], sample: bytes, /, **options: object) -> None:
-        """Called when a writer has gone, never for a message. RMF's types have no keys."""
+        """Called when a writer is gone, never for a message. RMF's types have no keys."""
 
     return {
         "__init__": __init__,

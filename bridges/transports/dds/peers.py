@@ -1,4 +1,4 @@
-"""What the ends on a DDS graph announce: topic, type, and in their user data the type hash."""
+"""Announcements of the ends on a DDS graph: topic, type, and the type hash in their user data."""
 
 import re
 import threading
@@ -15,7 +15,7 @@ from bridges.transports.peers import Announced, Peers
 AT_ONCE: Final = 100
 HASH: Final = re.compile(r"typehash=(RIHS01_[0-9a-f]{64});")
 TYPE: Final = re.compile(r"(\w+)::msg::dds_::(\w+)_")
-"""A message's name, as ROS writes it in DDS."""
+"""A message's name in ROS's DDS."""
 
 _reading = threading.Lock()
 
@@ -25,7 +25,7 @@ class _State(Protocol):
 
 
 class _End(Protocol):
-    """What DDS announces of an end (cyclonedds.builtin.DcpsEndpoint)."""
+    """DDS's announcement of an end (cyclonedds.builtin.DcpsEndpoint)."""
 
     key: Hashable
     topic_name: str
@@ -35,28 +35,28 @@ class _End(Protocol):
 
 
 class BuiltinReader(builtin.BuiltinDataReader):  # type: ignore[misc] # noqa: TID251
-    """Reads what participants and their ends announce, one thread of the process at a time.
+    """Reads the announcements of participants and their ends, in one thread of the process at a time.
 
-    cyclonedds reads each announced QoS into the same variables (11.0.1, qos._CQos._gc_*): where two
-    threads read at once, an end gets another's user data. A process may have several nodes.
+    cyclonedds reads each announced QoS into the same variables (11.0.1, qos._CQos._gc_*): if two
+    threads read at once, an end gets another end's user data. A process may have several nodes.
     """
 
     def take(self, count: int) -> list[Any]:
-        """At most so many of what was announced since."""
+        """Take at most `count` new announcements."""
         with _reading:
             taken: list[Any] = super().take(count)
         return taken
 
 
 class DdsPeers:
-    """Reads DDS's own topics, on which each end is announced, and tells `peers`."""
+    """Reads DDS's own topics with the announcements of ends, and reports the ends to `peers`."""
 
     def __init__(self, peers: Peers) -> None:
         self._peers = peers
         self._readers: list[tuple[bool, BuiltinReader]] = []
 
     def join(self, participant: DomainParticipant) -> list[BuiltinReader]:
-        """Begin anew; the readers are the caller's to wait for and to delete."""
+        """Make and return new readers, for the caller to wait for and to delete."""
         topics = (builtin.BuiltinTopicDcpsSubscription, builtin.BuiltinTopicDcpsPublication)
         readers = [BuiltinReader(participant, topic) for topic in topics]
         self._readers = list(enumerate(readers))  # type: ignore[arg-type]
@@ -64,7 +64,7 @@ class DdsPeers:
         return readers
 
     def look(self) -> bool:
-        """Take what was announced since; False if nothing was."""
+        """Take the new announcements; return False if there are none."""
         news = False
         for publishes, reader in self._readers:
             while samples := reader.take(AT_ONCE):
@@ -86,7 +86,7 @@ class DdsPeers:
 
 
 def _hash(qos: Qos) -> str:
-    """The type hash in an end's user data; "" without one."""
+    """Return the type hash in an end's user data; "" without one."""
     if Policy.Userdata not in qos:
         return ""
     found = HASH.search(bytes(qos[Policy.Userdata].data).decode(errors="replace"))

@@ -1,11 +1,11 @@
-"""The `dds` transport: ROS 2's wire without ROS, by cyclonedds 11.0.1.
+"""The `dds` transport: ROS 2's wire without ROS, with cyclonedds 11.0.1.
 
-Names, types and QoS are those that rmw_cyclonedds and rmw_fastrtps use: topic `rt/<name>`, type
+Names, types and QoS are those of rmw_cyclonedds and rmw_fastrtps: topic `rt/<name>`, type
 `<package>::msg::dds_::<Type>_`, plain CDR, the type hash in the endpoint's user data.
 
-One thread reads for all subscriptions. It drops and counts an invalid sample, and logs the first one of
-each topic. (Cyclone's C library already refuses samples that do not fit their type, and says so on
-stderr.) If reading itself fails, the node joins again.
+One thread reads for all subscriptions. It drops and counts invalid samples, and logs the first one of
+each topic. (Cyclone's C library itself refuses samples that do not fit their type, and logs them on
+stderr.) If reading fails, the node joins again.
 
 Only this folder imports cyclonedds, and only `choose.py` imports this file.
 """
@@ -48,8 +48,8 @@ CANNOT_JOIN: Final = (
 LOOK_EVERY_NS: Final = int(LOOK_EVERY_S * 1e9)
 ANY_SAMPLE: Final = core.SampleState.Any | core.ViewState.Any | core.InstanceState.Any
 ERRORS: Final = 1 | 2
-"""What Cyclone may log: errors, also fatal ones. It would warn of each malformed datagram, and anybody
-can send those. Neither its Python binding nor its configuration can turn these warnings off."""
+"""Lets Cyclone log only errors, also fatal ones. It would log a warning for each malformed datagram,
+which anybody can send. Neither its Python binding nor its configuration can turn warnings off."""
 
 _domains: WeakValueDictionary[tuple[int, str], Domain] = WeakValueDictionary()
 _domains_lock = threading.Lock()
@@ -59,9 +59,9 @@ class DdsTransport(Threaded):
     """One node: a participant, its reader thread, its publishers and subscriptions.
 
     `loopback`: stay on this machine, whatever CYCLONEDDS_URI says. When the wall clock is set back or,
-    off loopback, the machine's addresses change, the node leaves the graph and joins again with the
-    same ends, and publishers send again what they retain. `release`: None to follow RMF's. Raises
-    TransportError when the domain cannot be joined.
+    without `loopback`, the machine's addresses change, the node leaves the graph and joins again with
+    the same ends, and publishers repeat their retained messages. `release`: None to follow RMF's.
+    Raises TransportError if the domain cannot be joined.
     """
 
     speaks = "dds"
@@ -113,7 +113,7 @@ class DdsTransport(Threaded):
         return subscription
 
     def close(self) -> None:
-        """Leave the graph at once. Deletes each entity, without waiting for the garbage collector."""
+        """Leave the graph at once: delete each entity without waiting for the garbage collector."""
         with self._lock:
             if self._closed:
                 return
@@ -143,7 +143,7 @@ class DdsTransport(Threaded):
         self._joined = True
 
     def _follow_network(self) -> None:
-        """Join again if the machine's addresses have changed since the last time."""
+        """Join again if the machine's addresses have changed, or the last attempt failed."""
         if (self._loopback and self._joined) or not self._look_is_due():
             return
         if self._network_changed() or not self._joined:
@@ -215,7 +215,7 @@ class DdsTransport(Threaded):
                 end.log_misfits(self._peers)
 
     def _follow_release(self) -> None:
-        """Join again if RMF is of another release in which a message of ours differs."""
+        """Take over RMF's release; join again if a message of ours differs in it."""
         before = self.release
         if self._peers.settle() and any(self._peers.differs(e.topic, before) for e in self._ends):
             self._join_anew()
@@ -223,7 +223,7 @@ class DdsTransport(Threaded):
             self._peers.name_misfits()
 
     def _recover(self, error: Exception) -> None:
-        """After an unexpected exception: log it once, and join again after a pause."""
+        """Recover from an unexpected exception: log it once, and join again after a pause."""
         if self._closed:
             return
         if not self._failed:
@@ -241,7 +241,7 @@ class DdsTransport(Threaded):
             return self._node.owners(writers)
 
     def _withdraw(self, publisher: DdsPublisher, writer: DataWriter) -> None:
-        """Take one writer off the graph; after close that has happened already."""
+        """Take one writer off the graph; do nothing after close, which has removed it."""
         with self._lock:
             if self._closed or publisher not in self._ends:
                 return
@@ -264,7 +264,8 @@ class DdsTransport(Threaded):
 
 
 def _shared_domain(domain_id: int, configuration: str) -> Domain:
-    """This process's domain with this configuration. Cyclone allows only one: participants share it."""
+    """Return this process's domain with this configuration. Participants share it, as Cyclone allows
+    only one."""
     key = domain_id, configuration
     with _domains_lock:
         domain = _domains.get(key)

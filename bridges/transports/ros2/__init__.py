@@ -1,1 +1,1 @@
-"""A ROS 2 node, by rclpy."""
+"""A ROS 2 node, with rclpy."""

@@ -1,6 +1,6 @@
 """The ends of the `ros2` transport: its publishers and subscriptions.
 
-An end outlives rclpy's publisher or subscription: when the transport joins again, it gets a new one.
+An end outlives rclpy's publisher or subscription, and gets a new one when the transport joins again.
 rclpy's callbacks run in the transport's thread; they only deliver the message.
 """
 
@@ -31,14 +31,14 @@ from bridges.transports.ros2.types import ros_type
 from bridges.transports.transport import Receive, TransportError
 
 UNHEARD: Final = 256
-"""The most own messages that may be on their way back to us: over twice any topic's depth."""
+"""The limit of own messages not yet heard back: over twice any topic's depth."""
 YIELD_S: Final = 50e-6
-"""rclpy's executor holds Python's lock for a while after a callback. This pause (s) lets the thread
-that the message has woken run first."""
+"""A pause (s) after a callback. It lets the thread woken by the message run first, as rclpy's executor
+holds Python's lock for a while afterwards."""
 
 
 class Ends:
-    """The ends of one node, and which of them must not hear which."""
+    """The ends of one node, and the pairs that must not hear each other."""
 
     def __init__(self, release: Release) -> None:
         self.release = release
@@ -50,19 +50,19 @@ class Ends:
         yield from self.subscriptions
 
     def heard_back(self, topic: AnyTopic) -> "list[Ros2Subscription]":
-        """The subscriptions that must not hear what this node publishes on the topic."""
+        """Return the subscriptions that must not hear this node's messages on the topic."""
         return [end for end in self.subscriptions if end.others_only and end.would_hear(topic)]
 
     def unheard_publishers(self, subscription: "Ros2Subscription") -> int:
-        """How many of this node's own publishers a subscription must not hear."""
+        """Return the number of this node's own publishers that a subscription must not hear."""
         if not subscription.others_only:
             return 0
         return sum(subscription.would_hear(end.topic) for end in self.publishers)
 
 
 class Ros2Publisher:
-    """The publisher of one topic. `lives`: does the transport? `withdraw(publisher)`: takes it off the
-    graph."""
+    """The publisher of one topic. `lives()`: does the transport live? `withdraw(publisher)` takes it
+    off the graph."""
 
     def __init__(
         self,
@@ -81,7 +81,7 @@ class Ros2Publisher:
         self._retained: deque[Message] = deque(maxlen=depth)
 
     def create(self, node: Node) -> None:
-        """Make rclpy's publisher, and send again what an earlier one retained for late joiners."""
+        """Make rclpy's publisher, and repeat the messages retained for late joiners."""
         made = node.create_publisher(
             ros_type(self.topic.type, self._ends.release),
             self.topic.name,
@@ -96,7 +96,7 @@ class Ros2Publisher:
             self._write(message)
 
     def drop(self) -> None:
-        """Let go of rclpy's publisher: nobody uses it from then on."""
+        """Drop rclpy's publisher, which is not used any more."""
         with self._using:
             self._end = None
 
@@ -108,14 +108,14 @@ class Ros2Publisher:
             self._end = None
 
     def publish(self, message: Message) -> None:
-        """Send. Raises TransportError if it was not sent, CdrError if no sample can hold it."""
+        """Send. Raises TransportError if the message was not sent, CdrError if it cannot be encoded."""
         if not self._lives():
             raise TransportError(f"topic {self.topic.name}: closed, or the reader has died")
         self._retained.append(message)
         self._write(message)
 
     def matched(self) -> int:
-        """How many subscriptions are reached, without own ones that it must skip; 0 after close."""
+        """Return the number of subscriptions reached, without own `others_only` ones; 0 after close."""
         with self._using:
             try:
                 count = int(self._end.get_subscription_count()) if self._end else 0
@@ -143,8 +143,8 @@ class Ros2Publisher:
 class Ros2Subscription:
     """The subscription of one topic. `dropped`: counts invalid samples, by topic name.
 
-    `said`: with `others_only`, what this node has published here and not heard back yet. rclpy (Jazzy)
-    has no such option, and does not say who sent a sample.
+    `said`: with `others_only`, this node's own messages, published here and not yet heard back, to be
+    skipped. rclpy (Jazzy) has no such option, and does not tell a sample's sender.
     """
 
     def __init__(
@@ -183,19 +183,19 @@ class Ros2Subscription:
             self._end, self._node = made, node
 
     def drop(self) -> None:
-        """Let go of rclpy's subscription: nobody uses it from then on."""
+        """Drop rclpy's subscription, which is not used any more."""
         with self._using:
             self._end = self._node = None
 
     def would_hear(self, published: AnyTopic) -> bool:
-        """Whether DDS would match this end with a publisher of that topic."""
+        """Would DDS match this end with a publisher of that topic?"""
         durabilities = (self.topic.subscribe.durability, published.publish.durability)
         return (published.name, published.type) == (self.topic.name, self.topic.type) and (
             durabilities != ("transient_local", "volatile")
         )
 
     def matched(self) -> int:
-        """How many publishers are heard; 0 after close."""
+        """Return the number of publishers heard; 0 after close."""
         with self._using:
             try:
                 count = int(self._end.get_publisher_count()) if self._end else 0
@@ -204,7 +204,7 @@ class Ros2Subscription:
         return max(0, count - self._ends.unheard_publishers(self))
 
     def senders(self) -> list[str]:
-        """The nodes of these publishers."""
+        """Return the nodes of these publishers."""
         with self._using:
             node = self._node
             try:

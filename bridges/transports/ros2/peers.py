@@ -1,4 +1,4 @@
-"""What rclpy knows of the other ends on our topics: their types and type hashes."""
+"""Types and type hashes of the other ends on our topics, from rclpy."""
 
 from collections.abc import Iterable, Sequence
 from typing import Protocol
@@ -8,7 +8,7 @@ from bridges.transports.peers import Announced, Peers
 
 
 class EndpointInfo(Protocol):
-    """rclpy's TopicEndpointInfo, as far as it is read here."""
+    """The parts of rclpy's TopicEndpointInfo that are read here."""
 
     @property
     def topic_type(self) -> str: ...
@@ -22,14 +22,14 @@ class Graph(Protocol):
     """The graph queries of an rclpy node."""
 
     def get_publishers_info_by_topic(self, topic_name: str) -> Sequence[EndpointInfo]:
-        """Every publisher of a topic."""
+        """Return every publisher of a topic."""
 
     def get_subscriptions_info_by_topic(self, topic_name: str) -> Sequence[EndpointInfo]:
-        """Every subscription of a topic."""
+        """Return every subscription of a topic."""
 
 
 def look(graph: Graph, peers: Peers, ours: Iterable[tuple[AnyTopic, bool]]) -> None:
-    """Tell `peers` what is there now; `ours`: each topic, and whether we publish it."""
+    """Report the present ends to `peers`. `ours`: (topic, True if we publish it)."""
     peers.clear()
     for topic, publishes in ours:
         peers.ours(topic, publishes=publishes)

@@ -2,7 +2,7 @@
 
 Without the paths that it sets, rclpy cannot be imported, and `transport: auto` would choose another
 transport under systemd than in a shell. The daemon's process becomes a shell, which sources the file
-and becomes the daemon. So the process id, by which systemd knows the daemon, stays the same.
+and becomes the daemon. So the process id, known to systemd, stays the same.
 """
 
 import logging
@@ -16,12 +16,12 @@ from bridges.transports.transport import TransportError
 log = logging.getLogger(__name__)
 
 SOURCED = "RMF_BRIDGE_ROS_SETUP"
-"""The variable that names the setup file which this process has sourced."""
+"""The variable with the path of the sourced setup file."""
 SHELL = 'setup=$1; shift; ours=("$@"); set --; . "$setup"; exec "${ours[@]}"'
 
 
 def sourcing(rmf: Rmf, environ: Mapping[str, str], argv: Sequence[str]) -> list[str]:
-    """The command that this process must become; empty if nothing is to be sourced.
+    """Return the command that this process must become; empty if no file must be sourced.
 
     `argv`: `sys.orig_argv`. Raises TransportError if `transport: ros2` needs a missing file.
     """
@@ -40,5 +40,5 @@ def sourcing(rmf: Rmf, environ: Mapping[str, str], argv: Sequence[str]) -> list[
 
 
 def sourced(rmf: Rmf, environ: Mapping[str, str]) -> dict[str, str]:
-    """The environment of that command: it says that the file has been sourced."""
+    """Return that command's environment, which marks the file as sourced."""
     return {**environ, SOURCED: rmf.ros_setup or ""}

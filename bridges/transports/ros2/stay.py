@@ -1,7 +1,7 @@
 """One stay of a node on ROS 2's graph: rclpy's context, node and executor, from joining to leaving.
 
-An RMW looks at the machine's network once, when a context's node joins: after a change of address the
-transport leaves and joins again with a new stay.
+An RMW reads the machine's network only when a context's node joins. So after a change of address the
+transport leaves, and joins again with a new stay.
 """
 
 import os
@@ -22,18 +22,18 @@ ON_LOOPBACK: Final = {
     "ROS_STATIC_PEERS": None,
     "CYCLONEDDS_URI": LOOPBACK,
 }
-"""The variables that an RMW reads when it joins. With these it only finds this machine's nodes, and
-Cyclone stays on the loopback interface."""
+"""The variables that an RMW reads when it joins. With these values it finds only this machine's nodes,
+and Cyclone stays on the loopback interface."""
 FAST_DDS_SPEAKS: Final = "FASTDDS_BUILTIN_TRANSPORTS"
-"""The variable of Fast DDS. UDPv4 leaves its shared memory out: that carries nothing between nodes of
-two users or two containers, although they find each other. `LOCALHOST` brings it back (rmw_fastrtps,
+"""Fast DDS's variable for its transports. UDPv4 excludes shared memory, over which nodes of two users
+or containers find but do not hear each other. `LOCALHOST` brings shared memory back (rmw_fastrtps,
 participant.cpp), and a profile with transports of its own prevails."""
 REFUSALS: Final = (RuntimeError, NameValidationException)
-"""How rclpy refuses: RCLError and InvalidHandle are RuntimeErrors."""
+"""rclpy's exceptions for a refusal: RCLError and InvalidHandle are RuntimeErrors."""
 
 
 class Stay:
-    """A node that has joined. Raises one of REFUSALS if it cannot, and then leaves nothing behind."""
+    """A node on the graph. If it cannot join, it cleans up and raises one of REFUSALS."""
 
     def __init__(
         self, name: str, domain_id: int, *, loopback: bool, ros_args: Sequence[str]
@@ -48,25 +48,25 @@ class Stay:
 
     @property
     def lasts(self) -> bool:
-        """Whether nobody has shut rclpy's context down."""
+        """Is rclpy's context still valid? False after its shutdown, by anybody."""
         return bool(self._context.ok())
 
     def spin(self, timeout_s: float | None) -> None:
-        """Run one callback, or return when `leave_soon` is called or the time is over."""
+        """Run one callback; return without one after `leave_soon` or `timeout_s` (s)."""
         self._executor.spin_once(timeout_sec=timeout_s)
 
     def leave_soon(self) -> None:
-        """End the `spin` that waits; from any thread."""
+        """End a waiting `spin`; from any thread."""
         self._leaving.trigger()
 
     def leave(self) -> None:
-        """Leave the graph at once. Nobody may use the node any more."""
+        """Leave the graph at once. The node must not be used afterwards."""
         self._executor.shutdown()
         self.node.destroy_node()
         self._context.try_shutdown()
 
     def _join(self, name: str, domain_id: int, ros_args: Sequence[str]) -> None:
-        # Without rclpy's logging: it would open a file below $HOME, and a service has none.
+        # Without rclpy's logging, which opens a file below $HOME: a service has no home.
         self._context.init(args=list(ros_args), initialize_logging=False, domain_id=domain_id)
         self.node = Node(
             name,
@@ -86,7 +86,7 @@ def _on_the_network() -> dict[str, str | None]:
 
 @contextmanager
 def _environment(wanted: Mapping[str, str | None]) -> Iterator[None]:
-    """Set these variables for the length of the block; None removes one."""
+    """Set these variables during the block; None removes a variable."""
     before = {name: os.environ.get(name) for name in wanted}
     _set(wanted)
     try:

@@ -1,12 +1,12 @@
-"""The `ros2` transport: an ordinary ROS 2 node, by rclpy, on whichever RMW is installed.
+"""The `ros2` transport: an ordinary ROS 2 node, with rclpy, on any installed RMW.
 
-Samples pass through rclpy as bytes, and `cdr.py` encodes and decodes them, as on `dds`. An invalid
-sample is dropped and counted, as there. rclpy's executor runs in a thread of this transport. When the
-machine's addresses change or its wall clock is set back, that thread leaves the graph and joins again,
-with the same ends. (Of the RMWs only Cyclone needs it for the clock; the others lose a moment.)
+Samples pass through rclpy as bytes; `cdr.py` encodes and decodes them. Invalid samples are dropped and
+counted. Both as on `dds`. rclpy's executor runs in a thread of this transport. When the machine's
+addresses change or its wall clock is set back, this thread leaves the graph and joins again, with the
+same ends. (After a step of the clock only Cyclone needs this; it briefly interrupts other RMWs.)
 
-Source: rclpy 7.1 (ROS 2 Jazzy), its public API. Only this file, `stay.py` and `ends.py` import
-rclpy, only `types.py` the message packages, and only `choose.py` imports this one.
+Source: rclpy 7.1 (ROS 2 Jazzy), its public API. Only this file, `stay.py` and `ends.py` import rclpy,
+only `types.py` imports the message packages, and only `choose.py` imports this file.
 """
 
 import atexit
@@ -29,7 +29,7 @@ from bridges.transports.transport import M, TransportError, any_type
 log = logging.getLogger(__name__)
 
 AGAIN_S: Final = 1.0
-"""How long (s) to wait after an exception of rclpy before its executor runs again."""
+"""The pause (s) after an exception of rclpy before its executor runs again."""
 
 
 class Ros2Transport(Threaded):
@@ -37,9 +37,9 @@ class Ros2Transport(Threaded):
 
     `ros_args`: the arguments after `--ros-args` on the command line: name, namespace, remappings and
     parameters (`use_sim_time`). `loopback`: stay on this machine, whatever the environment says.
-    When the wall clock is set back or, off loopback, the machine's addresses change, the node leaves
-    the graph and joins again, and publishers send again what they retain. Raises TransportError when
-    the graph cannot be joined.
+    When the wall clock is set back or, without `loopback`, the machine's addresses change, the node
+    leaves the graph and joins again, and publishers repeat their retained messages. Raises
+    TransportError if the graph cannot be joined.
     """
 
     speaks = "ros2"
@@ -65,12 +65,12 @@ class Ros2Transport(Threaded):
         self.name = self.node.get_name()
         self._start(self._spin, "ros2")
         self._watch_clock()
-        # An executor's thread that outlives the interpreter aborts it, as where a start is refused.
+        # An executor's thread that still runs at the interpreter's exit, as after a failed start, aborts it.
         atexit.register(self.close)
 
     @property
     def node(self) -> Node:
-        """rclpy's node; another one after the node has joined again. Raises TransportError without a
+        """rclpy's node; a new one each time the transport joins again. Raises TransportError without a
         network."""
         if self._stay is None:
             raise TransportError(f"{self.name} has no network")
@@ -100,7 +100,7 @@ class Ros2Transport(Threaded):
         return subscription
 
     def faults(self) -> list[tuple[str, str]]:
-        """What keeps it and other nodes from hearing each other; from any thread."""
+        """Return (code, detail) of each fault that keeps nodes from hearing each other; any thread."""
         with self._lock:
             if not self.lives or self._stay is None:
                 return []
@@ -110,7 +110,7 @@ class Ros2Transport(Threaded):
             return self._peers.faults()
 
     def wall(self) -> float:
-        """ROS's time (s since the epoch): the wall clock, or `/clock` where use_sim_time is set."""
+        """Return ROS's time (s since the epoch): the wall clock, or `/clock` with use_sim_time."""
         return float(self._clock.now().nanoseconds * 1e-9)
 
     def close(self) -> None:
@@ -130,7 +130,7 @@ class Ros2Transport(Threaded):
             self._stay.leave_soon()
 
     def _join(self) -> None:
-        """Raises one of REFUSALS."""
+        """Join with a new stay. Raises one of REFUSALS."""
         self._addresses = addresses.addresses()
         self._stay = Stay(
             self._asked_name, self.domain_id, loopback=self._loopback, ros_args=self._ros_args
@@ -160,8 +160,8 @@ class Ros2Transport(Threaded):
                     log.warning(pairs("not_joined", node=self.name, reason=error))
 
     def _spin(self) -> None:
-        """Run the executor. An exception of rclpy ends the thread only if it keeps coming, or if the
-        context has been shut down."""
+        """Run the executor. Exceptions of rclpy end the thread only if repeated, or after the context
+        was shut down."""
         failures = 0
         while not self._closed and self._lasts() and failures < notices.FAILURES:
             try:
@@ -191,7 +191,7 @@ class Ros2Transport(Threaded):
             self._join_anew()
 
     def _withdraw(self, publisher: Ros2Publisher) -> None:
-        """Take one publisher off the graph; after close that has happened already."""
+        """Take one publisher off the graph; do nothing after close, which has removed it."""
         with self._lock:
             if self._closed or publisher not in self._ends.publishers:
                 return

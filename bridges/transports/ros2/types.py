@@ -1,7 +1,7 @@
 """The types of `definitions.py` for rclpy: the classes of the installed ROS packages.
 
-Samples pass through rclpy as bytes (`transport.py`), so these classes only name their types. Their
-fields are compared with `definitions.py`, because bytes of another definition would be misread.
+Samples pass through rclpy as bytes (`transport.py`); these classes only name their types. Their fields
+are compared with `definitions.py`, because bytes of another definition would be misread.
 """
 
 import importlib
@@ -13,7 +13,7 @@ from bridges.messages.releases import DEFAULT, DIFFERING, NEWEST, RELEASES, Rele
 from bridges.transports.transport import TransportError
 
 NAMES = {str: "string", bool: "boolean", "byte": "octet", "float32": "float", "float64": "double"}
-"""ROS's Python classes name these types as IDL does."""
+"""Our type -> its IDL name, as in ROS's Python classes."""
 
 
 class RosMessage(Protocol):
@@ -24,17 +24,17 @@ class RosMessage(Protocol):
 
 
 def installed() -> Release:
-    """The release of RMF's message packages that are installed; the default if they are of none."""
+    """Return the release of the installed RMF message packages; the default if none fits."""
     fitting = (one for one in RELEASES.values() if all(_fits(kind, one) for kind in DIFFERING))
     return next(fitting, DEFAULT)
 
 
 def _fits(message_type: type, release: Release) -> bool:
-    """Is it installed as this release has it, or not at all if the release lacks it?"""
+    """Does the installed message match this release's, or lack it if the release lacks it?"""
     try:
         module = importlib.import_module(f"{PACKAGES[message_type]}.msg")
     except ImportError:
-        return True  # told when it is wanted
+        return True  # reported when the message is used
     found: type[RosMessage] | None = getattr(module, message_type.__name__, None)
     if found is None or not release.has(message_type):
         return found is None and not release.has(message_type)
@@ -43,7 +43,8 @@ def _fits(message_type: type, release: Release) -> bool:
 
 
 def ros_type(message_type: type, release: Release = NEWEST) -> type[RosMessage]:
-    """The ROS class of a message type. Raises TransportError if it is missing or has other fields."""
+    """Return the ROS class of a message type. Raises TransportError if it is missing or has other
+    fields."""
     package, name = PACKAGES[message_type], message_type.__name__
     try:
         found: type[RosMessage] | None = getattr(
@@ -69,7 +70,7 @@ def ros_type(message_type: type, release: Release = NEWEST) -> type[RosMessage]:
 
 
 def how_to_install(package: str) -> str:
-    """What to do on Ubuntu with ROS 2's package sources."""
+    """Return the instruction to install a package on Ubuntu with ROS 2's package sources."""
     return (
         f"`sudo apt install ros-jazzy-{package.replace('_', '-')}`, and source ROS's setup file"
         " (`ros_setup:` in the YAML does that for a service)"
@@ -77,7 +78,7 @@ def how_to_install(package: str) -> str:
 
 
 def fields_of(message_type: type, release: Release = NEWEST) -> dict[str, str]:
-    """Field -> type, as `get_fields_and_field_types()` names it."""
+    """Return field -> type, with the names of `get_fields_and_field_types()`."""
     return {name: _name(kind) for name, kind in release.fields(message_type).items()}
 
 

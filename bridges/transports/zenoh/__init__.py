@@ -1,1 +1,1 @@
-"""ROS 2's wire without ROS, by zenoh."""
+"""ROS 2's wire without ROS, with zenoh."""

@@ -12,20 +12,20 @@ from bridges.kinds.shared.rmf_section import Zenoh, ZenohTls
 from bridges.transports.transport import TransportError
 
 Configuration = dict[str, object]
-"""A key of zenoh's configuration -> its value, as JSON holds it."""
+"""A key of zenoh's configuration -> its JSON value."""
 
 LOOPBACK_PORT: Final = 17400
-"""The port on which nodes of domain 0 on this machine meet; domain N uses the Nth port after it. It is
-not a router's (7447), and not one that Linux assigns by itself (from 32768)."""
+"""The port on which nodes of domain 0 on this machine meet; domain N uses the Nth port after it. It
+differs from routers' (7447) and from those that Linux assigns by itself (from 32768)."""
 RETRY: Final = {"period_init_ms": 100, "period_max_ms": 1000, "period_increase_factor": 2}
 
 COMMON: Final[Configuration] = {
     "scouting/multicast/enabled": False,
     "scouting/delay": 1,  # ms: scouting is off, so there is nothing to wait for
-    # zenoh's own clock panics before 1970, and then sends and hears nothing more. What is retained is
-    # ordered by its number, so nothing needs the time.
+    # zenoh's own clock panics before 1970, and zenoh then sends and hears nothing more. Retained
+    # messages are ordered by their numbers and need no time.
     "timestamping/enabled": False,
-    # A new message waits while retained ones are queried. A node that hangs must not delay a fire alarm
+    # New messages wait during the query for retained ones. A hung node must not delay a fire alarm
     # for longer than this (ms); rmw_zenoh would wait forever.
     "queries_default_timeout": 3000,
     "transport/shared_memory/enabled": False,
@@ -37,16 +37,16 @@ _LOCAL = re.compile(r"[a-z]+/(localhost|127\.[0-9.]+|\[::1\]):[0-9]+")
 
 
 def is_local(endpoint: str) -> bool:
-    """Whether an endpoint is on this machine's loopback."""
+    """Is an endpoint on this machine's loopback?"""
     return _LOCAL.fullmatch(endpoint) is not None
 
 
 def on_loopback(domain_id: int) -> list[Configuration]:
-    """Configurations for a node that only meets nodes of its domain on this machine, and no router.
+    """Return configurations, to be tried in order, for a node that meets only this machine's nodes of
+    its domain, and no router.
 
-    To be tried in this order. The first node listens on the domain's port, and introduces later nodes
-    to each other. Later nodes keep trying to connect to that port, so they also find a node that
-    takes it over.
+    The first node listens on the domain's port, and introduces later nodes to each other. Later nodes
+    keep trying to connect to that port, and so find a successor that takes it over.
     """
     meeting = f"tcp/127.0.0.1:{LOOPBACK_PORT + domain_id}"
     common = COMMON | {
@@ -61,8 +61,8 @@ def on_loopback(domain_id: int) -> list[Configuration]:
 
 
 def on_the_site(zenoh: Zenoh) -> Configuration:
-    """The configuration that the YAML asks for. Raises TransportError for a file that is missing, or a
-    secret that others can read."""
+    """Return the configuration for the YAML's settings. Raises TransportError for a missing file, or a
+    secret that other users can read."""
     wanted = COMMON | {"mode": mode(zenoh), "connect/endpoints": list(zenoh.connect)}
     if wanted["mode"] == "peer":
         wanted["listen/endpoints"] = list(zenoh.listen)
@@ -76,11 +76,11 @@ def on_the_site(zenoh: Zenoh) -> Configuration:
 
 
 def mode(zenoh: Zenoh) -> str:
-    """`peer` or `client`.
+    """Return the node's mode: `peer` or `client`.
 
     A router forwards no messages between peers, because peers connect directly. So a node that peers
-    cannot reach must be a client. With several routers it must be one too: a peer connects to all of
-    them, and would receive each message once from each.
+    cannot reach must be a client. A node with several routers must be a client too: a peer connects to
+    all routers, and would receive each message once from each.
     """
     if zenoh.mode != "auto":
         return zenoh.mode

@@ -2,11 +2,11 @@
 
 They are made as in rmw_zenoh (jazzy: rmw_publisher_data.cpp, rmw_subscription_data.cpp). A publisher
 that retains messages is an advanced publisher, with a cache as deep as its history. A subscription
-that wants retained messages is an advanced subscriber. It queries each cache when either of the two is
-new, and again for samples that it has missed.
+that wants retained messages is an advanced subscriber: it queries a publisher's cache when either end
+is new, and again for missed samples.
 
 An end outlives its session: when the transport joins again, the end gets a place in the new session.
-Callbacks on zenoh's threads only leave work for the transport's thread.
+Callbacks on zenoh's threads only queue work for the transport's thread.
 """
 
 import time
@@ -34,8 +34,8 @@ from bridges.transports.zenoh.place import Place, Tell
 from bridges.transports.zenoh.session import contained
 
 HEARTBEAT_S: Final = 0.5
-"""As in rmw_zenoh: this long after a retained message its number is sent again, so that subscribers
-notice a loss."""
+"""The delay (s) after a retained message until its number is sent again, for subscribers to notice a
+loss; as in rmw_zenoh."""
 AT_ONCE: Final = 100
 """The most samples taken from one subscription before the others have their turn."""
 
@@ -48,8 +48,8 @@ class Declared(Protocol):
 
 
 class ZenohEnd(ABC):
-    """What publishers and subscriptions share. `do(order)`: runs it on the transport's thread. `tell`:
-    as `Place`."""
+    """The base of publishers and subscriptions. `do(order)` runs an order on the transport's thread.
+    `tell`: see `Place`."""
 
     def __init__(
         self, topic: AnyTopic, notice: str, do: Callable[[Order], None], tell: Tell
@@ -65,7 +65,7 @@ class ZenohEnd(ABC):
 
     @abstractmethod
     def create(self, session: zenoh.Session, keys: Keys, number: int) -> None:
-        """Take a place in a session. `number`: unique within it."""
+        """Take a place in a session. `number`: unique within the session."""
 
     def _placed(self, session: zenoh.Session, keys: Keys, kind: Kind, number: int) -> Place:
         misfit, tell, do = self.log_misfit, self._tell, self._do
@@ -80,13 +80,13 @@ class ZenohEnd(ABC):
             end.undeclare()
 
     def give_up(self) -> object:
-        """Leave a session that is about to be closed. Returns what was declared in it."""
+        """Leave a session that is about to be closed; return the objects declared in it."""
         held = self.place, self._end
         self.place = self._end = None
         return held
 
     def log_misfit(self, policy: str) -> None:
-        """Log, once for each policy, that a peer does not fit."""
+        """Log a peer that does not fit, once for each policy."""
         if policy not in self._noticed:
             self._noticed.add(policy)
             self._do(partial(notices.misfit, self.topic, self._notice, policy))
@@ -95,8 +95,8 @@ class ZenohEnd(ABC):
 class ZenohPublisher(ZenohEnd):
     """The publisher of one topic.
 
-    `withdraw(publisher)`: takes it off the graph. `lives()`: the transport is open and its thread
-    runs. `deaf`: tokens of this node's own subscriptions that must not hear it.
+    `withdraw(publisher)` takes it off the graph. `lives()`: True while the transport is open and its
+    thread runs. `deaf`: tokens of this node's own subscriptions that must not hear this publisher.
     """
 
     _end: zenoh.Publisher | ext.AdvancedPublisher | None
@@ -119,7 +119,7 @@ class ZenohPublisher(ZenohEnd):
         self._retained: deque[bytes] = deque(maxlen=depth)
 
     def create(self, session: zenoh.Session, keys: Keys, number: int) -> None:
-        """Take a place in a session, and send what was retained again for late joiners."""
+        """Take a place in a session, and repeat the messages retained for late joiners."""
         place = self._placed(session, keys, "MP", number)
         self._release = keys.release
         self._end = end = self._declared(session, place.key)
@@ -129,7 +129,7 @@ class ZenohPublisher(ZenohEnd):
             self._put(end, place, sample)
 
     def publish(self, message: Message) -> None:
-        """Send. Raises TransportError if it was not sent, CdrError if no sample can hold it."""
+        """Send. Raises TransportError if the message was not sent, CdrError if it cannot be encoded."""
         if not self._lives():
             raise TransportError(f"topic {self.topic.name}: closed, or the reader has died")
         sample = cdr.encode(self.topic.type, message, self._release)
@@ -144,7 +144,7 @@ class ZenohPublisher(ZenohEnd):
             raise TransportError(f"topic {self.topic.name}: not sent: {error}") from error
 
     def matched(self) -> int:
-        """How many subscriptions are reached; 0 after close."""
+        """Return the number of subscriptions reached; 0 after close."""
         place = self.place
         return len(place.peers.keys() - self._deaf) if place else 0
 
@@ -155,7 +155,7 @@ class ZenohPublisher(ZenohEnd):
     def _declared(
         self, session: zenoh.Session, key: str
     ) -> zenoh.Publisher | ext.AdvancedPublisher:
-        # With DROP, zenoh waits for 1 ms at most for room in the queue to a peer.
+        # With DROP, zenoh waits at most 1 ms for room in the queue to a peer.
         congestion, reliable = CongestionControl.DROP, Reliability.RELIABLE
         if not self._retained.maxlen:
             return session.declare_publisher(
@@ -184,8 +184,8 @@ class ZenohPublisher(ZenohEnd):
 class ZenohSubscription(ZenohEnd):
     """The subscription of one topic.
 
-    `dropped`: counts invalid samples, by topic name. `others_only`: does not hear this node's own
-    publishers. `attached`: only samples with the attachment of a ROS node are valid.
+    `dropped`: counts invalid samples, by topic name. `others_only`: skip this node's own publishers.
+    `attached`: only samples with the attachment of a ROS node are valid.
     """
 
     def __init__(
@@ -231,18 +231,18 @@ class ZenohSubscription(ZenohEnd):
         place.appear()
 
     def matched(self) -> int:
-        """How many publishers are heard; 0 after close."""
+        """Return the number of publishers heard; 0 after close."""
         return len(self.senders())
 
     def senders(self) -> list[str]:
-        """The nodes of these publishers."""
+        """Return the nodes of these publishers."""
         place = self.place
         peers = list(place.peers.values()) if place else []
         ours = self._own_session if self.others_only else ""
         return [peer.node for peer in peers if peer.session != ours]
 
     def take(self) -> None:
-        """Deliver what has arrived, at most AT_ONCE samples; the rest waits for the next turn."""
+        """Deliver the arrived samples, at most AT_ONCE; the rest waits for the next turn."""
         for _ in range(min(AT_ONCE, len(self._waiting))):
             try:
                 message = self._message(self._waiting.popleft())
@@ -255,14 +255,14 @@ class ZenohSubscription(ZenohEnd):
             self._ring()
 
     def _arrived(self, sample: Sample) -> None:
-        """Called on zenoh's thread. A full queue drops its oldest sample, as KEEP_LAST does."""
+        """Queue a sample; called on zenoh's thread. A full queue drops its oldest sample: KEEP_LAST."""
         size = len(sample.payload)
         long = size > cdr.longest(self.topic.type)
         self._waiting.append(CdrError(f"{size} bytes long") if long else sample)
         self._ring()
 
     def _message(self, sample: Sample | CdrError) -> Message | None:
-        """The message in a sample; None if its publisher must not be heard. Raises CdrError."""
+        """Return a sample's message; None if its publisher must not be heard. Raises CdrError."""
         if isinstance(sample, CdrError):
             raise sample
         place = self.place

@@ -1,13 +1,13 @@
-"""How ROS's topics and nodes are named on zenoh: data keys, liveliness tokens, attachments. Pure.
+"""Names of ROS's topics and nodes on zenoh: data keys, liveliness tokens, attachments. Pure.
 
-There are two ways to name them, and nodes of one do not hear those of the other:
+There are two naming schemes; nodes with different schemes do not hear each other:
 - rmw_zenoh's, where each ROS context is a zenoh session. Source: ros2/rmw_zenoh, jazzy:
   its design.md; rmw_zenoh_cpp/src/detail/liveliness_utils.cpp and attachment_helpers.cpp.
 - zenoh-bridge-ros2dds's, which routes a DDS domain. Source: eclipse-zenoh/zenoh-plugin-ros2dds,
   liveliness_mgt.rs and ros2_utils.rs.
 
-A liveliness token is a key that exists as long as its session. Tokens tell other nodes that a node, a
-publisher or a subscription is there. An end is a publisher or a subscription.
+A liveliness token is a key that exists as long as its session. Tokens announce a node, a publisher or
+a subscription to other nodes. An end is a publisher or a subscription.
 """
 
 import re
@@ -29,16 +29,16 @@ NODE_ID: Final = 0
 _HEAD: Final = struct.Struct("<qqB")
 GID_LENGTH: Final = 16
 LONGEST: Final = 2000
-"""No token of a ROS node is longer (characters): ROS bounds each name in it to 255."""
+"""The greatest length of a ROS node's token (characters): ROS limits each name in it to 255."""
 HASH: Final = re.compile(r"typehash=(RIHS01_[0-9a-f]{64});")
 
 
 class Peer(Struct, frozen=True):
-    """What a token says of an end.
+    """An end, from its token.
 
-    `type`: the message type, with the hash where the token has one. `transient_local`: a publisher
-    retains its messages; a subscription wants retained ones. `announced`: its topic, type and hash.
-    `node`: its node, as `/namespace/name`.
+    `type`: the message type, with the hash if the token has one. `transient_local`: a publisher
+    retains its messages; a subscription wants retained ones. `announced`: the end's topic, type and
+    hash. `node`: the end's node, as `/namespace/name`.
     """
 
     session: str
@@ -49,31 +49,31 @@ class Peer(Struct, frozen=True):
 
 
 class Keys(Protocol):
-    """The names of one node's ends, in one of the two ways. `session`: the zenoh session's id."""
+    """The names of one node's ends, in one of the two schemes. `session`: the zenoh session's id."""
 
     session: str
     release: Release
 
     def presence(self) -> str:
-        """The token of the node itself."""
+        """Return the token of the node itself."""
 
     def data(self, topic: AnyTopic) -> str:
-        """The key under which a topic's samples travel."""
+        """Return the key of a topic's samples."""
 
     def type(self, topic: AnyTopic) -> str:
-        """The topic's type as `Peer.type` names it."""
+        """Return the topic's type, in the form of `Peer.type`."""
 
     def token(self, kind: Kind, topic: AnyTopic, number: int) -> str:
-        """The token of an end. `number`: unique within the session."""
+        """Return the token of an end. `number`: unique within the session."""
 
     def others(self, kind: Kind, topic: AnyTopic) -> str:
-        """A key expression that matches the tokens of all ends of this kind on a topic."""
+        """Return a key expression that matches the tokens of all ends of this kind on a topic."""
 
     def witnesses(self) -> list[str]:
-        """Key expressions that match the tokens which tell RMF's release (`peers.py`)."""
+        """Return key expressions for the tokens that show RMF's release (`peers.py`)."""
 
     def peer(self, token: str) -> Peer | None:
-        """What a token says of its end; None for the token of anything else."""
+        """Return a token's end; None if the token is not of an end."""
 
 
 class RmwZenoh:
@@ -100,7 +100,7 @@ class RmwZenoh:
         qos = _qos(topic, kind)
         ids = f"{self._domain}/{self.session}/{NODE_ID}/{number}/{kind}"
         retained = "1" if qos.durability == "transient_local" else ""
-        # Only what differs from rmw_zenoh's defaults is written: reliable, volatile, keep last 42.
+        # rmw_zenoh's defaults are left out: reliable, volatile, keep last 42.
         depth = "" if qos.depth == 42 else qos.depth
         return (
             f"@ros2_lv/{ids}/{self._node}/{_name(topic, '%')}/{self.type(topic)}"
@@ -183,18 +183,18 @@ WAYS: Final[dict[str, type[RmwZenoh] | type[Ros2Dds]]] = {
 
 
 def gid(token: str) -> bytes:
-    """The 16 bytes that identify an end in ROS: the XXH3-128 of its token, lower half first."""
+    """Return an end's identity in ROS, 16 bytes: the XXH3-128 of its token, lower half first."""
     return xxhash.xxh3_128_digest(token.encode())[::-1]
 
 
 def attachment(number: int, wall_ns: int, sender: bytes) -> bytes:
-    """The attachment of a sample. `number`: counts an end's samples from 1. `wall_ns`: when it was sent
-    (ns since the epoch). `sender`: the gid of the sending end."""
+    """Return a sample's attachment. `number`: counts an end's samples from 1. `wall_ns`: the time of
+    sending (ns since the epoch). `sender`: the gid of the sending end."""
     return _HEAD.pack(number, wall_ns, GID_LENGTH) + sender
 
 
 def sender(attached: bytes) -> bytes | None:
-    """The gid of the sending end; None if this is not the attachment of a ROS node."""
+    """Return the gid of the sending end; None if this is not a ROS node's attachment."""
     if len(attached) != _HEAD.size + GID_LENGTH or attached[_HEAD.size - 1] != GID_LENGTH:
         return None
     return attached[_HEAD.size :]

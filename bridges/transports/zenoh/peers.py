@@ -1,7 +1,7 @@
-"""What the ends on a zenoh graph announce, by their tokens.
+"""Announcements of the ends on a zenoh graph, by their tokens.
 
-Each end of ours watches the tokens on its own topic (`place.py`). Those that show RMF's release
-are watched here, whatever our topics are.
+Each of our ends watches the tokens on its own topic (`place.py`). The tokens that show RMF's release
+are watched here, for any topics of ours.
 """
 
 import logging
@@ -20,21 +20,21 @@ from bridges.transports.zenoh.keys import Keys, Peer
 log = logging.getLogger(__name__)
 
 MOST: Final = 1000
-"""More ends than any site has on one topic."""
+"""The limit of tokens: more ends than any site has on one topic."""
 
 Order = Callable[[], None]
 """Work for the transport's thread."""
 
 
 class Merged:
-    """An order that waits for the transport's thread once at most, however often it is given."""
+    """An order that is queued for the transport's thread at most once at a time."""
 
     def __init__(self, do: Callable[[Order], None], order: Order) -> None:
         self._do, self._order = do, order
         self._waits = False
 
     def __call__(self) -> None:
-        """Give it, on any thread."""
+        """Queue the order; from any thread."""
         if not self._waits:
             self._waits = True
             self._do(self._run)
@@ -47,9 +47,9 @@ class Merged:
 class Tokens:
     """The tokens that match some key expressions, while the session is open or until `leave`.
 
-    `came(token, peer)`, `gone(token)`: called on zenoh's thread. No more than MOST tokens are kept:
-    further ones are left out, which is logged once. When half of them have gone, all are asked for
-    again, so that after a flood nobody is missing. `do(order)`: runs it on the transport's thread.
+    `came(token, peer)`, `gone(token)`: called on zenoh's thread. At most MOST tokens are kept; further
+    ones are left out, logged once. When half of the kept ones have gone, all tokens are queried again,
+    so none is missing after a flood. `do(order)` runs an order on the transport's thread.
     """
 
     def __init__(
@@ -70,14 +70,14 @@ class Tokens:
         self._watch()
 
     def leave(self) -> None:
-        """Watch them no longer."""
+        """Stop watching the tokens."""
         with self._lock:
             self._left = True
             watching, self._watching = self._watching, []
             _undeclare(watching)
 
     def _watch(self) -> None:
-        """Hear of all that are there, and of each that comes or goes."""
+        """Watch for all present tokens, and for each that comes or goes."""
         on_token = Callback(self._look, indirect=False)
         self._watching = [
             self._live.declare_subscriber(expression, on_token, history=True)
@@ -95,7 +95,7 @@ class Tokens:
             self._watch()
 
     def _look(self, sample: zenoh.Sample) -> None:
-        """A token has come or gone. Called on zenoh's thread."""
+        """Note a token that has come or gone; called on zenoh's thread."""
         token = str(sample.key_expr)
         if sample.kind == zenoh.SampleKind.DELETE:
             self._known.discard(token)
@@ -122,7 +122,8 @@ class Tokens:
 
 
 class ZenohPeers:
-    """Tells `peers` of tokens, on zenoh's thread. `news`: called after each. `do`: as `Tokens`."""
+    """Reports tokens to `peers`, on zenoh's thread. `news`: called after each token. `do`: see
+    `Tokens`."""
 
     def __init__(self, peers: Peers, news: Order, do: Callable[[Order], None]) -> None:
         self._peers = peers
@@ -130,12 +131,12 @@ class ZenohPeers:
         self._do = do
 
     def watch(self, session: zenoh.Session, keys: Keys) -> Tokens:
-        """Begin anew in this session; what is returned must be kept while it is open."""
+        """Start again in this session; the caller must keep the returned Tokens while it is open."""
         self._peers.clear()
         return Tokens(session, keys, keys.witnesses(), self._came, self._gone, self._do)
 
     def tell(self, token: str, end: Announced | None) -> None:
-        """An end is there, or has gone (None)."""
+        """Note an end that has come; or, with None, gone."""
         if end is None:
             self._peers.gone(token)
         else:

@@ -1,4 +1,4 @@
-"""An end's place in one zenoh session: which of its peers it reaches, and which do not fit."""
+"""An end's place in one zenoh session: the peers that it reaches, and those that do not fit."""
 
 from collections.abc import Callable
 
@@ -12,16 +12,16 @@ from bridges.transports.zenoh.keys import Keys, Kind
 from bridges.transports.zenoh.peers import Order, Tokens
 
 Tell = Callable[[str, Announced | None], None]
-"""Takes a token and its end, or None when it has gone."""
+"""Takes a token and its end; None instead of an end that has gone."""
 
 
 class Place:
     """An end's place in one session: its token, and the tokens of its peers.
 
-    Peers are the ends of the other kind on the same topic, in any process. `peers`: those that this
-    end reaches, by their tokens. `unheard`: the gids of those that do not fit. `misfit(policy)`: called
-    on zenoh's thread for each peer whose QoS does not fit. `tell(token, end)`: likewise for each that
-    comes, and with None when it goes. `do`: as `Tokens`.
+    Peers are the ends of the other kind on the same topic, in any process. `peers`: the peers that this
+    end reaches, by token. `unheard`: the gids of peers that do not fit. Called on zenoh's thread:
+    `misfit(policy)` for each peer whose QoS does not fit; `tell(token, end)` for each peer that comes,
+    with None when it goes. `do`: see `Tokens`.
     """
 
     def __init__(
@@ -53,7 +53,7 @@ class Place:
         self._alive: zenoh.LivelinessToken | None = None
 
     def appear(self) -> None:
-        """Declare the token: the end sends or hears now."""
+        """Declare the token, as the end now sends or hears."""
         self._alive = self._live.declare_token(self.token)
 
     def leave(self) -> None:
@@ -63,7 +63,7 @@ class Place:
         self._tokens.leave()
 
     def _part(self, token: str) -> None:
-        """A peer has gone. Called on zenoh's thread, as `_meet` is."""
+        """Forget a peer that has gone; called on zenoh's thread, like `_meet`."""
         self.peers.pop(token, None)
         self.unheard.discard(zenoh_keys.gid(token))
         self._tell(token, None)
@@ -75,11 +75,11 @@ class Place:
             self.peers[token] = peer
             return
         self.unheard.add(zenoh_keys.gid(token))
-        if policy != "type":  # `peers.py` logs those of every end
+        if policy != "type":  # `peers.py` logs misfits of types
             self._misfit(policy)
 
     def _incompatible(self, theirs: zenoh_keys.Peer) -> str:
-        """The QoS policy by which DDS would not match the two ends; "" if it would match them."""
+        """Return the QoS policy by which DDS would not match the two ends; "" if they match."""
         hashed = type_hash(self._topic.type, self._keys.release)
         if theirs.type != self._keys.type(self._topic) or theirs.announced.hash not in ("", hashed):
             return "type"

@@ -1,4 +1,4 @@
-"""Opening and closing a zenoh session."""
+"""Opens and closes zenoh sessions."""
 
 import ctypes
 import json
@@ -12,8 +12,8 @@ from bridges.transports.zenoh.config import Configuration
 
 @contextmanager
 def contained() -> Iterator[None]:
-    """Around every call into zenoh: a panic there is no Exception, and would end the daemon. Raises
-    ZError for it."""
+    """Raise zenoh's panics as ZError, for every call into zenoh: a panic is not an Exception, and would
+    end the daemon."""
     try:
         yield
     except BaseException as error:
@@ -23,7 +23,7 @@ def contained() -> Iterator[None]:
 
 
 def opened(ways: list[Configuration]) -> zenoh.Session:
-    """A session with the first of these configurations that works. Raises ZError if none does."""
+    """Open a session with the first of these configurations that works. Raises ZError if none does."""
     wanted, *further = ways
     config = zenoh.Config()
     for key, value in wanted.items():
@@ -44,6 +44,6 @@ def closed(session: zenoh.Session, held: list[object]) -> None:
 
 
 def trim_memory() -> None:
-    """Return freed memory to the system: opening a session leaves 2.5 MB of it in this process."""
+    """Return freed memory to the system: 2.5 MB after the opening of a session."""
     with suppress(AttributeError):  # a C library other than glibc has no such call
         ctypes.CDLL(None).malloc_trim(0)

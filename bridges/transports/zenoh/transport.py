@@ -2,11 +2,11 @@
 zenoh-bridge-ros2dds with one node behind it.
 
 zenoh reconnects by itself: it keeps looking for its routers, and declares everything again when one
-answers. This transport opens a new session only when the machine's addresses have changed: the old
-session would notice that only when its links time out.
+answers. This transport opens a new session only when the machine's addresses have changed, as the old
+session would notice this only by its links' timeouts.
 
-Source: eclipse-zenoh 1.10 (Python API), and the sources in zenoh_keys.py and zenoh_ends.py. Only
-these files import zenoh, and only choose.py imports this one.
+Source: eclipse-zenoh 1.10 (Python API), and the sources named in `keys.py` and `ends.py`. Only this
+folder imports zenoh, and only `choose.py` imports this file.
 """
 
 import atexit
@@ -45,10 +45,10 @@ NO_ROUTER: Final = (
 
 
 class ZenohTransport(Threaded):
-    """One node: a session, its publishers and subscriptions, and the thread that hands on messages.
+    """One node: a session, its publishers and subscriptions, and the thread that delivers messages.
 
     `loopback`: stay on this machine, without a router, whatever `settings` say. Raises TransportError
-    when no session can be opened. It is no error that no other node answers yet.
+    if no session can be opened. Missing answers of other nodes are not an error.
     """
 
     speaks = "zenoh"
@@ -89,12 +89,12 @@ class ZenohTransport(Threaded):
         self._join()
         if self._session is None and not self._wants_router:
             raise TransportError(f"cannot open a zenoh session: {self._why_unlinked}")
-        # A session that is still open aborts the interpreter when it exits.
+        # A session still open at the interpreter's exit aborts it.
         atexit.register(self.close)
         self._start(self._listen, "zenoh")
 
     def faults(self) -> list[tuple[str, str]]:
-        """Also: it is off the graph, or no router answers."""
+        """Return the faults of every transport, and ROUTER_ON_LOOPBACK or NO_ROUTER."""
         found = super().faults()
         if self._away:
             found.insert(0, (ROUTER_MET, WHY_AWAY))
@@ -152,7 +152,7 @@ class ZenohTransport(Threaded):
     # --- the session ---------------------------------------------------------------------------
 
     def _join(self) -> None:
-        """Open a session if possible. A client has none before its router answers."""
+        """Open a session if possible. A client has no session before its router answers."""
         self._addresses = addresses.addresses()
         if self._loopback:
             ways = zenoh_config.on_loopback(self.domain_id)
@@ -163,7 +163,7 @@ class ZenohTransport(Threaded):
         except zenoh.ZError as error:
             self._why_unlinked = str(error).partition(" at /")[
                 0
-            ]  # a place in zenoh's source follows
+            ]  # without the place in zenoh's source
             return
         way, name = WAYS[self._settings.keys], str(session.zid())
         self._keys: Keys = way(self.domain_id, name, self.name, self.release)
@@ -177,14 +177,14 @@ class ZenohTransport(Threaded):
         trim_memory()
 
     def _appear(self, session: zenoh.Session) -> None:
-        """Be on the graph, with every end."""
+        """Put the node and every end on the graph."""
         self._presence = session.liveliness().declare_token(self._keys.presence())
         self._witnesses = self._watcher.watch(session, self._keys)
         for end in self._ends:
             self._attach(end)
 
     def _vanish(self) -> None:
-        """Take everything off the graph, and stay in the session to see when the router has gone."""
+        """Take the node and every end off the graph; keep the session, to notice the router's leave."""
         for end in self._ends:
             end.leave()
         self._deaf.clear()
@@ -195,7 +195,7 @@ class ZenohTransport(Threaded):
             presence.undeclare()  # type: ignore[no-untyped-call]
 
     def _attach(self, end: ZenohEnd) -> None:
-        """Give an end its place, if we are on the graph and the release has its message."""
+        """Give an end its place if the node is on the graph and the release has the end's message."""
         self._peers.ours(end.topic, publishes=isinstance(end, ZenohPublisher))
         off = self._away or end.place or not self.release.has(end.topic.type)
         if self._session is None or off:
@@ -206,10 +206,10 @@ class ZenohTransport(Threaded):
         end.create(self._session, self._keys, number)
 
     def _neighbour(self, neighbours: dict[str, zenoh.WhatAmI], event: zenoh.TransportEvent) -> None:
-        """A router or peer has connected or gone. Called on zenoh's thread.
+        """Note a router or peer that has connected or gone; called on zenoh's thread.
 
-        To ask the session for its neighbours here would wait for a lock that this thread holds. So they
-        are counted.
+        The neighbours are tracked here, because asking the session for them would wait for a lock that
+        this thread holds.
         """
         if event.kind == zenoh.SampleKind.PUT:
             neighbours[str(event.transport.zid)] = event.transport.whatami
@@ -224,9 +224,9 @@ class ZenohTransport(Threaded):
                 publisher.leave()
 
     def _leave(self) -> None:
-        """Leave the session. Another thread closes it: on a dead link that takes 10 s.
+        """Leave the session, and close it in another thread: on a dead link this takes 10 s.
 
-        What was declared in it is kept until then, because to drop it sooner may block this thread.
+        Objects declared in the session are kept until then: dropping them sooner may block this thread.
         """
         session, self._session = self._session, None
         held: list[object] = [end.give_up() for end in self._ends]
@@ -251,7 +251,7 @@ class ZenohTransport(Threaded):
                 self._leave()
 
     def _follow_release(self) -> None:
-        """Give the ends whose message differs in RMF's release a new place."""
+        """Take over RMF's release; give a new place to each end whose message differs in it."""
         before = self.release
         if not self._peers.settle():
             self._peers.name_misfits()
@@ -285,7 +285,7 @@ class ZenohTransport(Threaded):
                 self._recover(error)
 
     def _recover(self, error: Exception) -> None:
-        """After an unexpected exception: log it once, and open a new session."""
+        """Recover from an unexpected exception: log it once, and open a new session."""
         if not self._failed:
             log.exception(pairs("reader_failed", node=self.name, reason=error))
         self._failed = True
@@ -294,7 +294,7 @@ class ZenohTransport(Threaded):
             self._join_anew()
 
     def _follow_network(self) -> None:
-        """Join again if the machine's addresses have changed since the last time."""
+        """Join again if the machine's addresses have changed, or there is no session."""
         if self._loopback:
             if self._away:
                 self._look()
@@ -306,12 +306,13 @@ class ZenohTransport(Threaded):
             self._join_anew()
 
     def _leaves_machine(self) -> bool:
-        """Whether any endpoint is on another machine."""
+        """Is any endpoint on another machine?"""
         endpoints = (*self._settings.connect, *self._settings.listen)
         return not all(map(zenoh_config.is_local, endpoints))
 
     def _look(self) -> None:
-        """Log once when no router or peer answers, and once when one answers again."""
+        """Log once if no router or peer answers, and once if one answers again. On loopback, leave the
+        graph while a router is linked."""
         neighbours = list(self._neighbours.values())
         routers = zenoh.WhatAmI.ROUTER in neighbours
         if self._loopback:
@@ -330,7 +331,7 @@ class ZenohTransport(Threaded):
             log.warning(pairs("not_linked", node=self.name, connect=where, reason=reason))
 
     def _keep_apart(self, away: bool) -> None:
-        """Leave the graph where a router is, and return to it when that has gone."""
+        """Leave the graph if `away`, because of a router; else return to it."""
         with self._lock:
             before, session = self._away, self._session
             if self._closed or session is None or not (before or away):
