@@ -155,7 +155,8 @@ def _owner(folder: Path, *, ours: bool) -> int:
 
 
 def _distrusted(place: Path, owner: int, *, last: bool) -> str:
-    """Return the reason to distrust a directory or link that a third user could have made; else ""."""
+    """Return the reason why a user other than root or the owner may have made this directory or link;
+    "" if none could."""
     found = place.lstat()
     if found.st_uid not in (Path("/").stat().st_uid, owner):
         return "belongs to another user"

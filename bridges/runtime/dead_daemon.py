@@ -74,7 +74,7 @@ def _places(file: Path, given: str | None) -> Directories | None:
     except PermissionError as error:
         if "SERVICE_RESULT" not in os.environ:  # set for ExecStopPost: systemd.exec(5)
             raise
-        logging.error("%s; switching off what %s names", error, file)
+        logging.error("%s; switching off the outputs of %s", error, file)
         return None
     return places
 
@@ -98,7 +98,7 @@ def _off_by_records(
 ) -> int:
     """Switch off the outputs of the records in `names`; of all records by default."""
     found = [r for r in records.unreleased() if names is None or r.name in names]
-    each_s = TIMEOUT_S / max(1, len(found))  # a dead bus of one leaves time for the others
+    each_s = TIMEOUT_S / max(1, len(found))  # a record with a dead bus leaves time for the others
     return _told(not [r for r in found if not _off_by_record(records, r, answered, each_s)])
 
 

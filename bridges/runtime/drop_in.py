@@ -24,7 +24,7 @@ LOCAL: Final = ("localhost", "multicast")
 
 
 def text(config: Config, groups: Collection[str]) -> str:
-    """Return the drop-in's text. `groups`: the machine's; a unit with an unknown one does not start."""
+    """Return the drop-in's text. `groups`: the machine's; with an unknown group no unit starts."""
     head = (
         f"# Written by `rmf-bridge enable` for {config.path.name}. After a change enable it again."
     )

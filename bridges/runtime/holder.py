@@ -83,8 +83,8 @@ def written(folder: Path) -> LockHolder | None:
 
 
 def shown(places: Directories) -> LockHolder | None:
-    """Return the living daemon of a fresh status file, or None. Finds a daemon without `holder.json`:
-    unable to write it, or of an older version."""
+    """Return the living daemon of a fresh status file, or None: for daemons without `holder.json`,
+    because they could not write it or are of an older version."""
     path = places.runtime / STATUS
     with suppress(OSError, msgspec.MsgspecError, UnicodeDecodeError), opened(places.runtime):
         fresh = abs(time.time() - path.lstat().st_mtime) < FRESH_S

@@ -190,7 +190,7 @@ def test_a_relay_that_is_not_verified_off_keeps_its_drop_in(
     left.touch()
     assert carry_out([off, Remove(kept)], live) == os.EX_UNAVAILABLE
     told = capsys.readouterr().err
-    assert "what ward had claimed is not verified off" in told
+    assert "the outputs of ward are not verified off" in told
     assert f"rm {left}" in told
     assert kept.exists()
 

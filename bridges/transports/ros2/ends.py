@@ -143,8 +143,8 @@ class Ros2Publisher:
 class Ros2Subscription:
     """The subscription of one topic. `dropped`: counts invalid samples, by topic name.
 
-    `said`: with `others_only`, this node's own messages, published here and not yet heard back, to be
-    skipped. rclpy (Jazzy) has no such option, and does not tell a sample's sender.
+    `said`: with `others_only`, this node's own messages that it has not heard back yet, and will skip.
+    rclpy (Jazzy) has no such option, and does not tell a sample's sender.
     """
 
     def __init__(

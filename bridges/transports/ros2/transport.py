@@ -65,7 +65,7 @@ class Ros2Transport(Threaded):
         self.name = self.node.get_name()
         self._start(self._spin, "ros2")
         self._watch_clock()
-        # An executor's thread that still runs at the interpreter's exit, as after a failed start, aborts it.
+        # An executor's thread that still runs at exit, as after a failed start, aborts the interpreter.
         atexit.register(self.close)
 
     @property

@@ -12,7 +12,7 @@ from bridges.transports.zenoh.keys import Keys, Kind
 from bridges.transports.zenoh.peers import Order, Tokens
 
 Tell = Callable[[str, Announced | None], None]
-"""Takes a token and its end; None instead of an end that has gone."""
+"""Takes a token and its end; the end is None once it has gone."""
 
 
 class Place:

@@ -89,7 +89,7 @@ class ZenohTransport(Threaded):
         self._join()
         if self._session is None and not self._wants_router:
             raise TransportError(f"cannot open a zenoh session: {self._why_unlinked}")
-        # A session still open at the interpreter's exit aborts it.
+        # A session that is still open at exit aborts the interpreter.
         atexit.register(self.close)
         self._start(self._listen, "zenoh")
 
