@@ -2,8 +2,8 @@
 
 A separate `outputs-off` process does it, as after every death: it can hang without hanging this daemon,
 and it uses the dead daemon's profiles. Devices that do not answer are reported and retried while we
-serve. Devices in our own record are not retried: `SafeFirst` makes each safe as soon as it answers. If
-a process has just tried, after the death or at boot, the start does not wait for another try.
+serve. Devices in our own record are not retried: `SafeFirst` makes each safe as soon as it answers. The
+start does not try them at all if a process has just done so, after the death or at boot.
 """
 
 import logging

@@ -71,7 +71,9 @@ def test_a_person_records_an_incident_and_replays_it(
     other.write_text(lift.read_text())
 
     assert made.returncode == 0, made.stderr
-    assert late.stdout.splitlines()[0] == f"no daemon serves {lift} now: not waiting for later events"
+    assert (
+        late.stdout.splitlines()[0] == f"no daemon serves {lift} now: not waiting for later events"
+    )
     assert (late.returncode, (tmp_path / "late.mcap").exists()) == (0, True)
     assert [(note.code, note.text) for note in notes_in(file)] == [("OPERATOR", "it stood")]
     assert {one.topic for one in heard_in(file)} == {"lift_states", "diagnostics"}
