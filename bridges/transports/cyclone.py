@@ -25,7 +25,7 @@ A sample longer than LONGEST is dropped at its first fragment. Memory holds for 
 incomplete sample and one that came too early (by default 16 and 128); after a loss the writer is asked
 to repeat."""
 FOUND_AGAIN: Final = "<SPDPInterval>2 s</SPDPInterval>"
-"""The period at which a node announces itself: short, for others to find it soon after a network failure
+"""The period at which a node announces itself: short, to be found soon after a network failure
 longer than a lease (10 s). By default Cyclone 0.10 announces each 8 s, 11 each 30 s to a lost peer."""
 NEVER_FORGOTTEN: Final = (
     "<InitialLocatorPruneDelay>inf</InitialLocatorPruneDelay>"
