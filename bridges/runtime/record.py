@@ -46,7 +46,6 @@ class ClaimedSettings(msgspec.Struct, frozen=True):
 class Claimed(msgspec.Struct, frozen=True):
     """`file`: the YAML's path. `yaml`: its text. `texts`: profiles and DBC files, by name.
 
-    `safe`: the devices verified off so far. Every version can read these four fields.
     `safe`: the devices verified off so far. Every version can read the fields up to this one.
     `tried`: True once a process has finished a try to switch off the other devices.
     """
