@@ -1,1 +1,1 @@
-"""A new bridge at its controller: its first YAML, its machine examined, each wire tried."""
+"""Commission a bridge: draft its YAML, examine its machine, try each wire."""

@@ -1,4 +1,4 @@
-"""An example for each key of the reference: from a shipped file, else its default, else by its type.
+"""Examples for the keys of the reference: from a shipped file, else the default, else by type.
 
 Shipped files are tested, so these examples stay valid.
 """
@@ -46,13 +46,13 @@ WRITTEN: dict[str, object] = {
     "doors": ["ward_door"],
     "lifts": ["Lift1"],
 }
-"""Examples for keys that no shipped file has. Each of these keys means the same everywhere."""
+"""Examples for keys missing in shipped files. Each of these keys means the same everywhere."""
 
 Found = dict[tuple[type, str], str]
 
 
 def example(struct: type, field: mi.Field) -> str:
-    """`key: value` as in a YAML; "" for a section, whose keys have examples of their own."""
+    """Return `key: value` as in a YAML; "" for a section, whose keys have their own examples."""
     if is_section(field.type):
         return ""
     shown = next(
@@ -65,13 +65,13 @@ def example(struct: type, field: mi.Field) -> str:
 
 
 def device_yamls() -> list[Path]:
-    """The shipped device YAMLs; `fleet_*.yaml` are configurations of RMF's fleet adapters."""
+    """Return the shipped device YAMLs; `fleet_*.yaml` are configurations of RMF's fleet adapters."""
     return sorted(f for f in CONFIG.glob("*.yaml") if not f.name.startswith("fleet_"))
 
 
 @functools.cache
 def _shipped() -> Found:
-    """The shortest value of each struct's field in the shipped files that is not its default."""
+    """Return each field's shortest value in the shipped files other than its default."""
     found: Found = {}
     for file in device_yamls():
         config = load(file)
@@ -85,7 +85,7 @@ def _shipped() -> Found:
 
 
 def _profiles() -> Iterator[Profile[msgspec.Struct]]:
-    """Every sort of profile that a driver reads."""
+    """Return every type of driver profile."""
     for kind in kind_names():
         for driver in named.driver_names(kind):
             found = vars(named.driver_module(kind, driver)).get("PROFILE")
@@ -114,14 +114,14 @@ def _note(found: Found, struct: type, name: str, text: str) -> None:
 
 
 def field_names(base: type) -> tuple[str, ...]:
-    """The fields of a struct; none for msgspec.Struct and its bases."""
+    """Return a struct's field names; none for msgspec.Struct and its bases."""
     if not issubclass(base, msgspec.Struct) or base is msgspec.Struct:
         return ()
     return base.__struct_fields__
 
 
 def flow(value: object) -> str:
-    """A value as YAML on one line."""
+    """Format a value as YAML on one line."""
     text = yaml.safe_dump(
         value, default_flow_style=True, width=10**6, allow_unicode=True, sort_keys=False
     )
@@ -129,7 +129,7 @@ def flow(value: object) -> str:
 
 
 def _is_numbered(info: mi.Type) -> bool:
-    """Whether it is a mapping whose keys are numbers."""
+    """Is this a mapping with numbers as keys?"""
     if isinstance(info, mi.Metadata):
         return _is_numbered(info.type)
     key = info.key_type if isinstance(info, mi.DictType) else None
@@ -143,7 +143,7 @@ def _by_type(field: mi.Field) -> object:
 
 
 def _any_of(info: mi.Type, field: mi.Field) -> object:
-    """Some valid value of this type."""
+    """Return some valid value of this type."""
     match info:
         case mi.Metadata(type=part):
             return _any_of(part, field)
@@ -163,7 +163,7 @@ def _any_of(info: mi.Type, field: mi.Field) -> object:
 
 
 def _number(info: mi.FloatType | mi.IntType) -> float:
-    """A plain one within its bounds."""
+    """Return a plain number within the bounds."""
     least = info.ge if info.ge is not None else 1
     most = info.le if info.le is not None else least + 10
     return next(n for n in (5, 1, 10, least, most) if least <= n <= most)

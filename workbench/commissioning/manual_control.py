@@ -1,4 +1,4 @@
-"""What the commands share that hold one device by hand: its record and guard, and its outputs off."""
+"""Hold one device by hand (`walk`, the kill test): its record, its guard, and its outputs off."""
 
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -16,10 +16,10 @@ def guarded(
     held: runtime_directory.RuntimeDirectory,
     outputs_off: Sequence[str],
 ) -> tuple[Bus, Callable[[], None]]:
-    """The device's bus, and what to call when every output is verified off. Raises HalError.
+    """Return the device's bus, and a function to call once all is verified off. Raises HalError.
 
-    Once the bus is open, and before an output is claimed: the record, and a guard that runs
-    `outputs_off` if we die. A bus that cannot be opened leaves nothing to switch off.
+    Record and guard (which runs `outputs_off` if we die) start once the bus is open, before an
+    output is claimed. A bus that cannot be opened leaves nothing to switch off.
     """
     directories.work_somewhere(held.places)
     bus = config.open_bus(config.bus_of(device))
@@ -34,7 +34,7 @@ def guarded(
 
 
 def not_off(driver: Driver[Any, Any], insist: Callable[[], None]) -> str:
-    """Switch every output off; why that is not verified, or "". `insist`: ends the bus's pauses."""
+    """Switch every output off. Return why this is unverified, or "". `insist`: end the bus's pauses."""
     insist()
     try:
         driver.make_safe()

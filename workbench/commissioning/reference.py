@@ -1,7 +1,7 @@
 """Generates the configuration reference from the structs of the YAML, as JSON Schema and as a page.
 
-Keys, types, bounds, units, defaults and meanings come from the fields of the structs, purposes from
-their docstrings.
+Keys, types, bounds, units, defaults and meanings come from the structs' fields, purposes from the
+structs' docstrings.
 """
 
 import inspect
@@ -34,11 +34,11 @@ FILE: dict[str, str] = {
     "buses": "name -> a bus, by its `type`.",
     "type": "the sort of a bus; its other keys depend on it.",
 }
-"""What the keys mean that no struct has."""
+"""Meanings of the keys outside the structs."""
 
 
 class Shape(msgspec.Struct, frozen=True):
-    """One `kind:` with one `driver:`, and the sections that such a file has."""
+    """One `kind:` with one `driver:`, and the sections of such a file."""
 
     kind: str
     devices_key: str
@@ -47,7 +47,7 @@ class Shape(msgspec.Struct, frozen=True):
 
 
 def shapes() -> Iterator[Shape]:
-    """Every combination of kind and driver."""
+    """Return every combination of kind and driver."""
     for kind in kind_names():
         key = kind_called(kind).devices_key
         for driver in named.driver_names(kind):
@@ -55,13 +55,13 @@ def shapes() -> Iterator[Shape]:
 
 
 def graph_kinds() -> list[AnyGraphKind]:
-    """Every kind without devices."""
+    """Return every kind without devices."""
     kinds = (kind_called(name) for name in kind_names())
     return [kind for kind in kinds if isinstance(kind, GraphKind)]
 
 
 def schema() -> Schema:
-    """JSON Schema (2020-12) of a device YAML, for editors."""
+    """Return the JSON Schema (2020-12) of a device YAML, for editors."""
     buses = {name: named.bus_called(name).settings for name in named.bus_types()}
     graph = [kind.settings for kind in graph_kinds()]
     types: list[type] = [
@@ -90,8 +90,8 @@ def schema() -> Schema:
 
 
 def _for_editors(component: dict[str, Any]) -> None:
-    """An editor shows titles, which are names of classes here, and of a key that may be null the
-    description of the struct, unless the key's own stands there."""
+    """Remove titles, which are class names, and give each nullable key its own description: an
+    editor would show both titles and the struct's description."""
     component.pop("title")
     for told in component.get("properties", {}).values():
         for part in told.get("anyOf", ()):
@@ -100,19 +100,19 @@ def _for_editors(component: dict[str, Any]) -> None:
 
 
 def _allow_type(components: dict[str, dict[str, dict[str, Schema]]], ref: Schema) -> None:
-    """Add `type:` to a bus: it is read before the struct, and is not one of its fields."""
+    """Add `type:` to a bus: this key is read before the struct and is not a field."""
     component = components[str(ref["$ref"]).rsplit("/", 1)[1]]
     component["properties"].setdefault("type", {"type": "string"})
     component["properties"]["type"]["description"] = FILE["type"]
 
 
 def _key(name: str, schema: Schema) -> Schema:
-    """One of the keys that no struct has."""
+    """Return the schema of a key outside the structs."""
     return {name: {"description": FILE[name], **schema}}
 
 
 def _file(shape: Shape, buses: dict[str, type], by_type: dict[type, Schema]) -> Schema:
-    """A file with this driver; a device may name another driver of the kind."""
+    """Return the schema of a file with this driver; a device may name another driver of the kind."""
     of_kind = [other for other in shapes() if other.kind == shape.kind]
     kinds_of_bus = [
         {"allOf": [by_type[buses[name]], {"properties": _key("type", {"const": name})}]}
@@ -143,7 +143,7 @@ def _file(shape: Shape, buses: dict[str, type], by_type: dict[type, Schema]) -> 
 
 
 def _named_by_device(driver: Shape, of_file: Shape) -> Schema:
-    """A device must name its driver, unless it is the file's own."""
+    """Require each device to name its driver, unless the file's driver serves."""
     required = [] if driver == of_file else ["driver"]
     return {"required": required, "properties": _key("driver", {"const": driver.driver})}
 
@@ -163,7 +163,7 @@ def _graph_file(kind: AnyGraphKind, by_type: dict[type, Schema]) -> Schema:
 
 
 def page() -> str:
-    """docs/reference/configuration.md: each struct once, at the end where several sections have it."""
+    """Return docs/reference/configuration.md. A struct of several sections stands once, at the end."""
     rows = [f"| `{key}` | {told} |" for key, told in FILE.items()]
     sections = [
         "# Configuration reference",
@@ -196,7 +196,7 @@ def _is_of_one(heading: str) -> bool:
 
 
 def _tops() -> Headings:
-    """The sections of a file, each with its heading; what several have comes before the first."""
+    """Return a file's sections and their headings; structs common to several come first."""
     found: Headings = {Rmf: "## `rmf`", RecordingSettings: "## `recording`"}
     for name in named.bus_types():
         found[named.bus_called(name).settings] = f"## Bus of `type: {name}`"
@@ -219,11 +219,11 @@ def _tops() -> Headings:
 
 
 def _headings(tops: Headings) -> Headings:
-    """Every struct of the page with its heading, in the page's order."""
+    """Return every struct of the page with its heading, in the page's order."""
     everywhere = [struct for top in tops for struct, _ in _inside(top, ())]
     heirs = Counter(base for struct in {*tops, *everywhere} for base in _bases(struct))
     shared = (base for base, many in heirs.items() if many > 1 and len(_fields(base)) > 1)
-    printed = {*tops, *everywhere, *shared}  # one key alone is no section: each has it
+    printed = {*tops, *everywhere, *shared}  # a base's only key is printed by its heirs
     inside = {top: list(_inside(top, printed)) for top in tops}
     tops_of = Counter(struct for found in inside.values() for struct in {s for s, _ in found})
     ordered: Headings = {}
@@ -237,7 +237,7 @@ def _headings(tops: Headings) -> Headings:
 
 
 def _inside(top: type, printed: Container[type]) -> Iterator[tuple[type, str]]:
-    """The structs inside a struct, and their paths from there; not those of a base that is printed."""
+    """Return the structs inside a struct and their relative paths, without those of printed bases."""
     todo, seen = [(top, "")], {top}
     while todo:
         struct, path = todo.pop(0)
@@ -250,7 +250,7 @@ def _inside(top: type, printed: Container[type]) -> Iterator[tuple[type, str]]:
 
 
 def _bases(struct: type) -> list[type]:
-    """The structs that it derives from, and that have fields; the nearest first."""
+    """Return the base structs with fields, nearest first."""
     return [base for base in struct.__mro__[1:] if field_names(base)]
 
 
@@ -261,7 +261,7 @@ def _fields(struct: type) -> tuple[mi.Field, ...]:
 
 
 def _own(struct: type, printed: Container[type]) -> list[mi.Field]:
-    """The fields that its nearest printed base does not have as they are."""
+    """Return the fields that are new or differ from the nearest printed base."""
     base = _printed_base(struct, printed)
     known = _fields(base) if base else ()
     return [field for field in _fields(struct) if field not in known]
@@ -311,7 +311,7 @@ def _example(struct: type, field: mi.Field) -> str:
 
 
 def meaning(struct: type, key: str) -> str:
-    """What a key of this struct means."""
+    """Return the meaning of a key of this struct."""
     (wanted,) = (field.type for field in _fields(struct) if field.encode_name == key)
     told = wanted.extra_json_schema if isinstance(wanted, mi.Metadata) else None
     return str((told or {}).get("description", ""))
@@ -322,7 +322,7 @@ def _purpose(struct: type) -> str:
 
 
 def parts(info: mi.Type) -> list[type]:
-    """The structs that a field's value is made of."""
+    """Return the structs inside a field's value."""
     match info:
         case mi.StructType(cls=cls):
             return [cls]

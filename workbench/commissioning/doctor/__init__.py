@@ -1,18 +1,18 @@
-"""`rmf-bridge doctor`: what keeps a bridge from working on this machine, and what to do.
+"""`rmf-bridge doctor`: find and explain the obstacles to a working bridge on this machine.
 
-    finding.py   what was found, what it means, what to do
+    finding.py   a finding: fact, meaning, remedy
     machine.py   the one seam to this machine: files, commands, ioctl
-    users.py     who the daemon runs as, and what that user may open
+    users.py     the daemon's user and its access to devices
     health.py    clock, watchdog, disks and directories
     chips.py     GPIO chips and lines as the kernel describes them
-    gpio.py      the header's chip, its lines, and the levels at boot and after a death
+    gpio.py      the header's chip and lines; levels at boot and after the daemon dies
     ports.py     serial ports
     can.py       the kernel's CAN interfaces
-    served.py    what a running daemon says, in place of its buses
-    answers.py   who answers on the buses of a daemon that does not run; it only reads
-    network.py   RMF's graph: interface, domain, who is there, message versions
+    served.py    a running daemon's status, read instead of its buses
+    answers.py   devices that answer on the buses while no daemon runs; reads only
+    network.py   RMF's graph: interface, domain, nodes present, message versions
     examination.py  every subject in turn
-    kill_test.py a process that holds an output on is killed; victim.py is that process
+    kill_test.py kills a process (victim.py) that holds an output on
 
-A subject is a function that yields findings. None of them switches anything, except the kill test.
+A subject is a function that yields findings. Only the kill test switches an output.
 """

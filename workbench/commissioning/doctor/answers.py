@@ -1,7 +1,7 @@
-"""Who answers on the buses of a file: each device read once, then a bounded scan for others.
+"""Find devices on a file's buses: read each named one once, then scan a bounded range for others.
 
-Nothing is written. A driver is only read, never opened, because opening claims outputs and may switch
-them off; a module's watchdog, which a driver would arm, is left out.
+Nothing is written. Drivers are read but never opened, because opening claims outputs and may switch
+them off. The modules' watchdogs are removed from the settings, so no driver arms one.
 """
 
 import re
@@ -36,7 +36,7 @@ DEVICE_TYPE: Final = (0x1000, 0, 4)
 
 
 def answers(config: Config, bus_name: str, whole: bool) -> Iterator[Finding]:
-    """The subject of one bus that is not GPIO. `whole`: scan every unit or node, not only 1 to 16."""
+    """Examine one bus other than GPIO. `whole`: scan every unit or node, not only 1 to 16."""
     subject, kind = f"bus {bus_name}", config.bus_types[bus_name]
     try:
         bus = _opened(config, bus_name)
@@ -55,14 +55,14 @@ def _opened(config: Config, bus_name: str) -> Bus:
 
 
 def unarmed(settings: msgspec.Struct) -> msgspec.Struct:
-    """A bus's settings without the modules' watchdogs, which a reading would arm."""
+    """Return a bus's settings without the modules' watchdogs, which a reading would arm."""
     if getattr(settings, "module_watchdog", None) is None:
         return settings
     return msgspec.structs.replace(settings, module_watchdog=None)
 
 
 def readings(config: Config, bus_name: str, bus: Any, subject: str) -> Iterator[Finding]:
-    """What each device of this bus answers, decoded by its driver."""
+    """Yield the answer of each device on this bus, decoded by its driver."""
     devices = config.devices_on(bus_name)
     drivers = {n: config.driver_type(n).create(n, config.devices[n], bus) for n in devices}
     _listened(bus)
@@ -82,7 +82,7 @@ def readings(config: Config, bus_name: str, bus: Any, subject: str) -> Iterator[
 
 
 def _read(read: Callable[[], Any], bus: Bus) -> Any:
-    """A reading; the first may come too late on a line that was asleep. Raises DriverError."""
+    """Read, several times if a sleeping line answers late. Raises DriverError."""
     for _ in range(TRIES - 1):
         bus.insist()
         try:
@@ -94,7 +94,7 @@ def _read(read: Callable[[], Any], bus: Bus) -> Any:
 
 
 def _listened(bus: Any) -> None:
-    """On CAN: take what comes for a while; the readings say what is wrong with the bus."""
+    """On CAN: receive for a while; the readings report faults of the bus."""
     if not hasattr(bus, "wait"):
         return
     try:
@@ -126,7 +126,7 @@ def _modbus(config: Config, bus_name: str, bus: Any, whole: bool) -> Iterator[Fi
 
 
 def _can(config: Config, bus_name: str, bus: Any, whole: bool) -> Iterator[Finding]:
-    """CANopen nodes are asked for their device type; other stations are only heard."""
+    """Ask CANopen nodes for their device type; listen to other stations."""
     from drivers.hal.can.canopen import Aborted, CanOpenNode
     from drivers.hal.can.frames import named
 
@@ -183,7 +183,7 @@ def _scanned(
 
 
 def numbers(config: Config, bus_name: str, what: str) -> Iterator[int]:
-    """The units or nodes that the file names on this bus."""
+    """Return the units or nodes that the file names on this bus."""
     for name in config.devices_on(bus_name):
         settings, driver = config.devices[name], config.driver_type(name)
         claimed = [place for place, _ in driver.claims(settings)]
@@ -195,7 +195,7 @@ def numbers(config: Config, bus_name: str, what: str) -> Iterator[int]:
 
 
 def ranges(numbers: Iterable[int]) -> str:
-    """`1, 3 to 16`."""
+    """Format numbers as `1, 3 to 16`."""
     runs: list[list[int]] = []
     for number in numbers:
         if runs and runs[-1][-1] == number - 1:

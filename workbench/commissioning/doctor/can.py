@@ -17,7 +17,7 @@ HOW: Final = 'docs/how-to/wire.md, "CAN": sudo ip link set {} up type can bitrat
 
 
 def interface(machine: Machine, name: str, bitrate: int | None) -> Iterator[Finding]:
-    """The subject `can`. `bitrate`: what the stations have (bit/s); None where each site chooses."""
+    """Examine `can`. `bitrate`: the stations' (bit/s); None where each site chooses its own."""
     rate = str(bitrate or "250000")
     folder = f"/sys/class/net/{name}"
     if not machine.at(folder).is_dir():
@@ -49,7 +49,7 @@ class _Timing(msgspec.Struct, frozen=True):
 
 
 class Controller(msgspec.Struct, frozen=True):
-    """What `ip -details` says of a controller."""
+    """A controller as `ip -details` reports it."""
 
     state: str = "?"
     bittiming: _Timing = _Timing()

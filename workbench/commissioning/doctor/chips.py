@@ -28,26 +28,26 @@ class Chip:
 
     @property
     def number(self) -> int:
-        """Its N in gpiochipN."""
+        """The N in gpiochipN."""
         return int(self.device.name.removeprefix("gpiochip"))
 
 
 @dataclass(frozen=True, slots=True)
 class LineNow:
-    """One line as it is. `consumer`: the kernel's name of who holds it; "" if nobody does."""
+    """The present state of a line. `consumer`: its holder as the kernel names it; "" if free."""
 
     consumer: str
     output: bool
 
 
 def devices(machine: Machine) -> list[Path]:
-    """Every GPIO chip's device, by its number."""
+    """Return every GPIO chip's device, ordered by number."""
     found = (p for p in machine.folder("/dev", "gpiochip*") if p.name[8:].isdecimal())
     return sorted(found, key=lambda path: int(path.name[8:]))
 
 
 def chips(machine: Machine) -> Iterator[Chip]:
-    """Those chips that this process may look at."""
+    """Return the chips that this process may open."""
     for device in devices(machine):
         try:
             answer = machine.ioctl(device, CHIP_INFO, bytes(CHIP.size))
@@ -58,7 +58,7 @@ def chips(machine: Machine) -> Iterator[Chip]:
 
 
 def line(machine: Machine, chip: Chip, offset: int) -> LineNow:
-    """A line of this chip. Raises OSError if there is none, or the kernel is older than 5.10."""
+    """Read a line of this chip. Raises OSError for an unknown line or a kernel before 5.10."""
     asked = LINE.pack(b"", b"", offset, 0, 0)
     _, consumer, _, _, flags = LINE.unpack(machine.ioctl(chip.device, LINE_INFO, asked))
     held = _text(consumer) or "somebody" if flags & USED else ""

@@ -1,4 +1,4 @@
-"""Every subject in turn, for one file on one machine."""
+"""Examine every subject in turn, for one file on one machine."""
 
 import time
 from collections.abc import Iterator, Sequence
@@ -29,7 +29,7 @@ XNERGY_BITRATE: Final = 250_000
 
 @dataclass(frozen=True, slots=True)
 class Options:
-    """What the command line asks for. `kill_test`: device and output; None without the test.
+    """The command line's choices. `kill_test`: device and output; None without the test.
 
     `whole_scan`: every unit or node of a bus. `listen_s`: how long to listen to RMF's graph; 0: not
     at all. `line`: with the options that name that graph.
@@ -47,7 +47,7 @@ class Options:
 def examined(
     config: Config, building: "BuildingMap | None", machine: Machine, options: Options
 ) -> Iterator[Finding]:
-    """Every finding, as it is made."""
+    """Yield every finding as soon as it is made."""
     file, who = config.path.absolute(), user(machine)
     yield from _file(config, building)
     yield from users(machine)
@@ -77,7 +77,7 @@ def examined(
 
 
 def _file(config: Config, building: "BuildingMap | None") -> Iterator[Finding]:
-    """The subject `file`: what `check` would say of it, in short."""
+    """Examine `file`: the result of `check`, in short."""
     yield ok("file", f"{config.path} is a valid file of a {config.kind}")
     for problem in config.warnings:
         yield note("file", str(problem), "legal, and worth a look", "rmf-bridge check FILE")
@@ -95,7 +95,7 @@ def _file(config: Config, building: "BuildingMap | None") -> Iterator[Finding]:
 def _way(
     config: Config, name: str, machine: Machine, who: User, now: ServingDaemon
 ) -> Iterator[Finding]:
-    """What this machine needs to reach the bus."""
+    """Examine this machine's access to the bus."""
     settings = config.buses[name]
     if config.bus_types[name] == "gpio":
         yield from _gpio(config, name, machine, who, now)
@@ -124,7 +124,7 @@ def _gpio(
 def _answering(
     config: Config, places: Directories, now: ServingDaemon, options: Options
 ) -> Iterator[Finding]:
-    """Who answers, while nobody else can open the buses."""
+    """Read the devices while no other process can open the buses."""
     names = [name for name, kind in config.bus_types.items() if kind != "gpio"]
     if now.busy or not names:
         return
@@ -157,7 +157,7 @@ def _killed(
     assert step is not None  # or the command would have ended
 
     def still_driven() -> bool | None:
-        """On GPIO: is one of the device's lines an output still?"""
+        """On GPIO: is one of the device's lines still an output?"""
         bus = config.bus_of(device)
         if config.bus_types[bus] != "gpio":
             return None

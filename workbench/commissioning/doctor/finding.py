@@ -1,4 +1,4 @@
-"""What a doctor finds: a subject, how good it is, what was found, what it means and what to do."""
+"""A finding of the doctor: subject, severity, fact, meaning and remedy."""
 
 from collections.abc import Iterable
 from typing import Final, Literal
@@ -6,13 +6,13 @@ from typing import Final, Literal
 import msgspec
 
 Level = Literal["ok", "note", "warning", "wrong"]
-"""`note`: worth knowing, and no reason to act."""
+"""`note`: worth knowing; needs no action."""
 WELL, WARNINGS, WRONG = 0, 1, 2
 EXIT_CODE: Final = {"ok": WELL, "note": WELL, "warning": WARNINGS, "wrong": WRONG}
 
 
 class Finding(msgspec.Struct, frozen=True):
-    """One finding. A finding that is `ok` has neither a meaning nor a remedy."""
+    """One finding. An `ok` finding has no meaning and no remedy."""
 
     subject: str
     level: Level
@@ -22,25 +22,25 @@ class Finding(msgspec.Struct, frozen=True):
 
 
 def ok(subject: str, found: str) -> Finding:
-    """All is well."""
+    """Make a finding: all is well."""
     return Finding(subject, "ok", found)
 
 
 def note(subject: str, found: str, means: str = "", do: str = "") -> Finding:
-    """Worth knowing."""
+    """Make a finding that is worth knowing."""
     return Finding(subject, "note", found, means, do)
 
 
 def warning(subject: str, found: str, means: str, do: str) -> Finding:
-    """It works now, but may fail later."""
+    """Make a finding: works now, but may fail later."""
     return Finding(subject, "warning", found, means, do)
 
 
 def wrong(subject: str, found: str, means: str, do: str) -> Finding:
-    """It cannot work like this."""
+    """Make a finding: cannot work like this."""
     return Finding(subject, "wrong", found, means, do)
 
 
 def exit_code(findings: Iterable[Finding]) -> int:
-    """0 all well, 1 warnings, 2 something is wrong."""
+    """Return 0 if all is well, 1 for warnings, 2 if something is wrong."""
     return max((EXIT_CODE[one.level] for one in findings), default=WELL)

@@ -1,5 +1,5 @@
-"""The form for an afternoon with real hardware (docs/how-to/hardware.md): the machine and its findings
-are filled in; what a person has to see is not.
+"""The form for an afternoon with real hardware (docs/how-to/hardware.md): machine and
+findings are filled in; a person fills in the rest.
 """
 
 import platform
@@ -19,7 +19,7 @@ ALL: Final = frozenset({"gpio", "modbus", "http", "can"})
 
 
 class FormStep(msgspec.Struct, frozen=True):
-    """One step of docs/how-to/hardware.md. `buses`: those that it is for. `seen`: what must be seen."""
+    """One step of docs/how-to/hardware.md. `buses`: the buses concerned. `seen`: the expected sight."""
 
     number: str
     buses: frozenset[str]
@@ -68,7 +68,7 @@ STEPS: Final = (
 
 
 def form(config: Config, found: Iterable[Finding], machine: Machine) -> str:
-    """The form as Markdown, with the steps for this file's buses."""
+    """Return the form as Markdown, with the steps for this file's buses."""
     buses = set(config.bus_types.values())
     model = machine.text("/proc/device-tree/model") or platform.machine()
     lines = [

@@ -1,4 +1,4 @@
-"""The 40-pin header: its chip, who holds its lines, its outputs at boot and after a death."""
+"""The 40-pin header: its chip, its lines' holders, its outputs at boot and after the daemon dies."""
 
 import re
 from collections.abc import Iterable, Iterator, Mapping
@@ -21,7 +21,7 @@ BOARDS: Final = {
     "pinctrl-bcm2711": "a Raspberry Pi 4",
     "pinctrl-rp1": "a Raspberry Pi 5",
 }
-"""The header's chip, by the label that Raspberry Pi's kernels give it."""
+"""Labels of the header's chip in Raspberry Pi's kernels."""
 HEADER_LABEL: Final = "pinctrl-"
 CONFIGS: Final = ("/boot/firmware/config.txt", "/boot/config.txt")
 PERSIST: Final = (
@@ -33,7 +33,7 @@ KILL_TEST: Final = "rmf-bridge doctor FILE --kill-test shows it with one output"
 
 
 def gpio(machine: Machine, chip: int | None, who: User) -> Iterator[Finding]:
-    """The subject `gpio`: is the header's chip there, and may the daemon use it? `chip`: the YAML's."""
+    """Examine `gpio`: is the header's chip there, may the daemon use it? `chip`: from the YAML."""
     if not machine.installed("lgpio"):
         do = "sudo apt install python3-lgpio, or in the clone .venv/bin/pip install '.[gpio]'"
         yield wrong(GPIO, "this Python has no lgpio", "no pin can be claimed", do)
@@ -58,7 +58,7 @@ def gpio(machine: Machine, chip: int | None, who: User) -> Iterator[Finding]:
 
 
 def header(machine: Machine, chip: int | None) -> Chip | None:
-    """The chip that the daemon will open: this one, or the one found by its label."""
+    """Return the daemon's chip: the named one, or else the one with the header's label."""
     for one in chips(machine):
         if one.number == chip or (chip is None and one.label.startswith(HEADER_LABEL)):
             return one
@@ -90,7 +90,7 @@ def _permission(machine: Machine, chip: Chip, who: User) -> Finding:
 
 
 def lines(machine: Machine, chip: Chip, wires: Iterable[Wire]) -> Iterator[Finding]:
-    """Which of these pins is held by another program, while no daemon runs?"""
+    """While no daemon runs: does another program hold one of these pins?"""
     free = True
     for wire in wires:
         try:
@@ -110,7 +110,7 @@ def lines(machine: Machine, chip: Chip, wires: Iterable[Wire]) -> Iterator[Findi
 
 
 def boot(machine: Machine, wires: Iterable[Wire], accepted: Mapping[str, str]) -> Iterator[Finding]:
-    """The subject `gpio at boot`: which relay is on from power-on until the daemon starts?"""
+    """Examine `gpio at boot`: which relays are on from power-on until the daemon starts?"""
     firmware, off = _firmware(machine), list[str]()
     for wire in (wire for wire in wires if wire.direction == "out"):
         level = firmware.get(_offset(wire))
@@ -134,7 +134,7 @@ def _safe_line(wire: Wire) -> str:
 
 
 def _firmware(machine: Machine) -> dict[int, bool]:
-    """BCM number -> the level that `gpio=18=op,dl` of config.txt drives; True is high."""
+    """Return BCM number -> level driven by `gpio=18=op,dl` in config.txt; True is high."""
     levels: dict[int, bool] = {}
     for text in filter(None, map(machine.text, CONFIGS)):
         for pins, options in re.findall(r"^\s*gpio=([0-9,-]+)=(\S+)", text, re.MULTILINE):
@@ -155,7 +155,7 @@ def _pins(text: str) -> Iterator[int]:
 
 
 def death(machine: Machine) -> Iterator[Finding]:
-    """The subject `gpio after a death`: does the kernel keep an output that nobody holds any more?"""
+    """Examine `gpio after a death`: does the kernel go on driving an output after its holder died?"""
     said = next(filter(None, map(machine.text, PERSIST)), "")
     strict = any(
         re.search(r"^\s*dtparam=.*\bstrict_gpiod\b", machine.text(path) or "", re.MULTILINE)

@@ -11,11 +11,11 @@ from workbench.commissioning.doctor.machine import Machine
 from workbench.commissioning.doctor.users import User
 
 FREE_LEAST: Final = 50 << 20
-"""With less free space than this (bytes) a growing log soon fills the disk."""
+"""Least free space (bytes); below, a growing log soon fills the disk."""
 
 
 def clock(machine: Machine) -> Iterator[Finding]:
-    """The subject `clock`: RMF compares the stamps of states with its own clock."""
+    """Examine `clock`: RMF compares the stamps of states with its own clock."""
     found = "the clock is not synchronised"
     means = (
         "states carry wrong stamps, and RMF may take them for old; durations do not depend on it"
@@ -33,7 +33,7 @@ def clock(machine: Machine) -> Iterator[Finding]:
 
 
 def watchdog(machine: Machine) -> Iterator[Finding]:
-    """The subject `watchdog`: who restarts this machine when its kernel or systemd hangs?"""
+    """Examine `watchdog`: is this machine restarted when its kernel or systemd hangs?"""
     subject = "watchdog"
     means = "when the kernel hangs, relays stay as they are until somebody cuts the supply"
     if not machine.folder("/dev", "watchdog*"):
@@ -60,7 +60,7 @@ def watchdog(machine: Machine) -> Iterator[Finding]:
 
 
 def directories(machine: Machine, places: Directories, who: User) -> Iterator[Finding]:
-    """The subject `disk`: can the daemon keep its files?"""
+    """Examine `disk`: can the daemon write its files?"""
     for folder in places.folders:
         found = existing(machine.at(folder))
         yield disk(str(folder), os.statvfs(found))
@@ -74,7 +74,7 @@ def directories(machine: Machine, places: Directories, who: User) -> Iterator[Fi
 
 
 def disk(what: str, found: os.statvfs_result) -> Finding:
-    """How much room there is. A disk in memory may be small."""
+    """Examine the free space. A disk in memory may be small."""
     means = "the device is served all the same, but status, log and the record of outputs get lost"
     if found.f_flag & os.ST_RDONLY:
         do = "an overlay or tmpfs for this directory; after errors of an SD card: replace it"
@@ -92,14 +92,14 @@ def disk(what: str, found: os.statvfs_result) -> Finding:
 
 
 def existing(folder: Path) -> Path:
-    """The directory itself, or the nearest one above it that exists."""
+    """Return the directory, or its nearest existing parent."""
     return next(place for place in (folder, *folder.parents) if _is_there(place))
 
 
 def _is_there(folder: Path) -> bool:
     try:
         return folder.is_dir()
-    except PermissionError:  # it is below one that this user may not search
+    except PermissionError:  # this user may not search a parent directory
         return False
 
 

@@ -1,9 +1,9 @@
 """The kill test: does an output go off when the process that holds it on is killed?
 
-Another process (`victim.py`) switches one output on as the daemon would, with its lock, its record and
-its guard. It is killed with -9. Then the guard must switch the output off and verify it, as
-systemd's ExecStopPost does after the death of a service. On GPIO the line is checked in between: does
-the kernel keep it as an output?
+Another process (`victim.py`) switches one output on as the daemon would, with the daemon's lock, record
+and guard, and is killed with -9. Then the guard must switch the output off and verify it, as systemd's
+ExecStopPost does after a service dies. On GPIO the line is checked in between: is it
+still an output?
 """
 
 import os
@@ -24,14 +24,14 @@ from workbench.commissioning.walk.core import WalkStep
 KILL_TEST: Final = "kill test"
 STARTS_S: Final = 15.0
 SEEN_S: Final = 1.0
-"""How long (s) a relay is on before the kill, so that somebody beside it can see it."""
+"""Seconds for which a relay is on before the kill, long enough to be seen."""
 OFF_WITHIN_S: Final = 15.0
 """`outputs-off` has 5 s, and may be tried twice."""
 LOOK_S: Final = 0.02
 CUT: Final = "cut the relays' supply; then rmf-bridge outputs-off FILE"
 
 StillDriven = Callable[[], bool | None]
-"""Whether the kernel still drives the line; None where that cannot be seen."""
+"""Does the kernel still drive the line? None where unknown."""
 
 
 def kill_test(
@@ -42,7 +42,7 @@ def kill_test(
     runtime_dir: str | None,
     kept: StillDriven,
 ) -> Iterator[Finding]:
-    """The subject `kill test`. Nobody else may serve the file."""
+    """Run the kill test. No daemon may serve the file meanwhile."""
     name = f"{device} {step.name}"
     victim = _started(file, device, step.name, runtime_dir)
     try:
@@ -98,7 +98,7 @@ def _started(
 
 
 def _line(victim: "subprocess.Popen[bytes]", within_s: float) -> str:
-    """What the victim says next; "" if it says nothing in time, or has ended."""
+    """Return the victim's next line; "" if none comes in time, or the victim has ended."""
     assert victim.stdout
     if not select.select([victim.stdout], [], [], within_s)[0]:
         return ""
@@ -110,7 +110,7 @@ def _ended_early(victim: "subprocess.Popen[bytes]") -> str:
 
 
 def _ended(victim: "subprocess.Popen[bytes]") -> None:
-    """Wait until the victim has ended. A victim that lives switches off when its input ends."""
+    """Wait until the victim has ended. A living victim switches off when its input ends."""
     assert victim.stdin
     assert victim.stdout
     victim.stdin.close()
@@ -119,7 +119,7 @@ def _ended(victim: "subprocess.Popen[bytes]") -> None:
 
 
 def _off_after(places: Directories, file: Path, died_at: float) -> float | None:
-    """How long (s) until the record was gone, which `outputs-off` removes when all is verified off."""
+    """Return the seconds until `outputs-off` has removed the record, once all is verified off."""
     pause = threading.Event()
     while (after_s := time.monotonic() - died_at) < OFF_WITHIN_S:
         if not Records(places, file).unreleased():

@@ -1,7 +1,7 @@
-"""This machine as the doctor sees it: its files, what its commands print, what its devices answer.
+"""This machine as the doctor sees it: its files, its commands' output, its devices' answers.
 
-The doctor has no other access to it. In tests `root` is the directory of a made-up machine; its
-commands are scripts in `usr/bin` there, and `ioctl` answers for its devices.
+The doctor reaches the machine only through this module. In tests `root` is the directory of a made-up
+machine; its commands are scripts in `usr/bin` there, and `ioctl` answers for its devices.
 """
 
 import fcntl
@@ -35,7 +35,7 @@ def _installed(package: str) -> bool:
 
 
 def _synchronised() -> bool | None:
-    """Whether the kernel's clock is synchronised, read by adjtimex(2)."""
+    """Is the kernel's clock synchronised, by adjtimex(2)?"""
     import ctypes
 
     state: int = ctypes.CDLL(None).adjtimex(ctypes.create_string_buffer(TIMEX_MAX))
@@ -44,10 +44,10 @@ def _synchronised() -> bool | None:
 
 @dataclass(frozen=True, slots=True)
 class Machine:
-    """`ioctl(device, request, argument)` gives what the kernel fills in, or raises OSError.
+    """The doctor's access. `ioctl(device, request, argument)`: the kernel's reply, or OSError.
 
-    `installed(package)`: can this Python import it? `synchronised()`: is the clock, None if that is not
-    known. `uid`, `gids`: of this process.
+    `installed(package)`: can this Python import it? `synchronised()`: is the clock? None if
+    unknown. `uid`, `gids`: of this process.
     """
 
     root: Path = Path("/")
@@ -58,15 +58,15 @@ class Machine:
     gids: frozenset[int] = field(default_factory=lambda: frozenset({os.getegid(), *os.getgroups()}))
 
     def at(self, path: str | Path) -> Path:
-        """Where an absolute path is found."""
+        """Return an absolute path's place below `root`."""
         return self.root / str(path).lstrip("/")
 
     def named(self, found: Path) -> str:
-        """The absolute path of what was found."""
+        """Return the absolute path of a place below `root`."""
         return f"/{found.relative_to(self.root)}"
 
     def text(self, path: str | Path) -> str | None:
-        """What a file says, without the blanks at its ends; None if it cannot be read."""
+        """Return a file's stripped text; None if unreadable."""
         try:
             with self.at(path).open("rb") as source:
                 return source.read(TEXT_MAX).decode(errors="replace").strip(" \t\r\n\0")
@@ -74,17 +74,17 @@ class Machine:
             return None
 
     def folder(self, path: str, pattern: str = "*") -> list[Path]:
-        """What is in a directory, sorted; nothing if there is none."""
+        """Return a directory's entries, sorted; empty without such a directory."""
         return sorted(self.at(path).glob(pattern))
 
     def target(self, path: str) -> str:
-        """The path behind a symbolic link such as /dev/serial/by-id/…; itself if it is none."""
+        """Follow a symbolic link such as /dev/serial/by-id/…; return any other path as it is."""
         found = self.at(path).resolve()
         root = self.root.resolve()
         return f"/{found.relative_to(root)}" if found.is_relative_to(root) else path
 
     def printed(self, *words: str) -> str | None:
-        """What a command prints; None if there is no such command, or it fails."""
+        """Return a command's output; None if the command is missing or fails."""
         path = os.pathsep.join(str(self.root / place) for place in PLACES)
         command = shutil.which(words[0], path=path)
         if command is None:

@@ -1,6 +1,6 @@
-"""RMF's graph as this machine sees it: interface and domain, who is there, and message versions.
+"""RMF's graph as this machine sees it: interface, domain, nodes, and message versions.
 
-It is joined as `watch` joins it, for some seconds: topics are heard, and nothing is published.
+The doctor joins it as `watch` does, for some seconds: it listens, and publishes nothing.
 """
 
 import importlib.metadata
@@ -35,14 +35,14 @@ SENDERS: Final = {
     "adapter_door_requests": "RMF's fleet adapters",
     "fleet_states": "RMF's fleet adapters",
 }
-"""Nobody can request anything without these. The other topics may be silent."""
+"""Requests need these topics. The others may be silent."""
 LIBRARIES: Final = {"dds": "cyclonedds", "zenoh": "eclipse-zenoh"}
 
 
 @dataclass(frozen=True, slots=True)
 class GraphLook:
-    """How to look. `listen_s`: how long. `serving`: our own daemon is on the graph too; None if
-    unknown. `watch`: the command that shows this graph.
+    """Settings of the look. `listen_s`: its length. `serving`: is our own daemon on the graph?
+    None if unknown. `watch`: the command that shows this graph.
     """
 
     localhost: bool
@@ -53,14 +53,14 @@ class GraphLook:
 
     @property
     def alone(self) -> str:
-        """What to do where nobody is heard."""
+        """Return the remedy for a silent graph."""
         return (
             f"docs/how-to/ros.md: domain, multicast, interfaces; {self.watch} shows what is heard"
         )
 
 
 def graph(config: Config, look: GraphLook) -> Iterator[Finding]:
-    """The subjects `network`, `RMF` and `messages`."""
+    """Examine `network`, `RMF` and `messages`."""
     try:
         domain = domain_id(config.rmf, os.environ)
         loopback = look.localhost or stays_on_loopback(config.rmf, os.environ)
@@ -114,7 +114,7 @@ def _heard(config: Config, transport: Transport, look: GraphLook) -> Iterator[Fi
 
 
 def _listened(ear: Ear, listen_s: float) -> list[Any]:
-    """Every message that comes in this time (s)."""
+    """Collect every message for this time (s)."""
     until, messages = time.monotonic() + listen_s, list[Any]()
     while (left_s := until - time.monotonic()) > 0:
         messages += [heard.message for heard in ear.listen(left_s)]
@@ -132,7 +132,7 @@ def _senders(topic: str, end: Subscription, look: GraphLook) -> Finding:
 
 
 def _rivals(ends: Sequence[Subscription], serving: bool | None) -> Iterator[Finding]:
-    """Other nodes that do the work of this one."""
+    """Find other nodes that serve the same device."""
     rivals = max((end.matched() for end in ends), default=0) - (serving is not False)
     if rivals > 0:
         means = "ours only listens (passive) while the other one is there"
@@ -190,7 +190,7 @@ def _installed() -> Iterator[Finding]:
 
 @contextmanager
 def overheard() -> Iterator[list[str]]:
-    """The warnings and errors that the transports log meanwhile."""
+    """Collect the transports' warnings and errors meanwhile."""
     said: list[str] = []
     ears = logging.Handler(logging.WARNING)
     ears.emit = lambda record: said.append(record.getMessage())  # type: ignore[method-assign]
@@ -208,4 +208,4 @@ def overheard() -> Iterator[list[str]]:
 
 
 def _ignore(message: object) -> None:
-    """The messages do not matter: only their senders are counted."""
+    """Discard a message: only senders are counted."""

@@ -15,7 +15,7 @@ DEAF: Final = "nobody on this line is heard"
 
 
 def port(machine: Machine, path: str, who: User, *, served: bool) -> Iterator[Finding]:
-    """The subject `serial port`. `served`: a daemon of this file runs, and has it open."""
+    """Examine `serial port`. `served`: a running daemon of this file has it open."""
     if not machine.at(path).exists():
         seen = ", ".join(machine.named(one) for one in machine.folder(BY_ID))
         do = (
@@ -49,7 +49,7 @@ def _permission(machine: Machine, path: str, device: str, who: User) -> Finding:
 
 
 def _stable(machine: Machine, path: str, device: str) -> Iterator[Finding]:
-    """Is it named by a path that the next boot may give to another adapter?"""
+    """Warn of a path that the next boot may give to another adapter."""
     if not re.match(r"/dev/tty(USB|ACM)", path):
         return
     same = [machine.named(one) for one in machine.folder(BY_ID)]

@@ -1,4 +1,4 @@
-"""Whether a daemon serves this file now, and what it says: its buses are then not opened.
+"""A running daemon of this file, and its status, read instead of opening its buses.
 
 A gateway may take one client only, and two masters on one line spoil each other's frames.
 """
@@ -22,9 +22,9 @@ NOT_ASKED: Final = "its buses are not asked, because a controller has one master
 
 @dataclass(frozen=True, slots=True)
 class ServingDaemon:
-    """What is known of the daemon. `busy`: why its buses must not be opened; "" if they may be.
+    """The daemon's state. `busy`: why its buses must not be opened; "" if they may be.
 
-    `serving`: a daemon serves this file; None where that cannot be seen. `simulated`: on fake hardware,
+    `serving`: does a daemon serve this file? None if unknown. `simulated`: on fake hardware,
     and on loopback.
     """
 
@@ -35,7 +35,7 @@ class ServingDaemon:
 
 
 def served(places: Directories, file: Path, wall: float) -> ServingDaemon:
-    """The subject `daemon`. `wall`: now, for the age of its status (s since the epoch)."""
+    """Examine `daemon`. `wall`: now (s since the epoch), for the age of the daemon's status."""
     try:
         held_by = holder.look(places)
     except PermissionError as error:
@@ -51,7 +51,7 @@ def served(places: Directories, file: Path, wall: float) -> ServingDaemon:
 
 
 def unseen(why: str) -> ServingDaemon:
-    """This user cannot see whether a daemon runs."""
+    """Warn that this user cannot see whether a daemon runs."""
     return ServingDaemon([wrong(DAEMON, why, NOT_ASKED, "sudo before the command")], why, None)
 
 
@@ -87,7 +87,7 @@ def _told(one: DaemonStatus) -> Iterator[Finding]:
 
 
 def _listeners(status: Status) -> Iterator[Finding]:
-    """Who hears the states. Other topics often have no listener."""
+    """Check for listeners to the states. Other topics often have none."""
     for topic, nodes in status.get("heard_by", {}).items():
         if nodes:
             yield ok(DAEMON, f"{topic}: heard by {nodes} node{'s' if nodes > 1 else ''}")

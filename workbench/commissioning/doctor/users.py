@@ -1,7 +1,7 @@
-"""Who the daemon runs as, and whether that user may open a device.
+"""The daemon's user, and that user's access to devices.
 
-With the unit installed it is the service's user, with the groups that a drop-in gives; else whoever
-asks. Users and groups are read from /etc/passwd and /etc/group.
+With the unit installed: the service's user, with the groups of its drop-ins; else the present user.
+ Users and groups are read from /etc/passwd and /etc/group.
 """
 
 import os
@@ -20,7 +20,7 @@ UNIT: Final = "rmf-bridge@.service"
 
 @dataclass(frozen=True, slots=True)
 class User:
-    """Whoever opens the devices. `service`: systemd's unit starts the daemon."""
+    """The user who opens the devices. `service`: systemd's unit starts the daemon."""
 
     name: str
     uid: int
@@ -28,7 +28,7 @@ class User:
     service: bool
 
     def may(self, found: os.stat_result) -> bool:
-        """Whether this user may read and write there, by its mode (access lists are not looked at)."""
+        """May this user read and write there, by the file's mode? Access lists are ignored."""
         if self.uid == 0:
             return True
         if found.st_uid == self.uid:
@@ -41,12 +41,12 @@ class User:
 
 
 def has_unit(machine: Machine) -> bool:
-    """Whether the unit of rmf-bridges is installed."""
+    """Is the unit of rmf-bridges installed?"""
     return any(machine.at(f"{place}/{UNIT}").exists() for place in UNITS)
 
 
 def user(machine: Machine) -> User:
-    """The daemon's user."""
+    """Return the daemon's user."""
     if not has_unit(machine):
         return User(_name(machine, machine.uid), machine.uid, machine.gids, service=False)
     ids = _passwd(machine).get(SERVICE_USER, (-1, -1))
@@ -58,7 +58,7 @@ def user(machine: Machine) -> User:
 
 
 def users(machine: Machine) -> Iterator[Finding]:
-    """The subject `user`: does the unit's user exist, with its groups?"""
+    """Examine `user`: does the unit's user exist, with its groups?"""
     subject = "user"
     if not has_unit(machine):
         name = _name(machine, machine.uid)
@@ -90,14 +90,14 @@ def users(machine: Machine) -> Iterator[Finding]:
 
 
 def join(who: User, group: str) -> str:
-    """What to do so that this user is in a group."""
+    """Return the remedy that puts this user in a group."""
     if who.service:
         return f"sudo rmf-bridge enable FILE: its drop-in gives the service the group {group}"
     return f"sudo usermod -aG {group} {who.name}, then log in again"
 
 
 def group_of(machine: Machine, gid: int) -> str:
-    """The name of a group; its number if it has none."""
+    """Return a group's name; its number if it has none."""
     return next((n for n, (found, _) in _groups(machine).items() if found == gid), str(gid))
 
 

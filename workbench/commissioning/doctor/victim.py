@@ -1,7 +1,7 @@
 """The process that the kill test kills: it switches one output on as the daemon would, and says `on`.
 
 `python -m workbench.commissioning.doctor.victim FILE DEVICE STEP RUNTIME_DIR`. It switches off and ends
-when its input ends or after ON_S, because whoever started it may have died.
+when its input ends or after ON_S, because its parent may have died.
 """
 
 import select
@@ -22,7 +22,7 @@ ON_S: Final = 5.0
 
 
 def main(file: Path, device: str, step: str, runtime_dir: str | None) -> int:
-    """0 when the output is verified off."""
+    """Return 0 if the output is verified off."""
     signals.End()
     try:
         config = load(file)
@@ -57,12 +57,12 @@ def _held(
 
 
 def step_called(config: Config, device: str, name: str | None) -> WalkStep | None:
-    """The output of this name; the first one by default, None if there is no such."""
+    """Return the output of this name; without a name the first; None if unknown."""
     return next((step for step in steps(config, device) if name in (None, step.name)), None)
 
 
 def _on_for_a_while(driver: Driver[Any, Any], bus: Bus, step: WalkStep | None) -> bool:
-    """Switch it on, and off again if nobody has killed us. True when it was verified off."""
+    """Switch on, and off again if we still live. True if verified off."""
     assert step is not None  # or the kill test would not have started
     try:
         driver.open()

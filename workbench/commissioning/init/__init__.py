@@ -1,4 +1,4 @@
-"""What `rmf-bridge init` writes: a commented YAML made from a few answers. Pure: answers in, text out.
+"""Draft a commented YAML for `rmf-bridge init`. Pure: answers in, text out.
 
 `points.py` gives each signal a pin or an address of its own.
 """
@@ -17,7 +17,7 @@ from workbench.commissioning.init.points import FreePoints, points_for
 from workbench.commissioning.reference import meaning
 
 DRIVERS: Final = {"http": "http", "can": "canopen"}
-"""The driver for a wiring; `dry_contact` for any other."""
+"""The driver for each wiring; `dry_contact` for wirings not listed."""
 WIRINGS: Final = {
     "lift": ("gpio", "modbus", "rs485"),
     "door": ("modbus", "rs485", "gpio", "http"),
@@ -37,7 +37,7 @@ ADDRESSES: Final = {
     "http": "192.168.1.60",
     "can": "can0",
 }
-"""The address that is offered for a wiring; a GPIO header has none."""
+"""The address offered for each wiring; a GPIO header has none."""
 HAZARDS: Final = LIFT_INPUTS[:7]
 DOOR_ENDS: Final = {"door_opened": "open", "door_closed": "closed"}
 BOOLEANS: Final = ("y", "n", "yes", "no", "on", "off", "true", "false", "null")
@@ -69,7 +69,7 @@ CHARGER_CANOPEN: Final = """\
 
 
 def draft(answers: DraftAnswers) -> str:
-    """The whole file. Raises Impossible if these answers do not go together."""
+    """Return the whole file. Raises Impossible for contradictory answers."""
     if answers.wiring not in WIRINGS[answers.kind]:
         raise Impossible(
             f"a {answers.kind} is not wired by {answers.wiring}: {', '.join(WIRINGS[answers.kind])}"
@@ -96,13 +96,13 @@ def draft(answers: DraftAnswers) -> str:
 
 
 def _lift(answers: DraftAnswers, points: FreePoints) -> Iterator[str]:
-    """The lines below the name of a lift on contacts."""
+    """Return the lines below the name of a lift on contacts."""
     floors = [quoted(floor) for floor in answers.floors]
     if len(floors) < 2 or len(set(floors)) < len(floors):
         raise Impossible(f"a lift has at least two floors, each name once, not {', '.join(floors)}")
     calls = [
         f"      {floor}: {{{points.relay()}}}" for floor in floors
-    ]  # first: they need most pins
+    ]  # floors first: they need most pins
     request, hold = points.relay(), points.relay()
     yield f"    floors: [{', '.join(floors)}]        # RMF's names, from below"
     yield "    inputs:"
@@ -146,7 +146,7 @@ def _floor_code(answers: DraftAnswers, floors: list[str], points: FreePoints) ->
 
 
 def _door(answers: DraftAnswers, points: FreePoints) -> Iterator[str]:
-    """The lines below the name of a door on contacts, or on a relay that answers HTTP."""
+    """Return the lines below the name of a door, on contacts or on an HTTP relay."""
     if answers.wiring == "http":
         yield from SHELLY.splitlines()
         return
@@ -158,7 +158,7 @@ def _door(answers: DraftAnswers, points: FreePoints) -> Iterator[str]:
 
 
 def _charger(answers: DraftAnswers, points: FreePoints) -> Iterator[str]:
-    """The lines below the name of a charger on HTTP, on CANopen, or on contacts."""
+    """Return the lines below the name of a charger, on HTTP, CANopen or contacts."""
     if answers.wiring in ("http", "can"):
         yield from (CHARGER_HTTP if answers.wiring == "http" else CHARGER_CANOPEN).splitlines()
         return
@@ -171,12 +171,12 @@ def _charger(answers: DraftAnswers, points: FreePoints) -> Iterator[str]:
 
 
 def _said(struct: type, key: str) -> str:
-    """What a key means as a comment: the beginning of its description."""
+    """Return a key's comment: the beginning of its description."""
     return f"# {re.split('[;:.]', meaning(struct, key))[0]}"
 
 
 def quoted(text: str) -> str:
-    """A scalar that YAML reads as this text, also where it looks like a number or boolean."""
+    """Quote a text so that YAML reads it as text even if it looks like a number or boolean."""
     plain = text[:1].isalpha() and text.replace("_", "a").replace("-", "a").isalnum()
     if plain and text.lower() not in BOOLEANS:
         return text

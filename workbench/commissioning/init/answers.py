@@ -1,4 +1,4 @@
-"""The answers that a draft is made from."""
+"""The answers from which a draft is made."""
 
 from typing import Final, Literal
 
@@ -13,20 +13,20 @@ LIFT_INPUTS: Final = (
     *("fire_alarm", "code_blue", "earthquake", "emergency", "out_of_service", "manual_mode"),
     *("overload", "agv_mode", "door_opened", "door_closed", "stopped"),
 )
-"""The inputs that a lift may have."""
+"""The possible inputs of a lift."""
 OFFERED: Final = ("fire_alarm", "agv_mode", "door_opened", "door_closed", "stopped")
 
 
 class Impossible(Exception):
-    """These answers do not go together. The text says why and what to do."""
+    """Contradictory answers. The text gives reason and remedy."""
 
 
 class DraftAnswers(msgspec.Struct, frozen=True, kw_only=True):
-    """What stands in front of the integrator.
+    """The device to be connected, as the integrator describes it.
 
     `address`: host, serial port or CAN interface; "" for the usual one. `floors`: RMF's names, from
     below. `signals`: a lift's inputs. `contacts`: the level of a closed contact on the header: high
-    where it leads to 3.3 V, low where it leads to ground. `relays`: the level that switches them on.
+    if wired to 3.3 V, low if wired to ground. `relays`: the level that switches them on.
     """
 
     kind: Kind

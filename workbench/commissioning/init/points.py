@@ -1,4 +1,4 @@
-"""Gives each signal of a draft the next free pin of the header, or address of the module."""
+"""Give each signal of a draft the next free pin of the header or address of the module."""
 
 from collections.abc import Iterator
 from itertools import count
@@ -13,20 +13,20 @@ relay belongs where that keeps it off. Source: BCM2835 ARM Peripherals, table 6-
 
 
 class FreePoints(Protocol):
-    """Where the next signals are wired; each answer is the inside of a YAML mapping."""
+    """The next free points; each method returns the inside of a YAML mapping."""
 
     def contact(self) -> str:
-        """A contact that is closed while its signal is on; a cut wire reads off."""
+        """Place a contact that is closed while its signal is on; a cut wire reads off."""
 
     def loop(self) -> str:
-        """A contact that opens to say its signal, as an alarm loop does; a cut wire reads on."""
+        """Place a contact that is open while its signal is on (an alarm loop); a cut wire reads on."""
 
     def relay(self) -> str:
-        """A relay that works when it is on."""
+        """Place a relay that acts while energised."""
 
 
 class PinHeader:
-    """The Pi's 40-pin header. Its methods raise Impossible when its pins are used up."""
+    """The Pi's 40-pin header. Its methods raise Impossible when no pin is left."""
 
     def __init__(self, contacts: Level, relays: Level) -> None:
         self._closed, self._relays = contacts, relays
@@ -36,16 +36,16 @@ class PinHeader:
         self._inputs = list(REST_HIGH if high else REST_LOW)
 
     def contact(self) -> str:
-        """The next pin for an input, pulled to the level of an open contact."""
+        """Take the next input pin, pulled to the level of an open contact."""
         return f'point: "J8:{self._input()}", active: {self._closed}, pull: {self._pull}'
 
     def loop(self) -> str:
-        """The same, on while the contact is open."""
+        """Take the next input pin, on while the contact is open."""
         opened = "low" if self._closed == "high" else "high"
         return f'point: "J8:{self._input()}", active: {opened}, pull: {self._pull}'
 
     def relay(self) -> str:
-        """The next pin whose relay stays off from power-on."""
+        """Take the next pin whose relay stays off from power-on."""
         return f'point: "J8:{_first(self._outputs)}", active: {self._relays}'
 
     def _input(self) -> int:
@@ -70,20 +70,20 @@ class Module:
         self._coils: Iterator[int] = count()
 
     def contact(self) -> str:
-        """The next discrete input; an open contact reads 0."""
+        """Take the next discrete input; an open contact reads 0."""
         return f'point: "unit {self._unit} discrete input {next(self._inputs)}", active: high'
 
     def loop(self) -> str:
-        """The same, on while it reads 0."""
+        """Take the next discrete input, on while it reads 0."""
         return f'point: "unit {self._unit} discrete input {next(self._inputs)}", active: low'
 
     def relay(self) -> str:
-        """The next coil."""
+        """Take the next coil."""
         return f'point: "unit {self._unit} coil {next(self._coils)}", active: high'
 
 
 def points_for(answers: DraftAnswers) -> FreePoints:
-    """A fresh set of points for this wiring."""
+    """Return all points of this wiring, none taken yet."""
     if answers.wiring == "gpio":
         return PinHeader(answers.contacts, answers.relays)
     return Module(answers.unit)

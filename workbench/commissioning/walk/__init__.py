@@ -1,5 +1,5 @@
-"""`rmf-bridge walk`: every input and output of a device tried with the electrician, and signed.
+"""`rmf-bridge walk`: try every input and output of a device with the electrician; sign the record.
 
-`core.py` decides (pure), `steps.py` says what can be tried of each kind, `bench.py` scans the device,
-`tap.py` shows the levels of its contacts, `screen.py` draws, `signed.py` writes the record.
+`core.py` decides (pure), `steps.py` lists the outputs to try, `bench.py` scans the device, `tap.py`
+shows the levels of its contacts, `screen.py` draws, `signed.py` writes the record.
 """

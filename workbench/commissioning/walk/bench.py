@@ -1,4 +1,4 @@
-"""Scans one device for a walk, on its own thread: a slow or dead terminal delays no output's end."""
+"""Scan one device for a walk, on its own thread: a slow or dead terminal delays no switching off."""
 
 import threading
 import time
@@ -27,7 +27,7 @@ SCAN_S: Final = 0.05
 
 @dataclass(slots=True)
 class ContactReading:
-    """One contact as it was read. `seen`: the meanings that it has shown so far."""
+    """One contact's latest reading. `seen`: its meanings seen so far."""
 
     wire: Wire
     point: str
@@ -37,14 +37,14 @@ class ContactReading:
 
     @property
     def asserted(self) -> bool | None:
-        """What its level means; None before it was read."""
+        """The level's meaning; None before the first reading."""
         return None if self.level is None else self.wire.asserted(self.level)
 
 
 class Bench:
-    """A device under test on its bus, which has a tap. `off`: every output off.
+    """A device under test on its tapped bus. `off`: the outputs with every one off.
 
-    Use it as a context: at its end every output is off, `verified_off` says whether that was seen.
+    Use as a context: at its end every output is off; `verified_off`: was this read back?
     """
 
     def __init__(
@@ -76,12 +76,12 @@ class Bench:
         self._thread.join()
 
     def put(self, event: Event) -> None:
-        """Something that the person did; from any thread."""
+        """Queue the person's action; from any thread."""
         self._events.append(event)
 
     @property
     def decoded(self) -> str:
-        """What the driver makes of the inputs, in words."""
+        """Return the driver's decoding of the inputs, in words."""
         return "" if self.memory.sample is None else plain(self.memory.sample)
 
     def _run(self) -> None:
@@ -125,7 +125,7 @@ class Bench:
         return InputsRead(sample)
 
     def _make_safe(self) -> bool:
-        """Without outputs to try, nothing was commanded, and a charge under way goes on."""
+        """Switch all outputs off. Without outputs to try do nothing: a running charge goes on."""
         if not self.steps:
             return True
         if why := not_off(self._driver, self._bus.insist):

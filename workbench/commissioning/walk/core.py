@@ -1,8 +1,8 @@
-"""When an output of a walk is on, and what counts as seen. Pure: time is an argument.
+"""Decide when an output of a walk is on and when its effect counts as seen. Pure: time is an argument.
 
-One output at a time, for ON_S at most; off at once where a reading fails, grows old, or shows that the
-output must not be on. Feedback may come later than the output: a car needs its time. What the inputs
-showed before the output was switched on is no feedback.
+One output at a time, for ON_S at most; off at once if a reading fails, grows old, or shows that the
+output must not be on. Feedback may follow late: a car needs time to move. Inputs that were already on
+before the output do not count as feedback.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -12,15 +12,15 @@ from typing import Any, Final
 ON_S: Final = 5.0
 FEEDBACK_S: Final = 120.0
 STALE_S: Final = 1.0
-"""No output is switched on, or stays on, with a reading older than this."""
+"""Oldest reading with which an output is switched on or stays on."""
 
 
 @dataclass(frozen=True, slots=True)
 class WalkStep:
-    """One output to try. `outputs`: the driver's, with this one on. `expects`: what should be seen.
+    """One output to try. `outputs`: the driver's, with this one on. `expects`: the effect to see.
 
-    `seen(sample)`: whether it is; None where no input shows it. `hindrance(sample)`: why the output
-    must not be on now, "" if it may.
+    `seen(sample)`: is the effect there? None if no input shows it. `hindrance(sample)`: why the
+    output must not be on now, "" if it may.
     """
 
     name: str
@@ -33,10 +33,10 @@ class WalkStep:
 
 @dataclass(frozen=True, slots=True)
 class WalkMemory:
-    """What a walk knows. `on`: the step whose output is on. `off_at`: when it goes off (s).
+    """The memory of a walk. `on`: the step whose output is on. `off_at`: time of its end (s).
 
-    `waits`: the step whose feedback may still come, until `waits_until`. `results`: step -> what was
-    seen of it. `says`: why the last key did nothing, or an output went off.
+    `waits`: the step whose feedback may still come, until `waits_until`. `results`: step -> the effect
+    seen. `says`: why the last key did nothing, or an output went off.
     """
 
     sample: Any = None
@@ -66,14 +66,14 @@ class InputsLost:
 
 @dataclass(frozen=True, slots=True)
 class Switch:
-    """The person wants this step's output on, or off if it is on."""
+    """The person toggles this step's output."""
 
     step: int
 
 
 @dataclass(frozen=True, slots=True)
 class ByEye:
-    """The person has seen this step's effect, or has seen that there is none."""
+    """The person has seen this step's effect, or its absence."""
 
     step: int
     seen: bool
@@ -87,7 +87,7 @@ Event = InputsRead | InputsLost | Switch | ByEye | Tick
 
 
 def decide(memory: WalkMemory, event: Event, now: float, steps: Sequence[WalkStep]) -> WalkMemory:
-    """The memory after this event."""
+    """Return the memory after this event."""
     match event:
         case InputsRead(sample):
             memory = replace(memory, sample=sample, read_at=now, why_lost="")
@@ -102,7 +102,7 @@ def decide(memory: WalkMemory, event: Event, now: float, steps: Sequence[WalkSte
 
 
 def output_of(memory: WalkMemory, steps: Sequence[WalkStep]) -> Any:
-    """The outputs to write; None for all off."""
+    """Return the outputs to write; None for all off."""
     return None if memory.on is None else steps[memory.on].outputs
 
 
@@ -151,7 +151,7 @@ def _hindrance(memory: WalkMemory, now: float, step: WalkStep) -> str:
 
 
 def _feedback(memory: WalkMemory, now: float, steps: Sequence[WalkStep]) -> WalkMemory:
-    """What the inputs show of the step that waits for them."""
+    """Check the inputs for the feedback that a step waits for."""
     if memory.waits is None:
         return memory
     step = steps[memory.waits]

@@ -1,4 +1,4 @@
-"""A walk on a terminal, also that of a phone: tables that are redrawn in place, and keys."""
+"""A walk on a terminal, even a phone's: tables redrawn in place, and keys."""
 
 import os
 import re
@@ -19,7 +19,7 @@ from workbench.commissioning.walk.signed import NOT_TRIED
 
 HELP: Final = "ENTER on/off   n next   p back   y seen   x not seen   q end"
 WIDE: Final = 60
-"""Columns from which the wires are shown too: a phone has about 40."""
+"""Least columns for showing the wires too; a phone has about 40."""
 HEADINGS: Final = 2
 BOLD, DIM, ALARM, ON = "1", "2", "1;31", "1;33"
 HIDE_CURSOR, SHOW_CURSOR = "\x1b[?25l", "\x1b[?25h"
@@ -27,11 +27,11 @@ UP, DOWN = "\x1b[A", "\x1b[B"
 KEY: Final = re.compile(r"\x1b\[[A-Z]|.", re.S)
 
 Lines = list[tuple[str, str]]
-"""Each with its style (`bridges/host/paint.py`)."""
+"""Texts, each with its style (`bridges/host/paint.py`)."""
 
 
 class Screen:
-    """What the person sees and types. `cursor`: the output that ENTER switches."""
+    """Display and keys. `cursor`: the output that ENTER switches."""
 
     def __init__(self, device: str, bench: Bench) -> None:
         self._device = device
@@ -57,7 +57,7 @@ class Screen:
         self._above = len(above)
 
     def obey(self, key: str) -> bool:
-        """Act on a key. False for the one that ends the walk."""
+        """Act on a key. Return False for the key that ends the walk."""
         steps = len(self._bench.steps)
         if key == "q":
             return False
@@ -74,7 +74,7 @@ class Screen:
         return True
 
     def page(self, now: float, columns: int, rows: int) -> Lines:
-        """Everything as it is now, as far as there is room."""
+        """Return the present display, as far as there is room."""
         memory = self._bench.memory
         age = "not read yet" if memory.read_at is None else f"read {now - memory.read_at:.1f} s ago"
         texts = (
@@ -94,7 +94,7 @@ class Screen:
         return [*title, *inputs, *decoded, *outputs, *(line for part in below for line in part)]
 
     def _selected(self) -> str:
-        """What the output at the cursor does, and what was seen of it."""
+        """Describe the output at the cursor and its effect seen so far."""
         if not self._bench.steps:
             return "no output can be tried here"
         step = self._bench.steps[self._cursor]
@@ -102,7 +102,7 @@ class Screen:
         return f"{step.name} {step.does}; should be seen: {step.expects}. So far: {seen}"
 
     def _inputs(self, now: float, most: int, columns: int) -> Lines:
-        """Every input; where there is no room, those that have changed last."""
+        """List every input; without enough room, the latest changes."""
         known = self._bench.inputs
         if not known:
             nothing = "no contacts: registers or messages, decoded"
@@ -120,7 +120,7 @@ class Screen:
         ]
 
     def _outputs(self, now: float, most: int, columns: int) -> Lines:
-        """Every output; where there is no room, those around the cursor."""
+        """List every output; without enough room, those around the cursor."""
         memory, steps = self._bench.memory, self._bench.steps
         rows, styles = [("", "output", "is", "seen")], [DIM]
         first = max(0, min(self._cursor - most // 2, len(steps) - most))
@@ -134,29 +134,29 @@ class Screen:
 
 
 class Room(NamedTuple):
-    """How many rows of inputs and of outputs fit."""
+    """The number of rows for inputs and for outputs."""
 
     inputs: int
     outputs: int
 
 
 def room(rows: int, inputs: int, outputs: int) -> Room:
-    """Share so many rows: three outputs at least, then inputs, then more outputs."""
+    """Share out the rows: at least three for outputs, then inputs, then more outputs."""
     least = min(outputs, 3)
     if inputs + least <= rows:
         return Room(inputs, min(outputs, rows - inputs))
-    for_inputs = max(1, rows - least - 1)  # a row says how many more there are
+    for_inputs = max(1, rows - least - 1)  # one row counts the hidden ones
     return Room(for_inputs, least)
 
 
 def _short(result: str) -> str:
-    """A result as a word or two, for the table."""
+    """Shorten a result to a word or two for the table."""
     known = (word for word in ("seen", "not seen") if result.startswith(word))
     return next(known, "nothing yet" if result else "")
 
 
 def _fitted(rows: Sequence[tuple[str, ...]], names: int, columns: int) -> list[str]:
-    """The rows as lines; where they are too long, the names in this column are cut."""
+    """Format the rows as lines; cut the names in this column if lines are too long."""
     lines = aligned(rows)
     if (over := max(map(width, lines)) - columns) > 0:
         longest = max(width(row[names]) for row in rows)
@@ -181,7 +181,7 @@ def _row(one: ContactReading, now: float) -> tuple[str, ...]:
 
 @contextmanager
 def keyboard() -> Iterator[int]:
-    """The terminal, giving single keys. Puts it back as it was."""
+    """Switch the terminal to single keys; restore it at the end."""
     terminal = sys.stdin.fileno()
     before = termios.tcgetattr(terminal)
     tty.setcbreak(terminal)
@@ -192,7 +192,7 @@ def keyboard() -> Iterator[int]:
 
 
 def keys(terminal: int, wait_s: float) -> list[str]:
-    """The keys that were pressed; none after `wait_s`, "q" if the terminal has gone."""
+    """Return the pressed keys; none after `wait_s`, "q" if the terminal is gone."""
     if not select.select([terminal], [], [], wait_s)[0]:
         return []
     try:

@@ -1,4 +1,4 @@
-"""The record of a walk: what was tried, what was seen, of which file, by whom. Markdown and JSON."""
+"""The record of a walk: file, tests, results and signature. Markdown and JSON."""
 
 import hashlib
 import json
@@ -27,7 +27,7 @@ def record(
     end: str,
     simulated: bool,
 ) -> dict[str, Any]:
-    """The record. `at`: when the walk began. `end`: how it ended, or that it has not."""
+    """Return the record. `at`: start of the walk. `end`: how the walk ended, or that it has not."""
     return {
         "file": str(file),
         "sha256": hashlib.sha256(file.read_bytes()).hexdigest(),
@@ -58,7 +58,7 @@ def _seen(one: ContactReading) -> str:
 
 
 def markdown(record: dict[str, Any]) -> str:
-    """The record for people; it is signed below."""
+    """Format the record for people, with room for the signature below."""
     practice = " on fake hardware: practice, no commissioning" if record["simulated"] else ""
     lines = [
         f"# Walk of {record['device']}{practice}",

@@ -1,4 +1,4 @@
-"""The outputs of each kind that a walk tries, and what its inputs should then show."""
+"""The outputs that a walk tries for each kind, and the feedback expected on the inputs."""
 
 from collections.abc import Callable, Collection, Iterator
 from typing import Any, Final
@@ -11,7 +11,7 @@ from bridges.settings.load import Config
 from workbench.commissioning.walk.core import WalkStep
 
 Wired = Collection[str] | None
-"""The names of the output lines; None where the driver has no lines."""
+"""Names of the output lines; None if the driver has no lines."""
 
 
 def _lift(settings: LiftSettings, wired: Wired) -> Iterator[WalkStep]:
@@ -113,7 +113,7 @@ OFF: Final = {"lift": LiftOutputs(), "door": DoorOutputs(), "charger": ChargerOu
 
 
 def steps(config: Config, device: str) -> list[WalkStep]:
-    """Every output of a device, in the order in which they are tried."""
+    """Return every output of a device, in the order of testing."""
     wires = config.wires(device)
     wired = {wire.signal for wire in wires if wire.direction == "out"} if wires else None
     return list(KINDS[config.kind](config.devices[device], wired))

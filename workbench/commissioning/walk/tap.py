@@ -1,4 +1,4 @@
-"""A bus with a tap: the driver works on it as ever, and the levels that it reads can be seen."""
+"""A bus with a tap: the driver works as usual, and the levels it reads can be seen."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -7,7 +7,7 @@ from drivers.hal.points import Lines, Pull
 
 
 class TappedLines:
-    """Lines that remember what was read."""
+    """Lines that remember the levels read."""
 
     def __init__(self, lines: Lines, levels: dict[str, int]) -> None:
         self.claim = lines.claim
@@ -20,7 +20,7 @@ class TappedLines:
         self._levels = levels
 
     def read(self) -> Mapping[str, int]:
-        """Every input's level, read now. Raises HalError."""
+        """Read every input's level. Raises HalError."""
         found = self._lines.read()
         self._levels.update(found)
         return found
@@ -38,9 +38,9 @@ class Tap:
         self.close = bus.close
 
     def __getattr__(self, name: str) -> Any:
-        """What else the driver needs of its bus."""
+        """Pass on everything else to the bus."""
         return getattr(self._bus, name)
 
     def lines(self, inputs: Mapping[str, Pull | None], outputs: Mapping[str, bool]) -> TappedLines:
-        """A set of points for one device, whose readings are seen here."""
+        """Return one device's points, whose readings are remembered here."""
         return TappedLines(self._bus.lines(inputs, outputs), self.levels)
