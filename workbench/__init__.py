@@ -1,1 +1,1 @@
-"""What people use to look at bridges, try them and commission them. No daemon loads any of it."""
+"""Tools for people: observe, try and commission bridges. No daemon imports this package."""

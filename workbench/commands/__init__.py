@@ -1,1 +1,1 @@
-"""The subcommands of `rmf-bridge` that no daemon needs, a file each."""
+"""The subcommands of `rmf-bridge` that no daemon needs, one file each."""

@@ -1,7 +1,7 @@
-"""`rmf-bridge doctor FILE`: what stands between this machine and a bridge that works, and what to do.
+"""`rmf-bridge doctor FILE`: find and explain the obstacles to a working bridge on this machine.
 
-On the target machine, before and after installing. It reads, and switches nothing, except the one
-output of a `--kill-test`. It opens no bus of a running service. Its subjects: `commissioning/doctor/`.
+For the target machine, before and after installing. It only reads; `--kill-test` alone switches one
+output. It opens no bus of a running service. Its subjects: `commissioning/doctor/`.
 """
 
 import argparse
@@ -33,7 +33,7 @@ LISTEN_S: Final = 3.0
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """The options of `doctor`."""
+    """Add the options of `doctor`."""
     parser.add_argument("file", type=Path, metavar="FILE", help="the device YAML")
     parser.add_argument("--json", action="store_true", help="for programs")
     parser.add_argument(
@@ -74,8 +74,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """0 all well, 1 warnings, 2 something is wrong, 64 not confirmed, 78 a YAML that is wrong."""
-    log.start("CRITICAL")  # what the buses would log is told as findings
+    """Return 0: all well, 1: warnings, 2: something is wrong, 64: not confirmed, 78: wrong YAML."""
+    log.start("CRITICAL")  # findings replace the buses' log messages
     try:
         config = load(args.file)
         config = replace(config, rmf=overridden(config.rmf, args))
@@ -121,7 +121,7 @@ def _building(file: str | None) -> "BuildingMap | None":
 
 
 def _not_confirmed(config: Config, args: argparse.Namespace) -> str:
-    """Why no output may be switched on; "" if it may."""
+    """Return why no output may be switched on; "" if allowed."""
     from workbench.commissioning.doctor.victim import step_called
 
     try:
@@ -159,18 +159,18 @@ def _examined(
 
 
 def _nothing(one: Finding) -> None:
-    """JSON is printed at the end."""
+    """Show nothing: JSON is printed at the end."""
 
 
 class FindingsText:
-    """The findings as they come, under a heading for each subject."""
+    """Print findings as they come, under a heading for each subject."""
 
     def __init__(self, out: TextIO) -> None:
         self._out = out
         self._subject = ""
 
     def show(self, one: Finding) -> None:
-        """A line, and what it means and what to do below it."""
+        """Print a finding's line, and its meaning and remedy below."""
         if one.subject != self._subject:
             self._subject = one.subject
             print(bold(printable(one.subject), self._out), file=self._out)

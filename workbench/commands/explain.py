@@ -37,7 +37,7 @@ AGAIN_S: Final = 1.0
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Options of `explain`."""
+    """Add the options of `explain`."""
     parser.add_argument(
         "file",
         type=Path,
@@ -70,8 +70,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """0; 1 when the device or anything of RMF was not heard, or the graph cannot be joined; 66 when
-    FILE is not a recording that can be read."""
+    """Return 0; 1 if the device or RMF was not heard or the graph cannot be joined; 66 if FILE is
+    no readable recording."""
     if (args.file is None) == (args.live is None):
         complain("explain", "name either a FILE or --live DEVICE")
         return 2
@@ -106,7 +106,7 @@ def _recorded(args: argparse.Namespace) -> int:
 
 
 def _all(site: HeardDevices, devices: list[tuple[Kind, str]], *, as_json: bool) -> int:
-    """Each device in a line, or as JSON."""
+    """Print each device in a line, or as JSON."""
     told = [site.explain(kind, name, None, faults.for_explain()) for kind, name in devices]
     if as_json:
         print(json.dumps([asdict(one) for one in told]))
@@ -118,7 +118,7 @@ def _all(site: HeardDevices, devices: list[tuple[Kind, str]], *, as_json: bool) 
 
 
 def _one(site: HeardDevices, args: argparse.Namespace) -> int:
-    """The device that was named, or the only one."""
+    """Print the named device, or the only one."""
     name = args.device or args.live or site.devices()[0][1]
     kinds = [args.kind] if args.kind else site.kinds(name) or ["lift"]
     if len(kinds) > 1:
@@ -154,7 +154,7 @@ def _live(args: argparse.Namespace) -> int:
 
 
 def _listen(ear: Ear, site: HeardDevices, for_s: float) -> None:
-    """Listen for this long (s)."""
+    """Listen for this time (s)."""
     until = time.monotonic() + for_s
     site.pass_time(time.monotonic(), time.time())
     while (left_s := until - time.monotonic()) > 0:

@@ -7,7 +7,7 @@ from workbench.graph.plants import MODES, add_simulation, names, obey, tell
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """The options of `fail`."""
+    """Add the options of `fail`."""
     add_simulation(parser)
     part = parser.add_argument(
         "part",
@@ -20,7 +20,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """0; 1 if it cannot fail like this; 69 if no simulation of the file runs."""
+    """Return 0; 1 if the part cannot fail like this; 69 if no simulation of the file runs."""
     if args.part is None:
         return tell(args, "fail")
     if args.mode is None:

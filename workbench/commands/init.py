@@ -1,6 +1,6 @@
-"""`rmf-bridge init FILE`: write a first YAML for the device that stands in front of you.
+"""`rmf-bridge init FILE`: write a first YAML for the device in front of you.
 
-It asks, or takes every answer as an option. What it writes passes `check`; it never overwrites a file.
+It asks, or takes every answer as an option. The new file passes `check`; no file is overwritten.
 """
 
 import argparse
@@ -36,9 +36,9 @@ Given = dict[str, Any]
 
 @dataclass(frozen=True, slots=True)
 class Question:
-    """One answer: its name in DraftAnswers, how to ask for it, and when.
+    """One question: its name in DraftAnswers, its text and its condition.
 
-    `offered`: the answer to begin with. `choices`: all that are possible; () for any text.
+    `offered`: the default answer. `choices`: the possible answers; () for any text.
     """
 
     name: str
@@ -115,7 +115,7 @@ QUESTIONS: Final = (
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """The file, and an option for each question."""
+    """Add the file, and an option for each question."""
     parser.add_argument("file", type=Path, metavar="FILE", help="the YAML to write")
     parser.add_argument("--kind", choices=get_args(Kind))
     parser.add_argument("--name", help="as on RMF's map")
@@ -140,7 +140,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """0; 64: answers are missing or do not go together; 66: the map; 73: the file is there already."""
+    """Return 0; 64: answers missing or contradictory; 66: unreadable map; 73: the file exists."""
     if os.path.lexists(args.file):  # before anything is asked
         return _there_already(args.file)
     if why := no_folder(args.file):
@@ -187,7 +187,7 @@ def _written(file: Path, given: Given) -> int:
 
 
 def answered(args: argparse.Namespace, found: BuildingMap | None) -> Given:
-    """Every answer: from the options, else from the map, else by asking. Raises Impossible."""
+    """Return every answer: from the options, else from the map, else by asking. Raises Impossible."""
     given: Given = {}
     for question in QUESTIONS:
         if not _needed(question, given, args):
@@ -212,7 +212,7 @@ def _needed(question: Question, given: Given, args: argparse.Namespace) -> bool:
 
 
 def _of_map(name: str, given: Given, found: BuildingMap | None) -> str | None:
-    """The answer that the map leaves no choice about."""
+    """Return the answer if the map has only one."""
     if found is None:
         return None
     if name == "name" and len(names := tuple(found.named[given["kind"]])) == 1:
@@ -248,7 +248,7 @@ def _ask(question: Question, offered: str, given: Given, found: BuildingMap | No
 
 
 def answers(given: Given) -> DraftAnswers:
-    """The answers as the draft takes them. Raises Impossible with what to write instead."""
+    """Convert the answers for the draft. Raises Impossible with the remedy."""
     told = dict(given)
     for name, most in (("unit", 247), ("domain_id", 232)):
         if name in told:
@@ -273,15 +273,15 @@ def _number(name: str, text: str, most: int) -> int:
 
 
 def write(path: Path, text: str) -> None:
-    """Write a new file. Raises OSError if there is one already, or it cannot be written."""
+    """Write a new file. Raises OSError if it exists or cannot be written."""
     with path.open("x", encoding="utf-8") as out:
         out.write(text)
 
 
 def _schema_line() -> str:
-    """The line by which an editor completes and checks the file; "" if the schema cannot be kept.
+    """Return the line with which editors complete and check the file; "" if no schema can be stored.
 
-    The schema of this version is kept among the user's data.
+    This version's schema is stored in the user's data directory.
     """
     from workbench.commissioning.reference import schema
 

@@ -1,9 +1,9 @@
 """`rmf-bridge judge`: check any lift, door or charger node against RMF's contract.
 
 `workbench/judge/` has the laws and the plays; here are the options, the graph, the clock and the
-verdict. Exit code 0: every law that was seen is kept. 1: one is broken. 2: a wrong command line.
-66: the recording cannot be read. 69: nothing was heard, the graph cannot be joined, or what was to
-be played was not.
+verdict. Exit code 0: every observed law is kept. 1: one is broken. 2: a wrong command line.
+66: the recording cannot be read. 69: nothing was heard, the graph cannot be joined, or the play was
+not performed.
 """
 
 import argparse
@@ -51,11 +51,11 @@ BESIDE: dict[str, tuple[str, ...]] = {
     "fleet": (topics.ADAPTER_LIFT_REQUESTS.name, topics.ADAPTER_DOOR_REQUESTS.name),
     "coordinator": (topics.CHARGER_REQUESTS.name, topics.CHARGER_CANCELS.name),
 }
-"""Whose topics a play may share, with `--beside`."""
+"""Nodes whose topics a play may share, with `--beside`."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Which device, for how long, and what to play."""
+    """Add the options: device, time, and play."""
     parser.add_argument("kind", choices=KINDS)
     parser.add_argument("name", metavar="NAME", nargs="?", help="the device, as RMF names it")
     add_graph_arguments(parser)
@@ -126,7 +126,7 @@ def _add_plays(parser: argparse.ArgumentParser) -> None:
 
 
 def performance_of(args: argparse.Namespace) -> Scenario | None:
-    """What is to be played; None to listen alone. A contradiction ends with exit code 2."""
+    """Return the play; None to listen only. Contradictory options end with exit code 2."""
     kinds: dict[Kind, bool] = {
         "lift": args.ride is not None,
         "door": args.passages is not None,
@@ -156,7 +156,7 @@ def performance_of(args: argparse.Namespace) -> Scenario | None:
 
 
 def words_of(args: argparse.Namespace) -> str:
-    """The device, in words."""
+    """Name the device in words."""
     return f"the {args.kind} {shown(args.name)}"
 
 
@@ -211,7 +211,7 @@ def _live(args: argparse.Namespace, performance: Scenario | None) -> int:
 
 
 def _begins(args: argparse.Namespace, performance: Scenario | None) -> str:
-    """What is under way, for whoever waits for the verdict."""
+    """Describe the judging under way to the waiting user."""
     if performance is not None:
         return f"plays with {words_of(args)}; Ctrl-C releases it, and judges"
     until = "until Ctrl-C" if args.for_s == NEVER else f"for {args.for_s:g} s"
@@ -219,7 +219,7 @@ def _begins(args: argparse.Namespace, performance: Scenario | None) -> str:
 
 
 def tell(found: Judgement, args: argparse.Namespace) -> int:
-    """Print the verdict, write the file, and give the exit code."""
+    """Print the verdict, write the file, and return the exit code."""
     if args.junit is not None:
         try:
             args.junit.write_text(junit(found), "utf-8")
@@ -235,7 +235,7 @@ def tell(found: Judgement, args: argparse.Namespace) -> int:
 
 
 class Live:
-    """The graph: what is heard on it, in order of arrival, and what is said."""
+    """The live graph: messages heard, in order of arrival, and messages published."""
 
     def __init__(
         self, transport: Transport, kind: Kind, beside: list[str], performance: Scenario | None
@@ -251,7 +251,7 @@ class Live:
         self._looked_at = 0.0
 
     def strangers(self) -> str:
-        """Who else publishes on the play's topics."""
+        """Return other publishers on the play's topics."""
         found = [name for name in self._sole if self._ear.ends[name].matched()]
         if not found:
             return ""
@@ -260,7 +260,7 @@ class Live:
         return f"others publish on {', '.join(found)}: to play all the same, add {beside}"
 
     def judge(self, judging: JudgeRun) -> None:
-        """Run until there is a verdict. Whatever ends a play, the device is released first."""
+        """Run until there is a verdict. However a play ends, the device is released first."""
         judging.begin(time.monotonic(), time.time())
         try:
             with _told_to_end() as told:
@@ -295,7 +295,7 @@ class Live:
 
 @contextmanager
 def _told_to_end() -> Iterator[Callable[[], bool]]:
-    """Whether Ctrl-C, SIGTERM or SIGHUP has come; none of them interrupts what is under way."""
+    """Has Ctrl-C, SIGTERM or SIGHUP come? None of them interrupts the present step."""
     told: list[int] = []
     with ended_by(lambda number, _: told.append(number)):
         yield lambda: bool(told)

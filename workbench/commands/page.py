@@ -1,4 +1,4 @@
-"""`rmf-bridge page`: a web page of what is on RMF's graph, or of one recording.
+"""`rmf-bridge page`: a web page of RMF's graph, live, or of one recording.
 
 It needs the extra `page` (NiceGUI), which no daemon imports. It listens on 127.0.0.1 unless `--listen`
 says otherwise, which needs a password file or a reverse proxy.
@@ -21,11 +21,11 @@ from workbench.graph.join import add_graph_arguments, command_line, complain, op
 PORT: Final = 8080
 LOOPBACK: Final = "127.0.0.1"
 RECORDER: Final = Path("/var/lib/rmf-bridge-recorder")
-"""`rmf-bridge-recorder.service` writes there."""
+"""The folder of `rmf-bridge-recorder.service`."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """The options of `page`."""
+    """Add the options of `page`."""
     parser.add_argument(
         "recording", nargs="?", type=Path, metavar="FILE", help="show this recording, and no graph"
     )
@@ -67,7 +67,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _incidents() -> Path:
-    """The recorder service's folder where this user may read it, else this user's own recorder's."""
+    """Return the recorder service's folder if this user may read it, else the user's own recorder's."""
     if os.access(RECORDER, os.R_OK | os.X_OK):
         return RECORDER
     return directories.state_base() / "recordings"
@@ -87,7 +87,7 @@ def _address(text: str) -> tuple[str, int]:
 
 
 def run(args: argparse.Namespace) -> int:
-    """0 after Ctrl-C or SIGTERM; 64, 66, 69 or 78 with what to do."""
+    """Return 0 after Ctrl-C or SIGTERM; 64, 66, 69 or 78 with the remedy printed."""
     from workbench.page.access import PasswordError, users
 
     log.start()
@@ -116,7 +116,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _serve(args: argparse.Namespace, opened: socket.socket, known: Mapping[str, str]) -> int:
-    """With NiceGUI, whose import takes seconds on a Raspberry Pi: what is wrong was said before."""
+    """Serve with NiceGUI. Errors are reported before: its import takes seconds on a Raspberry Pi."""
     try:
         from workbench.page import web
     except ImportError as error:
@@ -131,7 +131,7 @@ def _family(address: str) -> socket.AddressFamily:
 
 
 def _unreadable(recording: Path) -> int:
-    """An exit code where nothing can be shown of this recording; 0 where something can."""
+    """Return 0 if anything in this recording can be shown, else the exit code."""
     from workbench.replay.bags import BagError, Notes, all_in
     from workbench.replay.recordings import unreadable
 
@@ -165,7 +165,7 @@ def _add_user(args: argparse.Namespace) -> int:
 
 
 def _unsafe(args: argparse.Namespace) -> str:
-    """Why the page may not listen there; "" if it may."""
+    """Return why the page may not listen there; "" if allowed."""
     loopback = ipaddress.ip_address(args.listen[0]).is_loopback
     if loopback or args.passwords or args.proxy:
         return ""

@@ -1,7 +1,7 @@
 """`rmf-bridge plot`: the timeline of a device from a recording, as one file: HTML, SVG or PNG.
 
-The file needs no network and no script. HTML has the explanation under the picture. PNG is made of
-the SVG by resvg, an extra, imported here and nowhere else.
+The file needs no network and no script. HTML has the explanation under the picture. PNG is rendered
+from the SVG by resvg, an extra, imported only here.
 """
 
 import argparse
@@ -29,11 +29,11 @@ NARROWEST, WIDEST = 480, 8000
 
 
 class PlotError(Exception):
-    """No picture can be made. The text says what to do."""
+    """No picture can be made. The text gives the remedy."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Options of `plot`."""
+    """Add the options of `plot`."""
     parser.add_argument(
         "file", type=Path, metavar="FILE", help="a recording, as `explain` reads it"
     )
@@ -75,8 +75,8 @@ def _width(text: str) -> int:
 
 
 def run(args: argparse.Namespace) -> int:
-    """0; 1 when there is nothing to draw, or the picture cannot be written; 66 when FILE is no
-    recording that can be read."""
+    """Return 0; 1 if there is nothing to draw or the picture cannot be written; 66 if FILE is no
+    readable recording."""
     try:
         name = args.device or _only(args)
         timeline, words = _read(args, name)
@@ -94,7 +94,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _only(args: argparse.Namespace) -> str:
-    """The only device of the recording. Raises PlotError where there are more."""
+    """Return the recording's only device. Raises PlotError if there are more."""
     site = HeardDevices()
     for heard in told_between(args.file, RecordingSpan(args.from_, args.to), "plot", ""):
         site.take(heard)
@@ -108,7 +108,7 @@ def _only(args: argparse.Namespace) -> str:
 
 
 def _read(args: argparse.Namespace, name: str) -> tuple[Timeline, list[str]]:
-    """The device's lanes, and its explanation in lines. Raises PlotError if it shows no state."""
+    """Return the device's lanes, and its explanation in lines. Raises PlotError without a state."""
     span, site = RecordingSpan(args.from_, args.to), HeardDevices(name)
     drawings = {kind: Drawing(kind, name) for kind in KINDS if args.kind in (None, kind)}
     for heard in told_between(args.file, span, "plot", name):
@@ -136,7 +136,7 @@ def _picture(args: argparse.Namespace, timeline: Timeline, words: list[str]) -> 
 
 
 def _png(picture: str) -> bytes:
-    """Raises PlotError without resvg."""
+    """Render the PNG. Raises PlotError without resvg."""
     try:
         import resvg_py
     except ImportError:
@@ -145,7 +145,7 @@ def _png(picture: str) -> bytes:
 
 
 def _page(picture: str, words: list[str], theme: Theme | None) -> Iterator[str]:
-    """One page, with the picture in it. A narrow screen scrolls the picture."""
+    """Return a page with the picture in it. A narrow screen scrolls the picture."""
     colours = [
         f"body{{background:{PAPER[theme or 'light'][0]};color:{PAPER[theme or 'light'][1]}}}"
     ]
@@ -166,7 +166,7 @@ def _page(picture: str, words: list[str], theme: Theme | None) -> Iterator[str]:
 
 
 def _write(file: Path, content: bytes) -> None:
-    """Whole or not at all. Raises PlotError."""
+    """Write the whole file or none. Raises PlotError."""
     beside = file.with_name(f".{file.name}.{os.getpid()}")
     try:
         try:

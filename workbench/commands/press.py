@@ -7,7 +7,7 @@ from workbench.graph.plants import add_simulation, names, obey, tell
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """The options of `press`."""
+    """Add the options of `press`."""
     add_simulation(parser)
     signal = parser.add_argument(
         "signal", metavar="SIGNAL", nargs="?", help="without one: print what there is"
@@ -17,7 +17,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """0; 1 if there is no such signal; 69 if no simulation of the file runs."""
+    """Return 0; 1 if there is no such signal; 69 if no simulation of the file runs."""
     if args.signal is None:
         return tell(args, "press")
     return obey(args, "press", args.signal, args.how)

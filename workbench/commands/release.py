@@ -1,10 +1,9 @@
-"""`rmf-bridge release LIFT`: an operator ends the session of whoever holds a lift.
+"""`rmf-bridge release LIFT`: an operator ends a lift's present session.
 
-It is `send lift LIFT --end` under the name that an operator looks for: it sends the holder's
-END_SESSION to the lift supervisor until the lift shows that the session is over. If the supervisor does
-not obey within seconds, or there is none, it goes to the lift's own daemon by itself; where a robot may
-be in the car, only with `--car-empty`. A robot that keeps requesting the lift goes to the end of the
-queue.
+This is `send lift LIFT --end` under an operator's word: it sends the holder's END_SESSION to the lift
+supervisor until the lift shows the session's end. If the supervisor is missing or does not obey within
+seconds, the request goes directly to the lift's own daemon; if a robot may be in the car, only with
+`--car-empty`. A robot that keeps requesting the lift goes to the end of the queue.
 """
 
 import argparse
@@ -13,7 +12,7 @@ from workbench.commands import send
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """The lift, and the options that every sender has."""
+    """Add the lift, and the options common to all senders."""
     parser.add_argument("name", metavar="LIFT", help="the lift, as RMF names it")
     parser.add_argument(
         "--session", default="", metavar="ID", help="end only this session (default: any)"
@@ -29,5 +28,5 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """As `send`: 0 when the session was seen to end, 1 with the reason when not."""
+    """Return 0 if the session was seen to end, else 1 with the reason, as `send`."""
     return send.run(args)

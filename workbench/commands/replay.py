@@ -1,4 +1,4 @@
-"""`rmf-bridge replay FILE`: the present program repeats the recorded decisions."""
+"""`rmf-bridge replay FILE`: repeat the recorded decisions with the present program."""
 
 import argparse
 import json
@@ -25,7 +25,7 @@ MOST: Final = 200
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """The options of `replay`."""
+    """Add the options of `replay`."""
     parser.add_argument(
         "file", type=Path, metavar="FILE", help="a recording of a daemon, or its ring"
     )
@@ -36,8 +36,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """0: every decision is the same. 1: one is not. 65: it cannot be replayed. 66: FILE is no recording
-    that can be read. 78: a YAML is wrong."""
+    """Return 0: every decision is the same. 1: one differs. 65: not replayable. 66: FILE is no
+    readable recording. 78: a YAML is wrong."""
     notes = Notes()
     try:
         head, entries = opened(args.file, notes)
@@ -117,7 +117,7 @@ def _lines(
 
 
 def _what_if(one: Difference) -> Iterator[str]:
-    """One line: what would have been decided, or that the decision is as recorded again."""
+    """Describe in one line the changed decision, or the return to the recorded one."""
     where = f"{_time(one.wall)} {one.subject}: {_part(one)}"
     if one.today is None:
         yield f"{where}: as recorded again"
@@ -139,7 +139,7 @@ def _part(one: Difference) -> str:
 
 
 def _plain(told: Tree) -> str:
-    """A part of a decision for people."""
+    """Format a part of a decision for people."""
     try:
         return plain(value(told))
     except UnknownValue:

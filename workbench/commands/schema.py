@@ -7,7 +7,7 @@ from workbench.commissioning import reference
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """The options of `schema`."""
+    """Add the options of `schema`."""
     parser.add_argument(
         "--markdown",
         action="store_true",
@@ -16,6 +16,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Print it."""
+    """Print the schema."""
     print(reference.page() if args.markdown else json.dumps(reference.schema(), indent=2), end="")
     return 0

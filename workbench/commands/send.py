@@ -1,7 +1,7 @@
 """`rmf-bridge send`: one request to a lift, door or charger, as RMF would send it, and its effect.
 
-Exit code 0 when the effect was seen, 1 when not (with the reason), 2 for a wrong command line, 130
-after Ctrl-C.
+Exit code 0 if the effect was seen, 1 if not (with the reason), 2 for a wrong command line, 130 after
+Ctrl-C.
 """
 
 import argparse
@@ -37,11 +37,11 @@ from workbench.graph.requests.lift import LiftEnd, LiftRide
 NODE_NAME = "rmf_bridge_send"
 LOOK_EVERY_S = 0.1
 STATES = (topics.LIFT_STATES, topics.DOOR_STATES, topics.CHARGER_STATES)
-"""Also those of other kinds: a name may be another kind's."""
+"""All kinds' states: the given name may belong to another kind."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """`lift`, `door` and `charger`, each with the options of the graph."""
+    """Add `lift`, `door` and `charger`, each with the options of the graph."""
     kinds = parser.add_subparsers(dest="kind", required=True, metavar="lift|door|charger")
     for kind, (text, example, add) in {
         "lift": (
@@ -61,7 +61,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def add_shared_arguments(parser: argparse.ArgumentParser, *, direct: bool) -> None:
-    """Which graph, how long, and with `direct` whom to ask."""
+    """Add the options: graph, time, and with `direct` the addressee."""
     add_graph_arguments(parser)
     parser.add_argument(
         "--timeout",
@@ -125,7 +125,7 @@ def _charger_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def request_of(args: argparse.Namespace) -> Request:
-    """The request that the command line asks for. A contradiction in it ends with exit code 2."""
+    """Return the command line's request. Contradictory options end with exit code 2."""
     match args.kind:
         case "lift":
             return _lift_request(args)
@@ -202,7 +202,7 @@ def send(
     command: str = "send",
     graph: str = "",
 ) -> int:
-    """0 when the effect was seen within `timeout_s`, else 1; 130 after Ctrl-C. `graph`: for people."""
+    """Return 0 if the effect was seen within `timeout_s`, else 1; 130 after Ctrl-C. `graph`: name."""
     exchange = _Exchange(transport, request, timeout_s, out, command, graph)
     try:
         while True:
@@ -214,7 +214,7 @@ def send(
 
 
 class _Exchange:
-    """Calls `exchange.step` with the clock, the transport and the terminal."""
+    """Call `exchange.step` with the clock, the transport and the terminal."""
 
     def __init__(
         self,
@@ -240,7 +240,7 @@ class _Exchange:
         self.described = ""
 
     def look(self) -> int | None:
-        """Take what was heard and do the next step; returns an exit code at the end."""
+        """Take the messages heard and do the next step; return an exit code at the end."""
         for heard in self.ear.listen(LOOK_EVERY_S):
             self._take(heard)
         now = time.monotonic()
@@ -262,7 +262,7 @@ class _Exchange:
         return self.publishers[topic.name]
 
     def _listeners(self) -> int:
-        """How many hear us; none while nobody is there who would pass it on."""
+        """Count our listeners; 0 while the node that would forward the request is missing."""
         if self.supervisor is not None and not self.supervisor.matched():
             return 0
         return self.publisher.matched()
@@ -304,7 +304,7 @@ class _Exchange:
 
 
 def _boarded(message: d.DiagnosticArray, lift: str) -> str:
-    """What a lift's own diagnostics say of a robot inside; "" if they are another's."""
+    """Return a lift's own diagnostics about a robot inside; "" for another lift's."""
     for status in message.status:
         values = {value.key: value.value for value in status.values}
         if (status.hardware_id, values.get("kind")) == (lift, "lift"):

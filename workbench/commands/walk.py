@@ -1,8 +1,8 @@
 """`rmf-bridge walk FILE`: try every wire of a device with the electrician, and sign what was seen.
 
-Every input is shown live; each output is switched on alone, after a key, for a few seconds. Nothing
-else may serve the device meanwhile. However it ends, every output is off: a guard switches them off
-even after a kill -9.
+Every input is shown live; a key switches each output on alone, for a few seconds. No daemon may serve
+the device meanwhile. However the walk ends, every output is off: a guard switches them off even after
+a kill -9.
 """
 
 import argparse
@@ -29,7 +29,7 @@ DRAW_S = 0.05
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """The options of `walk`."""
+    """Add the options of `walk`."""
     parser.add_argument("file", type=Path, metavar="FILE", help="the device YAML")
     device = parser.add_argument(
         "--device", metavar="NAME", help="which device, if the file has several"
@@ -49,7 +49,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """0: all off; 1: not verified off; 64: no terminal, device; 69: in use; 73: no record; 78: YAML."""
+    """Return 0: all off; 1: not verified off; 64: no terminal or device; 69: in use; 73: no record;
+    78: wrong YAML."""
     log.start("WARNING")
     if not (sys.stdin.isatty() and sys.stdout.isatty()):
         print("walk needs a terminal: it switches outputs by keys", file=sys.stderr)

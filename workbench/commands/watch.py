@@ -27,7 +27,7 @@ REDRAW_AT_MOST_EVERY_S = 0.1
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Options of `watch`."""
+    """Add the options of `watch`."""
     add_graph_arguments(parser)
     parser.add_argument(
         "--once",
@@ -43,7 +43,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """0; 1 when `--once` heard nothing or the graph cannot be joined."""
+    """Return 0; 1 if `--once` heard nothing or the graph cannot be joined."""
     try:
         with interruptible(), closing(open_graph(args, "rmf_bridge_watch")) as transport:
             ear = listen_on(transport)
@@ -60,7 +60,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def listen_on(transport: Transport) -> Ear:
-    """An ear for every topic that `watch` shows."""
+    """Listen on every topic that `watch` shows."""
     shown = (
         topics.LIFT_STATES,
         topics.DOOR_STATES,
@@ -89,7 +89,7 @@ def show_once(ear: Ear, seconds: float, out: TextIO, *, as_json: bool = False) -
 
 
 def settled(board: Board, now: float, wall: float) -> list[BoardRow]:
-    """The rows without those that might not say yet that they are simulated."""
+    """Return the rows, without devices that may still turn out to be simulated."""
     young = board.unsettled(now)
     return [row for row in board.rows(now, wall) if (row.kind, row.name) not in young]
 

@@ -1,1 +1,1 @@
-"""Recordings of every kind, read and decided again."""
+"""Read recordings of every kind, and replay their decisions."""

@@ -1,10 +1,10 @@
-"""An incident without the site's names: each becomes `name01`, `name02` …, the same one everywhere.
+"""Anonymise an incident: each of the site's names becomes `name01`, `name02` …, everywhere alike.
 
-Names are the name fields of RMF's messages, the single words that cores remember, the devices, and
-what the YAML names. They are replaced in messages, memories, notes and the YAML, also
-inside of texts. Their order stays, because cores sort by names. A word that is also one of ours (a key
-or a value of the YAML, a word of a core, a topic) stays: without it the recording would no longer
-be the same. Comments of the YAML go; the addresses of its buses become `192.0.2.1`.
+Names come from the name fields of RMF's messages, the single words in cores' memories, the devices,
+and the YAML. They are replaced in messages, memories, notes and the YAML, also inside longer texts.
+Their sort order stays, because cores sort by names. Words of the program itself (keys and values of the
+YAML, words of a core, topics) stay, because replacing them would change the recording. Comments of the
+YAML are removed; the addresses of its buses become `192.0.2.1`.
 """
 
 import enum
@@ -48,7 +48,7 @@ from workbench.replay.replayed import of_head
 from workbench.replay.sources import TOPICS
 
 SAID: Final = FREE_TEXTS | {"code", "detail", "reason", "code_fault", "errors", "lost", "io_fault"}
-"""Fields of a core's values that hold its own words."""
+"""Fields in which a core keeps its own words."""
 NAME: Final = re.compile(r"(?!\d+$)[\w./-]{1,128}")
 ADDRESS: Final = "192.0.2.1"
 HOSTS: Final = ("host", "api_base", "url")
@@ -57,7 +57,7 @@ Swap = Callable[[str], str]
 
 
 def anonymous(incident: Incident) -> Incident:
-    """The same incident without names. Raises SettingsError, if today's rules refuse its YAML."""
+    """Return the incident without names. Raises SettingsError if today's rules refuse its YAML."""
     config = of_head(incident.head)
     content = yaml.safe_load(incident.head.yaml)
     own = {*_subjects(incident), *_own_names(config, content)}
@@ -72,7 +72,7 @@ def anonymous(incident: Incident) -> Incident:
 
 
 def _swap(names: list[str]) -> Swap:
-    """Replaces names, whole or inside of a text; the longest first."""
+    """Replace names, whole or inside a text, longest first."""
     if not names:
         return lambda text: text
     width = len(str(len(names)))
@@ -107,7 +107,7 @@ def _names_in(value: object, field: str = "") -> Iterator[str]:
 
 
 def _remembered(incident: Incident) -> Iterator[str]:
-    """Each text of one word in a memory or an event, except a core's own words."""
+    """Yield each single-word text in a memory or an event, except a core's own words."""
     for entry in incident.entries:
         if isinstance(entry, Known):
             yield from _tree_names([entry.memory, entry.reading])
@@ -135,7 +135,7 @@ def _subjects(incident: Incident) -> Iterator[str]:
 
 
 def _own_names(config: Config, content: dict[str, Any]) -> Iterator[str]:
-    """The devices and places that the YAML names; of a kind without hardware, every word of its own."""
+    """Return the YAML's devices and places; for a kind without hardware, every word of the site."""
     kind = kind_called(config.kind)
     yield from content.get("rmf", {}).get("topics", {}).values()
     if isinstance(kind, GraphKind):
@@ -159,7 +159,7 @@ def _words(value: object) -> Iterator[str]:
 
 @cache
 def our_words() -> frozenset[str]:
-    """Every key and word that a YAML or a core may have by itself."""
+    """Return every key and word that is part of the program, in a YAML or a core."""
     found = {"site", *TOPICS}
     _schema_words(schema(), found)
     for kind in kind_names():
@@ -181,7 +181,7 @@ def _schema_words(part: object, found: set[str]) -> None:
 
 
 def _module_words(module: ModuleType) -> Iterator[str]:
-    """The words that its types may hold: literals, and the values of enumerations."""
+    """Return the words in a module's types: literals and values of enumerations."""
     for kind in vars(module).values():
         if inspect.isclass(kind) and issubclass(kind, enum.Enum):
             yield from (str(member.value) for member in kind)
@@ -257,7 +257,7 @@ def _message(value: Any, swap: Swap) -> Any:
 
 
 def _tree(told: Tree, swap: Swap) -> Tree:
-    """Texts are swapped; names of types, of fields and of members are not."""
+    """Swap texts, but not the names of types, fields and members."""
     if isinstance(told, str):
         return swap(told)
     if isinstance(told, list):

@@ -1,11 +1,11 @@
-"""What was heard on RMF's graph, from a recording: ours, rosbag2's of any release (MCAP or sqlite3), or
-a daemon's ring itself.
+"""Read RMF's messages from a recording: ours, rosbag2's of any release (MCAP or sqlite3), or a daemon's
+ring itself.
 
 A recording is read as a stream, in bounded memory. Topics and types that are not RMF's are skipped and
-counted. If it is damaged, what can be read is yielded, and then the damage is noted.
+counted. From a damaged recording, the readable part is yielded, and then the damage noted.
 
-In our own files `log_time` is by a clock that never steps, and `publish_time` by the wall clock. Others
-have one clock, which may step: then `at` goes on from where it was.
+In our own files `log_time` is by a clock that never steps, and `publish_time` by the wall clock. Other
+recordings have one clock; if it steps back, `at` goes on from its last value.
 """
 
 import logging
@@ -29,7 +29,7 @@ log = logging.getLogger(__name__)
 
 NS: Final = 1e-9
 STEPPED_NS: Final = 10**9
-"""A clock that goes back by this much was set back; less is disorder in the recording."""
+"""Least step back of a clock that was set back; less is disorder in the recording."""
 LONGEST_MESSAGE: Final = 8 << 20
 
 
@@ -38,18 +38,18 @@ Keep = Callable[[str, bytes, float], bool]
 
 
 def heard_in(path: Path, notes: Notes | None = None, keep: Keep | None = None) -> Iterator[Heard]:
-    """All messages of RMF in a recording, as `all_in` gives them."""
+    """Yield all messages of RMF in a recording, as `all_in` does."""
     return (one for one in all_in(path, notes, keep) if isinstance(one, Heard))
 
 
 def all_in(
     path: Path, notes: Notes | None = None, keep: Keep | None = None
 ) -> Iterator[Heard | Own]:
-    """Every message of RMF in a recording, and every text of ours, in the order of recording.
+    """Yield RMF's messages and our recorder's texts, in the order of recording.
 
-    `path`: an MCAP file, a `.db3` file, a directory of rosbag2, or a ring. What is skipped or damaged
-    is noted in `notes`; damage is logged where there are none. What `keep` does not want is skipped
-    undecoded, which takes a tenth of the time. Raises BagError if it is not a recording.
+    `path`: an MCAP file, a `.db3` file, a directory of rosbag2, or a ring. Skipped messages
+    and damage go to `notes`; without `notes`, damage is logged. Samples refused by `keep` stay
+    undecoded, which takes a tenth of the time. Raises BagError if `path` is no recording.
     """
     noted = Notes() if notes is None else notes
     clock = _Clock()
@@ -78,7 +78,7 @@ class _Clock:
         self._last = -(1 << 63)
 
     def at(self, recorded: int) -> int:
-        """When a message came that was recorded at this time."""
+        """Return the steady time of a message recorded at this time."""
         if recorded + self._shift < self._last - STEPPED_NS:
             self._shift = self._last - recorded
         self._last = max(self._last, recorded + self._shift)
@@ -91,7 +91,7 @@ def _raw(path: Path, noted: Notes) -> Iterator[Raw]:
 
 
 def _parts(path: Path) -> list[Path]:
-    """The files of a recording in their order; its directory, if that is read as a whole."""
+    """Return the files of a recording in order; the directory itself if read as a whole."""
     try:
         if not path.is_dir():
             return [path]
@@ -109,12 +109,12 @@ def _parts(path: Path) -> list[Path]:
 
 
 def continuous(files: list[Path]) -> list[Path]:
-    """The files of our recorder that follow each other without overlap; all, if there are none."""
+    """Return our recorder's files that continue each other without overlap; all files if none do."""
     return [file for file in files if f"_{CONTINUOUS}_" in file.name] or files
 
 
 def _number(path: Path) -> tuple[int, str]:
-    """rosbag2 numbers the files of a recording: name_2 comes before name_10."""
+    """Return the number that rosbag2 gives a file: name_2 comes before name_10."""
     number = path.stem.rpartition("_")[2]
     return int(number) if number.isdecimal() and len(number) < 7 else 0, path.name
 
@@ -151,7 +151,7 @@ def _of_ring(path: Path) -> Iterator[Raw]:
 
 
 def _beginning(path: Path) -> bytes:
-    """Raises BagError if it cannot be read, or is not a regular file."""
+    """Read the first bytes. Raises BagError if the file is unreadable or not a regular one."""
     try:
         return user_files.read(path, 15).content
     except OSError as error:

@@ -1,4 +1,4 @@
-"""What can be replayed: a file that our recorder wrote, a directory of such files, or a ring itself."""
+"""Open recordings for a replay: a file of our recorder, a directory of such files, or a ring itself."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -12,8 +12,8 @@ from workbench.replay.sources import BagError, Notes
 
 
 def opened(path: Path, notes: Notes) -> tuple[Head, Iterator[AnyEntry]]:
-    """The run of a daemon in a file, and its entries. In a directory: the first run, and its entries in
-    all files, in the order of their names. Raises BagError."""
+    """Return a daemon's run and its entries. In a directory: the first run, and its entries from
+    all files, in the order of file names. Raises BagError."""
     if path.is_dir():
         return _of_all(sorted(path.glob("*.mcap")), path, notes)
     try:
@@ -34,7 +34,7 @@ def opened(path: Path, notes: Notes) -> tuple[Head, Iterator[AnyEntry]]:
 
 
 def _of_all(files: list[Path], folder: Path, notes: Notes) -> tuple[Head, Iterator[AnyEntry]]:
-    """The entries of the first file's daemon; only its continuous files, if it has any."""
+    """Yield the entries of the first file's daemon; only from its continuous files, if any."""
     if not files:
         raise BagError(f"{folder} holds no recording: it has no .mcap file")
     files = continuous(files)

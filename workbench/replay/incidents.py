@@ -1,4 +1,4 @@
-"""Reads the files that our recorder wrote: the daemon's run, and its entries, for a replay."""
+"""Read our recorder's files for a replay: the daemon's run and its entries."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -18,7 +18,7 @@ NONE = "{} has no entries of an rmf-bridge daemon: only a recording that has the
 
 
 def head_of(path: Path) -> Head:
-    """The run of the daemon that a file is from. Raises BagError."""
+    """Return the daemon's run that a file comes from. Raises BagError."""
     try:
         for record in records(path):
             if isinstance(record, Metadata) and record.name == HEAD:
@@ -31,7 +31,7 @@ def head_of(path: Path) -> Head:
 
 
 def entries_in(path: Path, notes: Notes) -> Iterator[AnyEntry]:
-    """Its entries, in their order. Damage is noted where it ends them."""
+    """Yield a file's entries in order. Damage that ends the entries is noted."""
     for told in _texts(path, ENTRIES, notes):
         try:
             yield entries.of_json(told)
@@ -41,7 +41,7 @@ def entries_in(path: Path, notes: Notes) -> Iterator[AnyEntry]:
 
 
 def notes_in(path: Path) -> list[Note]:
-    """Why the file was made."""
+    """Return the reasons for which the file was made."""
     try:
         return [msgspec.json.decode(told, type=Note) for told in _texts(path, NOTES, Notes())]
     except (msgspec.MsgspecError, RecursionError):
@@ -49,7 +49,7 @@ def notes_in(path: Path) -> list[Note]:
 
 
 def _texts(path: Path, topic: str, notes: Notes) -> Iterator[str]:
-    """What our recorder wrote on one of its topics."""
+    """Yield our recorder's texts on one of its topics."""
     channels = set()
     try:
         for record in records(path):

@@ -1,4 +1,4 @@
-"""RMF's messages in an MCAP file, ours or rosbag2's."""
+"""Read RMF's messages from an MCAP file, ours or rosbag2's."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -15,7 +15,7 @@ NO_CHANNEL: Final = Source("", None, "of no channel")
 
 
 def raw_in(path: Path, notes: Notes) -> Iterator[Raw]:
-    """Its messages of RMF, as they were recorded. Damage is noted where it ends them."""
+    """Yield a file's RMF messages, undecoded. Damage that ends the messages is noted."""
     declared = _Declared()
     try:
         for record in records(path):
@@ -33,7 +33,7 @@ def raw_in(path: Path, notes: Notes) -> Iterator[Raw]:
 
 
 class _Declared:
-    """What a file has declared so far. `ours`: our recorder wrote it. `sources`: by channel."""
+    """A file's declarations so far. `ours`: is it our recorder's? `sources`: by channel."""
 
     def __init__(self) -> None:
         self.ours = False
@@ -41,7 +41,7 @@ class _Declared:
         self._types: dict[int, tuple[str, list[Release]]] = {}
 
     def is_ours(self, found: Source) -> bool:
-        """Is it one of our recorder's own topics?"""
+        """Is this one of our recorder's own topics?"""
         return self.ours and found.topic.startswith(OWN_TOPICS)
 
     def take(self, record: McapRecord) -> None:

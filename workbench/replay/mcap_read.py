@@ -1,8 +1,8 @@
-"""Reads the records of an MCAP file, whoever wrote it: in bounded memory, and in time that the file's
-size bounds.
+"""Read the records of any writer's MCAP file, in bounded memory, and in time bounded by the file's
+size.
 
 Everything in the file is checked before it is used: a length may be false, a chunk may unpack to
-gigabytes, the end may be missing. The index is not used, so a file without one is read as well. Format:
+gigabytes, the end may be missing. The index is not used and may be missing. Format:
 https://mcap.dev/spec (version 0).
 """
 
@@ -21,18 +21,18 @@ from mcap.records import Channel, Chunk, Header, McapRecord, Message, Metadata, 
 
 MAGIC: Final = b"\x89MCAP0\r\n"
 LONGEST_RECORD: Final = 64 << 20
-"""The longest record, and the most that a chunk unpacks to (bytes). rosbag2 and Foxglove write chunks
+"""Limit of a record and of an unpacked chunk (bytes). rosbag2 and Foxglove write chunks
 of 1 to 8 MB."""
 MOST_UNPACKED: Final = 200
 FIRST_UNPACKED: Final = 2 << 20
-"""A file may unpack to this many times its size, and so much (bytes) beside: more is no recording."""
+"""Limit of a file unpacked: this multiple of its size plus so many bytes; more is no recording."""
 MOST_DECLARED: Final = 10_000
-"""The most schemas and channels of a file."""
+"""Limit of schemas and channels in a file."""
 FRAME: Final = 9
 """Each record begins with its opcode (1 byte) and its length (8 bytes)."""
 
 MESSAGE: Final = struct.Struct("<HIQQ")
-"""A message begins with its channel, its sequence, and when it was logged and published (ns). It is
+"""A message begins with channel, sequence, log time and publish time (ns). It is
 taken apart here, because there are more messages than anything else."""
 READ: Final[dict[int, Callable[[ReadDataStream], McapRecord]]] = {
     Opcode.HEADER: Header.read,
@@ -48,16 +48,16 @@ INVALID: Final = (
     zstandard.ZstdError,
     RuntimeError,
 )
-"""What reading a record of any bytes may raise."""
+"""Exceptions raised by parsing arbitrary bytes as a record."""
 LAST: Final = (Opcode.DATA_END, Opcode.FOOTER)
 
 
 class Damaged(ValueError):
-    """The file cannot be read further, and why."""
+    """The file cannot be read further; the text gives the reason."""
 
 
 def records(path: Path) -> Iterator[McapRecord]:
-    """Every header, schema, channel, message and metadata record, in the file's order.
+    """Yield every header, schema, channel, message and metadata record, in the file's order.
 
     Raises Damaged at the place from which nothing more can be read, and OSError.
     """
@@ -69,14 +69,14 @@ def records(path: Path) -> Iterator[McapRecord]:
 
 
 class _Allowances:
-    """How much more of a file may be unpacked, and how many more channels it may declare."""
+    """Remaining bytes to unpack and channels to declare in a file."""
 
     def __init__(self, size: int) -> None:
         self._unpacked = FIRST_UNPACKED + MOST_UNPACKED * size
         self._declared = MOST_DECLARED
 
     def records(self, source: IO[bytes], size: int) -> Iterator[McapRecord]:
-        """The records from here to the end of the data."""
+        """Yield the records from here to the end of the data."""
         while True:
             at = source.tell()
             opcode, body = _body(source, at, size)
@@ -135,7 +135,7 @@ def _stream(body: bytes) -> ReadDataStream:
 
 
 def _body(source: IO[bytes], at: int, size: int) -> tuple[int, bytes]:
-    """The next record's opcode and content. Raises Damaged."""
+    """Read the next record's opcode and content. Raises Damaged."""
     frame = source.read(FRAME)
     if len(frame) < FRAME:
         raise Damaged(f"it ends in the middle, at byte {at}")

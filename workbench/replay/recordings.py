@@ -1,4 +1,4 @@
-"""What the commands that read a recording share: the part that is asked for, and how they refuse."""
+"""Common parts of the commands that read a recording: the span asked for, refusals, thinning out."""
 
 import argparse
 import os
@@ -19,9 +19,9 @@ from workbench.replay.sources import BagError, Notes
 
 CLOCK = re.compile(r"(?:(\d{4}-\d\d-\d\d)[ T])?(\d\d?):(\d\d)(?::(\d\d(?:\.\d+)?))?")
 SAME_S = 2.4
-"""Shorter than the silence (3 s) after which a daemon counts as silent."""
+"""Shorter than the 3 s after which a daemon counts as silent."""
 STAMPED = 12
-"""This many bytes of a DiagnosticArray are CDR's head and the stamp (OMG DDSI-RTPS 10.2; Header)."""
+"""Bytes before a DiagnosticArray's status: CDR's head, the stamp (OMG DDSI-RTPS 10.2; Header)."""
 MOST_TOLD = 512
 FIRST_OF_OTHERS = 300
 COORDINATOR = b"charger_coordinator"
@@ -29,14 +29,14 @@ COORDINATOR = b"charger_coordinator"
 
 @dataclass(frozen=True, slots=True)
 class TypedTime:
-    """A time as typed: s from the beginning, or a local time of a day (None: the first one)."""
+    """A time as typed: s from the beginning, or a local time of a day (None: the recording's first)."""
 
     after_s: float | None = None
     day: str | None = None
     of_day_s: float = 0.0
 
     def wall(self, began: float) -> float:
-        """In s since the epoch, in a recording that began then."""
+        """Return the time (s since the epoch), in a recording with this beginning."""
         if self.after_s is not None:
             return began + self.after_s
         day = datetime.fromisoformat(self.day) if self.day else datetime.fromtimestamp(began)
@@ -46,7 +46,7 @@ class TypedTime:
 
 @dataclass(slots=True)
 class RecordingSpan:
-    """The part of a recording that is asked for. `begins_at`: when it began, by `Heard.at`."""
+    """The part of a recording asked for. `begins_at`: when it began, by `Heard.at`."""
 
     from_: TypedTime | None
     to: TypedTime | None
@@ -54,13 +54,13 @@ class RecordingSpan:
 
 
 def unreadable(command: str, error: BagError) -> int:
-    """Say why there is no recording to read, and give the exit code, 66 for every command."""
+    """Print why the recording cannot be read; return the exit code, 66 for every command."""
     complain(command, error)
     return os.EX_NOINPUT
 
 
 def add_span_arguments(parser: argparse.ArgumentParser) -> None:
-    """`--from` and `--to`."""
+    """Add `--from` and `--to`."""
     times = (
         "14:03, 14:03:07, '2026-11-22 14:03' (this machine's time), or +90: s from its beginning"
     )
@@ -71,7 +71,7 @@ def add_span_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _time(text: str) -> TypedTime:
-    """Raises ArgumentTypeError."""
+    """Parse a time. Raises ArgumentTypeError."""
     found = CLOCK.fullmatch(text)
     try:
         if found is None:
@@ -94,11 +94,11 @@ def _plus(text: str) -> float:
 
 
 class Sieve:
-    """Which samples are worth decoding, for one device or (name "") for all.
+    """Choose the samples worth decoding, for one device or (name "") for all.
 
-    Diagnostics come each second and seldom change: those that differ from what their node has just
-    said by numbers alone (ages, counts) are taken every SAME_S only. Of other devices the first
-    samples are taken, for their names.
+    Diagnostics come each second and seldom change: if only numbers (ages, counts) differ from
+    the node's last sample, one is taken every SAME_S. From other devices the first samples are
+    taken, for their names.
     """
 
     def __init__(self, name: str) -> None:
@@ -107,7 +107,7 @@ class Sieve:
         self._told: OrderedDict[bytes, float] = OrderedDict()
 
     def keep(self, topic: str, sample: bytes, at: float) -> bool:
-        """Is it to be decoded?"""
+        """Should this sample be decoded?"""
         if topic.startswith(OWN_TOPICS) and topic.removeprefix(OWN_TOPICS) not in noted.TOPICS:
             return False
         if self._name not in sample and not self._is_common(topic, sample):
@@ -116,7 +116,7 @@ class Sieve:
         return topic != topics.DIAGNOSTICS.name or self._is_news(sample, at)
 
     def _is_common(self, topic: str, sample: bytes) -> bool:
-        """Is it of all devices? A heartbeat without this door says that nobody holds it."""
+        """Does the topic concern all devices? A heartbeat without a door means that nobody holds it."""
         return topic == topics.DOOR_SUPERVISOR_HEARTBEAT.name or COORDINATOR in sample
 
     def _is_news(self, sample: bytes, at: float) -> bool:
@@ -133,7 +133,7 @@ class Sieve:
 def told_between(
     path: Path, span: RecordingSpan, command: str, device: str
 ) -> Iterator[Heard | Own]:
-    """What concerns the device ("": all), messages and our recorder's texts, as `between` gives it.
+    """Yield messages and our recorder's texts about the device ("": all), as `between` does.
 
     Messages that differ little from second to second are thinned out (`Sieve`).
     """
@@ -143,9 +143,9 @@ def told_between(
 def between(
     path: Path, span: RecordingSpan, command: str, keep: Keep | None = None
 ) -> Iterator[Heard | Own]:
-    """A recording until the end of the span; what is before it too, as states last.
+    """Yield a recording until the end of the span, from its beginning, because states last.
 
-    Damage is told on standard error. Raises BagError.
+    Damage is printed on standard error. Raises BagError.
     """
     notes, began, until = Notes(), None, float("inf")
     for heard in all_in(path, notes, keep):
@@ -162,7 +162,7 @@ def between(
 
 
 def within(path: Path, span: RecordingSpan, command: str) -> Iterator[Heard]:
-    """The messages of the span alone, none left out. Damage is told. Raises BagError."""
+    """Yield all messages inside the span. Damage is printed on standard error. Raises BagError."""
     for heard in between(path, span, command):
         has_begun = span.from_ is None or heard.at >= span.begins_at > float("-inf")
         if has_begun and isinstance(heard, Heard):

@@ -1,7 +1,7 @@
-"""A recording played again: today's core decides on what was recorded, and each decision is compared.
+"""Replay a recording: today's core decides on the recorded events, and each decision is compared.
 
-A core is a pure function of its memory, an event, the time and its limits. A recording has the memory
-at its beginning and every event. So the decisions come out the same, to the bit, unless the core or
+A core is a pure function of its memory, an event, the time and its limits. A recording has the initial
+memory and every event. So the decisions come out the same, to the bit, unless the core or
 its limits have changed.
 """
 
@@ -36,14 +36,14 @@ AnyDecision = Decision[Any, Any, Any]
 Parts = tuple[str, Tree, Tree]
 """A part of a decision that differs: its name, as recorded, and today."""
 CONTEXT: Final = 6
-"""A difference is reported with this many events before it."""
+"""The number of events reported before a difference."""
 PARTS: Final = ("outputs", "news", "refused")
-"""The parts that are compared when other limits are tried: those that are visible from outside."""
+"""The parts visible from outside; only these are compared when other limits are tried."""
 
 
 @dataclass(frozen=True, slots=True)
 class ReplayedCore:
-    """What a replay needs of a kind, with the limits of one subject. `types`: `typed.types_of`."""
+    """A kind's core as a replay needs it, with one subject's limits. `types`: `typed.types_of`."""
 
     decide: Callable[[Any, Any, float], Any]
     published: Callable[[Any, Any], Any]
@@ -52,7 +52,7 @@ class ReplayedCore:
 
 @dataclass(frozen=True, slots=True)
 class Difference:
-    """A decision that differs. `wall`: when (s since the epoch). `what`: which part of it.
+    """A differing decision. `wall`: its time (s since the epoch). `what`: the differing part.
 
     `before`: the last events up to this one, each with its time, in words.
     """
@@ -67,8 +67,8 @@ class Difference:
 
 @dataclass(slots=True)
 class Course:
-    """How far a replay has come. `decisions`: how many were compared. `unusable`: entries of subjects
-    that cannot be replayed. `subjects`: those that can. `began`, `ended`: s since the epoch."""
+    """Progress of a replay. `decisions`: number compared. `unusable`: entries of subjects that cannot
+    be replayed. `subjects`: replayable ones. `began`, `ended`: s since the epoch."""
 
     decisions: int = 0
     unusable: int = 0
@@ -86,7 +86,7 @@ class Course:
 
 
 def of_head(head: Head) -> Config:
-    """The settings that a daemon ran with. Raises SettingsError, if today's rules refuse them."""
+    """Return a daemon's settings. Raises SettingsError if today's rules refuse them."""
     texts.give(head.texts)
     return understood(head.file, head.yaml)
 
@@ -100,7 +100,7 @@ class ReplayedCores:
         self._made: dict[str, ReplayedCore | None] = {}
 
     def of(self, subject: str) -> ReplayedCore | None:
-        """The core of a subject; None where these settings have no such device."""
+        """Return a subject's core; None if the settings have no such device."""
         if subject not in self._made:
             self._made[subject] = self._make(subject)
         return self._made[subject]
@@ -124,7 +124,7 @@ def _with(decide: Callable[..., Any], limits: Any) -> Callable[[Any, Any, float]
 
 
 class _Subject:
-    """One subject, whose decisions are made again from its memory on."""
+    """One subject; its decisions are repeated, beginning with its recorded memory."""
 
     def __init__(self, core: ReplayedCore, known: Known) -> None:
         self._core = core
@@ -138,19 +138,19 @@ class _Subject:
 
     @property
     def has_decided(self) -> bool:
-        """Whether there is a reading to come again, and a report to go out."""
+        """Is there a reading to repeat, and a report to publish?"""
         return self._report is not None
 
     def memory(self) -> Tree:
-        """What is remembered now."""
+        """The present memory."""
         return tree(self._memory)
 
     def published(self) -> None:
-        """The report has gone out."""
+        """Note that the report has been published."""
         self._memory = self._core.published(self._memory, self._report)
 
     def step(self, step: Decided) -> list[Parts]:
-        """Decide on an event; gives what differs."""
+        """Decide on an event; return the differences."""
         event = typed(step.event, self._core.types["event"])
         if type(event) in (Sampled, IoFailed):
             self._reading = event
@@ -163,7 +163,7 @@ class _Subject:
         return _differing(self._recorded | told, decision)
 
     def again(self, at: float) -> list[Parts]:
-        """The last reading once more, which changed nothing when it was recorded."""
+        """Repeat the last reading, which changed nothing when recorded."""
         outputs, news, report = self._outputs, self._news, self._report
         decision = self._decide(self._reading, at)
         if (
@@ -181,7 +181,7 @@ class _Subject:
         self.last.append((at, event))
         try:
             decision: AnyDecision = self._core.decide(self._memory, event, at)
-        except Exception as error:  # it never raises for what a core has remembered itself
+        except Exception as error:  # a core never raises for a memory of its own making
             why = f"{type(error).__name__}: {error}"
             raise UnknownValue(f"the core cannot decide on what was recorded: {why}") from error
         self._memory, self._report = decision.memory, decision.report
@@ -210,7 +210,7 @@ def _differing(recorded: dict[str, Tree], decision: AnyDecision) -> list[Parts]:
 
 
 class Replay:
-    """A recording played again. `course`: how far it has come."""
+    """The replay of a recording. `course`: its progress."""
 
     def __init__(self, entries: Iterable[AnyEntry], cores: ReplayedCores) -> None:
         self.course = Course()
@@ -219,7 +219,7 @@ class Replay:
         self._subjects: dict[str, _Subject | None] = {}
 
     def differences(self) -> Iterator[Difference]:
-        """The first difference of each subject: today's core decides, or remembers, something else."""
+        """Yield each subject's first difference in decision or memory."""
         for entry in self._entries:
             self.course.reach(entry)
             for at, found in self._played(entry, strict=True):
@@ -229,8 +229,8 @@ class Replay:
                     break
 
     def changes(self) -> Iterator[Difference]:
-        """Where other limits decide differently: each time that outputs, state or refusal begin to
-        differ, differ in another way, or become as recorded again."""
+        """Yield the effects of other limits: each time that outputs, state or refusal begin to
+        differ, differ in another way, or match the recording again."""
         shown: dict[tuple[str, str], Tree] = {}
         for entry in self._entries:
             self.course.reach(entry)
@@ -250,7 +250,7 @@ class Replay:
         return Difference(_name(entry), at + offset_s, *found, words)
 
     def _played(self, entry: AnyEntry, *, strict: bool) -> Iterator[tuple[float, list[Parts]]]:
-        """Each decision of one entry: when, and what differs. `strict`: memories are compared too."""
+        """Yield time and differences of each decision in an entry. `strict`: compare memories too."""
         if isinstance(entry, Known):
             yield from self._known(entry, strict=strict)
         elif isinstance(entry, SubjectForgotten):
@@ -276,7 +276,7 @@ class Replay:
                 yield at, subject.again(at)
 
     def _known(self, entry: Known, *, strict: bool) -> Iterator[tuple[float, list[Parts]]]:
-        """Begin a subject's course, or compare the memory that it has come to."""
+        """Begin a subject's replay, or compare its memory with the recorded one."""
         name = entry.subject
         if entry.anew or name not in self._subjects:
             core = self._cores.of(name)
@@ -298,7 +298,7 @@ def _kind(event: object) -> str:
 
 
 def times(entry: Same) -> tuple[float, ...]:
-    """When the reading came again. Raises UnknownValue."""
+    """Return the times at which a reading was repeated. Raises UnknownValue."""
     if len(entry.times) % 8:
         raise UnknownValue("not a list of times")
     found = struct.unpack(f"<{len(entry.times) // 8}d", entry.times)

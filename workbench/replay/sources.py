@@ -1,4 +1,4 @@
-"""The topics of a recording: which of them are RMF's, and how their samples are decoded."""
+"""The topics of a recording: recognise RMF's, and decode their samples."""
 
 from collections import Counter
 from collections.abc import Callable, Iterable
@@ -17,16 +17,16 @@ TOPICS: Final = frozenset(topic.name for topic in topics.every())
 
 
 class BagError(Exception):
-    """The path holds no recording that can be read. The text says what to do."""
+    """The path holds no readable recording. The text gives the remedy."""
 
 
 class NotReplayable(BagError):
-    """It can be read, and nothing in it can be decided again."""
+    """The recording is readable, but none of its decisions can be replayed."""
 
 
 @dataclass(slots=True)
 class Notes:
-    """What is missing. `skipped`: messages by reason. `damage`: why the end is missing, if it is."""
+    """Missing parts. `skipped`: messages by reason. `damage`: why the end is missing; else empty."""
 
     skipped: Counter[str] = field(default_factory=Counter)
     damage: str = ""
@@ -38,9 +38,9 @@ class Notes:
 
 
 class Raw(NamedTuple):
-    """A message as it was recorded. `at`, `wall`: ns by the recorder's and by the wall clock.
+    """A recorded message, undecoded. `at`, `wall`: ns by the recorder's and by the wall clock.
 
-    `decode`: None for a text of our own recorder.
+    `decode`: None for our own recorder's texts.
     """
 
     at: int
@@ -51,7 +51,7 @@ class Raw(NamedTuple):
 
 
 class Source(NamedTuple):
-    """A recorded topic. `decode`: None where it is not RMF's; then `why` says so."""
+    """A recorded topic. `decode`: None if the topic is not RMF's; `why` gives the reason."""
 
     topic: str
     decode: Callable[[bytes], Message] | None
@@ -59,7 +59,7 @@ class Source(NamedTuple):
 
 
 def source(topic: str, type_name: str, releases: list[Release]) -> Source:
-    """A topic of this type, of one of these releases."""
+    """Make the source for a topic of this type and one of these releases."""
     topic = topic.removeprefix("/")
     short = topic[:LONGEST_NAME]
     message_type = MESSAGES.get(type_name)
@@ -71,7 +71,7 @@ def source(topic: str, type_name: str, releases: list[Release]) -> Source:
 
 
 def releases(type_name: str, definition: str, digest: str = "") -> list[Release]:
-    """The releases that a message may be of; if the recording does not say, all that have it.
+    """Return a message's possible releases; if not recorded, all releases that have the type.
 
     `definition`: its text, or "". `digest`: its RIHS01 hash, or "".
     """
@@ -86,7 +86,7 @@ def releases(type_name: str, definition: str, digest: str = "") -> list[Release]
 
 
 def _decoded(message_type: type[Message], sample: bytes, releases: Iterable[Release]) -> Message:
-    """Raises CdrError, the last release's."""
+    """Decode by the first fitting release. Raises the last release's CdrError."""
     error = cdr.CdrError("no release")
     for release in releases:
         try:

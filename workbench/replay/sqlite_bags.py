@@ -1,4 +1,4 @@
-"""RMF's messages in what rosbag2 stores as sqlite3, read by the `rosbags` library."""
+"""Read RMF's messages from rosbag2's sqlite3 files, with the `rosbags` library."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -11,9 +11,9 @@ from workbench.replay.sources import BagError, Notes, Raw, releases, source
 
 
 def raw_in(path: Path, notes: Notes) -> Iterator[Raw]:
-    """Its messages of RMF, as they were recorded. `path`: a `.db3` file, or its directory.
+    """Yield a recording's RMF messages, undecoded. `path`: a `.db3` file, or its directory.
 
-    Damage is noted where it ends them. Raises BagError for what cannot be opened.
+    Damage that ends the messages is noted. Raises BagError if the recording cannot be opened.
     """
     began = False
     try:

@@ -1,5 +1,5 @@
-"""A recorded value must be of the type that a core takes. `trees.value` alone makes any type that holds
-values, with anything in its fields; the types are those that the core itself is annotated with.
+"""Check recorded values against a core's own type annotations, because `trees.value` alone makes any
+type of value with anything in its fields.
 """
 
 import math
@@ -16,7 +16,7 @@ LONGEST = 100
 
 @cache
 def types_of(decide: Callable[..., Any]) -> Mapping[str, Any]:
-    """The types of a core's `memory`, `event`, `outputs` and `report`; the last two may be None."""
+    """Return a core's types of `memory`, `event`, `outputs`, `report`; the last two may be None."""
     hints = get_type_hints(decide)
     memory, outputs, report = get_args(hints["return"])
     told = {"outputs": Union[outputs, None], "report": Union[report, None]}  # noqa: UP007
@@ -24,7 +24,7 @@ def types_of(decide: Callable[..., Any]) -> Mapping[str, Any]:
 
 
 def typed(told: Tree, hint: Any) -> Any:
-    """The value of a tree, if it is of this type throughout. Raises UnknownValue."""
+    """Return a tree's value. Raises UnknownValue unless every part has its annotated type."""
     found = value(told)
     if not _fits(found, hint):
         shown = str(told)
@@ -50,7 +50,7 @@ def _fits(found: Any, hint: Any) -> bool:
 
 
 def _parts(found: Any, args: tuple[Any, ...]) -> Iterator[tuple[Any, Any]]:
-    """All that a value holds, each with its type. `args`: those of its own type."""
+    """Yield a value's parts with their types. `args`: the arguments of the value's type."""
     kind: Any = type(found)
     if fields := _fields(kind, args):
         yield from ((getattr(found, name), hint) for name, hint in fields.items())
@@ -64,7 +64,7 @@ def _parts(found: Any, args: tuple[Any, ...]) -> Iterator[tuple[Any, Any]]:
 
 @cache
 def _fields(kind: Hashable, args: tuple[Any, ...]) -> Mapping[str, Any]:
-    """The fields of a struct or a tuple with names, and their types; empty for all else."""
+    """Return fields and types of a struct or named tuple; empty for all else."""
     if not hasattr(kind, "__struct_fields__") and not hasattr(kind, "_fields"):
         return {}
     own = dict(zip(getattr(kind, "__parameters__", ()), args, strict=False))
@@ -72,7 +72,7 @@ def _fields(kind: Hashable, args: tuple[Any, ...]) -> Mapping[str, Any]:
 
 
 def _closed(hint: Any, own: Mapping[Any, Any]) -> Any:
-    """A type whose variables are replaced by what they stand for."""
+    """Return a type with its type variables filled in."""
     if isinstance(hint, TypeVar):
         return own.get(hint, Any)
     open_ = getattr(hint, "__parameters__", ()) if get_origin(hint) else ()

@@ -1,10 +1,10 @@
 """RMF's supervisors and fleet adapters as rules, so that `judge` and the tests can play them.
 
-Taken from rmf_ros2 9dedd0f (2026-05), with its quirks: nothing here times out, retries or looks at a
-lift's mode.
+Taken from rmf_ros2 9dedd0f (2026-05), quirks included: no timeouts, no retries, a lift's mode ignored.
 
-No I/O and no clock: each party hears a message or is ticked at its `wake_at`, and returns what it
-publishes. `now` is RMF's clock in seconds (since the epoch, where stamps matter). A
+
+No I/O and no clock: each party hears a message or is ticked at its `wake_at`, and returns the
+messages to publish. `now` is RMF's clock in seconds (since the epoch, where stamps matter). A
 restarted party is a new object.
 """
 
@@ -17,7 +17,7 @@ from bridges.messages.stamps import stamp
 from bridges.messages.topics import AnyTopic
 
 Said = tuple[AnyTopic, d.Message]
-"""One message and the topic that it is published on."""
+"""One message and its topic."""
 
 NEVER: Final = float("inf")
 
@@ -29,19 +29,19 @@ class Party(ABC):
 
     @abstractmethod
     def hear(self, message: d.Message, now: float) -> list[Said]:
-        """A message has arrived on one of the topics subscribed."""
+        """Take a message from one of the subscribed topics."""
 
     def tick(self, now: float) -> list[Said]:
-        """The timer that was due at `wake_at` fires."""
+        """Fire the timer due at `wake_at`."""
         return []
 
     def wake_at(self) -> float:
-        """When a timer is due next: s, or inf."""
+        """Time of the next timer: s, or inf."""
         return NEVER
 
 
 def door_request(door: str, requester: str, mode: d.DoorModeValue, now: float) -> d.DoorRequest:
-    """A DoorRequest as RMF's nodes build it."""
+    """Build a DoorRequest as RMF's nodes do."""
     return d.DoorRequest(stamp(now), requester, door, d.DoorMode(int(mode)))
 
 

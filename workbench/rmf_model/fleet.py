@@ -1,13 +1,12 @@
-"""A fleet adapter and its robots, as far as charging goes.
+"""A fleet adapter and its robots, for charging only.
 
 Read in rmf_ros2 9dedd0f (TaskManager.cpp, tasks/ChargeBattery.cpp, phases/WaitForCharge.cpp,
 FleetUpdateHandle.cpp) and seen with Jazzy's:
 1. ChargeBattery goes to the robot's dedicated waypoint and waits there for its battery. An assignment
-   whose waypoint or mode differs from the last one starts it again, and moves no robot without it. A
-   waypoint that the graph does not have is the end of the adapter.
-2. It is a task when RMF finds the battery too low for the way to the dedicated waypoint (the automatic
-   retreat; never while the robot stands there already, and Jazzy's never below the recharge threshold),
-   or when its planner wants it. That task ends at recharge_soc. As the fleet's `finishing_request:
+   with a new waypoint or mode restarts a running ChargeBattery, and moves no other robot. A waypoint
+   missing in the graph crashes the adapter.
+2. ChargeBattery is a task if RMF finds the battery too low for the way to the dedicated waypoint (the
+   automatic retreat; never for a robot there, and Jazzy's never below the recharge threshold) or if its planner wants it. That task ends at recharge_soc. As the fleet's `finishing_request:
    charge` it is not a task, and lasts until the next task, however full the battery is. With
    `nothing` a robot stays. With `park` it drives to a parking spot; Jazzy's (branch jazzy, 7eef65a)
    knows no spots, and goes where ChargeBattery would, at each assignment too.
@@ -37,14 +36,14 @@ Doing = Literal["", "work", "charge", "idle charge", "idle park"]
 
 
 class AdapterCrashed(Exception):
-    """What RMF's fleet adapter does when it is sent to a waypoint that it does not know."""
+    """RMF's fleet adapter crashed on an assignment to an unknown waypoint."""
 
 
 @dataclass
 class FleetRobot:
-    """`place`: the waypoint at which it stands; "" on the road. `goes_to`: where it drives.
-    `dedicated`, `waits`: its charging assignment. `doing`: its task, or what it does without one.
-    `task_id`: "" without a task. `mode`: the last that a phase has set. `stuck`: it cannot drive."""
+    """`place`: the waypoint at which it stands; "" on the road. `goes_to`: its destination.
+    `dedicated`, `waits`: its charging assignment. `doing`: its task, or its activity without one.
+    `task_id`: "" without a task. `mode`: as last set by a phase. `stuck`: it cannot drive."""
 
     name: str
     place: str
@@ -61,7 +60,7 @@ class FleetRobot:
 
     @property
     def charges(self) -> bool:
-        """Its ChargeBattery runs, as a task or without one."""
+        """Does its ChargeBattery run, as a task or without one?"""
         return self.doing in ("charge", "idle charge")
 
 
@@ -79,7 +78,7 @@ class FleetAdapter(Party):
         finishing: Finishing = "nothing",
         jazzy: bool = False,
     ) -> None:
-        """`robots`: each where it stands, which is a parking spot. `drive_s`: how long every way takes.
+        """`robots`: each at its parking spot. `drive_s`: the time of every drive.
         `finishing`: the fleet's `finishing_request`. `jazzy`: by Jazzy's rules where they differ."""
         self.name = name
         self.graph = graph
@@ -94,30 +93,30 @@ class FleetAdapter(Party):
             self._rest(robot, 0.0)
 
     def charge(self, who: str, now: float, percent: float = 40.0) -> None:
-        """RMF's planner finds its battery low: ChargeBattery begins, as a task."""
+        """Begin ChargeBattery as a task: RMF's planner finds the battery low."""
         self.robots[who].battery_percent = percent
         self._begin(self.robots[who], "charge", now)
 
     def works(self, who: str, place: str, now: float) -> None:
-        """Another task takes it away."""
+        """Begin another task."""
         self._begin(self.robots[who], "work", now, place)
 
     def rests(self, who: str, now: float) -> None:
-        """Its task is over, and the fleet's finishing request begins."""
+        """End the task and begin the fleet's finishing request."""
         self._rest(self.robots[who], now)
 
     def starts_again(self, now: float) -> None:
-        """The adapter was killed and is up again: each robot has the charger of its file."""
+        """Restart after a kill: each robot has the charger of the adapter's file."""
         for robot in self.robots.values():
             robot.dedicated, robot.waits, robot.mode = self._spots[robot.name], False, IDLE
             self._rest(robot, now)
 
     def strays(self, who: str, place: str, now: float) -> None:
-        """It drives there in the task that it has, whatever that wants."""
+        """Drive the robot there within its present task, against that task's purpose."""
         self._go(self.robots[who], place, now)
 
     def hear(self, message: d.Message, now: float) -> list[Said]:
-        """Charging assignments."""
+        """Take a charging assignment."""
         if isinstance(message, d.ChargingAssignments) and message.fleet_name == self.name:
             for assignment in message.assignments:
                 if assignment.waypoint_name not in self.graph:
@@ -129,7 +128,7 @@ class FleetAdapter(Party):
         return []
 
     def tick(self, now: float) -> list[Said]:
-        """Robots drive on, low ones retreat, full ones end their task, the state goes out."""
+        """Drive robots on, retreat low ones, end full ones' tasks, and publish the state."""
         for robot in self.robots.values():
             self._move(robot, now)
             self._retreat(robot, now)
@@ -140,7 +139,7 @@ class FleetAdapter(Party):
         return [(FLEET_STATES, d.FleetState(self.name, states))]
 
     def wake_at(self) -> float:
-        """The next state, or the next arrival."""
+        """Time of the next state or arrival."""
         ways = [robot.arrives_at for robot in self.robots.values() if robot.goes_to]
         return min([self._told_at + EVERY_S, *ways])
 
@@ -162,7 +161,7 @@ class FleetAdapter(Party):
             self._go(robot, robot.dedicated if self.jazzy else self._spots[robot.name], now)
 
     def _retreat(self, robot: FleetRobot, now: float) -> None:
-        """consider_retreating_to_charger: not with a task, and not where it is dedicated to."""
+        """Apply consider_retreating_to_charger: not during a task, nor at the dedicated waypoint."""
         low = robot.battery_percent < RETREAT_PERCENT
         if self.jazzy and robot.battery_percent <= TOO_LATE_PERCENT:
             return

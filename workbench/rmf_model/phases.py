@@ -1,7 +1,7 @@
 """The phases of a robot's task that concern us: RequestLift, EndLiftSession, DoorOpen, DoorClose.
 
 Source: rmf_ros2 9dedd0f, rmf_fleet_adapter/src/rmf_fleet_adapter/phases/. None of them gives up.
-Left out: the lift watchdog, localisation, holding points (they send nothing to us).
+Left out, as they send nothing to us: the lift watchdog, localisation, holding points.
 """
 
 from typing import Final
@@ -16,10 +16,10 @@ REPEAT_S: Final = 1.0
 
 
 class RequestLift(Phase):
-    """Waits for a LiftState with our floor, DOOR_OPEN and our session; it looks at no mode.
+    """Wait for a LiftState with our floor, DOOR_OPEN and our session; modes are ignored.
 
-    Its own 1 s timer publishes nothing once a destination is set: the repeats come from the
-    context, one for each LiftState.
+    Once a destination is set, the phase's 1 s timer publishes nothing: the context repeats the
+    request at each LiftState.
     """
 
     claims_lift = True
@@ -28,7 +28,7 @@ class RequestLift(Phase):
         self.wanted = LiftDestination(lift, floor, inside)
 
     def begin(self, robot: RobotContext, now: float) -> list[Said]:
-        """Sends the request. If the robot is outside and the lift has come, the phase is done at
+        """Send the request. If the robot is outside and the lift has come, the phase is done at
         once."""
         if not self.wanted.inside and robot.has_lift_arrived(self.wanted.lift, self.wanted.floor):
             self.done = True
@@ -36,7 +36,7 @@ class RequestLift(Phase):
         return robot.set_lift_destination(self.wanted, now)
 
     def hear(self, robot: RobotContext, message: d.Message, now: float) -> list[Said]:
-        """RequestLift.cpp:322-326, _finish: once the lift has come, it requests as from inside."""
+        """Once the lift has come, request as from inside (RequestLift.cpp:322-326, _finish)."""
         match message:
             case d.LiftState(
                 lift_name=self.wanted.lift,
@@ -53,26 +53,26 @@ class RequestLift(Phase):
 
 
 class EndLiftSession(Phase):
-    """Releases the lift. Done when a state of the lift shows a session other than ours."""
+    """Release the lift. Done when a LiftState shows a session other than ours."""
 
     def __init__(self, lift: str) -> None:
         self.lift = lift
 
     def begin(self, robot: RobotContext, now: float) -> list[Said]:
-        """Sends nothing: END_SESSION goes out at the next LiftState that shows our session."""
+        """Send nothing: END_SESSION follows the next LiftState with our session."""
         return robot.release_lift()
 
     def hear(self, robot: RobotContext, message: d.Message, now: float) -> list[Said]:
-        """EndLiftSession.cpp, _init_obs."""
+        """Look for the session's end (EndLiftSession.cpp, _init_obs)."""
         if isinstance(message, d.LiftState) and message.lift_name == self.lift:
             self.done = message.session_id != robot.requester_id
         return []
 
 
 class DoorOpen(Phase):
-    """OPEN at the start and every second, until the door is OPEN *and* the heartbeat lists us.
+    """Send OPEN at the start and every second, until the door is OPEN *and* the heartbeat lists us.
 
-    Only the latest state (of whichever door) and the latest heartbeat since the start count.
+    Only the latest state (of any door) and the latest heartbeat since the start count.
     """
 
     def __init__(self, door: str) -> None:
@@ -81,12 +81,12 @@ class DoorOpen(Phase):
         self._heartbeat: d.SupervisorHeartbeat | None = None
 
     def begin(self, robot: RobotContext, now: float) -> list[Said]:
-        """Begins to hold the door, and sends OPEN."""
+        """Begin to hold the door, and send OPEN."""
         robot.holding_door = self.door
         return self.tick(robot, now)
 
     def hear(self, robot: RobotContext, message: d.Message, now: float) -> list[Said]:
-        """DoorOpen.cpp, _update_status."""
+        """Look at the door and the heartbeat (DoorOpen.cpp, _update_status)."""
         match message:
             case d.DoorState():
                 self._state = message
@@ -102,13 +102,13 @@ class DoorOpen(Phase):
         return []
 
     def tick(self, robot: RobotContext, now: float) -> list[Said]:
-        """Sends OPEN again."""
+        """Send OPEN again."""
         self.due_at = now + REPEAT_S
         return [robot.ask_door(self.door, d.DoorModeValue.MODE_OPEN, now)]
 
 
 class DoorClose(Phase):
-    """CLOSE at the start and every second, until a heartbeat no longer lists us.
+    """Send CLOSE at the start and every second, until a heartbeat no longer lists us.
 
     It does not wait for the door.
     """
@@ -117,18 +117,18 @@ class DoorClose(Phase):
         self.door = door
 
     def begin(self, robot: RobotContext, now: float) -> list[Said]:
-        """Stops holding the door, and sends CLOSE."""
+        """Stop holding the door, and send CLOSE."""
         if robot.holding_door == self.door:
             robot.holding_door = None
         return self.tick(robot, now)
 
     def hear(self, robot: RobotContext, message: d.Message, now: float) -> list[Said]:
-        """DoorClose.cpp, _update_status."""
+        """Look at the heartbeat (DoorClose.cpp, _update_status)."""
         if isinstance(message, d.SupervisorHeartbeat):
             self.done = not has_session(message, robot.requester_id, self.door)
         return []
 
     def tick(self, robot: RobotContext, now: float) -> list[Said]:
-        """Sends CLOSE again."""
+        """Send CLOSE again."""
         self.due_at = now + REPEAT_S
         return [robot.ask_door(self.door, d.DoorModeValue.MODE_CLOSED, now)]

@@ -1,4 +1,4 @@
-"""A fleet adapter, for one robot: what its context does by itself, whichever phase is running.
+"""A fleet adapter's context of one robot: its own actions, common to all phases.
 
 Source: rmf_ros2 9dedd0f, rmf_fleet_adapter/src/rmf_fleet_adapter/agv/RobotContext.cpp:1281-1324 and
 1600-1800. The phases are in `phases.py`. `jazzy`: by Jazzy's rules where they differ (branch jazzy,
@@ -17,7 +17,7 @@ from workbench.rmf_model import NEVER, Party, Said, door_request, has_session
 
 
 class LiftDestination(Struct, frozen=True):
-    """Where the robot wants its lift; `inside` once it may be in the car."""
+    """The lift's destination for the robot; `inside`: may the robot be in the car?"""
 
     lift: str
     floor: str
@@ -27,7 +27,7 @@ class LiftDestination(Struct, frozen=True):
 class Phase(ABC):
     """One step of a robot's task.
 
-    `due_at`: its wall timer. `claims_lift`: while it runs, the lift is not released for idleness.
+    `due_at`: its wall timer. `claims_lift`: the phase keeps an idle lift from being released.
     """
 
     done = False
@@ -36,21 +36,21 @@ class Phase(ABC):
 
     @abstractmethod
     def begin(self, robot: "RobotContext", now: float) -> list[Said]:
-        """Start."""
+        """Start the phase."""
 
     @abstractmethod
     def hear(self, robot: "RobotContext", message: d.Message, now: float) -> list[Said]:
-        """Take a message, after the context's own rules have."""
+        """Take a message, after the context's own rules."""
 
     def tick(self, robot: "RobotContext", now: float) -> list[Said]:
-        """The phase's wall timer fires."""
+        """Fire the phase's wall timer."""
         return []
 
 
 class RobotContext(Party):
     """A fleet adapter's RobotContext (`requester_id` is fleet/robot) and its one running phase.
 
-    `on_task`: it has a task. `in_car`: its position is inside the lift. The caller sets both.
+    `on_task`: has the robot a task? `in_car`: is its position inside the lift? The caller sets both.
     A cancelled phase is `robot.phase = None`.
     """
 
@@ -73,17 +73,17 @@ class RobotContext(Party):
         self._tasked_at = float("-inf")
 
     def begin(self, phase: Phase, now: float) -> list[Said]:
-        """Start this phase; the one before is dropped, done or not."""
+        """Start this phase; drop the last one, done or not."""
         self.phase = phase
         return phase.begin(self, now)
 
     @property
     def done(self) -> bool:
-        """No phase is running."""
+        """Is no phase running?"""
         return self.phase is None or self.phase.done
 
     def hear(self, message: d.Message, now: float) -> list[Said]:
-        """The context's own rules first, then the phase's."""
+        """Apply the context's own rules, then the phase's."""
         said: list[Said] = []
         match message:
             case d.LiftState():
@@ -95,29 +95,29 @@ class RobotContext(Party):
         return said
 
     def tick(self, now: float) -> list[Said]:
-        """The phase's wall timer."""
+        """Fire the phase's wall timer."""
         return [] if self.phase is None or self.done else self.phase.tick(self, now)
 
     def wake_at(self) -> float:
-        """When that is due."""
+        """Time of the phase's wall timer."""
         return NEVER if self.phase is None or self.done else self.phase.due_at
 
     # ---- lift
 
     def set_lift_destination(self, wanted: LiftDestination, now: float) -> list[Said]:
-        """Ask for the lift now, and again at each of its states."""
+        """Request the lift now, and again at each LiftState."""
         self.lift_arrived = self.has_lift_arrived(wanted.lift, wanted.floor)
         self.destination = wanted
         self._idle_since = None
         return self._publish_destination(now)
 
     def has_lift_arrived(self, lift: str, floor: str) -> bool:
-        """The lift has come for this destination already."""
+        """Has the lift already come for this destination?"""
         at = self.destination
         return self.lift_arrived and at is not None and (at.lift, at.floor) == (lift, floor)
 
     def release_lift(self) -> list[Said]:
-        """Forget the lift. END goes out once a LiftState shows our session; Jazzy sends one now too."""
+        """Forget the lift. END follows a LiftState with our session; Jazzy also sends END at once."""
         said = []
         if self.jazzy and self.destination is not None:
             said = [self._end(self.destination.lift, self.destination.floor, 0.0)]
@@ -176,7 +176,7 @@ class RobotContext(Party):
     # ---- door
 
     def ask_door(self, door: str, mode: d.DoorModeValue, now: float) -> Said:
-        """The adapter's DoorRequest."""
+        """Make the adapter's DoorRequest."""
         return topics.ADAPTER_DOOR_REQUESTS, door_request(door, self.requester_id, mode, now)
 
     def _check_door_supervisor(self, heartbeat: d.SupervisorHeartbeat, now: float) -> list[Said]:

@@ -1,8 +1,8 @@
 """rmf_lift_supervisor and rmf_door_supervisor, rule by rule.
 
 Source: rmf_ros2 9dedd0f, rmf_fleet_adapter/src/lift_supervisor/Node.cpp and
-door_supervisor/Node.cpp. Neither remembers anything across a restart. Where Jazzy's differ (branch
-jazzy, 7eef65a), `jazzy` says so.
+door_supervisor/Node.cpp. Neither remembers anything across a restart. `jazzy`: by Jazzy's rules
+where they differ (branch jazzy, 7eef65a).
 """
 
 from collections.abc import Sequence
@@ -19,7 +19,7 @@ from workbench.rmf_model import Party, Said, door_request
 class LiftSupervisor(Party):
     """rmf_lift_supervisor: one slot for each lift, which holds the last request of its holder.
 
-    Jazzy's repeats its holder's request at every state, and sends END for an empty session too.
+    Jazzy's repeats the holder's request at every state, and sends END for an empty session too.
     """
 
     subscribes: Sequence[topics.AnyTopic] = (topics.ADAPTER_LIFT_REQUESTS, topics.LIFT_STATES)
@@ -29,7 +29,7 @@ class LiftSupervisor(Party):
         self._jazzy = jazzy
 
     def hear(self, message: d.Message, now: float) -> list[Said]:
-        """Adapter requests are adopted, forwarded or silently dropped; states cause repeats."""
+        """Adopt, forward or silently drop adapter requests; repeat requests at states."""
         match message:
             case d.LiftRequest():
                 return self._requested(message, now)
@@ -82,9 +82,9 @@ def _satisfies(state: d.LiftState, held: d.LiftRequest) -> bool:
 
 
 class DoorSupervisor(Party):
-    """rmf_door_supervisor: who wants each door open, and since when.
+    """rmf_door_supervisor: the sessions of each door, with their beginnings.
 
-    The heartbeat goes out on each adapter request and at no other time.
+    The heartbeat is published on each adapter request and at no other time.
     """
 
     subscribes: Sequence[topics.AnyTopic] = (topics.ADAPTER_DOOR_REQUESTS, topics.DOOR_STATES)
@@ -94,7 +94,7 @@ class DoorSupervisor(Party):
         self.sessions: dict[str, dict[str, d.Time]] = {}
 
     def hear(self, message: d.Message, now: float) -> list[Said]:
-        """Adapter requests open and close sessions; states cause reminders."""
+        """Open and close sessions at adapter requests; send reminders at states."""
         match message:
             case d.DoorRequest(requested_mode=d.DoorMode(d.DoorModeValue.MODE_OPEN)):
                 return self._opened(message, now)
