@@ -1,10 +1,10 @@
-"""`python -m hal_fakes FILE BUS --socket PATH`: the far side of one bus, in a process of its own.
+"""`python -m hal_fakes FILE BUS --socket PATH`: serve the far side of one bus in a separate process.
 
-For buses whose fake is `Outside` (`hal_fakes/fake.py`). What must stand in the bus's settings instead
-is printed as one line of JSON when all is ready.
+For buses whose fake is `Outside` (`hal_fakes/fake.py`). When all is ready, the replacements for
+the bus's settings are printed as one line of JSON.
 
-The process ends when its standard input does, so that nothing is left behind however the daemon
-died. It ignores SIGINT: Ctrl-C in a terminal reaches both, and the daemon has to finish first.
+The process ends when its standard input does, so nothing is left behind however the daemon dies.
+ It ignores SIGINT: Ctrl-C in a terminal reaches both, and the daemon has to finish first.
 """
 
 import argparse
@@ -54,7 +54,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 @contextmanager
 def served(path: Path, bus_name: str, socket: Path) -> Iterator[dict[str, object]]:
-    """The far side of this bus until the end of the block; gives what must stand in its settings.
+    """Serve the far side of this bus until the end of the block; yield its replaced settings.
 
     Raises SettingsError, DriverError.
     """

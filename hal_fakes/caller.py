@@ -1,4 +1,4 @@
-"""One connection to the control socket of a running simulation; `control.py` says what it takes."""
+"""A connection to the control socket of a running simulation; `control.py` lists the orders."""
 
 import json
 import socket
@@ -12,11 +12,11 @@ PATIENCE_S: Final = 120.0
 
 
 class SimulationRefused(Exception):
-    """The simulation refuses; the text is its answer."""
+    """The simulation refuses an order; the text is the answer."""
 
 
 class Caller:
-    """A connection. Raises OSError where nobody listens or answers within `patience_s`; None: waits."""
+    """A connection. Raises OSError without a listener or an answer within `patience_s` (None: wait)."""
 
     def __init__(self, path: Path, patience_s: float | None = PATIENCE_S) -> None:
         self._end = socket.socket(socket.AF_UNIX)
@@ -35,27 +35,27 @@ class Caller:
         self.close()
 
     def say(self, line: str) -> str:
-        """Send a line, and return the next one that comes."""
+        """Send a line, and return the next line received."""
         self._end.sendall(line.encode() + b"\n")
         return self.hear()
 
     def order(self, line: str) -> None:
-        """Send a line. Raises SimulationRefused unless it is done."""
+        """Send an order. Raises SimulationRefused unless it is carried out."""
         answer = self.say(line)
         if answer != "ok":
             raise SimulationRefused(f"{line}: {answer or 'no answer'}")
 
     def hear(self) -> str:
-        """The next line; "" when the simulation has hung up."""
+        """Return the next line; "" when the simulation has hung up."""
         return self._lines.readline().rstrip("\n")
 
     def edges(self) -> Iterator[Edge]:
-        """Every edge from now on, after `follow`, until the simulation hangs up."""
+        """After `follow`: yield every edge until the simulation hangs up."""
         while line := self.hear():
             yield Edge(**json.loads(line))
 
     def edge(self, signal: str, value: bool) -> float:
-        """Wait for this edge, after `follow`; its monotonic time (s)."""
+        """After `follow`: wait for this edge; return its monotonic time (s)."""
         return next(e.at for e in self.edges() if (e.signal, e.value) == (signal, value))
 
     def close(self) -> None:

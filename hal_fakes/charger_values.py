@@ -1,6 +1,6 @@
-"""Values for a charger's places, so that the driver's rules and errors read the wanted activity.
+"""Find values for a charger's fields that the driver's rules and errors read as the wanted activity.
 
-It tries values until the driver's own rules judge them as wanted.
+Values are tried until the driver's own rules give that activity.
 """
 
 import itertools
@@ -26,7 +26,7 @@ NEAREST: Final = {
     Activity.STOPPING: Activity.CHARGING,
     Activity.RELEASED: Activity.IDLE,
 }
-"""What is shown for an activity that no code or rule can express."""
+"""Nearest activities, shown for an activity without code or rule."""
 
 
 def values(
@@ -35,9 +35,9 @@ def values(
     wanted: Meaning,
     natural: Mapping[str, Value],
 ) -> dict[str, Value] | None:
-    """What to show at each place. `natural`: what stands there anyway, tried first.
+    """Return the value of each field. `natural`: the fields' usual values, tried first.
 
-    None where no rule can say it; an error without a rule is shown at the first place of errors.
+    None if no rule fits; an error without a rule is shown in the first error field.
     """
     shown: dict[str, Value] = {at: 0 for _, at in errors.places()}
     shown |= {n.at: n.well[0] for n in errors.codes}
@@ -56,7 +56,7 @@ def values(
 
 
 def _shows_error(errors: StationErrors, shown: dict[str, Value], robot: bool) -> bool:
-    """Show an error of this side, or of the other where this one has none."""
+    """Show an error of this side, or of the other side if this one has none."""
     sides = ("robot", "station") if robot else ("station", "robot")
     for side in sides:
         for number in errors.codes:
@@ -84,7 +84,7 @@ def _candidates(
 
 
 def _near(test: Test) -> Iterator[Value]:
-    """Values that pass a test, and some that do not."""
+    """Return values that pass a test, and some that fail."""
     yield from test.one_of
     for limit in (test.above, test.below):
         if limit is not None:

@@ -1,8 +1,8 @@
-"""The socket by which a story reaches the plants of a running simulation.
+"""The control socket to the plants of a running simulation.
 
 AF_UNIX, lines of text, words with spaces in quotes. Each line is answered `ok` or `error TEXT`:
 
-- `follow`: from now on every edge comes as a line of JSON,
+- `follow`: from now on every edge is sent as a line of JSON,
   `{"at": s monotonic, "device": …, "what": "relay"|"sensor", "signal": …, "value": …}`
 - `fail DEVICE PART MODE`: a wire or part fails (`off`, `stuck`, `slow`, `garbage`, `wrong`); `ok` mends
 - `press DEVICE SIGNAL on|off`: a person or the building acts
@@ -37,7 +37,7 @@ class Control:
         self._plants = plants
         self._followers: set[socket.socket] = set()
         self._callers: dict[socket.socket, threading.Thread] = {}
-        self._lock = threading.Lock()  # of the two above; never held while a plant is called
+        self._lock = threading.Lock()  # guards the two above; never held while a plant is called
         self._listener = _listen(path)
         for plant in plants.values():
             plant.on_edge = self._tell
@@ -129,7 +129,7 @@ class Control:
 
 
 def _sent(follower: socket.socket, line: bytes) -> bool:
-    """Without waiting: a follower that does not read must not stop the plants."""
+    """Send without waiting: a follower that does not read must not stop the plants."""
     try:
         return follower.send(line, socket.MSG_DONTWAIT) == len(line)
     except OSError:

@@ -1,4 +1,4 @@
-"""A ROS domain that nobody on this machine uses, on DDS or zenoh, for the demo and the tests."""
+"""Find an unused ROS domain on this machine, on DDS or zenoh, for the demo and the tests."""
 
 import atexit
 import random
@@ -10,14 +10,14 @@ from typing import Final
 from bridges.transports.zenoh.config import LOOPBACK_PORT
 
 DOMAINS: Final = range(10, 70)
-"""`bench/` has those from 70 on; above 101 the ports reach into those that Linux hands to clients."""
+"""`bench/` uses domains from 70 on; above 101 the ports overlap Linux's ephemeral ports."""
 CLAIM: Final = "\0rmf-bridges-test-domain-{}"
 
 
 def free_domain() -> int:
-    """One in which no participant of this machine is, claimed until this process ends.
+    """Return a domain without participants on this machine, claimed until this process ends.
 
-    Raises OSError when there is none.
+    Raises OSError if none is free.
     """
     domain, claim = _claimed()
     atexit.register(claim.close)
@@ -26,18 +26,18 @@ def free_domain() -> int:
 
 @contextmanager
 def domain_for_a_while() -> Iterator[int]:
-    """The same, claimed until the end of the block."""
+    """Yield a free domain, claimed until the end of the block."""
     domain, claim = _claimed()
     with claim:
         yield domain
 
 
 def _claimed() -> tuple[int, socket.socket]:
-    """A free domain and the claim on it, which lasts until it is closed.
+    """Return a free domain and the claim on it, which lasts until closed.
 
-    Raises OSError when there is none. Of a domain d the ports are 7400 + 250 d: multicast discovery
+    Raises OSError if none is free. Domain d has its ports from 7400 + 250 d: multicast discovery
     there, participant i's unicast ports 10 + 2 i and 11 + 2 i above it (DDSI-RTPS 2.5, 9.6.2.3). The
-    first one may have left while others are still there.
+    first participant may have left while others remain.
     """
     for domain in random.sample(DOMAINS, len(DOMAINS)):
         base = 7400 + 250 * domain

@@ -1,7 +1,7 @@
 """The far side of a `can` bus, across processes: controllers behind an slcan adapter on a pty.
 
-How the bus fails is in `hal_fakes/can/side.py`, how a CANopen receiver does in `canopen_rcu.py`, and a
-charger with frames of its own in `frame_charger.py`.
+Failures: of the bus in `hal_fakes/can/side.py`, of a CANopen receiver in `canopen_rcu.py`, of a charger
+with its own frames in `frame_charger.py`.
 """
 
 from collections.abc import Sequence

@@ -1,12 +1,12 @@
 """Xnergy's receiver as a CANopen node: `canopen.LocalNode`, with a plant behind its objects.
 
-Failing parts, beside those of the plant and the bus:
+Failing parts, in addition to those of plant and bus:
 
 |           | off    | stuck              | slow              | garbage        | wrong                |
 | node      | silent | no SDO is answered | answers come late | of five bytes  | about another object |
-| heartbeat | none   | none               | each second       | of three bytes | it says `stopped`    |
+| heartbeat | none   | none               | each second       | of three bytes | state `stopped`    |
 
-A node that is switched off loses its power, and says that it starts when it is back.
+A node that is `off` loses its power, and sends its boot-up message when it is back.
 """
 
 import time
@@ -46,14 +46,14 @@ class CanOpenRcu:
         self._send: Send | None = None
 
     def hear(self, message: can.Message, now: float, send: Send) -> None:
-        """A request, if it is for this node."""
+        """Take a request, if it is for this node."""
         if self.plant.failures.get("node") in ("off", "stuck") or message.is_extended_id:
             return
         self._send = send
         self._network.notify(message.arbitration_id, bytearray(message.data), now)
 
     def tick(self, now: float, send: Send) -> None:
-        """The heartbeat."""
+        """Send the heartbeat."""
         off = self.plant.failures.get("node") == "off"
         if off and not self._was_off:
             self.plant.drive("power", False, now)
@@ -70,13 +70,13 @@ class CanOpenRcu:
         send(frame(0x700 + self._id, beat))
 
     def reply(self, can_id: int, answer: bytes) -> None:
-        """What the library answers goes out, spoiled as it is told."""
+        """Send the library's answer, spoiled by the ordered failure."""
         mode = self.plant.failures.get("node")
         if mode == "garbage":
             answer = answer[:5]
         elif mode == "wrong":
             answer = answer[:3] + bytes((answer[3] ^ 0x40,)) + answer[4:]
-        assert self._send  # it answers nobody but who asks
+        assert self._send  # there is no answer before a request
         self._send(frame(can_id, answer), late=mode == "slow")
 
     def _reading(self) -> Reading:
@@ -107,17 +107,17 @@ class _Network(canopen.Network):
         self._rcu = rcu
 
     def send_message(self, can_id: int, data: bytes, remote: bool = False) -> None:
-        """An answer of the node's."""
+        """Send an answer of the node."""
         self._rcu.reply(can_id, bytes(data))
 
 
 def frame(can_id: int, payload: bytes) -> can.Message:
-    """A frame with an id of eleven bits."""
+    """Make a frame with an id of eleven bits."""
     return can.Message(arbitration_id=can_id, is_extended_id=False, data=payload)
 
 
 def dictionary() -> canopen.ObjectDictionary:
-    """The RCU's published objects."""
+    """Return the RCU's published objects."""
     made = canopen.ObjectDictionary()  # type: ignore[no-untyped-call]
     for found in OBJECTS.values():
         if found.index not in made:

@@ -1,12 +1,12 @@
-"""A charger with its maker's own CAN frames, by the driver's map, with a plant behind it.
+"""A charger with its maker's own CAN frames: a plant behind the driver's map.
 
 It charges while every frame of its map comes on time with the values of `on`. It stops when a frame has
-the values of `off`, or when one stays away for three periods. A busy machine delays this
-station as well as the daemon, so a long gap between two looks counts as one look only. If the map wakes
-it, it sleeps until then, and again after it was off.
+the values of `off`, or is missing for three periods. A busy machine delays this station as well as the
+daemon, so a long gap between two looks counts as one look only. If the map has a wake-up, the charger
+sleeps until woken, and again after being off.
 
-Failing part `node`, beside those of the plant and the bus: `off` is silent, `stuck` says what it said
-before, `slow` says it every two seconds, `garbage` sends frames of six bytes, `wrong` an unlisted
+Failing part `node`, in addition to those of plant and bus: `off` is silent, `stuck` repeats its last
+status, `slow` sends it every two seconds, `garbage` sends frames of six bytes, `wrong` an unlisted
 state.
 """
 
@@ -40,7 +40,7 @@ FLAGS: Final = {
     "too_far": "BadCoilPosition",
     "too_near": "BadCoilPosition",
 }
-"""Which error signal shows what is wrong with the plant; none is published for foreign objects."""
+"""The plant's faults and their error signals; none is published for foreign objects."""
 ROBOTS_FAULTS: Final = frozenset(FLAGS) - {"transmitter_fault", "foreign_object"}
 
 
@@ -64,7 +64,7 @@ class FrameCharger:
         self._status: list[can.Message] = []
 
     def hear(self, message: can.Message, now: float, send: Send) -> None:
-        """A frame that feeds it, or that takes its power away."""
+        """Take a frame that keeps the charge going or ends it."""
         self._look(now)
         extended = dbc.EXTENDED if message.is_extended_id else 0
         heard = message.arbitration_id | extended
@@ -82,7 +82,7 @@ class FrameCharger:
         self.plant.drive("power", self._fed(), now)
 
     def tick(self, now: float, send: Send) -> None:
-        """Stop when the frames that keep it charging stay away, and send the status."""
+        """Stop if frames that keep it charging are missing; send the status."""
         self._look(now)
         mode = self.plant.failures.get("node")
         self.plant.drive("power", self._fed() and mode != "off", now)
@@ -98,7 +98,7 @@ class FrameCharger:
             send(_short(message) if mode == "garbage" else message)
 
     def _look(self, now: float) -> None:
-        """Add to the time that this station has watched the bus."""
+        """Count the time for which this station has watched the bus."""
         self._watched_s += min(now - self._looked_at, STATUS_S)
         self._looked_at = now
 
@@ -160,7 +160,7 @@ class FrameCharger:
     def _by_rules(
         self, reading: Reading, natural: Mapping[str, float], wrong: bool
     ) -> dict[str, float]:
-        """What the signals of rules, error numbers and error flags hold."""
+        """Return the values of the signals of rules, error numbers and error flags."""
         known = self._map
         flags = (*known.errors.station, *known.errors.robot)
         numbers = StationErrors(codes=known.errors.codes, bits=known.errors.bits)
@@ -172,7 +172,7 @@ class FrameCharger:
         return {at: float(value) for at, value in (found or {}).items() if at not in flags}
 
     def _code(self, state: State, reading: Reading) -> int:
-        """The first code of the plant's activity, or of the nearest one that the map has."""
+        """Return the first code of the plant's activity, or of the nearest activity in the map."""
         lists = state.codes.lists()
         codes = lists[reading.activity] or lists[NEAREST.get(reading.activity, Activity.ERROR)]
         return codes[0]

@@ -1,13 +1,13 @@
-"""What stands on the far side of a CAN bus: a medium, and stations on it, in a thread of their own.
+"""The far side of a CAN bus: a medium with stations, in their own thread.
 
 The medium is python-can's `virtual` bus within one process, or an slcan adapter on a pseudo-terminal
 across processes (`hal_fakes/can/slcan_port.py`). A part `bus` of any plant on it fails as buses do:
 
-- `off`: the adapter is pulled out; a virtual bus is silent
+- `off`: the adapter is unplugged; a virtual bus is silent
 - `stuck`: nothing passes in either direction
-- `slow`: everything from the far side comes too late
-- `garbage`: noise: bytes that are no slcan, or frames of anybody with any content
-- `wrong`: the controller reports bus-off; an adapter, which cannot, hears others' frames only
+- `slow`: every frame from the far side comes too late
+- `garbage`: noise: bytes that are no slcan, or frames with random ids and content
+- `wrong`: the controller reports bus-off; an adapter, unable to report, passes only foreign frames
 """
 
 import heapq
@@ -24,40 +24,40 @@ from drivers.hal.can import CanSettings
 from hal_fakes.plants.plant import FailureMode, Plant
 
 LOOK_S: Final = 0.02
-"""How late an ordered failure, a heartbeat or a status frame may be (s)."""
+"""Greatest delay (s) of an ordered failure, a heartbeat or a status frame."""
 BUS_OFF: Final = 0x40
 SLOWNESS: Final = 1.5
-"""How many of the client's timeouts a slow answer takes."""
+"""Delay of a slow answer, in multiples of the client's timeout."""
 
 
 def slow_s(settings: CanSettings) -> float:
-    """How late a slow answer comes on this bus."""
+    """Return the delay (s) of a slow answer on this bus."""
     return SLOWNESS * settings.timeout_s
 
 
 class Medium(Protocol):
-    """The wire. `replace`: what to write into the bus's settings instead."""
+    """The wire. `replace`: replacements for the bus's settings."""
 
     replace: dict[str, object]
 
     def receive(self, wait_s: float) -> can.Message | None:
-        """The next frame from the daemon; None if none comes within `wait_s`."""
+        """Return the daemon's next frame; None if none comes within `wait_s`."""
 
     def send(self, message: can.Message) -> None:
         """Send to the daemon. The frame is lost if no program has the bus open."""
 
     def fail(self, mode: FailureMode | None) -> None:
-        """From now on work (None) or fail in this way. Called often."""
+        """Fail in this way from now on; None: work. Called often."""
 
     def close(self) -> None:
         """End. May be called twice."""
 
 
 class Send(Protocol):
-    """How a station sends."""
+    """A station's sending function."""
 
     def __call__(self, message: can.Message, late: bool = False) -> None:
-        """Send now; `late`: after the daemon has stopped waiting for it."""
+        """Send now; `late`: after the daemon has stopped waiting."""
 
 
 class CanStation(Protocol):
@@ -66,14 +66,14 @@ class CanStation(Protocol):
     plant: Plant
 
     def hear(self, message: can.Message, now: float, send: Send) -> None:
-        """A frame from the daemon."""
+        """Take a frame from the daemon."""
 
     def tick(self, now: float, send: Send) -> None:
         """Send what is due; called often."""
 
 
 class VirtualBus:
-    """python-can's `virtual` bus: `channel` names it for whoever opens it as well.
+    """python-can's `virtual` bus, opened by both sides under the name `channel`.
 
     `interface`: another of python-can's, such as `socketcan` with its channel vcan0.
     """
@@ -85,11 +85,11 @@ class VirtualBus:
         self._off_told = False
 
     def receive(self, wait_s: float) -> can.Message | None:
-        """The next frame."""
+        """Return the next frame."""
         return self._bus.recv(wait_s) if self._bus else None
 
     def send(self, message: can.Message) -> None:
-        """To whoever has the channel open."""
+        """Send to every program that has the channel open."""
         if self._bus:
             self._bus.send(message)
 
@@ -110,7 +110,7 @@ class VirtualBus:
 
 
 def any_frame(noise: random.Random) -> can.Message:
-    """A random frame."""
+    """Make a random frame."""
     extended = noise.random() < 0.5
     return can.Message(
         arbitration_id=noise.randrange(1 << (29 if extended else 11)),
@@ -120,9 +120,9 @@ def any_frame(noise: random.Random) -> can.Message:
 
 
 class CanFarSide:
-    """A running far side. `replace`: what to write into the bus's settings instead.
+    """A running far side. `replace`: replacements for the bus's settings.
 
-    `slow_s`: how late a frame comes that is sent late, or on a slow bus.
+    `slow_s`: delay of a frame sent late, or on a slow bus (s).
     """
 
     def __init__(self, medium: Medium, stations: Sequence[CanStation], slow_s: float) -> None:

@@ -41,7 +41,7 @@ class SlcanPort:
         self._open = False
 
     def receive(self, wait_s: float) -> can.Message | None:
-        """The next frame from the daemon; commands are obeyed."""
+        """Return the daemon's next frame; obey commands."""
         while b"\r" not in self._heard:
             wire = self.adapter.wire
             readable = select.select([wire] if wire is not None else [], [], [], wait_s)[0]
@@ -55,12 +55,12 @@ class SlcanPort:
         return self._obey(line.decode("ascii", "replace"))
 
     def send(self, message: can.Message) -> None:
-        """To the daemon."""
+        """Send to the daemon."""
         if self._open and not self._others:
             self._write(encoded(message))
 
     def fail(self, mode: FailureMode | None) -> None:
-        """`off` pulls the adapter out, `garbage` sends noise, `wrong` passes only others' frames."""
+        """`off` unplugs the adapter, `garbage` sends noise, `wrong` passes only others' frames."""
         if (mode == "off") != (self.adapter.wire is None):
             self._heard, self._open = b"", False
             (self.adapter.pull if mode == "off" else self.adapter.plug)()
@@ -71,7 +71,7 @@ class SlcanPort:
             self._write(encoded(any_frame(self._noise)))
 
     def close(self) -> None:
-        """Pull it out for good. May be called twice."""
+        """Unplug permanently. May be called twice."""
         self.adapter.pull()
         self._directory.cleanup()
 
@@ -95,14 +95,14 @@ class SlcanPort:
 
 
 def encoded(message: can.Message) -> bytes:
-    """The line for a frame."""
+    """Return the line for a frame."""
     letter = "T" if message.is_extended_id else "t"
     digits = f"{message.arbitration_id:0{DIGITS[letter]}X}"
     return f"{letter}{digits}{message.dlc}{bytes(message.data).hex().upper()}\r".encode()
 
 
 def decoded(line: str) -> can.Message:
-    """The frame in a line. Raises ValueError, IndexError."""
+    """Return the frame in a line. Raises ValueError, IndexError."""
     size = DIGITS[line[0]]
     count = int(line[1 + size])
     data = bytes.fromhex(line[2 + size : 2 + size + 2 * count])

@@ -4,9 +4,9 @@
 door, rides a lift and charges (`ride`), or three robots share two chargers (`charging`).
 
     daemons.py   the daemons' processes, and the control sockets of their plants
-    journal.py   what happened, and how it is printed
-    demo_run.py  starts the daemons, plays the day, and stops everything however it ends
-    world.py     RMF on the graph: what is heard, said and awaited
-    ride.py      the robot's day, and whether it went right
-    charging.py  the chargers' day, and whether it went right
+    journal.py   events, and their printed lines
+    demo_run.py  starts the daemons, plays the day, and always stops everything
+    world.py     RMF on the graph: messages heard, sent and awaited
+    ride.py      the robot's day, and its verdict
+    charging.py  the chargers' day, and its verdict
 """

@@ -1,5 +1,5 @@
-"""`python -m hal_fakes.demo [ride|charging|page]`: exit code 0 when the day went right, 1 with the
-reason, 130 after Ctrl-C. Nothing is left running, whichever way it ends."""
+"""`python -m hal_fakes.demo [ride|charging|page]`: exit code 0 after a correct day, 1 with the
+reason, 130 after Ctrl-C. Nothing is left running in any case."""
 
 import argparse
 import sys

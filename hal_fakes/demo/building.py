@@ -1,4 +1,4 @@
-"""`make demo-page`: two lifts, two doors, two chargers, five robots that ride for ever, and the page.
+"""`make demo-page`: two lifts, two doors, two chargers, five robots riding endlessly, and the page.
 
 The daemons and the page are processes of their own; this one plays the fleet adapters, and lets
 something fail every minute. It ends with Ctrl-C.
@@ -36,13 +36,13 @@ FAULTS: Final = (
     (PAD_A, "fail", "server", "off", "ok"),
     (LIFT2, "fail", "unit", "off", "ok"),
 )
-"""A device, what is done to a part of it, how, and how that ends."""
+"""A device, an order for one of its parts, the order's mode, and the order that ends it."""
 FAULT_EVERY_S, FAULT_LASTS_S = 60.0, 15.0
 DRIVES_S: Final = 3.0
 CHARGES_S: Final = 20.0
 
 Step = Phase | float | Callable[[], bool]
-"""A phase of RMF's task, seconds to wait, or what has to come about."""
+"""A phase of RMF's task, seconds to wait, or a condition to await."""
 
 
 class Rider:
@@ -76,7 +76,7 @@ class Rider:
 def errands(
     robot: RobotContext, lift: str, door: str, floors: tuple[str, str], levels: dict[str, str]
 ) -> Iterator[Step]:
-    """Through a door, up or down in a lift, a rest; and again. `levels`: where each robot is."""
+    """Yield steps endlessly: through a door, up or down in a lift, a rest. `levels`: each robot's."""
     there = cycle((floors, floors[::-1]))
     for start, goal in there:
         yield DoorOpen(door)
@@ -94,7 +94,7 @@ def errands(
 
 
 def charges(world: World, robot: str, charger: str) -> Iterator[Step]:
-    """Onto the pad, charged for a while, off it; and again."""
+    """Yield steps endlessly: onto the pad, a while of charging, off the pad."""
     numbers = count(1)
     request_at = [0.0]
 
@@ -120,7 +120,7 @@ def charges(world: World, robot: str, charger: str) -> Iterator[Step]:
 
 
 def live(world: World) -> None:
-    """For ever."""
+    """Play endlessly."""
     rides = (
         ("R1", LIFT1, WARD, ("L1", "L3")),
         ("R2", LIFT1, SIDE, ("L2", "L4")),
@@ -188,7 +188,7 @@ def _fleet(riders: list[Rider], levels: Mapping[str, str], now: float) -> d.Flee
 
 
 def dawns(world: World) -> bool:
-    """Every daemon is up, and has said what its sensors see."""
+    """Is every daemon up, with a state from its sensors?"""
     devices = (LIFT1, LIFT2, WARD, SIDE, PAD_A, PAD_E)
     return all(world.journal.latest(device) is not None for device in devices)
 

@@ -1,10 +1,10 @@
-"""`make demo-charging`: the scenarios of shared chargers by their numbers, and whether each went right.
+"""`make demo-charging`: the numbered scenarios of shared chargers, and the verdict on each.
 
 Two chargers on HTTP and the coordinator, each a process of its own. This one plays two fleets of two
 brands, an operator and a technician: a robot that its schedule charges (1), wishes of a robot and of
 an operator (2), more robots than chargers and a blocked pad (3), a robot at the wrong charger (4),
 chargers that overheat (5a), and a robot that cannot be charged (5b). A line that begins with `so:` is
-a fact that was waited for: without it the demo ends with exit code 1.
+an awaited fact: without it the demo ends with exit code 1.
 """
 
 from collections.abc import Iterable
@@ -31,12 +31,12 @@ COORDINATOR = HERE / "charging_coordinator.yaml"
 
 
 def dawns(world: World) -> bool:
-    """Both chargers are idle, and the coordinator speaks."""
+    """Are both chargers idle, and does the coordinator publish?"""
     return _idle(world) and bool(world.places)
 
 
 def live(world: World) -> None:
-    """All scenarios, in their order."""
+    """Play all scenarios in order."""
     fleets = DemoFleets(world, load(COORDINATOR).section)
     world.join(fleets)
     with world.leg("1 scheduled", f"all day {ONE} is to be charged to 96 %"):
@@ -95,7 +95,7 @@ def _waits(world: World, fleets: DemoFleets, who: str, why: str, within_s: float
 
 
 def _mended(world: World, charger: str) -> None:
-    """As a technician does, with `rmf-bridge reset`."""
+    """Mend and reset as a technician does, with `rmf-bridge reset`."""
     world.note("is cooled and reset by the technician", charger)
     world.press(charger, "over_temperature", False)
     world.daemons[charger].reset()
@@ -195,11 +195,11 @@ def _robot_faulty(world: World, fleets: DemoFleets) -> None:
 # --- the verdict: pure -------------------------------------------------------------------------
 
 CHARGED: Final = {A: [ONE, TWO, ONE, ONE, ONE, ONE], B: [PORTER, TWO, ONE]}
-"""Who was charged where, in order; nobody else, nowhere else."""
+"""The only charges allowed: robot and charger, in order."""
 
 
 def problems(journal: Journal) -> list[str]:
-    """Everything that was not as it should be; empty when the day went right."""
+    """Return all errors of the day; empty if it went right."""
     states = [state for state in journal.states if isinstance(state, d.ChargerState)]
     return [*_charged(states), *_shared(states), *_unverified(states)]
 
@@ -213,7 +213,7 @@ def _charged(states: list[d.ChargerState]) -> Iterable[str]:
 
 
 def _shared(states: list[d.ChargerState]) -> Iterable[str]:
-    """Never one robot on two chargers, as far as their states say."""
+    """Find robots on two chargers at once, by the chargers' states."""
     latest: dict[str, d.ChargerState] = {}
     for state in states:
         latest[state.charger_name] = state
@@ -224,7 +224,7 @@ def _shared(states: list[d.ChargerState]) -> Iterable[str]:
 
 
 def _unverified(states: list[d.ChargerState]) -> Iterable[str]:
-    """What is charged was asked for, by the coordinator."""
+    """Find charges that the coordinator did not request."""
     for state in states:
         if _charging(state) and not state.request_id.startswith("charger_coordinator/"):
             yield f"{state.charger_name} charged for {state.request_id or 'no request'}"

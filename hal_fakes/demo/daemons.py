@@ -26,9 +26,9 @@ class DemoFailed(Exception):
 
 
 class Program:
-    """One `rmf-bridge …`, in a session of its own.
+    """One `rmf-bridge …`, in its own session.
 
-    So a Ctrl-C in the terminal reaches the demo alone, which then stops everybody in order.
+    A Ctrl-C in the terminal then reaches the demo alone, which stops every program in order.
     """
 
     def __init__(self, name: str, log: Path, words: Iterable[str], domain_id: int) -> None:
@@ -53,16 +53,16 @@ class Program:
             raise DemoFailed(f"the daemon {self.name} has died; its log says why")
 
     def tail(self) -> str:
-        """The end of its log."""
+        """Return the end of its log."""
         return "\n".join(self.log.read_text(errors="replace").splitlines()[-TAIL:])
 
     def ask_to_stop(self) -> None:
-        """SIGTERM: outputs off, and off the graph."""
+        """Send SIGTERM: the daemon switches outputs off and leaves the graph."""
         if not self._exited():
             os.kill(self._process.pid, signal.SIGTERM)
 
     def end(self, deadline: float) -> None:
-        """Wait until it is gone, then make sure that nothing of its session remains."""
+        """Wait for its end, then kill any rest of its session."""
         while not self._exited() and time.monotonic() < deadline:
             time.sleep(0.02)
         if self._process.returncode is None:
@@ -70,7 +70,7 @@ class Program:
         self._process.wait()
 
     def _exited(self) -> bool:
-        """Without reaping it: its number stays its own, and its session's, until `end`."""
+        """Has it exited? It is not reaped: pid and session id stay reserved until `end`."""
         if self._process.returncode is not None:
             return True
         look = os.WEXITED | os.WNOHANG | os.WNOWAIT
@@ -100,7 +100,7 @@ class DaemonProcess(Program):
                 raise DemoFailed(str(error)) from None
 
     def reset(self) -> None:
-        """As `rmf-bridge reset` does."""
+        """Reset as `rmf-bridge reset` does."""
         if not self._exited():
             os.kill(self._process.pid, signal.SIGUSR1)
 
@@ -117,7 +117,7 @@ class DaemonProcess(Program):
 
 
 class PageProcess(Program):
-    """`rmf-bridge page`, on which `demo` may log in."""
+    """`rmf-bridge page`; user `demo` may log in."""
 
     def __init__(self, directory: Path, domain_id: int, password: str) -> None:
         self._password = password
@@ -129,7 +129,7 @@ class PageProcess(Program):
         super().__init__("page", directory / "page.log", words, domain_id)
 
     def address(self) -> str:
-        """Where it is, once it has said so."""
+        """Return the page's address, once logged."""
         deadline = time.monotonic() + CONNECT_WITHIN_S
         while not (said := [line for line in self.tail().splitlines() if "http://" in line]):
             self.check()
@@ -140,7 +140,7 @@ class PageProcess(Program):
 
 
 def _page_port() -> str:
-    """PAGE_PORT, else 8080, or a free one where that is taken."""
+    """Return PAGE_PORT, else 8080, or a free port if that is taken."""
     if given := os.environ.get("PAGE_PORT"):
         return given
     try:

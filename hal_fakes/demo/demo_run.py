@@ -1,6 +1,6 @@
-"""What a demo is, and the one way through it: daemons up, the day, the verdict, nothing left running.
+"""Run a demo: start the daemons, play the day, give the verdict, leave nothing running.
 
-Exit code 0 when it went right, 1 with the reason, 130 after Ctrl-C.
+Exit code 0 after a correct day, 1 with the reason, 130 after Ctrl-C.
 """
 
 import shutil
@@ -27,7 +27,7 @@ from hal_fakes.wire import join, wire
 
 READY_WITHIN_S: Final = 20.0
 Failure = tuple[str, str, str]
-"""A device, a part of its plant, and how that fails."""
+"""A device, a part of its plant, and the failure mode."""
 
 
 class Interrupted(Exception):
@@ -36,13 +36,12 @@ class Interrupted(Exception):
 
 @dataclass(frozen=True, slots=True)
 class Demo:
-    """`files`: a daemon's YAML, by the device that it serves. `dawn`: how everything stands in the
-    morning, which `dawns` sees. `live`: the day itself, which raises DemoFailed when something does
-    not come about in time. `problems`: whatever was not as it should be, from the journal alone.
-    `right`: the day in a sentence. `outcomes`: what each part of the day has shown, if the summary
-    lists them.
-    `page_password`: the page is served beside it, and `demo` may log in with it.
-    `publishes`: the topics of RMF's side; without the supervisors' where real ones run."""
+    """`files`: device -> its daemon's YAML. `dawn`: the state of everything in the morning, checked
+    by `dawns`. `live`: the day itself; raises DemoFailed when an awaited event is late.
+    `problems`: the errors of the day, from the journal alone. `right`: the day in a sentence.
+    `outcomes`: the results of the parts of the day, if the summary lists them.
+    `page_password`: the page is served too; user `demo` may log in with this password.
+    `publishes`: the topics of RMF's side; without the supervisors' if real ones run."""
 
     files: dict[str, Path]
     dawn: str
@@ -56,9 +55,9 @@ class Demo:
 
 
 class DemoRun:
-    """One performance of a demo; `failures` happen before its day begins.
+    """One run of a demo; `failures` are set before the day begins.
 
-    `patience`: how many times as long as usual each step may take.
+    `patience`: factor on every step's time limit.
     """
 
     def __init__(self, demo: Demo, failures: Sequence[Failure] = (), patience: float = 1.0) -> None:
@@ -72,7 +71,7 @@ class DemoRun:
         self._interrupted = False
 
     def play(self) -> int:
-        """The exit code; the daemons' logs remain only where it went wrong."""
+        """Return the exit code; keep the daemons' logs only after an error."""
         for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
             signal.signal(number, self._interrupt)
         directory = Path(tempfile.mkdtemp(prefix="rmf-demo-"))
@@ -126,7 +125,7 @@ class DemoRun:
 
     @contextmanager
     def _up(self, directory: Path) -> Iterator[Transport]:
-        """Every daemon started, on a domain and a loopback of their own, and a place beside them."""
+        """Start every daemon on a private domain and loopback; yield RMF's side on the same graph."""
         domain = free_domain()
         count = len(self.demo.files)
         begun = f"{count} daemons on fake hardware, {wire()}, domain {domain}, loopback only"
@@ -147,7 +146,7 @@ class DemoRun:
             transport.close()
 
     def _interrupt(self, number: int, frame: FrameType | None) -> None:
-        """Only marks it: nothing is cut off half-way, so nothing is forgotten."""
+        """Only note the signal: each step is completed first, so nothing is left behind."""
         self._interrupted = True
 
     def _check(self) -> None:
@@ -171,7 +170,7 @@ class DemoRun:
 
 
 def summary(demo: Demo, journal: Journal) -> str:
-    """What was done, in a few lines."""
+    """Summarise the day in a few lines."""
     counts = ", ".join(f"{n} {what}" for what, n in sorted(journal.counts().items()))
     legs = ", ".join(f"{name} {seconds:.1f} s" for name, seconds in journal.legs.items())
     if demo.outcomes:

@@ -22,13 +22,13 @@ WARD: Final = "ward"
 DRIVE_S: Final = 1.0
 FILLS_PER_S: Final = 15.0
 CONFIGURED: Final = {"tiny": Path(__file__).parents[2] / "config" / "fleet_tiny.yaml"}
-"""Fleets that are started from their adapter's configuration; the others have only this."""
+"""Fleets started from their adapter's configuration; the others have only their robots here."""
 FINISHING: Final[dict[str, Finishing]] = {"porter": "nothing"}
 
 
 class DemoFleets(Party):
-    """Both fleets, as one party on RMF's side; and what the coordinator shows on /diagnostics: its
-    `queue`, and all of it, `shown`, by its key."""
+    """Both fleets, as one party on RMF's side, and the coordinator's diagnostics: its `queue`, and
+    `shown`: key -> value of all of them."""
 
     subscribes: Sequence[AnyTopic] = (CHARGING_ASSIGNMENTS, DIAGNOSTICS)
 
@@ -49,14 +49,14 @@ class DemoFleets(Party):
     # ---- a party on RMF's side
 
     def hear(self, message: d.Message, now: float) -> list[Said]:
-        """Charging assignments, and what the coordinator shows."""
+        """Take charging assignments and the coordinator's diagnostics."""
         if isinstance(message, d.DiagnosticArray):
             self._diagnosed(message)
             return []
         return [said for fleet in self.fleets.values() for said in fleet.hear(message, now)]
 
     def tick(self, now: float) -> list[Said]:
-        """Robots drive on, batteries fill, pads are stepped on and off."""
+        """Drive robots on, fill batteries, move robots onto and off pads."""
         said = [said for fleet in self.fleets.values() for said in fleet.tick(now)]
         self._fill(now)
         for who in self._who.values():
@@ -64,27 +64,27 @@ class DemoFleets(Party):
         return said
 
     def wake_at(self) -> float:
-        """All the time."""
+        """Due all the time."""
         return 0.0
 
     # ---- what the day calls
 
     def robot(self, who: str) -> FleetRobot:
-        """This robot, as its fleet adapter knows it."""
+        """Return this robot as its fleet adapter knows it."""
         return self.fleets[self._who[who].fleet].robots[who]
 
     def needs(self, who: str, percent: float) -> None:
-        """RMF finds its battery low."""
+        """Let RMF find the robot's battery low."""
         self.world.note(f"is at {percent:.0f} %: its fleet begins a ChargeBattery", who)
         self.fleets[self._who[who].fleet].charge(who, self.world.wall(), percent)
 
     def leaves(self, who: str, place: str = WARD) -> None:
-        """It has work elsewhere."""
+        """Give the robot work elsewhere."""
         self.world.note(f"has work at {place}", who)
         self.fleets[self._who[who].fleet].works(who, place, self.world.wall())
 
     def rests(self, who: str, percent: float) -> None:
-        """Its work is done."""
+        """End the robot's work."""
         robot, fleet = self.robot(who), self.fleets[self._who[who].fleet]
         robot.battery_percent = percent
         finishing = f"finishing_request: {fleet.finishing}"
@@ -92,14 +92,14 @@ class DemoFleets(Party):
         fleet.rests(who, self.world.wall())
 
     def strays(self, who: str, place: str) -> None:
-        """It drives where nobody has sent it."""
+        """Drive the robot to a place without being sent."""
         self.world.note(f"drives to {place} by mistake", who)
         self.fleets[self._who[who].fleet].strays(who, place, self.world.wall())
 
     # ---- inside
 
     def _diagnosed(self, message: d.DiagnosticArray) -> None:
-        """The coordinator's queue, when it has changed."""
+        """Note the coordinator's queue when it changes."""
         for status in message.status:
             values = {pair.key: pair.value for pair in status.values}
             if values.get("kind") == "charger_coordinator" and "queue" in values:
@@ -116,7 +116,7 @@ class DemoFleets(Party):
                 robot.battery_percent = min(100.0, percent)
 
     def _stands(self, who: RobotName) -> None:
-        """Onto a pad, and off it."""
+        """Put robots onto pads, and take them off."""
         before = self._on_pad.get(who.name)
         charger = self._stations.get((who.fleet, self.robot(who.name).place))
         if charger == before:
@@ -143,11 +143,11 @@ def _fleet(name: str, site: CoordinatorSettings) -> FleetAdapter:
 def tutorial_fleet(
     file: Path, graph: Graph, drive_s: float, only: Collection[str] = ()
 ) -> FleetAdapter:
-    """A fleet from its adapter's configuration file, as RMF's tutorial shapes it, each robot at its
-    charger's waypoint. Raises SettingsError, or ValueError.
+    """Make a fleet from its adapter's configuration file (in the form of RMF's tutorial), each
+    robot at its charger's waypoint. Raises SettingsError, or ValueError.
 
-    `graph`: its navigation graph. `drive_s`: how long every way takes. `only`: these robots; all of the
-    file when empty.
+    `graph`: its navigation graph. `drive_s`: the time of every drive. `only`: these robots; empty: all
+    of the file.
     """
     found = load_fleet(str(file))
     places: dict[str, str] = {}

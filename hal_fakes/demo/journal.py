@@ -1,4 +1,4 @@
-"""What happened in the demo, in order of time, and one readable line for each event."""
+"""The demo's events in order of time, with one readable line for each."""
 
 from collections import Counter
 from collections.abc import Callable
@@ -11,7 +11,7 @@ from hal_fakes.plants.plant import Edge
 
 What = Literal["robot", "request", "relay", "sensor", "state", "place", "alert", "demo"]
 SETTLES_S = 0.15
-"""Events reach us by several ways, each stamped where it happened: lines wait to be sorted."""
+"""Seconds for which lines wait to be sorted: events arrive by several ways, stamped at their source."""
 COLOURS = {
     "request": 36,
     "relay": 33,
@@ -41,7 +41,7 @@ class JournalLine:
 
 
 class Journal:
-    """Everything that happened. Repeats are kept and counted, but not printed."""
+    """All events. Repeats are kept and counted, but not printed."""
 
     def __init__(self, began_at: float, write: Callable[[str], object], *, colour: bool) -> None:
         self.began_at = began_at
@@ -55,62 +55,62 @@ class Journal:
         self._told: dict[tuple[str, str], str] = {}
 
     def edge(self, edge: Edge) -> None:
-        """A relay of ours, or a contact of the plant's."""
+        """Note a change of our relay or of the plant's contact."""
         self.edges.append(edge)
         value = ("off", "on")[edge.value] if isinstance(edge.value, bool) else edge.value
         self._add(JournalLine(edge.at, edge.what, edge.device, f"{edge.signal} {value}"))
 
     def request(self, message: Requested, at: float) -> None:
-        """What a node is sent."""
+        """Note a request to a node."""
         self.requests.append(message)
         self._once(JournalLine(at, "request", words.device(message), words.request(message)))
 
     def state(self, message: Stated, at: float) -> None:
-        """What a node says."""
+        """Note a node's state."""
         self.states.append(message)
         self._once(JournalLine(at, "state", words.device(message), words.described(message)))
 
     def note(self, what: What, text: str, at: float, device: str = "") -> None:
-        """What a robot does, where it is sent, what a person is told, or the demo itself."""
+        """Note a robot's action or destination, a person's alert, or a step of the demo."""
         self._add(JournalLine(at, what, device, text))
 
     def forget(self) -> None:
-        """Of a demo that never ends, only the latest of each device is kept."""
+        """Keep only each device's latest events, for an endless demo."""
         latest = {words.device(state): state for state in self.states}
         self.states[:] = latest.values()
         self.edges.clear()
         self.requests.clear()
 
     def flush(self, until: float) -> None:
-        """Print what happened before `until` (monotonic s)."""
+        """Print the events before `until` (monotonic s)."""
         due = sorted((line for line in self._waiting if line.at <= until), key=lambda x: x.at)
         self._waiting = [line for line in self._waiting if line.at > until]
         for line in due:
             self._write(line.render(self.began_at, colour=self._colour) + "\n")
 
     def begin_day(self) -> None:
-        """From here on it counts: keep only the last state of each device."""
+        """Begin to count: keep only the last state of each device."""
         self.states = [*{words.device(state): state for state in self.states}.values()]
         self.edges, self.requests = [], []
 
     def latest(self, device: str) -> Stated | None:
-        """The last state of a device."""
+        """Return the last state of a device."""
         return next((s for s in reversed(self.states) if words.device(s) == device), None)
 
     def relays_on(self) -> list[str]:
-        """`Lift1 door_open` for each relay that is energised."""
+        """Return `Lift1 door_open` for each energised relay."""
         last = {(e.device, e.signal): e.value for e in self.edges if e.what == "relay"}
         return [f"{device} {signal}" for (device, signal), value in last.items() if value]
 
     def counts(self) -> Counter[str]:
-        """How many requests, states, relay edges and sensor edges there were."""
+        """Count requests, states, relay edges and sensor edges."""
         counts = Counter(f"{edge.what} edges" for edge in self.edges)
         counts["requests"] = len(self.requests)
         counts["states"] = len(self.states)
         return counts
 
     def _once(self, line: JournalLine) -> None:
-        """Unless it says of this device what the last such line said."""
+        """Add a line, unless equal to the last one of this sort for the device."""
         key = (line.what, line.device)
         if self._told.get(key) != line.text:
             self._told[key] = line.text

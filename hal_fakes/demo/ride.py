@@ -1,5 +1,5 @@
 """`make demo`: a robot's day, through a door, up in a lift and to a charger, as a fleet adapter drives
-it; and whether it went right, from the journal alone."""
+it; and the verdict, from the journal alone."""
 
 from collections.abc import Iterable
 from itertools import groupby
@@ -25,7 +25,7 @@ CHARGE_S: Final = 3.0
 
 
 def dawns(world: World) -> bool:
-    """Every daemon is up, listens, and has published what its sensors read."""
+    """Is every daemon up and listening, with its sensors' state published?"""
     lift = world.journal.latest(LIFT)
     return (
         world.listened_to(topics.LIFT_REQUESTS, topics.DOOR_REQUESTS, topics.CHARGER_REQUESTS)
@@ -37,7 +37,7 @@ def dawns(world: World) -> bool:
 
 
 def live(world: World) -> None:
-    """The whole day."""
+    """Play the whole day."""
     robot = RobotContext(SESSION)
     world.join(LiftSupervisor(), DoorSupervisor(), robot)
     with world.leg("door"):
@@ -53,7 +53,7 @@ def live(world: World) -> None:
 def _phase(
     world: World, robot: RobotContext, phase: Phase, text: str, within_s: float, what: str
 ) -> None:
-    """The robot's fleet adapter begins a phase, and ends it."""
+    """Let the robot's fleet adapter begin a phase, and end it."""
     world.note(text, SESSION)
     world.say(robot.begin(phase, world.wall()))
     world.until(lambda: robot.done, within_s, what)
@@ -122,12 +122,12 @@ RELAYS = {
         ("agv_mode_request", False),
     ],
 }
-"""Every relay edge of the day, and no other."""
+"""All the relay edges that the day must have."""
 CHARGING = ["IDLE", "ASSIGNED", "CHARGING", "RELEASED", "IDLE"]
 
 
 def problems(journal: Journal) -> list[str]:
-    """Everything that was not as it should be; empty when the day went right."""
+    """Return all errors of the day; empty if it went right."""
     return [*_relays(journal), *_door(journal), *_lift(journal), *_charger(journal)]
 
 
@@ -181,7 +181,7 @@ def _charger(journal: Journal) -> Iterable[str]:
 
 
 def _in_order(values: Iterable[str]) -> list[str]:
-    """Without the repeats."""
+    """Return the items without repeats."""
     return [value for value, _ in groupby(values)]
 
 

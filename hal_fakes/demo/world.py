@@ -1,7 +1,7 @@
-"""RMF's side of a demo on a real graph: its supervisors, fleet adapters and robots, and what is heard.
+"""RMF's side of a demo on a real graph: supervisors, fleet adapters, robots, and the messages heard.
 
 Requests take RMF's whole way: a fleet adapter publishes on the adapter topics, the supervisor hears
-that from the wire and publishes on the daemon's topic.
+them from the wire and publishes on the daemon's topic.
 """
 
 import time
@@ -45,8 +45,8 @@ LOOK_EVERY_S: Final = 0.05
 class World:
     """One inbox for messages and edges; the day waits in `until`, and meanwhile RMF works.
 
-    `places`: where each robot is sent to charge or to wait. `alerts`: what a person was told.
-    `page`: what the page says of its address, if there is one.
+    `places`: each robot's assigned place to charge or wait. `alerts`: texts for a person.
+    `page`: the page's address line, if there is a page.
     """
 
     def __init__(
@@ -59,9 +59,9 @@ class World:
         *,
         publishes: Iterable[AnyTopic] = PUBLISHED,
     ) -> None:
-        """`check` is called all the time, and raises when there is no point in going on. `patience`
-        multiplies how long `until` waits. `publishes`: what is said here; a supervisor that hears
-        another publisher of its topics waits."""
+        """`check`: called all the time; raises when the demo must end. `patience`: factor on the time
+        limits of `until`. `publishes`: the topics published here; a supervisor that hears another
+        publisher of its topics waits."""
         self.daemons = daemons
         self.journal = journal
         self.places: dict[str, str] = {}
@@ -77,15 +77,15 @@ class World:
         }
         self._heard: set[str] = set()
         self._hear(*STATES, topics.CHARGING_ASSIGNMENTS, topics.ALERT)
-        for topic in TO_DAEMONS:  # what we send is noted when it is sent
+        for topic in TO_DAEMONS:  # our own messages are noted on sending
             transport.subscribe(topic, self._to_inbox(topic), others_only=True)
 
     def edge(self, edge: Edge) -> None:
-        """A plant's edge; from any thread."""
+        """Note a plant's edge; from any thread."""
         self._inbox.put(lambda: self.journal.edge(edge))
 
     def join(self, *parties: Party) -> None:
-        """Somebody on RMF's side takes part from now on."""
+        """Add a party on RMF's side."""
         self._parties += parties
         self._hear(*(topic for party in parties for topic in party.subscribes))
 
@@ -96,16 +96,16 @@ class World:
         return time.time()
 
     def listened_to(self, *to: AnyTopic) -> bool:
-        """A daemon has matched each of these topics, on which we send requests."""
+        """Has a daemon matched each of these request topics?"""
         return all(self._publishers[topic.name].matched() for topic in to)
 
     def door_is(self, door: str, mode: d.DoorModeValue) -> bool:
-        """The door's last state has this mode."""
+        """Has the door's last state this mode?"""
         latest = self.journal.latest(door)
         return isinstance(latest, d.DoorState) and latest.current_mode.value == mode
 
     def charger_is(self, charger: str, state: str, robot: str = "", error: str = "") -> bool:
-        """The charger's last state is this, for this robot, with this in its error message."""
+        """Has the charger's last state these values: state, robot, part of the error message?"""
         latest = self.journal.latest(charger)
         return (
             isinstance(latest, d.ChargerState)
@@ -115,7 +115,7 @@ class World:
         )
 
     def alerted(self, code: str) -> bool:
-        """A person was told this."""
+        """Was a person told this?"""
         return any(alert.subtitle == code for alert in self.alerts)
 
     # ---- what a day does
@@ -129,20 +129,20 @@ class World:
             self._publishers[topic.name].publish(message)
 
     def press(self, device: str, signal_name: str, on: bool) -> None:
-        """A person or the building acts on a plant."""
+        """Act on a plant as a person or the building."""
         self.daemons[device].order(f"press {device} {signal_name} {'on' if on else 'off'}")
 
     def fail(self, device: str, part: str, mode: str) -> None:
-        """A part of a plant fails, or is mended (`ok`)."""
+        """Let a part of a plant fail, or mend it (`ok`)."""
         self.daemons[device].order(f"fail {device} {part} {mode}")
 
     def note(self, text: str, who: str = "") -> None:
-        """One line about a robot, or about the demo."""
+        """Note a line about a robot or the demo."""
         self.journal.note("robot" if who else "demo", text, time.monotonic(), who)
 
     @contextmanager
     def leg(self, name: str, text: str = "") -> Iterator[None]:
-        """A part of the day, timed; announced if there is a text."""
+        """Time a part of the day; announce it if there is a text."""
         began_at = time.monotonic()
         if text:
             self.note(f"-- {name}: {text}")
@@ -155,9 +155,9 @@ class World:
     def until(
         self, ready: Callable[[], bool], within_s: float, what: str, repeat: Said | None = None
     ) -> None:
-        """Go on until `ready`. `repeat` is published now and every second meanwhile.
+        """Run until `ready`. `repeat`: published now and every second meanwhile.
 
-        Raises DemoFailed, with `what`, when it takes longer than `within_s`, times the patience.
+        Raises DemoFailed with `what` after `within_s` times the patience.
         """
         within_s *= self._patience
         deadline = time.monotonic() + within_s
@@ -171,12 +171,12 @@ class World:
             self._turn(LOOK_EVERY_S)
 
     def shows(self, what: str, ready: Callable[[], bool], within_s: float = 10.0) -> None:
-        """Go on when this has come about, and say so. Raises DemoFailed if it takes too long."""
+        """Wait for this fact, and print it. Raises DemoFailed after the time limit."""
         self.until(ready, within_s, what)
         self.note(f"   so: {what}")
 
     def pause(self, seconds: float) -> None:
-        """Let so many seconds pass."""
+        """Let this many seconds pass."""
         over_at = time.monotonic() + seconds
         while (left_s := over_at - time.monotonic()) > 0:
             self._turn(min(LOOK_EVERY_S, left_s))

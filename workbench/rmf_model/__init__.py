@@ -2,7 +2,6 @@
 
 Taken from rmf_ros2 9dedd0f (2026-05), quirks included: no timeouts, no retries, a lift's mode ignored.
 
-
 No I/O and no clock: each party hears a message or is ticked at its `wake_at`, and returns the
 messages to publish. `now` is RMF's clock in seconds (since the epoch, where stamps matter). A
 restarted party is a new object.

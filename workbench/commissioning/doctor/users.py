@@ -1,7 +1,7 @@
 """The daemon's user, and that user's access to devices.
 
 With the unit installed: the service's user, with the groups of its drop-ins; else the present user.
- Users and groups are read from /etc/passwd and /etc/group.
+Users and groups are read from /etc/passwd and /etc/group.
 """
 
 import os
