@@ -1,1 +1,1 @@
-"""Benchmarks: what the daemons cost beside a bare transport node, as ratios in one run."""
+"""Benchmarks: the daemons' cost compared with a bare transport node's, as ratios in one run."""

@@ -1,7 +1,7 @@
-"""`make bench`: latency and memory of the daemons beside a bare transport node, in one run.
+"""`make bench`: latency and memory of the daemons compared with a bare transport node, in one run.
 
 Everything runs on loopback, on fake hardware, in processes of its own. The tables go to stdout, the
-figures to bench/results/bench.json. Some of it: `python -m bench idle buses`.
+figures to bench/results/bench.json. A selection: `python -m bench idle buses`.
 """
 
 import json

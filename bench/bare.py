@@ -1,4 +1,4 @@
-"""The thing to compare with: a transport node that does nothing but answer (run as its own process)."""
+"""The baseline: a transport node that only answers (run as its own process)."""
 
 import signal
 import sys

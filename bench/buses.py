@@ -1,5 +1,5 @@
-"""What buses keep up with: a serial line of doors, many doors on TCP with a dead one, chargers on HTTP
-with bad ones among them, and a CAN bus that is full. Each against the least that it could take.
+"""The limits of buses: a serial line of doors, many doors on TCP with a dead one, chargers on HTTP with
+bad ones among them, and a full CAN bus. Each is compared with its theoretical least time.
 """
 
 import statistics
@@ -31,7 +31,7 @@ from hal_fakes.simulate import Simulation
 
 
 def measure(scratch: Path) -> Tables:
-    """A table for each bus."""
+    """Measure; return a table for each bus."""
     return {
         "8 doors at 19200 baud": _serial(scratch),
         "states of doors on one TCP gateway": _many_doors(scratch),
@@ -61,11 +61,11 @@ REQUEST: Final = 8
 REPLY: Final = 6
 """Characters of a request for bits, and of a reply with up to eight of them, with unit and CRC."""
 READINGS: Final = 2
-"""Of each door: its coil and its inputs."""
+"""A door's coil and inputs."""
 
 
 def _serial(scratch: Path) -> Rows:
-    """The wire: every character, and the 3.5 characters of silence before each frame."""
+    """Compute the wire's time: every character, and 3.5 characters of silence before each frame."""
     daemon(doors(POLLED, LINE), scratch / "serial")  # writes the file
     config = load(scratch / "serial.yaml")
     serial = config.buses["line"].serial
@@ -77,7 +77,7 @@ def _serial(scratch: Path) -> Rows:
 
 
 def _cycles(config: Config, scratch: Path) -> list[float]:
-    """Seconds of each poll of all doors."""
+    """Return the seconds of each poll of all doors."""
     simulation = Simulation(config, scratch)
     bus = cast(ModbusBus, simulation.open_bus("line"))
     drivers = [create(name, settings, bus) for name, settings in config.devices.items()]
@@ -105,7 +105,7 @@ States = dict[str, list[tuple[float, DoorState]]]
 
 
 def _many_doors(scratch: Path) -> Rows:
-    """Each is to be polled every 0.1 s; a state comes each second."""
+    """Poll each door every 0.1 s; its state comes each second."""
     with _doors(scratch, MANY):
         many = _ages(_door_states())
     with _doors(scratch, DEAD_OF) as plant:
@@ -127,7 +127,7 @@ def _doors(scratch: Path, many: int) -> Iterator[Caller]:
 
 
 def _door_states() -> States:
-    """Every state that arrives in this time: (wall time of its arrival, state), by door."""
+    """Collect this time's states: (wall time of arrival, state), by door."""
     seen: States = defaultdict(list)
     with graph() as transport:
         transport.subscribe(
@@ -149,25 +149,25 @@ def _ages(seen: States) -> Row:
     }
 
 
-# ---- HTTP chargers: how old is what RMF knows of the sound ones, in poll periods?
+# ---- HTTP chargers: the age of RMF's knowledge of the sound ones, in poll periods
 
 SOUND, DEAD, TRICKLING = 35, 10, 5
 LOOK_S: Final = 0.02
 
 
 class Known:
-    """When each charger was read that somebody knows of (wall clock s); any thread may note."""
+    """Charger -> wall time (s) of its last known reading; any thread may note."""
 
     def __init__(self) -> None:
         self.read_at: dict[int, float] = {}
 
     def state(self, state: ChargerState) -> None:
-        """A ChargerState has come."""
+        """Note a ChargerState."""
         self.read_at[int(state.charger_name.rpartition("_")[2])] = in_seconds(state.charger_time)
 
 
 def _bad_chargers(scratch: Path) -> Rows:
-    """For comparison, on the same servers at the same time, the naive loop: one
+    """Measure ours and, on the same servers at the same time, the naive loop: one
     `requests.get` after the other, each second, with a timeout that applies to each read."""
     rmf, plain, done = Known(), Known(), threading.Event()
     with http_chargers(SOUND, DEAD, TRICKLING) as ports, graph() as transport:
@@ -186,7 +186,7 @@ def _bad_chargers(scratch: Path) -> Rows:
 
 
 def _mixed(ports: Sequence[int]) -> list[int]:
-    """The bad ones spread among the sound ones."""
+    """Spread the bad ones among the sound ones."""
     bad, sound = list(ports[SOUND:]), list(ports[:SOUND])
     every = len(ports) // len(bad)
     mixed = [
@@ -196,7 +196,7 @@ def _mixed(ports: Sequence[int]) -> list[int]:
 
 
 def _sequential(ports: Sequence[int], known: Known, done: threading.Event) -> None:
-    """Every charger in turn, each second."""
+    """Read every charger in turn, each second."""
     while not done.is_set():
         started_at = time.monotonic()
         for n, port in enumerate(ports):
@@ -211,7 +211,7 @@ def _sequential(ports: Sequence[int], known: Known, done: threading.Event) -> No
 
 
 def _known_ages(chargers: Sequence[int], knowns: dict[str, Known]) -> Rows:
-    """Ages of what is known of these chargers, looked at again and again, in poll periods."""
+    """Sample the ages of the known readings of these chargers, in poll periods."""
     never = time.time() - SETTLE_S
     ages: dict[str, list[float]] = {name: [] for name in knowns}
     for _ in range(round(1.5 * WATCHED_S / LOOK_S)):
@@ -230,11 +230,11 @@ LASTS_S: Final = 10.0
 BATCH_S: Final = 0.005
 SCAN_S: Final = 0.2
 OURS: Final = (0x58A, 0x70A, 0x123, 0x321)
-"""Every second frame is one of these; the rest is somebody else's."""
+"""Ids of every second frame; the others are foreign."""
 
 
 def _flooded(read: Callable[[str, threading.Event, list[int]], float]) -> Row:
-    """Frames at a full bus's pace, and a reader that counts those that it wants."""
+    """Send frames at a full bus's pace; count the wanted ones at a reader."""
     channel = f"bench-{read.__name__}"
     ended, heard, seconds = threading.Event(), [0], list[float]()
     reader = threading.Thread(target=lambda: seconds.append(read(channel, ended, heard)))
@@ -252,7 +252,7 @@ def _flooded(read: Callable[[str, threading.Event, list[int]], float]) -> Row:
 
 
 def _send(channel: str) -> tuple[int, float]:
-    """Frames, paced; how many, and in how many seconds."""
+    """Send paced frames; return their number and the seconds taken."""
     bus = can.Bus(channel, interface="virtual")
     begun_at = time.monotonic()
     sent = 0
@@ -269,7 +269,7 @@ def _send(channel: str) -> tuple[int, float]:
 
 
 def _bare_can(channel: str, ended: threading.Event, heard: list[int]) -> float:
-    """The CPU seconds that python-can alone takes."""
+    """Return the CPU seconds of python-can alone."""
     bus = can.Bus(channel, interface="virtual")
     begun_s = time.thread_time()
     while not ended.wait(SCAN_S):
@@ -281,7 +281,7 @@ def _bare_can(channel: str, ended: threading.Event, heard: list[int]) -> float:
 
 
 def _our_can(channel: str, ended: threading.Event, heard: list[int]) -> float:
-    """The CPU seconds that our bus takes, with four ids wanted."""
+    """Return the CPU seconds of our bus, with four ids wanted."""
     settings = CanSettings(socketcan="can0", scan_s=SCAN_S)
     bus = CanBus(settings, vendor=lambda: can.Bus(channel, interface="virtual"))
 

@@ -1,4 +1,4 @@
-"""HTTP chargers for the bench, in a process of its own: sound, dead and trickling ones.
+"""HTTP chargers for the bench, in a separate process: sound, dead and trickling ones.
 
 Run as a process it prints the ports, one JSON line, and serves until its standard input ends.
 """
@@ -16,7 +16,7 @@ from typing import Any, Final
 BODY: Final = b'{"state": 0, "error_msg": ""}'
 HEAD: Final = b"HTTP/1.1 200 OK\r\nContent-Type: application/json\r\nContent-Length: %d\r\n\r\n"
 TRICKLE_S: Final = 0.25
-"""Between two bytes: shorter than any timeout for one read."""
+"""Seconds between two bytes: shorter than any timeout for one read."""
 
 
 PERIOD_S: Final = 1.0
@@ -26,7 +26,7 @@ CODES: Final = {"idle": [0], "charging": [5], "error": [8]}
 
 @contextmanager
 def http_chargers(sound: int, dead: int = 0, trickling: int = 0) -> Iterator[list[int]]:
-    """The ports of so many chargers."""
+    """Serve so many chargers; yield their ports."""
     counts = [str(count) for count in (sound, dead, trickling)]
     command = [sys.executable, "-m", "bench.charger_servers", *counts]
     far = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
@@ -41,7 +41,7 @@ def http_chargers(sound: int, dead: int = 0, trickling: int = 0) -> Iterator[lis
 
 
 def chargers_at(ports: Sequence[int]) -> dict[str, Any]:
-    """A daemon's YAML: a bus and a charger at each port."""
+    """Return a daemon's YAML: a bus and a charger at each port."""
     settings = {"type": "http", "timeout_s": TIMEOUT_S, "scan_s": PERIOD_S}
     return {
         "kind": "charger",
@@ -57,7 +57,7 @@ def chargers_at(ports: Sequence[int]) -> dict[str, Any]:
 
 
 async def _sound(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-    """Answers at once, on a connection that is kept."""
+    """Answer at once, on a kept connection."""
     with contextlib.suppress(OSError, asyncio.IncompleteReadError):
         while await reader.readuntil(b"\r\n\r\n"):
             writer.write(HEAD % len(BODY) + BODY)
@@ -66,7 +66,7 @@ async def _sound(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> 
 
 
 async def _dead(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-    """Takes the connection and says nothing."""
+    """Accept the connection and send nothing."""
     with contextlib.suppress(OSError):
         while await reader.read(4096):
             pass
@@ -74,7 +74,7 @@ async def _dead(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> N
 
 
 async def _trickling(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-    """One byte now and then."""
+    """Send one byte now and then."""
     with contextlib.suppress(OSError, asyncio.IncompleteReadError):
         await reader.readuntil(b"\r\n\r\n")
         for byte in HEAD % len(BODY) + BODY:
@@ -89,7 +89,7 @@ async def _serve(sound: int, dead: int, trickling: int) -> None:
     servers = [await asyncio.start_server(kind, "127.0.0.1", 0) for kind in kinds]
     print(json.dumps([server.sockets[0].getsockname()[1] for server in servers]), flush=True)
     await asyncio.get_running_loop().run_in_executor(None, sys.stdin.read)
-    os._exit(0)  # conversations that would never end are not worth a goodbye
+    os._exit(0)  # some connections would never close
 
 
 if __name__ == "__main__":

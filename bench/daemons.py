@@ -1,4 +1,4 @@
-"""Starting and stopping what is measured, hearing and asking it, and what it costs."""
+"""Start and stop the measured processes, talk to them, and measure their cost."""
 
 import os
 import signal
@@ -29,7 +29,7 @@ SETTLE_S = 3.0
 
 @contextmanager
 def graph(speaks: Wire = "dds") -> Iterator[Transport]:
-    """This process's own place on the daemons' graph."""
+    """Join the daemons' graph with this process."""
     rmf = Rmf(transport=speaks, domain_id=DOMAIN)
     transport = open_transport(rmf, "bench", localhost=True)
     try:
@@ -40,7 +40,7 @@ def graph(speaks: Wire = "dds") -> Iterator[Transport]:
 
 @contextmanager
 def running(command: list[str], log: Path) -> Iterator[subprocess.Popen[bytes]]:
-    """A process, ended by SIGTERM."""
+    """Run a process; end it by SIGTERM."""
     with log.open("wb") as out:
         pipe = subprocess.PIPE
         child = subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=out)
@@ -59,7 +59,7 @@ def running(command: list[str], log: Path) -> Iterator[subprocess.Popen[bytes]]:
 
 
 def shipped(name: str) -> Content:
-    """An example of `config/`."""
+    """Read an example of `config/`."""
     content: Content = yaml.safe_load((ROOT / f"config/{name}.yaml").read_text())
     return content
 
@@ -67,7 +67,7 @@ def shipped(name: str) -> Content:
 def daemon(
     content: Content, directory: Path, transport: str = "dds", *, simulate: bool = True
 ) -> list[str]:
-    """The command of one daemon, on this transport and on loopback whatever its YAML says."""
+    """Return a daemon's command, with this transport and loopback in place of its YAML's."""
     file = directory.with_suffix(".yaml")
     rmf = {"transport": transport, "network": "localhost"}
     file.write_text(yaml.safe_dump({**content, "rmf": rmf}, sort_keys=False))
@@ -78,14 +78,14 @@ def daemon(
 
 @contextmanager
 def ready(command: list[str], log: Path) -> Iterator[subprocess.Popen[bytes]]:
-    """A process that has said in its log that it is ready."""
+    """Run a process; yield it once its log says that it is ready."""
     with running(command, log) as child:
         wait_for_log(log, "ready")
         yield child
 
 
 def wait_for_log(log: Path, word: str, deadline_s: float = 20.0) -> None:
-    """Until a line with this word is in a log."""
+    """Wait for a line with this word in a log."""
     until = time.monotonic() + deadline_s
     while word not in log.read_text():
         if time.monotonic() > until:
@@ -94,7 +94,7 @@ def wait_for_log(log: Path, word: str, deadline_s: float = 20.0) -> None:
 
 
 def cost(command: list[str], log: Path, watched_s: float = 10.0) -> Row:
-    """What a process costs that is left alone: memory, threads, CPU, time to be ready."""
+    """Measure an idle process: memory, threads, CPU, time to be ready."""
     started_at = time.monotonic()
     with ready(command, log) as child:
         ready_s = time.monotonic() - started_at
@@ -103,7 +103,7 @@ def cost(command: list[str], log: Path, watched_s: float = 10.0) -> Row:
 
 
 def cost_of(pid: int, watched_s: float) -> Row:
-    """What a process costs from now on."""
+    """Measure the cost of a process from now on."""
     before_s = cpu_s(pid)
     time.sleep(watched_s)
     used_s = cpu_s(pid) - before_s
@@ -112,12 +112,12 @@ def cost_of(pid: int, watched_s: float) -> Row:
 
 
 def memory_mb(pid: int) -> float:
-    """Resident memory of a process in MB (10^6 bytes)."""
+    """Return a process's resident memory in MB (10^6 bytes)."""
     pages = int(Path(f"/proc/{pid}/statm").read_text().split()[1])
     return pages * os.sysconf("SC_PAGE_SIZE") / 1e6
 
 
 def cpu_s(pid: int) -> float:
-    """User and system time that a process has used (s)."""
+    """Return a process's user and system time (s)."""
     fields = Path(f"/proc/{pid}/stat").read_text().rsplit(") ", 1)[1].split()
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")

@@ -1,4 +1,4 @@
-"""How fast a simulated day goes by: two robots ride two lifts all day, through our supervisor."""
+"""The time of a simulated day: two robots ride two lifts all day, through our supervisor."""
 
 import time
 from pathlib import Path
@@ -13,7 +13,7 @@ DAY_S = 86400.0
 
 
 def measure(scratch: Path) -> Tables:
-    """Seconds of ours, and rides."""
+    """Return the real seconds taken, and the rides."""
     began = time.perf_counter()
     world = World()
     for name in ("Lift1", "Lift2"):
@@ -34,7 +34,7 @@ class _Lift(LiftNode):
 
 
 class _Rider(Rider):
-    """Takes the two lifts in turn, and has something to do for a minute between its rides."""
+    """Rides the two lifts in turn, and is busy for a minute between rides."""
 
     REST_S = 60.0
 

@@ -47,7 +47,7 @@ def measure(scratch: Path) -> dict[str, Any]:
 
 
 def day() -> Iterator[Heard]:
-    """What is heard in the day."""
+    """Return the messages heard in the day."""
     every = DAY_S / RIDES
     for second in range(DAY_S):
         ride, at = divmod(second, every)

@@ -9,13 +9,13 @@ Tables = dict[str, Rows]
 
 
 def percentiles(values: Sequence[float]) -> tuple[float, float]:
-    """p50 and p99."""
+    """Return p50 and p99."""
     cuts = statistics.quantiles(values, n=100, method="inclusive")
     return cuts[49], cuts[98]
 
 
 def compared(seconds: Sequence[float], bare: Sequence[float]) -> Row:
-    """Milliseconds, and how many times the bare ones they are."""
+    """Return milliseconds, and their ratio to the bare ones."""
     (p50, p99), (bare50, bare99) = percentiles(seconds), percentiles(bare)
     return {
         "p50 ms": p50 * 1e3,
@@ -26,14 +26,14 @@ def compared(seconds: Sequence[float], bare: Sequence[float]) -> Row:
 
 
 def each_more(rows: Rows, counts: Sequence[int]) -> Row:
-    """What one more costs, from the first and the last row."""
+    """Return the cost of one more, from the first and the last row."""
     first, *_, last = rows.values()
     more = counts[-1] - counts[0]
     return {key: (last[key] - first[key]) / more for key in ("RSS MB", "CPU %")}
 
 
 def lines(title: str, rows: Rows) -> list[str]:
-    """A table."""
+    """Format a table."""
     headings = list(dict.fromkeys(heading for row in rows.values() for heading in row))
     table = [f"{title:34}" + "".join(f"{heading:>12}" for heading in headings)]
     for name, row in rows.items():

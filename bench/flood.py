@@ -1,7 +1,7 @@
 """`make flood`: a lift's daemon under ten thousand requests a second for a minute.
 
-Half of the requests are right, half are for floors that it has not. What must hold: memory stays where
-it is, the state still comes once a second, and the last right request is the one that counts.
+Half of the requests are valid, half are for unknown floors. Required: memory stays constant, the state
+still comes once a second, and the last valid request counts.
 """
 
 import sys
@@ -30,7 +30,7 @@ WRONG = replace(RIGHT, destination_floor="L9")
 
 
 def measure(scratch: Path, seconds: float) -> dict[str, Any]:
-    """The daemon before, during and after the flood."""
+    """Measure the daemon before, during and after the flood."""
     command = daemon(shipped("lift_dry_contact"), scratch / "flood")
     with ready(command, scratch / "flood.log") as child:
         rmf = DdsTransport("flood", DOMAIN, loopback=True)
@@ -56,7 +56,7 @@ def measure(scratch: Path, seconds: float) -> dict[str, Any]:
 
 
 def _flood(requests: Publisher[LiftRequest], pid: int, seconds: float) -> tuple[list[float], int]:
-    """Send; the daemon's memory (MB) each 5 s, and how many were sent."""
+    """Send requests; return the daemon's memory (MB) each 5 s, and the number sent."""
     sent, started_at = 0, time.monotonic()
     rss_mb: list[float] = []
     while (passed_s := time.monotonic() - started_at) < seconds:
@@ -76,14 +76,14 @@ def _longest_gap(heard: list[tuple[float, LiftState]], start: float, end: float)
 
 
 def show(figures: dict[str, Any]) -> None:
-    """One figure a line."""
+    """Print one figure a line."""
     for name, value in figures.items():
         shown = value if isinstance(value, dict | bool) else round(value, 2)
         print(f"{name:28}{shown}")
 
 
 def main() -> int:
-    """As many seconds as the command line says; a minute otherwise."""
+    """Flood for the command line's seconds; a minute by default."""
     seconds = float(sys.argv[1]) if len(sys.argv) > 1 else SECONDS
     with tempfile.TemporaryDirectory(prefix="rmf-flood-") as scratch:
         figures = measure(Path(scratch), seconds)

@@ -1,4 +1,4 @@
-"""What idle daemons cost beside a bare transport node, and what another device in one of them costs."""
+"""The cost of idle daemons compared with a bare transport node, and of each further device."""
 
 from itertools import count
 from pathlib import Path
@@ -14,8 +14,8 @@ SLCAN = {"port": "/dev/serial/by-id/simulated", "bitrate": 250000}
 
 
 def measure(scratch: Path) -> Tables:
-    """The bare node on each wire, a lift on zenoh and the shipped devices; then one table for each
-    that can be many, all on dds."""
+    """Measure the bare node on each wire, a lift on zenoh and the shipped devices; then one table
+    for each kind with many devices, all on dds."""
     one = {f"bare node on {wire}": cost([*BARE, wire], scratch / f"{wire}.log") for wire in WIRES}
     lift = daemon(shipped("lift_dry_contact"), scratch / "on_zenoh", "zenoh")
     one["lift_dry_contact on zenoh"] = cost(lift, scratch / "on_zenoh.log")
@@ -41,7 +41,7 @@ def _many(scratch: Path, name: str, contents: dict[int, Content]) -> Rows:
 
 
 def _http(scratch: Path) -> Rows:
-    """Their servers are a separate process: simulated ones would cost the daemon something."""
+    """Measure HTTP chargers. Their servers are a separate process, to cost the daemon nothing."""
     rows: Rows = {}
     for n in HTTP_CHARGERS:
         with http_chargers(n) as ports:
@@ -50,7 +50,7 @@ def _http(scratch: Path) -> Rows:
 
 
 def lifts(many: int) -> Content:
-    """The shipped lift so many times over, each on a Modbus module of its own."""
+    """Return the shipped lift so many times, each on its own Modbus module."""
     content = shipped("lift_dry_contact")
     one = content["lifts"]["Lift1"]
     lifts = {f"Lift{unit}": _on_module(one, unit) for unit in range(1, many + 1)}
@@ -74,7 +74,7 @@ def _on_module(lift: Any, unit: int) -> Any:
 
 
 def doors(many: int, bus: Content = TCP) -> Content:
-    """Doors with two limit switches and a relay, each a unit of its own on one line."""
+    """Return doors with two limit switches and a relay, each its own unit on one line."""
     return {
         "kind": "door",
         "driver": "dry_contact",
@@ -92,7 +92,7 @@ def _door(unit: int) -> Content:
 
 
 def canopen(many: int) -> Content:
-    """Receivers on one simulated adapter."""
+    """Return receivers on one simulated adapter."""
     return {
         "kind": "charger",
         "driver": "canopen",

@@ -1,7 +1,7 @@
-"""How long a request takes to the relay, an input to RMF and a hazard to all outputs off, against a
-bare round trip and a bare edge callback; and where there is ROS 2, the same against a bare rclpy node.
+"""The times from request to relay, input to RMF, and hazard to all outputs off, compared with a bare
+round trip and a bare edge callback; with ROS 2 installed, also compared with a bare rclpy node.
 
-The far end, which sends and times, is the same for each: on `dds`, as cheap as it can be.
+The far end, which sends and times, is the same for each: on `dds`, with the least cost.
 """
 
 import queue
@@ -41,13 +41,13 @@ ROUNDS = 300
 HAZARDS = 100
 WARM_UP = 20
 PAUSE_S = 0.12
-"""Between rounds, everywhere alike: a daemon sends ten states a second at most, and idle CPUs sleep."""
+"""Pause (s) between all rounds: a daemon sends ten states a second at most, and idle CPUs sleep."""
 MINIMAL = [sys.executable, "-m", "bench.minimal_ros", str(DOMAIN)]
 Times = list[float]
 
 
 def measure(scratch: Path) -> Tables:
-    """Milliseconds, p50 and p99, of each path."""
+    """Return milliseconds, p50 and p99, of each path."""
     latencies: Rows = {}
     for wire in reversed(WIRES):  # the hazard's figures are those of the last, dds
         round_trips = _bare_round_trips(scratch, wire)
@@ -71,7 +71,7 @@ def measure(scratch: Path) -> Tables:
 
 
 def _with_ros(scratch: Path) -> Tables:
-    """A lift daemon on `ros2` and on `dds`, against an rclpy node that only sets a pin."""
+    """Compare a lift daemon on `ros2` and on `dds` with an rclpy node that only sets a pin."""
     if missing := missing_of_ros():
         return {f"with ROS 2: nothing, as there is no ROS here ({missing})": {}}
     bare_relay, bare_state, bare_mb = _minimal(scratch)
@@ -86,7 +86,7 @@ def _with_ros(scratch: Path) -> Tables:
 
 
 class Graph:
-    """This process's end: sends LiftRequests, and times the LiftStates that come."""
+    """This process's end of the graph: sends LiftRequests, and times the LiftStates received."""
 
     def __init__(self, transport: Transport) -> None:
         self._requests = transport.publisher(LIFT_REQUESTS)
@@ -97,7 +97,7 @@ class Graph:
         time.sleep(0.5)  # the other side may not have matched yet
 
     def send(self, session: str, request_type: LiftRequestType, floor: str) -> float:
-        """Publish a request; when (monotonic s)."""
+        """Publish a request; return the time (monotonic s)."""
         at = time.monotonic()
         self._requests.publish(
             LiftRequest(
@@ -111,7 +111,7 @@ class Graph:
         return at
 
     def state(self, since: float, true: Callable[[LiftState], bool]) -> float:
-        """When the first state after `since` (monotonic s) for which this is true arrived."""
+        """Return the arrival time of the first state after `since` (monotonic s) that meets this."""
         while True:
             at, state = self._states.get(timeout=10.0)
             if at > since and true(state):
@@ -136,7 +136,7 @@ def _round_trip(far: Graph) -> float:
 
 
 def _quick_lift() -> Content:
-    """The shipped lift with every deliberate delay taken out, so that only the path is measured."""
+    """Return the shipped lift without deliberate delays, so only the path is measured."""
     content = shipped("lift_dry_contact")
     lift = content["lifts"]["Lift1"]
     for contact in _contacts(lift["inputs"]):
@@ -156,9 +156,9 @@ def _contacts(part: Any) -> list[dict[str, Any]]:
 def daemon_paths(
     scratch: Path, transport: str, ours: Wire = "dds", *, keep: str = ""
 ) -> tuple[Times, Times, Times, float]:
-    """Seconds of each request to the relay, edge to RMF and hazard to all off, and memory (MB).
+    """Return seconds from request to relay, edge to RMF and hazard to all off, and memory (MB).
 
-    `ours`: the wire of this end. `keep`: what is recorded; the default where not given.
+    `ours`: the wire of this end. `keep`: the setting for recording; default if not given.
     """
     directory = scratch / f"quick_{transport}{keep}"
     recording = {"recording": {"keep": keep}} if keep else {}
@@ -200,7 +200,7 @@ def _to_outputs_off(far: Graph, plant: Caller, hand: Caller) -> float:
     hand.order("press Lift1 fire_alarm on")
     at = plant.edge("fire_alarm", True)
     took = plant.edge("agv_mode_request", False) - at
-    # While it burns: a session that outlived the fire would have its relay back at once.
+    # During the fire: a session that survived it would switch its relay on again at once.
     ended_at = far.send("bench", LiftRequestType.REQUEST_END_SESSION, "")
     far.state(ended_at, lambda state: not state.session_id)
     hand.order("press Lift1 fire_alarm off")
@@ -210,7 +210,7 @@ def _to_outputs_off(far: Graph, plant: Caller, hand: Caller) -> float:
 
 
 def _bare_callbacks(scratch: Path) -> Times:
-    """From the contact to gpiozero's callback, in a process that does nothing else."""
+    """Measure from the contact to gpiozero's callback, in an otherwise idle process."""
     daemon(_quick_lift(), scratch / "callbacks")  # writes the file
     settings = load(scratch / "callbacks.yaml").devices["Lift1"]
     assert isinstance(settings, DryContactLiftSettings)

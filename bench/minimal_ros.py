@@ -1,7 +1,7 @@
-"""The thing to compare with on ROS: an rclpy node that only sets a pin (run as its own process).
+"""The baseline on ROS: an rclpy node that only sets a pin (run as its own process).
 
 A LiftRequest switches the pin, `on` and `off` on stdin switch an input, whose edge goes out as a
-LiftState. Each edge is a line on stdout: its signal, its level, and when (monotonic s).
+LiftState. Each edge is a line on stdout: signal, level, time (monotonic s).
 """
 
 import os

@@ -1,12 +1,12 @@
 """The page with 50 lifts, 200 doors and 50 chargers at 1 Hz, looked at by three real browsers.
 
-A lift's session carries the time of its publishing; a script in each browser notes when it is on
-the screen. `a tenth changes`: as on a busy site. `all change`: no card is ever the same twice. Each
-device's daemon publishes its diagnostics too.
+A lift's session carries its publishing time; a script in each browser notes the time on screen. `a
+tenth changes`: as on a busy site. `all change`: every card changes each time. Each device's daemon
+publishes its diagnostics too.
 
-`an hour`, only with BENCH_PAGE_HOUR_S=N, for so many seconds: what the page keeps, and what a browser
-of the site and one of a device keep after a collection, every half minute. The first ten minutes do not
-count: a device shows so much, and that has to fill. `first` and `last` are the lowest of ten minutes.
+`an hour`, only with BENCH_PAGE_HOUR_S=N, for N seconds: memory of the page, and of a browser of the site
+and of a device after a collection, every half minute. The first ten minutes do not count: the page of a
+device shows that much, and fills first. `first` and `last` are the lowest of ten minutes.
 """
 
 import os
@@ -51,7 +51,7 @@ WATCH: Final = """() => { window.late = []; const seen = new Set();
 
 
 def measure(scratch: Path) -> Tables:
-    """Seconds from publishing to the screen, the page's processor and memory, the browsers' heaps."""
+    """Measure seconds from publishing to screen, the page's CPU and memory, the browsers' heaps."""
     rows = {}
     for name, share in (("a tenth changes", 10), ("all change", 1)):
         with _page(share, scratch) as seen:
@@ -65,14 +65,14 @@ def measure(scratch: Path) -> Tables:
 
 @dataclass(frozen=True)
 class Seen:
-    """A page, what it is shown, and the browsers that look at it."""
+    """A page, its publisher, and the browsers that show it."""
 
     pid: int
     site: "_Site"
     tabs: list[Page]
 
     def live(self, seconds: float) -> None:
-        """The site goes on for so long."""
+        """Keep the site running for this time (s)."""
         self.site.live(seconds, self.tabs[0])
 
 
@@ -131,7 +131,7 @@ class _Site:
             self._told("charger", charger.charger_name)
 
     def _told(self, kind: str, name: str) -> None:
-        """What the device's daemon says of itself."""
+        """Return the diagnostics of the device's daemon."""
         devices = {name: {"input_age_s": 0.05, "waiting": "-"}}
         self._diagnose(diagnosis(f"{name}_node", kind, {}, devices, stamp(time.time())))
 
@@ -154,7 +154,7 @@ class _Site:
         return d.ChargerState(stamp(time.time()), state, f"charger{number:02}")
 
     def live(self, seconds: float, tab: Page) -> None:
-        """Publish for so long; `tab` is any browser, whose events go on meanwhile."""
+        """Publish for this time (s); `tab`: any browser; its events go on meanwhile."""
         began, said = time.monotonic(), 0
         while (at := time.monotonic() - began) < seconds:
             while said < at * DEVICES:
@@ -168,7 +168,7 @@ class _Site:
 
 
 def _looked_at(seen: Seen) -> Row:
-    """From publishing to the screen, and what it costs."""
+    """Measure the time from publishing to screen, and the cost."""
     loads: list[str] = []
     for tab in seen.tabs:
         tab.evaluate(WATCH)
@@ -189,7 +189,7 @@ def _looked_at(seen: Seen) -> Row:
 
 
 def _hour(seen: Seen) -> Rows:
-    """What is kept, and whether it grows."""
+    """Measure the memory kept, and its growth."""
     *_, site, device = seen.tabs
     device.goto(f"{device.url}lift/lift00")
     kept: list[tuple[float, float, float, float]] = []

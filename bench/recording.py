@@ -1,4 +1,4 @@
-"""What a ring costs beside a daemon without one, and how fast a recording of a day is replayed."""
+"""The cost of a ring, compared with a daemon without one, and the replay speed of a day's recording."""
 
 import os
 import time
@@ -40,7 +40,7 @@ CONFIG = Path(__file__).parent.parent / "config/lift_dry_contact.yaml"
 
 
 def measure(scratch: Path) -> Tables:
-    """A lift with and without a ring, in turn; its paths; and a day of one lift at 20 Hz."""
+    """Measure a lift with and without a ring, in turn; its paths; and a day of one lift at 20 Hz."""
     return {
         "a lift, left alone": _idle(scratch),
         "its paths, with a ring": _paths(scratch),
@@ -69,7 +69,7 @@ def _mean(rows: list[Row]) -> Row:
 
 
 def _paths(scratch: Path) -> Rows:
-    """Request to relay, input to RMF and hazard to off: with a ring, against the same without."""
+    """Compare request to relay, input to RMF and hazard to off, with and without a ring."""
     with_ring = daemon_paths(scratch, "dds", keep="ring")
     without = daemon_paths(scratch, "dds", keep="nothing")
     names = ("LiftRequest to relay edge", "input edge to LiftState", "hazard to all outputs off")
@@ -77,7 +77,7 @@ def _paths(scratch: Path) -> Rows:
 
 
 def _day(scratch: Path) -> Row:
-    """A continuous recording of a day; then what was heard is read, and all is decided again."""
+    """Record a day continuously; then read the messages heard, and replay all decisions."""
     began = time.perf_counter()
     Day(scratch).play()
     made_s = time.perf_counter() - began
@@ -132,7 +132,7 @@ class Day:
         )
 
     def play(self) -> None:
-        """The whole day."""
+        """Play the whole day."""
         for scan in range(int(DAY_S / SCAN_S)):
             self.now = scan * SCAN_S
             for event in events(self.now):
@@ -144,7 +144,7 @@ class Day:
         self._recorder.close()
 
     def _tell(self) -> None:
-        """Each second: the state, and the request that RMF repeats."""
+        """Publish each second: the state, and the request that RMF repeats."""
         assert self._lift.decision
         report = self._lift.decision.report
         state = state_message("Lift1", self._settings, report, Time(int(WALL + self.now)))
@@ -162,7 +162,7 @@ def _floor(now: float) -> str:
 
 
 def events(now: float) -> Iterator[object]:
-    """What the lift shows, and is requested: a ride in each RIDE_S."""
+    """Yield the lift's readings and requests: a ride in each RIDE_S."""
     into, before = now % RIDE_S, _floor(now - RIDE_S)
     agv = 0.5 < into < 16.0
     if into < 2.0:

@@ -1,6 +1,6 @@
-"""Fakes are found like drivers: `DRIVER` and `BUS` name a module, and its `FAKE` stands in for them.
+"""Find fakes like drivers: `DRIVER` and `BUS` name a module, whose `FAKE` stands in for them.
 
-Only this file imports fakes by name. A driver that names none gets the plant of its kind,
+Only this file imports fakes by name. A driver without a fake gets its kind's plant,
 `hal_fakes/plants/<kind>.py`, at the far end of its wires.
 """
 
@@ -22,11 +22,11 @@ Station = TypeVar("Station")
 
 @dataclass(frozen=True)
 class Fake(Generic[Settings]):
-    """One sort of controller.
+    """The fake of one sort of controller.
 
     `plant(name, settings, wires)`: its physics; `wires` is the driver's table.
-    `station(plant, settings)`: what the bus's fake puts on the bus, with that plant behind it. Without
-    it, the plant's contacts are put there as a `PlantWiring`.
+    `station(plant, settings)`: the controller for the bus's fake, with that plant behind it. Without
+    `station`, the plant's contacts are wired to the bus as a `PlantWiring`.
     """
 
     plant: Callable[[str, Settings, Sequence[Wire]], Plant]
@@ -36,7 +36,7 @@ class Fake(Generic[Settings]):
 class Server(Protocol):
     """A running far side.
 
-    `replace`: what to write into the bus's settings instead
+    `replace`: replacements for the bus's settings
     (`{"tcp": {"host": "127.0.0.1", "port": 41234}}`).
     """
 
@@ -48,10 +48,10 @@ class Server(Protocol):
 
 @dataclass(frozen=True)
 class Outside(Generic[Settings, Station]):
-    """The far side of a bus, in a process of its own.
+    """The far side of a bus, in its own process.
 
     `serve(settings, stations)`: starts a real server on 127.0.0.1, or on its own line, and returns at
-    once. It may call the plants from any thread, and does not keep their time.
+    once. The server may call the plants from any thread, and does not advance their time.
     """
 
     serve: Callable[[Settings, Sequence[Station]], Server]
@@ -71,7 +71,7 @@ FarSide: TypeAlias = Inside[Any, Any] | Outside[Any, Any]
 
 
 def plants_on(config: Config, bus: str) -> dict[str, Plant]:
-    """A new plant for each device on this bus."""
+    """Make a plant for each device on this bus."""
     return {
         name: _fake(config, name).plant(name, config.devices[name], config.wires(name))
         for name in config.devices_on(bus)
@@ -79,7 +79,7 @@ def plants_on(config: Config, bus: str) -> dict[str, Plant]:
 
 
 def stations_on(config: Config, bus: str, plants: Mapping[str, Plant]) -> list[Any]:
-    """What stands on this bus, with the devices' plants behind it."""
+    """Return this bus's stations, with the devices' plants behind them."""
     return [_station(config, bus, name, plants[name]) for name in config.devices_on(bus)]
 
 
@@ -91,7 +91,7 @@ def _station(config: Config, bus: str, name: str, plant: Plant) -> object:
 
 
 def far_side(config: Config, bus: str) -> FarSide:
-    """The far side of this bus. Raises HalError where its type has none."""
+    """Return the far side of this bus. Raises HalError if its type has none."""
     name = config.bus_type(bus).fake
     if not name:
         raise HalError(f"a bus of type {config.bus_types[bus]} cannot be simulated: it has no fake")

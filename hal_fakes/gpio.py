@@ -22,7 +22,7 @@ from hal_fakes.wiring import PlantWiring
 
 
 class WiredPin(MockPin):  # type: ignore[misc]
-    """One pin of the header, with what hangs on it."""
+    """One pin of the header, with its wire."""
 
     factory: "WiredFactory"
 
@@ -32,7 +32,7 @@ class WiredPin(MockPin):  # type: ignore[misc]
         self._safe: bool | None = None
 
     def output_with_state(self, state: bool) -> None:
-        """Claim as an output at this level, which is the one to leave it at."""
+        """Claim as an output at this level, to be restored on closing."""
         self._function = "output"
         self._state = self._safe = bool(state)
         self.clear_states()
@@ -47,7 +47,7 @@ class WiredPin(MockPin):  # type: ignore[misc]
         self.clear_states()
 
     def close(self) -> None:
-        """An output to its safe level, where the kernel keeps it; then let go."""
+        """Set an output to its safe level, which the kernel keeps; then release the pin."""
         if self._safe is not None:
             self._change_state(self._safe)
         self._safe = None
@@ -55,7 +55,7 @@ class WiredPin(MockPin):  # type: ignore[misc]
         self._function = "input"
 
     def follow_wire(self, level: bool) -> None:
-        """The wire has this level now; an edge is told to whoever watches the pin."""
+        """Take the wire's level; report an edge to the pin's watcher."""
         if self._function == "input":
             (self.drive_high if level else self.drive_low)()
 
@@ -69,8 +69,8 @@ class WiredPin(MockPin):  # type: ignore[misc]
 class WiredFactory(MockFactory):  # type: ignore[misc]
     """The header with its wiring.
 
-    `clock` gives the time (s) of what the daemon drives; `lock` is held while pins are brought to
-    their wires' levels, so that an older level never overtakes a newer one.
+    `clock` gives the time (s) of the daemon's outputs; `lock` is held while pins take their
+    wires' levels, so an older level never overtakes a newer one.
     """
 
     def __init__(
@@ -85,7 +85,7 @@ class WiredFactory(MockFactory):  # type: ignore[misc]
         self._wirings = wirings
 
     def driven(self, point: str, level: bool) -> None:
-        """The daemon has put an output at this level."""
+        """Note that the daemon has set an output to this level."""
         for wiring in self._wirings:
             if point in wiring.outputs:
                 wiring.drive(point, level, self.clock())
@@ -102,7 +102,7 @@ class WiredFactory(MockFactory):  # type: ignore[misc]
 
 
 def open_bus(settings: GpioSettings, wirings: Sequence[PlantWiring], world: RealTime) -> GpioBus:
-    """A real GPIO bus on pins that are wired to the plants of this bus."""
+    """Open a real GPIO bus on pins wired to the plants of this bus."""
     factory = WiredFactory(wirings, lock=world.lock)
     world.on_step.append(factory.show)
     return open_real_bus(settings, factory)

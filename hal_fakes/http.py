@@ -1,6 +1,6 @@
 """The far side of an `http` bus: a real HTTP server on 127.0.0.1 in front of stations.
 
-Each station has a file that makes its answers (`hal_fakes/http_charger.py`). The wire fails by part and
+Each sort of station makes its answers in a file of its own (`hal_fakes/http_charger.py`). The wire fails by part and
 mode (`hal_fakes.plants.plant.FAILURE_MODES`):
 
 |         | off              | stuck           | slow               | garbage        | wrong         |
@@ -48,17 +48,17 @@ class HttpStation(Protocol):
     commands: Mapping[tuple[str, str], tuple[str, bool]]
 
     def answer(self) -> bytes:
-        """The body for a reading, now."""
+        """Return the body of a reading at this moment."""
 
     def obey(self, signal: str, asserted: bool) -> None:
         """Obey a command for this signal."""
 
     def tick(self) -> None:
-        """Called often: let timers run out."""
+        """Let timers run out. Called often."""
 
 
 class HttpServer:
-    """A running server. `replace`: what to write into the bus's settings instead.
+    """A running server. `replace`: replacements for the bus's settings.
 
     `path`: the API's path. `timeout_s`: the client's deadline, which slow failures overrun.
     """
@@ -97,7 +97,7 @@ class _Listener(ThreadingHTTPServer):
         super().__init__(("127.0.0.1", 0), _Call)
 
     def service_actions(self) -> None:
-        """The server's own pause between requests."""
+        """Look after the server between requests."""
         for station in self._stations:
             station.tick()
 
@@ -108,13 +108,13 @@ class _Listener(ThreadingHTTPServer):
         return caller, address
 
     def shutdown_request(self, request: socket.socket | tuple[bytes, socket.socket]) -> None:
-        assert isinstance(request, socket.socket)  # a datagram's would be a pair
+        assert isinstance(request, socket.socket)  # for a datagram it would be a pair
         with self._lock:
             self._callers.discard(request)
         super().shutdown_request(request)
 
     def hang_up(self) -> None:
-        """End every conversation."""
+        """Close every connection."""
         with self._lock:
             callers = list(self._callers)
         for caller in callers:
@@ -202,7 +202,7 @@ class _Call(BaseHTTPRequestHandler):
             self.wfile.write(rest[n : n + 1])
 
     def _wait(self, seconds: float) -> None:
-        """Wait so long, or until the caller hangs up or the server closes (ConnectionError)."""
+        """Wait this long, or until the caller hangs up or the server closes (ConnectionError)."""
         end = time.monotonic() + seconds
         while (left_s := end - time.monotonic()) > 0:
             if select([self.connection], [], [], min(left_s, LOOK_S))[0]:

@@ -1,7 +1,7 @@
-"""A charging station that answers HTTP: its plant in the maker's numbers or words and fields.
+"""A charging station on HTTP: its plant's state in the maker's numbers or words and fields.
 
-`GET state_path` answers what the station does; clearing, start, stop and range check do what they are
-called.
+`GET state_path` answers the station's activity; the commands are clearing, start, stop and range check.
+
 """
 
 import json
@@ -21,7 +21,7 @@ from hal_fakes.plants.plant import Plant
 
 
 def build(name: str, settings: HttpChargerSettings) -> ChargerPlant:
-    """The station that these settings speak to, with the robots that it knows."""
+    """Build the station for these settings, with the robots it knows."""
     return ChargerPlant(
         name,
         settings.receivers,
@@ -33,7 +33,7 @@ def build(name: str, settings: HttpChargerSettings) -> ChargerPlant:
 
 
 class FakeHttpCharger:
-    """A station (`hal_fakes.http.HttpStation`): one plant with the numbers and paths of its maker."""
+    """A station (`hal_fakes.http.HttpStation`): one plant with its maker's numbers and paths."""
 
     def __init__(self, plant: Plant, settings: HttpChargerSettings) -> None:
         self.plant = plant
@@ -48,14 +48,14 @@ class FakeHttpCharger:
         self._last: bytes | None = None
 
     def reading(self) -> Reading:
-        """What the station does now."""
+        """Return the station's present reading."""
         self.plant.advance(time.monotonic())
         reading = self.plant.reading()
         assert isinstance(reading, Reading)
         return reading
 
     def obey(self, signal: str, asserted: bool) -> None:
-        """A command for this signal has come."""
+        """Obey a command for this signal."""
         now, after_s = time.monotonic(), self._settings.switches_off_after_s
         if signal == "power":
             self._off_at = now + after_s if asserted and after_s else float("inf")
@@ -67,11 +67,11 @@ class FakeHttpCharger:
             self.obey("power", False)
 
     def answer(self) -> bytes:
-        """The answer to `GET state_path` now."""
+        """Return the present answer to `GET state_path`."""
         return self.body(self.reading())
 
     def body(self, reading: Reading) -> bytes:
-        """The answer that shows this reading; wrong where the server is told to be."""
+        """Return the answer for this reading; wrong if that failure is ordered."""
         server, body = reading.failures.get("server"), reading.failures.get("body")
         if server == "stuck" and self._last is not None:
             return self._last
@@ -88,7 +88,7 @@ class FakeHttpCharger:
         return {"off": b"", "garbage": self._last[:-9]}.get(body or "", self._last)
 
     def _answer(self, code: int | str, reading: Reading) -> dict[str, object]:
-        """Everything where the YAML says that it is."""
+        """Return all values, in the fields named by the YAML."""
         fields, answer = self._settings.fields, dict[str, object]()
         if self._settings.codes is not None:
             put(answer, fields.state, self._words.get(code, code))
@@ -109,7 +109,7 @@ class FakeHttpCharger:
         return answer
 
     def _by_rules(self, reading: Reading, answer: dict[str, object]) -> dict[str, Value]:
-        """What the places of rules and errors hold."""
+        """Return the values of the fields for rules and errors."""
         said = self._settings
         wanted = ROBOT_ERROR if reading.robots else (reading.activity, "")
         shown = {at: found(answer, at) for _, at in places(said.rules)}
@@ -130,7 +130,7 @@ class FakeHttpCharger:
 
 
 def _commands(settings: HttpChargerSettings) -> Iterator[tuple[tuple[str, str], tuple[str, bool]]]:
-    """Method and path of each command, and what it does to the plant."""
+    """Return method and path of each command, and its effect on the plant."""
     if settings.clear_error_path:
         yield ("POST", settings.clear_error_path), ("clear_error", True)
     for call, signal, asserted in (

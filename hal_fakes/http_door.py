@@ -1,7 +1,7 @@
-"""A door on a relay that answers HTTP: its plant's contacts where the YAML says that they are.
+"""A door on an HTTP relay: its plant's contacts in the fields named by the YAML.
 
-The relay switches itself off when its timer is not renewed. How its server, its headers and its body
-fail is in `hal_fakes/http.py`.
+The relay switches itself off when its timer is not renewed. Failures of server, headers and body:
+`hal_fakes/http.py`.
 """
 
 import json
@@ -55,7 +55,7 @@ class FakeHttpDoor:
             self.obey(HOLD, False)
 
     def answer(self) -> bytes:
-        """The answer to `GET state_path` now; wrong where the server is told to be."""
+        """Return the present answer to `GET state_path`; wrong if that failure is ordered."""
         self.tick()
         self.plant.advance(time.monotonic())
         server, body = self.plant.failures.get("server"), self.plant.failures.get("body")

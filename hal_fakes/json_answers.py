@@ -4,7 +4,7 @@ from drivers.json_fields import JsonFlag, Value, same
 
 
 def value_of(place: JsonFlag, yes: bool) -> Value:
-    """The value that means yes or no."""
+    """Return the value that means yes or no."""
     if not place.when:
         return yes
     if yes:

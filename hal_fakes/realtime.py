@@ -29,13 +29,13 @@ class RealTime:
         self._thread.start()
 
     def stir(self) -> None:
-        """A plant was driven: look again at what is due."""
+        """Recompute the next event, because a plant was driven."""
         with self.lock:
             self._stirred = True
             self._due.notify()
 
     def show(self) -> None:
-        """Show moved contacts at once, in the caller's thread; wake ours if it would wake too late."""
+        """Show moved contacts at once, in the caller's thread; wake our thread if it would wake too late."""
         with self.lock:
             if self._step() < self._next_at:
                 self.stir()
@@ -69,7 +69,7 @@ def _timeout(next_at: float) -> float | None:
 
 
 class _Serialised:
-    """One plant behind the world's lock; whoever drives it also stirs the world."""
+    """One plant behind the world's lock; driving it also stirs the world."""
 
     def __init__(self, plant: Plant, world: RealTime) -> None:
         self.name = plant.name

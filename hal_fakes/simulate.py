@@ -24,7 +24,7 @@ from hal_fakes.realtime import RealTime
 
 LogFormat = Literal["text", "json"]
 READY_S = 15.0
-"""How long a child may take to serve (a busy Raspberry Pi imports slowly)."""
+"""Time limit (s) for a child's start (a busy Raspberry Pi imports slowly)."""
 PATIENCE_S = 1.5
 """A simulated bus waits at least this long (s) for an answer: its far side shares this machine,
 which may be busy. Not longer, as a call may take half of the shortest WatchdogSec
@@ -32,7 +32,7 @@ which may be busy. Not longer, as a call may take half of the shortest WatchdogS
 
 
 class Simulation:
-    """The far sides of a file's buses. Those in a process of their own start while the daemon does.
+    """The far sides of a file's buses. Those in separate processes start while the daemon does.
 
     Make it before the daemon changes directory: the file's relative paths must still be valid.
     """
@@ -40,7 +40,7 @@ class Simulation:
     def __init__(
         self, config: Config, runtime_dir: Path, *, log_format: LogFormat | None = None
     ) -> None:
-        """`log_format`: how a child says what is pressed; None where nobody reads its log."""
+        """`log_format`: a child's format for logging presses; None if its log is not read."""
         self._log = ["--log-format", log_format] if log_format else []
         self._config = config
         self._file = str(Path(config.path).resolve())
@@ -51,7 +51,7 @@ class Simulation:
         }
 
     def open_bus(self, name: str) -> Bus:
-        """A real bus in front of the fake for it. Raises HalError.
+        """Open a real bus in front of its fake. Raises HalError.
 
         Two buses may be opened one after the other, not at once.
         """
@@ -64,12 +64,12 @@ class Simulation:
         self._open.close()
 
     def socket_path(self, name: str) -> Path:
-        """Where the control socket of this bus's plants is."""
+        """Return the path of the control socket to this bus's plants."""
         several = len(self._config.buses) > 1
         return self._runtime_dir / (f"plant-{name}.sock" if several else "plant.sock")
 
     def _has_process(self, name: str) -> bool:
-        """Asked without an import of the fake, which would bring its libraries into the daemon."""
+        """Has the bus's fake a process? Found without importing the fake's libraries into the daemon."""
         bus_type = self._config.bus_type(name)
         return bool(bus_type.fake) and not bus_type.fake_inside
 
@@ -122,7 +122,7 @@ def _first_line(child: "subprocess.Popen[bytes]", bus_name: str) -> dict[str, ob
 
 
 def _end(child: "subprocess.Popen[bytes]") -> None:
-    """Its standard input ends, so it ends; killed when it does not."""
+    """End a child by closing its standard input; kill it if that fails."""
     assert child.stdin is not None
     assert child.stdout is not None
     with contextlib.suppress(OSError):

@@ -1,4 +1,4 @@
-"""The wire that the demos and the tests run on: `dds` where it can be, `zenoh` elsewhere."""
+"""The wire of the demos and the tests: `dds` where available, else `zenoh`."""
 
 import os
 from typing import Literal
@@ -11,7 +11,7 @@ Wire = Literal["dds", "zenoh"]
 
 
 def wire() -> Wire:
-    """TRANSPORT in the environment, else what runs here."""
+    """Return the environment's TRANSPORT, else a wire that runs here."""
     named = os.environ.get("TRANSPORT") or runs_here()
     if named not in ("dds", "zenoh"):
         raise TransportError(f"TRANSPORT is {named!r}: dds or zenoh")
@@ -19,11 +19,11 @@ def wire() -> Wire:
 
 
 def runs_here() -> Wire:
-    """dds where cyclonedds imports, else zenoh: as `auto` has it on a machine without ROS."""
+    """Return dds if cyclonedds imports, else zenoh, as `auto` does on a machine without ROS."""
     return "zenoh" if missing_of_dds() else "dds"
 
 
 def join(name: str, domain_id: int) -> Transport:
-    """A node of RMF's newest release on this wire, on this machine alone."""
+    """Join as a node of RMF's newest release on this wire, on this machine alone."""
     rmf = Rmf(transport=wire(), domain_id=domain_id, release="kilted")
     return open_transport(rmf, name, localhost=True)

@@ -1,4 +1,4 @@
-"""The wires between a plant's signals and a bus's points, which have addresses and levels.
+"""The wires between a plant's signals and a bus's points (with addresses and levels).
 
 For buses with points (GPIO, Modbus). `plants/contact.py` says how wires fail.
 """
@@ -22,11 +22,11 @@ class PlantWiring:
         self.flashes = {canonical(w.flash.point): canonical(w.point) for w in wires if w.flash}
 
     def levels(self, now: float) -> dict[str, bool]:
-        """Every input's level (True is high) by canonical point, at `now` (monotonic s)."""
+        """Return every input's level (True is high) by canonical point, at `now` (monotonic s)."""
         self.plant.advance(now)
         return {p: w.level(self.plant.sense(w.signal)) for p, w in self.inputs.items()}
 
     def drive(self, point: str, level: bool, now: float) -> None:
-        """Set an output to the level that the bus has at `now`. KeyError if it is not wired here."""
+        """Set an output to the bus's level at `now`. KeyError if it is not wired here."""
         wire = self.outputs[point]
         self.plant.drive(wire.signal, wire.asserted(level), now)

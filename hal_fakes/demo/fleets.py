@@ -22,7 +22,7 @@ WARD: Final = "ward"
 DRIVE_S: Final = 1.0
 FILLS_PER_S: Final = 15.0
 CONFIGURED: Final = {"tiny": Path(__file__).parents[2] / "config" / "fleet_tiny.yaml"}
-"""Fleets started from their adapter's configuration; the others have only their robots here."""
+"""Fleets started from their adapter's configuration; the others have only the setting below."""
 FINISHING: Final[dict[str, Finishing]] = {"porter": "nothing"}
 
 

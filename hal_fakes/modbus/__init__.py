@@ -32,7 +32,7 @@ from hal_fakes.modbus.units import FakeUnits, FarSide
 
 _aiohttp = sys.modules.get("aiohttp")
 sys.modules["aiohttp"] = None  # type: ignore[assignment]  # as if it were not installed
-try:  # pymodbus would import it for a page that is not served; that takes half of a far side's start
+try:  # pymodbus would import it for an unused page; that takes half of a far side's start
     from pymodbus.server import ModbusTcpServer
 finally:
     del sys.modules["aiohttp"]
@@ -41,9 +41,9 @@ finally:
 
 TRANSACTION: Final = 0
 UNIT: Final = 6
-"""Their places in a reply on TCP."""
+"""Their positions in a reply on TCP."""
 LOOK_S: Final = 0.02
-"""How soon the server obeys `off` (s)."""
+"""Greatest delay (s) with which the server obeys `off`."""
 READY_S: Final = 10.0
 
 
@@ -60,7 +60,7 @@ def serve(settings: ModbusSettings, stations: Sequence[FarSide]) -> "ModbusServe
 class ModbusServer:
     """A running server, with an asyncio loop in its own thread.
 
-    `replace`: what to write into the bus's settings instead.
+    `replace`: replacements for the bus's settings.
     """
 
     def __init__(self, devices: Iterable[FarSide], slow_s: float) -> None:
@@ -121,7 +121,7 @@ class ModbusServer:
             await asyncio.sleep(LOOK_S)
 
     def _send(self, sending: bool, packet: bytes) -> bytes:
-        """The bytes that go onto the wire."""
+        """Return the bytes to put onto the wire."""
         if not sending:
             return packet
         server = self._units.failure("server")
@@ -135,7 +135,7 @@ class ModbusServer:
 
 
 def _placeholder() -> SimDevice:
-    """pymodbus wants registers of its own; ours are the plants'."""
+    """Make the registers that pymodbus demands; ours are the plants'."""
     return SimDevice(0, simdata=SimData(0, datatype=DataType.REGISTERS))
 
 

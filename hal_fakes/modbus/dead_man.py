@@ -1,4 +1,4 @@
-"""The watchdog of a simulated I/O module, as couplers of the WAGO 750 series have it.
+"""The watchdog of a simulated I/O module, as in couplers of the WAGO 750 series.
 
 Its holding registers: 0x1000 time (x 100 ms), 0x1003 trigger, 0x1006 state (0 stopped, 1 running,
 2 tripped), 0x1007 restart. A trigger counts if its value differs from the last one; the first starts
@@ -35,7 +35,7 @@ class ModuleWatchdog:
         return self._registers[STATE] == TRIPPED
 
     def get(self, point: Point, now: float) -> int:
-        """The value there."""
+        """Return the value there."""
         return self._registers[point.address]
 
     def set(self, point: Point, value: int, now: float) -> bool:
@@ -52,11 +52,11 @@ class ModuleWatchdog:
         return True
 
     def expire(self) -> None:
-        """Let it trip at the next look."""
+        """Make the watchdog trip at the next look."""
         self._due_at = 0.0
 
     def trips(self, now: float) -> bool:
-        """Does it trip at `now`? Once for each time."""
+        """Does the watchdog trip at `now`? True once for each trip."""
         if self._registers[STATE] != RUNNING or now < self._due_at:
             return False
         self._registers[STATE] = TRIPPED

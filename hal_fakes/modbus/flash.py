@@ -1,4 +1,4 @@
-"""The far side of a pulse that a module times: pymodbus's server takes any value for a coil's 1."""
+"""The far side of a module-timed pulse; pymodbus's own server would take any coil value as 1."""
 
 import struct
 from typing import Final
@@ -13,7 +13,7 @@ COIL_VALUES: Final = (0xFF00, 0)
 
 
 class TimedCoilRequest(WriteSingleCoilRequest):
-    """Function 5 with its value as sent. A value other than on and off asks `FakeUnits` for a flash."""
+    """Function 5 with its value as sent. Values other than on and off make `FakeUnits` flash the coil."""
 
     def decode(self, data: bytes) -> None:
         """Keep the value."""
@@ -37,8 +37,8 @@ class TimedCoilRequest(WriteSingleCoilRequest):
 
 
 class FlashEcho(WriteSingleCoilRequest):
-    """The reply."""
+    """The reply to a flash."""
 
     def encode(self) -> bytes:
-        """The request's own bytes."""
+        """Return the request's own bytes."""
         return struct.pack(">HH", self.address, *self.registers)

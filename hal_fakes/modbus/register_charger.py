@@ -1,4 +1,4 @@
-"""A charging station on registers: its plant in the numbers of its map."""
+"""A charging station on registers: its plant's state in the numbers of its map."""
 
 from bridges.kinds.charger.signals import Activity
 from drivers.charger.register import POWER, RegisterChargerSettings, cells, charger_map, orders
@@ -28,7 +28,7 @@ class FakeRegisterCharger:
         self.outputs = frozenset(self._orders)
 
     def get(self, point: Point, now: float) -> int:
-        """What is read there at `now` (monotonic s): several values may share a register."""
+        """Return the register at `now` (monotonic s): several values may share one."""
         if point in self._written:
             return self._written[point]
         self.plant.advance(now)
@@ -42,7 +42,7 @@ class FakeRegisterCharger:
         return word
 
     def set(self, point: Point, value: int, now: float) -> bool:
-        """A write; False where nothing can be written."""
+        """Write a value; False if not writable."""
         if point not in self._written:
             return False
         self._written[point] = value
@@ -78,7 +78,7 @@ class FakeRegisterCharger:
 
 
 def build(name: str, settings: RegisterChargerSettings) -> ChargerPlant:
-    """The station that this map speaks of."""
+    """Build the station of this map."""
     found = charger_map(settings)
     return ChargerPlant(
         name,

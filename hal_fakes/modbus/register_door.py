@@ -1,6 +1,6 @@
-"""A door operator behind Modbus registers: its plant's contacts as the numbers of its register map.
+"""A door operator behind Modbus registers: its plant's contacts in the numbers of its register map.
 
-It has found its ends: the position is 0 or 100 there, and between them the number for `unknown`, or 50.
+It knows its end positions: they read 0 and 100; between them it reads the number for `unknown`, or 50.
 """
 
 from drivers.door.register import RegisterDoorSettings, door_map, points
@@ -24,7 +24,7 @@ def contacts(settings: RegisterDoorSettings) -> list[Wire]:
 
 
 class FakeRegisterDoor:
-    """The cells of one operator. `points`: what it has, `outputs` among it; `unit`: where."""
+    """The cells of one operator. `points`: all of them, including `outputs`; `unit`: its unit."""
 
     def __init__(self, plant: Plant, settings: RegisterDoorSettings) -> None:
         self.plant = plant
@@ -36,7 +36,7 @@ class FakeRegisterDoor:
         self.outputs = frozenset({self._parts["command"]})
 
     def get(self, point: Point, now: float) -> int:
-        """What is read there at `now` (monotonic s)."""
+        """Return the value there at `now` (monotonic s)."""
         self.plant.advance(now)
         value = 0
         for part, where in self._parts.items():
@@ -45,7 +45,7 @@ class FakeRegisterDoor:
         return value
 
     def set(self, point: Point, value: int, now: float) -> bool:
-        """A write; False where nothing can be written."""
+        """Write a value; False if not writable."""
         if point != self._parts["command"]:
             return False
         self._command = value

@@ -1,6 +1,6 @@
-"""A lift's gateway: its plant's contacts as the numbers of its register map, its commands as relays.
+"""A lift's gateway: its plant's contacts in the numbers of its register map, its commands as relays.
 
-Behind the gateway is a lift on contacts, which can be cut like wires to us: a floor's line each, two
+Behind the gateway is a lift on contacts, which can be cut like wires to us: one for each floor, two
 for a door, one for each hazard.
 """
 
@@ -28,11 +28,11 @@ from hal_fakes.plants.lift import LiftPace, LiftPlant
 from hal_fakes.plants.plant import Plant
 
 NONSENSE = 65535
-"""What a whole register shows of a door that is open and closed at once."""
+"""Whole register's value for a door that is open and closed at once."""
 
 
 def contacts(settings: RegisterLiftSettings) -> dry_contact.DryContactLiftSettings:
-    """The lift behind the gateway, as the wiring of its contacts."""
+    """Return the wiring of the contacts of the lift behind the gateway."""
     found, inputs, coils = settings.map, count(), count()
 
     def line(part: NumberField | LiftFlag | None = None, active: str = "high") -> dict[str, str]:
@@ -66,7 +66,7 @@ def contacts(settings: RegisterLiftSettings) -> dry_contact.DryContactLiftSettin
 
 
 class FakeRegisterLift:
-    """The cells of one gateway. `points`: what it has, `outputs` among it; `unit`: where."""
+    """The cells of one gateway. `points`: all of them, including `outputs`; `unit`: its unit."""
 
     def __init__(self, plant: Plant, settings: RegisterLiftSettings) -> None:
         self.plant = plant
@@ -80,7 +80,7 @@ class FakeRegisterLift:
         self.outputs = frozenset(self._written)
 
     def get(self, point: Point, now: float) -> int:
-        """What is read there at `now` (monotonic s)."""
+        """Return the value there at `now` (monotonic s)."""
         self.plant.advance(now)
         value = self._written.get(point, 0)
         for name, where in self._parts.items():
@@ -89,7 +89,7 @@ class FakeRegisterLift:
         return value
 
     def set(self, point: Point, value: int, now: float) -> bool:
-        """A write; False where nothing can be written. What goes off goes first."""
+        """Write a value; False if not writable. Relays go off before others go on."""
         if point not in self._written:
             return False
         self._written[point] = value
@@ -99,7 +99,7 @@ class FakeRegisterLift:
         return True
 
     def _relays(self, point: Point, value: int) -> Iterator[tuple[str, bool]]:
-        """What this value of a place has on or off."""
+        """Return the relays that this value switches on or off."""
         commands = self._map.commands
         for signal, _, command in commands.singles():
             if at(self.unit, command.at) == point:
@@ -150,7 +150,7 @@ class FakeRegisterLift:
 
 
 def build(name: str, settings: RegisterLiftSettings, pace: LiftPace | None = None) -> LiftPlant:
-    """The lift behind this gateway."""
+    """Build the lift behind this gateway."""
     return LiftPlant(name, contacts(settings), pace)
 
 

@@ -1,12 +1,12 @@
 """The far side of a serial `modbus` bus: units on RS-485 behind a pseudo-terminal.
 
 An absent unit is silent. A pseudo-terminal has no baud rate, so this file delays each byte by its time
-on the wire. A request is complete after its characters and 3.5 of silence; then the reply begins.
+on the wire. A request is complete after its characters and 3.5 characters of silence; then the reply begins.
 With `ignore_echo` in the settings the adapter echoes. `port` is a link that stays the same when the
-adapter is pulled and comes back, as one in /dev/serial/by-id. On command (`fail DEVICE unit|server
+adapter is unplugged and plugged in, as in /dev/serial/by-id. On command (`fail DEVICE unit|server
 MODE`) one unit, or the server, which is the line with all of them, is
 
-- `off`: the unit is silent; the server's adapter is pulled out
+- `off`: the unit is silent; the server's adapter is unplugged
 - `stuck`: the unit's inputs stay as they were; the line is cut, and silent
 - `slow`: the reply comes after the client has stopped waiting
 - `garbage`: a wrong CRC, or half a frame
@@ -41,7 +41,7 @@ from hal_fakes.modbus.units import FakeUnits, FarSide
 from hal_fakes.plants.plant import FailureMode
 
 LOOK_S: Final = 0.02
-"""How soon an adapter is pulled (s)."""
+"""Greatest delay (s) before an adapter is unplugged."""
 READY_S: Final = 10.0
 
 
@@ -54,7 +54,7 @@ class SerialAdapter:
 
     @property
     def wire(self) -> int | None:
-        """The descriptor of the line's side; None while it is pulled out."""
+        """Return the descriptor of the line's side; None while unplugged."""
         return self._ends[0] if self._ends else None
 
     def plug(self) -> None:
@@ -73,7 +73,7 @@ class SerialAdapter:
 
 
 class RtuLine:
-    """A running line with its own thread. `replace`: what to write into the bus's settings instead.
+    """A running line with its own thread. `replace`: replacements for the bus's settings.
 
     `slow_s`: a slow reply's delay (s). `requests`: every frame heard so far.
     """
@@ -137,7 +137,7 @@ class RtuLine:
             (self.adapter.pull if pulled else self.adapter.plug)()
 
     def _listen(self) -> None:
-        """Read what is sent until something is due. Its characters take their time on the wire."""
+        """Read until something is due. Characters take their time on the wire."""
         wire = self.adapter.wire
         readable = select.select([wire] if wire is not None else [], [], [], self._idle_s())[0]
         sent = b""
@@ -171,7 +171,7 @@ class RtuLine:
     # ---- the units: frames and their meaning
 
     def _hear(self, frame: bytes) -> None:
-        """A request is complete. Its reply, if any, begins now, or later if the unit is slow."""
+        """Handle a complete request. Its reply, if any, begins now, or later if the unit is slow."""
         self.requests.append(frame)
         unit = frame[0]
         modes = {self._units.failure("server"), self._units.failure("unit", unit)} - {None}
@@ -184,7 +184,7 @@ class RtuLine:
         self._put(reply, heard_at + (self._slow_s if "slow" in modes else 0.0))
 
     def _reply(self, frame: bytes) -> bytes:
-        """The unit's reply; none to a broken frame."""
+        """Return the unit's reply; none to a broken frame."""
         crc = int.from_bytes(frame[-2:], "big")
         if len(frame) < 4 or not FramerRTU.check_CRC(frame[:-2], crc):
             return b""
@@ -200,7 +200,7 @@ class RtuLine:
         return self._framer.buildFrame(response)
 
     def _spoiled(self, mode: FailureMode | None, reply: bytes) -> bytes:
-        """The reply as this mode spoils it. Each mode has several ways, used in turn."""
+        """Spoil the reply by this mode. Each mode has several ways, used in turn."""
         if mode == "garbage":
             broken = bytes((reply[-1] ^ 0x55,))
             return reply[:-1] + broken if next(self._kinds) % 2 else reply[: len(reply) // 2]

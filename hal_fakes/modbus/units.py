@@ -1,4 +1,4 @@
-"""The units that pymodbus's servers ask: bits and registers with plants behind them, and how they fail.
+"""The units behind pymodbus's servers: bits and registers with plants behind them, and their failures.
 
 A gateway (`hal_fakes/modbus/__init__.py`) and a serial line (`hal_fakes/modbus/rtu.py`) use the same.
 """
@@ -20,7 +20,7 @@ Part = Literal["unit", "server"]
 
 
 class UnitCells(Protocol):
-    """Registers and bits of one unit, with a plant behind them. `outputs`: what can be written."""
+    """Registers and bits of one unit, with a plant behind them. `outputs`: the writable ones."""
 
     unit: int
     points: frozenset[Point]
@@ -31,14 +31,14 @@ class UnitCells(Protocol):
         """The plant; None for registers of the module itself."""
 
     def get(self, point: Point, now: float) -> int:
-        """The value there at `now` (monotonic s)."""
+        """Return the value there at `now` (monotonic s)."""
 
     def set(self, point: Point, value: int, now: float) -> bool:
         """Write a value; False if nothing can be written there."""
 
 
 FarSide: TypeAlias = PlantWiring | UnitCells
-"""What units can consist of."""
+"""The possible contents of a unit."""
 
 TABLES: Final[dict[int, Table]] = {
     1: "coil",
@@ -56,7 +56,7 @@ TABLES: Final[dict[int, Table]] = {
 class FakeUnits:
     """All units, as pymodbus's server reads and writes them. `slow_s`: a slow reply's delay (s).
 
-    Coils keep what was written; inputs show the plants' contacts.
+    Coils keep the written value; inputs show the plants' contacts.
     """
 
     def __init__(self, devices: Iterable[FarSide], slow_s: float) -> None:
@@ -96,7 +96,7 @@ class FakeUnits:
                 self._plants[unit].append(device.plant)
 
     def tick(self) -> None:
-        """Let watchdogs trip and pulses end when it is time; called often."""
+        """Let due watchdogs trip and due pulses end; called often."""
         now = time.monotonic()
         for coil in [coil for coil, at in self._off_at.items() if at <= now]:
             self._set(coil, False)
@@ -107,7 +107,7 @@ class FakeUnits:
                         wiring.drive(name, False, now)
 
     def failure(self, part: Part, unit: int | None = None) -> FailureMode | None:
-        """The failure of the server, or of this unit; None if it works."""
+        """Return the failure of the server, or of this unit; None if sound."""
         modes = (plant.failures.get(part) for plant in self._plants.get(unit, ()))
         return next((mode for mode in modes if mode is not None), None)
 
@@ -118,7 +118,7 @@ class FakeUnits:
     async def async_getValues(
         self, device_id: int, func_code: int, address: int, count: int = 1
     ) -> list[int] | ExcCodes:
-        """The bits or registers for a read request, or for a write's echo."""
+        """Return the bits or registers for a read request, or for a write's echo."""
         points = await self._points(device_id, func_code, address, count)
         if isinstance(points, ExcCodes):
             return points
@@ -127,7 +127,7 @@ class FakeUnits:
     async def async_setValues(
         self, device_id: int, func_code: int, address: int, values: list[int]
     ) -> ExcCodes | None:
-        """A write to coils or registers."""
+        """Write to coils or registers."""
         points = await self._points(device_id, func_code, address, len(values))
         if isinstance(points, ExcCodes):
             return points
@@ -168,7 +168,7 @@ class FakeUnits:
     async def _points(
         self, unit: int, function: int, address: int, count: int
     ) -> list[Point] | ExcCodes:
-        """The points of a request, or the exception for it. Raises NoSuchIdException for silence."""
+        """Return a request's points, or its exception code. Raises NoSuchIdException for silence."""
         table = TABLES.get(function)
         if table is None:
             return ExcCodes.ILLEGAL_FUNCTION

@@ -1,20 +1,20 @@
-"""A wireless charger: its pad, the robot on it, battery and heat, whatever wire its controller is on.
+"""A wireless charger on any wire: its pad, the robot on the pad, battery and heat.
 
 To press: `robot` (one stands on the pad), or a robot of the YAML's `receivers` by its name
-(`tiny/AMR02`), or a `stranger`; whoever comes pushes nobody away, and the last one to come is seen.
-`misparked`: whoever stands there stands beside the middle. `foreign_object` (something lies on the
+(`tiny/AMR02`), or a `stranger`; several may stand there, and the last to come is seen. `misparked`:
+the robot stands off centre. `foreign_object` (something lies on the
 pad), `over_temperature`, `transmitter_fault`. A robot comes with its battery 40 % full. The pad rises
 to it; the station shakes hands, charges, ramps down when the battery is full, waits, and is idle again
 until another robot comes. Current warms the coil, and a fan cools it. An error stays until its cause
-has gone and it is cleared, or, where nothing clears it, the power is off; one of the robot's
-(ROBOTS_FAULTS) until the robot leaves.
+is gone and the error is cleared or (if nothing can clear it) the power is off; a robot's error
+(ROBOTS_FAULTS) stays until the robot leaves.
 
-To drive: `clear_error`, and where the station can be commanded `power` (without it, it charges nobody)
-and `range_check` (its result is there a moment later; a station that needs none knows at once). On
+To drive: `clear_error`, and on a commanded station `power` (needed for charging) and `range_check`
+(its result comes a moment later; a station without range checks knows at once). On
 contacts: the relay `enable`; `charging` while current flows, `ready` while it could, `fault` in an
 error, `at_height` and `range_ok` of the pad.
 
-Failing parts and what `off`, `stuck`, `slow`, `garbage` and `wrong` do to them; `pad` is in `pad.py`:
+Failing parts, with the effects of `off`, `stuck`, `slow`, `garbage` and `wrong`; `pad` is in `pad.py`:
 
 |          | off              | stuck            | slow         | garbage          | wrong         |
 | receiver | never answers    | in the handshake | 10 x as long | contact is lost  | wrong answer  |
@@ -66,12 +66,12 @@ RANGES: Final = {"in": True, "out": False, "failed": False}
 
 @dataclass(frozen=True, slots=True)
 class Reading:
-    """What a controller without contacts can tell at one instant.
+    """The knowledge of a controller without contacts at one instant.
 
-    `progress`: of the activity, 0-1. `faults`: keys of TEXTS. `here`: is anybody? `receiver`: whom it
-    sees, "" for nobody. `couples`: could current flow now? `range_result`: of the last range check,
-    `none`, `ongoing`, `in`, `out` or `failed`; `in_range`: the same, or `couples` where nobody asks.
-    `range_ok`: does whoever is there stand well? `battery`: 0-1. `time_to_full_s`: while current flows.
+    `progress`: of the activity, 0-1. `faults`: keys of TEXTS. `here`: is a robot there? `receiver`: the
+    one seen, "" for none. `couples`: could current flow now? `range_result`: of the last range check,
+    `none`, `ongoing`, `in`, `out` or `failed`; `in_range`: the same, or `couples` without checks.
+    `range_ok`: does the robot stand well? `battery`: 0-1. `time_to_full_s`: while current flows.
     """
 
     activity: Activity
@@ -93,7 +93,7 @@ class Reading:
 
     @property
     def error_text(self) -> str:
-        """What is wrong, in the station's words."""
+        """Describe the faults in the station's words."""
         return ", ".join(text for fault, text in TEXTS.items() if fault in self.faults)
 
     @property
@@ -103,17 +103,17 @@ class Reading:
 
     @property
     def number(self) -> float:
-        """The receiver's number; 0 where it has none."""
+        """The receiver's number; 0 if it has none."""
         return float(self.receiver) if self.receiver.isdecimal() else 0.0
 
 
 class ChargerPlant(WiredPlant):
-    """`battery`: 0-1, of the robot on the pad; nobody's when there is none.
+    """`battery`: 0-1, of the robot on the pad; meaningless without one.
 
     `receivers`: id -> robot. `commanded`: it charges only while `power` is on. `asked`: it knows
     whether a robot is in range only by a range check. `cleared`: an error stays until it is cleared.
-    `pace`: how many times as fast as a real one it shakes hands, moves and stops. `wires`: its
-    contacts, where it has any. `links`: what of its wire can fail.
+    `pace`: handshake, movement and stopping are so many times faster than a real charger's.
+    `wires`: its contacts, if any. `links`: the parts of its wire that can fail.
     """
 
     def __init__(
@@ -147,7 +147,7 @@ class ChargerPlant(WiredPlant):
     # ---- what a controller sees and does
 
     def reading(self) -> Reading:
-        """Everything at once."""
+        """Return everything at once."""
         lasts = self._until - self._since
         flows = self.activity in CURRENT_FLOWS
         draws = flows and self.failures.get("battery") not in ("off", "garbage")
@@ -173,7 +173,7 @@ class ChargerPlant(WiredPlant):
         )
 
     def contact(self, signal: str) -> bool:
-        """Is this contact asserted, in truth?"""
+        """Is this contact really asserted?"""
         return {
             "charging": self.activity in CURRENT_FLOWS,
             "fault": self.activity is Activity.ERROR,
@@ -183,11 +183,11 @@ class ChargerPlant(WiredPlant):
         }[signal]
 
     def actuate(self, signal: str, energised: bool) -> None:
-        """The enable relay has reached the station."""
+        """Take the enable relay's change."""
         self.power = energised
 
     def drive(self, signal: str, asserted: bool, now: float) -> None:
-        """A command, or the relay. `power` is a level, the others are asked for by True."""
+        """Obey a command or the relay. `power` is a level; True requests one of the others."""
         if signal in self._relays:
             super().drive(signal, asserted, now)
             return
@@ -208,11 +208,11 @@ class ChargerPlant(WiredPlant):
     # ---- physics
 
     def event_at(self) -> float:
-        """When something under way ends by itself."""
+        """Time at which a running activity ends by itself."""
         return min(self._until, self.pad.rises_until, self._range_until, self._coil.trips_at())
 
     def act(self, signal: str, asserted: bool) -> None:
-        """A robot comes or leaves."""
+        """Let a robot come or leave."""
         if signal not in self._receivers:
             return
         if asserted and signal not in self._here:
@@ -223,7 +223,7 @@ class ChargerPlant(WiredPlant):
             self.battery = self.battery if self._here else 0.0
 
     def run(self) -> None:
-        """What is due ends, and what pad, heat and causes demand begins."""
+        """End due activities; begin those demanded by pad, heat and causes."""
         if self.pad.follow(self.now, bool(self._here), self.failures.get("pad"), self.pace):
             self.note("sensor", "gap_mm", self.pad.gap_mm())
         if self.now >= self._range_until:
@@ -252,7 +252,7 @@ class ChargerPlant(WiredPlant):
             self._shake_hands()
 
     def _wants(self) -> bool:
-        """Is there somebody to be charged?"""
+        """Is there a robot to charge?"""
         there = bool(self._here) and self.failures.get("receiver") != "off"
         return self.activity is Activity.IDLE and there and self.power and self._filled() < 1.0
 
@@ -285,7 +285,7 @@ class ChargerPlant(WiredPlant):
             self.note("sensor", "state", str(activity))
 
     def _stop(self) -> None:
-        """The robot or the power has gone: a handshake ends, a current ramps down if it still can."""
+        """End a handshake, or ramp the current down if possible: robot or power is gone."""
         if self.activity is Activity.HANDSHAKE:
             self._enter(Activity.IDLE)
         elif not self._here:
@@ -299,7 +299,7 @@ class ChargerPlant(WiredPlant):
         self._enter(Activity.HANDSHAKE, LASTS_S[Activity.HANDSHAKE] / self.pace * slowness)
 
     def _end(self) -> None:
-        """The activity under way has run its time."""
+        """End the present activity: its time is over."""
         receiver = self.failures.get("receiver")
         match self.activity:
             case Activity.HANDSHAKE if receiver == "wrong":
@@ -331,20 +331,20 @@ class ChargerPlant(WiredPlant):
         return HOT_C if self.pressed["over_temperature"] else self._coil.celsius(self.now)
 
     def _fills(self) -> float:
-        """How much of the battery fills in a second."""
+        """Return the share of the battery filled in a second."""
         mode = self.failures.get("battery")
         slowness = SLOWNESS if mode == "slow" else 1.0
         return 0.0 if mode in ("stuck", "off", "garbage") else 1.0 / FILL_S / slowness
 
     def _filled(self) -> float:
-        """The battery now."""
+        """Return the battery's present charge."""
         if self.activity is not Activity.CHARGING:
             return self.battery
         return min(1.0, self.battery + (self.now - self._since) * self._fills())
 
 
 def build(name: str, settings: ChargerSettings, wires: Iterable[Wire]) -> ChargerPlant:
-    """A station on these contacts."""
+    """Build a station on these contacts."""
     return ChargerPlant(name, commanded=True, cleared=False, wires=wires)
 
 

@@ -1,6 +1,6 @@
 """One wire between a plant and a bus, and the ways in which wires fail.
 
-The same five for every bus, so that a story told on GPIO can be told on Modbus:
+The same five for every bus, so a test scenario on GPIO also works on Modbus:
 
 - `off`: cut. An input falls to its pull (or reads 0 at a module, or floats where nothing pulls it);
   the relay behind a cut output never energises.
@@ -21,7 +21,7 @@ GARBAGE_S = 0.1
 
 
 class Contact:
-    """One wire: `feed` what is true at one end, and `shows` is what the other end sees.
+    """One wire: `feed` the true value at one end; `shows` is the value seen at the other end.
 
     For an input the plant feeds and the bus sees; for an output we feed and the relay sees.
     Asserted or not, never levels.
@@ -37,7 +37,7 @@ class Contact:
         self._noise_at = 0.0
 
     def feed(self, asserted: bool, now: float) -> None:
-        """What the near end has at `now` (s)."""
+        """Take the near end's value at `now` (s)."""
         if asserted != self._fed and self.mode == "slow":
             self._late.append((now + SLOW_S, asserted))
         self._fed = asserted
@@ -51,7 +51,7 @@ class Contact:
         self._settle(now)
 
     def next_at(self) -> float:
-        """When `shows` may change though nothing is fed: s, or inf, as always for a sound wire."""
+        """Next time (s) at which `shows` may change by itself; inf for never, and for a sound wire."""
         if self._late:
             return self._late[0][0]
         return self._noise_at if self._noisy() else float("inf")

@@ -1,9 +1,9 @@
-"""A pedestrian door with an operator: it opens while it is held or pushed, and closes by itself.
+"""A pedestrian door with an operator: opens while held or pushed, and closes by itself.
 
 Contacts: `opened` and `closed` at its end positions, `obstruction` (light curtain), `fire` (the
 building's). Relay: `hold_open`. To press: `push` (a person's button or hand), `obstruction`,
 `fire`. Failing part `operator`: `off` and `stuck` stand still, `slow` takes five times as long,
-`wrong` turns each command round, `garbage` stops halfway. At a Modbus module `unit` and `server`
+`wrong` inverts each command, `garbage` stops halfway. At a Modbus module `unit` and `server`
 fail as well (`hal_fakes/modbus/`).
 """
 
@@ -25,7 +25,7 @@ BUTTONS: Final = ("fire", "obstruction", "push")
 def build(
     name: str, settings: DoorSettings, wires: Iterable[Wire], parts: Iterable[str] = ()
 ) -> "DoorPlant":
-    """A door with these contacts and this relay; `parts` of its controller can fail."""
+    """Build a door with these contacts and this relay; `parts` of its controller can fail."""
     every_s = settings.pulse.every_s if settings.pulse else 0.0
     return DoorPlant(name, wires, auto_close_s=max(AUTO_CLOSE_S, every_s), parts=parts)
 
@@ -33,8 +33,8 @@ def build(
 class DoorPlant(WiredPlant):
     """The door: `position` is 0 when closed and 1 when open.
 
-    `open_s`, `close_s`: the time of a whole travel. `auto_close_s`: how long the operator waits
-    before it closes when nothing holds the door any longer. `parts`: what of its controller can fail.
+    `open_s`, `close_s`: the time of a whole travel. `auto_close_s`: the operator's wait before
+    closing a door no longer held. `parts`: the parts of its controller that can fail.
     """
 
     def __init__(
@@ -68,11 +68,11 @@ class DoorPlant(WiredPlant):
         return self.pressed[signal]
 
     def actuate(self, signal: str, energised: bool) -> None:
-        """The hold relay."""
+        """Take a change of the hold relay."""
         self._held = energised
 
     def run(self) -> None:
-        """Move to where the door is now, and see whether it goes on."""
+        """Move to the present position, then decide on the next movement."""
         self._move()
         in_the_way = self.pressed["obstruction"] and self.position > 0
         wanted = self._held or self.pressed["push"] or in_the_way
@@ -82,7 +82,7 @@ class DoorPlant(WiredPlant):
         self._steer(1 if wanted or self.now < self._close_at else -1)
 
     def event_at(self) -> float:
-        """When it arrives at an end position, or begins to close."""
+        """Time of arrival at an end position, or of the start of closing."""
         waits = not self._wanted and self.now < self._close_at
         return min(self._arrives_at, self._close_at if waits else float("inf"))
 
@@ -101,7 +101,7 @@ class DoorPlant(WiredPlant):
         return 1.0 if direction > 0 else 0.0
 
     def _steer(self, direction: int) -> None:
-        """Go this way, as well as the operator still can."""
+        """Move in this direction, as far as the operator's failure allows."""
         failure = self.failures.get("operator")
         if failure == "wrong":
             direction = -direction

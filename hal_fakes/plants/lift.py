@@ -1,19 +1,19 @@
-"""A lift with its controller: car, doors, AGV key logic, people, and what takes it away from RMF.
+"""A lift with its controller: car, doors, AGV key logic, people, and the hazards that take it from RMF.
 
-- AGV mode is granted some time after it is asked for, once people's calls are done, and never under
-  a hazard; it goes when the request goes or a hazard comes.
-- With `agv_mode: by_call` a call asks for it, which counts until the door is open there and not held
-  (as open-rmf/mock-lift-io has it, firmware/Mock-Lift/src/main.cpp).
+- AGV mode is granted some time after its request, once people's calls are done, and never under
+  a hazard; it ends when the request ends or a hazard comes.
+- With `agv_mode: by_call` a call requests it, and counts until the door there is open and not held
+  (as in open-rmf/mock-lift-io, firmware/Mock-Lift/src/main.cpp).
 - In AGV mode a call takes the car to that landing; there the door opens, stays for its dwell time,
   and longer while its open relay is on. The car leaves with its doors closed.
 - Fire: the car goes to the lowest landing and stands there open. Emergency, earthquake: it stops at
-  the next landing and opens. Code blue, out of service, manual: it is only no longer RMF's.
+  the next landing and opens. Code blue, out of service, manual: only AGV mode ends.
 - AGV mode lost on the way: it stops at the next landing and opens for its dwell time.
 - Overload: it stays where it is, open.
 
 To press: each wired hazard, `hall_<landing>` (a person's call), `obstruction`, `rear_obstruction`.
 Parts that fail: `car` (`off`, `stuck`: stands where it is; `slow`; `wrong`: goes a floor too far),
-`door_operator` and `rear_door_operator` (`off`, `stuck`: stands; `slow`; `wrong`: turned round),
+`door_operator` and `rear_door_operator` (`off`, `stuck`: stands; `slow`; `wrong`: inverted),
 `controller` (`off`: no AGV mode; `stuck`: AGV mode stays as it is; `slow`). Wires fail as in
 `hal_fakes/plants/contact.py`.
 """
@@ -44,7 +44,7 @@ FAILS: dict[str, tuple[FailureMode, ...]] = {
 
 @dataclass(frozen=True, slots=True)
 class LiftPace:
-    """How long things take (s): a floor, a door's travel, AGV mode, a door's stay at a landing."""
+    """Durations (s): a floor's travel, a door's travel, granting AGV mode, a door's stay at a landing."""
 
     floor_s: float = 2.0
     door_s: float = 1.0
@@ -53,7 +53,7 @@ class LiftPace:
 
 
 def build(name: str, settings: DryContactLiftSettings) -> "LiftPlant":
-    """The lift that these settings are wired to."""
+    """Build the lift wired to these settings."""
     return LiftPlant(name, settings)
 
 
@@ -87,34 +87,34 @@ class LiftPlant(WiredPlant):
     # ---- what WiredPlant asks for
 
     def contact(self, signal: str) -> bool:
-        """Is this contact asserted, in truth?"""
+        """Is this contact really asserted?"""
         return self._asserted.get(signal, False)
 
     def actuate(self, signal: str, energised: bool) -> None:
-        """A relay of ours; a call counts when it has stood still for a moment."""
+        """Take a change of our relay; a call counts once it has been stable for a moment."""
         (self._on.add if energised else self._on.discard)(signal)
         if signal.startswith("call_"):
             self._seen, self._seen_at = self._called(), self.now + CALL_SETTLES_S
 
     def act(self, signal: str, asserted: bool) -> None:
-        """A person calls the car to a landing; in AGV mode nobody can."""
+        """Call the car to a landing as a person; without effect in AGV mode."""
         if signal.startswith("hall_") and asserted and not self.agv:
             self._people.append(self._levels.index(signal.removeprefix("hall_")))
 
     def fail(self, part: str, mode: FailureMode | None) -> None:
-        """Make a wire or part fail; None mends it. ValueError names what there is."""
+        """Make a wire or part fail; None mends it. ValueError names the known ones."""
         if mode is not None and mode not in FAILS.get(part, (mode,)):
             raise ValueError(f"{part} does not fail by {mode!r}, but by {', '.join(FAILS[part])}")
         super().fail(part, mode)
 
     def run(self) -> None:
-        """Everything that is due now, then what follows from it."""
+        """Do all that is due now, then its consequences."""
         for door in self.doors.values():
             door.run(self.now)
         self._take_call()
         self.car.run(self.now, self._goal(), self._floor_s())
         self._arrive()
-        self._grant()  # may follow from the arrival, and may bring a call to where the car stands
+        self._grant()  # may follow from the arrival; may bring a call to the car's landing
         self._arrive()
         for side, door in self.doors.items():
             turned = self.failures.get(f"{PREFIX[side]}door_operator") == "wrong"
@@ -124,7 +124,7 @@ class LiftPlant(WiredPlant):
         self._asserted = self._lines()
 
     def event_at(self) -> float:
-        """When the car, a door or the controller does something next by itself."""
+        """Time of the next own event of car, doors or controller."""
         dwells = [d.dwell_until for d in self.doors.values() if d.dwell_until > self.now]
         doors = [d.due_at for d in self.doors.values()]
         return min([self.car.event_at(), self._grant_at, self._seen_at, *doors, *dwells])
@@ -135,7 +135,7 @@ class LiftPlant(WiredPlant):
         return any(self.pressed.get(h, False) for h in hazards)
 
     def _called(self) -> int | None:
-        """The landing whose call is on; None for none, or for a code that means none."""
+        """Return the landing whose call is on; None for none, or for a code that means none."""
         code = self._wiring.call_code
         for i, level in enumerate(self._levels):
             lines = code.lines(level) if code else {f"call_{level}": True}
@@ -147,12 +147,12 @@ class LiftPlant(WiredPlant):
     def _take_call(self) -> None:
         if self._seen_at <= self.now:
             self._seen_at = NEVER
-            if self._seen is not None:  # it counts while AGV mode is on, which starts anew with it
+            if self._seen is not None:  # a call counts while AGV mode is on, and a new call starts AGV mode anew
                 self._call = self._seen
                 self._called_for_agv = True
 
     def _grant(self) -> None:
-        """AGV mode comes after a while, and goes at once."""
+        """Grant AGV mode after a while; end it at once."""
         failure = self.failures.get("controller")
         taken = self._hazard(*(h for h in Hazard if h is not Hazard.OVERLOAD))
         asked = self._asked() and not taken and failure != "off"
@@ -172,7 +172,7 @@ class LiftPlant(WiredPlant):
                 self._call = self._called()
 
     def _asked(self) -> bool:
-        """Does anything of ours ask for AGV mode?"""
+        """Does any of our relays request AGV mode?"""
         if self._wiring.agv_mode == "requested":
             return "agv_mode_request" in self._on
         held = bool(self._on & {"door_open", "rear_door_open"}) or self._called() is not None
@@ -183,7 +183,7 @@ class LiftPlant(WiredPlant):
         return self._called_for_agv
 
     def _goal(self) -> int | None:
-        """The landing where the car should be; None: wherever it stops next."""
+        """Return the landing for the car to go to; None: the next possible stop."""
         if self._hazard(Hazard.FIRE):
             return 0
         if self._hazard(*OPENS_UP):
@@ -194,7 +194,7 @@ class LiftPlant(WiredPlant):
         return goal
 
     def _arrive(self) -> None:
-        """Standing at the goal: the call is done, and the landing's door opens for its dwell time."""
+        """At the goal: end the call, and open the landing's door for its dwell time."""
         goal = self._goal()
         if not self.car.standing or not (self._let_out or self.car.floor == goal):
             return
@@ -240,7 +240,7 @@ class LiftPlant(WiredPlant):
     # ---- its contacts
 
     def _lines(self) -> dict[str, bool]:
-        """Every input signal as the controller shows it."""
+        """Return every input signal as the controller shows it."""
         lines = {h.value: self._hazard(h) for h in Hazard} | {"agv_mode": self.agv}
         for side, door in self.doors.items():
             lines |= self._door_lines(f"{PREFIX[side]}door", door)
@@ -277,7 +277,7 @@ class LiftPlant(WiredPlant):
         return codes.lines("service", number, len(code.bits))
 
     def _floor_lines(self) -> dict[str, bool]:
-        """A controller that has no code for between floors shows the last one on."""
+        """Return the floor code; a controller without a code for between floors keeps the last."""
         shown = self.car.shown
         try:
             self._code = self._wiring.floor_code.show(

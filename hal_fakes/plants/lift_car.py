@@ -1,4 +1,4 @@
-"""A lift's car and its doors: where they are and how they move, in virtual time."""
+"""A lift's car and its doors: positions and movements in virtual time."""
 
 from typing import Literal
 
@@ -9,7 +9,7 @@ LEGS = {"leaving": 0.25, "between": 0.5, "arriving": 0.25}
 
 
 class Car:
-    """`floor`: the landing's index, 0 for the lowest; `leg`: where it is on its way."""
+    """`floor`: the landing's index, 0 for the lowest; `leg`: the present part of its way."""
 
     def __init__(self) -> None:
         self.floor = 0
@@ -20,7 +20,7 @@ class Car:
 
     @property
     def standing(self) -> bool:
-        """At a landing, and not moving."""
+        """Is the car at a landing, and not moving?"""
         return self.leg == "standing"
 
     @property
@@ -29,7 +29,7 @@ class Car:
         return None if self.leg == "between" else self.floor
 
     def run(self, now: float, goal: int | None, floor_s: float | None) -> None:
-        """Travel on. `floor_s`: a floor takes so long (s), None: the car is stuck where it is."""
+        """Travel on. `floor_s`: the time (s) for a floor; None: the car is stuck."""
         if floor_s is None:
             self._frozen = True
             return
@@ -46,7 +46,7 @@ class Car:
             self._begin("leaving", now, floor_s)
 
     def event_at(self) -> float:
-        """When the next leg begins."""
+        """Time at which the next leg begins."""
         return NEVER if self._frozen else self.due_at
 
     def _next_leg(self, goal: int | None, floor_s: float) -> None:
@@ -68,7 +68,7 @@ class Car:
 
 
 class CarDoor:
-    """One door of the car with its landing door. `dwell_until`: it stays open by itself so long."""
+    """One door of the car with its landing door. `dwell_until`: end of its stay open."""
 
     def __init__(self) -> None:
         self.dwell_until = 0.0
@@ -80,16 +80,16 @@ class CarDoor:
 
     @property
     def opened(self) -> bool:
-        """Fully open, as its limit contact says."""
+        """Is it fully open, by its limit contact?"""
         return self._position == 1.0 and not self._course
 
     @property
     def closed(self) -> bool:
-        """Fully closed and locked."""
+        """Is it fully closed and locked?"""
         return self._position == 0.0 and not self._course
 
     def run(self, now: float) -> None:
-        """Move to where it is at `now`."""
+        """Move to the position at `now` (s)."""
         if now >= self.due_at:
             self._position = 1.0 if self._course > 0 else 0.0
             self._course, self.due_at = 0, NEVER
@@ -99,7 +99,7 @@ class CarDoor:
         self._since = now
 
     def steer(self, now: float, open_it: bool, travel_s: float | None) -> None:
-        """Towards open or closed; None: the operator stands still."""
+        """Move towards open or closed; None: stop the operator."""
         goal = 1.0 if open_it else 0.0
         if travel_s is None or self._position == goal:
             self._course, self.due_at = 0, NEVER

@@ -1,4 +1,4 @@
-"""What the plants have in common: a record of edges, wires that fail, parts that fail, a clock.
+"""The common base of plants: a record of edges, failing wires, failing parts, a clock.
 
 A kind's plant derives from WiredPlant and adds its physics. Edges are those of the terminal block: the
 relay as we drove it, the contact as its wire showed it, so a cut wire is an edge like any other.
@@ -16,11 +16,11 @@ EDGES_KEPT = 100_000
 
 
 class WiredPlant(ABC):
-    """What every plant (`hal_fakes.plants.plant.Plant`) has besides its physics.
+    """Every plant (`hal_fakes.plants.plant.Plant`) without its physics.
 
     `wires`: the driver's wiring table of this device; empty where the controller has no contacts.
-    `parts`: what can fail besides wires (`car`, `door_operator`); the plant looks at `failures`.
-    `buttons`: what can be pressed; `pressed` has each, and whether it is now.
+    `parts`: parts that can fail besides wires (`car`, `door_operator`); the plant reads `failures`.
+    `buttons`: signals that can be pressed; `pressed`: button -> is it pressed?
     Wires to an I/O module add its parts `unit` and `server` (`hal_fakes/modbus/`).
     """
 
@@ -52,26 +52,26 @@ class WiredPlant(ABC):
 
     @abstractmethod
     def contact(self, signal: str) -> bool:
-        """Is this contact of the controller asserted, in truth?"""
+        """Is this contact of the controller really asserted?"""
 
     def actuate(self, signal: str, energised: bool) -> None:  # noqa: B027
-        """A relay of ours has changed at the controller's side at `self.now`. Most have none."""
+        """Take a change of our relay at `self.now`. Most plants need nothing here."""
 
     @abstractmethod
     def run(self) -> None:
-        """Physics at `self.now`: every own event that is due happens. May be called at any time."""
+        """Run the physics at `self.now`: do every own event that is due. May be called at any time."""
 
     @abstractmethod
     def event_at(self) -> float:
-        """When the next own event is due: s, or inf. `run` at that time must use it up."""
+        """Time of the next own event: s, or inf. `run` at that time must use it up."""
 
     def act(self, signal: str, asserted: bool) -> None:  # noqa: B027
-        """Somebody has pressed or released this. Most need only know what is pressed."""
+        """Take a press or release. Most plants need only `pressed`."""
 
     # ---- the Plant protocol
 
     def drive(self, signal: str, asserted: bool, now: float) -> None:
-        """A relay of ours changes."""
+        """Take a change of our relay."""
         self.advance(now)
         if asserted != self._driven[signal]:
             self._driven[signal] = asserted
@@ -79,9 +79,9 @@ class WiredPlant(ABC):
             self._settle()
 
     def advance(self, now: float) -> None:
-        """Let everything due until `now` happen, each at its own time. Time never goes back.
+        """Do everything due until `now`, each at its own time. Time never goes back.
 
-        Between two events nothing changes that anybody can see.
+        Between two events nothing visible changes.
         """
         while (at := self.next_at()) <= now:
             self.now = max(self.now, at)
@@ -95,15 +95,15 @@ class WiredPlant(ABC):
         return self._sensors[signal].shows
 
     def reading(self) -> object:
-        """None: it has contacts alone."""
+        """Return None: the plant has contacts alone."""
         return None
 
     def next_at(self) -> float:
-        """When something will change if nothing is driven: s, or inf."""
+        """Time of the next change without a command: s, or inf."""
         return min([self.event_at(), *(contact.next_at() for contact in self._broken)])
 
     def fail(self, part: str, mode: FailureMode | None) -> None:
-        """Make a wire or part fail from now on; None mends it. ValueError names what there is."""
+        """Make a wire or part fail from now on; None mends it. ValueError names the known ones."""
         contact = self._sensors.get(part) or self._relays.get(part)
         if contact is None and part not in self._parts:
             known = ", ".join(self.names()["fail"])
@@ -121,12 +121,12 @@ class WiredPlant(ABC):
         self._settle()
 
     def names(self) -> dict[str, list[str]]:
-        """What can `press` and what can `fail`."""
+        """Return the names for `press` and `fail`."""
         parts = sorted({*self._parts, *self._sensors, *self._relays})
         return {"press": list(self.pressed), "fail": parts}
 
     def press(self, signal: str, asserted: bool, now: float) -> None:
-        """A person or the building acts. ValueError names what can be pressed."""
+        """Act as a person or the building. ValueError names the known signals."""
         if signal not in self.pressed:
             known = ", ".join(self.pressed)
             raise ValueError(f"{self.name} has no {signal!r} to press; there are {known}")
@@ -140,7 +140,7 @@ class WiredPlant(ABC):
     def note(
         self, what: Literal["relay", "sensor"], signal: str, value: bool | int | str | float
     ) -> None:
-        """Record an edge at `self.now` and tell who listens."""
+        """Record an edge at `self.now` and tell the listeners."""
         edge = Edge(self.now, self.name, what, signal, value)
         self.edges.append(edge)
         if len(self.edges) > EDGES_KEPT:
@@ -149,7 +149,7 @@ class WiredPlant(ABC):
             self.on_edge(edge)
 
     def _settle(self) -> None:
-        """Relays reach the controller, its physics runs, its contacts reach us."""
+        """Pass relays to the controller, run its physics, pass its contacts to us."""
         self._settled = True
         for signal, relay in self._relays.items():
             relay.feed(self._driven[signal], self.now)

@@ -13,13 +13,13 @@ NEVER: Final = float("inf")
 SLOWNESS: Final = 10.0
 
 CLEARANCE_MM: Final = 60.0
-"""The gap (mm) between a robot's receiver and the pad when it is down."""
+"""The gap (mm) between a robot's receiver and the lowered pad."""
 RISE_MM: Final = 40.0
 RISE_S: Final = 0.4
 HEIGHTS_MM: Final[dict[FailureMode | None, float]] = {"off": 0.0, "garbage": 20.0, "wrong": 52.0}
-"""How high the pad rises where it does not rise to RISE_MM."""
+"""The pad's height if it does not reach RISE_MM."""
 GAP_MM: Final = (10.0, 30.0)
-"""The gaps (mm) at which the two can couple."""
+"""The range of gaps (mm) at which pad and receiver can couple."""
 
 AMBIENT_C: Final = 25.0
 TRIP_C: Final = 95.0
@@ -34,19 +34,19 @@ class LiftingPad:
         self._height_mm = 0.0
 
     def gap_mm(self) -> float:
-        """Between it and a robot's receiver."""
+        """The gap between the pad and a robot's receiver."""
         return CLEARANCE_MM - self._height_mm
 
     def at_height(self) -> bool:
-        """Is it where it charges?"""
+        """Is the pad at its charging height?"""
         return self._height_mm == RISE_MM
 
     def couples(self) -> bool:
-        """Is the gap one that a charge can cross?"""
+        """Can a charge cross the gap?"""
         return GAP_MM[0] <= self.gap_mm() <= GAP_MM[1]
 
     def follow(self, now: float, robot: bool, mode: FailureMode | None, pace: float) -> bool:
-        """Rise to a robot that is there, sink when there is none. Has it just risen?"""
+        """Rise to a robot, sink without one. True if the pad has just risen."""
         goal = HEIGHTS_MM.get(mode, RISE_MM) if robot else 0.0
         if mode == "stuck" or self._height_mm == goal:
             self.rises_until = NEVER
@@ -61,22 +61,22 @@ class LiftingPad:
 
 
 class Coil:
-    """Its temperature approaches what heat and cooling make of it."""
+    """The coil; its temperature approaches the balance of heating and cooling."""
 
     def __init__(self) -> None:
         self._at, self._celsius, self._goal = 0.0, AMBIENT_C, AMBIENT_C
 
     def tend(self, now: float, goal: float) -> None:
-        """From now on approach this (°C)."""
+        """Approach this temperature (°C) from now on."""
         self._at, self._celsius, self._goal = now, self.celsius(now), goal
 
     def celsius(self, now: float) -> float:
-        """How warm it is at `now` (s)."""
+        """Return the temperature at `now` (s)."""
         rest = math.exp(-(now - self._at) / WARMS_IN_S)
         return self._goal + (self._celsius - self._goal) * rest
 
     def trips_at(self) -> float:
-        """When it gets too hot, or is cool enough again: s, or inf."""
+        """Time at which it gets too hot, or cool enough again: s, or inf."""
         if (self._goal > TRIP_C) == (self._celsius >= TRIP_C):
             return NEVER
         rest = (self._goal - TRIP_C) / (self._goal - self._celsius)

@@ -1,4 +1,4 @@
-"""What every plant is: physics driven by commands and time. It records each edge and can fail.
+"""The protocol of plants: physics driven by commands and time, with recorded edges and failures.
 
 `machine.py` has all of it but the physics. A kind's plants are in `<kind>.py`.
 """
@@ -25,7 +25,7 @@ class Edge:
 class Plant(Protocol):
     """One lift, door or charger. Signals are logical here (asserted or not); levels are the wire's.
 
-    Not thread-safe: whoever puts it on a wire serialises the calls.
+    Not thread-safe: the far side of the wire serialises the calls.
     """
 
     name: str
@@ -34,10 +34,10 @@ class Plant(Protocol):
 
     @property
     def failures(self) -> Mapping[str, FailureMode]:
-        """Part -> how it fails. The far side of a bus looks for its own parts here."""
+        """Part -> failure mode. The far side of a bus looks for its own parts here."""
 
     def drive(self, signal: str, asserted: bool, now: float) -> None:
-        """A relay of ours changes."""
+        """Take a change of our relay."""
 
     def advance(self, now: float) -> None:
         """Let the physics run until `now`."""
@@ -46,16 +46,16 @@ class Plant(Protocol):
         """Is this contact asserted, as the wire shows it (failures included)?"""
 
     def reading(self) -> object:
-        """What a controller without contacts knows at this instant; None if it has contacts alone."""
+        """Return the present reading of a controller without contacts; None if it has contacts alone."""
 
     def next_at(self) -> float:
-        """When something will change if nothing is driven: monotonic seconds, or inf."""
+        """Time of the next change without a command: monotonic s, or inf."""
 
     def fail(self, part: str, mode: FailureMode | None) -> None:
         """Make a signal or part fail this way; None mends it. ValueError names the known parts."""
 
     def names(self) -> Mapping[str, list[str]]:
-        """What can `press` and what can `fail`."""
+        """Return the names for `press` and `fail`."""
 
     def press(self, signal: str, asserted: bool, now: float) -> None:
-        """A person or the building acts: a fire alarm, a key switch, an obstruction."""
+        """Act as a person or the building: a fire alarm, a key switch, an obstruction."""

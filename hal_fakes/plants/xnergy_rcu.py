@@ -1,4 +1,4 @@
-"""What Xnergy's receiver (RCU) shows of the plant: its numbers, whether on CANopen or on Modbus."""
+"""Xnergy's receiver (RCU) in front of the plant: its numbers, common to CANopen and Modbus."""
 
 from typing import Final
 
@@ -12,7 +12,7 @@ from hal_fakes.plants.pad import AMBIENT_C
 from hal_fakes.plants.plant import Plant
 
 SIGNALS: Final = {ENABLE: "power", CHECK_RANGE: "range_check"}
-"""What is written, and what it does to the plant."""
+"""Writable objects, and their effects on the plant."""
 HANDSHAKE: Final = (1, 2, 3, 4)
 STATES: Final = {
     Activity.IDLE: 0,
@@ -35,7 +35,7 @@ RANGES: Final = {"none": 0, "ongoing": 0, "in": IN_RANGE, "out": 2, "failed": 24
 
 
 def words(reading: Reading, latched: int = 0) -> dict[str, int]:
-    """The words by the names of `drivers.charger.xnergy`. `latched`: errors before this one."""
+    """Return the words by the names in `drivers.charger.xnergy`. `latched`: earlier errors."""
     now = sum(ERRORS[fault] for fault in reading.faults)
     shadow = now | latched
     return {
@@ -53,21 +53,21 @@ def words(reading: Reading, latched: int = 0) -> dict[str, int]:
 
 
 def state(reading: Reading) -> int:
-    """The state code; a handshake has four."""
+    """Return the state code; a handshake has four."""
     if reading.activity is Activity.HANDSHAKE:
         return HANDSHAKE[min(int(reading.progress * len(HANDSHAKE)), len(HANDSHAKE) - 1)]
     return STATES[reading.activity]
 
 
 def rcu_plant(name: str, *links: str) -> ChargerPlant:
-    """A charger with this receiver; `links` are the parts of its wire."""
+    """Build a charger with this receiver; `links` are the parts of its wire."""
     return ChargerPlant(name, commanded=True, cleared=False, links=links)
 
 
 class ModbusRcu:
     """The registers and coils of one receiver, with a plant behind them (`hal_fakes.modbus.units`).
 
-    `points`: what it has, `outputs` among it; `unit`: where.
+    `points`: all of them, including `outputs`; `unit`: its unit.
     """
 
     def __init__(self, plant: Plant, settings: ModbusChargerSettings) -> None:
@@ -80,7 +80,7 @@ class ModbusRcu:
         self.outputs = frozenset(self._coils)
 
     def get(self, point: Point, now: float) -> int:
-        """What is read there at `now` (monotonic s)."""
+        """Return the value there at `now` (monotonic s)."""
         if point in self._coils:
             return self._coils[point]
         self.plant.advance(now)
@@ -91,7 +91,7 @@ class ModbusRcu:
         return found[self._names[point]] & 0xFFFF
 
     def set(self, point: Point, value: int, now: float) -> bool:
-        """A write; False where nothing can be written."""
+        """Write a value; False if not writable."""
         if point not in self._coils:
             return False
         self._coils[point] = value

@@ -6,11 +6,11 @@ FleetUpdateHandle.cpp) and seen with Jazzy's:
    with a new waypoint or mode restarts a running ChargeBattery, and moves no other robot. A waypoint
    missing in the graph crashes the adapter.
 2. ChargeBattery is a task if RMF finds the battery too low for the way to the dedicated waypoint (the
-   automatic retreat; never for a robot there, and Jazzy's never below the recharge threshold) or if its
-   planner wants it. That task ends at recharge_soc. As the fleet's `finishing_request: charge` it is not
-   a task, and lasts until the next task, however full the battery is. With `nothing` a robot stays. With
-   `park` it drives to a parking spot; Jazzy's (branch jazzy, 7eef65a) knows no spots, and goes where
-   ChargeBattery would, at each assignment too.
+   automatic retreat; never for a robot there, and Jazzy's never below the recharge threshold) or if
+   its planner wants it. That task ends at recharge_soc. As the fleet's `finishing_request: charge`
+   it is not a task, and lasts until the next task, however full the battery is. With `nothing` a
+   robot stays. With `park` it drives to a parking spot; Jazzy's (branch jazzy, 7eef65a) knows no spots,
+   and goes where ChargeBattery would, at each assignment too.
 3. A robot without a task shows the mode IDLE and no task id, also while it charges. WaitForCharge
    alone sets CHARGING, and nothing sets it back: every later task shows it too.
 4. An EasyFullControl adapter that starts forgets the assignments: it takes the retained one, and a
