@@ -4,9 +4,9 @@ A lift's session carries its publishing time; a script in each browser notes the
 tenth changes`: as on a busy site. `all change`: every card changes each time. Each device's daemon
 publishes its diagnostics too.
 
-`an hour`, only with BENCH_PAGE_HOUR_S=N, for N seconds: memory of the page, and of a browser of the site
-and of a device after a collection, every half minute. The first ten minutes do not count: the page of a
-device shows that much, and fills first. `first` and `last` are the lowest of ten minutes.
+`an hour`, only with BENCH_PAGE_HOUR_S=N, for N seconds: memory of the page, and of browsers of the
+site and of a device after a collection, every half minute. The first ten minutes do not count: a
+device's page shows that much, and fills first. `first` and `last` are the lowest of ten minutes.
 """
 
 import os

@@ -1,7 +1,7 @@
 """The far side of an `http` bus: a real HTTP server on 127.0.0.1 in front of stations.
 
-Each sort of station makes its answers in a file of its own (`hal_fakes/http_charger.py`). The wire fails by part and
-mode (`hal_fakes.plants.plant.FAILURE_MODES`):
+Each sort of station has a file that makes its answers (`hal_fakes/http_charger.py`). The wire fails by
+part and mode (`hal_fakes.plants.plant.FAILURE_MODES`):
 
 |         | off              | stuck           | slow               | garbage        | wrong         |
 | server  | hangs up at once | the last answer | answers too late   | an HTML page   | state as text |

@@ -35,7 +35,7 @@ class RealTime:
             self._due.notify()
 
     def show(self) -> None:
-        """Show moved contacts at once, in the caller's thread; wake our thread if it would wake too late."""
+        """Show moved contacts at once, in the caller's thread; wake ours if its sleep is too long."""
         with self.lock:
             if self._step() < self._next_at:
                 self.stir()

@@ -69,7 +69,7 @@ class Simulation:
         return self._runtime_dir / (f"plant-{name}.sock" if several else "plant.sock")
 
     def _has_process(self, name: str) -> bool:
-        """Has the bus's fake a process? Found without importing the fake's libraries into the daemon."""
+        """Has the bus's fake a process? Found without importing it: its libraries are unwanted here."""
         bus_type = self._config.bus_type(name)
         return bool(bus_type.fake) and not bus_type.fake_inside
 

@@ -13,7 +13,7 @@ COIL_VALUES: Final = (0xFF00, 0)
 
 
 class TimedCoilRequest(WriteSingleCoilRequest):
-    """Function 5 with its value as sent. Values other than on and off make `FakeUnits` flash the coil."""
+    """Function 5 with its value as sent. Other values than on and off make `FakeUnits` flash."""
 
     def decode(self, data: bytes) -> None:
         """Keep the value."""

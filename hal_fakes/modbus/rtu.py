@@ -1,7 +1,7 @@
 """The far side of a serial `modbus` bus: units on RS-485 behind a pseudo-terminal.
 
 An absent unit is silent. A pseudo-terminal has no baud rate, so this file delays each byte by its time
-on the wire. A request is complete after its characters and 3.5 characters of silence; then the reply begins.
+on the wire. A request ends with 3.5 characters of silence; then the reply begins.
 With `ignore_echo` in the settings the adapter echoes. `port` is a link that stays the same when the
 adapter is unplugged and plugged in, as in /dev/serial/by-id. On command (`fail DEVICE unit|server
 MODE`) one unit, or the server, which is the line with all of them, is

@@ -44,7 +44,7 @@ FAILS: dict[str, tuple[FailureMode, ...]] = {
 
 @dataclass(frozen=True, slots=True)
 class LiftPace:
-    """Durations (s): a floor's travel, a door's travel, granting AGV mode, a door's stay at a landing."""
+    """Durations (s): a floor's and a door's travel, granting AGV mode, a door's stay at a landing."""
 
     floor_s: float = 2.0
     door_s: float = 1.0
@@ -147,7 +147,7 @@ class LiftPlant(WiredPlant):
     def _take_call(self) -> None:
         if self._seen_at <= self.now:
             self._seen_at = NEVER
-            if self._seen is not None:  # a call counts while AGV mode is on, and a new call starts AGV mode anew
+            if self._seen is not None:  # a call counts while AGV mode is on, and starts it anew
                 self._call = self._seen
                 self._called_for_agv = True
 

@@ -46,7 +46,7 @@ class Plant(Protocol):
         """Is this contact asserted, as the wire shows it (failures included)?"""
 
     def reading(self) -> object:
-        """Return the present reading of a controller without contacts; None if it has contacts alone."""
+        """Return the reading of a controller without contacts; None if it has contacts alone."""
 
     def next_at(self) -> float:
         """Time of the next change without a command: monotonic s, or inf."""
