@@ -1,4 +1,4 @@
-"""The parts of an answer, and what the answers about every kind of device share."""
+"""The parts of an answer, and the common part of all kinds' answers."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -16,12 +16,12 @@ Remedies = Mapping[str, tuple[str, str]]
 """A fault's code -> its likely cause, and what to do."""
 MOST_NAMES: Final = 8
 LISTENS_S: Final = 2.5
-"""Whoever has listened for less time than this cannot say that something is missing."""
+"""Least listening time (s) for calling something missing."""
 
 
 @dataclass(slots=True)
 class Answer:
-    """Sentences, RMF's view, and what has to happen next."""
+    """Sentences, RMF's view, and the next step."""
 
     now: list[str] = field(default_factory=list)
     next: list[NextStep] = field(default_factory=list)
@@ -31,7 +31,7 @@ class Answer:
     since: float = float("-inf")
 
     def say(self, text: str, *steps: NextStep) -> "Answer":
-        """One more sentence, and what follows from it."""
+        """Add a sentence, and the next step that follows from it."""
         self.now.append(text)
         self.next += steps
         return self
@@ -39,14 +39,14 @@ class Answer:
 
 @dataclass(frozen=True, slots=True)
 class OthersHeard:
-    """What else was heard: the names of each kind, and the number of messages."""
+    """Other things heard: the names of each kind, and the number of messages."""
 
     names: Mapping[Kind, tuple[str, ...]]
     messages: int
 
 
 def unheard(device: Device, around: OthersHeard, clock: TimePhrases) -> Answer:
-    """Nobody publishes a state of it."""
+    """Answer for a device without any state."""
     answer = Answer(since=device.began.at)
     others = around.names.get(device.kind, ())
     if not around.messages:
@@ -78,7 +78,7 @@ def _others(around: OthersHeard) -> str:
 
 
 def silent(device: Device, clock: TimePhrases) -> Answer | None:
-    """Its states have stopped."""
+    """Answer for a device whose states have stopped."""
     last = device.last_state
     if last is None or not device.is_silent(clock.now):
         return None
@@ -100,7 +100,7 @@ def silent(device: Device, clock: TimePhrases) -> Answer | None:
 
 
 def old_reading(device: Device, clock: TimePhrases) -> str:
-    """What is wrong with the age of its states; "" if nothing is."""
+    """Return the fault in its readings' age; "" if sound."""
     match device.reading.value:
         case "was never read":
             return f"States of {device.name} come, but its inputs were never read."
@@ -114,14 +114,14 @@ def old_reading(device: Device, clock: TimePhrases) -> str:
 
 
 def say_waits(found: Answer, device: Device, clock: TimePhrases) -> None:
-    """What our daemons say that a request waits for."""
+    """Add our daemons' reasons why a request waits."""
     for kind, text in device.waits_said(clock.now).items():
         whose = "daemon" if kind == device.kind else "supervisor"
         found.say(f"Its {whose} says that the request waits {text}.")
 
 
 def notes(device: Device, clock: TimePhrases) -> tuple[str, ...]:
-    """What may mislead the reader."""
+    """Add notes on things that may mislead the reader."""
     found = []
     if device.reading.value == "is from the future":
         ahead = lasted(-device.stamp_age_s)
@@ -155,7 +155,7 @@ def clock_of(claim: DeviceRequester) -> tuple[str, ...]:
 
 
 def faults(device: Device, clock: TimePhrases, remedies: Remedies) -> tuple[FaultTold, ...]:
-    """The present faults, with their remedies."""
+    """Add the present faults, with their remedies."""
     return tuple(
         FaultTold(code, detail, clock.since(moment), *remedies.get(code, ()))
         for code, (detail, moment) in device.faults(clock.now).items()

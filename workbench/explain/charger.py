@@ -1,4 +1,4 @@
-"""Who has a charger, and why a robot is not charged at it: sentences, from what was heard of it.
+"""Explain a charger: its holder, and why a robot is not charged, in sentences from its messages.
 
 RMF itself asks no charger for anything; requests come from the charger coordinator, another node or an
 operator, and a refusal is published on `charger_refusals` (`bridges/kinds/charger/refusals.py`).
@@ -20,13 +20,13 @@ from workbench.explain.rows import label
 REFUSED_LATELY_S: Final = 60.0
 
 Coordinator = Mapping[str, str]
-"""What the coordinator's diagnostics say: each charger's state, `queue`, `schedule`, `assigns`."""
+"""The coordinator's diagnostics: each charger's state, `queue`, `schedule`, `assigns`."""
 
 
 def answer(
     charger: ChargerFacts, clock: TimePhrases, around: common.OthersHeard, coordinator: Coordinator
 ) -> Answer:
-    """The charger at the end of what was heard. `coordinator`: what it says now, {} if nothing."""
+    """Explain the charger at the last message. `coordinator`: its diagnostics now, {} without."""
     if charger.last_state is None:
         found = common.unheard(charger, around, clock)
         _refusal(found, charger, clock)
@@ -107,7 +107,7 @@ def _idle(found: Answer, charger: ChargerFacts, clock: TimePhrases) -> None:
 
 
 def _error(found: Answer, charger: ChargerFacts) -> None:
-    """Which side is at fault, as its text says."""
+    """Name the side at fault, by the error's text."""
     text = charger.error.value
     misplaced = misplaced_in(text)
     if misplaced is not None and misplaced.robot is not None:
@@ -151,7 +151,7 @@ def _refusal(found: Answer, charger: ChargerFacts, clock: TimePhrases) -> None:
 
 
 def _coordinated(found: Answer, charger: ChargerFacts, coordinator: Coordinator) -> None:
-    """What the coordinator says of this charger, of the queue and of the schedule."""
+    """Add the coordinator's words on this charger, the queue and the schedule."""
     of_it = coordinator.get(charger.id, "")
     if of_it:
         found.say(f"The coordinator lists it as {label(of_it)}.")

@@ -1,4 +1,4 @@
-"""What was heard of one charger, and its story: who asked for it, and who was refused."""
+"""One charger's facts from its messages, and its story: requests and refusals."""
 
 from dataclasses import dataclass
 
@@ -13,7 +13,7 @@ from workbench.explain.rows import label
 
 @dataclass(slots=True)
 class HeardRefusal:
-    """The last refusal that was heard of this charger."""
+    """The last refusal heard for this charger."""
 
     who: str
     request: str
@@ -22,7 +22,7 @@ class HeardRefusal:
 
 
 class ChargerFacts(Device, ObservedCharger):
-    """`refusal`: the last one. `charges`: how many have begun."""
+    """`refusal`: the last one. `charges`: the number begun."""
 
     def __init__(self, name: str, began: Moment) -> None:
         super().__init__(name, began)
@@ -31,11 +31,11 @@ class ChargerFacts(Device, ObservedCharger):
 
     @property
     def full_in_s(self) -> float:
-        """As it last said."""
+        """The time to full, as last published."""
         return in_seconds(self.state.time_to_fully_charged) if self.state else 0.0
 
     def says(self, one: News) -> str:
-        """A line of the story; "" for none."""
+        """Return a line of the story; "" for none."""
         match one.what:
             case "asks" if one.requester:
                 robot = one.requester.wants

@@ -1,4 +1,4 @@
-"""What is known of every kind of device: its states and their age, its daemons' faults, its story."""
+"""Facts common to all kinds of device: states and their age, daemons' faults, story."""
 
 import sys
 from abc import abstractmethod
@@ -21,12 +21,12 @@ MOST_LINES: Final = 600
 BACK_S: Final = 0.2
 BACK_TIMES: Final = 3
 BACK_WITHIN_S: Final = 15.0
-"""Stamps that go back this far, this often within this time come from two nodes."""
+"""Stamps that step back this far (s), this often, within this time (s) come from two nodes."""
 
 
 class Device(ObservedDevice[Any]):
-    """One device as it was heard, and its story. `name`: its name as a text that can be shown. `focus`:
-    a session whose last ride's story is kept whole, even if others ride after it."""
+    """One device, from its messages, and its story. `name`: in a printable form. `focus`: the session
+    whose last ride's story is kept whole, even if others ride later."""
 
     def __init__(self, name: str, began: Moment) -> None:
         super().__init__(name, began)
@@ -37,11 +37,11 @@ class Device(ObservedDevice[Any]):
         self.notes_faults = False
 
     def hear(self, moment: Moment, topic: str, message: d.Message) -> list[News]:
-        """Take a message about it, and tell what it changed."""
+        """Take a message about the device; add its changes to the story."""
         return self._tell_all(super().hear(moment, topic, message))
 
     def diagnose(self, moment: Moment, status: d.DiagnosticStatus) -> list[News]:
-        """Take what a daemon of ours says of it, and tell what that changed."""
+        """Take our daemon's diagnostics about it; add the changes to the story."""
         return self._tell_all(super().diagnose(moment, status))
 
     def _tell_all(self, news: Iterable[News]) -> list[News]:
@@ -52,18 +52,18 @@ class Device(ObservedDevice[Any]):
         return told
 
     def text(self, name: str) -> str:
-        """A name from the network, as it can be shown."""
+        """Return a name from the network in a printable form."""
         return label(name)
 
     @abstractmethod
     def says(self, one: News) -> str:
-        """A line of the story; "" for none."""
+        """Return a line of the story; "" for none."""
 
     def notice(self, one: News) -> None:
-        """Count what has been told."""
+        """Count the events told."""
 
     def _reads(self, one: News) -> str:
-        """What is told of every kind's states and daemons."""
+        """Return the story line for an event common to all kinds of device."""
         match one.what:
             case "first state":
                 return f"the first state of {self.name} comes"
@@ -80,21 +80,21 @@ class Device(ObservedDevice[Any]):
         return ""
 
     def tell(self, moment: Moment, text: str) -> None:
-        """A line of the story; none for ""."""
+        """Add a line to the story; none for ""."""
         if not text:
             return
         self.lines.append(StoryLine(moment.at, moment.wall, sys.intern(label(text, 200))))
 
     def lines_since(self, at: float) -> tuple[StoryLine, ...]:
-        """The story from this time on."""
+        """Return the story from this time on."""
         return tuple(line for line in self.lines if line.at >= at)
 
     def two_nodes(self, now: Moment) -> bool:
-        """Do the stamps go back and forth, as those of two nodes do?"""
+        """Do the stamps go back and forth, as from two nodes?"""
         return self.steps_back(now.at, BACK_S, BACK_WITHIN_S) >= BACK_TIMES
 
     def note(self, moment: Moment, note: Noted) -> None:
-        """What its own daemon noted: it writes what changes, so each note holds until the next."""
+        """Take a note of its own daemon. Notes are of changes: each holds until the next."""
         if self.noted is None:
             near = moment.at - self.began.at <= SILENT_S
             self.noted = Diagnosis(self.kind, Moment(moment.at, moment.wall, seen=not near))
@@ -110,21 +110,21 @@ class Device(ObservedDevice[Any]):
             self._tell_all(known.refuses(moment, label(note.refused.partition(": ")[0])))
 
     def _daemons(self) -> Iterator[Diagnosis]:
-        """What its own daemon noted, and what daemons of ours have said."""
+        """Yield its own daemon's notes, and our daemons' diagnostics."""
         if self.noted is not None:
             yield self.noted
         yield from self.diagnoses.values()
 
     def heard_from(self, now: Moment) -> Iterator[Diagnosis]:
-        """What daemons of ours say now, and what the device's own noted."""
+        """Return our daemons' present diagnostics, and the notes of the device's own."""
         return (o for o in self._daemons() if o is self.noted or o.is_current(now.at))
 
     def own(self, now: Moment) -> Diagnosis | None:
-        """What the device's own daemon says now; None if that is not ours, or silent."""
+        """Return the present diagnostics of the device's own daemon; None if foreign or silent."""
         return next((one for one in self.heard_from(now) if one.kind == self.kind), None)
 
     def faults(self, now: Moment) -> dict[str, tuple[str, Moment]]:
-        """Code -> detail, and since when; the device's own first."""
+        """Return code -> detail and beginning; the device's own first."""
         found: dict[str, tuple[str, Moment]] = {}
         for one in sorted(self.heard_from(now), key=lambda one: one.kind != self.kind):
             for code, fault in one.faults.items():
@@ -132,12 +132,12 @@ class Device(ObservedDevice[Any]):
         return found
 
     def waits_said(self, now: Moment) -> dict[str, str]:
-        """What those wait for that ask our daemons for it, by the daemon's kind."""
+        """Return the reasons why requesters wait, by the kind of our daemon that reports them."""
         said = ((one.kind, one.values.get("waits")) for one in self.heard_from(now))
         return {kind: label(text, 200) for kind, text in said if text}
 
     def refusals(self, now: Moment, since: float) -> list[str]:
-        """Why requests were refused since then (s), the last reason first."""
+        """Return reasons of refusals since then (s), the last first."""
         found = [
             (last.at, reason)
             for one in self.heard_from(now)
@@ -147,7 +147,7 @@ class Device(ObservedDevice[Any]):
         return [reason for _, reason in sorted(found, reverse=True)]
 
     def _fault(self, one: News) -> str:
-        """A daemon notes a fault, and publishes it later: the story has it once."""
+        """Tell a fault once, although a daemon first notes and later publishes it."""
         found = self.diagnoses[one.who] if one.who else self.noted
         assert found is not None
         if self.notes_faults and one.who and found.kind == self.kind:

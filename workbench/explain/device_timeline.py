@@ -1,4 +1,4 @@
-"""The timeline of one device as lanes: what `plot` and the web page draw.
+"""The timeline of one device as lanes, for `plot` and the web page.
 
 A lane has one or more rows, such as one for each relay; the spans of a row never overlap. Times are on
 `Heard.at`'s clock. Everything is bounded: the newest spans of a row and the rows with the latest
@@ -27,7 +27,7 @@ from workbench.explain.state_tones import tone
 from workbench.explain.timeline import LANES, Lane, LaneName, Level, Timeline, Tone
 
 MOST_ROWS: Final = 12
-"""The most rows of a lane: a flood of made-up requesters or faults must not fill a page."""
+"""Limit of a lane's rows: a flood of made-up requesters or faults must not fill a page."""
 STAMP: Final = "stamp"
 """The row of `faults` for states that are too old."""
 AGES: Final = {
@@ -37,7 +37,7 @@ AGES: Final = {
     "is from the future": "the stamp is in the future",
 }
 SUPERVISOR: Final = "supervisor"
-"""The row of `requests` for what the supervisor passes on to the device's own daemon."""
+"""The row of `requests` for the supervisor's requests to the device's own daemon."""
 
 
 def lanes(
@@ -57,7 +57,7 @@ def lanes(
 
 
 class Drawing:
-    """The timeline of one device while it grows. What was over `past_s` (s) before is forgotten."""
+    """A growing timeline of one device. Spans that ended more than `past_s` (s) ago are forgotten."""
 
     def __init__(self, kind: Kind, device: str, past_s: float = float("inf")) -> None:
         self._kind: Kind = kind
@@ -75,7 +75,7 @@ class Drawing:
         self._said: dict[str, Diagnosis] = {}
 
     def take(self, heard: Heard | Level | Own) -> None:
-        """Take the next one. One that a recording has in the wrong order counts as of now."""
+        """Take the next message. One out of order in a recording counts as new."""
         if isinstance(heard, Own):
             note = noted(heard.topic.rpartition("/")[2], heard.text)
             if note is not None and note.subject == self._device:
@@ -93,7 +93,7 @@ class Drawing:
                 self._hear(heard.topic.rpartition("/")[2], heard.message, heard.wall)
 
     def timeline(self, from_s: float = float("-inf"), to_s: float = float("inf")) -> Timeline:
-        """What was heard between these times, and at most until now."""
+        """Return the timeline between these times, and at most until now."""
         if self._began_at is None:
             return Timeline(self._kind, self._device, 0.0, 0.0, 0.0, ())
         to_s = max(self._began_at, min(to_s, self._now))
@@ -122,7 +122,7 @@ class Drawing:
     def _row(
         self, lane: LaneName, part: str = "", keeps_s: float = ASKS_WITHIN_S, *, fills: bool = False
     ) -> LaneRow:
-        """The row of this name. If there is no room, the row that was silent the longest goes."""
+        """Return the row of this name. Without room, the row silent for the longest is dropped."""
         rows, part = self._rows[lane], label(part)
         if part not in rows:
             if len(rows) >= MOST_ROWS:
@@ -132,10 +132,10 @@ class Drawing:
         return rows[part]
 
     def _say(self, lane: LaneName, text: str, looks: Tone) -> None:
-        """A lane of one row that a state fills."""
+        """Set the value of a one-row lane from a state."""
         self._row(lane, fills=True).say(self._now, label(text), looks)
 
-    # ---- what our daemon noted
+    # ---- our daemon's notes
 
     def _note(self, level: Level) -> None:
         if level.lane not in self._noted:  # more exact than diagnostics, which come once a second
@@ -145,7 +145,7 @@ class Drawing:
         row = self._row(level.lane, level.name, keeps_s=float("inf"))
         row.say(self._now, label(level.value), looks)
 
-    # ---- what was heard
+    # ---- messages heard
 
     def _hear(self, topic: str, message: d.Message, wall: float) -> None:
         match message:
@@ -181,7 +181,7 @@ class Drawing:
                 self._say("mode", text, tone(d.ChargerStateValue, state.state))
 
     def _age(self, stamped_at: float, wall: float) -> None:
-        """A state whose reading is old, or from another clock, is shown as a fault of its own."""
+        """Show an old reading, or one from another clock, as a separate fault."""
         text = AGES[reading_age(stamped_at, wall)]
         if text or STAMP in self._rows["faults"]:
             self._row("faults", STAMP).say(self._now, text, "wrong")
@@ -201,7 +201,7 @@ class Drawing:
         self._destination = state.destination_floor
 
     def _request(self, topic: str, message: words.Requested) -> None:
-        """One row for each requester, and one for the supervisor, which passes requests on."""
+        """Fill a row for each requester, and one for the supervisor, which passes requests on."""
         match message:
             case d.LiftRequest():
                 ends = message.request_type == d.LiftRequestType.REQUEST_END_SESSION
@@ -265,7 +265,7 @@ class Drawing:
 
 
 def _floor(floor: str, runs: Tone) -> Tone:
-    """A lift without motion lines stands where its floor is known."""
+    """Return a floor's tone; a lift without motion lines counts as standing if its floor is known."""
     if not floor:
         return "unknown"
     return "works" if runs == "works" else "calm"

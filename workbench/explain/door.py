@@ -1,4 +1,4 @@
-"""Why a robot waits at a door, and why a door stays open: sentences, from what was heard of it.
+"""Explain why a robot waits at a door or a door stays open, in sentences from its messages.
 
 RMF's DoorOpen waits for two things: the door's state OPEN, and a heartbeat of the door supervisor that
 lists the robot for this door. DoorClose waits until no heartbeat lists it (rmf_ros2, DoorOpen.cpp and
@@ -18,15 +18,15 @@ from workbench.explain.phrases import TimePhrases
 
 SETTLES_S: Final = 2.0
 LONG_S: Final = 60.0
-"""No robot takes longer than this to drive through a doorway."""
+"""The longest time (s) of a robot's drive through a doorway."""
 AWAY: Final = ("offline", "unknown")
 
 
 def answer(
     door: DoorFacts, clock: TimePhrases, around: common.OthersHeard, focus: str = ""
 ) -> Answer:
-    """The door at the end of what was heard. `focus`: the requester in question; "" for whoever
-    waits."""
+    """Explain the door at the last message. `focus`: the requester in question; "" for the
+    waiting one."""
     if door.last_state is None:
         return _with_askers(common.unheard(door, around, clock), door, clock)
     stopped = common.silent(door, clock)
@@ -83,7 +83,7 @@ def _with_askers(found: Answer, door: DoorFacts, clock: TimePhrases) -> Answer:
 def _fields(
     door: DoorFacts, claim: DeviceRequester, clock: TimePhrases
 ) -> tuple[CheckedField, ...]:
-    """What DoorOpen or DoorClose checks, as this requester's fleet adapter sees it."""
+    """Return the fields that DoorOpen or DoorClose checks, as this requester's fleet adapter sees."""
     told = {
         "door": door.mode.since,
         "heartbeat": door.holders.get(claim.who) or claim.since,
@@ -106,7 +106,7 @@ def _away(found: Answer, door: DoorFacts, clock: TimePhrases) -> None:
 
 
 def _opens(found: Answer, door: DoorFacts, claim: DeviceRequester, clock: TimePhrases) -> None:
-    """It waits for the door to be open."""
+    """Explain a wait for the door to open."""
     if claim.who not in door.holders:
         _not_listed(found, door, claim, clock)
         return
@@ -177,8 +177,8 @@ def _nobody_asks(found: Answer, door: DoorFacts, clock: TimePhrases) -> None:
 
 
 def _asked_open(found: Answer, door: DoorFacts, clock: TimePhrases) -> None:
-    """Only the supervisor was heard, or a person with `send --direct`, as the door's own daemon hears
-    them."""
+    """Explain requests heard only on the daemon's own topic: from the supervisor, or from a person
+    with `send --direct`."""
     assert door.asked is not None
     found.say(
         f"On door_requests {door.asked_by} has asked for OPEN {clock.since(door.asked.since)}."
@@ -189,8 +189,8 @@ def _asked_open(found: Answer, door: DoorFacts, clock: TimePhrases) -> None:
 
 
 def _held_open(found: Answer, door: DoorFacts, clock: TimePhrases) -> None:
-    """Who holds it, and whether they are alive. A robot in a doorway is silent, so silence is
-    normal."""
+    """Name the holders, and whether they are alive. A robot in a doorway is silent, so silence
+    is normal."""
     who, since = min(door.holders.items(), key=lambda one: one[1].at)
     claim = door.requesters.get(who)
     last: Moment | None = claim.last if claim else None

@@ -1,4 +1,4 @@
-"""What was heard of one door, and its story."""
+"""One door's facts from its messages, and its story."""
 
 from bridges.observe.door import OPEN, SUPERVISOR, ObservedDoor
 from bridges.observe.news import News
@@ -9,7 +9,7 @@ from workbench.explain.phrases import lasted
 
 
 class DoorFacts(Device, ObservedDoor):
-    """`passages`: how many holds have ended."""
+    """`passages`: the number of holds that have ended."""
 
     def __init__(self, name: str, began: Moment) -> None:
         super().__init__(name, began)
@@ -17,11 +17,11 @@ class DoorFacts(Device, ObservedDoor):
 
     @property
     def asked_by(self) -> str:
-        """Who asked last on `door_requests`."""
+        """The last requester on `door_requests`."""
         return "the supervisor" if self.sender == SUPERVISOR else self.sender
 
     def says(self, one: News) -> str:
-        """A line of the story; "" for none."""
+        """Return a line of the story; "" for none."""
         who, by = one.who, one.requester
         match one.what:
             case "passed on":

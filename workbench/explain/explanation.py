@@ -1,6 +1,6 @@
 """An explanation as values: for one screen of text, and for JSON by `dataclasses.asdict`.
 
-Every text is one printable line; what comes from the network in it is escaped.
+Every text is one printable line; parts from the network are escaped.
 """
 
 from dataclasses import dataclass
@@ -18,14 +18,14 @@ Who = Literal[
     "the controller",
     "a person",
 ]
-"""Who has to act next. `the device's node`: its daemon, ours or another maker's. `the controller`: that
-of the lift, door or charger itself."""
+"""The party that has to act next. `the device's node`: its daemon, ours or another maker's.
+`the controller`: that of the lift, door or charger itself."""
 
 
 @dataclass(frozen=True, slots=True)
 class CheckedField:
-    """One of the things that RMF checks. `wanted`: what the requester waits for. `met`: it is so.
-    `since`: when it became what it is, in words.
+    """One of RMF's conditions. `wanted`: the value the requester waits for. `met`: is it so?
+    `since`: beginning of the present value, in words.
     """
 
     name: str
@@ -37,7 +37,7 @@ class CheckedField:
 
 @dataclass(frozen=True, slots=True)
 class NextStep:
-    """What has to happen next, and who has to do it."""
+    """The next step, and the party that has to act."""
 
     who: Who
     what: str
@@ -45,7 +45,7 @@ class NextStep:
 
 @dataclass(frozen=True, slots=True)
 class StoryLine:
-    """One thing that happened. `at`: s on the recording's steady clock; `wall`: s since the epoch."""
+    """One event. `at`: s on the recording's steady clock; `wall`: s since the epoch."""
 
     at: float
     wall: float
@@ -54,7 +54,7 @@ class StoryLine:
 
 @dataclass(frozen=True, slots=True)
 class FaultTold:
-    """A present fault, with its remedy where our table has one."""
+    """A present fault, with its remedy if our table has one."""
 
     code: str
     detail: str
@@ -65,10 +65,10 @@ class FaultTold:
 
 @dataclass(frozen=True, slots=True)
 class Explanation:
-    """One device, at the end of what was heard.
+    """The explanation of one device, at the last message.
 
-    `now`: sentences, the most important first. `asks`: the requester that `fields` are about. `story`:
-    the ride in question; `left_out`: how many of its lines are missing. `before`: what came before it.
+    `now`: sentences, the most important first. `asks`: the requester of `fields`. `story`: the
+    ride in question; `left_out`: number of its lines missing. `before`: the events before it.
     """
 
     kind: Kind

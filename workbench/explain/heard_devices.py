@@ -1,4 +1,4 @@
-"""What was heard on a graph, device by device, and the explanation of each.
+"""Sort a graph's messages by device, and explain each device.
 
 `HeardDevices.take` is fed in the order of time and remembers in bounds, so a day's recording takes
 no more memory than a minute's.
@@ -34,9 +34,9 @@ STORY_LINES: Final = 40
 
 
 class HeardDevices(ObservedGraph[Device]):
-    """All devices that were heard, or only those of this `name`.
+    """All devices heard, or only those of this `name`.
 
-    `session`: whose last ride's story is kept, even if others ride after it.
+    `session`: the one whose last ride's story is kept, even if others ride later.
     """
 
     makes: ClassVar = {"lift": LiftFacts, "door": DoorFacts, "charger": ChargerFacts}
@@ -48,7 +48,7 @@ class HeardDevices(ObservedGraph[Device]):
         most_lines: int = MOST_LINES,
         graph: Sequence[str] = (),
     ) -> None:
-        """`most_lines`: how many are remembered of what each device did. `graph`: the options that name
+        """`most_lines`: story lines remembered of each device. `graph`: the options that name
         this graph, for commands."""
         super().__init__()
         self._most_lines = most_lines
@@ -60,7 +60,7 @@ class HeardDevices(ObservedGraph[Device]):
         self._others: dict[Kind, dict[str, None]] = {kind: {} for kind in KINDS}
 
     def take(self, heard: Heard | Own) -> None:
-        """The next message, or the next text of our own recorder's."""
+        """Take the next message, or the next text of our recorder."""
         if isinstance(heard, Own):
             self._note(self.moment(heard), heard)
             return
@@ -74,18 +74,18 @@ class HeardDevices(ObservedGraph[Device]):
         self._story_from = at
 
     def devices(self) -> list[Key]:
-        """The devices that have published a state, in the order of kinds and names."""
+        """Return the devices that have published a state, in the order of kinds and names."""
         return [(kind, one) for kind in KINDS for one in sorted(d.id for d in self.stated(kind))]
 
     def kinds(self, name: str) -> list[Kind]:
-        """The kinds of a device of this name: by its states, or else by the requests for it."""
+        """Return the kinds of a device of this name: by its states, else by the requests for it."""
         found = [kind for kind in KINDS if (kind, name) in self.known]
         return [kind for kind in found if self.known[kind, name].state is not None] or found
 
     def explain(
         self, kind: Kind, name: str, zone: tzinfo | None, remedies: Remedies | None = None
     ) -> Explanation:
-        """The device at the end of what was heard. `zone`: of the times; None: this machine's."""
+        """Explain the device at the last message. `zone`: of the times; None: this machine's."""
         clock = TimePhrases(self.now, zone)
         began = self.began or self.now
         device = self.known.get((kind, name)) or self.make(kind, name)
@@ -130,15 +130,15 @@ class HeardDevices(ObservedGraph[Device]):
         raise AssertionError(device)
 
     def _story(self, device: Device, answer: Answer) -> tuple[StoryLine, ...]:
-        """All that is remembered of the ride in question."""
+        """Return the remembered story of the ride in question."""
         if isinstance(device, LiftFacts) and device.kept and not answer.asks:
             return device.kept
         return device.lines_since(max(answer.since, self._story_from))
 
-    # ---- who hears what
+    # ---- messages to devices
 
     def make(self, kind: Kind, name: str) -> Device:
-        """A device of which nothing was heard yet."""
+        """Make a device without messages yet."""
         made = super().make(kind, name)
         made.focus = self._session
         made.lines = deque(maxlen=self._most_lines)
@@ -147,7 +147,7 @@ class HeardDevices(ObservedGraph[Device]):
     def device(
         self, kind: Kind, name: str, moment: Moment, *, stated: bool = False
     ) -> Device | None:
-        """The device of this name, if we explain it."""
+        """Return the device of this name, if we explain it."""
         if self._name in ("", name):
             return super().device(kind, name, moment, stated=stated)
         if stated and name and len(self._others[kind]) < MOST_DEVICES:
@@ -180,7 +180,7 @@ class HeardDevices(ObservedGraph[Device]):
 
 
 def _before(device: Device, clock: TimePhrases) -> str:
-    """What came before, in one sentence; "" if nothing did."""
+    """Summarise the earlier events in one sentence; "" if there were none."""
     match device:
         case LiftFacts() if device.rides.ended:
             rides = device.rides

@@ -1,8 +1,8 @@
-"""Why a robot waits for a lift: sentences, from what was heard of it.
+"""Explain why a robot waits for a lift, in sentences from its messages.
 
 RMF's RequestLift looks at four fields of LiftState and at nothing else: the lift's name, its session,
-its floor and its door (rmf_ros2, RequestLift.cpp:322-326). The answer says which of them is missing,
-why, and who has to do the next thing.
+its floor and its door (rmf_ros2, RequestLift.cpp:322-326). The answer names the missing ones,
+the reason, and the party that has to act next.
 """
 
 from shlex import quote
@@ -19,7 +19,7 @@ from workbench.explain.phrases import TimePhrases, lasted
 from workbench.explain.rows import label
 
 LONG_S: Final = 60.0
-"""A robot that has what it waits for drives within a minute."""
+"""A robot drives within this time (s) of getting all it waits for."""
 HAZARDS: Final = {
     "FIRE": "the fire alarm has to end, and be reset where its settings ask for that",
     "EMERGENCY": "the emergency (stop, code blue, earthquake) has to end",
@@ -30,7 +30,7 @@ HAZARDS: Final = {
 def answer(
     lift: LiftFacts, clock: TimePhrases, around: common.OthersHeard, focus: str = ""
 ) -> Answer:
-    """The lift at the end of what was heard. `focus`: the session in question; "" for whoever waits."""
+    """Explain the lift at the last message. `focus`: the session in question; "" for a waiting one."""
     if lift.last_state is None:
         return _with_askers(common.unheard(lift, around, clock), lift, clock)
     stopped = common.silent(lift, clock)
@@ -61,7 +61,7 @@ def answer(
 
 
 def _in_question(lift: LiftFacts, clock: TimePhrases, focus: str) -> DeviceRequester | None:
-    """The claim in question: that of `focus`, or of whoever waits longest, else the holder's."""
+    """Return the claim in question: that of `focus`, else the longest waiting, else the holder's."""
     if focus:
         return lift.requesters.get(focus)
     waiting = [one for one in lift.asking(clock.now) if not lift.matches(one)]
@@ -71,7 +71,7 @@ def _in_question(lift: LiftFacts, clock: TimePhrases, focus: str) -> DeviceReque
 
 
 def _begins(lift: LiftFacts, claim: DeviceRequester | None) -> float:
-    """When the story in question begins (s): when the one that waits asked, or the holder got it."""
+    """Return the story's beginning (s): the waiting one's request, or the holder's grant."""
     holder = lift.requesters.get(lift.session.value)
     starts = [claim.first.at] if claim else []
     if holder is not None:
@@ -92,7 +92,7 @@ def _with_askers(found: Answer, lift: LiftFacts, clock: TimePhrases) -> Answer:
 
 
 def _hold(found: Answer, lift: LiftFacts, clock: TimePhrases, *, then: bool = False) -> None:
-    """Who has it, and where the car is. `then`: in the past tense, as of the last state."""
+    """Name the holder and the car's place. `then`: in the past tense, as of the last state."""
     holder = "nobody" if lift.session.value == NOBODY else lift.session.value
     motion = "" if lift.motion.value == "unknown" else f", {_motion(lift.motion.value)}"
     car = f"at {lift.floor.value}, door {lift.door.value}{motion}, mode {lift.mode.value}"
@@ -110,7 +110,7 @@ def _motion(motion: str) -> str:
 def _fields(
     lift: LiftFacts, claim: DeviceRequester, clock: TimePhrases
 ) -> tuple[CheckedField, ...]:
-    """RequestLift's fields, as this requester's fleet adapter sees them; the name is what was heard."""
+    """Return RequestLift's fields, as this requester's fleet adapter sees them; the name as heard."""
     since = (lift.session.since, lift.floor.since, lift.door.since)
     return tuple(
         CheckedField(*check, clock.since(moment))
@@ -144,7 +144,7 @@ def _others_wait(
 
 
 def _why(found: Answer, lift: LiftFacts, claim: DeviceRequester, clock: TimePhrases) -> None:
-    """Why this claim is not met; if it is, who has to act next."""
+    """Explain why this claim is not met; if it is, name the party to act next."""
     holder = lift.session.value
     if lift.matches(claim) and claim.asks(clock.now):
         _drives(found, lift, claim, clock)
@@ -183,7 +183,7 @@ def _hazard(found: Answer, lift: LiftFacts, clock: TimePhrases) -> None:
 def _held(
     found: Answer, lift: LiftFacts, claim: DeviceRequester, holder: str, clock: TimePhrases
 ) -> None:
-    """Another session has it."""
+    """Explain a lift held by another session."""
     theirs = lift.requesters.get(holder)
     if theirs is not None and theirs.ended is not None:
         _end_not_obeyed(found, lift, theirs, clock)
@@ -199,7 +199,7 @@ def _held(
 
 
 def _forgotten(found: Answer, lift: LiftFacts, holder: str, clock: TimePhrases) -> None:
-    """The supervisor asks for another session than the one that has the lift."""
+    """Explain that the supervisor requests for another session than the holder's."""
     asks = lift.supervisor
     if asks is None or asks.value in ("", holder, NOBODY):
         return
@@ -216,7 +216,7 @@ def _forgotten(found: Answer, lift: LiftFacts, holder: str, clock: TimePhrases) 
 
 
 def _without_word(found: Answer, lift: LiftFacts, holder: str, clock: TimePhrases) -> None:
-    """The holder of the lift is silent."""
+    """Explain a silent holder of the lift."""
     theirs = lift.requesters.get(holder)
     heard_s = clock.now.at - max(lift.began.at, lift.session.since.at)
     if theirs is None and heard_s < common.LISTENS_S:
@@ -280,7 +280,7 @@ def _end_not_obeyed(
 
 
 def _drives(found: Answer, lift: LiftFacts, claim: DeviceRequester, clock: TimePhrases) -> None:
-    """It has what it waits for."""
+    """Explain a robot that has all it waited for."""
     met = claim.met or claim.since
     found.say(
         f"{claim.who} has seen its lift at {claim.wants} with the door open {clock.since(met)}.",
@@ -295,7 +295,7 @@ def _drives(found: Answer, lift: LiftFacts, claim: DeviceRequester, clock: TimeP
 
 
 def _missing(found: Answer, lift: LiftFacts, claim: DeviceRequester, clock: TimePhrases) -> None:
-    """The session is given; the mode, the floor or the door is not there yet."""
+    """Explain a granted session whose mode, floor or door is still missing."""
     on = common.relays(lift, clock)
     if lift.mode.value in HAZARDS:
         _hazard(found, lift, clock)

@@ -1,4 +1,4 @@
-"""What was heard of one lift, and the story of each ride."""
+"""One lift's facts from its messages, and the story of each ride."""
 
 from dataclasses import dataclass
 from typing import Final
@@ -12,13 +12,12 @@ from workbench.explain.phrases import lasted
 from workbench.explain.rows import label
 
 DIRECT: Final = "the supervisor, or a person with `send --direct`,"
-"""Whoever sends on `lift_requests` what no fleet adapter was heard to ask for."""
+"""The sender on `lift_requests` of a request that no fleet adapter was heard to make."""
 
 
 @dataclass(slots=True)
 class Rides:
-    """Totals of all rides: how many ended, the longest wait for the car, and when the last one
-    began."""
+    """Totals of all rides: number ended, longest wait for the car, beginning of the last."""
 
     ended: int = 0
     longest_s: float = 0.0
@@ -37,17 +36,17 @@ class LiftFacts(Device, ObservedLift):
 
     @property
     def floors(self) -> tuple[str, ...]:
-        """The floors that it serves."""
+        """Return the floors that it serves."""
         served = self.state.available_floors[:200] if self.state else ()
         return tuple(map(label, served))
 
     def sender(self, who: str) -> str:
-        """Who asks for this session on `lift_requests`, as far as that is known."""
+        """Name the sender for this session on `lift_requests`, as far as known."""
         one = self.requesters.get(who)
         return "the supervisor" if one is not None and one.own else DIRECT
 
     def says(self, one: News) -> str:
-        """A line of the story; "" for none."""
+        """Return a line of the story; "" for none."""
         who, by = one.who, one.requester
         match one.what:
             case "asks" if by:

@@ -1,4 +1,4 @@
-"""Why a lift that nobody has is not given to the robot that asks for it."""
+"""Explain why a free lift is not given to the requesting robot."""
 
 from typing import Final
 
@@ -9,11 +9,11 @@ from workbench.explain.lift_facts import LiftFacts
 from workbench.explain.phrases import TimePhrases
 
 SETTLES_S: Final = 2.0
-"""This much time between a request and its grant, or a supervisor's change of mind, is normal."""
+"""Normal time (s) from a request to its grant, or to a supervisor's change of holder."""
 
 
 def not_granted(found: Answer, lift: LiftFacts, claim: DeviceRequester, clock: TimePhrases) -> None:
-    """The lift is free, and yet it is not given to the requester."""
+    """Explain why the free lift is not given to the requester."""
     if lift.floors and claim.wants not in lift.floors:
         found.say(
             f"{lift.name} serves {', '.join(lift.floors[:12])}, not {claim.wants or 'an empty name'}:"

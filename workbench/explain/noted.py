@@ -1,4 +1,4 @@
-"""What one of our daemons noted of its own device: inputs, outputs, faults and refusals.
+"""The notes of our daemons about their own devices: inputs, outputs, faults and refusals.
 
 In an incident file the texts are JSON under `/rmf_bridge/` (`bridges/blackbox/incident.py`,
 `readable`). A file may come from anywhere, so a text of another shape is ignored.
@@ -20,7 +20,7 @@ MOST: Final = 40
 @dataclass(frozen=True, slots=True)
 class Noted:
     """One note about `subject`. `inputs`, `outputs`, `faults`: all of them, as name -> value ("": off),
-    or None where the note is about something else. `refused`: why a request was refused.
+    or None if the note is about something else. `refused`: why a request was refused.
     """
 
     subject: str
@@ -31,7 +31,7 @@ class Noted:
 
 
 def noted(topic: str, text: str) -> Noted | None:
-    """The note in a text of this topic (its last part); None if it is not a note."""
+    """Return the note in a text of this topic (its last part); None for other texts."""
     try:
         told = msgspec.json.decode(text)
     except (msgspec.MsgspecError, RecursionError):
@@ -51,7 +51,7 @@ def noted(topic: str, text: str) -> Noted | None:
 
 
 def levels(at: float, note: Noted, on: dict[tuple[str, str], str]) -> Iterator[Level]:
-    """What has changed by this note. `on`: what was on before; it is brought up to date."""
+    """Yield the changes by this note. `on`: name -> value before; updated here."""
     lanes = (("inputs", note.inputs), ("relays", note.outputs), ("faults", note.faults))
     for lane, found in lanes:
         if found is None:
@@ -64,7 +64,7 @@ def levels(at: float, note: Noted, on: dict[tuple[str, str], str]) -> Iterator[L
 
 
 def _fields(struct: object) -> Iterator[tuple[str, str]]:
-    """The fields of a sample or of outputs that are on, off or one of a few words; no measurements."""
+    """Return the fields of a sample or of outputs with on, off or a word; no measurements."""
     if not isinstance(struct, dict):
         return
     for name, value in [*struct.items()][:MOST]:

@@ -1,7 +1,7 @@
-"""How each tone looks, by day and by night: colours that colour-blind people tell apart, and patterns.
+"""The look of each tone, by day and by night: colours safe for the colour-blind, and patterns.
 
-The colours are Okabe's and Ito's (https://jfly.uni-koeln.de/color/). No tone differs from another
-only by colour: a label says what it is, and what is wrong, unknown or only wanted has a pattern.
+The colours are Okabe's and Ito's (https://jfly.uni-koeln.de/color/). Tones never differ by
+colour alone: each has a label, and wrong, unknown and requested ones also have a pattern.
 """
 
 from dataclasses import dataclass
@@ -58,7 +58,7 @@ PAPER: Final[dict[Theme, tuple[str, str, str, str]]] = {
 
 
 def css(theme: Theme) -> str:
-    """The rules of one theme."""
+    """Return the rules of one theme."""
     back, text, weak, grid = PAPER[theme]
     rules = [
         f".paper{{fill:{back}}}",
@@ -77,7 +77,7 @@ def css(theme: Theme) -> str:
 
 
 def style(theme: Theme | None) -> str:
-    """The style sheet: of one theme, or of both, as the reader's screen has it."""
+    """Return the style sheet: of one theme, or of both, chosen by the reader's screen."""
     if theme is not None:
         return css(theme)
     return f"{css('light')}@media (prefers-color-scheme: dark){{{css('dark')}}}"

@@ -1,4 +1,4 @@
-"""Times, durations, lists and commands as a person says them."""
+"""Phrases for times, durations, lists and commands."""
 
 import re
 import shlex
@@ -34,12 +34,12 @@ def listed(names: Sequence[str], word: str = "and") -> str:
 
 
 def on_graph(text: str, options: Sequence[str]) -> str:
-    """The text, with the options that name a graph in each command of it that joins one."""
+    """Add the options that name a graph to each graph-joining command in the text."""
 
     def joined(found: re.Match[str]) -> str:
         command, name = found.groups()
         words = [*options]
-        if name == "doctor" and "--config" in words:  # it is given that file itself
+        if name == "doctor" and "--config" in words:  # it names the file already
             at = words.index("--config")
             del words[at : at + 2]
         return f"`{command} {shlex.join(words)}`" if words else found[0]

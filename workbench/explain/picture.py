@@ -22,7 +22,7 @@ TOP: Final = 82.0
 BOTTOM: Final = 56.0
 RIGHT: Final = 16.0
 CHAR: Final = 6.6
-"""Pixels of a character of the 12-pixel font, on the wide side."""
+"""Width (pixels) of a character of the 12-pixel font, rounded up."""
 NARROW: Final = 1.2
 """Spans narrower than this (pixels) are drawn as one with their neighbours."""
 TICKS: Final = (1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 900, 1800, 3600, 7200, 10800, 21600, 43200)
@@ -36,7 +36,7 @@ def svg(
     zone: tzinfo | None = None,
     theme: Theme | None = None,
 ) -> str:
-    """The picture. `zone`: of its times; None: this machine's. `theme`: None: the reader's."""
+    """Draw the picture. `zone`: of its times; None: this machine's. `theme`: None: the reader's."""
     return tostring(Picture(timeline, max(LEAST_WIDE, width), zone, theme).root, "unicode")
 
 
@@ -111,7 +111,7 @@ class Picture:
         return SubElement(self.root, "line", place)
 
     def _patterns(self) -> None:
-        """Hatches for what is wrong, dots for what is not known, lines for what is asked."""
+        """Add hatches for wrong, dots for unknown, lines for requested spans."""
         defs = SubElement(self.root, "defs")
         for tone, size, path, wide in (
             ("wrong", 8, "M-1,9 L9,-1", "1.4"),
@@ -142,7 +142,7 @@ class Picture:
         self._text(12, 42, f"from {began}, {for_s}{more}", "small weak")
 
     def _axis(self) -> None:
-        """Vertical lines at round times."""
+        """Draw vertical lines at round times."""
         begin, end = self._timeline.wall, self._wall(self._timeline.to_s)
         fits = max(2, int((self._width - self._left) // 90))
         step = next((tick for tick in TICKS if (end - begin) / tick <= fits), 86400)
@@ -185,7 +185,7 @@ class Picture:
         self._marks(lane, y, what)
 
     def _marks(self, lane: Lane, y: float, what: str) -> None:
-        """A pointer downwards at each, with its label where there is room before the next."""
+        """Draw a pointer at each mark, with its label if there is room before the next."""
         busy = [(self._x(span.from_s), self._x(span.to_s)) for span in lane.spans]
         places = [self._x(mark.at_s) for mark in lane.marks]
         for number, (mark, x) in enumerate(zip(lane.marks, places, strict=True)):
@@ -211,7 +211,7 @@ class Picture:
         SubElement(element, "title").text = text
 
     def _steps(self) -> None:
-        """Where the listener's clock was stepped."""
+        """Mark the steps of the listener's clock."""
         for mark in self._timeline.steps:
             line = self._line(self._x(mark.at_s), TOP - 8, self._foot + 4, "step")
             self._hint(line, mark.label)
@@ -236,18 +236,18 @@ def _legend_height(width: int) -> float:
 
 
 def _gutter(lanes: Iterable[Lane], width: int) -> float:
-    """How wide the names on the left are: at most a quarter of the picture."""
+    """Return the width of the names on the left: at most a quarter of the picture."""
     longest = max((_wide(lane.row) for lane in lanes), default=0.0)
     return min(max(96.0, 12 + 76 + longest + 8), max(150.0, width / 4))
 
 
 def _wide(text: str) -> float:
-    """Its width (pixels), roughly; 走 takes two places."""
+    """Return a text's rough width (pixels); 走 takes two places."""
     return CHAR * sum(1.7 if unicodedata.east_asian_width(c) in "WF" else 1.0 for c in text)
 
 
 def _fitted(text: str, room: float) -> str:
-    """The text, cut to fit; "" if almost nothing of it fits."""
+    """Cut the text to fit; "" if almost nothing fits."""
     if _wide(text) <= room:
         return text
     kept = text
@@ -257,7 +257,7 @@ def _fitted(text: str, room: float) -> str:
 
 
 def _round_times(begin: float, end: float, step: int, zone: tzinfo | None) -> Iterator[float]:
-    """Each round time between them, by the local clock of that zone."""
+    """Yield the round times between two times, by the zone's local clock."""
     try:
         offset = datetime.fromtimestamp(begin, zone).astimezone(zone).utcoffset()
     except (OverflowError, ValueError, OSError):
@@ -276,7 +276,7 @@ WORST: Final[dict[Tone, int]] = {"wrong": 2, "unknown": 1}
 def _drawable(
     spans: Iterable[LaneSpan], x: Callable[[float], float]
 ) -> Iterator[tuple[LaneSpan, int]]:
-    """The spans, with those too narrow to be seen joined: each with the number that it stands for."""
+    """Return the spans, the invisibly narrow ones joined, each with its number of original spans."""
     joined: list[LaneSpan] = []
     for span in spans:
         gap = joined and x(span.from_s) - x(joined[-1].to_s) > NARROW
@@ -293,7 +293,7 @@ def _drawable(
 
 
 def _one(spans: list[LaneSpan]) -> LaneSpan:
-    """Several narrow spans as one, with the tone of the one that is wrong, if any is."""
+    """Join narrow spans to one, with the worst tone among them."""
     tone = max(spans, key=lambda span: (WORST.get(span.tone, 0), span.to_s - span.from_s)).tone
     label = spans[0].label if len(spans) == 1 else ""
     return LaneSpan(spans[0].from_s, spans[-1].to_s, label, tone)

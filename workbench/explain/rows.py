@@ -10,12 +10,12 @@ from workbench.explain.timeline import LaneSpan, Mark, Tone
 
 LONGEST_LABEL: Final = 120
 MOST_SPANS: Final = 2000
-"""A row keeps this many spans and marks: the newest."""
+"""Limit of a row's spans and marks; the newest are kept."""
 NOT_HEARD: Final = "not heard"
 
 
 def label(text: str, longest: int = LONGEST_LABEL) -> str:
-    """A text from the network as a label: one line, not too long."""
+    """Make a label of a network text: one line, not too long."""
     shown = words.printable(text[: longest + 1])
     return shown if len(shown) <= longest else shown[: longest - 1] + "…"
 
@@ -23,8 +23,8 @@ def label(text: str, longest: int = LONGEST_LABEL) -> str:
 class LaneRow:
     """Spans that never overlap, and marks.
 
-    A value holds for `keeps_s` (s) at most; with `fills` a span then says NOT_HEARD. What ended
-    `past_s` (s) before the newest is forgotten.
+    A value holds for `keeps_s` (s) at most; with `fills` a span then says NOT_HEARD. Spans that
+    ended `past_s` (s) before the newest are forgotten.
     """
 
     def __init__(
@@ -49,7 +49,7 @@ class LaneRow:
         if self._open is not None and self._open[1:] != (text, tone):
             self._close(at)
         if text and self._open is None:
-            self._open = at, sys.intern(text), tone  # thousands of spans say the same few words
+            self._open = at, sys.intern(text), tone  # thousands of spans share a few words
         self.heard_at = at
 
     def mark(self, at: float, text: str, tone: Tone) -> None:
@@ -61,7 +61,7 @@ class LaneRow:
         self.heard_at = max(self.heard_at, at)
 
     def spans(self, from_s: float, to_s: float) -> Iterator[LaneSpan]:
-        """The spans between these times, cut to them; the last one may still go on."""
+        """Return the spans between these times, cut to them; the last one may still go on."""
         for span in (*self._spans, *self._going_on(to_s)):
             if span.to_s > from_s and span.from_s < to_s:
                 yield LaneSpan(
@@ -69,7 +69,7 @@ class LaneRow:
                 )
 
     def marks(self, from_s: float, to_s: float) -> Iterator[Mark]:
-        """The marks between these times."""
+        """Return the marks between these times."""
         return (mark for mark in self._marks if from_s <= mark.at_s <= to_s)
 
     def _going_on(self, to_s: float) -> Iterator[LaneSpan]:
@@ -82,7 +82,7 @@ class LaneRow:
             yield LaneSpan(self.heard_at, to_s, NOT_HEARD, "unknown")
 
     def _expire(self, at: float) -> None:
-        """Close what nobody has confirmed for too long, at its last confirmation."""
+        """Close a span not confirmed for too long, at its last confirmation."""
         if at <= self.heard_at + self._keeps_s or self.heard_at == float("-inf"):
             return
         self._close(self.heard_at)

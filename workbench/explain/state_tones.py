@@ -1,4 +1,4 @@
-"""The tone of each value of RMF's states; that of a number which RMF does not define is `unknown`."""
+"""The tone of each value of RMF's states; `unknown` for numbers that RMF does not define."""
 
 from collections.abc import Mapping
 from enum import IntEnum
@@ -18,6 +18,6 @@ TONES: Final[Mapping[type[IntEnum], tuple[Tone, ...]]] = {
 
 
 def tone(kind: type[IntEnum], number: int) -> Tone:
-    """Of this number, in a field of this kind."""
+    """Return the tone of this number, in a field of this kind."""
     known: dict[int, Tone] = dict(zip(kind, TONES[kind], strict=True))
     return known.get(number, "unknown")

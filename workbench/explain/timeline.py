@@ -1,4 +1,4 @@
-"""A timeline as values: what `plot` and the web page draw, and JSON by `dataclasses.asdict`.
+"""A timeline as values, for `plot`, the web page, and JSON by `dataclasses.asdict`.
 
 Times are s on `Heard.at`'s clock. Every text is printable and not too long, and may come from the
 network: it is text, never markup.
@@ -25,14 +25,14 @@ LANES: Final[tuple[LaneName, ...]] = (
 )
 """In the order in which they are drawn."""
 Tone = Literal["calm", "works", "open", "held", "asks", "wrong", "unknown"]
-"""How a span looks, beside its label. calm: at rest. works: moves, charges, is on. open: a robot may
+"""The look of a span, besides its label. calm: at rest. works: moves, charges, is on. open: a robot may
 pass. held: somebody's session. asks: somebody requests something. wrong: a fault or hazard.
 unknown: not heard."""
 
 
 @dataclass(frozen=True, slots=True)
 class LaneSpan:
-    """Something that was so from `from_s` to `to_s`."""
+    """A value that held from `from_s` to `to_s`."""
 
     from_s: float
     to_s: float
@@ -42,7 +42,7 @@ class LaneSpan:
 
 @dataclass(frozen=True, slots=True)
 class Mark:
-    """Something that happened at `at_s`."""
+    """An event at `at_s`."""
 
     at_s: float
     label: str
@@ -51,8 +51,8 @@ class Mark:
 
 @dataclass(frozen=True, slots=True)
 class Lane:
-    """One row of a lane; its spans never overlap. `row`: which relay, input, requester or fault; "" in
-    a lane of one row. `left_out`: the oldest spans and marks, dropped because there were too many.
+    """One row of a lane; its spans never overlap. `row`: a relay, input, requester or fault; "" in a
+    lane of one row. `left_out`: the oldest spans and marks, dropped because there were too many.
     """
 
     name: LaneName
@@ -66,8 +66,8 @@ class Lane:
 class Timeline:
     """One device between two times.
 
-    `wall`: s since the epoch at `from_s`, by the listener's clock. `steps`: where that clock was
-    stepped. `lanes`: in the order of LANES, only those of which something was heard. `left_out`:
+    `wall`: s since the epoch at `from_s`, by the listener's clock. `steps`: the steps of that
+    clock. `lanes`: in the order of LANES, only those with messages. `left_out`:
     rows that were dropped.
     """
 
@@ -83,7 +83,7 @@ class Timeline:
 
 @dataclass(frozen=True, slots=True)
 class Level:
-    """What one of our daemons noted of its device: from `at` on, `name` is `value` ("": off, or over).
+    """A note of our daemon about its device: from `at` on, `name` is `value` ("": off, or over).
 
     `lane`: relays (an output and its value), inputs, or faults (a code and its detail).
     """

@@ -1,1 +1,1 @@
-"""RMF's graph as a person meets it: joined, watched, and asked for something."""
+"""RMF's graph for people: join it, watch it, and send requests."""

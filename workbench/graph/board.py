@@ -1,4 +1,4 @@
-"""What `watch` shows: rows made from messages and a time. Pure.
+"""The rows of `watch`, made from messages and a time. Pure.
 
 RMF's states have no field for faults, queues and simulations. Our daemons publish those on
 `/diagnostics`.
@@ -27,7 +27,7 @@ SETTLES_S: Final = 1.5
 """A daemon's diagnostics come at 1 Hz."""
 HEADINGS: Final = ("kind", "name", "state", "held by", "waiting", "age", "", "faults")
 MOST_PLACES: Final = 500
-"""Of robots. Anybody can make names up, and the page listens for months."""
+"""Limit of robots: anybody can make names up, and the page listens for months."""
 SECONDS: Final = re.compile(r"\d+(\.\d+)? (s|min)\b")
 
 Device = tuple[str, str]
@@ -37,9 +37,9 @@ Device = tuple[str, str]
 class BoardRow(Struct, frozen=True):
     """One device, the charger coordinator, or a robot with its assigned place.
 
-    `waiting`: who waits, or what the one that has it waits for. `age`: age of the reading.
-    `mark`: why the row may be wrong. `simulated`: no hardware is behind it.
-    `faults`: those that its daemons report.
+    `waiting`: the waiting ones, or the thing that the holder waits for. `age`: of the reading.
+    `mark`: why the row may be wrong. `simulated`: is it without hardware? `faults`: reported by
+    its daemons.
     """
 
     kind: str
@@ -54,7 +54,7 @@ class BoardRow(Struct, frozen=True):
 
     @property
     def wrong(self) -> bool:
-        """Whether the row needs attention."""
+        """Does the row need attention?"""
         return bool(self.mark or self.faults)
 
     def cells(self) -> tuple[str, ...]:
@@ -66,7 +66,7 @@ class BoardRow(Struct, frozen=True):
         return (*state, self.waiting, self.age, marks, self.faults)
 
     def news(self) -> tuple[object, ...]:
-        """The parts whose change is printed: seconds that only count on are left out."""
+        """The parts whose change is printed, without running seconds."""
         told = (self.state, self.held_by, self.waiting, self.mark, self.faults)
         return (self.simulated, *(SECONDS.sub("", text) for text in told))
 
@@ -75,17 +75,17 @@ class Board:
     """The latest state and diagnosis of each device."""
 
     def __init__(self, graph: ObservedGraph[Any] | None = None) -> None:
-        """`graph`: what is remembered of the devices, if others fill it."""
+        """`graph`: the memory of the devices, if filled elsewhere."""
         self._graph = graph or PlainGraph()
         self._places: dict[str, str] = {}
 
     def take(self, heard: Heard) -> None:
-        """Take one message that was heard."""
+        """Take a message."""
         self._graph.hear(heard)
         self.note(heard)
 
     def note(self, heard: Heard) -> None:
-        """Take one message, but for what it says of a device's state."""
+        """Take a message, except a device's state."""
         if not isinstance(heard.message, d.ChargingAssignments):
             return
         for one in heard.message.assignments:
@@ -95,7 +95,7 @@ class Board:
                 self._places[who] = place
 
     def unsettled(self, now: float) -> set[Device]:
-        """Kind and name of devices heard only just now, whose daemon may yet say that it simulates."""
+        """Kind and name of devices just heard, whose daemons may yet report a simulation."""
         return {
             (one.kind, words.printable(one.id))
             for one in self._graph.stated()
@@ -104,11 +104,11 @@ class Board:
         }
 
     def rows_of(self, devices: Iterable[AnyDevice], now: float, wall: float) -> list[BoardRow]:
-        """The rows of these devices, in their order; each has published a state."""
+        """Return these devices' rows, in the given order; each device has published a state."""
         return [self._device(one, now, wall) for one in devices]
 
     def rows(self, now: float, wall: float) -> list[BoardRow]:
-        """The rows, sorted by kind and name. `now`: monotonic s; `wall`: the clock of the stamps."""
+        """Return the rows, sorted by kind and name. `now`: monotonic s; `wall`: the stamps' clock."""
         every = [one for kind in words.KINDS for one in sorted(self._graph.stated(kind), key=_name)]
         devices = self.rows_of(every, now, wall)
         return [*devices, *self._coordinators(now), *self._robots()]
@@ -163,17 +163,17 @@ class Board:
 
 
 def _said(device: AnyDevice, now: float) -> list[Diagnosis]:
-    """What nodes of ours say of it now."""
+    """Return our nodes' present diagnostics about it."""
     return [one for one in device.diagnoses.values() if one.is_current(now)]
 
 
 def _waiting(said: Diagnosis) -> str:
-    """Who waits, and for what: `fleet/b (12 s): for END of fleet/a`."""
+    """Name the waiting ones and the reason: `fleet/b (12 s): for END of fleet/a`."""
     return ": ".join(filter(None, (said.value("waiting"), said.value("waits"))))
 
 
 def _coordinates(diagnosis: Diagnosis) -> str:
-    """What the coordinator does, and its schedule."""
+    """Describe the coordinator's work and schedule."""
     silent = diagnosis.value("assigns").startswith("no:")
     does = "asks for chargers that another node assigns" if silent else "assigns chargers"
     schedule = diagnosis.value("schedule")
@@ -181,7 +181,7 @@ def _coordinates(diagnosis: Diagnosis) -> str:
 
 
 def _faults(found: Iterable[Diagnosis]) -> str:
-    """One text for each fault, such as `OVERLOAD (since 3 s)`."""
+    """Return one text for each fault, such as `OVERLOAD (since 3 s)`."""
     told = [(code, one.value(code)) for one in found for code in one.faults]
     texts = [f"{code} ({detail})" if detail else code for code, detail in told]
     return words.printable("; ".join(dict.fromkeys(texts)))
@@ -210,7 +210,7 @@ def _mark(device: AnyDevice, now: float) -> str:
 
 
 def table(rows: Iterable[BoardRow]) -> list[str]:
-    """The rows in columns, under headings; columns for queues, marks and faults only if needed."""
+    """Format the rows in columns under headings; queues, marks and faults only if needed."""
     shown = [row.cells() for row in rows]
     if not shown:
         return ["nothing heard yet"]
@@ -224,13 +224,13 @@ def table(rows: Iterable[BoardRow]) -> list[str]:
 
 
 def changes(before: list[BoardRow], after: list[BoardRow]) -> list[BoardRow]:
-    """The rows that have changed, not counting ages and running seconds."""
+    """Return the rows that have changed, not counting ages and running seconds."""
     known = {(row.kind, row.name): row.news() for row in before}
     return [row for row in after if known.get((row.kind, row.name)) != row.news()]
 
 
 def change_line(row: BoardRow, wall: float) -> str:
-    """A changed row as one line, for a pipe."""
+    """Format a changed row as one line, for a pipe."""
     clock = time.strftime("%H:%M:%S", time.localtime(wall)) + f".{int(wall * 1000) % 1000:03d}"
     kind, name, state, held_by, waiting, age, marks, faults = row.cells()
     parts = [clock, f"{kind:<7}", f"{name:<12}", f"{state:<38}", held_by]
@@ -240,15 +240,15 @@ def change_line(row: BoardRow, wall: float) -> str:
 
 
 def json_line(row: BoardRow, wall: float) -> str:
-    """A changed row as one line of JSON, with the time of the change (s since the epoch)."""
+    """Format a changed row as one line of JSON, with the time of the change (s since the epoch)."""
     return json.dumps({"at": round(wall, 3), **asdict(row)})
 
 
 def repaint(
     rows: list[BoardRow], lines_before: int, columns: int, lines: int, *, coloured: bool = True
 ) -> tuple[str, int]:
-    """The text that redraws a terminal showing `lines_before` lines of the table, and the new number
-    of lines. No line wraps and nothing scrolls away.
+    """Return the text that redraws a terminal showing `lines_before` lines of the table, and the new
+    number of lines. No line wraps and nothing scrolls away.
     """
     shown = list(_fitting(rows, columns - 1))
     if len(shown) >= lines:
@@ -261,8 +261,8 @@ def repaint(
 
 
 def _fitting(rows: list[BoardRow], columns: int) -> Iterator[tuple[str, bool]]:
-    """Each line of the table, and whether it needs attention. Where it is too long for a terminal, its
-    marks and faults follow on a line of their own."""
+    """Return each line of the table, and whether it needs attention. Marks and faults of a row too
+    long for the terminal follow on a separate line."""
     heading, *lines = table(rows)
     yield heading, False
     for row, line in zip(rows, lines, strict=True):

@@ -1,8 +1,8 @@
-"""When `send` sends, when it ends, and what it says when the request has no effect.
+"""Decide when `send` sends and ends, and its text if the request has no effect.
 
 Pure: `step(request, seen, now)`. A request is repeated at 1 Hz until its effect is seen, as in RMF.
 Only a state heard after the first request counts, because an earlier one may show the same for another
-reason. Each request's message, and what fulfils it, are in `requests/`.
+reason. `requests/` has each request's message and the condition that fulfils it.
 """
 
 from collections.abc import Iterable
@@ -17,7 +17,7 @@ REPEAT_S: Final = 1.0
 PATIENCE_S: Final = 2.0
 """States come at 1 Hz. After two seconds of silence a request is sent all the same."""
 HINT_AFTER_S: Final = 3.0
-"""A node that starts needs a second or two to find the others. Then `send` says what it waits for."""
+"""A starting node needs a second or two to find the others. Then `send` prints what is missing."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,7 +32,7 @@ class SendStep:
 
 
 def step(request: Request, seen: RequestProgress, now: float) -> SendStep:
-    """What to do now."""
+    """Return the next step."""
     over = request.outcome(seen)
     if over is not None:
         return SendStep(outcome=over)
@@ -55,7 +55,7 @@ def _may_send(request: Request, seen: RequestProgress, now: float, *, direct: bo
 
 
 def _hint(request: Request, seen: RequestProgress, now: float) -> str:
-    """What the user can do, before the timeout."""
+    """Return advice for the user, before the timeout."""
     if now < seen.began_at + HINT_AFTER_S:
         return ""
     if missed := _missed(request, seen):
@@ -67,7 +67,7 @@ def _hint(request: Request, seen: RequestProgress, now: float) -> str:
 
 
 def _reason(request: Request, seen: RequestProgress, now: float) -> str:
-    """Why the request timed out, and where to look next."""
+    """Return why the request timed out, and where to look next."""
     if missed := _missed(request, seen):
         return _given_up("", seen) if _said(missed) in seen.hinted else _said(missed)
     silent_s = now - seen.stated_at
@@ -82,14 +82,14 @@ def _reason(request: Request, seen: RequestProgress, now: float) -> str:
 
 
 def _missed(request: Request, seen: RequestProgress) -> Obstacle | None:
-    """Who is not on the graph: whoever takes the request, or the device."""
+    """Name the party missing on the graph: the request's receiver, or the device."""
     if seen.first_sent_at is None and seen.listeners == 0:
         return request.nobody(seen)
     return None if seen.states else request.unheard(seen)
 
 
 def _given_up(more: str, seen: RequestProgress) -> str:
-    """The end of a wait whose reason was said when it began."""
+    """End a wait whose reason was printed at its beginning."""
     return f"gave up after {seen.timeout_s:g} s{more}"
 
 

@@ -1,4 +1,4 @@
-"""What the commands of a graph share: the options that name it, joining it, seconds, and an end."""
+"""The common part of the commands on a graph: options, joining, durations, ending."""
 
 import argparse
 import os
@@ -19,7 +19,7 @@ from bridges.transports.transport import M, Publisher, Subscription, Transport, 
 
 
 def add_graph_arguments(parser: argparse.ArgumentParser) -> None:
-    """The options that say which graph: `--config`, `--domain-id`, `--transport`, `--localhost`."""
+    """Add the options that choose the graph: `--config`, `--domain-id`, `--transport`, `--localhost`."""
     parser.add_argument(
         "--config",
         type=Path,
@@ -48,7 +48,7 @@ def _domain(text: str) -> int:
 
 
 def seconds(least: float, most: float) -> Callable[[str], float]:
-    """A reader of an option's number of seconds, for argparse."""
+    """Return an argparse reader for an option in seconds."""
 
     def read(text: str) -> float:
         with suppress(ValueError):
@@ -69,7 +69,7 @@ def open_graph(args: argparse.Namespace, node_name: str) -> Transport:
 
 
 class Renamed:
-    """A transport on which topics have the names that a site has given them (`rmf.topics` of a YAML).
+    """A transport with the site's topic names (`rmf.topics` of a YAML).
 
     `names`: RMF's topic name -> the site's.
     """
@@ -93,16 +93,16 @@ class Renamed:
 
     @property
     def release(self) -> Release:
-        """The release of RMF's messages that it speaks now."""
+        """The release of RMF's messages spoken now."""
         return self._transport.release
 
     def faults(self) -> list[tuple[str, str]]:
-        """(code, detail) of what now keeps this node and others from hearing each other."""
+        """Return (code, detail) of the present obstacles between this node and others."""
         return self._transport.faults()
 
     @property
     def lives(self) -> bool:
-        """Whether its thread runs."""
+        """Does its thread run?"""
         return self._transport.lives
 
     def _named(self, topic: Topic[M]) -> Topic[M]:
@@ -110,7 +110,7 @@ class Renamed:
 
 
 def graph_of(args: argparse.Namespace, speaks: str) -> str:
-    """Where the joined graph is, for people: `dds in domain 7, on this machine alone`."""
+    """Describe the joined graph: `dds in domain 7, on this machine alone`."""
     from bridges.transports.choose import domain_id, stays_on_loopback
 
     rmf = overridden(_configured(args.config), args)
@@ -131,7 +131,7 @@ def _configured(file: Path | None) -> Rmf:
 
 
 def interruptible() -> AbstractContextManager[None]:
-    """SIGINT, SIGTERM and SIGHUP raise KeyboardInterrupt.
+    """Let SIGINT, SIGTERM and SIGHUP raise KeyboardInterrupt.
 
     Otherwise the node of a killed command would stay on the graph for over 10 s.
     """
@@ -140,7 +140,7 @@ def interruptible() -> AbstractContextManager[None]:
 
 @contextmanager
 def ended_by(action: Callable[[int, FrameType | None], object]) -> Iterator[None]:
-    """SIGINT, SIGTERM and SIGHUP do this, and what they did before afterwards."""
+    """Let SIGINT, SIGTERM and SIGHUP do this until the end of the block."""
     signals = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
     before = {number: signal.signal(number, action) for number in signals}
     try:
@@ -159,25 +159,25 @@ def complain(command: str, text: object) -> None:
 class CommandLine:
     """The command line as typed, so that a proposed command has the same options and can be copied.
 
-    `typed`: every word after `rmf-bridge`. `options`: what another command needs to act on the same
-    graph.
+    `typed`: every word after `rmf-bridge`. `options`: those with which another command acts on the
+    same graph.
     """
 
     typed: tuple[str, ...] = ()
     options: tuple[str, ...] = ()
 
     def again_with(self, option: str) -> str:
-        """The same command with one more option."""
+        """Return the same command with one more option."""
         return shlex.join(("rmf-bridge", *self.typed, option))
 
     def other(self, *command: str) -> str:
-        """Another command, on the same graph. Only `send` knows `--direct`."""
+        """Return another command, on the same graph. Only `send` knows `--direct`."""
         options = [one for one in self.options if one != "--direct" or command[0] == "send"]
         return shlex.join(("rmf-bridge", *command, *options))
 
 
 def command_line(args: argparse.Namespace) -> CommandLine:
-    """From parsed arguments; `args.typed` is what `cli` was given."""
+    """Make it from parsed arguments; `args.typed`: the words given to `cli`."""
     options = ["--direct"] if getattr(args, "direct", False) else []
     if args.config is not None:
         options += ["--config", str(args.config)]

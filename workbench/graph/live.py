@@ -28,12 +28,12 @@ OF_DEVICES: Final[tuple[AnyTopic, ...]] = (
     topics.ADAPTER_CHARGER_CANCELS,
     topics.DIAGNOSTICS,
 )
-"""Where devices are spoken of. Volatile: no retained request is taken for a new one."""
+"""The topics about devices. Volatile: no retained request is taken for a new one."""
 
 
 class Ear:
-    """Hears these topics from now on. `others_only`: not what the same transport publishes. `ends`: the
-    subscriptions by topic."""
+    """Hears these topics from now on. `others_only`: without the same transport's own messages.
+    `ends`: the subscriptions by topic."""
 
     def __init__(
         self,
@@ -54,7 +54,7 @@ class Ear:
         self._waiting.put(Heard(time.monotonic(), time.time(), topic, bounded(message)))
 
     def listen(self, timeout_s: float) -> list[Heard]:
-        """Everything that has arrived, in order; waits up to `timeout_s` for the first."""
+        """Yield all messages that have arrived, in order; wait up to `timeout_s` for the first."""
         heard = []
         try:
             heard.append(self._waiting.get(timeout=max(0.0, timeout_s)))

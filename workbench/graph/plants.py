@@ -1,4 +1,4 @@
-"""Speaks to the plants of a running simulation by their control sockets (`hal_fakes/control.py`)."""
+"""Talk to the plants of a running simulation by their control sockets (`hal_fakes/control.py`)."""
 
 import argparse
 import json
@@ -16,7 +16,7 @@ ANSWER_S = 5.0
 
 
 def add_simulation(parser: argparse.ArgumentParser) -> None:
-    """The options that name a simulation and one of its devices."""
+    """Add the options that name a simulation and one of its devices."""
     parser.add_argument("file", type=Path, metavar="FILE", help="the YAML that is simulated")
     device = parser.add_argument(
         "--device", metavar="NAME", help="which device, if the file has several"
@@ -26,7 +26,7 @@ def add_simulation(parser: argparse.ArgumentParser) -> None:
 
 
 def names(verb: str) -> Completer:
-    """Completes what can `press` or `fail`, from the running simulation; nothing where none runs."""
+    """Complete the names for `press` or `fail` from the running simulation; nothing without one."""
 
     def complete(prefix: str, parsed_args: argparse.Namespace, **_: object) -> list[str]:
         found = set[str]()
@@ -51,7 +51,7 @@ def _folder(args: argparse.Namespace) -> Path:
 
 
 def tell(args: argparse.Namespace, verb: str) -> int:
-    """Print what can `press` or `fail` in each device. 0; 69 if no simulation runs."""
+    """Print each device's names for `press` or `fail`. Return 0; 69 if no simulation runs."""
     try:
         answers = [json.loads(ask(path, ["names"])) for path in _sockets(args)]
     except (OSError, ValueError) as error:
@@ -66,9 +66,9 @@ def tell(args: argparse.Namespace, verb: str) -> int:
 
 
 def obey(args: argparse.Namespace, verb: str, *words: str) -> int:
-    """Send one command and say what was done.
+    """Send one command and print its effect.
 
-    0; 1 if it is refused; 69 without a simulation; 64 for no such device; 78 for a wrong YAML.
+    Return 0; 1 if it is refused; 69 without a simulation; 64 for no such device; 78 for a wrong YAML.
     """
     from bridges.settings.load import SettingsError, load
     from workbench.graph.which_device import NoDevice, device_of
@@ -107,7 +107,7 @@ def _nobody(args: argparse.Namespace) -> int:
 
 
 def ask(path: Path, words: list[str]) -> str:
-    """The answer to one line: `ok` or `error TEXT`. Raises OSError."""
+    """Send one line; return the answer, `ok` or `error TEXT`. Raises OSError."""
     with socket.socket(socket.AF_UNIX) as caller:
         caller.settimeout(ANSWER_S)
         caller.connect(str(path))

@@ -1,14 +1,14 @@
-"""The device of a file that a command is about."""
+"""Find the device of a file that a command concerns."""
 
 from bridges.settings.config import Config
 
 
 class NoDevice(Exception):
-    """No device of the file is meant; the text says what to write."""
+    """The command names no device of the file; the text gives the remedy."""
 
 
 def device_of(config: Config, name: str | None) -> str:
-    """The device that is meant: the only one if none is named. Raises NoDevice."""
+    """Return the named device; without a name the only one. Raises NoDevice."""
     names = list(config.devices)
     if not names:
         raise NoDevice(f"a {config.kind} has no wires")

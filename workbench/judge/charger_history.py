@@ -1,4 +1,4 @@
-"""What is remembered of a charger: who requested it, and what its states have shown."""
+"""The history of a charger: its requests and states."""
 
 from typing import Final
 
@@ -13,11 +13,11 @@ CHARGING: Final = d.ChargerStateValue.CHARGER_CHARGING
 RELEASED: Final = d.ChargerStateValue.CHARGER_RELEASED
 ERROR: Final = d.ChargerStateValue.CHARGER_ERROR
 UNREQUESTED: Final = "unrequested/"
-"""Whatever follows it, nobody asked for this charge. A station's next one may have the same id."""
+"""Prefix of ids of unrequested charges. A station's next charge may have the same id."""
 
 
 class ChargerHistory(History[d.ChargerState]):
-    """`requests`: by id, the latest. `cancels`: id -> when it was first cancelled; the cancel of a
+    """`requests`: by id, the latest. `cancels`: id -> time of the first cancel; the cancel of a
     charge that nobody requested is forgotten with it. `foreign_at`: the last cancel of an id that the
     station does not show."""
 
@@ -32,11 +32,11 @@ class ChargerHistory(History[d.ChargerState]):
 
     @property
     def same_since(self) -> float:
-        """Since when state and request have been as they are."""
+        """Return the time since which state and request are unchanged."""
         return max(self.since, self.seen.condition.since.at, self.seen.request.since.at)
 
     def take_other(self, heard: Heard) -> bool:
-        """Requests to this charger and their cancels."""
+        """Take requests to this charger, and cancels."""
         match heard.message:
             case d.ChargerRequest(charger_name=self.name):
                 self.asked()
@@ -53,7 +53,7 @@ class ChargerHistory(History[d.ChargerState]):
         self.cancels.pop(UNREQUESTED + self.name, None)
 
     def settle(self, state: d.ChargerState) -> None:
-        """Forget the cancel of what is over."""
+        """Forget the cancels of finished charges."""
         if state.state in (IDLE, RELEASED):
             self.cancels.pop(UNREQUESTED + self.name, None)
 
@@ -66,5 +66,5 @@ class ChargerHistory(History[d.ChargerState]):
 
 
 def unrequested(request_id: str) -> bool:
-    """Does nobody's request have this id?"""
+    """Is this id without a request?"""
     return request_id.startswith(UNREQUESTED)

@@ -34,7 +34,7 @@ def _numbers(history: ChargerHistory) -> Finding:
 
 
 def _known(history: ChargerHistory) -> d.ChargerState | None:
-    """The state, if it is one of RMF's."""
+    """Return the state, if it is one of RMF's."""
     state = history.new
     return state if state is not None and state.state in list(d.ChargerStateValue) else None
 
@@ -71,8 +71,8 @@ def _same_robot(history: ChargerHistory) -> Finding:
 
 
 def _keeps(history: ChargerHistory) -> Finding:
-    """One charge belongs to one request. What nobody requested becomes its own robot's charge when that
-    robot's request comes, and a node that has started again may know of no request."""
+    """One charge belongs to one request. An unrequested charge is taken over by its own robot's
+    request when that comes, and a restarted node may know of no request."""
     state, before = history.new, history.before
     if state is None or before is None or (before.state, state.state) != (CHARGING, CHARGING):
         return None
@@ -126,7 +126,7 @@ def _foreign_cancel(history: ChargerHistory) -> Finding:
     if state is None or before is None or before.state != ASSIGNED or not before.request_id:
         return None
     if unrequested(before.request_id):
-        return None  # it ends when its robot leaves, which nobody announces
+        return None  # it ends when its robot leaves, unannounced
     if history.now - history.foreign_at > FOREIGN_S:
         return None
     if state.state not in (IDLE, RELEASED) or before.request_id in history.cancels:

@@ -1,4 +1,4 @@
-"""What is remembered of a door: what was requested of it, and how it has moved since."""
+"""The history of a door: its requests and movements."""
 
 from collections import deque
 from typing import Final
@@ -15,7 +15,7 @@ BLIND: Final = (d.DoorModeValue.MODE_OFFLINE, d.DoorModeValue.MODE_UNKNOWN)
 REOPENS_WITHIN_S: Final = 1.0
 AT_ONCE_S: Final = 0.3
 CROSSES_S: Final = 0.5
-"""A state may be heard after the CLOSE that it has caused."""
+"""A state may be heard this long (s) after the CLOSE that it has caused."""
 DWELLS_S: Final = 0.5
 """No operator releases a door that people have opened sooner than this."""
 OPENING_S: Final = 1.0
@@ -23,7 +23,7 @@ OPENING_S: Final = 1.0
 
 
 class DoorHistory(History[d.DoorState]):
-    """`latched`: the last request was OPEN. `asked_at`: the first OPEN of this latch; `asked`: how many
+    """`latched`: the last request was OPEN. `asked_at`: the first OPEN of this latch; `asked`: OPENs
     since the door was last seen other than closed, at `not_closed_at`. `closed_at`: the last CLOSE on
     door_requests; `adapter_closed_at`: that of a fleet adapter to the supervisor. `was_open`: the
     door has been open in this latch. `reopened`: when it reopened at once, in this latch. `instant`:
@@ -51,11 +51,11 @@ class DoorHistory(History[d.DoorState]):
 
     @property
     def mode_before(self) -> int:
-        """Its mode in the state before; -1 for none."""
+        """The mode in the state before; -1 for none."""
         return self.before.current_mode.value if self.before else -1
 
     def take_other(self, heard: Heard) -> bool:
-        """Requests to this door, from the supervisor and from fleet adapters."""
+        """Take requests to this door, from the supervisor and from fleet adapters."""
         message = heard.message
         if not isinstance(message, d.DoorRequest) or message.door_name != self.name:
             return False
@@ -77,7 +77,7 @@ class DoorHistory(History[d.DoorState]):
         self.not_closed_at = self.now
 
     def settle(self, state: d.DoorState) -> None:
-        """Note how it moves."""
+        """Note the door's movement."""
         self.opened = self.left = False
         if self.mode != CLOSED:
             self.not_closed_at, self.openings = self.now, 0

@@ -14,7 +14,7 @@ INSTANT: Final = 2
 SHUT: Final = 3
 BYPASS_S: Final = 5.0
 FLICKERS_S: Final = 0.9
-"""No door can close and open again in this time."""
+"""Time (s) in which no door can close and open again."""
 
 
 def _numbers(history: DoorHistory) -> Finding:
@@ -36,7 +36,7 @@ def _opens(history: DoorHistory) -> Finding:
 
 
 def _left_open(history: DoorHistory) -> bool:
-    """Was it open for a requester, and has it just ceased to be?"""
+    """Was it open for a requester, and has this just ended?"""
     moves = history.mode in (CLOSED, d.DoorModeValue.MODE_MOVING)
     return history.latched and history.was_open and moves and history.mode_before == OPEN
 
@@ -46,7 +46,7 @@ def _bypass(history: DoorHistory) -> bool:
 
 
 def _stays(history: DoorHistory) -> Finding:
-    """Silence must not close it."""
+    """Silence must not close the door."""
     if history.new is None or not history.latched or not history.was_open:
         return None
     if not _left_open(history) or _bypass(history):

@@ -1,7 +1,7 @@
-"""What is remembered of one device while its messages are heard; bounded, however many come.
+"""The history of one device, from its messages; bounded, however many come.
 
-A history takes messages and decides nothing; laws read it. This file has what all three kinds share:
-what was heard of the device, the pace of its states, their stamps, and what followed a request.
+A history takes messages and decides nothing; laws read it. This file has the part common to all three
+kinds: messages, the pace and stamps of states, and the answers to requests.
 """
 
 from abc import ABC, abstractmethod
@@ -18,13 +18,13 @@ from bridges.observe.limits import SLOWEST_S
 from bridges.observe.requesters import Moment
 
 REMEMBERED: Final = 200
-"""How many requesters a history remembers; a site has some dozens."""
+"""Limit of requesters remembered by a history; a site has some dozens."""
 BURST: Final = 20
 FROZEN_S: Final = 0.05
 ANSWERS_WITHIN_S: Final = 0.1
 OFTEN_S: Final = 30.0
 EARLY_S: Final = 0.15
-"""A state this early (s) cannot be explained by a timer's jitter."""
+"""Least earliness (s) of a state that a timer's jitter cannot explain."""
 
 NOT_YET: Final = float("-inf")
 
@@ -33,7 +33,7 @@ V = TypeVar("V")
 
 
 def keep(known: dict[str, V], key: str, value: V) -> None:
-    """Put it last, and forget the oldest if there are too many."""
+    """Put an entry last; forget the oldest if there are too many."""
     known.pop(key, None)
     known[key] = value
     if len(known) > REMEMBERED:
@@ -41,12 +41,12 @@ def keep(known: dict[str, V], key: str, value: V) -> None:
 
 
 class History(ABC, Generic[T]):
-    """One device. Times are those of what was heard (s).
+    """One device. Times are those of the messages (s).
 
-    `news`: the message taken last, None when only time has passed. `seen`: what was heard of it.
+    `news`: the message taken last, None when only time has passed. `seen`: the observations of it.
     `before`: the state before the latest, None at the first one, and after a silence, because the
-    node may have restarted; `since`: when that was. `frozen_s`: for how long the states have shown
-    the same stamp. `burst_s`: how long the latest BURST unchanged states took.
+    node may have restarted; `since`: time of that. `frozen_s`: time for which the states have shown
+    the same stamp. `burst_s`: time taken by the latest BURST unchanged states.
     """
 
     observes: ClassVar[type[AnyDevice]]
@@ -68,7 +68,7 @@ class History(ABC, Generic[T]):
         self._quiet: deque[float] = deque(maxlen=15)
 
     def take(self, heard: Heard) -> bool:
-        """Take a message. False if no law needs to look, because it is not about this device."""
+        """Take a message. False if no law need be checked, because it is not about this device."""
         self.now, self.news = heard.at, heard.message
         message = heard.message
         if not isinstance(message, words.Stated | words.Requested):
@@ -85,7 +85,7 @@ class History(ABC, Generic[T]):
         return self.take_other(heard)
 
     def pass_time(self, now: float) -> None:
-        """Note that time has passed and nothing was heard."""
+        """Note that time has passed without a message."""
         self.now, self.news = now, None
 
     @abstractmethod
@@ -94,7 +94,7 @@ class History(ABC, Generic[T]):
 
     @abstractmethod
     def settle(self, state: T) -> None:
-        """Note what the new state means; `before` and `state` are set."""
+        """Note the new state's meaning; `before` and `state` are set."""
 
     def forget(self) -> None:
         """Forget what a silence may have ended."""
@@ -114,7 +114,7 @@ class History(ABC, Generic[T]):
 
     @property
     def heard_at(self) -> float:
-        """When it came."""
+        """The time of the latest state."""
         return self.seen.last_state.at if self.seen.last_state else NOT_YET
 
     @property
@@ -124,11 +124,11 @@ class History(ABC, Generic[T]):
 
     @property
     def answers(self) -> int:
-        """How many of the latest 8 requests were each answered by a state that was not due."""
+        """Count those of the latest 8 requests answered by a state that was not due."""
         return sum(self._answers)
 
     def _take_state(self, state: T, earlier: float) -> bool:
-        """Take the new state. `earlier`: when the one before came."""
+        """Take the new state. `earlier`: time of the one before."""
         self.states += 1
         self.before = self.seen.before
         if self.before is None or self.seen.gap_s > SLOWEST_S:
@@ -162,5 +162,5 @@ class History(ABC, Generic[T]):
 
 
 def _content(state: words.Stated) -> words.Stated:
-    """All but the stamp."""
+    """Return all but the stamp."""
     return replace(state, **{f"{words.kind(state)}_time": d.Time()})

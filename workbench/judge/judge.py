@@ -1,4 +1,4 @@
-"""Checks one device's messages against the laws of its kind."""
+"""Check one device's messages against the laws of its kind."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
@@ -22,14 +22,14 @@ SCENES: Final[Mapping[Kind, type[History[Any]]]] = MappingProxyType(
     {"lift": LiftHistory, "door": DoorHistory, "charger": ChargerHistory}
 )
 LEEWAY_S: Final = 1.0
-"""How far apart in time (s) two topics may be heard."""
+"""Greatest difference (s) in the arrival of two topics."""
 SHOWN: Final = 3
-"""The most pieces of evidence stored for one law."""
+"""Limit of evidence stored for one law."""
 
 
 @dataclass
 class _Tally:
-    """The score of one law. `doubt`: what may still be excused, and the evidence that it would be."""
+    """The score of one law. `doubt`: a possible breach that may still be excused, and its evidence."""
 
     law: Law[Any]
     kept: int = 0
@@ -44,7 +44,7 @@ class _Tally:
             self.evidence.append(heard)
 
     def judged(self) -> JudgedLaw:
-        """The law with its verdict."""
+        """Return the law with its verdict."""
         if self.broken:
             return JudgedLaw(self.law, Verdict.BROKEN, self.broken, tuple(self.evidence))
         return JudgedLaw(self.law, Verdict.KEPT if self.kept else Verdict.NOT_SEEN, self.kept)
@@ -53,7 +53,7 @@ class _Tally:
 class Judge:
     """Judges one device, by RMF's name for it, in bounded memory.
 
-    `only`: the ids of the laws to judge by; all of the kind without it. `broken`: any of them is.
+    `only`: the ids of the laws to judge by; all of the kind without it. `broken`: is any of them?
     """
 
     def __init__(self, kind: Kind, name: str, only: Iterable[str] | None = None) -> None:
@@ -77,11 +77,11 @@ class Judge:
     def fire_ends(
         self, publishers: int, retaining: int, supervisors: int, at: float, wall: float
     ) -> None:
-        """How many publishers the fire topic has, how many of them retain, and how many supervisors
-        there are; only if one lift is on the graph, because the topic does not say whose alarm it is.
+        """Take the number of the fire topic's publishers, of retaining ones, and of supervisors; only
+        if one lift is on the graph, because the topic does not name the alarm's lift.
         Jazzy's lift supervisor has a volatile publisher, and never uses it (rmf_ros2 7eef65a,
-        lift_supervisor/Node.cpp:52). Only what is found twice counts, because ends are discovered
-        one by one."""
+        lift_supervisor/Node.cpp:52). Only a repeated finding counts, because publishers are
+        discovered one by one."""
         if isinstance(self.history, LiftHistory) and publishers and not self.history.others:
             volatile = publishers - retaining
             found = None if 0 < volatile <= supervisors else volatile > 0
@@ -101,7 +101,7 @@ class Judge:
         return self.verdicts()
 
     def verdicts(self) -> tuple[JudgedLaw, ...]:
-        """Each law with its verdict so far."""
+        """Return each law with its verdict so far."""
         return tuple(tally.judged() for tally in self._tallies)
 
     def _breaks(self, tally: _Tally, evidence: Evidence) -> None:

@@ -1,7 +1,7 @@
-"""From the first message to the verdict: listen, play if asked and allowed, release, judge.
+"""Run a judgement: listen, play if asked and allowed, release, give the verdict.
 
-Without I/O and clock, so that it is the same on a wire and in virtual time. The shell hands over what
-it hears, publishes what is returned, and calls `turn` at `wake_at`.
+Without I/O and clock, so that it is the same on a wire and in virtual time. The shell hands over
+its messages, publishes those returned, and calls `turn` at `wake_at`.
 """
 
 from collections.abc import Callable
@@ -15,15 +15,15 @@ from workbench.judge.shared_laws import BURST_WITHIN_S
 from workbench.rmf_model import NEVER, Said
 
 LISTENS_S: Final = 4.0
-"""Wait this long before a play: for the device's state, and to find other nodes."""
+"""Wait (s) before a play, for the device's state and other nodes."""
 APPEARS_S: Final = 15.0
-"""The first state may take this long, because nodes must find each other."""
+"""Time limit (s) of the first state: nodes must find each other."""
 SETTLES_S: Final = 4.0
-"""Listen this long after a play: a law may need it to be seen broken."""
+"""Listening time (s) after a play, in which breaches may still show."""
 
 
 class Act(Enum):
-    """The act that is under way."""
+    """The present act."""
 
     LISTEN = auto()
     PLAY = auto()
@@ -33,8 +33,8 @@ class Act(Enum):
 
 
 class JudgeRun:
-    """`for_s`: how long to listen without a play; inf: until `stop`. `strangers()`: who else
-    publishes on the play's topics, "" for nobody. `note`: why a play was not played, or not to its
+    """`for_s`: listening time without a play; inf: until `stop`. `strangers()`: other publishers
+    on the play's topics, "" for none. `note`: why a play was not performed, or not to its
     end.
     """
 
@@ -70,7 +70,7 @@ class JudgeRun:
         self._last = (at, wall)
 
     def hear(self, heard: Heard) -> list[Said]:
-        """A message of the graph, ours not among them."""
+        """Take a message of the graph, except our own."""
         self._last = (heard.at, heard.wall)
         self.judge.hear(heard)
         if self._scenario is None or self.act not in (Act.PLAY, Act.LEAVE):
@@ -100,7 +100,7 @@ class JudgeRun:
         return []
 
     def wake_at(self) -> float:
-        """When to call `turn` at the latest (monotonic s)."""
+        """The latest time to call `turn` (monotonic s)."""
         if self.act is Act.PLAY and self._scenario is not None:
             return min(self._scenario.wake_at() - self._epoch, self._last[0] + REPEAT_S)
         return NEVER if self.act is Act.DONE else self._until
@@ -117,8 +117,8 @@ class JudgeRun:
 
     @property
     def _now(self) -> float:
-        """RMF's clock: the wall clock at the beginning plus the time since, so that no step changes
-        it."""
+        """Return RMF's clock: the wall clock at the beginning plus the time since, unaffected by clock
+        steps."""
         return self._epoch + self._last[0]
 
     def _begin_play(self) -> list[Said]:

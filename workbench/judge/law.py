@@ -1,4 +1,4 @@
-"""What a law is, and what a judge finds: kept, broken, or not seen."""
+"""Laws, and a judge's findings: kept, broken, or not seen."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ from bridges.messages import words
 S_contra = TypeVar("S_contra", contravariant=True)
 
 LONGEST: Final = 60
-"""A name from the network is shown no longer than this."""
+"""Limit of a network name's length when shown."""
 
 
 class Verdict(StrEnum):
@@ -23,7 +23,7 @@ class Verdict(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Doubt:
-    """It looks broken, unless a message that is on its way still explains it.
+    """A law looks broken, unless a message still on its way explains it.
 
     Topics have no common order on a wire: a lift's state may be heard before the END that caused it.
     `excused()` is called again at each message, for `LEEWAY_S`.
@@ -34,15 +34,15 @@ class Doubt:
 
 
 Finding = str | Doubt | None
-"""What a law finds in the latest message: how it breaks the law, KEPT, or None if it does not apply."""
+"""A law's finding in the latest message: the breach, KEPT, or None if the law does not apply."""
 KEPT: Final = ""
 
 
 @dataclass(frozen=True, slots=True)
 class Law(Generic[S_contra]):
-    """One sentence of RMF's contract, and how it is checked after each message.
+    """One sentence of RMF's contract, and its check after each message.
 
-    `source`: where it can be read. `check(history)`: a pure function of what has been heard.
+    `source`: its reference. `check(history)`: a pure function of the messages heard.
     `sensed`: a stuck or noisy wire below a correct node can break it too.
     """
 
@@ -56,7 +56,7 @@ class Law(Generic[S_contra]):
 
 @dataclass(frozen=True, slots=True)
 class Evidence:
-    """What breaks a law. `at`: s on the clock of what was heard; `wall`: s since the epoch."""
+    """Evidence of a breach. `at`: s on the messages' clock; `wall`: s since the epoch."""
 
     at: float
     wall: float
@@ -65,7 +65,7 @@ class Evidence:
 
 @dataclass(frozen=True, slots=True)
 class JudgedLaw:
-    """A law and what was found. `times`: how often it was kept or broken; `evidence`: the first few."""
+    """A law and its verdict. `times`: how often it was kept or broken; `evidence`: the first few."""
 
     law: Law[object]
     verdict: Verdict

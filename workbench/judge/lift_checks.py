@@ -1,4 +1,4 @@
-"""How each law of a lift is checked after a message. The laws themselves are in `lift_laws.py`."""
+"""Checks of a lift's laws after each message. The laws themselves are in `lift_laws.py`."""
 
 from typing import Final
 
@@ -17,7 +17,7 @@ JUMPS_WITHIN_S: Final = 1.5
 REFUSED: Final = 3
 FOREIGN_S: Final = 2.0
 SETTLED_S: Final = 3.0
-"""For this long after a node's first state it may still obey requests that we have not heard."""
+"""Time (s) after a node's first state in which it may still obey requests that we have not heard."""
 
 
 def opened(state: d.LiftState) -> bool:
@@ -129,7 +129,7 @@ def ended_unasked(history: LiftHistory) -> Finding:
 
 
 def _foreign_end(history: LiftHistory, session: str, since: float) -> str:
-    """The session whose END has just come, if this session's has not come since then; "" for none."""
+    """Return the session whose END has just come, unless this session's END came later; "" for none."""
     if history.has_ended(session, since):
         return ""
     others = (who for who in history.ended if who not in ("", session))
@@ -222,7 +222,7 @@ def floors(history: LiftHistory) -> Finding:
 
 
 def destination(history: LiftHistory) -> Finding:
-    """The car goes where its holder asked."""
+    """The car goes to its holder's requested floor."""
     state = history.new
     if state is None or not state.session_id or not state.destination_floor:
         return None
@@ -267,7 +267,7 @@ def grants_nothing(history: LiftHistory) -> Finding:
 
 
 def no_false(history: LiftHistory) -> Finding:
-    """Only an operator calls an alarm off. With several lifts it is unknown which one published."""
+    """Only an operator calls an alarm off. With several lifts the publisher is unknown."""
     if not isinstance(history.news, d.Bool) or history.others:
         return None
     if history.often(history.false_alarms):

@@ -1,4 +1,4 @@
-"""What is remembered of a lift: who asked for what, who has it, and where its door was open."""
+"""The history of a lift: requests, sessions, and the places of its open door."""
 
 from collections import deque
 from dataclasses import dataclass, field
@@ -12,12 +12,12 @@ from bridges.observe.limits import SLOWEST_S
 from workbench.judge.history import NOT_YET, History, keep
 
 GRACE_S: Final = 65.0
-"""Until then the same session may resume: its robot may have been left in the car."""
+"""Time (s) in which a session may resume: its robot may still be in the car."""
 LATE_S: Final = 5.0
-"""An END may have been sent this long before the session was shown."""
+"""Greatest time (s) from an END to the state that first shows its session."""
 FLOORS: Final = 8
 AT_ONCE_S: Final = 0.3
-"""Longer than a scan, and than a state and a request take to cross on a wire."""
+"""Longer than a scan, and than the crossing of a state and a request on the wire."""
 REOPENS_WITHIN_S: Final = 1.0
 END: Final = d.LiftRequestType.REQUEST_END_SESSION
 
@@ -25,8 +25,8 @@ END: Final = d.LiftRequestType.REQUEST_END_SESSION
 @dataclass
 class Ask:
     """The requests of one session. `direct_at`: the latest on lift_requests. `since`:
-    when the present row of requests there, without a gap, began. `human`: it asked for HUMAN mode.
-    `direct`: it was heard on lift_requests."""
+    the beginning of the present gapless row of requests there. `human`: did it ask for HUMAN mode?
+    `direct`: was it heard on lift_requests?"""
 
     since: float
     floors: deque[str] = field(default_factory=lambda: deque(maxlen=FLOORS))
@@ -48,17 +48,17 @@ class Ending:
 
 
 class LiftHistory(History[d.LiftState]):
-    """`asks`, `elsewhere`: who asked for this lift, and for others. `ended`: session -> its last END.
+    """`asks`, `elsewhere`: requests for this lift, and for others. `ended`: session -> its last END.
     `granted_at`: since when the present session has been shown; `held_since`: the same of the session
-    before. `known`: the beginning of the present one was seen. `last`: who had it before, until
+    before. `known`: was the beginning of the present one seen? `last`: the session before, until
     `last_at`. `offered`: OPEN has been shown at its destination; `offers`: OPEN is shown while that
     is not so. `ending`: the ENDs of the present session. `bare_refused`: how many sessions in a row
     outlived an END without a floor and ended at one with a floor. `reopened`: when the door
     reopened at once, in one stop. `open_seen`: floor and time of the last OPEN at another floor.
-    `other_asked_at`: when lift_requests last carried another session's request. `free_since`: since
-    when nobody has it and no hazard is there.
-    `false_alarms`: when the fire topic said false without need. `volatile`: whether its publisher
-    retains nothing, None if that is not known.
+    `other_asked_at`: when lift_requests last carried another session's request. `free_since`:
+    beginning of the present time without session and hazard.
+    `false_alarms`: times of a needless false on the fire topic. `volatile`: does its publisher
+    retain nothing? None if unknown.
     """
 
     observes = ObservedLift
@@ -86,12 +86,12 @@ class LiftHistory(History[d.LiftState]):
 
     @property
     def session(self) -> str:
-        """Who has it now."""
+        """The present session."""
         return self.state.session_id if self.state else ""
 
     @property
     def session_before(self) -> str:
-        """Who had it in the state before."""
+        """The session in the state before."""
         return self.before.session_id if self.before else ""
 
     def has_ended(self, session: str, since: float) -> bool:
@@ -104,7 +104,7 @@ class LiftHistory(History[d.LiftState]):
         return ask is not None and floor in ask.floors
 
     def take_other(self, heard: Heard) -> bool:
-        """Requests of this lift and of others, and the fire alarm."""
+        """Take requests of this lift and of others, and the fire alarm."""
         message = heard.message
         if isinstance(message, d.Bool) and heard.topic == topics.FIRE_ALARM_TRIGGER.name:
             return self._alarm(message.data)

@@ -16,16 +16,16 @@ from workbench.rmf_model.robot import Phase, RobotContext
 
 DEAF_S: Final = 6.0
 """The played supervisor is silent for this long after an END without a floor. RMF's would send one with
-a floor at once, and so hide that the first was refused."""
+a floor at once, and so hide the refusal of the first."""
 RETAINED: Final = topics.ADAPTER_LIFT_REQUESTS.publish.depth
 
 Step = Phase | float
 Script = Callable[[RobotContext], Iterator[Step]]
-"""What a robot does: phases, and seconds in which it drives."""
+"""A robot's steps: phases, and seconds of driving."""
 
 
 class Traveller:
-    """A robot with its fleet adapter. `waits_since`: when its phase began; inf while it drives."""
+    """A robot with its fleet adapter. `waits_since`: beginning of its phase; inf while it drives."""
 
     def __init__(self, requester_id: str, script: Script) -> None:
         self.robot = RobotContext(requester_id)
@@ -36,7 +36,7 @@ class Traveller:
 
     @property
     def waits_for(self) -> str:
-        """What RMF waits for: the name of its phase."""
+        """The name of the phase that waits."""
         phase = self.robot.phase
         return type(phase).__name__ if phase is not None and not phase.done else ""
 
@@ -56,7 +56,7 @@ class Traveller:
         return []
 
     def wake_at(self) -> float:
-        """When its timer is due, or its drive is over."""
+        """Time of its next timer, or of the end of its drive."""
         drives = self._drives_until if self.robot.done and not self.done else NEVER
         return min(self.robot.wake_at(), drives)
 
@@ -65,7 +65,7 @@ class PlayedNodes:
     """One scenario for one device. `now` is RMF's clock (s since the epoch).
 
     `supervisor`: makes a new one; None if one is on the graph. `over`: every step was done, or `failed`
-    says why not. Methods return the messages to be published and judged.
+    gives the reason. Methods return the messages to be published and judged.
     """
 
     def __init__(
@@ -86,12 +86,12 @@ class PlayedNodes:
 
     @property
     def over(self) -> bool:
-        """There is nothing more to play."""
+        """Is there nothing more to play?"""
         return bool(self.failed) or all(traveller.done for traveller in self.travellers)
 
     @property
     def names(self) -> set[str]:
-        """The sessions that are ours."""
+        """Our own sessions."""
         return {traveller.robot.requester_id for traveller in self.travellers}
 
     def begin(self, now: float) -> list[Said]:
@@ -99,14 +99,14 @@ class PlayedNodes:
         return self._go_on(now)
 
     def hear(self, topic: str, message: d.Message, now: float) -> list[Said]:
-        """A message of the graph, ours not among them. `topic`: its name."""
+        """Take a message of the graph, except our own. `topic`: its name."""
         if isinstance(message, words.Stated) and words.device(message) != self.device:
             return []
         said = self._spread(topic, message, now)
         return said + self._go_on(now)
 
     def tick(self, now: float) -> list[Said]:
-        """A timer is due."""
+        """Fire due timers."""
         said = []
         for traveller in self.travellers:
             if now >= traveller.robot.wake_at():
@@ -115,12 +115,12 @@ class PlayedNodes:
         return said + self._go_on(now)
 
     def wake_at(self) -> float:
-        """When to call `tick` at the latest."""
+        """The latest time to call `tick`."""
         waits = (t.waits_since + self._patience_s for t in self.travellers)
         return min([*(t.wake_at() for t in self.travellers), *waits])
 
     def restart_supervisor(self, now: float) -> list[Said]:
-        """The played supervisor dies, and a new one hears what fleet adapters have retained."""
+        """Replace the played supervisor; the new one hears fleet adapters' retained messages."""
         if self._makes is None:
             return []
         self._supervisor = self._makes()
@@ -143,7 +143,7 @@ class PlayedNodes:
         self.failed = f"{traveller.waits_for} of {who} has not ended in {self._patience_s:.0f} s"
 
     def _say(self, said: list[Said], now: float) -> list[Said]:
-        """These messages, with the answers of the other played nodes."""
+        """Return these messages, with the answers of the other played nodes."""
         out = []
         for topic, message in said:
             out.append((topic, message))

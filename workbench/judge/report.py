@@ -1,4 +1,4 @@
-"""The verdict as a person, a program and a CI server read it."""
+"""Format the verdict for people, programs and CI servers."""
 
 from dataclasses import dataclass
 from datetime import datetime
@@ -18,9 +18,9 @@ NARROWEST: Final = 60
 
 @dataclass(frozen=True, slots=True)
 class Judgement:
-    """One judgement. `wall`: when it began (s since the epoch). `heard_s`: how long we listened.
-    `states`: how many the device sent. `others`: other devices of its kind. `notes`: remarks of the
-    listener."""
+    """One judgement. `wall`: its beginning (s since the epoch). `heard_s`: time of listening.
+    `states`: number heard. `others`: other devices of its kind. `notes`: the
+    listener's remarks."""
 
     kind: Kind
     name: str
@@ -32,19 +32,19 @@ class Judgement:
     notes: tuple[str, ...] = ()
 
     def of(self, verdict: Verdict) -> list[JudgedLaw]:
-        """The laws with this verdict."""
+        """Return the laws with this verdict."""
         return [judged for judged in self.judged if judged.verdict is verdict]
 
 
 def report(judge: Judge, judged: tuple[JudgedLaw, ...], heard_s: float, *notes: str) -> Judgement:
-    """What a judge has found."""
+    """Report a judge's findings."""
     wall, history = judge.first.wall if judge.first else 0.0, judge.history
     others = tuple(sorted(history.others))
     return Judgement(judge.kind, judge.name, wall, heard_s, history.states, others, judged, notes)
 
 
 def text(report: Judgement, width: int) -> str:
-    """One screen: broken laws first, with their evidence; a line for each other one."""
+    """Format one screen: broken laws first, with their evidence; a line for each other one."""
     name = words.printable(report.name)
     if not report.states:
         lines = [f"{report.kind} {name}: no state heard in {report.heard_s:.0f} s{_others(report)}"]
@@ -74,7 +74,7 @@ def _cut(sentence: str, room: int) -> str:
 
 
 def _time(wall: float) -> str:
-    """The local time of day, to the millisecond; the number where no calendar has it."""
+    """Format the local time of day, to the millisecond; a time beyond the calendar as a number."""
     try:
         return f"{datetime.fromtimestamp(wall):%H:%M:%S}.{int(wall * 1000) % 1000:03d}"
     except (OverflowError, ValueError, OSError):
@@ -93,7 +93,7 @@ def _others(report: Judgement) -> str:
 
 
 class LawJson(msgspec.Struct, frozen=True):
-    """A law as JSON has it."""
+    """A law in JSON."""
 
     id: str
     verdict: str
@@ -105,7 +105,7 @@ class LawJson(msgspec.Struct, frozen=True):
 
 
 class ReportJson(msgspec.Struct, frozen=True):
-    """A report as JSON has it."""
+    """A report in JSON."""
 
     kind: str
     name: str
@@ -123,7 +123,7 @@ def verdict(report: Judgement) -> Verdict:
 
 
 def as_json(report: Judgement) -> str:
-    """One JSON object."""
+    """Return one JSON object."""
     laws = tuple(
         LawJson(
             *(j.law.id, j.verdict, j.law.sentence, j.law.reason, j.law.source),
@@ -141,7 +141,7 @@ def as_json(report: Judgement) -> str:
 
 
 def junit(report: Judgement) -> str:
-    """JUnit's XML: each law a test case, a broken one a failure, one that was not seen skipped."""
+    """Return JUnit's XML: each law a test case, broken: failure, not seen: skipped."""
     suite = ElementTree.Element(
         "testsuite",
         name=words.printable(f"rmf-bridge judge {report.kind} {report.name}"),
@@ -173,7 +173,7 @@ def _case(suite: ElementTree.Element, report: Judgement, judged: JudgedLaw) -> N
 
 
 def markdown(kind: Kind) -> str:
-    """A kind's laws as the table of docs/reference/laws.md; * marks those that a wire can break too."""
+    """Return a kind's laws as a table for docs/reference/laws.md; *: a wire can break it too."""
     rows = [
         f"| `{law.id}`{'*' if law.sensed else ''} | {law.sentence} | {law.reason} | {law.source} |"
         for law in LAWS[kind]

@@ -1,4 +1,4 @@
-"""What is played for a lift, a door and a charger, when it may be, and how the device is released."""
+"""Plays for a lift, a door and a charger: their conditions, their course, and the device's release."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
@@ -20,7 +20,7 @@ from workbench.rmf_model.supervisors import DoorSupervisor, LiftSupervisor
 FLEET: Final = "rmf_bridge_judge"
 DRIVES_S: Final = 3.0
 DOORWAY_S: Final = 15.0
-"""Longer than any node waits that closes a door in silence."""
+"""Longer than the wait of any node that closes a door in silence."""
 SERVED: Final = (d.ChargerStateValue.CHARGER_ASSIGNED, d.ChargerStateValue.CHARGER_CHARGING)
 STRANGER: Final = f"{FLEET}/nobody"
 STAYS_S: Final = 5.0
@@ -31,7 +31,7 @@ START_TIMEOUT_S: Final = 30.0
 
 
 def busy(state: words.Stated) -> str:
-    """Why nothing may be played for this device now; "" if it is idle."""
+    """Return why nothing may be played for this device now; "" if it is idle."""
     match state:
         case d.LiftState():
             idle = not state.session_id and state.current_mode not in HAZARDS
@@ -43,9 +43,9 @@ def busy(state: words.Stated) -> str:
 
 
 class Scenario(ABC):
-    """A play, its topics, and its end. `speaks`: the topics that we publish; `sole`: those of them that
-    nobody else may publish, because two supervisors would spoil the test. After the play, however it
-    ended, `leave` is called every REPEAT_S until `left`."""
+    """A play, its topics, and its end. `speaks`: the topics that we publish; `sole`: those without
+    any other publisher, because two supervisors would spoil the test. However the play ends,
+    `leave` is then called every REPEAT_S until `left`."""
 
     speaks: tuple[AnyTopic, ...]
     hears: tuple[AnyTopic, ...]
@@ -54,16 +54,16 @@ class Scenario(ABC):
 
     @property
     def over(self) -> bool:
-        """Has it been played, or can it not go on?"""
+        """Is the play finished, or unable to go on?"""
         return bool(self.failed) or self.play.over
 
     @property
     def why(self) -> str:
-        """Why it was not played to its end; "" if it was."""
+        """Why the play did not reach its end; "" if it did."""
         return self.failed or self.play.failed
 
     def unfit(self, state: words.Stated) -> str:
-        """Why it may not be played now; "" if it may."""
+        """Return why it may not be played now; "" if allowed."""
         return busy(state)
 
     def begin(self, now: float) -> list[Said]:
@@ -71,15 +71,15 @@ class Scenario(ABC):
         return self.play.begin(now)
 
     def hear(self, topic: str, message: d.Message, now: float) -> list[Said]:
-        """A message of the graph."""
+        """Take a message of the graph."""
         return self.play.hear(topic, message, now)
 
     def tick(self, now: float) -> list[Said]:
-        """A timer is due."""
+        """Fire due timers."""
         return self.play.tick(now)
 
     def wake_at(self) -> float:
-        """When the next timer is due."""
+        """Time of the next timer."""
         return self.play.wake_at()
 
     @abstractmethod
@@ -140,7 +140,7 @@ class RideScenario(Scenario):
         yield EndLiftSession(self.lift)
 
     def unfit(self, state: words.Stated) -> str:
-        """A lift that is idle, and serves both floors."""
+        """Require an idle lift that serves both floors."""
         served = state.available_floors if isinstance(state, d.LiftState) else ()
         missing = [shown(floor) for floor in self._floors if served and floor not in served]
         if not missing:
@@ -148,7 +148,7 @@ class RideScenario(Scenario):
         return f"{', '.join(missing)}: it serves {', '.join(map(shown, served[:MOST_FLOORS]))}"
 
     def hear(self, topic: str, message: d.Message, now: float) -> list[Said]:
-        """States, until somebody else has the lift."""
+        """Take states, until another session has the lift."""
         if isinstance(message, d.LiftState) and message.lift_name == self.lift:
             self._state = message
             if message.session_id and message.session_id not in self.play.names:
@@ -169,7 +169,7 @@ class RideScenario(Scenario):
         return said
 
     def leave(self, now: float) -> list[Said]:
-        """END for each of us, as fleet adapters send it; with a floor if that does not help."""
+        """Send END for each of us, as fleet adapters do; with a floor if that has no effect."""
         self._leaving += 1
         floor = self._state.current_floor if self._state and self._leaving > 3 else ""
         ends = [self._end(name, floor, now) for name in sorted(self.play.names)]
@@ -186,7 +186,7 @@ class RideScenario(Scenario):
 
     @property
     def left(self) -> bool:
-        """END was sent, and the lift shows none of our sessions."""
+        """Was END sent, and does the lift show none of our sessions?"""
         free = self._state is None or self._state.session_id not in self.play.names
         return self._leaving > 0 and free
 
@@ -225,14 +225,14 @@ class PassageScenario(Scenario):
             yield from self._until_closed()
 
     def _until_closed(self) -> Iterator[Step]:
-        """RMF does not wait for it; the next passage is to begin at a closed door."""
+        """Wait until closed, so the next passage begins at a closed door; RMF would not wait."""
         for _ in range(30):
             if self._mode == d.DoorModeValue.MODE_CLOSED:
                 return
             yield 1.0
 
     def hear(self, topic: str, message: d.Message, now: float) -> list[Said]:
-        """States and heartbeats. A restart comes with the first state after the OPEN."""
+        """Take states and heartbeats. A restart comes with the first state after the OPEN."""
         if isinstance(message, d.DoorState) and message.door_name == self.door:
             self._mode = message.current_mode.value
         said = self.play.hear(topic, message, now)
@@ -242,7 +242,7 @@ class PassageScenario(Scenario):
         return said
 
     def leave(self, now: float) -> list[Said]:
-        """CLOSE, to the supervisor or in its name."""
+        """Send CLOSE, to the supervisor or in its name."""
         self._leaving += 1
         [name] = self.play.names
         closed = d.DoorModeValue.MODE_CLOSED
@@ -256,13 +256,13 @@ class PassageScenario(Scenario):
 
     @property
     def left(self) -> bool:
-        """CLOSE was sent, and the door is no longer OPEN."""
+        """Was CLOSE sent, and is the door no longer OPEN?"""
         return self._leaving > 0 and self._mode != d.DoorModeValue.MODE_OPEN
 
 
 @dataclass
 class _Asked:
-    """How far the request for a charger is: when each step was done (s)."""
+    """The progress of a charger's request: the time of each step (s)."""
 
     asked_at: float = NEVER
     assigned_at: float = NEVER
@@ -271,7 +271,7 @@ class _Asked:
 
 
 class ChargeScenario(Scenario):
-    """A station is requested, the request of another is cancelled, and then ours.
+    """Request a station, cancel another's request, then cancel ours.
 
     `robot`: FLEET/ROBOT. No robot need come.
     """
@@ -289,7 +289,7 @@ class ChargeScenario(Scenario):
 
     @property
     def over(self) -> bool:
-        """Our request is cancelled, or was never granted."""
+        """Is our request cancelled, or was it never granted?"""
         return bool(self.failed) or self._at.cancelled_at < NEVER
 
     def begin(self, now: float) -> list[Said]:
@@ -300,7 +300,7 @@ class ChargeScenario(Scenario):
         return [(topics.CHARGER_REQUESTS, request)]
 
     def hear(self, topic: str, message: d.Message, now: float) -> list[Said]:
-        """Its states, and a refusal."""
+        """Take its states, and a refusal."""
         if isinstance(message, d.DiagnosticStatus) and message.hardware_id == self.charger:
             if any((v.key, v.value) == ("request_id", self._id) for v in message.values):
                 self.failed = f"refused: {shown(message.message)}"
@@ -327,7 +327,7 @@ class ChargeScenario(Scenario):
         return []
 
     def wake_at(self) -> float:
-        """The cancel, or the end of our patience."""
+        """Time of the cancel, or of giving up."""
         if self._at.assigned_at < NEVER:
             return self._at.assigned_at + STAYS_S
         return self._at.asked_at + self._patience_s
@@ -339,7 +339,7 @@ class ChargeScenario(Scenario):
 
     @property
     def left(self) -> bool:
-        """The charger no longer serves our request."""
+        """Has the charger stopped serving our request?"""
         state = self._state
         shows = state is not None and state.state in SERVED and state.request_id == self._id
         return self._at.cancelled_at < NEVER and not shows

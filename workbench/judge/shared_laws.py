@@ -12,7 +12,7 @@ from workbench.judge.law import KEPT, Finding, Law
 AnyScene = History[Any]
 
 STALE_S: Final = 5.0
-"""No site may call a reading of this age fresh."""
+"""Age (s) at which no site may call a reading fresh."""
 BURST_WITHIN_S: Final = 1.0
 ANSWERS: Final = 5
 BACK_S: Final = 0.5
@@ -93,7 +93,7 @@ ANSWERED: Final[Law[AnyScene]] = Law(
     "RMF repeats its request at each state: a state for each request would loop for ever",
     "rmf_ros2 agv/RobotContext.cpp:1732-1735, lift_supervisor/Node.cpp:58-140",
     answers,
-    sensed=True,  # a noisy wire may change what is noted beside the state, ten times a second
+    sensed=True,  # a noisy wire may change the notes beside the state ten times a second
 )
 ONE: Final[Law[AnyScene]] = Law(
     "ONE",
@@ -112,5 +112,5 @@ STAMP: Final[Law[AnyScene]] = Law(
 
 
 def named(law: Law[AnyScene], id: str, **changes: Any) -> Law[Any]:
-    """A shared law under the number that it has in a kind's contract."""
+    """Return a shared law under its number in a kind's contract."""
     return replace(law, id=id, **changes)

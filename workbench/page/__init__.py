@@ -1,1 +1,1 @@
-"""The page: what is on RMF's graph, for people who look rather than read. A process of its own."""
+"""The page: a graphical view of RMF's graph, in its own process."""

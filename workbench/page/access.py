@@ -1,4 +1,4 @@
-"""Who may act on the page: passwords, sessions, and how often a wrong one may be tried.
+"""Access to the page's actions: passwords, sessions, and a limit of failed logins.
 
 A password file has a line `user:scrypt$N$r$p$salt$hash` for each user, as `rmf-bridge page --add-user`
 writes it: scrypt with a salt of its own (RFC 7914, from Python's hashlib).
@@ -47,13 +47,13 @@ def hashed(password: str) -> str:
 
 
 def matches(password: str, stored: str) -> bool:
-    """Whether it is this password. Raises PasswordError if `stored` is not one of our hashes."""
+    """Does the password match? Raises PasswordError if `stored` is not one of our hashes."""
     cost, salt, wanted = _parts(stored)
     return hmac.compare_digest(_scrypt(password, salt, *cost), wanted)
 
 
 def _parts(stored: str) -> tuple[tuple[int, int, int], bytes, bytes]:
-    """N, r and p, the salt and the hash. Raises PasswordError."""
+    """Return N, r and p, the salt and the hash. Raises PasswordError."""
     try:
         name, n, r, p, salt, expected = stored.split("$")
         cost = (int(n), int(r), int(p))
@@ -115,13 +115,13 @@ def add_user(file: Path, user: str, password: str) -> None:
 
 
 class Tries:
-    """How often an address has failed to log in. Bounded: the oldest ones are forgotten."""
+    """Failed logins by address. Bounded: the oldest are forgotten."""
 
     def __init__(self) -> None:
         self._failed_at: OrderedDict[str, list[float]] = OrderedDict()
 
     def allowed(self, address: str, now: float) -> bool:
-        """Whether it may try again."""
+        """May this address try again?"""
         recent = [at for at in self._failed_at.get(address, ()) if now - at < TRIES_IN_S]
         return len(recent) < TRIES
 
@@ -135,7 +135,7 @@ class Tries:
 
 @dataclass(slots=True)
 class LoginSession:
-    """Somebody who has logged in. `proof`: what a form must send back (CSRF)."""
+    """A logged-in user. `proof`: the token that a form must send back (CSRF)."""
 
     user: str
     began_at: float
@@ -144,7 +144,7 @@ class LoginSession:
 
 
 class LoginSessions:
-    """Who has logged in, by the secret of their cookie."""
+    """Logged-in users, by their cookies' secrets."""
 
     def __init__(self) -> None:
         self._by_secret: OrderedDict[str, LoginSession] = OrderedDict()
@@ -158,7 +158,7 @@ class LoginSessions:
         return secret
 
     def find(self, secret: str | None, now: float) -> LoginSession | None:
-        """The session of this cookie; None if there is none, or it is over."""
+        """Return this cookie's session; None if unknown or over."""
         session = self._by_secret.get(secret or "")
         if session is None or secret is None:
             return None
@@ -174,7 +174,7 @@ class LoginSessions:
 
 
 class PasswordCheck:
-    """Lets users in with a password, each address only so often."""
+    """Lets users in with a password, with a limit of tries for each address."""
 
     def __init__(self, known: Mapping[str, str]) -> None:
         self._known = known
@@ -182,7 +182,7 @@ class PasswordCheck:
         self._nobody = hashed(secrets.token_urlsafe(16))
 
     def refuses(self, user: str, password: str, address: str, now: float) -> str:
-        """Why this user may not come in; "" if they may. An unknown user takes as long to refuse."""
+        """Return why this user is refused; "" if let in. Refusing an unknown user takes as long."""
         if not self._tries.allowed(address, now):
             return "too many wrong passwords; wait a minute"
         right = matches(password[:1024], self._known.get(user, self._nobody))

@@ -1,4 +1,4 @@
-"""What somebody who has logged in may do, and the command that does it.
+"""The actions of a logged-in user, and their commands.
 
 The page has no rights and no topics of its own: each action is a command of this program, run as the
 page's user, as it would be in this machine's shell. Each is logged with who asked for it. Names come
@@ -43,7 +43,7 @@ class Action:
 
 @dataclass(frozen=True, slots=True)
 class Local:
-    """A daemon on this machine that serves the device: its YAML, and what a simulation can do.
+    """A daemon on this machine that serves the device: its YAML, and its simulation's actions.
 
     `presses`, `fails`: the signals and parts of its plant; none if it is not a simulation.
     """
@@ -66,14 +66,14 @@ class PastAction:
 
     @property
     def came(self) -> str:
-        """The outcome, in a few sentences."""
+        """Describe the outcome in a few sentences."""
         if self.code is None:
             return f"no answer within {TIMEOUT_S:.0f} s: check what the device does"
         return self.said.strip() or ("done" if self.code == 0 else f"exit code {self.code}")
 
 
 def actions(view: DeviceView, local: Local | None, graph: Sequence[str]) -> list[Action]:
-    """What can be done to this device. `graph`: the options that name the page's graph."""
+    """Return this device's actions. `graph`: the options that name the page's graph."""
     found = [*_on_graph(view, graph)]
     if local is not None:
         words = ("reset", *_runtime(local), "--", local.file)
@@ -113,14 +113,14 @@ def queue(name: str, robot: str, graph: Sequence[str]) -> Action:
 
 
 def press(local: Local, device: str, signal: str, on: bool) -> Action:
-    """In a simulation: somebody presses or lets go."""
+    """In a simulation: press or let go."""
     how = "on" if on else "off"
     words = ("press", f"--device={device}", *_runtime(local), "--", local.file, signal, how)
     return Action(f"Press {signal}", f"{signal} {how}, in the simulation?", words)
 
 
 def fail(local: Local, device: str, part: str, how: str) -> Action:
-    """In a simulation: a part fails, or is mended (`ok`)."""
+    """In a simulation: let a part fail, or mend it (`ok`)."""
     words = ("fail", f"--device={device}", *_runtime(local), "--", local.file, part, how)
     return Action(f"Fail {part}", f"{part} {how}, in the simulation?", words)
 
@@ -130,7 +130,7 @@ def _runtime(local: Local) -> tuple[str, ...]:
 
 
 class Deeds:
-    """Carries actions out, and remembers who did what."""
+    """Carries out actions, and remembers them with their users."""
 
     def __init__(self, folder: Path | None) -> None:
         """`folder`: where `actions.jsonl` is written, if anywhere."""
@@ -138,7 +138,7 @@ class Deeds:
         self.latest: deque[PastAction] = deque(maxlen=MOST_KEPT)
 
     async def do(self, action: Action, user: str) -> PastAction:
-        """Run the command. Never raises; `said` has what went wrong."""
+        """Run the command. Never raises; errors are in `said`."""
         code, said = await _run(action.words)
         done = PastAction(time.time(), user, action.text, code, said)
         self.latest.appendleft(done)
@@ -159,7 +159,7 @@ class Deeds:
 
 
 async def _run(words: Sequence[str]) -> tuple[int | None, str]:
-    """The exit code and the output's beginning; None if it was ended because it took too long."""
+    """Run it; return the exit code and the output's beginning; None after the time limit."""
     try:
         child = await asyncio.create_subprocess_exec(
             sys.executable,

@@ -35,7 +35,7 @@ class Buttons:
         self._graph = graph
 
     def show(self, key: Key, request: Request) -> None:
-        """The device's buttons, and who did what lately; nothing for a user who has not logged in."""
+        """Show the device's buttons and recent actions; nothing without a login."""
         if not self._login.user(request):
             return
         with ui.element("section").classes("panel wide-part").props('aria-label="Actions"'):
@@ -45,7 +45,7 @@ class Buttons:
             self._lately()
 
     def _lately(self) -> None:
-        """Who did what, the latest first."""
+        """Show recent actions and their users, the latest first."""
         place = part()
 
         def tell() -> None:

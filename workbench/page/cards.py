@@ -1,7 +1,7 @@
-"""What browsers show of the site: each card is drawn once, when it changes, for all of them.
+"""The site in browsers: each card is drawn once, when it changes, for all of them.
 
-Whatever has changed in a turn goes to each browser as one script, made once: a browser that had to
-understand an update for each card could not keep up with 300 of them in a second.
+The changes of a turn go to each browser as one script, made once: with an update for each card, a
+browser could not keep up with 300 of them in a second.
 """
 
 import json
@@ -16,7 +16,7 @@ from workbench.page.listener import Listener
 from workbench.page.live_site import DeviceView, LiveSite
 
 AGES_S: Final = 1.0
-"""How often (s) ages and silences, which change by themselves, are drawn again."""
+"""Seconds between drawings of ages and silences, which change by themselves."""
 Key = tuple[str, str]
 """A device's kind, and its name as it is shown."""
 
@@ -31,7 +31,7 @@ def place_of(key: Key) -> str:
 
 
 def script(changed: Mapping[str, str]) -> str:
-    """JavaScript that draws these elements again. `changed`: what is in each of them, by its id."""
+    """Return JavaScript that redraws these elements. `changed`: id -> content."""
     return (
         f"for (const [id, html] of Object.entries({json.dumps(changed)}))"
         " { const place = document.getElementById(id); if (place) place.innerHTML = html; }"
@@ -45,11 +45,11 @@ class Wall(Protocol):
         """Show a change, by this script."""
 
     def rebuild(self) -> None:
-        """Draw everything again: cards were added, or have gone."""
+        """Draw everything again: cards were added or removed."""
 
 
 class Cards:
-    """The cards, and the walls that they hang on."""
+    """The cards, and the walls that show them."""
 
     def __init__(
         self, site: LiveSite, listener: Listener, clock: Callable[[], float] = time.monotonic
@@ -63,7 +63,7 @@ class Cards:
         self._aged_at = float("-inf")
 
     def turn(self) -> None:
-        """Take what was heard, and draw what has changed since."""
+        """Take the messages heard, and draw the changes."""
         heard = self._listener.turn()
         now = self._clock()
         changed: dict[str, str] = {}
@@ -80,12 +80,12 @@ class Cards:
                 wall.change(told)
 
     def status(self) -> str:
-        """One line: what is heard, and what needs attention."""
+        """Return one line: the devices heard, and those that need attention."""
         told = " · ".join(self._told())
         return f'<p class="status" role="status">{told}</p>'
 
     def robots(self) -> str:
-        """The robots that fleets report."""
+        """Draw the robots that fleets report."""
         return drawing.robots(self._site.robots(), self._clock())
 
     def _told(self) -> Iterable[str]:
@@ -107,7 +107,7 @@ class Cards:
             yield f"{self._listener.cut} messages were too long and are shown in part"
 
     def _draw(self, every: Iterable[DeviceView]) -> dict[str, str]:
-        """The cards that have changed, by their places."""
+        """Draw the changed cards; return them by place."""
         changed, added = {}, False
         for shown in every:
             key = (shown.row.kind, shown.row.name)

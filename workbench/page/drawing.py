@@ -1,7 +1,7 @@
 """The site's devices as HTML and SVG: a shaft, a door, a charger, a robot. Pure.
 
 Every text goes through `html.escape`: names come from the network. Nothing is shown only by colour;
-each drawing says in words what it shows.
+each drawing has its meaning in words.
 """
 
 from collections.abc import Iterable, Sequence
@@ -15,9 +15,9 @@ from workbench.page.live_site import DeviceView, RobotShown, Stands
 
 OLD: Final = ' class="old"'
 LONGEST: Final = 160
-"""The most characters of a text on a card; the whole text is on the device's own page."""
+"""Limit of characters of a text on a card; the device's own page has the whole text."""
 MOST_FLOORS: Final = 40
-"""A shaft with more landings is not drawn; the words still say where the car is."""
+"""Limit of landings of a drawn shaft; beyond it, words alone give the car's place."""
 FLOOR_PX, SHAFT_PX, LABEL_PX = 22, 44, 46
 ARROWS: Final = {d.LiftMotion.MOTION_UP: "▲", d.LiftMotion.MOTION_DOWN: "▼"}
 LEAVES: Final = {"open": 0.12, "moving": 0.3, "closed": 0.5}
@@ -25,9 +25,9 @@ LEAVES: Final = {"open": 0.12, "moving": 0.3, "closed": 0.5}
 
 
 def card(view: DeviceView, *, before: DeviceView | None = None) -> str:
-    """One device, as a box that says what it is, how it stands and what is wrong.
+    """Draw one device as a box: name, state and faults.
 
-    `before`: as it was drawn the last time, so that its car is seen to move.
+    `before`: the last drawing's view, so the car's movement is visible.
     """
     row = view.row
     name = f"<h3>{_told(row.name)}</h3>"
@@ -43,7 +43,7 @@ def card(view: DeviceView, *, before: DeviceView | None = None) -> str:
 
 
 def path_of(kind: str, name: str) -> str:
-    """The device's own page."""
+    """Return the address of the device's own page."""
     return f"/{kind}/{quote(name, safe='')}"
 
 
@@ -74,7 +74,7 @@ def _facts(view: DeviceView) -> Iterable[str]:
 
 
 def had(stands: Stands) -> str:
-    """In minutes, so that a card does not change every second: `at least 12 min`."""
+    """Format in minutes, so a card does not change every second: `at least 12 min`."""
     minutes = int(stands.for_s // 60)
     if stands.at_least:
         return f"at least {minutes} min" if minutes else "since before this page heard of it"
@@ -86,7 +86,7 @@ def _fact(name: str, value: str) -> str:
 
 
 def _told(text: str) -> str:
-    """As HTML; of a long text its beginning."""
+    """Format as HTML; of a long text its beginning."""
     return escape(text if len(text) <= LONGEST else f"{text[:LONGEST]}…")
 
 
@@ -105,9 +105,9 @@ def _picture(view: DeviceView, before: DeviceView | None) -> str:
 
 
 def shaft(state: d.LiftState, left: str = "", *, old: bool = False) -> str:
-    """A lift's shaft: its floors, highest at the top, the car at its floor, its door and direction.
+    """Draw a lift's shaft: floors, highest at the top, car at its floor, door and direction.
 
-    `left`: the floor that the car was drawn at before.
+    `left`: the car's floor in the last drawing.
     """
     floors = floors_of(state)
     if not floors:
@@ -143,7 +143,7 @@ def _car(state: d.LiftState, floors: Sequence[str], left: str) -> str:
 
 
 def floors_of(state: d.LiftState) -> list[str]:
-    """The landings from the top down (RMF lists them from the bottom up); empty if there are too
+    """Return the landings from the top down (RMF lists them from the bottom up); empty if too
     many."""
     floors = list(dict.fromkeys(state.available_floors))
     return floors[::-1] if len(floors) <= MOST_FLOORS else []
@@ -158,7 +158,7 @@ def _short(text: str) -> str:
 
 
 def _leaves(x: float, y: float, width: float, height: float, door: str) -> str:
-    """A car or doorway with two leaves: apart, together, or between; hatched if unknown."""
+    """Draw a car or doorway with two leaves: apart, together, or between; hatched if unknown."""
     share = LEAVES.get(door)
     frame = _rect("car", x, y, width, height)
     if share is None:
@@ -190,7 +190,7 @@ def _svg(width: float, height: float, said: str, inner: str) -> str:
 
 
 def robots(found: Sequence[RobotShown], now: float) -> str:
-    """The robots that fleets report, as a table."""
+    """Draw the robots that fleets report, as a table."""
     if not found:
         return ""
     rows = "".join(_robot(one, now) for one in found)

@@ -10,12 +10,12 @@ from workbench.page.tables import table
 
 
 def explanation(found: Explanation) -> str:
-    """The sentences, what RMF checks, who has to act next, and the faults with what to do."""
+    """Format the sentences, RMF's conditions, the party to act next, and the faults with remedies."""
     return "".join(_parts(found))
 
 
 def timeline(svg: str) -> str:
-    """A timeline's picture; on a narrow screen it scrolls inside, by keyboard too."""
+    """Format a timeline's picture; on a narrow screen it scrolls, by keyboard too."""
     return f'<div class="timeline" tabindex="0" role="region" aria-label="Timeline">{svg}</div>'
 
 
@@ -41,7 +41,7 @@ def _parts(found: Explanation) -> Iterator[str]:
 
 
 def story(found: Explanation) -> str:
-    """What happened, line by line."""
+    """Format the events, line by line."""
     if not found.story:
         return "<p>Nothing was heard of it.</p>"
     last = found.story[-1]

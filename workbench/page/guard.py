@@ -1,9 +1,9 @@
-"""What every request to the page must pass before anything else sees it: its Host, its Origin, a login,
-and that it is whole, in bounded time and size.
+"""Guard the page: before anything else, check each request's Host, Origin and login, and that it is
+whole, in bounded time and size.
 
-A page on 127.0.0.1 can be reached by any web site that the same browser has open: by a name that is
+A page on 127.0.0.1 can be reached by any web site that the same browser has open: by a name
 made to resolve to 127.0.0.1 (DNS rebinding), or by a socket or form of another origin. So only the
-names that the page was given are answered, and only its own origin may open its socket or post.
+page's configured names are answered, and only its own origin may open its socket or post.
 """
 
 import asyncio
@@ -18,9 +18,9 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 MOST_BODY: Final = 64 * 1024
 BODY_S: Final = 5.0
-"""How long (s) a request may take to come."""
+"""Time limit (s) of receiving a request."""
 ANSWER_S: Final = 120.0
-"""How long (s) an answer may take to go: a recording of 16 MB in 1 Mbit/s."""
+"""Time limit (s) of sending an answer: a recording of 16 MB in 1 Mbit/s."""
 HEADERS: Final = {
     "content-security-policy": "default-src 'self'; script-src 'self' 'unsafe-inline' 'unsafe-eval';"
     " style-src 'self' 'unsafe-inline'; img-src 'self' data:; font-src 'self' data:;"
@@ -34,7 +34,7 @@ HEADERS: Final = {
 
 @dataclass(frozen=True, slots=True)
 class HttpRefusal:
-    """Why a request is not answered. `to`: where it is sent instead, if anywhere."""
+    """Why a request is not answered. `to`: the address it is redirected to, if any."""
 
     status: int
     why: str
@@ -42,7 +42,7 @@ class HttpRefusal:
 
 
 def refused(scope: Scope, hosts: Collection[str]) -> str:
-    """Why this request is not answered; "" if it is. `hosts`: names, with or without a port.
+    """Return why this request is refused; "" if answered. `hosts`: names, with or without a port.
 
     An address is answered as well: only a name can be made to resolve to another machine.
     """
@@ -62,7 +62,7 @@ def refused(scope: Scope, hosts: Collection[str]) -> str:
 
 
 def host_of(netloc: str) -> str:
-    """Without the port: `[::1]:8080` is `[::1]`."""
+    """Return the host without its port: `[::1]` for `[::1]:8080`."""
     name, colon, port = netloc.rpartition(":")
     return name if colon and port.isdecimal() else netloc
 
@@ -78,7 +78,7 @@ def _is_address(host: str) -> bool:
 class RequestGuard:
     """The outermost layer of the page.
 
-    `gate`: what else is asked of a request whose Host and Origin are right.
+    `gate`: the further check of requests with the right Host and Origin.
     """
 
     def __init__(
@@ -89,7 +89,7 @@ class RequestGuard:
         self._gate = gate
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """ASGI."""
+        """Handle a connection (ASGI)."""
         if scope["type"] not in ("http", "websocket"):
             await self._app(scope, receive, send)
             return
@@ -117,7 +117,7 @@ class RequestGuard:
 
 
 async def _whole(receive: Receive) -> tuple[Receive, HttpRefusal | None]:
-    """The same request with its body read, or why it is refused."""
+    """Return the request with its body read, or why it is refused."""
     body, more = b"", True
     try:
         async with asyncio.timeout(BODY_S):

@@ -1,4 +1,4 @@
-"""The head of every view: its title, links to the others, and who has logged in."""
+"""The head of every view: its title, links to the others, and the user."""
 
 from html import escape
 from typing import Final
@@ -12,7 +12,7 @@ from workbench.page.login import Login
 BLUE: Final = "#005a93"
 """The colour of buttons: white text is readable on it in both themes."""
 GREEN: Final = "#00674c"
-"""The colour of success; white text is not readable on the library's own."""
+"""The colour of success; on the library's own, white text is unreadable."""
 
 
 def head(title: str, login: Login, request: Request) -> None:
@@ -33,5 +33,5 @@ def main(style: str = "") -> ui.element:
 
 
 def part(html: str = "", style: str = "") -> ui.html:
-    """A part that is set again. `html`: our own markup, in which every text is escaped."""
+    """Make a part whose content is replaced later. `html`: our own markup with every text escaped."""
     return ui.html(html, sanitize=False).classes(style)

@@ -48,7 +48,7 @@ class IncidentViews:
         await self._view(self._path(name), client, _download(name))
 
     async def alone(self, request: Request, client: Client) -> None:
-        """The recording that the page was started for."""
+        """Show the only recording, given at the page's start."""
         assert self._recording is not None
         head(self._recording.name, self._login, request)
         await self._view(self._recording, client)
@@ -76,7 +76,7 @@ class IncidentViews:
         return f'<ul class="incidents">{items}</ul>' if items else "<p>There are no incidents.</p>"
 
     async def _view(self, path: Path | None, client: Client, link: str = "") -> None:
-        """Show the view at once, and fill it when the recording has been read, which may take long."""
+        """Show the view at once, and fill it once the recording is read, which may take long."""
         with main():
             if path is None:
                 part("<p>There is no incident of that name.</p>")

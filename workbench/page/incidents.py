@@ -1,4 +1,4 @@
-"""The folder of recordings: what is in it, and one of them understood. No other folder is ever read.
+"""List the folder of recordings, and explain one of them. No other folder is ever read.
 
 A recording may come from elsewhere and be hostile, so it is read in a process of its own
 (`python -m workbench.page.incidents FILE`) with limited memory and time.
@@ -28,19 +28,19 @@ from workbench.replay.sources import BagError, Notes
 SUFFIX: Final = ".mcap"
 MOST_LISTED: Final = 500
 MOST_DEVICES: Final = 50
-"""The most devices shown of one recording; more are counted."""
+"""Limit of devices shown of one recording; the others are counted."""
 LONGEST_S: Final = 20.0
 """A recording is read for this long (s) at most; the page says that the rest is left out."""
 
 ENDED_S: Final = 60.0
-"""Its process is ended after this long (s): the recording is full of messages that are not RMF's."""
+"""Its process is ended after this time (s): the recording is full of messages other than RMF's."""
 MOST_MEMORY: Final = 128 << 20
 """The memory of its process (bytes), which shares the unit's 256 MB with the page."""
 
 
 @dataclass(frozen=True, slots=True)
 class File:
-    """A recording in the folder. `wall`: when it was written last (s since the epoch)."""
+    """A recording in the folder. `wall`: time of the last write (s since the epoch)."""
 
     name: str
     size: int
@@ -49,14 +49,14 @@ class File:
 
 @dataclass(frozen=True, slots=True)
 class ExplainedRecording:
-    """What a recording tells: each device's explanation and timeline, and what could not be read."""
+    """An explained recording: each device's explanation and timeline, and the unreadable parts."""
 
     devices: tuple[tuple[Explanation, Timeline], ...]
     notes: tuple[str, ...]
 
 
 def listed(folder: Path) -> list[File]:
-    """The newest recordings first. Raises OSError."""
+    """List recordings, newest first. Raises OSError."""
     found = sorted(_files(folder), key=lambda one: one.wall, reverse=True)
     return found[:MOST_LISTED]
 
@@ -69,12 +69,12 @@ def _files(folder: Path) -> Iterator[File]:
 
 
 def path_in(folder: Path, name: str) -> Path | None:
-    """The recording of this name in the folder; None if there is none, whatever the name says."""
+    """Return the recording of this name in the folder; None for every other name."""
     return next((folder / one.name for one in _files(folder) if one.name == name), None)
 
 
 async def read_apart(path: Path) -> ExplainedRecording:
-    """`read`, in a process of its own. Raises BagError."""
+    """Run `read` in its own process. Raises BagError."""
     child = await asyncio.create_subprocess_exec(
         sys.executable,
         "-P",
@@ -110,7 +110,7 @@ def main(path: Path) -> int:
 
 
 def read(path: Path, remedies: Remedies) -> ExplainedRecording:
-    """The whole recording, in bounded time. Raises BagError if it is none."""
+    """Read the recording in bounded time. Raises BagError if it is none."""
     notes, story = Notes(), heard_devices.HeardDevices()
     cut = not _all_of(path, notes, story.take)
     devices = story.devices()
@@ -126,7 +126,7 @@ def read(path: Path, remedies: Remedies) -> ExplainedRecording:
 
 
 def _all_of(path: Path, notes: Notes, take: Callable[[Heard], None]) -> bool:
-    """Whether the time was enough for all of it."""
+    """Take all messages. True if the time was enough."""
     until = time.monotonic() + LONGEST_S
     for heard in heard_in(path, notes):
         take(heard)

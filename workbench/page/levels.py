@@ -1,6 +1,6 @@
-"""What a daemon on this machine senses and drives now, from the ring that it writes.
+"""The present inputs and outputs of a daemon on this machine, from its ring.
 
-The ring has what the driver made of the contacts, and what the core decided; no voltages.
+The ring has the driver's decoding of the contacts and the core's decisions; no voltages.
 """
 
 from collections.abc import Iterable, Iterator, Mapping
@@ -12,7 +12,7 @@ from bridges.blackbox.ring import NAME, RingError, Tail
 from bridges.blackbox.value_codec import HOLDS, TYPE, Tree
 
 Rows = Mapping[str, str]
-"""What something is called, and what it is now."""
+"""A name and its present value."""
 
 
 class Levels:
@@ -26,7 +26,7 @@ class Levels:
         self._inode = 0
 
     def look(self) -> None:
-        """Read what is new; a ring that is missing or cannot be read leaves nothing known."""
+        """Read new entries; without a readable ring nothing is known."""
         try:
             inode = self._path.stat().st_ino
             if self._tail is None or inode != self._inode:
@@ -37,7 +37,7 @@ class Levels:
             self.sensed, self.driven = {}, {}
 
     def take(self, entries: Iterable[AnyEntry]) -> None:
-        """Entries of the ring, in their order."""
+        """Take entries of the ring, in order."""
         for entry in entries:
             if isinstance(entry, Known):
                 self._event(entry.subject, entry.reading)
@@ -68,7 +68,7 @@ def _fields(tree: Tree) -> Iterator[tuple[str, str]]:
 
 
 def in_words(value: Tree) -> str:
-    """A value in a few words."""
+    """Describe a value in a few words."""
     match value:
         case None | "":
             return "-"

@@ -18,7 +18,7 @@ from workbench.page.live_site import HEARD, LiveSite
 log = logging.getLogger(__name__)
 
 WAITING: Final = 20_000
-"""The most messages that wait for the site. More come only in a flood: they are lost, and counted."""
+"""Limit of waiting messages. More come only in a flood, and are dropped and counted."""
 LONGEST_TURN_S: Final = 0.05
 """A flood must not keep the browsers waiting."""
 AGAIN_S: Final = 3.0
@@ -54,7 +54,7 @@ class Listener:
             self.lost += 1
 
     def turn(self) -> bool:
-        """Take what has arrived, on the caller's thread. True if there was anything."""
+        """Take the waiting messages, on the caller's thread. True if there were any."""
         any_heard = False
         until = time.monotonic() + LONGEST_TURN_S
         while time.monotonic() < until:

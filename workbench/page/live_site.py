@@ -1,7 +1,7 @@
-"""What the page knows of RMF's graph: each device's latest state, and its last ten minutes.
+"""The page's memory of RMF's graph: each device's latest state, and its last ten minutes.
 
-Pure: time comes with each message. Names come from the network, where anybody may make them up, so
-everything has a bound, and known devices stay whatever comes later.
+Pure: time comes with each message. Anybody on the network may make names up, so everything
+has a bound, and known devices are never displaced by later ones.
 """
 
 from collections.abc import Sequence
@@ -30,7 +30,7 @@ from workbench.graph.board import Board, BoardRow
 KEPT_S: Final = 600.0
 """The past that a device's page shows."""
 MOST_LINES: Final = 100
-"""The most story lines of one device. Its view shows forty. With six hundred each a large site takes
+"""Limit of story lines of one device. Its view shows forty. With six hundred each a large site takes
 150 MB."""
 MOST_ROBOTS: Final = 500
 
@@ -56,7 +56,7 @@ HEARD: Final[tuple[AnyTopic, ...]] = (
 
 @dataclass(frozen=True, slots=True)
 class RobotShown:
-    """A robot, as its fleet says."""
+    """A robot as its fleet reports it."""
 
     fleet: str
     state: d.RobotState
@@ -65,7 +65,7 @@ class RobotShown:
 
 @dataclass(frozen=True, slots=True)
 class Stands:
-    """How long a robot has had a charger (s). `at_least`: it had it when the page began to listen."""
+    """Time (s) since a robot got its charger. `at_least`: the page began to listen later."""
 
     for_s: float
     at_least: bool
@@ -73,9 +73,9 @@ class Stands:
 
 @dataclass(frozen=True, slots=True)
 class DeviceView:
-    """A device as the page draws it: its row, as `watch` has it, and its last state if it has one.
+    """A device as the page draws it: its row from `watch`, and its last state, if any.
 
-    `stands`: how long its robot has had a charger.
+    `stands`: its robot's time at the charger.
     """
 
     row: BoardRow
@@ -97,11 +97,11 @@ class LiveSite:
 
     @property
     def crowded(self) -> set[Kind]:
-        """The kinds of which some devices had no room."""
+        """The kinds with devices dropped for lack of room."""
         return self._story.crowded
 
     def take(self, heard: Heard) -> None:
-        """One message of the graph."""
+        """Take a message of the graph."""
         self.heard_at = heard.at
         message = heard.message
         if isinstance(message, Stated):
@@ -121,26 +121,26 @@ class LiveSite:
             self._board.note(heard)
 
     def devices(self, now: float, wall: float) -> list[DeviceView]:
-        """All devices, coordinators and scheduled robots. `now`: monotonic s; `wall`: stamps' clock."""
+        """Return all devices, coordinators and scheduled robots. `now`: monotonic s; `wall`: stamps' clock."""
         every, rows = self._story.stated(), self._board.rows(now, wall)
         shown = {f"{one.kind} {words.printable(one.id)}": one for one in every}
         return [_view(row, shown.get(f"{row.kind} {row.name}")) for row in rows]
 
     def changed(self, now: float, wall: float) -> list[DeviceView]:
-        """The devices that were heard of since this was asked last."""
+        """Return the devices with messages since the last call."""
         changed, self._changed = self._changed, set()
         known = [found for key in sorted(changed) if (found := self._device(key))]
         rows = self._board.rows_of(known, now, wall)
         return [_view(row, device) for row, device in zip(rows, known, strict=True)]
 
     def knows(self, kind: str, name: str) -> bool:
-        """Whether the device of this printed name is still known; what has no states always is."""
+        """Is the device of this printed name still known? Always true for those without states."""
         return kind not in KINDS or self._found(kind, name) is not None
 
     def explain(
         self, kind: str, name: str, now: float, wall: float, remedies: Remedies
     ) -> Explanation | None:
-        """Why somebody waits for this device, or what it does."""
+        """Explain why somebody waits for this device, or its activity."""
         device = self._found(kind, name)
         if device is None:
             return None
@@ -148,36 +148,36 @@ class LiveSite:
         return self._story.explain(device.kind, device.id, None, remedies)
 
     def timeline(self, kind: str, name: str, now: float) -> Timeline | None:
-        """The last ten minutes of a device; `name` as it is shown."""
+        """Return the last ten minutes of a device; `name`: as shown."""
         device = self._found(kind, name)
         drawing = self._drawings.get((device.kind, device.id)) if device else None
         return drawing.timeline(now - KEPT_S) if drawing else None
 
     def _found(self, kind: str, name: str) -> Device | None:
-        """The device of this name, as it is shown."""
+        """Return the device of this shown name."""
         for known in (one for one in KINDS if one == kind):
             every = (one for one in self._story.stated(known) if words.printable(one.id) == name)
             return self._device((known, name)) or next(every, None)
         return None
 
     def _device(self, key: Key) -> Device | None:
-        """The device, if it has published a state."""
+        """Return the device, if it has published a state."""
         found = self._story.known.get(key)
         return found if found is not None and found.state is not None else None
 
     def robots(self) -> list[RobotShown]:
-        """The robots that fleets report, by fleet and name."""
+        """Return the robots that fleets report, by fleet and name."""
         return [robot for _, robot in sorted(self._robots.items())]
 
     def _about(self, key: Key, heard: Heard) -> None:
-        """A request, a cancel or a refusal. None is kept for a device that does not exist: anybody can
-        ask for anything."""
+        """Take a request, a cancel or a refusal. None is kept for an unknown device: anybody can
+        request anything."""
         if self._device(key):
             self._story.take(heard)
             self._remember(key, heard)
 
     def _remember(self, key: Key, heard: Heard) -> None:
-        """What the device's timeline shows."""
+        """Remember a message for the device's timeline."""
         if not self._device(key):
             return
         if key not in self._drawings:
@@ -217,7 +217,7 @@ class LiveSite:
 
 
 def _view(row: BoardRow, device: Device | None) -> DeviceView:
-    """What is drawn. A robot has had its charger as long as that is seen, until its last state."""
+    """Return the view to draw. A robot's time at its charger runs until the last state seen."""
     stands = None
     if isinstance(device, ObservedCharger) and device.last_state and device.robot.value != NOBODY:
         since = device.robot.since

@@ -1,4 +1,4 @@
-"""The daemons on this machine, as far as the page's user may see them: which YAML serves a device.
+"""The daemons on this machine that the page's user may see, and the YAML that serves each device.
 
 It reads what `rmf-bridge status` reads, and asks a simulation for the names of its signals and parts.
 """
@@ -21,9 +21,9 @@ from workbench.page.levels import Levels, Rows
 
 @dataclass(frozen=True, slots=True)
 class ServedDevice:
-    """A device that a daemon here serves: its YAML, what it senses and what it drives now.
+    """A device served by a daemon here: its YAML, present inputs and outputs.
 
-    `contacts`: each known signal, and whether it is asserted.
+    `contacts`: known signal -> is it asserted?
     """
 
     local: Local
@@ -33,7 +33,7 @@ class ServedDevice:
 
 
 class LocalDaemons:
-    """What was seen of this machine's daemons the last time. `served`: by kind and name."""
+    """This machine's daemons when last looked at. `served`: by kind and name."""
 
     def __init__(self, base: Path | None) -> None:
         """`base`: the folder of runtime directories, if not where `run` and systemd make them."""

@@ -1,4 +1,4 @@
-"""Who asks for a page: by the cookie of a login, or by the header of a trusted proxy.
+"""Identify the user of a request: by a login's cookie, or by a trusted proxy's header.
 
 A session's cookie is HttpOnly and SameSite=Strict, and Secure where the
 form came over TLS; a form carries a proof beside it. The header of a
@@ -33,7 +33,7 @@ FORM: Final = """<!doctype html><html lang="en"><head><meta charset="utf-8">
 
 
 class Login:
-    """Knows who asks. Without a password file and a proxy nobody can log in, and nobody may act."""
+    """Identifies users. Without a password file and a proxy nobody can log in, and nobody may act."""
 
     def __init__(self, door: PasswordCheck | None, *, proxy: str = "", header: str = "") -> None:
         """`proxy`: the address whose `header` names the user."""
@@ -44,14 +44,14 @@ class Login:
         self._one_at_a_time = asyncio.Lock()
 
     def user(self, request: HTTPConnection) -> str:
-        """Who asks; "" for somebody who has not logged in."""
+        """Return the user; "" without a login."""
         if self._proxy and request.client and request.client.host == self._proxy:
             return printable(request.headers.get(self._header, ""))[:64]
         session = self._sessions.find(request.cookies.get(COOKIE), time.monotonic())
         return session.user if session else ""
 
     def form(self, request: Request, user: str) -> str:
-        """HTML for the head of a page: who is logged in, or the way to log in."""
+        """Return HTML for the head of a page: the user, or the link to the login."""
         session = self._sessions.find(request.cookies.get(COOKIE), time.monotonic())
         if user and session:
             return (
@@ -66,7 +66,7 @@ class Login:
         return f'<p class="who"><a href="/login?next={quote(request.url.path)}">Log in</a></p>'
 
     def show(self, request: Request) -> HTMLResponse:
-        """The form in which somebody logs in."""
+        """Show the login form."""
         return self._page(request)
 
     def _page(self, request: Request, why: str = "", status: int = 200) -> HTMLResponse:
@@ -100,7 +100,7 @@ class Login:
         return answer
 
     async def log_out(self, request: Request) -> Response:
-        """End the session, if the form is ours."""
+        """End the session, if the form carries its proof."""
         secret = request.cookies.get(COOKIE)
         session = self._sessions.find(secret, time.monotonic())
         fields = await _fields(request)
@@ -113,7 +113,7 @@ class Login:
 
 
 async def _fields(request: Request) -> dict[str, str]:
-    """A form's fields; none of a form with too many."""
+    """Return a form's fields; none of a form with too many."""
     try:
         found = parse_qs((await request.body()).decode(errors="replace"), max_num_fields=10)
     except ValueError:
@@ -122,7 +122,7 @@ async def _fields(request: Request) -> dict[str, str]:
 
 
 def _next(request: Request) -> str:
-    """Where to go afterwards: a path of this page alone."""
+    """Return the next address: only a path of this page."""
     path = request.query_params.get("next", "/")
     plain = path.startswith("/") and not path.startswith(("//", "/\\")) and path.isprintable()
     return path if plain else "/"

@@ -1,4 +1,4 @@
-"""Which connections have sent no request for too long."""
+"""Find connections that have sent no request for too long."""
 
 from collections.abc import Hashable, Iterable
 from typing import Final
@@ -9,13 +9,13 @@ for ever."""
 
 
 class Silent:
-    """Since when each connection has sent no request."""
+    """Connection -> time since which it has sent no request."""
 
     def __init__(self) -> None:
         self._since: dict[Hashable, float] = {}
 
     def too_long(self, there: Iterable[Hashable], now: float) -> list[Hashable]:
-        """Those of `there` that have sent none for longer than MOST_SILENT_S. All others are
-        forgotten."""
+        """Return those of `there` that have sent none for longer than MOST_SILENT_S. Forget all
+        others."""
         self._since = {one: self._since.get(one, now) for one in there}
         return [one for one, since in self._since.items() if now - since > MOST_SILENT_S]

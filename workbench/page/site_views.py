@@ -39,7 +39,7 @@ NOT_HERE: Final = (
 
 
 class SiteWall:
-    """One browser's view of the site. It has few elements of the library's, because a browser goes
+    """One browser's view of the site. It has few elements of the library, because a browser goes
     through all of them at each update."""
 
     def __init__(self, cards: Cards, client: Client) -> None:
@@ -55,7 +55,7 @@ class SiteWall:
         self.rebuild()
 
     def change(self, script: str) -> None:
-        """Nothing is kept for a browser that is away; when it is back, all is built again."""
+        """Send a change; skip a browser that is away: on its return all is rebuilt."""
         if not self._client.has_socket_connection:
             self._missed = True
         elif self._missed:
@@ -66,7 +66,7 @@ class SiteWall:
     def rebuild(self) -> None:
         """Draw all cards that match the search, by kind and name."""
         self._missed = not self._client.has_socket_connection
-        self._built += 1  # what is the same as before would not be sent
+        self._built += 1  # equal content would not be sent
         wanted = str(self._find.value or "").lower()
         html = "".join(self._section(*section, wanted) for section in SECTIONS)
         none = "<p>No device is shown.</p>"
@@ -78,7 +78,7 @@ class SiteWall:
         return f'<h2>{title}</h2><div class="cards">{slots}</div>' if keys else ""
 
     def _slot(self, key: Key) -> str:
-        """The link stands beside what is drawn again, so that it keeps the keyboard's focus."""
+        """Make a card's slot. The link is outside the redrawn part, to keep the keyboard's focus."""
         card = f'<div id="{place_of(key)}">{self._cards.cards[key]}</div>'
         name, path = escape(key[1]), path_of(*key)
         link = f'<a class="cover" href="{path}" aria-label="{name}"></a>' if key[0] in KINDS else ""
@@ -111,7 +111,7 @@ class SiteViews:
             ui.page(f"/{kind}/{{name:path}}", title="Device")(partial(self.device, kind))
 
     def site(self, request: Request, client: Client) -> None:
-        """Everything, as a wall of cards."""
+        """Show everything, as a wall of cards."""
         head("Site", self._login, request)
         with main():
             wall = SiteWall(self._cards, client)
@@ -119,7 +119,7 @@ class SiteViews:
         client.on_delete(lambda: self._cards.walls.remove(wall))
 
     def device(self, kind: str, name: str, request: Request) -> None:
-        """One device."""
+        """Show one device."""
         head(name, self._login, request)
         key = (kind, name)
         with main("device"):

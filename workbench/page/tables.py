@@ -28,7 +28,7 @@ def table(headings: Sequence[str], rows: Iterable[Sequence[str]], caption: str) 
 def wiring(file: str, device: str, contacts: Mapping[str, bool]) -> str:
     """The tables of the device's YAML, wires and limits, as `rmf-bridge check` prints them.
 
-    `contacts`: each known signal, and whether it is asserted: a column of the wires.
+    `contacts`: known signal -> is it asserted? Shown as a column of the wires.
     """
     found = _tables(file, _changed_at(file), device)
     if isinstance(found, str):
@@ -51,7 +51,7 @@ def _now(asserted: bool | None, active: str) -> str:
 
 
 def levels(sensed: Mapping[str, str], driven: Mapping[str, str]) -> str:
-    """What a daemon senses and drives now."""
+    """Return a daemon's present inputs and outputs as tables."""
     if not sensed and not driven:
         return f"<p>{NO_RING}</p>"
     rows = [(name, "sensed", value) for name, value in sensed.items()]
@@ -68,7 +68,7 @@ def _changed_at(file: str) -> float:
 
 @lru_cache(maxsize=64)
 def _tables(file: str, changed_at: float, device: str) -> list[Table] | str:
-    """The tables, or why there are none. `changed_at`: a file that has changed is read again."""
+    """Return the tables, or why there are none. `changed_at`: rereads a changed file."""
     try:
         config = load(Path(file))
     except SettingsError as error:

@@ -1,6 +1,6 @@
-"""The page's application: which view is at which address, who is let in, and the process that serves.
+"""The page's application: the views' addresses, admission, and the serving process.
 
-NiceGUI is imported here and in the views alone. What a browser does reaches the graph only by a
+NiceGUI is imported here and in the views alone. A browser's actions reach the graph only by a
 command (`actions.py`).
 """
 
@@ -44,9 +44,9 @@ log = logging.getLogger(__name__)
 PUMP_S: Final = 0.1
 HERE_S: Final = 1.0
 RECONNECT_S: Final = 30.0
-"""A browser that is away for longer loads its view again."""
+"""A browser that is away for longer (s) reloads its view."""
 MOST_HISTORY: Final = 100
-"""How many missed updates a browser is sent when it is back; after more it loads its view again."""
+"""Limit of missed updates sent to a returning browser; after more it reloads its view."""
 MOST_CONNECTIONS: Final = 200
 MOST_BYTES: Final = 64 * 1024
 """The longest message from a browser; the library's own are a hundredth of it."""
@@ -58,20 +58,20 @@ LIBRARY: Final = "/_nicegui/"
 SOCKET: Final = "/_nicegui_ws/"
 LOOK_S: Final = 1.0
 QUIET_S: Final = 60.0
-"""How often (s) at most it is said that browsers do not read."""
+"""Least time (s) between log lines about browsers that do not read."""
 MOST_WAITING: Final = 50
-"""The most unread packets of a browser: about five seconds of them. A browser that reads has a few."""
+"""Limit of a browser's unread packets: those of about five seconds. A browser that reads has a few."""
 
 
 class Gate:
-    """Who may look at the page, and how many browsers at once. `closed`: only logged-in users."""
+    """Admission of browsers, up to a number at once. `closed`: only logged-in users."""
 
     def __init__(self, login: Login, *, closed: bool) -> None:
         self._login = login
         self._closed = closed
 
     def __call__(self, scope: Scope) -> HttpRefusal | None:
-        """Why a request is not answered; None if it is."""
+        """Return why a request is refused; None if answered."""
         path = str(scope["path"])
         if path in OF_EVERYBODY or path.startswith(LIBRARY):
             return None
@@ -159,12 +159,12 @@ async def _pump(cards: Cards) -> None:
         await asyncio.sleep(PUMP_S)
         try:
             cards.turn()
-        except Exception:  # the page goes on, whatever a message does to one card
+        except Exception:  # an error in one card must not stop the page
             log.exception("page")
 
 
 async def _look(here: LocalDaemons) -> None:
-    """See which daemons are on this machine, off the pump's path."""
+    """Look for this machine's daemons, without delaying the pump."""
     while True:
         with suppress(OSError):
             await asyncio.to_thread(here.look)
@@ -172,7 +172,7 @@ async def _look(here: LocalDaemons) -> None:
 
 
 async def _end_useless() -> None:
-    """For ever: end the connection of a browser that does not read, and one that sends no request."""
+    """Endlessly end connections of browsers that do not read or send no request."""
     silent = Silent()
     ended: set[object] = set()
     told_at = AGES_AGO
@@ -193,7 +193,7 @@ def _unasked(connections: Iterable[Any]) -> Iterator[tuple[Hashable, Any]]:
 
 
 async def _end_deaf(ended: set[object], told_at: float) -> float:
-    """`ended`: which were ended before, and may take a while to go. Returns when it was said last."""
+    """End browsers that do not read. `ended`: those already being ended. Return the last log time."""
     sockets = core.sio.eio.sockets.copy()
     ended &= sockets.keys()
     deaf = [one for one in sockets.keys() - ended if sockets[one].queue.qsize() > MOST_WAITING]

@@ -1,7 +1,7 @@
-"""Every request that `send` can make: its message, when it is fulfilled, and why it is not.
+"""Every request that `send` can make: its message, its fulfilment, and its obstacles.
 
 Messages and the conditions that fulfil them are those of RMF's fleet adapters (rmf_ros2 9dedd0f).
-There is one file for each kind of device; this one has what they share. A request's `obstacles` are a
+There is one file for each kind of device; this one has the common part. A request's `obstacles` are a
 table, most specific first; the last one always applies.
 """
 
@@ -27,14 +27,13 @@ NEVER_AT: Final = float("-inf")
 
 
 class RequestProgress(Struct, frozen=True):
-    """What has happened since the command began; times are monotonic s.
+    """The events since the command began; times are monotonic s.
 
     `listeners`: matched subscriptions of the request's topic. `states`: those that concern the
-    request, in order, the last at `stated_at`. `there`: kind and name of every device that was heard.
-    `graph`: where we listen, for people. `hinted`: the hints that were said. `heartbeat`: the latest
-    of the door supervisor, at `heartbeat_at`.
-    `boarded`: what the lift's diagnostics say of a robot inside, "yes" or "no"; "" if
-    they were not heard. `refusals`: those of chargers, after our first request.
+    request, in order, the last at `stated_at`. `there`: kind and name of every device heard.
+    `graph`: where we listen, for people. `hinted`: the hints printed. `heartbeat`: the latest of the
+    door supervisor, at `heartbeat_at`. `boarded`: is a robot inside, by the lift's diagnostics?
+    "yes" or "no"; "" if not heard. `refusals`: those of chargers, after our first request.
     """
 
     began_at: float
@@ -53,7 +52,7 @@ class RequestProgress(Struct, frozen=True):
     refusals: tuple[ChargerRefusal, ...] = ()
 
     def hears(self, heard: Heard, about: Callable[[words.Stated], bool]) -> "RequestProgress":
-        """Take a message that was heard. `about(state)`: does the state concern the request?"""
+        """Take a message. `about(state)`: does the state concern the request?"""
         message = heard.message
         if isinstance(message, SupervisorHeartbeat):
             return replace(self, heartbeat=message, heartbeat_at=heard.at)
@@ -68,16 +67,16 @@ class RequestProgress(Struct, frozen=True):
         return replace(self, there=there, states=(*self.states, message), stated_at=heard.at)
 
     def names(self, kind: str) -> list[str]:
-        """Every device of this kind that was heard, sorted."""
+        """Return every device heard of this kind, sorted."""
         return sorted(name for one, name in self.there if one == kind)
 
     def sends(self, now: float) -> "RequestProgress":
-        """The request is sent now."""
+        """Note that the request is sent now."""
         first = now if self.first_sent_at is None else self.first_sent_at
         return replace(self, first_sent_at=first, last_sent_at=now)
 
     def states_of(self, kind: type[State]) -> list[State]:
-        """The states heard, in order. `kind`: their type."""
+        """Return the states heard, in order. `kind`: their type."""
         return [state for state in self.states if isinstance(state, kind)]
 
     def answer(self, kind: type[State]) -> State | None:
@@ -88,7 +87,7 @@ class RequestProgress(Struct, frozen=True):
         return self.states_of(kind)[-1]
 
     def requesters(self, door: str) -> list[str] | None:
-        """Who holds the door, by a heartbeat heard after our first request; None without one."""
+        """Return the door's holders, by a heartbeat after our first request; None without one."""
         sent_at = self.first_sent_at
         if self.heartbeat is None or sent_at is None or self.heartbeat_at < sent_at:
             return None
@@ -125,7 +124,7 @@ class Obstacle(NamedTuple):
 class Request(ABC):
     """A request about the device of this `name`: to its daemon if `direct`, else to the supervisor.
 
-    `answers`: topics that are heard beside the states.
+    `answers`: topics to hear besides the states.
     """
 
     name: str
@@ -141,7 +140,7 @@ class Request(ABC):
 
     @property
     def topic(self) -> AnyTopic:
-        """The daemon's own topic, or the one that fleet adapters use."""
+        """The daemon's own topic, or the fleet adapters'."""
         return self.own if self.direct or self.adapter is None else self.adapter
 
     @abstractmethod
@@ -154,27 +153,27 @@ class Request(ABC):
 
     @abstractmethod
     def obstacles(self, seen: RequestProgress) -> Iterable[Obstacle]:
-        """Why there is no effect, judged by the last state; the first `present` one counts."""
+        """Return the possible reasons for no effect, by the last state; the first `present` one counts."""
 
     @property
     def supervisor(self) -> AnyTopic | None:
-        """The topic on which the supervisor speaks, if others hear adapters as it does."""
+        """The topic on which the supervisor publishes, if others also listen to adapters."""
         return None
 
     def goes_direct(self, seen: RequestProgress, now: float) -> bool:
-        """Whether it is time to ask the device's own daemon, which the supervisor has not done."""
+        """Is it time to ask the device's own daemon, in place of an idle supervisor?"""
         return False
 
     def about(self, state: words.Stated) -> bool:
-        """Whether the state is of this device."""
+        """Is the state of this device?"""
         return (words.kind(state), words.device(state)) == (self.kind, self.name)
 
     def ready(self, seen: RequestProgress) -> bool:
-        """Whether the device has been heard."""
+        """Has the device been heard?"""
         return bool(seen.states)
 
     def misnamed(self, seen: RequestProgress) -> str:
-        """Which other kind of device has this name; "" if none was heard."""
+        """Return the other kind of device with this name; "" if none was heard."""
         if self.ready(seen):
             return ""
         kinds = sorted(kind for kind, name in seen.there if name == self.name and kind != self.kind)
@@ -184,7 +183,7 @@ class Request(ABC):
         return f"{self.name} is a {' and a '.join(kinds)}, not a {self.kind}; {there}"
 
     def nobody(self, seen: RequestProgress) -> Obstacle:
-        """No supervisor or daemon subscribes to the request."""
+        """Explain that no supervisor or daemon subscribes to the request."""
         silence = f"no node subscribes to {self.topic.name}"
         if self.supervisor is not None:
             silence = f"no node publishes {self.supervisor.name}"
@@ -198,7 +197,7 @@ class Request(ABC):
         return Obstacle(True, text, f"to ask the {self.kind}'s own daemon: {there}")
 
     def unheard(self, seen: RequestProgress) -> Obstacle:
-        """The device has not been heard; perhaps another has a similar name."""
+        """Explain that the device has not been heard; suggest a similar name."""
         topic, names = self.states.name, seen.names(self.kind)
         if not names:
             text = f"no {self.kind} is heard on {topic}; {self._hears(seen)}"
@@ -206,7 +205,7 @@ class Request(ABC):
         return Obstacle(True, f"no '{self.name}' on {topic}; {self._hears(seen)}")
 
     def _hears(self, seen: RequestProgress) -> str:
-        """Whom we hear: devices of the kind, else any; else where we listen."""
+        """Name the devices heard: of the kind, else any; else the graph."""
         if names := seen.names(self.kind):
             near = "" if self.name in names else nearest(self.name, names)
             return f"{self.kind}s heard: {', '.join(names)}{near}"
@@ -215,7 +214,7 @@ class Request(ABC):
         return f"nothing is heard{seen.graph and f' by {seen.graph}'}"
 
     def _elsewhere(self, seen: RequestProgress) -> str:
-        """Where else the device may be: on loopback, in another domain, on another transport."""
+        """Suggest other places of the device: loopback, another domain, another transport."""
         if self._loopback():
             return self._loopback()
         return "" if seen.there else WHERE

@@ -1,4 +1,4 @@
-"""Assigning a charger to a robot and cancelling that: by its daemon, or by the coordinator's queue."""
+"""Assign a charger to a robot, and cancel: by the charger's daemon, or by the coordinator's queue."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -38,7 +38,7 @@ class RobotCharge(_Charger):
     answers: ClassVar[tuple[AnyTopic, ...]] = (topics.CHARGER_REFUSALS,)
 
     def message(self, seen: RequestProgress) -> d.ChargerRequest:
-        """The request, always with the same id, so that a repeat is not a new request."""
+        """Return the request, always with the same id: a repeat is no new request."""
         charger = "" if self.name == ANY else self.name
         limit = duration(self.start_timeout_s)
         return d.ChargerRequest(charger, self.fleet, self.robot, limit, self.request_id)
@@ -84,7 +84,7 @@ def _error(state: d.ChargerState) -> Obstacle:
 
 @dataclass(frozen=True, slots=True)
 class ChargeCancel(_Charger):
-    """Cancel the request that the charger is assigned to."""
+    """Cancel the request to which the charger is assigned."""
 
     request_id: str
 
@@ -130,7 +130,7 @@ class QueuedCharge(RobotCharge):
         return f"{self.fleet}/{self.robot}"
 
     def about(self, state: words.Stated) -> bool:
-        """Whether a charger shows this robot."""
+        """Does a charger show this robot?"""
         return isinstance(state, d.ChargerState) and (
             (state.robot_fleet, state.robot_name) == (self.fleet, self.robot)
         )

@@ -1,4 +1,4 @@
-"""Holding a door open and releasing it, as DoorOpen.cpp and DoorClose.cpp do."""
+"""Hold a door open and release it, as DoorOpen.cpp and DoorClose.cpp do."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -51,7 +51,7 @@ class DoorMove(Request):
         return requesters is not None and (self.requester in requesters) == self.opened
 
     def obstacles(self, seen: RequestProgress) -> Iterable[Obstacle]:
-        """Judged by the mode of the door."""
+        """Return the obstacles, judged by the door's mode."""
         mode, name = seen.states_of(d.DoorState)[-1].current_mode.value, self.name
         others = ", ".join(r for r in seen.requesters(name) or [] if r != self.requester)
         return (

@@ -1,4 +1,4 @@
-"""Requesting a lift, as RequestLift.cpp does, and ending a session, as EndLiftSession.cpp does."""
+"""Request a lift, as RequestLift.cpp does, and end a session, as EndLiftSession.cpp does."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ from bridges.observe.lift import HAZARDS, request_lift
 from workbench.graph.requests import Failed, Fulfilled, Obstacle, Request, RequestProgress, nearest
 
 OBEYS_WITHIN_S: Final = 5.0
-"""A supervisor that obeys ends a session within a few states."""
+"""Time limit (s) for a supervisor's end of a session; it needs a few states."""
 
 
 class _Lift(Request):
@@ -22,7 +22,7 @@ class _Lift(Request):
 
     @property
     def supervisor(self) -> AnyTopic | None:
-        """A lift's own daemon hears adapters too: only who speaks to it is a supervisor."""
+        """A supervisor publishes to the lift's daemon; subscribing to adapters is no sign, as daemons do it too."""
         return None if self.direct else self.own
 
     @property
@@ -32,7 +32,7 @@ class _Lift(Request):
 
 @dataclass(frozen=True, slots=True)
 class LiftRide(_Lift):
-    """Ask for a session, and for the car at this floor with its door open, as a fleet adapter does."""
+    """Request a session, and the car at this floor with its door open, as a fleet adapter does."""
 
     floor: str
     session: str
@@ -76,7 +76,7 @@ class LiftRide(_Lift):
         return self.granted_only or all(check.met for check in checks)
 
     def obstacles(self, seen: RequestProgress) -> Iterable[Obstacle]:
-        """The session, the mode, or the floor or door that the car has not reached."""
+        """Return the obstacles: session, mode, or a floor or door state not reached."""
         state = seen.states_of(d.LiftState)[-1]
         name, session, mode = self.name, state.session_id, state.current_mode
         word = words.word(d.LiftMode, mode)
@@ -103,7 +103,7 @@ class LiftRide(_Lift):
 
 @dataclass(frozen=True, slots=True)
 class LiftEnd(_Lift):
-    """End `session`; if it is "", that of the first LiftState heard.
+    """End `session`; "": the session of the first LiftState heard.
 
     `falls_back`: if the supervisor does not obey within OBEYS_WITHIN_S, the lift's own daemon is asked;
     where a robot may be inside, only if the operator says that the car is empty (`car_empty`).
@@ -118,8 +118,8 @@ class LiftEnd(_Lift):
         return self.session or next(first, "")
 
     def message(self, seen: RequestProgress) -> d.LiftRequest | None:
-        """END_SESSION without a floor, as fleets send it; DOOR_OPEN tells our lifts that a person ends
-        it, who counts for more than a robot that goes on asking."""
+        """END_SESSION without a floor, as fleets send it; DOOR_OPEN tells our lifts that a person
+        ends it, which outranks a robot that goes on requesting."""
         session = self._ending(seen)
         if not session:
             return None
@@ -145,13 +145,13 @@ class LiftEnd(_Lift):
         return Fulfilled(f"{self.name} is not held by {session}: nothing to end{instead}")
 
     def goes_direct(self, seen: RequestProgress, now: float) -> bool:
-        """The supervisor, if there is one, has had its time, and nobody is in the car."""
+        """Has the supervisor, if any, had its time, and is the car empty?"""
         asked_at = seen.began_at if seen.first_sent_at is None else seen.first_sent_at
         late = now >= asked_at + OBEYS_WITHIN_S
         return self.falls_back and not self.direct and late and self._outside(seen)
 
     def nobody(self, seen: RequestProgress) -> Obstacle:
-        """Without a supervisor too, a robot may be in the car."""
+        """Explain the refusal: even without a supervisor, a robot may be in the car."""
         found = super(LiftEnd, self).nobody(seen)
         if self.direct or not self.falls_back or not seen.states:
             return found
