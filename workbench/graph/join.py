@@ -19,7 +19,7 @@ from bridges.transports.transport import M, Publisher, Subscription, Transport, 
 
 
 def add_graph_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the options that choose the graph: `--config`, `--domain-id`, `--transport`, `--localhost`."""
+    """Add the graph's options: `--config`, `--domain-id`, `--transport`, `--localhost`."""
     parser.add_argument(
         "--config",
         type=Path,

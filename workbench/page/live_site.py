@@ -121,7 +121,7 @@ class LiveSite:
             self._board.note(heard)
 
     def devices(self, now: float, wall: float) -> list[DeviceView]:
-        """Return all devices, coordinators and scheduled robots. `now`: monotonic s; `wall`: stamps' clock."""
+        """Return devices, coordinators, scheduled robots. `now`: monotonic s; `wall`: stamps' clock."""
         every, rows = self._story.stated(), self._board.rows(now, wall)
         shown = {f"{one.kind} {words.printable(one.id)}": one for one in every}
         return [_view(row, shown.get(f"{row.kind} {row.name}")) for row in rows]

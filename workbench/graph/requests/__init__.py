@@ -153,7 +153,7 @@ class Request(ABC):
 
     @abstractmethod
     def obstacles(self, seen: RequestProgress) -> Iterable[Obstacle]:
-        """Return the possible reasons for no effect, by the last state; the first `present` one counts."""
+        """Return the possible reasons for no effect by the last state; the first `present` counts."""
 
     @property
     def supervisor(self) -> AnyTopic | None:

@@ -22,7 +22,7 @@ class _Lift(Request):
 
     @property
     def supervisor(self) -> AnyTopic | None:
-        """A supervisor publishes to the lift's daemon; subscribing to adapters is no sign, as daemons do it too."""
+        """A supervisor is known by its publishing to the lift: daemons hear adapters too."""
         return None if self.direct else self.own
 
     @property
