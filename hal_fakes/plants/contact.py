@@ -4,7 +4,7 @@ The same five for every bus, so a test scenario on GPIO also works on Modbus:
 
 - `off`: cut. An input falls to its pull (or reads 0 at a module, or floats where nothing pulls it);
   the relay behind a cut output never energises.
-- `stuck`: holds what it had (a welded relay, a jammed contact).
+- `stuck`: holds its last value (a welded relay, a jammed contact).
 - `slow`: everything arrives SLOW_S late.
 - `garbage`: random, another value every GARBAGE_S at the most, the same ones in each run.
 - `wrong`: inverted (normally open taken for normally closed).

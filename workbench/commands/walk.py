@@ -1,4 +1,4 @@
-"""`rmf-bridge walk FILE`: try every wire of a device with the electrician, and sign what was seen.
+"""`rmf-bridge walk FILE`: try every wire of a device with the electrician, and sign the results.
 
 Every input is shown live; a key switches each output on alone, for a few seconds. No daemon may serve
 the device meanwhile. However the walk ends, every output is off: a guard switches them off even after

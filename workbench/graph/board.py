@@ -85,7 +85,7 @@ class Board:
         self.note(heard)
 
     def note(self, heard: Heard) -> None:
-        """Take a message, except a device's state."""
+        """Take a message's charging assignments; the device memory takes the rest."""
         if not isinstance(heard.message, d.ChargingAssignments):
             return
         for one in heard.message.assignments:

@@ -71,7 +71,7 @@ class DoorHistory(History[d.DoorState]):
         return True
 
     def forget(self) -> None:
-        """Forget what was requested before a silence: the node may have forgotten it."""
+        """Forget requests from before a silence: the node may have restarted."""
         self.latched = self.was_open = False
         self._people_at = NOT_YET
         self.not_closed_at = self.now

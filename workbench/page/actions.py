@@ -1,7 +1,7 @@
 """The actions of a logged-in user, and their commands.
 
 The page has no rights and no topics of its own: each action is a command of this program, run as the
-page's user, as it would be in this machine's shell. Each is logged with who asked for it. Names come
+page's user, as it would be in this machine's shell. Each is logged with its user. Names come
 from the network and may look like options: options have their value after `=`, names stand after `--`.
 """
 

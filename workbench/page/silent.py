@@ -4,8 +4,8 @@ from collections.abc import Hashable, Iterable
 from typing import Final
 
 MOST_SILENT_S: Final = 10.0
-"""How long (s) a connection may take to send its next request's whole head. The web server itself waits
-for ever."""
+"""Time limit (s) for a connection to send its next request's whole head. The web server itself has
+none."""
 
 
 class Silent:

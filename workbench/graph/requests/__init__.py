@@ -157,7 +157,7 @@ class Request(ABC):
 
     @property
     def supervisor(self) -> AnyTopic | None:
-        """The topic on which the supervisor publishes, if others also listen to adapters."""
+        """The topic that shows a supervisor, if daemons too listen to adapters."""
         return None
 
     def goes_direct(self, seen: RequestProgress, now: float) -> bool:

@@ -136,7 +136,7 @@ class QueuedCharge(RobotCharge):
         )
 
     def ready(self, seen: RequestProgress) -> bool:
-        """Whether any charger has been heard."""
+        """Has any charger been heard?"""
         return bool(seen.names(self.kind))
 
     def outcome(self, seen: RequestProgress) -> Fulfilled | Failed | None:
@@ -182,7 +182,7 @@ class QueuedCancel(ChargeCancel):
         return False
 
     def ready(self, seen: RequestProgress) -> bool:
-        """Whether any charger has been heard."""
+        """Has any charger been heard?"""
         return bool(seen.names(self.kind))
 
     def outcome(self, seen: RequestProgress) -> Fulfilled | None:
