@@ -205,7 +205,7 @@ DEMO: Final = Demo(
         "lift_supervisor": CONFIG / "lift_supervisor.yaml",
         "door_supervisor": CONFIG / "door_supervisor.yaml",
     },
-    dawn="every device has said how it stands",
+    dawn="a state of every device",
     dawns=dawns,
     live=live,
     problems=lambda journal: (),

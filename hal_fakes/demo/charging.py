@@ -169,7 +169,7 @@ def _stations_faulty(world: World, fleets: DemoFleets) -> None:
     _error(world, B, "station: over temperature", ONE)
     _alerted(world, "STATION_OUT_OF_SERVICE", f"{B}: station: over temperature")
     _charges(world, A, ONE)
-    good = f"{ONE} has kept its good name"
+    good = f"{ONE} is not counted as defective"
     world.shows(good, lambda: not world.alerted("ROBOT_FAULTY"), 1)
     _mended(world, B)
     _free(world)
@@ -247,7 +247,7 @@ DEMO: Final = Demo(
         "2 ad-hoc": f"{TWO} asked through its fleet, an operator for {PORTER} on the pad: both charged",
         "3 stacked": f"{TWO} waited, a person was told who blocks {B}, and {TWO} was next there",
         "4 wrong station": f"{B} gave {ONE} no power; {ONE} was sent on and charged at {A}",
-        "5a station faulty": f"{ONE} was charged at the other charger, twice, and kept its good name",
+        "5a station faulty": f"{ONE} was charged twice at the other charger, and is not suspected",
         "5b robot faulty": f"{TWO} was tried at two chargers and no more; {ONE} was charged meanwhile",
     },
 )

@@ -103,7 +103,7 @@ class WiredPlant(ABC):
         return min([self.event_at(), *(contact.next_at() for contact in self._broken)])
 
     def fail(self, part: str, mode: FailureMode | None) -> None:
-        """Make a wire or part fail from now on; None mends it. ValueError names the known ones."""
+        """Make a wire or part fail from now on; None mends it. ValueError lists the known parts."""
         contact = self._sensors.get(part) or self._relays.get(part)
         if contact is None and part not in self._parts:
             known = ", ".join(self.names()["fail"])

@@ -62,10 +62,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     kill.add_argument(
         "--kill-test",
         action="store_true",
-        help="hold one output on, kill the process that does, and see that it goes off",
+        help="hold one output on, kill the holding process, and see the output go off",
     )
     device = kill.add_argument(
-        "--device", metavar="NAME", help="whose output (default: the first device)"
+        "--device", metavar="NAME", help="the output's device (default: the first)"
     )
     completed_by(device, device_names)
     kill.add_argument("--output", metavar="NAME", help="which output, as walk names it")

@@ -206,7 +206,7 @@ def _needed(question: Question, given: Given, args: argparse.Namespace) -> bool:
         return True
     if getattr(args, question.name) is not None:
         raise Impossible(
-            f"--{question.name} has no meaning for a {given['kind']} on {given['wiring']}"
+            f"--{question.name} does not apply to a {given['kind']} on {given['wiring']}"
         )
     return False
 

@@ -138,7 +138,7 @@ def performance_of(args: argparse.Namespace) -> Scenario | None:
     if wanted != [args.kind]:
         args.usage("a lift is played by --ride A B, a door by --passages N, a charger by --charge")
     if not args.active:
-        args.usage(f"this moves {words_of(args)}: say --active as well")
+        args.usage(f"this moves {words_of(args)}: add --active")
     if args.restarts and not args.localhost:
         args.usage("--restarts needs --localhost: never restart a supervisor with a real device")
     through = "supervisor" in args.beside
@@ -171,7 +171,7 @@ def run(args: argparse.Namespace) -> int:
     if args.recording is None:
         return _live(args, performance)
     if performance is not None:
-        args.usage("a recording cannot be moved: leave --active out")
+        args.usage("a recording is only judged: leave --active out")
     try:
         return _recorded(args)
     except BagError as error:

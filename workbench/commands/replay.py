@@ -44,7 +44,7 @@ def run(args: argparse.Namespace) -> int:
         config = load(args.config) if args.config else of_head(head)
         if config.kind != head.kind:
             raise NotReplayable(
-                f"{args.config} is of a {config.kind}, {args.file} of a {head.kind}"
+                f"{args.config} describes a {config.kind}, {args.file} records a {head.kind}"
             )
         replay = Replay(entries, ReplayedCores(config))
         found = replay.changes() if args.config else replay.differences()
@@ -112,7 +112,7 @@ def _lines(
     if len(differences) == MOST:
         yield f"… and no more than {MOST} are shown"
     if not differences:
-        same = f"{args.config} would have changed none" if args.config else "all as recorded"
+        same = f"{args.config} would have changed no decision" if args.config else "all as recorded"
         yield same
 
 

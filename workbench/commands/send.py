@@ -86,7 +86,7 @@ def _lift_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--end",
         action="store_true",
-        help="end the session that --session names (default: that of whoever holds the lift)",
+        help="end the session that --session names (default: the holder's)",
     )
     parser.add_argument(
         "--granted-only", action="store_true", help="wait for the session, not for the car"

@@ -172,7 +172,7 @@ def page() -> str:
         " an editor completes keys, marks wrong ones and shows what a key means, if the file's first"
         " line names the schema: `# yaml-language-server: $schema=FILE`. `rmf-bridge init` writes this"
         " line; for another file: `rmf-bridge schema > FILE`, after each upgrade again. Only `check`"
-        " sees what concerns several keys.",
+        " finds errors across several keys.",
         "A file has these keys, and its devices under the key of their kind (`lifts`, `doors` or"
         " `chargers`). The file of a supervisor or coordinator has `kind`, `rmf`, `recording` and"
         " one section of its own.",
@@ -186,7 +186,7 @@ def page() -> str:
     return "\n\n".join(sections) + "\n"
 
 
-SHARED = "## What several sections have"
+SHARED = "## Common to several sections"
 
 Headings = dict[type, str]
 

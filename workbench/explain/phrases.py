@@ -34,7 +34,7 @@ def listed(names: Sequence[str], word: str = "and") -> str:
 
 
 def on_graph(text: str, options: Sequence[str]) -> str:
-    """Add the options that name a graph to each graph-joining command in the text."""
+    """Add the graph's options to every command in the text that joins it."""
 
     def joined(found: re.Match[str]) -> str:
         command, name = found.groups()

@@ -1,4 +1,4 @@
-"""Find the device of a file that a command concerns."""
+"""Find the command's device in a file."""
 
 from bridges.settings.config import Config
 

@@ -92,7 +92,7 @@ class Judge:
                     self._check(tally, at, wall)
 
     def end(self, at: float, wall: float) -> tuple[JudgedLaw, ...]:
-        """End the hearing. Returns each law with its verdict, in the laws' order."""
+        """End the hearing. Return each law with its verdict, in the laws' order."""
         self.history.pass_time(at)
         if self.history.states:
             for tally in self._tallies:

@@ -67,7 +67,7 @@ class Scenario(ABC):
         return busy(state)
 
     def begin(self, now: float) -> list[Said]:
-        """Begin."""
+        """Begin the play."""
         return self.play.begin(now)
 
     def hear(self, topic: str, message: d.Message, now: float) -> list[Said]:

@@ -23,7 +23,7 @@ CORPUS = Path(__file__).parents[1] / "replay" / "corpus"
     ("line", "why"),
     [
         ("judge lift", "which lift? Give its NAME"),
-        ("judge lift Lift1 --ride L1 L3", "this moves the lift 'Lift1': say --active as well"),
+        ("judge lift Lift1 --ride L1 L3", "this moves the lift 'Lift1': add --active"),
         ("judge lift Lift1 --active", "a lift is played by --ride A B"),
         ("judge door ward --active --ride L1 L3", "a lift is played by --ride A B"),
         ("judge lift Lift1 --active --ride L1 L3 --restarts", "--restarts needs --localhost"),

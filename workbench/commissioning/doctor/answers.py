@@ -169,7 +169,7 @@ def _scanned(
     )
     strangers = sorted(set(found) - ours)
     if found == asked:
-        return note(subject, text, f"it answers whatever the {what} is, as many TCP modules do")
+        return note(subject, text, f"it answers for every {what}, as many TCP modules do")
     if strangers and not ours <= set(found):
         do = f"write the {what} that answers, or give the device its own"
         means = f"{what} {ranges(sorted(ours))} of this file may be wrong"

@@ -94,7 +94,7 @@ def _controller(name: str, told: Controller, bitrate: int | None) -> Iterator[Fi
     elif state not in ("ERROR-ACTIVE", "?"):
         yield warning(CAN, f"{name} is {state.lower()}", "it counts many errors", check)
     if not told.restart_ms:
-        means = "after a bus-off nothing is heard until somebody sets it down and up"
+        means = "after a bus-off nothing is heard until the interface is set down and up"
         yield warning(CAN, f"{name} has no restart-ms", means, how)
 
 

@@ -161,14 +161,14 @@ def death(machine: Machine) -> Iterator[Finding]:
         re.search(r"^\s*dtparam=.*\bstrict_gpiod\b", machine.text(path) or "", re.MULTILINE)
         for path in CONFIGS
     )
-    means = "after a kill -9 a relay stays on until outputs-off has run, and for good if it cannot"
+    means = "after a kill -9 a relay stays on until outputs-off has run, or for good if that fails"
     if said in ("Y", "1"):
         do = "dtparam=strict_gpiod in /boot/firmware/config.txt, and reboot"
         if strict:
             do = "reboot: strict_gpiod is in config.txt, and not in effect yet"
         yield warning(DEATH, "the kernel keeps an output's level", means, f"{do}. {KILL_TEST}")
     elif said in ("N", "0"):
-        yield ok(DEATH, f"the kernel makes an output an input again. {KILL_TEST}")
+        yield ok(DEATH, f"the kernel turns a released output into an input. {KILL_TEST}")
     else:
         found = "it is not known whether the kernel keeps an output's level"
         yield warning(DEATH, found, means, KILL_TEST)

@@ -125,7 +125,7 @@ def _switch(memory: WalkMemory, step: int, now: float, steps: Sequence[WalkStep]
         results={**memory.results, step: told},
         says=""
         if proves
-        else f"the inputs show already what {tried.name} should do: that proves nothing",
+        else f"the inputs already show the effect of {tried.name}: that proves nothing",
     )
 
 
