@@ -36,7 +36,7 @@ FAULTS: Final = (
     (PAD_A, "fail", "server", "off", "ok"),
     (LIFT2, "fail", "unit", "off", "ok"),
 )
-"""A device, an order for one of its parts, the order's mode, and the order that ends it."""
+"""Device, order, part or signal, mode, and the mode that ends the fault."""
 FAULT_EVERY_S, FAULT_LASTS_S = 60.0, 15.0
 DRIVES_S: Final = 3.0
 CHARGES_S: Final = 20.0
@@ -205,7 +205,7 @@ DEMO: Final = Demo(
         "lift_supervisor": CONFIG / "lift_supervisor.yaml",
         "door_supervisor": CONFIG / "door_supervisor.yaml",
     },
-    dawn="a state of every device",
+    dawn="every device has published its state",
     dawns=dawns,
     live=live,
     problems=lambda journal: (),

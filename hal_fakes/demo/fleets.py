@@ -67,7 +67,7 @@ class DemoFleets(Party):
         """Due all the time."""
         return 0.0
 
-    # ---- what the day calls
+    # ---- calls of the day
 
     def robot(self, who: str) -> FleetRobot:
         """Return this robot as its fleet adapter knows it."""

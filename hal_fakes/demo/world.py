@@ -89,7 +89,7 @@ class World:
         self._parties += parties
         self._hear(*(topic for party in parties for topic in party.subscribes))
 
-    # ---- what a day looks at
+    # ---- questions of the day
 
     def wall(self) -> float:
         """RMF's clock (s since the epoch)."""
@@ -118,7 +118,7 @@ class World:
         """Was a person told this?"""
         return any(alert.subtitle == code for alert in self.alerts)
 
-    # ---- what a day does
+    # ---- actions of the day
 
     def say(self, said: Iterable[Said]) -> None:
         """Publish these messages, and note those to a daemon in the journal."""

@@ -144,7 +144,7 @@ class ChargerPlant(WiredPlant):
         self._since, self._until = 0.0, NEVER
         self._range, self._range_until = "none", NEVER
 
-    # ---- what a controller sees and does
+    # ---- the controller's readings and commands
 
     def reading(self) -> Reading:
         """Return everything at once."""

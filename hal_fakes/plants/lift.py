@@ -84,7 +84,7 @@ class LiftPlant(WiredPlant):
         self._code: dict[str, bool] = {}
         self._asserted: dict[str, bool] = {}
 
-    # ---- what WiredPlant asks for
+    # ---- WiredPlant's methods
 
     def contact(self, signal: str) -> bool:
         """Is this contact really asserted?"""

@@ -48,7 +48,7 @@ class WiredPlant(ABC):
         self._driven = dict.fromkeys(self._relays, False)
         self._shown: dict[str, bool] = {}
 
-    # ---- what a kind's plant adds
+    # ---- added by a kind's plant
 
     @abstractmethod
     def contact(self, signal: str) -> bool:

@@ -63,7 +63,7 @@ class RobotCharge(_Charger):
         return Failed(f"{text}; to cancel that: {self.line.other(*cancel)}")
 
     def obstacles(self, seen: RequestProgress) -> Iterable[Obstacle]:
-        """An error, or another request."""
+        """Return the obstacles: an error, or another request."""
         state = seen.states_of(d.ChargerState)[-1]
         cancel = self.line.other("send", "charger", self.name, "--cancel", state.request_id)
         return (
@@ -109,7 +109,7 @@ class ChargeCancel(_Charger):
         return state.request_id == self.request_id and state.state not in released
 
     def obstacles(self, seen: RequestProgress) -> Iterable[Obstacle]:
-        """The charger still serves the request."""
+        """Return the obstacle: the charger still serves the request."""
         text = f"{self.name} still serves request {self.request_id}: its daemon's log says why"
         return (Obstacle(True, text),)
 
@@ -161,7 +161,7 @@ class QueuedCharge(RobotCharge):
         )
 
     def obstacles(self, seen: RequestProgress) -> Iterable[Obstacle]:
-        """The charger's error, or no charger assigned."""
+        """Return the obstacles: the charger's error, or no charger assigned."""
         text = f"the {COORDINATOR} has not assigned {self.who} a charger: its log says why"
         return _error(seen.states_of(d.ChargerState)[-1]), Obstacle(True, text)
 

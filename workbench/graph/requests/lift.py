@@ -163,7 +163,7 @@ class LiftEnd(_Lift):
         return self.car_empty or seen.boarded == "no"
 
     def obstacles(self, seen: RequestProgress) -> Iterable[Obstacle]:
-        """The session is still shown."""
+        """Return the obstacles: the session is still shown."""
         if self.falls_back and not self._outside(seen):
             text = f"{self.name} still shows the session, and its robot may be in the car: look into it"
             there = self.line.again_with("--car-empty")
