@@ -80,7 +80,7 @@ def test_a_person_records_an_incident_and_replays_it(
     assert (told.returncode, json.loads(told.stdout)["differences"]) == (0, [])
     assert json.loads(told.stdout)["decisions"] > 5
     assert (ring.returncode, ring.stdout.splitlines()[-1]) == (0, "all as recorded")
-    assert bridge("replay", file, "--config", other).stdout.endswith("changed none\n")
+    assert bridge("replay", file, "--config", other).stdout.endswith("changed no decision\n")
 
 
 def test_the_recorder_makes_a_file_of_a_daemon_that_is_killed(

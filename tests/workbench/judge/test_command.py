@@ -28,7 +28,7 @@ CORPUS = Path(__file__).parents[1] / "replay" / "corpus"
         ("judge door ward --active --ride L1 L3", "a lift is played by --ride A B"),
         ("judge lift Lift1 --active --ride L1 L3 --restarts", "--restarts needs --localhost"),
         ("judge charger a --charge", "this moves the charger 'a'"),
-        ("judge lift Lift1 --active --ride L1 L3 --recording x", "a recording cannot be moved"),
+        ("judge lift Lift1 --active --ride L1 L3 --recording x", "a recording is only judged"),
         ("judge lift Lift1 --for 0", "'0': write 0.1 to 604800 seconds"),
     ],
 )
