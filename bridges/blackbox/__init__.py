@@ -1,1 +1,1 @@
-"""What a daemon heard, decided and sent: kept in a ring, and written to files by the recorder."""
+"""Record a daemon's messages, events and decisions: a ring keeps them, the recorder writes files."""

@@ -1,8 +1,8 @@
-"""What a ring holds: the head of a daemon's run, and its entries.
+"""The contents of a ring: the head of a daemon's run, and its entries.
 
-All times are by the daemon's monotonic clock (s); `Clocks` says what the wall clock showed then.
+All times are by the daemon's monotonic clock (s); `Clocks` has the matching wall-clock times.
 A subject is a lift, a door, a charger, or a coordinator's site. Its core is a pure function, so its
-memory at one time and each event after it are enough to have every decision made again.
+memory at one time and the events after that time are enough to repeat every decision.
 """
 
 from collections.abc import Callable
@@ -20,16 +20,16 @@ LATEST_S: Final = 4e9
 """Within this time, before and after zero, every sum of three is a date, and fits into an MCAP file."""
 Seconds = Annotated[float, Meta(ge=-LATEST_S, le=LATEST_S)]
 DEEPEST: Final = 60
-"""The most a tree is nested; a core's memory has a tenth of it."""
+"""The maximum depth of a tree; a core's memory has a tenth of it."""
 E = TypeVar("E")
 
 
 class Invalid(ValueError):
-    """No entry, or no head, that this version can read. The text says why."""
+    """The bytes are not an entry or head of this version. The text gives the reason."""
 
 
 class Head(msgspec.Struct, frozen=True):
-    """One run of a daemon: what it is made of, and the file that it serves.
+    """One run of a daemon: its software, and the file that it serves.
 
     `file`: the YAML's path. `yaml`: its text. `texts`: profiles and DBC files that it uses.
     """
@@ -47,19 +47,19 @@ class Head(msgspec.Struct, frozen=True):
 
 
 class RingEntry(msgspec.Struct, frozen=True, array_like=True, tag_field="is"):
-    """Every entry."""
+    """The base of all entries."""
 
     at: Seconds
 
 
 class Clocks(RingEntry, frozen=True, tag_field="is", tag=0):
-    """What the wall clock showed at this time (s since the epoch)."""
+    """The wall clock at this time (s since the epoch)."""
 
     wall: Seconds
 
 
 class Spoken(RingEntry, frozen=True, tag_field="is", tag=1):
-    """A message heard from RMF's graph, or sent. `cdr`: as it is on the wire in `release`."""
+    """A message heard from RMF's graph, or sent. `cdr`: its bytes on the wire in `release`."""
 
     sent: bool
     topic: str
@@ -69,8 +69,8 @@ class Spoken(RingEntry, frozen=True, tag_field="is", tag=1):
 
 
 class Known(RingEntry, frozen=True, tag_field="is", tag=2):
-    """All that a replay needs to start here: a subject's memory, its last reading, and what was last
-    decided; None before the first. `anew`: the memory is not what the last decision left."""
+    """All that a replay needs to start here: a subject's memory, its last reading and its last
+    decision (None before the first). `anew`: the memory does not come from that decision."""
 
     subject: str
     memory: Tree
@@ -81,8 +81,7 @@ class Known(RingEntry, frozen=True, tag_field="is", tag=2):
 
 
 class Decided(RingEntry, frozen=True, tag_field="is", tag=3):
-    """An event, and what the core decided. `outputs`, `news`, `faults`: only those that have
-    changed."""
+    """An event and the core's decision. `outputs`, `news`, `faults`: only those that have changed."""
 
     subject: str
     event: Tree
@@ -95,14 +94,14 @@ class Decided(RingEntry, frozen=True, tag_field="is", tag=3):
 
 
 class Same(RingEntry, frozen=True, tag_field="is", tag=4):
-    """The last reading came again at each of these times (doubles), and changed no decision."""
+    """Times (doubles) at which the last reading came again and changed no decision."""
 
     subject: str
     times: bytes
 
 
 class Published(RingEntry, frozen=True, tag_field="is", tag=5):
-    """The subject's report went out, and its memory took note of that."""
+    """The subject's report was published, and its memory records that."""
 
     subject: str
 
@@ -126,7 +125,7 @@ class EntriesLost(RingEntry, frozen=True, tag_field="is", tag=8):
 
 
 class DaemonEnded(RingEntry, frozen=True, tag_field="is", tag=9):
-    """The daemon ended in good order. `safe`: every output was verified off."""
+    """The daemon shut down cleanly. `safe`: every output was verified off."""
 
     safe: bool
 
@@ -152,7 +151,7 @@ _JSON_HEADS: Final = msgspec.json.Decoder(Head)
 
 
 def encode(entry: AnyEntry | Head) -> bytes:
-    """An entry, or a head, as bytes."""
+    """Encode an entry or a head."""
     return _ENCODER.encode(entry)
 
 
@@ -162,7 +161,7 @@ def decode(content: bytes) -> AnyEntry:
 
 
 def as_json(entry: AnyEntry | Head) -> str:
-    """An entry, or a head, as text."""
+    """Return an entry or a head as JSON text."""
     return msgspec.json.encode(entry).decode()
 
 
@@ -189,7 +188,7 @@ def _decoded(decode: Callable[..., E], content: bytes | str) -> E:
 
 
 def _known(entry: AnyEntry) -> AnyEntry:
-    """The entry, if this version knows what it names. Raises Invalid."""
+    """Return the entry if this version knows the names in it. Raises Invalid."""
     if isinstance(entry, Spoken):
         kind, release = MESSAGES.get(entry.type), RELEASES.get(entry.release)
         if kind is None or release is None or not release.has(kind):

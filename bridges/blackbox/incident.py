@@ -1,4 +1,4 @@
-"""One incident: the entries of a daemon that belong to it, and why it was recorded. Pure."""
+"""One incident: the daemon's entries that belong to it, and the reasons for recording it. Pure."""
 
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
@@ -17,7 +17,7 @@ ERRORS: Final = (name_of(IoFailed), name_of(WriteFailed), name_of(Suspended))
 
 
 class Note(msgspec.Struct, frozen=True):
-    """Why there is a recording: a fixed name, and a text. `at`: monotonic s."""
+    """A reason for a recording: a fixed name, and a text. `at`: monotonic s."""
 
     at: float
     code: str
@@ -26,7 +26,7 @@ class Note(msgspec.Struct, frozen=True):
 
 
 class Incident(msgspec.Struct, frozen=True):
-    """The content of a file. `entries` begin where everything that a replay needs is known."""
+    """The content of a file. `entries` begin with everything that a replay needs."""
 
     head: Head
     entries: Sequence[AnyEntry]
@@ -34,7 +34,7 @@ class Incident(msgspec.Struct, frozen=True):
 
 
 def part(entries: Sequence[AnyEntry], begin_at: float, end_at: float) -> Sequence[AnyEntry]:
-    """The entries from `begin_at` to `end_at` (monotonic s), with as many before as a replay needs."""
+    """Return the entries from `begin_at` to `end_at` (monotonic s), and earlier ones a replay needs."""
     first = 0
     for place, (entry, following) in enumerate(pairwise(entries)):
         if entry.at > begin_at:
@@ -45,7 +45,7 @@ def part(entries: Sequence[AnyEntry], begin_at: float, end_at: float) -> Sequenc
 
 
 def timed(entries: Sequence[AnyEntry]) -> Iterator[tuple[AnyEntry, float, float]]:
-    """Each entry with two times (s since the epoch): by a clock that never steps, and by the wall."""
+    """Yield each entry with two times (s since the epoch): on a steady clock, on the wall clock."""
     clocks = [entry for entry in entries if isinstance(entry, Clocks)]
     steady = wall = clocks[0].wall - clocks[0].at if clocks else 0.0
     for entry in entries:
@@ -55,7 +55,7 @@ def timed(entries: Sequence[AnyEntry]) -> Iterator[tuple[AnyEntry, float, float]
 
 
 def readable(step: Decided) -> Iterator[tuple[str, Tree]]:
-    """A step as (topic, JSON), for readers in Foxglove or `ros2 bag`."""
+    """Yield a step as (topic, JSON), for display in Foxglove or `ros2 bag`."""
     event = step.event if isinstance(step.event, dict) else {}
     kind = str(event.get("", ""))
     if kind == READING:
@@ -81,4 +81,4 @@ INSTALL: Final = "in the clone, .venv/bin/pip install '.[recording,sqlite]'"
 
 
 LIBRARY: Final = "rmf-bridges"
-"""How the `library` in the header of our own files begins."""
+"""The beginning of `library` in the header of our own files."""

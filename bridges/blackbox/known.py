@@ -1,4 +1,4 @@
-"""What a ring already says of a subject, and the entries that say it."""
+"""The state of each subject as recorded in a ring, and the entries that record it."""
 
 from typing import Any
 
@@ -10,7 +10,7 @@ AnyDecision = Decision[Any, Any, Any]
 
 
 class KnownSubject:
-    """What is known of a subject. `times`: when the last reading came again, not yet in the ring."""
+    """A subject's recorded state. `times`: repeats of the last reading that are not in the ring yet."""
 
     def __init__(self, memory: object) -> None:
         self.memory = memory
@@ -21,7 +21,7 @@ class KnownSubject:
         self.times: list[float] = []
 
     def is_as_before(self, event: object, decision: AnyDecision, news: object) -> bool:
-        """Is this the last reading again, and did it change nothing?"""
+        """Is this the last reading again, without any change?"""
         return (
             event == self.reading
             and decision.outputs == self.outputs
@@ -33,8 +33,8 @@ class KnownSubject:
 
 
 def known(name: str, subject: KnownSubject, now: float, *, anew: bool = False) -> Known:
-    """The entry with all that a replay needs of a subject. `anew`: its memory is not what the last
-    decision left."""
+    """Return the entry from which a replay of a subject can start. `anew`: its memory does not come
+    from the last decision."""
     return Known(
         now,
         name,
@@ -54,7 +54,7 @@ def step(
     decision: AnyDecision,
     news: object,
 ) -> Decided:
-    """The entry of a decision: what has not changed is left out."""
+    """Return the entry of a decision, without unchanged values."""
     faults, before = decision.report.faults, subject.report
     return Decided(
         now,

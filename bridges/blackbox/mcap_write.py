@@ -1,8 +1,8 @@
-"""Writes an incident as an MCAP file that Foxglove, PlotJuggler and `ros2 bag` open as it is.
+"""Writes an incident as an MCAP file for Foxglove, PlotJuggler and `ros2 bag`.
 
 rosbag2 refuses a file with topics of more than one encoding (rosbag2_cpp, sequential_reader.cpp,
-`check_topics_serialization_formats`), so what is not RMF's is JSON in `std_msgs/msg/String`, under
-`/rmf_bridge/`: to be read by people, and `entries`, from which `rmf-bridge replay` decides again.
+`check_topics_serialization_formats`), so our own data is JSON in `std_msgs/msg/String`, under
+`/rmf_bridge/`: topics for people, and `entries`, from which `rmf-bridge replay` repeats decisions.
 """
 
 import os
@@ -38,7 +38,7 @@ QOS: Final = """\
   liveliness_lease_duration: {{sec: 9223372036, nsec: 854775807}}
   avoid_ros_namespace_conventions: false
 """
-"""As rosbag2 wrote it up to version 8 of its metadata, which every release since reads."""
+"""The form up to version 8 of rosbag2's metadata, which every later release reads too."""
 BAG: Final = """\
 version: 8
 storage_identifier: mcap
@@ -53,7 +53,7 @@ files: []
 custom_data: ~
 ros_distro: {distro}
 """
-"""Gives rosbag2 the version; it takes the rest from the file's own index."""
+"""Gives rosbag2 the version; rosbag2 takes the rest from the file's own index."""
 KNOWN_QOS: Final = {topic.name: topic.publish for topic in topics.every()}
 
 
@@ -65,7 +65,7 @@ class String:
 
 
 def write(path: Path, incident: Incident) -> None:
-    """Write a file; it has its name only when it is complete. Raises OSError."""
+    """Write a file, under a temporary name until it is complete. Raises OSError."""
     new = path.with_name(f".{path.name}.part")
     try:
         with new.open("wb") as out:
@@ -118,18 +118,18 @@ class _Channels:
         self._channels: dict[tuple[str, ...], int] = {}
 
     def spoken(self, spoken: Spoken, steady: float, wall: float) -> None:
-        """A message of RMF, as it was on the wire."""
+        """Write a message of RMF, with its bytes on the wire."""
         key = (spoken.topic, spoken.type, spoken.release, "sent" if spoken.sent else "heard")
         if key not in self._channels:
             self._channels[key] = self._declare(spoken, key[-1])
         self._add(self._channels[key], spoken.cdr, steady, wall)
 
     def say(self, topic: str, told: Tree, steady: float, wall: float) -> None:
-        """Something of ours, as JSON."""
+        """Write our own data as JSON."""
         self.text(topic, msgspec.json.encode(told).decode(), steady, wall)
 
     def text(self, topic: str, told: str, steady: float, wall: float) -> None:
-        """A text of ours."""
+        """Write our own text."""
         if (topic,) not in self._channels:
             schema = self._schema("std_msgs/msg/String", "", "string data\n")
             qos = {"offered_qos_profiles": QOS.format(depth=100, durability=2)}

@@ -1,8 +1,8 @@
 """The recorder: one process beside all daemons of a machine, which turns their rings into files.
 
-It has no devices, and no daemon waits for it. Each second it reads what is new in each ring. An
-entry that triggers a recording (`triggers.py`) makes a file, once what follows is in the ring too.
-Nothing is written while all is well, unless a YAML asks for `keep: continuous`.
+It has no devices, and no daemon waits for it. Each second it reads the new entries of each ring. An
+entry that triggers a recording (`triggers.py`) leads to a file, once the time after it is in the
+ring too. Nothing is written while all is well, unless a YAML asks for `keep: continuous`.
 """
 
 import logging
@@ -23,11 +23,11 @@ from bridges.kinds.shared.durations import AGES_AGO
 log = logging.getLogger(__name__)
 
 LATE_S: Final = 60.0
-"""An entry older than this when a ring is first seen was handled by an earlier recorder."""
+"""Entries older than this at the first look at a ring were handled by an earlier recorder."""
 GRACE_S: Final = 2.0
-"""After this much more time, what follows is certainly in the ring."""
+"""After this extra time, the entries to be included are certainly in the ring."""
 PART_S: Final = 300.0
-"""How much one file of `keep: continuous` holds."""
+"""The length of one file of `keep: continuous`."""
 
 
 class Recorder:
@@ -48,7 +48,7 @@ class Recorder:
         self._failing = False
 
     def look(self) -> None:
-        """Read what is new, and write what is due. Called each second; does not raise."""
+        """Read new entries, and write due recordings. Called each second; does not raise."""
         folders = list(self._folders())
         for folder in folders:
             self._look_at(folder)
@@ -56,7 +56,7 @@ class Recorder:
             self._finish(self._followed.pop(folder))
 
     def close(self) -> None:
-        """Write the recordings that have begun, as far as they go."""
+        """Write the unfinished recordings as they are."""
         for followed in self._followed.values():
             self._finish(followed)
         self._followed.clear()
@@ -76,7 +76,7 @@ class Recorder:
             self._take_died(folder / NAME)
 
     def _follow(self, folder: Path) -> "_Followed":
-        """The ring of the run that is there now. Raises RingError."""
+        """Return the ring of the present run. Raises RingError."""
         followed = self._followed.get(folder)
         if followed is not None and not followed.is_replaced():
             return followed
@@ -90,8 +90,8 @@ class Recorder:
             self._put(*due)
 
     def _take_died(self, path: Path) -> None:
-        """Record the ring of a run that did not end in good order, once. A run that never served has
-        nothing to show: a failed start is in the log."""
+        """Record the ring of a run that did not shut down cleanly, once. A failed start is not
+        recorded: it is in the log."""
         try:
             identity = _identity(path)
             if identity in self._seen_dead:
@@ -108,7 +108,7 @@ class Recorder:
             self._put(Incident(read.head, part(entries, at - BEFORE_S, at), (note,)), DIED)
 
     def _is_first(self, head: Head) -> bool:
-        """Is it not recorded yet, and not one of many deaths in a row?"""
+        """Is this death still unrecorded, and not one of many in a row?"""
         last = self._died_at.get(head.file, AGES_AGO)
         if self._recordings.has(head, DIED) or self._now() < last + AGAIN_S:
             return False
@@ -131,7 +131,7 @@ class Recorder:
 
 
 class _Followed:
-    """One ring, and the parts of it that are to become files."""
+    """One ring, and the recordings of it that have begun."""
 
     def __init__(self, path: Path, now: float) -> None:
         """Raises RingError."""
@@ -149,7 +149,7 @@ class _Followed:
         return _identity(self._tail.path) != self._identity
 
     def take(self, now: float) -> None:
-        """Read what is new. Raises RingError."""
+        """Read new entries. Raises RingError."""
         new = self._tail.new()
         for entry in new:
             notes = self._triggers.take(entry)
@@ -161,7 +161,7 @@ class _Followed:
             self._part += new
 
     def due(self, now: float) -> list[tuple[Incident, str]]:
-        """The recordings that are complete now; with `now` infinite, all that have begun."""
+        """Return the recordings that are complete now; with `now` infinite, all that have begun."""
         found = []
         if self._notes and now >= self._notes[0].at + AFTER_S + GRACE_S:
             found.append(self._incident())
@@ -179,7 +179,7 @@ class _Followed:
         return Incident(read.head, entries, notes), first.code
 
     def _read(self) -> RingContent:
-        """The ring as it is now; as it was at first, if it is gone."""
+        """Read the ring; if it is gone, return its first content."""
         try:
             read = RingContent(self._tail.path)
             if read.head.run == self.head.run:
@@ -190,8 +190,8 @@ class _Followed:
         return self._kept
 
     def _continuous(self, *, whole: bool) -> list[tuple[Incident, str]]:
-        """What has come since the last file, up to a place where all is known: each file stands
-        alone."""
+        """Return the entries since the last file, up to a place where a replay can start: each file
+        stands alone."""
         known = [at for at in range(1, len(self._part)) if begins(self._part, at)]
         end = len(self._part) if whole or not known else known[-1]
         entries, self._part = self._part[:end], self._part[end:]
@@ -199,7 +199,7 @@ class _Followed:
 
 
 def _last_words(entries: Sequence[AnyEntry]) -> str:
-    """Why a run died, as far as it said so."""
+    """Return the cause of a run's death, as far as the entries tell it."""
     for entry in entries:
         if isinstance(entry, DaemonDied):
             return entry.reason
@@ -209,7 +209,7 @@ def _last_words(entries: Sequence[AnyEntry]) -> str:
 
 
 def _runs(pid: int) -> bool:
-    """Is there a process of this number?"""
+    """Is there a process with this pid?"""
     try:
         os.kill(pid, 0)
     except ProcessLookupError:
@@ -220,13 +220,13 @@ def _runs(pid: int) -> bool:
 
 
 def begins(entries: Sequence[AnyEntry], at: int) -> bool:
-    """Do the entries from this place on begin with all that is known?"""
+    """Can a replay start at this place, with every subject known?"""
     following = entries[at + 1 : at + 2]
     return isinstance(entries[at], Clocks) and bool(following) and isinstance(following[0], Known)
 
 
 def wall_of(entries: Sequence[AnyEntry]) -> float:
-    """The wall clock at the end of these entries (s since the epoch)."""
+    """Return the wall clock at the end of these entries (s since the epoch)."""
     clocks = [entry for entry in entries if isinstance(entry, Clocks)]
     return clocks[-1].wall - clocks[-1].at + entries[-1].at if clocks else 0.0
 

@@ -1,4 +1,4 @@
-"""Where recordings are stored: their names, and bounds that spare an SD card."""
+"""The store of recordings: their names, and limits that spare an SD card."""
 
 import os
 from contextlib import suppress
@@ -31,7 +31,7 @@ class Recordings:
                 begun.unlink()
 
     def name(self, head: Head, wall: float, code: str) -> str:
-        """`<file>_<day>_<time>_<why>_<run>.mcap`, in the machine's own time."""
+        """Return `<file>_<day>_<time>_<why>_<run>.mcap`, in the machine's own time."""
         when = datetime.fromtimestamp(wall).strftime("%Y-%m-%d_%H-%M-%S")
         return f"{_stem(head)}_{when}_{code.lower()}_{head.run[:8]}{SUFFIX}"
 
@@ -40,7 +40,7 @@ class Recordings:
         return any(self.folder.glob(f"*_{code.lower()}_{head.run[:8]}{SUFFIX}"))
 
     def put(self, incident: Incident, wall: float, code: str) -> Path:
-        """Write a recording; the oldest of the same daemon make room for it. Raises OSError."""
+        """Write a recording, and remove the same daemon's oldest beyond its limits. Raises OSError."""
         from bridges.blackbox import mcap_write
 
         self.folder.mkdir(mode=0o750, parents=True, exist_ok=True)
@@ -56,7 +56,7 @@ class Recordings:
             raise DiskFull(f"less than {LEAST_FREE // 1_000_000} MB are free on {self.folder}")
 
     def _prune(self, head: Head, newest: Path) -> None:
-        """Remove the oldest recordings of a daemon beyond its bounds, and never the newest."""
+        """Remove a daemon's oldest recordings beyond its limits, but never the newest."""
         keep = head.recording
         of_daemon = [p for p in self.folder.glob(f"{_stem(head)}_*{SUFFIX}") if _is_of(p, head)]
         sized = sorted((p.stat().st_mtime_ns, p.stat().st_size, p) for p in of_daemon)

@@ -1,10 +1,10 @@
 """The ring: a file of fixed size on tmpfs with a daemon's last minutes. It outlives a kill.
 
-It has a head, then SEGMENTS of equal size, used in turn. Each begins with its number and with what was
-known of every subject; entries follow, each with its length and a checksum. The checksum also covers
-the segment's number, so an entry of an earlier turn, or one that a kill has torn, is never taken for
-a valid one. It is written with `pwrite`, not mapped: if somebody truncates the file, no signal
-kills the daemon.
+It has a head, then SEGMENTS of equal size, used in turn. Each begins with its number and the state of
+every subject; entries follow, each with its length and a checksum. The checksum also covers the
+segment's number, so an entry from an earlier turn, or an entry cut short by a kill, is never valid.
+The file is written with `pwrite`, not mapped: truncating a mapped file would kill the daemon by a
+signal.
 """
 
 import os
@@ -21,7 +21,7 @@ from bridges.host import user_files
 MAGIC: Final = b"RMFRING1"
 SEGMENTS: Final = 8
 TOP: Final = struct.Struct("<8sBxxxII")
-"""Magic, whether the run has ended in good order, the size of a segment, the length of the head."""
+"""Magic, clean shutdown (a flag), the size of a segment, the length of the head."""
 ENDED_AT: Final = 8
 MARK: Final = struct.Struct("<QI")
 """A segment begins with its number, and the checksum of that."""
@@ -42,7 +42,7 @@ class Ring:
     """The writing end. Each method may raise OSError; then a new ring must be made."""
 
     def __init__(self, folder: Path, head: Head, size: int) -> None:
-        """Make the file, with all its space claimed. The ring of a run that died stays beside it."""
+        """Make the file and reserve all its space. The ring of a run that died stays beside it."""
         self.path = folder / NAME
         self._segment_size = max(size // SEGMENTS, PAGE)
         told = entries.encode(head)
@@ -66,7 +66,7 @@ class Ring:
 
     @property
     def lives(self) -> bool:
-        """Whether the file is still at its path."""
+        """Is the file still at its path?"""
         try:
             return os.path.samestat(os.fstat(self._file), self.path.lstat())
         except OSError:
@@ -74,15 +74,15 @@ class Ring:
 
     @property
     def room(self) -> int:
-        """How much one entry may take at most (bytes)."""
+        """Return the maximum size of an entry (bytes)."""
         return self._segment_size - MARK.size - 2 * FRAME.size
 
     def fits(self, length: int) -> bool:
-        """Whether this many bytes of entries (with `frame`) still fit into this segment."""
+        """Do this many bytes of entries (with `frame`) still fit into this segment?"""
         return self._offset + length + FRAME.size <= self._segment_size
 
     def begin_segment(self) -> None:
-        """Go on in the next segment; its old content is gone."""
+        """Continue in the next segment, and discard its old content."""
         self._number += 1
         number = self._number.to_bytes(8, "little")
         start = MARK.pack(self._number, zlib.crc32(number)) + bytes(FRAME.size)
@@ -90,16 +90,16 @@ class Ring:
         self._offset = MARK.size
 
     def frame(self, content: bytes) -> bytes:
-        """An entry as it stands in this segment."""
+        """Return an entry with its length, and its checksum in this segment."""
         return FRAME.pack(len(content), zlib.crc32(content, self._number)) + content
 
     def write(self, frames: bytes) -> None:
-        """Append entries, framed for this segment, in which they must fit."""
+        """Append entries that are framed for this segment and fit into it."""
         os.pwrite(self._file, frames + bytes(FRAME.size), self._place + self._offset)
         self._offset += len(frames)
 
     def close(self, *, ended: bool) -> None:
-        """`ended`: the run ended in good order, so its ring is not needed."""
+        """Close the ring. `ended`: the run shut down cleanly, so its ring is not needed."""
         try:
             if ended:
                 os.pwrite(self._file, b"\1", ENDED_AT)
@@ -112,7 +112,7 @@ class Ring:
 
 
 def _died(path: Path) -> bool:
-    """Is there a ring whose run did not end in good order?"""
+    """Is there a ring whose run did not shut down cleanly?"""
     try:
         found = user_files.read(path, TOP.size - 1).content
     except OSError:
@@ -121,10 +121,9 @@ def _died(path: Path) -> bool:
 
 
 class RingContent:
-    """A ring's content at one time. `head`: of the run. `ended`: it ended in good order.
+    """A ring's content at one time. `head`: the run's. `ended`: the run shut down cleanly.
 
-    `segments`: each one's number and entries, in order, without what is being written meanwhile or
-    was torn.
+    `segments`: each segment's number and entries, in order, without incomplete entries.
     """
 
     def __init__(self, path: Path) -> None:
@@ -149,15 +148,15 @@ class RingContent:
             raise RingError(f"{path} has an entry that is invalid: {error}") from None
 
     def entries(self) -> Iterator[AnyEntry]:
-        """Every entry, the oldest first."""
+        """Yield every entry, the oldest first."""
         for found in self.segments.values():
             yield from found
 
 
 class Tail:
-    """Follows a ring that is being written: what is new since the last look.
+    """Follows a ring that is being written, and reads its new entries.
 
-    `head`: of the run. Raises RingError when it is made, and when the file cannot be read any more.
+    `head`: the run's. The constructor and `new` raise RingError if the file cannot be read.
     """
 
     def __init__(self, path: Path) -> None:
@@ -167,8 +166,8 @@ class Tail:
         self._offset = MARK.size
 
     def new(self) -> list[AnyEntry]:
-        """What was written since the last call; at first, all that is there. What the ring has lost
-        meanwhile is left out."""
+        """Return the entries written since the last call (the first call: all). Entries that the
+        ring has overwritten meanwhile are missing."""
         try:
             with self.path.open("rb") as ring:
                 return self._new(ring)
@@ -192,7 +191,7 @@ class Tail:
         return found
 
     def _start(self, ring: IO[bytes], turn: int) -> int:
-        """The number of the segment at a place; 0 for none."""
+        """Return the number of the segment at a place; 0 for none."""
         ring.seek(self._first + turn * self._size)
         start = ring.read(MARK.size)
         if len(start) < MARK.size:
@@ -203,7 +202,7 @@ class Tail:
 
 
 def _top(path: Path) -> tuple[Head, int, int]:
-    """A ring's head, where its first segment is, and the size of a segment. Raises RingError."""
+    """Return a ring's head, its first segment's offset, and the segment size. Raises RingError."""
     try:
         content = user_files.read(path, LONGEST_TOP).content
         magic, _, size, length = TOP.unpack_from(content)
@@ -223,7 +222,7 @@ def _entries(segment: bytes, number: int) -> list[AnyEntry]:
 
 
 def frames(segment: bytes, number: int, at: int) -> Iterator[tuple[bytes, int]]:
-    """The entries of a segment from a place on, each with where it ends, up to the first torn one."""
+    """Yield a segment's entries from offset `at`, each with its end, up to the first torn entry."""
     while at + FRAME.size <= len(segment):
         length, checksum = FRAME.unpack_from(segment, at)
         content = segment[at + FRAME.size : at + FRAME.size + length]

@@ -1,9 +1,9 @@
-"""When a recording is to be made of a daemon, from its entries. Pure.
+"""Finds the reasons for a recording in a daemon's entries. Pure.
 
 - a fault appears (a hazard is one: it keeps the device from RMF);
-- a request is refused, other than what every handover and start refuse;
-- somebody has waited longer than `waiting_s` for what was requested;
-- the daemon says that a defect ends it.
+- a request is refused, except for the refusals of every handover and start;
+- a request has waited longer than `waiting_s`;
+- the daemon reports a defect that ends it.
 The same cause at the same subject counts once in AGAIN_S.
 """
 
@@ -28,7 +28,7 @@ FAULT, REFUSED, WAITING, DIED = "FAULT", "REFUSED", "WAITING", "DIED"
 
 
 class Triggers:
-    """Why to record one run of a daemon. `waiting_s`: a wait this long (s) is a reason."""
+    """Finds the reasons to record one run of a daemon. `waiting_s`: a wait this long (s) is one."""
 
     def __init__(self, waiting_s: float) -> None:
         self._faults: dict[str, set[str]] = {}
@@ -37,7 +37,7 @@ class Triggers:
         self._graph = PlainGraph()
 
     def take(self, entry: AnyEntry) -> list[Note]:
-        """Why a recording is to be made now; empty if nothing is new."""
+        """Return new reasons for a recording; empty if there are none."""
         return [note for note in self._all(entry) if self._is_new(note)]
 
     def _all(self, entry: AnyEntry) -> Iterator[Note]:
@@ -66,7 +66,7 @@ class Triggers:
             yield Note(step.at, REFUSED, step.refused, step.subject)
 
     def _spoken(self, spoken: Spoken) -> Iterator[Note]:
-        """Who has waited for too long, by the messages alone."""
+        """Yield notes for overlong waits, by the messages alone."""
         kind, release = MESSAGES.get(spoken.type), RELEASES.get(spoken.release)
         if kind is None or release is None:
             return

@@ -1,10 +1,9 @@
-"""What cores work with (events, memories, outputs, reports) as trees of plain values, and back.
+"""Converts a core's values (events, memories, outputs, reports) to trees of plain values, and back.
 
-A tree holds None, bool, int, float, str, lists and mappings with text as keys. A tuple is a
-list; anything else is a mapping whose key `""` names its type (`lift.memory.Session`), with its fields
-beside it, or what it holds under `=`. Only types with a name (in
-`bridges/kinds/shared/recorded.py`, and in `RECORDED` of each kind) are written and created: no
-recording can call anything else.
+A tree holds None, bool, int, float, str, lists and mappings with text as keys. A tuple becomes a
+list; any other value a mapping whose key `""` names its type (`lift.memory.Session`), with its fields
+beside it, or its content under `=`. Only types with a name (in `bridges/kinds/shared/recorded.py`,
+and in `RECORDED` of each kind) are written and created: no recording can call anything else.
 """
 
 import math
@@ -28,24 +27,24 @@ TYPE: Final = ""
 HOLDS: Final = "="
 MAP, SET, NUMBER = "map", "set", "number"
 ENDLESS: Final = (math.inf, -math.inf)
-"""What JSON has no word for."""
+"""Floats that JSON cannot express."""
 PLAIN: Final = frozenset({type(None), bool, int, float, str})
 
 
 class UnknownValue(ValueError):
-    """A tree names a type, a field or a member that this version does not have."""
+    """A tree names a type, field or member that this version does not have."""
 
 
 class Struct(NamedTuple):
-    """A type with fields: its name in a tree, and each field's name here and there, which differ if the
-    field has been renamed (`msgspec.field(name=…)`)."""
+    """A type with fields: its name in a tree, and each field's name in code and in trees, which differ
+    if the field was renamed (`msgspec.field(name=…)`)."""
 
     name: str
     fields: tuple[tuple[str, str], ...]
 
 
 def tree(value: object) -> Tree:
-    """The tree of a value. Raises TypeError for what no core has."""
+    """Return the tree of a value. Raises TypeError for types that no core has."""
     kind: type[Any] = type(value)
     if kind is float and value in ENDLESS:
         return {TYPE: NUMBER, HOLDS: str(value)}
@@ -117,8 +116,8 @@ _structs: dict[type[Any], Struct | None] = {}
 
 
 def first_difference(one: Tree, other: Tree, path: str = "") -> tuple[str, Tree, Tree] | None:
-    """Where two trees differ, and how; None if they do not. A field that only one of them has is
-    not a difference: another version of the program has more fields, or fewer."""
+    """Return the first difference as (path, one, other); None if there is none. A field that only
+    one tree has does not count: another version of the program may have more or fewer fields."""
     if isinstance(one, dict) and isinstance(other, dict) and one.get(TYPE) == other.get(TYPE):
         names = [name for name in one if name in other]
         below = ((f"{path}.{name}".strip("."), one[name], other[name]) for name in names)
@@ -157,7 +156,7 @@ def name_of(kind: type) -> str:
 
 @cache
 def _type(name: str) -> type[Any]:
-    """The type of this name; of the kinds only the one that it begins with is loaded. Raises
+    """Return the type of this name. Only the kind at the beginning of the name is loaded. Raises
     UnknownValue."""
     kind = name.partition(".")[0]
     known = recorded(kind) if kind in kind_names() else SHARED
