@@ -33,7 +33,7 @@ Place = tuple[str, float, float]
 
 
 class BuildingMap(Struct, frozen=True):
-    """The names of one file. `named`: what -> name -> line. `stops`: lift -> the floors it serves.
+    """The names of one file. `named`: sort -> name -> line. `stops`: lift -> its floors.
 
     `places`: waypoint -> level, x, y (m), of a navigation graph; traffic-editor's file has pixels.
     """
@@ -45,7 +45,7 @@ class BuildingMap(Struct, frozen=True):
 
 
 def load_map(file: str) -> BuildingMap:
-    """Read a building map or navigation graph. Raises SettingsError with what is wrong with it."""
+    """Read a building map or navigation graph. Raises SettingsError with its problems."""
     page = YamlFile(file)
     root = compose(page, read(file, MAP), MAP)
     page.check()
@@ -102,7 +102,7 @@ class _MapReading:
             self._add_stop(lift, level)
 
     def _add(self, what: str, name: ScalarNode | None) -> None:
-        """Unnamed vertices and doors have the name ""; they are left out."""
+        """Add a name. Unnamed vertices and doors have the name "", and are left out."""
         if name is not None and name.value:
             self.named[what].setdefault(name.value, _line(name))
 
@@ -110,7 +110,7 @@ class _MapReading:
         self.stops.setdefault(lift.value, {}).setdefault(level.value, _line(level))
 
     def _entries(self, node: Node, key: str) -> Iterator[tuple[ScalarNode, Node]]:
-        """The entries of the mapping below `key`; none if it is missing or empty."""
+        """Yield the entries of the mapping below `key`; none if it is missing or empty."""
         for name, value in self._section(node, key, MappingNode, "a mapping (name: ...)"):
             if isinstance(name, ScalarNode):
                 yield name, value
@@ -118,7 +118,7 @@ class _MapReading:
                 self._page.note(name, f"a name in '{key}' must be text")
 
     def _items(self, node: Node, key: str, what: str) -> Iterator[SequenceNode]:
-        """The lists in the list below `key`; none if it is missing or empty."""
+        """Yield the lists in the list below `key`; none if it is missing or empty."""
         for item in self._section(node, key, SequenceNode, "a list"):
             if isinstance(item, SequenceNode):
                 yield item
@@ -126,7 +126,7 @@ class _MapReading:
                 self._page.note(item, f"{what} must be a list ([x, y, ...]), as RMF has it")
 
     def _section(self, node: Node, key: str, kind: type[CollectionNode], what: str) -> list[Any]:
-        """What the section below `key` holds; nothing if it is missing or empty."""
+        """Return the content of the section below `key`; [] if it is missing or empty."""
         section = _below(node, key)
         if section is None or _is_empty(section):
             return []

@@ -25,7 +25,7 @@ class BusRead(Struct, frozen=True):
     settings: object = BROKEN
 
     def remarks(self) -> Remarks:
-        """What is legal about its settings but may be a mistake."""
+        """Yield its settings that are legal but may be a mistake."""
         return self.hal.warnings(self.settings) if self.hal and self.settings is not BROKEN else ()
 
 
@@ -62,6 +62,6 @@ def _note_untyped(bus: MappingEntry, allowed: list[str], values: Values, page: Y
 
 
 def _is_other_type(kind: MappingEntry, allowed: list[str]) -> bool:
-    """Whether there is such a bus type, but none of the file's drivers can use it."""
+    """Does this bus type exist, though none of the file's drivers can use it?"""
     others = set(named.bus_types()).difference(allowed)
     return isinstance(kind.value, ScalarNode) and kind.value.value in others

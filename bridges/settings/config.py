@@ -20,7 +20,7 @@ class Config(Struct, frozen=True):
 
     `text`: its bytes as they were read. `buses` and `devices`: name -> the `settings` of the bus's
     or driver's record, whose type only that record knows. `bus_types`: name -> `type:`. `warnings`:
-    legal settings that may be a mistake. `notes`: settings that a site may want, and should know about.
+    legal settings that may be a mistake. `notes`: intended settings with effects to know about.
     `section`: the settings of a kind without devices (`bridges/kinds/shared/graph_kind.py`), which
     has no driver and no buses.
     """
@@ -65,6 +65,6 @@ class Config(Struct, frozen=True):
         return self.bus_type(name).open_bus(self.buses[name])
 
     def open_to_switch_off(self, name: str) -> Bus:
-        """The same for a process that only switches off. Raises HalError."""
+        """Open the real bus for a process that only switches off. Raises HalError."""
         hal = self.bus_type(name)
         return (hal.open_to_switch_off or hal.open_bus)(self.buses[name])

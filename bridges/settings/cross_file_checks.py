@@ -1,4 +1,4 @@
-"""Checks files against each other: places or names used twice, domains that differ, unknown names.
+"""Checks files against each other: places or names used twice, different domains, unknown names.
 
 Files that are checked together belong to one site. Unless the user says otherwise, they run on one
 machine.
@@ -27,21 +27,21 @@ class Found(Struct, frozen=True):
 
 
 class ExclusiveUse(Struct, frozen=True):
-    """A file uses something that only one file may use. `what`: its name. `path`: where it says so."""
+    """The use of something by a file, exclusive to one file. `what`: its name. `path`: in the YAML."""
 
     config: Config
     what: str
     path: Path
 
     def place(self) -> Problem:
-        """The place in the file, as a Problem without text."""
+        """Return the place in the file, as a Problem without text."""
         page = YamlFile(str(self.config.path))
         root = compose(page, self.config.text)
         return page.problem(locate(Spot(root, root, ""), self.path).where(), "")
 
 
 def across(configs: Sequence[Config], one_machine: bool = True) -> Found:
-    """Errors and warnings about these files together."""
+    """Return errors and warnings about these files together."""
     claims = [claim for config in configs for claim in _claims(config, one_machine)]
     errors = [*_domains(configs), *taken(configs, one_machine), *_nowhere(configs)]
     gateways = [claim for config in configs for claim in _gateways(config)]
@@ -50,7 +50,7 @@ def across(configs: Sequence[Config], one_machine: bool = True) -> Found:
 
 
 def taken(configs: Sequence[Config], one_machine: bool = True) -> Iterator[Problem]:
-    """What a file uses that an earlier one has for itself: ports, pins, units' points, RMF's names."""
+    """Yield each exclusive port, pin, point of a unit or RMF name that an earlier file uses too."""
     lines = list(_twice(c for config in configs for c in _lines(config, one_machine)))
     busy = {claim.what for claim, _ in lines}
     claims = (c for config in configs for c in _claims(config, one_machine))
@@ -59,7 +59,7 @@ def taken(configs: Sequence[Config], one_machine: bool = True) -> Iterator[Probl
 
 
 def _twice(claims: Iterable[ExclusiveUse]) -> Iterator[tuple[ExclusiveUse, ExclusiveUse]]:
-    """(later, first) for what two files claim; the loader has checked each file by itself."""
+    """Yield (later, first) for each double claim by two files; the loader has checked each file."""
     first: dict[str, ExclusiveUse] = {}
     for claim in claims:
         other = first.setdefault(claim.what, claim)
@@ -86,21 +86,21 @@ def _buses(config: Config) -> Iterator[tuple[str, Where]]:
 
 
 def _lines(config: Config, one_machine: bool) -> Iterator[ExclusiveUse]:
-    """Ports that only one daemon can open."""
+    """Yield ports that only one daemon can open."""
     for name, where in _buses(config):
         if where.clients == "one" and one_machine:
             yield ExclusiveUse(config, where.text, ("buses", name))
 
 
 def _gateways(config: Config) -> Iterator[ExclusiveUse]:
-    """Addresses where the make decides how many clients may connect."""
+    """Yield the addresses of gateways; their make decides how many clients may connect."""
     for name, where in _buses(config):
         if where.clients is None:
             yield ExclusiveUse(config, where.text, ("buses", name))
 
 
 def _claims(config: Config, one_machine: bool) -> Iterator[ExclusiveUse]:
-    """Names on RMF's graph, and places on buses."""
+    """Yield names on RMF's graph, and places on buses."""
     kind = kind_called(config.kind)
     if isinstance(kind, GraphKind):
         yield ExclusiveUse(config, f"kind: {kind.name}", ("kind",))
@@ -126,7 +126,7 @@ def _places(config: Config, bus: str, device: str) -> Iterator[tuple[str, Path]]
 
 
 def _shared(pair: tuple[ExclusiveUse, ExclusiveUse], claims: Sequence[ExclusiveUse]) -> Problem:
-    """The warning for one gateway in two files; it names the units that both ask."""
+    """Return the warning for one gateway in two files, with the units that both files ask."""
     claim, other = pair
     both = _units(claim.config, claim.what, claims) & _units(other.config, claim.what, claims)
     units = f" for unit {', '.join(sorted(both))}" if both else ""
@@ -157,7 +157,7 @@ def _devices(configs: Sequence[Config], kind: str) -> dict[str, Config]:
 
 
 def _nowhere(configs: Sequence[Config]) -> Iterator[Problem]:
-    """Devices that a kind without hardware names, but no file of their kind has."""
+    """Yield devices that a kind without hardware names, but no file of their kind has."""
     for claim, kind, name in _spoken(configs):
         known = _devices(configs, kind)
         if known and name not in known:
@@ -165,7 +165,7 @@ def _nowhere(configs: Sequence[Config]) -> Iterator[Problem]:
 
 
 def _unspoken(configs: Sequence[Config]) -> Iterator[Problem]:
-    """Devices that a kind without hardware does not name, though it names others of their kind."""
+    """Yield devices missing from a kind without hardware that names others of the same kind."""
     spoken = [(kind, name, claim) for claim, kind, name in _spoken(configs)]
     for kind in sorted({kind for kind, _, _ in spoken}):
         names = {name for k, name, _ in spoken if k == kind}

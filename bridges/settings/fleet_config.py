@@ -1,4 +1,4 @@
-"""The configuration file of a fleet adapter (EasyFullControl): the keys that our files must agree with.
+"""The configuration file of a fleet adapter (EasyFullControl): the keys that our files must match.
 
     rmf_fleet:
       name: tiny
@@ -10,7 +10,7 @@
 
 Older files have `robots:` beside `rmf_fleet:`, with `rmf_config: {charger: {waypoint: charger_a}}`, and
 one pair of lists for all levels. Source: open-rmf/fleet_adapter_template, config.yaml and
-fleet_adapter.py. Other keys do not concern us, and are ignored.
+fleet_adapter.py. All other keys are ignored.
 """
 
 import re
@@ -27,7 +27,7 @@ from bridges.yaml.positions import Spot, locate
 
 FLEET = Sort("fleet configuration", "rmf_fleet: ...", 256 * 1024, 20_000)
 EVERY_LEVEL = ""
-"""The level of reference coordinates that are given once for all."""
+"""The level name for reference coordinates that apply to every level."""
 Soc = Annotated[float, msgspec.Meta(ge=0, le=1)]
 Path = tuple[str, ...]
 
@@ -39,7 +39,7 @@ class Charger(msgspec.Struct, frozen=True):
 
 
 class OlderRobot(msgspec.Struct, frozen=True):
-    """The part of a robot's settings that is for RMF."""
+    """A robot's settings for RMF."""
 
     charger: Charger | None = None
 
@@ -51,7 +51,7 @@ class RobotConfig(msgspec.Struct, frozen=True):
     rmf_config: OlderRobot | None = None
 
     def waypoint(self) -> tuple[Path, str | None]:
-        """Where the waypoint stands below the robot, and its name."""
+        """Return the waypoint's path below the robot, and its name."""
         if isinstance(self.charger, str):
             return ("charger",), self.charger
         if self.charger is not None:
@@ -107,7 +107,7 @@ class FleetFile(msgspec.Struct, frozen=True):
                 yield (*top, name), name, robot or RobotConfig()
 
     def references(self) -> Mapping[str, Pairs]:
-        """Level -> pairs; the level is EVERY_LEVEL in a file that gives them once."""
+        """Return level -> pairs; the level is EVERY_LEVEL where the file has one list for all."""
         return self.contents.reference_coordinates or {}
 
     def problem(self, path: Path, text: str) -> Problem:
@@ -116,7 +116,7 @@ class FleetFile(msgspec.Struct, frozen=True):
 
 
 def load_fleet(file: str) -> FleetFile:
-    """Read a fleet configuration. Raises SettingsError with what is wrong with it."""
+    """Read a fleet configuration. Raises SettingsError with its problems."""
     page = YamlFile(file)
     root = compose(page, read(file, FLEET), FLEET)
     page.check()

@@ -1,7 +1,7 @@
 """Compares a coordinator's YAML with the configuration of a fleet's adapter, and with RMF's map.
 
-The two are written by different people, and RMF says nothing when they differ: a robot waits for ever,
-or stays on a pad. Each mismatch is reported with its file, its line and what to write.
+Different people write these files, and RMF reports no mismatch: a robot waits for ever, or stays on
+a pad. Each mismatch is reported with its file, its line and the fix.
 """
 
 import math
@@ -22,12 +22,12 @@ from bridges.yaml.positions import Spot, locate
 from bridges.yaml.spelling import unknown
 
 Transforms = Mapping[str, Similarity]
-"""Level -> RMF's map to the robot's; EVERY_LEVEL for all."""
+"""Level -> transform from RMF's map to the robot's; EVERY_LEVEL for all."""
 FINISHING = ("charge", "park", "nothing")
 
 
 class Compared(Struct):
-    """What was found: errors, possible mistakes, and what else is good to know."""
+    """The findings: errors, possible mistakes, and notes."""
 
     errors: list[Problem] = field(default_factory=list)
     warnings: list[Problem] = field(default_factory=list)
@@ -35,7 +35,7 @@ class Compared(Struct):
 
 
 def compared(config: Config, fleet: FleetFile, building: BuildingMap | None) -> Compared:
-    """A coordinator's file beside one fleet's. `building`: positions are compared too."""
+    """Compare a coordinator's file with one fleet's. `building`: compare positions too."""
     found = _Comparing(config, fleet)
     found.names()
     found.percentages()
@@ -55,7 +55,7 @@ class _Comparing:
         self._name = fleet.fleet.name
 
     def names(self) -> None:
-        """The fleet, its robots, and where each of them charges."""
+        """Compare the names of the fleet, its robots, and their chargers' waypoints."""
         if self._name not in self._settings.fleets:
             text = unknown("fleet", self._name, self._settings.fleets)
             self._theirs("errors", ("rmf_fleet", "name"), f"{self._ours_file()} has an {text}")
@@ -95,7 +95,7 @@ class _Comparing:
             self._theirs("warnings", path, text)
 
     def percentages(self) -> None:
-        """Where charging begins and ends, on both sides."""
+        """Compare the percentages at which charging begins and ends."""
         soc, threshold = self._fleet.fleet.recharge_soc, self._fleet.fleet.recharge_threshold
         full, again = self._settings.full_percent, self._settings.again_percent
         if soc is not None and full < 100 * soc:
@@ -119,7 +119,7 @@ class _Comparing:
             self._theirs("errors", ("rmf_fleet", "recharge_threshold"), text)
 
     def finishing(self) -> None:
-        """What a robot does when its task is over."""
+        """Check what a robot does after a task."""
         request = self._fleet.fleet.finishing_request
         path = ("rmf_fleet", "finishing_request")
         if request is not None and request not in FINISHING:
@@ -133,7 +133,7 @@ class _Comparing:
             self._theirs("warnings", path if request else ("rmf_fleet",), text)
 
     def positions(self, building: BuildingMap | None) -> None:
-        """The maps' transforms, and each waypoint beside the navigation graph."""
+        """Check the maps' transforms, and compare each waypoint with the navigation graph."""
         transforms = dict(self._transforms())
         fleet = self._settings.fleets.get(self._name)
         if fleet is None:

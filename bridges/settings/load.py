@@ -1,16 +1,16 @@
-"""A device YAML becomes a Config, or a SettingsError that names every problem with its place.
+"""Turns a device YAML into a Config, or raises a SettingsError with every problem and its place.
 
     kind: lift              a folder of bridges/kinds/ that holds a KIND
     driver: dry_contact     a file of drivers/<kind>/; a device may name another as its own `driver:`
     rmf: {...}              bridges.kinds.shared.rmf_section.Rmf
     buses: {name: {type: a file of drivers/hal/, ...}}
     recording: {...}        bridges.kinds.shared.recording_section.RecordingSettings
-    lifts: {name: {...}}    the kind's own key; what each holds is the driver's `settings`
+    lifts: {name: {...}}    the kind's own key; each device has the driver's `settings`
 
 A kind without hardware has only `kind`, `rmf`, `recording` and one section of its own.
 
-Structs define what a section may contain (`bridges/yaml/values.py`); this file and `wiring.py` check
-what concerns several sections. The daemon takes nothing else from the file, and checks nothing again.
+Structs define the content of a section (`bridges/yaml/values.py`); this file and `wiring.py` check
+sections against each other. The daemon takes nothing else from the file, and checks nothing again.
 """
 
 from pathlib import Path
@@ -45,7 +45,7 @@ OF_RMF: Final = {
     "rmf_fleet": ("a fleet adapter's configuration", "--fleet-config"),
     "levels": ("RMF's building map or navigation graph", "--building-map"),
 }
-"""Top key of a file of RMF's -> what the file is, and the option of `check` that takes it."""
+"""Top key of a file of RMF's -> the file's name, and the option of `check` for it."""
 
 
 def load(path: Path | str) -> Config:
@@ -54,7 +54,7 @@ def load(path: Path | str) -> Config:
 
 
 def understood(path: Path | str, text: bytes) -> Config:
-    """The Config of a device YAML's text, which is or was at this path. Raises SettingsError."""
+    """Return the Config of a device YAML's text. `path`: its file. Raises SettingsError."""
     page = YamlFile(str(path))
     root = compose(page, text)
     _note_rmfs(page, root)
@@ -65,7 +65,7 @@ def understood(path: Path | str, text: bytes) -> Config:
 
 
 def _note_rmfs(page: YamlFile, root: MappingNode) -> None:
-    """Refuse a file of RMF's as a whole, before each of its keys is found unknown."""
+    """Refuse a file of RMF's as a whole, instead of an error for each of its keys."""
     for key, (what, option) in OF_RMF.items():
         entry = below(root, key)
         if entry and not below(root, "kind"):
@@ -97,7 +97,7 @@ class _DeviceReading:
         self._notes: list[Problem] = []
 
     def config(self, path: Path, text: bytes) -> Config:
-        """What was read, if no problem was noted."""
+        """Read the file and return its Config. Raises SettingsError if a problem was noted."""
         return Config(
             path=path,
             text=text,
@@ -153,7 +153,7 @@ class _DeviceReading:
             self._driver = named.driver_called(self._kind_name, name)
 
     def _read_own_drivers(self, devices: Node) -> None:
-        """Read the drivers that devices name themselves; None for a driver that does not exist."""
+        """Read the drivers that single devices name; None for a driver that does not exist."""
         for key, value in devices.value if isinstance(devices, MappingNode) else ():
             own = below(value, "driver")
             if own and isinstance(key, ScalarNode) and not is_none(own.value):
@@ -175,7 +175,7 @@ class _DeviceReading:
                 self._page.note(key, unknown("topic", name, TOPICS))
 
     def _read_section(self, entry: MappingEntry | None, kind: AnyGraphKind) -> None:
-        """The settings of a kind without devices; all of them may have defaults."""
+        """Read the settings of a kind without devices; the section may be optional."""
         if entry:
             self._section = self._values.make(kind.settings, entry.spot())
             spot = Spot(entry.value, entry.key, entry.spot().label)
@@ -191,7 +191,7 @@ class _DeviceReading:
         return self._section is BROKEN or bool(self._page.problems)
 
     def _names(self, spot: Spot, of: str) -> list[MappingEntry]:
-        """The entries of a section whose keys are names."""
+        """Return the entries of a section whose keys are names."""
         entries = self._values.entries(spot)
         if isinstance(spot.node, MappingNode) and not spot.node.value:
             self._page.note(spot.at, f"{spot.label} is empty: it needs at least one {of}")
@@ -208,7 +208,7 @@ class _DeviceReading:
                 self._warn(locate(entry.spot(), path).where(), f"bus '{entry.name}': {text}")
 
     def _allowed_types(self) -> list[str]:
-        """The bus types that the drivers can use; all of them while a driver is not known."""
+        """Return the bus types that the drivers can use; every type if a driver is unknown."""
         types, drivers = named.bus_types(), [self._driver, *self._own_drivers.values()]
         return [t for t in types if not all(d and t not in d.buses for d in drivers)]
 
@@ -253,7 +253,7 @@ class _DeviceReading:
     def _device(
         self, entry: MappingEntry, bus: str | None, driver: AnyDriver
     ) -> DeviceSettings | Broken:
-        """A device's settings; checks its wires too."""
+        """Read a device's settings, and check its wires."""
         spot = Spot(entry.value, entry.key, entry.spot().label)
         hal = self._buses[bus].hal if bus else None
         wiring = WiringCheck(self._page, entry.name, bus or "", hal)
@@ -308,7 +308,7 @@ class _DeviceReading:
             self._notes.append(self._page.problem(node, f"note: {spot.label}: {text}"))
 
     def _collect_unwatched(self) -> None:
-        """Collect what is to be said of outputs that outlive this machine, once for each bus."""
+        """Collect remarks about outputs that stay on without this machine, once for each bus."""
         for name, bus in () if self._page.problems else self._buses.items():
             assert bus.hal
             unwatched = bus.hal.unwatched(bus.settings, self._written.get(name, ()))

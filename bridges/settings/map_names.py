@@ -18,7 +18,7 @@ from bridges.yaml.spelling import nearest, short
 
 
 def places(config: Config) -> list[Place]:
-    """Every name in a file that RMF's map must have, with its path in the file."""
+    """Return every name in a file that RMF's map must have, with its path in the file."""
     kind = kind_called(config.kind)
     if isinstance(kind, GraphKind):
         found = kind.on_map(config.section)
@@ -33,7 +33,7 @@ def places(config: Config) -> list[Place]:
 
 
 def mismatches(config: Config, building: BuildingMap) -> list[Problem]:
-    """Every name of the file that is missing on the map, and every stop that the file lacks."""
+    """Return a problem for each name missing on the map, and for each stop missing in the file."""
     page = YamlFile(str(config.path))
     root = compose(page, config.text)
     top = Spot(root, root, "the file")
@@ -52,7 +52,7 @@ def mismatches(config: Config, building: BuildingMap) -> list[Problem]:
 
 
 def _missing(building: BuildingMap, what: str, name: str, lift: str) -> str:
-    """The problem if the map lacks the name, with a suggestion; "" if it has it."""
+    """Return the problem, with a suggestion, if the name is missing on the map; else ""."""
     stops = building.stops.get(lift)
     known = building.named[what] if stops is None else stops
     if name in known:

@@ -10,13 +10,13 @@ from bridges.kinds.shared.remarks import Remarks
 from bridges.yaml.values import described
 
 RENEWED: Final = 3
-"""An output that switches off by itself must be renewed once in this many scans."""
+"""The time after which an output switches off by itself, in scans, at least."""
 LONG_S: Final = 1000.0
-"""A duration (s) this long was often meant in milliseconds."""
+"""A duration (s) of this length or more is often a mistake for milliseconds."""
 
 
 def milliseconds(structs: Iterable[tuple[tuple[str, ...], object]]) -> Remarks:
-    """A remark (path, text) on each suspiciously long duration that is not a default."""
+    """Yield a remark (path, text) on each suspiciously long duration that is not a default."""
     for path, struct in structs:
         cls: object = type(struct)
         info = described(cls)
@@ -39,7 +39,7 @@ def _clock(seconds: float) -> str:
 
 
 def out_of_step(device: DeviceSettings, bus: object) -> Remarks:
-    """Problems with a bus that is too slow for its device: readings and commands that come too late."""
+    """Yield problems with a bus that is too slow for its device: late readings and commands."""
     scan_s = getattr(bus, "scan_s", 0.0)
     yield from _stale_readings(device, scan_s)
     if renewed := device.off_after():
@@ -54,7 +54,7 @@ def out_of_step(device: DeviceSettings, bus: object) -> Remarks:
 
 
 def _stale_readings(device: DeviceSettings, scan_s: float) -> Remarks:
-    """A problem if a reading becomes stale before the next one."""
+    """Yield a problem if a reading becomes stale before the next one."""
     stale_s = device.stale_after()
     if stale_s is not None and scan_s >= stale_s:
         text = f"stale_after_s is {stale_s:g}, but its bus is read every {scan_s:g} s (scan_s)"

@@ -1,4 +1,4 @@
-"""A struct's plain settings as text: numbers with units, and the default where the value differs.
+"""Shows a struct's plain settings as text: numbers with units, and defaults that were changed.
 
 Wires, maps and code tables are left out: their drivers describe them (`drivers/driver_type.py`).
 """
@@ -15,12 +15,12 @@ _LEAVES = (str, int, float, bool, type(None))
 
 
 def plain(struct: object) -> list[Row]:
-    """Every setting that is a number, a word or a list of them, at any depth."""
+    """Return every setting that is a number, a word or a list of them, at any depth."""
     return list(_rows(struct, (), deep=True))
 
 
 def choices_of(device: object) -> list[Row]:
-    """The plain settings of a device, and of its sections that have no sections themselves."""
+    """Return the plain settings of a device, and of its sections without sections of their own."""
     return list(_rows(device, (), deep=False))
 
 
@@ -43,7 +43,7 @@ def _fields(struct: type) -> tuple[mi.Field, ...]:
 
 
 def is_section(info: mi.Type) -> bool:
-    """Whether a field holds a struct, or a list or mapping of structs."""
+    """Does a field hold a struct, or a list or mapping of structs?"""
     match info:
         case mi.UnionType(types=types):
             return all(is_section(t) for t in types if not isinstance(t, mi.NoneType))
@@ -55,7 +55,7 @@ def is_section(info: mi.Type) -> bool:
 
 
 def _is_plain(value: object) -> bool:
-    """Whether it is a word or a number, or a list or mapping of these."""
+    """Is the value a word or a number, or a list or mapping of these?"""
     value = getattr(value, "value", value)
     if isinstance(value, dict):
         value = list(value.values())
@@ -89,7 +89,7 @@ def _text(value: object, unit: str) -> str:
 
 
 def _instead(field: mi.Field, value: object, unit: str) -> str:
-    """The default, if the value differs from it."""
+    """Return the default if the value differs from it; else ""."""
     if field.required or field.default in (msgspec.NODEFAULT, None, value):
         return ""
     return f"default: {_text(field.default, unit)}"

@@ -1,6 +1,6 @@
-"""The similarity transform between two maps, from pairs of the same points: rotation, scale, shift.
+"""Estimates the similarity transform (rotation, scale, shift) between two maps, from pairs of points.
 
-It is the least-squares transform that the fleet adapter template estimates with `nudged` from a fleet
+The fleet adapter template estimates the same least-squares transform with `nudged` from a fleet
 configuration's `reference_coordinates` (open-rmf/fleet_adapter_template, fleet_adapter.py), with the
 same mean squared error. A point is a complex number here: x + y·i.
 """
@@ -22,12 +22,12 @@ class Similarity(Struct, frozen=True):
 
     @property
     def rotation(self) -> float:
-        """Counterclockwise, in radians."""
+        """Return the rotation, counterclockwise, in radians."""
         return cmath.phase(self.turn)
 
     @property
     def scale(self) -> float:
-        """How many units of `to` one unit of `from` is."""
+        """Return the length of one unit of `from`, in units of `to`."""
         return abs(self.turn)
 
     @property
@@ -36,13 +36,13 @@ class Similarity(Struct, frozen=True):
         return float(self.mse**0.5 / self.scale)
 
     def back(self, at: Point) -> Point:
-        """A point of `to`, in `from`."""
+        """Transform a point of `to` back to `from`."""
         found = (complex(*at) - self.shift) / self.turn
         return found.real, found.imag
 
 
 def estimate(these: Sequence[Point], those: Sequence[Point]) -> Similarity:
-    """The transform from `these` to `those`, pair by pair. Raises ValueError with the reason."""
+    """Estimate the transform from `these` to `those`, pair by pair. Raises ValueError."""
     if len(these) != len(those):
         raise ValueError(f"{len(these)} points and {len(those)}: they must be pairs")
     if len(these) < 2:

@@ -69,7 +69,7 @@ class WiringCheck:
                     self.written.append(self._hal.canonical(wire.point))
 
     def _stands(self, wire: Wire, key: str, text: str, spot: Spot) -> bool:
-        """Record that this wire uses this point; False if the point is invalid."""
+        """Record the wire's use of this point; return False if the point is invalid."""
         entry = locate(spot, wire.path)
         point = below(entry.value, key)
         node = point.value if point else entry.where()
@@ -79,27 +79,27 @@ class WiringCheck:
         return reason is None
 
     def warnings(self, wires: Iterable[Wire], spot: Spot) -> Iterable[tuple[Node, str]]:
-        """What is legal about these wires but may be a mistake, and the node to point to."""
+        """Yield (node to point to, text) for wires that are legal but may be a mistake."""
         for wire in wires:
             for text in self._hal.wire_warnings(wire) if self._hal else ():
                 yield locate(spot, wire.path).where(), f"'{wire.signal}': {text}"
 
     def claims(self, places: Iterable[tuple[str, tuple[str, ...]]], spot: Spot) -> None:
-        """Record what a device without wires needs for itself: (place, path in its YAML)."""
+        """Record the exclusive places of a device without wires: (place, path in its YAML)."""
         for text, path in places:
             user = f"{self._device} {'.'.join(path)}"
             self.uses.append(Use(self._bus, text, text, user, locate(spot, path).where()))
             self.written.append(text)
 
     def reach(self, bus: object) -> None:
-        """Note points that no bus of these settings (BROKEN where they are not known) can have."""
+        """Note points that a bus with these settings (BROKEN: unknown) cannot have."""
         for use in self.uses if self._hal and bus is not BROKEN else ():
             assert self._hal
             if reason := self._hal.unreachable(bus, use.point):
                 self._page.note(use.node, reason)
 
     def parts(self, structs: Iterable[tuple[tuple[str, ...], object]], spot: Spot) -> None:
-        """Check the wires of a device whose other settings are invalid, so that it has no table."""
+        """Check the wires of a device that has no table because other settings are invalid."""
         for path, struct in structs:
             if isinstance(struct, Input):
                 pull, debounce_s = struct.pull, struct.debounce_s
@@ -116,7 +116,7 @@ class WiringCheck:
 
 
 def note_conflicts(page: YamlFile, uses: Iterable[Use]) -> None:
-    """One point of one bus serves one signal: the later one in the file is the problem."""
+    """Note each point with a second signal, at the later place in the file."""
     first: dict[tuple[str, str], Use] = {}
     for use in sorted(uses, key=lambda u: (u.node.start_mark.line, u.node.start_mark.column)):
         other = first.setdefault((use.bus, use.point), use)

@@ -1,6 +1,6 @@
-"""Parses YAML text to nodes with line and column; refuses invalid YAML and features we do not accept.
+"""Parses YAML text to nodes with line and column; refuses invalid YAML and some valid features.
 
-It uses PyYAML's pure Python loader: its messages say more, and libyaml's composer recurses in C without
+Uses PyYAML's pure Python loader: its messages say more, and libyaml's composer recurses in C without
 a limit, so a deeply nested file would crash the interpreter instead of raising.
 """
 
@@ -22,11 +22,11 @@ from bridges.yaml.problems import SettingsError as SettingsError
 
 MAX_DEPTH = 32
 HALVES = re.compile("[\ud800-\udfff]")
-"""Surrogates: halves of a pair in UTF-16, which no text can be written with."""
+"""Surrogates: halves of a UTF-16 pair, which cannot be encoded alone."""
 
 
 class Sort(Struct, frozen=True):
-    """One sort of file: its name, how it begins, and its maximum size."""
+    """One sort of file: its name, its first line as an example, and its maximum size."""
 
     name: str
     begins: str
@@ -45,7 +45,7 @@ class YamlFile:
         self.problems: list[Problem] = []
 
     def problem(self, where: Node | Mark | None, text: str) -> Problem:
-        """A problem at the start of a node. The text may quote anything from the file."""
+        """Return a problem at the start of a node. The text may quote anything from the file."""
         mark = where.start_mark if isinstance(where, Node) else where
         if mark is None:
             return Problem(self.file, 1, 1, printable(text))
@@ -127,7 +127,7 @@ def _children(node: Node | None) -> Iterator[Node]:
 
 
 def read(file: str, sort: Sort = DEVICE) -> bytes:
-    """The file's bytes. Raises SettingsError if it is unreadable or too long."""
+    """Read the file's bytes. Raises SettingsError if the file is unreadable or too long."""
     try:
         text = user_files.read(file, sort.max_bytes).content
     except (OSError, ValueError) as error:
@@ -140,7 +140,7 @@ def read(file: str, sort: Sort = DEVICE) -> bytes:
 
 
 def compose(page: YamlFile, text: bytes, sort: Sort = DEVICE) -> MappingNode:
-    """The file's top-level mapping. Raises SettingsError if it has none."""
+    """Return the file's top-level mapping. Raises SettingsError if there is none."""
     root = _root(page, _decoded(page, text), sort)
     if not isinstance(root, MappingNode):
         found = "empty" if root is None else "not a mapping"
@@ -185,5 +185,5 @@ def _problem_after(page: YamlFile, before: str, text: str) -> Problem:
 
 
 def is_plain(node: ScalarNode) -> bool:
-    """Whether a scalar is written without quotes, so that its text decides its type."""
+    """Is the scalar written without quotes? Then its text decides its type."""
     return node.style is None

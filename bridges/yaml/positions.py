@@ -1,4 +1,4 @@
-"""Places in a YAML file: where a value stands, and what an error about it points to."""
+"""Places in a YAML file: the positions of values and of errors about them."""
 
 from collections.abc import Iterable
 
@@ -11,10 +11,10 @@ from bridges.yaml.spelling import short
 
 
 class Spot(Struct, frozen=True):
-    """A node that is to become a value.
+    """A node to be converted to a value.
 
-    `at`: the node that an error about the whole value points to (its key). `label`: the value's name
-    in errors. `path`: its path below the top struct.
+    `at`: the place of errors about the whole value (its key). `label`: the value's name in errors.
+    `path`: its path below the top struct.
     """
 
     node: Node
@@ -31,11 +31,11 @@ class MappingEntry(Struct, frozen=True):
     value: Node
 
     def spot(self, path: tuple[str, ...] = ()) -> Spot:
-        """The value, below `path`."""
+        """Return the Spot of the value, below `path`."""
         return Spot(self.value, self.key, f"'{short(self.name)}'", (*path, self.name))
 
     def where(self) -> Node:
-        """The node that an error about the value points to: a scalar itself, else the key."""
+        """Return the place of errors about the value: a scalar itself, else the key."""
         node = self.value
         if isinstance(node, ScalarNode) and (node.value or not is_plain(node)):
             return node
@@ -43,7 +43,7 @@ class MappingEntry(Struct, frozen=True):
 
 
 def below(node: Node, part: str) -> MappingEntry | None:
-    """The entry of a mapping, or the item of a list, that `part` names."""
+    """Return the entry of a mapping or the item of a list with the name `part`."""
     if isinstance(node, MappingNode):
         for key, value in node.value:
             if isinstance(key, ScalarNode) and key.value == part:
@@ -54,7 +54,7 @@ def below(node: Node, part: str) -> MappingEntry | None:
 
 
 def locate(spot: Spot, path: Iterable[object]) -> MappingEntry:
-    """The entry at `path` below a value, or its nearest existing parent."""
+    """Return the entry at `path` below a value, or its nearest existing parent."""
     found = MappingEntry("", spot.at, spot.node)
     for part in path:
         entry = below(found.value, str(part))
@@ -65,5 +65,5 @@ def locate(spot: Spot, path: Iterable[object]) -> MappingEntry:
 
 
 def is_none(node: Node) -> bool:
-    """Whether `null` or `~` is written. An empty value does not count: it was probably forgotten."""
+    """Is the value `null` or `~`? An empty value does not count: it was probably forgotten."""
     return isinstance(node, ScalarNode) and is_plain(node) and is_null_word(node.value)

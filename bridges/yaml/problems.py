@@ -1,4 +1,4 @@
-"""What is wrong with a file, and where. Loads no YAML library, for code that only reports problems."""
+"""Problems in a file, with their places. Loads no YAML library, for code that only reports problems."""
 
 from collections.abc import Iterable
 

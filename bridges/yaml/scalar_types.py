@@ -1,7 +1,7 @@
-"""Converts one YAML scalar to a text, number, boolean or choice, or says why it cannot.
+"""Converts one YAML scalar to a text, number, boolean or choice, or raises with the reason.
 
-msgspec decides whether the type allows the value. No version of YAML may read a text as anything else,
-and a number must be written unambiguously (`scalars.py`).
+msgspec decides whether the type allows the value. A text must be a text in every version of YAML, and
+a number must be written unambiguously (`scalars.py`).
 """
 
 from collections.abc import Callable, Mapping
@@ -32,7 +32,7 @@ from bridges.yaml.spelling import either, nearest, short
 from bridges.yaml.typo_hints import has_unit, number_meant
 
 Extra = Mapping[str, str]
-"""What a field's `Meta(extra=…)` says: its `unit`, its `pattern` in words, its `check`."""
+"""A field's `Meta(extra=…)`: its `unit`, its `pattern` in words, its `check`."""
 
 
 class WrongScalar(Exception):
@@ -40,7 +40,7 @@ class WrongScalar(Exception):
 
 
 def looks(node: Node) -> str:
-    """What the node is, in words."""
+    """Describe the node in words."""
     if isinstance(node, SequenceNode):
         return "a list"
     if not isinstance(node, ScalarNode):
@@ -55,7 +55,7 @@ def looks(node: Node) -> str:
 
 
 def wanted_text(wanted: Type, extra: Extra | None = None) -> str:
-    """What a type requires, with bounds and unit."""
+    """Describe the values of a type, with bounds and unit."""
     if isinstance(wanted, Metadata):
         return wanted_text(wanted.type, wanted.extra)
     if isinstance(wanted, UnionType):
@@ -80,7 +80,7 @@ _NOUNS: dict[type[Type], str] = {
 
 
 def leaf(types: list[Type], node: ScalarNode, extra: Extra) -> object:
-    """The scalar converted to the first of these types that fits. Raises WrongScalar."""
+    """Convert the scalar to the first of these types that fits. Raises WrongScalar."""
     *others, last = sorted(types, key=_rank)
     for wanted in others:
         try:
@@ -99,12 +99,12 @@ def leaf(types: list[Type], node: ScalarNode, extra: Extra) -> object:
 
 
 def _rank(wanted: Type) -> int:
-    """Sort key that tries text last: it fits nearly everything."""
+    """Return a sort key that puts text last: text fits nearly everything."""
     return isinstance(wanted.type if isinstance(wanted, Metadata) else wanted, StrType)
 
 
 def _annotation(wanted: Type) -> object:
-    """The type that msgspec described, with its bounds, for `convert`."""
+    """Rebuild a type, with its bounds, from msgspec's description, for `convert`."""
     if isinstance(wanted, EnumType):
         return wanted.cls
     if isinstance(wanted, LiteralType):
@@ -116,8 +116,8 @@ _PLAIN: dict[type[Type], type] = {StrType: str, IntType: int, FloatType: float, 
 
 
 def _read(wanted: Type, node: ScalarNode, extra: Extra) -> object:
-    """The value, if it is unambiguous. Raises WrongScalar."""
-    if isinstance(wanted, LiteralType | EnumType):  # as written: how YAML reads it does not matter
+    """Return the value if it is unambiguous. Raises WrongScalar."""
+    if isinstance(wanted, LiteralType | EnumType):  # as written, whatever YAML makes of it
         return choices(wanted).get(node.value, node.value)
     if isinstance(wanted, StrType):
         _check_text(node, extra)
@@ -136,7 +136,7 @@ _READINGS: dict[type[Type], Callable[[str], object]] = {
 
 
 def _reason(wanted: Type, node: ScalarNode, extra: Extra, length: bool) -> str:
-    """Why `convert` refused a value; `length`: because of its length."""
+    """Return the reason for `convert`'s refusal; `length`: the reason is the text's length."""
     written = short(node.value)
     if isinstance(wanted, LiteralType | EnumType):
         near = nearest(node.value, choices(wanted))
@@ -165,7 +165,7 @@ def _check_text(node: ScalarNode, extra: Extra) -> None:
 
 
 def _misread(wanted: Type, node: ScalarNode, extra: Extra) -> WrongScalar:
-    """The error for a text that is not a plain number or boolean; it says how to write it."""
+    """Return the error, with the right spelling, for a text that is no plain number or boolean."""
     text, asked = short(node.value), wanted_text(wanted, extra)
     whole = isinstance(wanted, IntType)
     if not is_plain(node):
@@ -191,7 +191,7 @@ def _misread(wanted: Type, node: ScalarNode, extra: Extra) -> WrongScalar:
 
 
 def _span(wanted: IntType | FloatType, extra: Extra) -> str:
-    """The bounds with their unit: ` from 0 to 10 s`."""
+    """Return the bounds with their unit: ` from 0 to 10 s`."""
     words = []
     if wanted.ge is not None and wanted.le is not None:
         words += [f"from {_digits(wanted.ge)} to {_digits(wanted.le)}"]
@@ -210,11 +210,11 @@ def _span(wanted: IntType | FloatType, extra: Extra) -> str:
 
 
 def _digits(bound: float) -> str:
-    """The bound as a person writes it: 1000000, 0.05."""
+    """Return the bound as a person writes it: 1000000, 0.05."""
     return str(int(bound)) if bound == int(bound) else f"{bound:g}"
 
 
 def choices(wanted: LiteralType | EnumType) -> dict[str, object]:
-    """The allowed texts -> their values."""
+    """Return the allowed texts -> their values."""
     values = wanted.values if isinstance(wanted, LiteralType) else [m.value for m in wanted.cls]
     return {str(value): value for value in values}

@@ -1,7 +1,7 @@
-"""How YAML reads a text without quotes, and which numbers and booleans are accepted.
+"""Finds texts without quotes that YAML reads as other values; accepts only unambiguous numbers.
 
-YAML 1.1 (PyYAML), YAML 1.2 and people read `017`, `1:30`, `no` or `1e3` differently. A name that any
-of them would read as something else must be quoted. A number must mean the same to all of them.
+YAML 1.1 (PyYAML), YAML 1.2 and people read `017`, `1:30`, `no` or `1e3` differently. A name must be
+quoted unless all three read it as that text. A number must mean the same to all three.
 """
 
 import math
@@ -39,17 +39,17 @@ def _base_60(text: str) -> float:
 
 
 def is_null(text: str) -> bool:
-    """Whether YAML reads the text as no value."""
+    """Does YAML read the text as null?"""
     return text in _NULLS
 
 
 def is_null_word(text: str) -> bool:
-    """Whether the text is a word for no value, and not just empty."""
+    """Is the text a word for null, and not just empty?"""
     return text in _NULL_WORDS
 
 
 def reads_as(text: str) -> str | None:
-    """How YAML 1.1 or 1.2 reads a plain text; None if both read it as that text.
+    """Describe YAML 1.1's or 1.2's reading of a plain text; None if both read the text itself.
 
     >>> reads_as("017"), reads_as("no"), reads_as("L1")
     ('the number 15', 'false', None)
@@ -84,14 +84,14 @@ def _short(value: object) -> str:
 
 
 def whole_number(text: str) -> int | None:
-    """The number of `12`, `-3` or `0x2000`; None for an ambiguous spelling."""
+    """Return the number of `12`, `-3` or `0x2000`; None for an ambiguous spelling."""
     if not _INT.fullmatch(text) or len(text) > 20:
         return None
     return int(text, 16 if "x" in text else 10)
 
 
 def number(text: str) -> float | None:
-    """The number of `5`, `0.05` or `1e3`; None for an ambiguous spelling or infinity."""
+    """Return the number of `5`, `0.05` or `1e3`; None for an ambiguous spelling or infinity."""
     if not _FLOAT.fullmatch(text):
         return None
     value = float(text)

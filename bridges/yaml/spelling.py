@@ -1,28 +1,28 @@
-"""How error texts show names: shortened, listed, and with the known name that was probably meant."""
+"""Formats names for error texts: shortened, listed, and with the most similar known name."""
 
 from collections.abc import Iterable
 
 
 def short(text: str) -> str:
-    """A text, shortened to 40 characters for a message."""
+    """Shorten a text to 40 characters for a message."""
     return text if len(text) <= 40 else f"{text[:37]}..."
 
 
 def either(names: Iterable[str]) -> str:
-    """`a, b or c`."""
+    """Return `a, b or c`."""
     *others, last = list(names) or ["nothing"]
     return f"{', '.join(others)} or {last}" if others else last
 
 
 def nearest(name: str, known: Iterable[str]) -> str | None:
-    """The known name that was probably meant; None if none is similar."""
-    from difflib import get_close_matches  # only what is misspelt needs it
+    """Return the most similar known name; None if none is similar."""
+    from difflib import get_close_matches  # only misspelt names need it
 
     return next(iter(get_close_matches(name, list(known), n=1)), None)
 
 
 def unknown(what: str, name: str, known: Iterable[str]) -> str:
-    """The error text for an unknown name, with the nearest known one and all of them."""
+    """Return the error text for an unknown name, with the nearest known name and all of them."""
     names = list(dict.fromkeys(known))
     near = nearest(name, names)
     meant = f"did you mean '{short(near)}'? " if near else ""

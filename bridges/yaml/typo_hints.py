@@ -36,7 +36,7 @@ _CURLY = ("\u201c", "\u201d", "\u201e", "\u2018", "\u2019", "\u201a", "\u00ab", 
 
 
 def reason(error: MarkedYAMLError, text: str) -> str:
-    """PyYAML's error on one line, with the fix if the cause is a common slip."""
+    """Return PyYAML's error on one line, with the fix if the cause is a common slip."""
     problem, where = str(error.problem), error.problem_mark or error.context_mark
     lines = text.splitlines()
     since = error.context_mark or where
@@ -59,7 +59,7 @@ def reason(error: MarkedYAMLError, text: str) -> str:
 
 
 def _odd_in(lines: list[str], first: int, last: int) -> str:
-    """Where these lines have a space that is not an ordinary one; "" if they have none."""
+    """Describe the first unusual space in these lines; "" if there is none."""
     for number, line in enumerate(lines[first : last + 1], first + 1):
         if found := _ODD.search(line.partition(" #")[0]):
             where = f"line {number}, column {found.start() + 1}"
@@ -80,20 +80,20 @@ def _spaces(line: str) -> int:
 
 
 def _follows_no_key(lines: list[str], where: Mark) -> bool:
-    """Whether the line above has the same indent and is not a key."""
+    """Does the line above have the same indent, without being a key?"""
     above, line = lines[max(where.line - 1, 0)], lines[where.line]
     return _spaces(above) == _spaces(line) and ": " not in f"{above} " and where.line > 0
 
 
 def named(character: str) -> str:
-    """The name of an invisible character: `a no-break space (U+00A0)`."""
+    """Return the name of an invisible character: `a no-break space (U+00A0)`."""
     name = unicodedata.name(character, "character that cannot be seen").lower()
     article = "an" if name[0] in "aeiou" else "a"
     return f"{article} {name} (U+{ord(character):04X})"
 
 
 def odd_space(text: str) -> str:
-    """Why a text without quotes does not say what it looks like; "" if it does."""
+    """Describe an unusual space or quote that misleads in a text without quotes; "" for none."""
     if found := _ODD.search(text):
         return (
             f"{named(found[0])}: write an ordinary space, or put the text in quotes if it is meant"
@@ -104,13 +104,13 @@ def odd_space(text: str) -> str:
 
 
 def cleaned(text: str) -> str:
-    """The text that was probably meant by one with an odd space or quote."""
+    """Return the text without its unusual spaces or quotes."""
     joined = re.sub(f"(?<=[0-9]){_ODD.pattern}(?=[0-9])", "", text)
     return _ODD.sub(" ", joined).strip("".join((" ", *_CURLY)))
 
 
 def number_meant(text: str, whole: bool) -> str:
-    """How to write a number that a person can read but YAML cannot; "" if the text is not a number."""
+    """Return YAML's spelling of a number that only a person can read; "" if it is not a number."""
     digits = "".join(str(unicodedata.digit(c, c)) for c in text)
     plain = re.sub(r"(?<=\d)['\u2019 ](?=\d{3}(\D|$))", "", digits)
     grouped = re.fullmatch(r"[-+]?\d{1,3}([.,]\d{3})+", plain)
@@ -122,5 +122,5 @@ def number_meant(text: str, whole: bool) -> str:
 
 
 def has_unit(text: str) -> bool:
-    """Whether a number is written with its unit: `10 s`, `10ms`, `80%`."""
+    """Is the text a number with its unit: `10 s`, `10ms`, `80%`?"""
     return bool(re.fullmatch(r"[-+]?\d+([.,]\d+)? ?[A-Za-z%\u00b0\u00b5\u03a9/]+", text))

@@ -1,8 +1,8 @@
-"""Converts YAML nodes to msgspec structs; reports all independent problems with line and column,
-unknown and duplicate keys among them.
+"""Converts YAML nodes to msgspec structs; reports all independent problems, such as unknown and
+duplicate keys, with line and column.
 
 `msgspec.convert` stops at the first problem and knows no lines, so this module walks the nodes itself.
-The structs, with their bounds and units, remain the only description of a file's contents.
+The structs, with their bounds and units, are the only description of a file's contents.
 """
 
 from collections.abc import Callable, Hashable, Mapping
@@ -30,19 +30,19 @@ from bridges.yaml.scalars import is_null
 from bridges.yaml.spelling import either, nearest, short, unknown
 
 VERBS = ("is", "has", "needs", "must", "says")
-"""A problem that begins with one of these words gets its key as the subject."""
+"""First words of problems that need their key as the subject."""
 
 T = TypeVar("T")
 
 
 @cache
 def described(cls: Hashable) -> Type:
-    """msgspec's description of a type. It takes a millisecond, and every file needs the same ones."""
+    """Return msgspec's description of a type, cached: making one takes a millisecond."""
     return inspect.type_info(cls)
 
 
 class Broken(Enum):
-    """The type of BROKEN, which stands for a value that could not be made."""
+    """The type of BROKEN, the mark for an invalid value."""
 
     BROKEN = "broken"
 
@@ -65,14 +65,14 @@ def _node_of(wanted: Type) -> type[Node]:
 
 
 Check = Callable[[str, Spot], str | None]
-"""Checks a text at its place: returns None, or the problem."""
+"""Checks a text at its place; returns None or the problem."""
 
 
 class Values:
     """Converts one file's nodes to values, and notes problems on its page.
 
     `checks`: for texts whose type has `Meta(extra={"check": name})`. Such a text is taken as written,
-    and only its check accepts or refuses it. `structs`: every struct that was made.
+    and only its check accepts or refuses it. `structs`: every struct made so far.
     """
 
     def __init__(self, page: YamlFile, checks: Mapping[str, Check] | None = None) -> None:
@@ -97,7 +97,7 @@ class Values:
         return self._value(wanted, spot)
 
     def entries(self, spot: Spot) -> list[MappingEntry]:
-        """A mapping's valid entries; notes duplicate, merge and non-text keys."""
+        """Return a mapping's valid entries; note duplicate, merge and non-text keys."""
         if not isinstance(spot.node, MappingNode):
             self._mismatch(spot, "a mapping (key: value)")
             return []
@@ -120,10 +120,10 @@ class Values:
         fields: Mapping[str, str | None],
         elsewhere: Mapping[str, str] | None = None,
     ) -> dict[str, MappingEntry]:
-        """The entries that `fields` names: key -> what its value must be, or None if it is optional.
+        """Return the entries of `fields`: key -> form of its value, or None if the key is optional.
 
-        An unknown key that resembles a missing one is taken for it: one slip is one problem.
-        `elsewhere`: for keys that do not belong here: key -> the section that it belongs below.
+        An unknown key that resembles a missing key is read as the missing key: one slip is one
+        problem. `elsewhere`: keys of other places -> the section that each belongs below.
         """
         found = {e.name: e for e in entries}
         near = {nearest(name, fields) for name in found if name not in fields}
@@ -150,7 +150,7 @@ class Values:
         return self._leaf([wanted], spot, extra or {})
 
     def _union(self, wanted: UnionType, spot: Spot, extra: Extra | None) -> object:
-        """The member that this kind of node can be; of several scalar types, the first that fits."""
+        """Convert to the member of this kind of node; of several scalar types, to the first that fits."""
         members = [t for t in wanted.types if not isinstance(t, NoneType)]
         if len(members) < len(wanted.types) and is_none(spot.node):
             return None
@@ -260,7 +260,7 @@ class Values:
 
 
 def sections_of(wanted: StructType) -> dict[str, str]:
-    """Keys of a struct's sections: key -> its section; "" for the struct's own keys."""
+    """Return the keys of a struct's sections: key -> its section; "" for the struct's own keys."""
     own = {field.encode_name for field in wanted.fields}
     types = [(f.encode_name, _bare(f.type)) for f in wanted.fields]
     inner = [
@@ -277,7 +277,7 @@ def sections_of(wanted: StructType) -> dict[str, str]:
 def _misplaced(
     entry: MappingEntry, before: MappingEntry | None, elsewhere: Mapping[str, str]
 ) -> str:
-    """Which typing slip explains an unknown key; "" if none does."""
+    """Describe the typing slip behind an unknown key; "" if none is found."""
     empty = before is not None and _is_empty(before.value)
     if before is not None and empty and not _is_empty(entry.value):
         return (
@@ -297,7 +297,7 @@ def _is_empty(node: Node) -> bool:
 
 
 def _of_subject(path: tuple[str, ...], name: str, label: str, text: str) -> str:
-    """The text with its subject: the key that it is about, where it does not name that itself."""
+    """Return the text with its key as the subject, unless the text names its subject itself."""
     if text.partition(" ")[0] in VERBS:
         return f"'{short(name)}' {text}" if name else f"{label} {text}"
     key = name

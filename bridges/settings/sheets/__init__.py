@@ -1,4 +1,4 @@
-"""The findings of `check` about a file: gathered once (`findings.py`), and written in three ways.
+"""The findings of `check` about a file: gathered once (`findings.py`), and written in three forms.
 
 text.py      for a terminal
 as_json.py   for a program

@@ -17,7 +17,7 @@ from drivers.hal.points import Wire
 HEADINGS = ("signal", "point", "direction", "active", "pull", "debounce", "at rest", "wire broken")
 BROKEN = {True: "asserted", False: "not asserted", None: "floats"}
 WIRES, MEANINGS = "wires", "meanings"
-"""The titles of the tables that say what is on the bus."""
+"""The titles of the tables with a device's wires, or its messages on the bus."""
 SETTINGS = ("setting", "value", "not the default")
 
 
@@ -25,7 +25,7 @@ class Part(msgspec.Struct, frozen=True, kw_only=True):
     """One controller: its name, its bus and its tables.
 
     `device`: its name, or the kind's if the kind has no devices. `bus`: its bus's name, or "".
-    `tables`: its wires, or what is sent to it and read from it, come first.
+    `tables`: its wires, or its commands and readings, come first.
     """
 
     device: str
@@ -34,7 +34,7 @@ class Part(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class BusShown(msgspec.Struct, frozen=True, kw_only=True):
-    """One bus and how it is set."""
+    """One bus and its settings."""
 
     name: str
     type: str
@@ -44,8 +44,8 @@ class BusShown(msgspec.Struct, frozen=True, kw_only=True):
 class Findings(msgspec.Struct, frozen=True, kw_only=True):
     """One file: its contents if it is valid, and its errors and warnings.
 
-    `sha256`: of its bytes, so that a signed sheet identifies the file. `notes`: what else a user should
-    know.
+    `sha256`: of its bytes, so that a signed sheet identifies the file. `notes`: further facts for the
+    user.
     """
 
     file: str
@@ -60,12 +60,12 @@ class Findings(msgspec.Struct, frozen=True, kw_only=True):
 
 
 def wrong(file: str, errors: Sequence[Problem]) -> Findings:
-    """The findings about an invalid file."""
+    """Return the findings about an invalid file."""
     return Findings(file=file, errors=list(errors))
 
 
 def findings(config: Config, errors: Sequence[Problem] = (), notes: Sequence[str] = ()) -> Findings:
-    """The findings about a valid file. `errors`: from comparing it with RMF's map."""
+    """Return the findings about a valid file. `errors`: from comparing it with RMF's map."""
     return Findings(
         file=str(config.path),
         kind=config.kind,
@@ -80,7 +80,7 @@ def findings(config: Config, errors: Sequence[Problem] = (), notes: Sequence[str
 
 
 def _lacking(config: Config) -> list[str]:
-    """What takes another way where RMF's release lacks its message."""
+    """List the messages that RMF's release lacks, and their substitutes."""
     kind = kind_called(config.kind)
     if isinstance(kind, GraphKind):
         topics = [*kind.publishes]
@@ -96,7 +96,7 @@ def _bus(config: Config, name: str) -> BusShown:
 
 
 def _graph(config: Config) -> Part:
-    """A kind without devices: its own tables, and its settings."""
+    """Describe a kind without devices: its own tables, and its settings."""
     kind = kind_called(config.kind)
     assert isinstance(kind, GraphKind)
     tables = [*kind.tables(config.section), _settings(config.section)]
@@ -122,13 +122,13 @@ def _device(config: Config, name: str) -> Part:
 
 
 def _settings(settings: object) -> Table:
-    """Durations and choices, without what is shown elsewhere: the bus, and accepted wires."""
+    """Return durations and choices, without the bus and accepted wires, which are shown elsewhere."""
     rows = (row for row in choices_of(settings) if row[0] not in ("bus", "driver", "accept_unsafe"))
     return Table("settings", SETTINGS, tuple(rows))
 
 
 def _row(wire: Wire, point: str) -> tuple[str, ...]:
-    """One wire. `point`: its description by the bus; the YAML's spelling is added to it."""
+    """Return a wire's row. `point`: the bus's description; the YAML's spelling is added to it."""
     spelled = point if f" {wire.point} " in f" {point} " else f"{wire.point} = {point}"
     if wire.flash is not None:
         spelled += f", {wire.flash.on_s:g} s by the module at {wire.flash.point}"

@@ -28,9 +28,9 @@ th { background: #eee; } .box { width: 2.2em; text-align: center; } .seen { min-
 """
 BOX = '<td class="box">&#9744;</td>'
 SHORT = 24
-"""A cell with so many letters is not broken into lines."""
+"""Cells with up to this many letters are not broken into lines."""
 NARROW = 60
-"""A table whose rows have so many letters fits in half the page's width."""
+"""Tables with up to this many letters in a row fit in half the page's width."""
 TO_TRY = (
     "every output is off while the unit is off, and after the machine has started",
     "every output is off 10 s after the daemon was killed (kill -9)",
@@ -39,7 +39,7 @@ TO_TRY = (
 
 
 def page(files: Sequence[Findings]) -> str:
-    """The whole file."""
+    """Return the whole file."""
     sections = (_section(findings, part) for findings in files for part in findings.parts)
     return (
         '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
@@ -77,7 +77,7 @@ def _bus(bus: BusShown) -> Table:
 
 
 def _is_wide(table: Table) -> bool:
-    """Does it need the page's whole width?"""
+    """Does the table need the page's whole width?"""
     return table.title in (WIRES, MEANINGS) or max(map(_letters, table.rows), default=0) > NARROW
 
 
@@ -86,14 +86,14 @@ def _letters(row: Sequence[str]) -> int:
 
 
 def _remarks(findings: Findings) -> Iterator[str]:
-    """The file's warnings and notes, all of them: each controller's page is signed by itself."""
+    """Yield all the file's warnings and notes: each controller's page is signed by itself."""
     warnings = (f"line {w.line}: {w.text.removeprefix('warning: ')}" for w in findings.warnings)
     for text in (*warnings, *(note.removeprefix(f"{findings.file}:") for note in findings.notes)):
         yield f'<p class="warning">&#9744; {escape(text)}</p>'
 
 
 def _table(table: Table, seen: bool = False) -> Iterator[str]:
-    """Each row with a box, and with room for what was `seen`."""
+    """Yield each row with a box; `seen`: with a column for observations."""
     shown = table.filled()
     headings = "".join(f"<th>{escape(heading)}</th>" for heading in shown.headings)
     more = '<th class="seen">seen</th>' if seen else ""
@@ -105,7 +105,7 @@ def _table(table: Table, seen: bool = False) -> Iterator[str]:
 
 
 def _block(table: Table) -> Iterator[str]:
-    """A table that stays in one column of the page."""
+    """Yield a table that stays in one column of the page."""
     yield "<div>"
     yield from _table(table)
     yield "</div>"
@@ -117,7 +117,7 @@ def _cell(text: str) -> str:
 
 
 def _trials(part: Part) -> Iterator[str]:
-    """Trials on the controller itself."""
+    """Yield the trials on the controller itself."""
     if part.bus:
         trials = Table("to be tried", ("trial",), tuple((trial,) for trial in TO_TRY))
         yield from _table(trials, seen=True)

@@ -8,7 +8,7 @@ from bridges.settings.sheets.findings import MEANINGS, WIRES, BusShown, Findings
 
 
 def lines(findings: Findings) -> list[str]:
-    """A valid file: its kind and driver, its wiring or messages, and a blank line at the end."""
+    """Return a valid file's kind and driver, its wiring or messages, and a blank line at the end."""
     driver = f", driver {findings.driver}" if findings.driver else ""
     return [f"{findings.file}: {findings.kind}{driver}", "", *_body(findings), *_notes(findings)]
 
@@ -27,7 +27,7 @@ def _bus(bus: BusShown) -> str:
 
 
 def _wiring(parts: Sequence[Part]) -> Iterator[str]:
-    """The wires of all devices of a bus in one table; then the meanings of those without wires."""
+    """Yield the wires of all devices of a bus in one table; then the meanings for other devices."""
     for title in (WIRES, MEANINGS):
         found = [(p.device, table) for p in parts for table in p.tables if table.title == title]
         headings = [("device", *table.headings) for _, table in found[:1]]
@@ -36,7 +36,7 @@ def _wiring(parts: Sequence[Part]) -> Iterator[str]:
 
 
 def _tables(parts: Sequence[Part]) -> Iterator[str]:
-    """The other tables. Equal tables of several devices are printed once."""
+    """Yield the other tables. Equal tables of several devices are printed once."""
     alike: dict[Table, list[str]] = {}
     for part in parts:
         for table in part.tables:
@@ -49,7 +49,7 @@ def _tables(parts: Sequence[Part]) -> Iterator[str]:
 
 
 def _table(table: Table) -> list[str]:
-    """The lines of a table, without columns that are empty in every row."""
+    """Return the lines of a table, without columns that are empty in every row."""
     filled = table.filled()
     return _indented([filled.headings, *filled.rows])
 
