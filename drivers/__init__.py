@@ -1,4 +1,4 @@
-"""Drivers: what a controller's signals mean. One file for each way of connecting a device.
+"""Drivers: the meaning of a controller's signals. One file for each way of connecting a device.
 
 A driver is the file `drivers/<kind>/<driver>.py`, named after the YAML's `kind:` and `driver:`. It ends
 with a `DRIVER` (`drivers/driver_type.py`); the rest of the code uses nothing else of the file.
@@ -26,7 +26,7 @@ class Driver(Protocol[Sample, Outputs]):
         """Claim every output at its safe level. Called once, and again after a DriverError."""
 
     def read(self) -> Sample:
-        """Read every input once and decode it. Never an old value: it reads anew or raises."""
+        """Read every input once and decode it. Returns fresh values only, or raises."""
 
     def write(self, outputs: Outputs) -> None:
         """Set every output to this level. Cheap when nothing has changed since the last write."""
@@ -40,7 +40,7 @@ class Driver(Protocol[Sample, Outputs]):
 
 @runtime_checkable
 class OnContacts(Protocol):
-    """A driver whose device is on contacts, which a person can compare with a meter."""
+    """A driver on contacts, whose levels a person can check with a meter."""
 
     def contacts(self) -> Mapping[str, bool]:
-        """Each signal as it was read or written last: asserted or not. What is unknown is left out."""
+        """Return signal -> asserted, as last read or written, without unknown signals."""

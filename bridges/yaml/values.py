@@ -150,7 +150,7 @@ class Values:
         return self._leaf([wanted], spot, extra or {})
 
     def _union(self, wanted: UnionType, spot: Spot, extra: Extra | None) -> object:
-        """Convert to the member of this kind of node; of several scalar types, to the first that fits."""
+        """Convert to the member for this kind of node: of several scalar types, the first that fits."""
         members = [t for t in wanted.types if not isinstance(t, NoneType)]
         if len(members) < len(wanted.types) and is_none(spot.node):
             return None

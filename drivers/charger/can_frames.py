@@ -1,9 +1,9 @@
 """A wireless charger on CAN with its maker's own frames: it broadcasts, and needs periodic frames.
 
-A map says what the frames mean (`can_map.py`). The charger charges while it receives the frames of the
+A map gives the frames' meanings (`can_map.py`). The charger charges while it receives the frames of the
 map at the map's periods, and stops by itself when they cease. So each frame is sent from a scan, never
 by a cyclic sender: when the daemon hangs, the frames cease. While the charger's own frames are missing,
-the driver sends only those that switch its power off, and those that wake it, if the map has any.
+the driver sends only the frames for power off, and the map's wake frames, if there are any.
 """
 
 import functools
@@ -56,12 +56,12 @@ class FrameChargerSettings(ChargerSettings, frozen=True, kw_only=True, forbid_un
             yield from _setpoint_problems(self)
 
     def can_stop(self) -> bool:
-        """Always: by a frame, or when its frames cease."""
+        """Always True: a frame stops the charger, and so does the end of our frames."""
         return True
 
 
 def frame_map(settings: FrameChargerSettings) -> FrameMap:
-    """The map: the one in the YAML, or the profile's."""
+    """Return the map in the YAML, or else the profile's."""
     return PROFILE.chosen(settings.profile, settings.map)
 
 
@@ -84,7 +84,7 @@ def _setpoint_problems(settings: FrameChargerSettings) -> Remarks:
 
 
 def _beyond(setpoints: Mapping[str, float]) -> Remarks:
-    """A setpoint above its own limit, as volts above max_volts."""
+    """Yield a problem for a setpoint above its own limit, such as volts above max_volts."""
     for name, value in setpoints.items():
         most = setpoints.get(f"max_{name}", value)
         if value > most:
@@ -92,7 +92,7 @@ def _beyond(setpoints: Mapping[str, float]) -> Remarks:
 
 
 def _impossible(settings: FrameChargerSettings, found: FrameMap) -> Remarks:
-    """A setpoint that its signal cannot hold."""
+    """Yield a problem for a setpoint outside the range of its signal."""
     frames = dbc.load(found.dbc)
     for sent in found.send:
         for signal, name in sent.setpoints.items():
@@ -113,9 +113,9 @@ def _encoding_problems(settings: FrameChargerSettings, sent: Sent, on: bool) -> 
 
 
 def claims(settings: FrameChargerSettings) -> Iterator[tuple[str, tuple[str, ...]]]:
-    """(place, path) of the frames, for this device alone; nothing while the map has problems.
+    """Yield (place, path) of the frames, exclusive to this device; nothing while the map has problems.
 
-    CANopen's NMT frame is everybody's.
+    CANopen's NMT frame is shared by all devices.
     """
     if any(PROFILE.problems(settings.profile, settings.map)):
         return
@@ -161,7 +161,7 @@ def warnings(settings: FrameChargerSettings) -> Remarks:
 
 
 def create(name: str, settings: FrameChargerSettings, bus: can.CanBus) -> "FrameDriver":
-    """The charger's driver on its bus; before the first reading it only wakes it."""
+    """Make the charger's driver; before the first reading it sends only wake frames."""
     return FrameDriver(settings, bus)
 
 
@@ -194,9 +194,9 @@ class FrameDriver:
         return sample
 
     def write(self, outputs: ChargerOutputs) -> None:
-        """Send each frame that is due, for power on or off. Raises DriverError.
+        """Send each due frame, for power on or off. Raises DriverError.
 
-        A charger that is not seen is told to stop, whatever is wanted of it.
+        While the charger's frames are missing, the frames for power off are sent, even for power on.
         """
         if outputs.power is not None:
             self._power = outputs.power
@@ -218,13 +218,13 @@ class FrameDriver:
                 return  # its frames cease, so it stops by itself
 
     def _read(self) -> Values:
-        """The values of its fresh frames. Without them, wake it if that is due. Raises HalError."""
+        """Return the values of fresh frames. Without any, send a due wake frame. Raises HalError."""
         try:
             return self._frames.read()
         except HalError:
             for wake in self._map.wake:
                 payload = functools.partial(self._dbc.encode, wake.frame, wake.says)
-                with suppress(HalError):  # what keeps us from reading says more
+                with suppress(HalError):  # the reading's own error says more
                     self._frames.feed(self._dbc.id(wake.frame), wake.every_s, payload)
             raise
 
@@ -263,10 +263,10 @@ def _meant(found: FrameMap, values: Values) -> Meant:
 
 
 def _errors(found: FrameMap, values: Values, activity: Activity) -> Found:
-    """The errors in the frames that have come, whatever the state is.
+    """Return the errors in the received frames, in any state.
 
-    The signal of `out_of_range` is an error only in an error state; otherwise it tells where the robot
-    is.
+    The signal of `out_of_range` is an error only in an error state; otherwise it tells the robot's
+    position.
     """
     position = "" if activity is Activity.ERROR else found.out_of_range
     return found.errors.found(lambda at: 0 if at == position else values.get(at))
@@ -274,7 +274,7 @@ def _errors(found: FrameMap, values: Values, activity: Activity) -> Found:
 
 def _measured(found: FrameMap, frames: dbc.Dbc, values: Values) -> Measured:
     def is_valid(signal: str) -> bool:
-        """The DBC file's [min|max]: a value outside is no reading."""
+        """Is the value within the DBC file's [min|max]? If not, it is no reading."""
         low, high = frames.bounds(*signal.split("."))
         return low <= values[signal] <= high
 
@@ -295,9 +295,9 @@ def _measured(found: FrameMap, frames: dbc.Dbc, values: Values) -> Measured:
 
 
 def _sequel(found: FrameMap) -> Sequel:
-    """The signals of an error may follow the frame of the state.
+    """Return the error frames to wait for: they may follow the frame of the state.
 
-    An error without a side would count as the station's and take it out of service.
+    An error without a known side would count as the station's and take it out of service.
     """
     return Sequel(
         first=found.state_frames()[0],
@@ -308,7 +308,7 @@ def _sequel(found: FrameMap) -> Sequel:
 
 
 def _said(found: FrameMap, frames: dbc.Dbc) -> dict[str, Said]:
-    """The frames to receive. A reading needs those of the state and of the pad."""
+    """Return the frames to receive. A reading needs the frames of the state and of the pad."""
     state = found.state_frames()
     pad = (found.receiver, found.range_ok, found.at_height)
     needed = {*state, *(signal.split(".")[0] for signal in pad if signal)}
@@ -331,12 +331,12 @@ def _heard(values: Values, signal: str) -> float:
 
 
 def _flag(values: Values, signal: str | None) -> bool | None:
-    """None where the map has no such signal."""
+    """Return the signal as a boolean; None if the map has no such signal."""
     return None if signal is None else bool(values[signal])
 
 
 def _rounded(value: float | None) -> float | None:
-    """Rounded to 3 decimals, which removes the float error of scaling by 0.1."""
+    """Round to 3 decimals, which removes the float error of scaling by 0.1."""
     return None if value is None else round(value, 3)
 
 

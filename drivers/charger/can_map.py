@@ -1,4 +1,4 @@
-"""What a charger's CAN frames mean: a DBC file defines the signals, this map says what each is for.
+"""The map of a charger's CAN frames: a DBC file defines the signals, the map gives each a purpose.
 
 The map is in a device YAML as `map:`, or in a file of `drivers/profiles/`.
 """
@@ -31,7 +31,7 @@ Mask = Annotated[int, msgspec.Meta(ge=1, le=0x1FFF_FFFF)]
 Fresh = Annotated[float, msgspec.Meta(ge=0.05, le=60, extra={"unit": "s"})]
 WakeEvery = Annotated[float, msgspec.Meta(ge=0.2, le=60, extra={"unit": "s"})]
 NMT: Final = 0x000
-"""The id by which CANopen's nodes are started (CiA 301); its payload says which node is meant."""
+"""The id of CANopen's NMT frame, which starts nodes (CiA 301); its payload names the node."""
 
 
 Frames = dbc.Dbc
@@ -63,12 +63,12 @@ class Sent(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
     ] = None
 
     def problems(self) -> Remarks:
-        """A frame that is never sent."""
+        """Yield a problem for a frame that is never sent."""
         if self.on is None and self.off is None:
             yield (), "is never sent: give on, or off, or both"
 
     def values(self, on: bool, setpoints: Mapping[str, float]) -> dict[str, float] | None:
-        """Its signals while the charger may charge (`on`) or must not; None when it is not sent."""
+        """Return signal -> value for power on or off (`on`); None if the frame is not sent then."""
         if not on:
             return self.off
         if self.on is None:
@@ -77,7 +77,7 @@ class Sent(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
 
 
 class Wake(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A frame that wakes a charger which is not heard. It must not charge."""
+    """A frame that wakes a silent charger. It must not start a charge."""
 
     frame: Annotated[Name, tells("its name in the DBC file; none of those in `send`.")]
     every_s: Annotated[
@@ -138,7 +138,7 @@ class FrameMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     ] = []
 
     def problems(self) -> Remarks:
-        """A DBC file that cannot be read; a frame or signal that it lacks."""
+        """Yield problems: an unreadable DBC file; a frame or signal that the file lacks."""
         try:
             found = dbc.load(self.dbc)
         except ValueError as error:
@@ -160,7 +160,7 @@ class FrameMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
             yield from self._wake_problems(found, ("wake", str(n)), wake)
 
     def _wake_problems(self, found: Frames, path: tuple[str, ...], wake: Wake) -> Remarks:
-        """A frame that may charge, or that cannot be made."""
+        """Yield a problem for a wake frame that `send` has too, or that cannot be encoded."""
         if wake.frame in (sent.frame for sent in self.send):
             yield (*path, "frame"), f"{wake.frame} is in send: what wakes a charger must not charge"
         lacks = list(_lacks(found, (*path, "frame"), wake.frame))
@@ -174,7 +174,7 @@ class FrameMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
                 yield (*path, "says"), str(error)
 
     def signals(self) -> Iterable[tuple[tuple[str, ...], str]]:
-        """Each signal that is read: (where in the map, Frame.Signal)."""
+        """Yield each signal that is read: (path in the map, Frame.Signal)."""
         if self.state:
             yield ("state", "at"), self.state.at
         for key in ("volts", "amps", "receiver", "out_of_range", "range_ok", "at_height"):
@@ -192,7 +192,7 @@ class FrameMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
         return {signal.split(".")[0] for _, signal in self.errors.places()}
 
     def state_frames(self) -> list[str]:
-        """The frames that say the state: its number's, and those that rules test."""
+        """Return the frames of the state: the frame of its number, and the frames of the rules."""
         signals = [self.state.at] if self.state else []
         signals += [signal for _, signal in by_rules.places(self.rules)]
         return list(dict.fromkeys(signal.split(".")[0] for signal in signals))
@@ -234,7 +234,7 @@ def rows(found: FrameMap) -> Iterator[tuple[str, str]]:
 
 
 def tables(found: FrameMap, setpoints: Mapping[str, float]) -> Iterator[Table]:
-    """The frames as bytes, to hold against `candump`: those that are sent, and samples of the read."""
+    """Yield the frames as bytes, to compare with `candump`: sent frames, and samples of read frames."""
     frames = dbc.load(found.dbc)
     sent = [_sent(frames, sent, on, setpoints) for sent in found.send for on in (True, False)]
     woken = [_row(frames, w.frame, "it is silent", w.every_s, w.says) for w in found.wake]
@@ -266,7 +266,7 @@ def _row(
 
 
 def _samples(found: FrameMap, frames: dbc.Dbc) -> Iterator[tuple[str, ...]]:
-    """Each signal that is read at values that show its scale, its byte order and its meaning."""
+    """Yield sample values of each signal read, to show its scale, byte order and meaning."""
     shown = set()
     for path, at in found.signals():
         if path[0] == "rules" and at in shown:
@@ -281,7 +281,7 @@ def _samples(found: FrameMap, frames: dbc.Dbc) -> Iterator[tuple[str, ...]]:
 
 
 def _values(found: FrameMap, path: tuple[str, ...]) -> Iterator[tuple[float, str]]:
-    """What a signal is shown with, and what that means."""
+    """Yield a signal's sample values with their meanings."""
     if path[0] == "state" and found.state:
         for code, (activity, side) in found.state.codes.meanings().items():
             yield float(code), f": {side or 'station'}'s error" if side else f": {activity}"

@@ -1,7 +1,7 @@
 """Xnergy's receiver (`xnergy.py`) on CANopen: its objects, read and written by SDO.
 
 The maker's defaults are 250 kbit/s and node id 10. The node sends a heartbeat (operational) every
-100 ms; without a heartbeat it is not read. Old firmware sends no heartbeat.
+100 ms; the driver does not read a node without a heartbeat. Old firmware sends no heartbeat.
 """
 
 from collections.abc import Iterable, Mapping
@@ -64,7 +64,7 @@ class CanOpenChargerSettings(
 
 
 def claims(settings: CanOpenChargerSettings) -> Iterable[tuple[str, tuple[str, ...]]]:
-    """(place, path) of the node, which no other device of the bus may use."""
+    """Yield (place, path) of the node, which no other device of the bus may use."""
     yield f"node {settings.node}", ("node",)
 
 
@@ -93,8 +93,8 @@ def create(name: str, settings: CanOpenChargerSettings, bus: can.CanBus) -> xner
 
 
 class Objects:
-    """`xnergy.ReceiverAccess` on the objects of one node. No objects of its temperatures are
-    published."""
+    """`xnergy.ReceiverAccess` on the objects of one node. The maker publishes no objects for its
+    temperatures."""
 
     reads = xnergy.ALWAYS
 
@@ -106,7 +106,7 @@ class Objects:
         self.now = bus.now
 
     def alive(self) -> bool:
-        """Check its heartbeat. True if it has restarted since the last call. Raises HalError."""
+        """Check the heartbeat; True if the node restarted since the last call. Raises HalError."""
         self._node.alive()
         before, self._starts = self._starts, self._node.starts
         return before != self._starts

@@ -1,7 +1,7 @@
 """DBC files, by cantools: a maker's frames and the signals in them.
 
-Frames and signals have the names of the file. Values are physical: scaled, in the signal's unit. An
-enumerated signal has its number as value.
+Frames and signals have their names in the file. Values are physical: scaled, in the signal's unit. The
+value of an enumerated signal is its number.
 """
 
 import functools
@@ -22,7 +22,7 @@ SIZE_MAX: Final = 4 << 20
 
 
 class Dbc:
-    """One DBC file. Raises ValueError that says what is wrong with it."""
+    """One DBC file. Raises ValueError with the problem if the file is invalid."""
 
     def __init__(self, text: str) -> None:
         import cantools
@@ -46,7 +46,7 @@ class Dbc:
         return [signal.name for signal in self._messages[frame].signals]
 
     def id(self, frame: str) -> int:
-        """A frame's id, with EXTENDED set if it has 29 bits."""
+        """Return a frame's id, with EXTENDED set if it has 29 bits."""
         message = self._messages[frame]
         return int(message.frame_id) | (EXTENDED if message.is_extended_frame else 0)
 
@@ -62,7 +62,7 @@ class Dbc:
             found = self._messages[frame].decode(payload, decode_choices=False)
         except (Error, ValueError, KeyError) as error:
             raise DriverError(f"{frame} {payload.hex(' ')} cannot be decoded: {error}") from None
-        assert isinstance(found, dict)  # a list is for frames within frames, which DBC has not
+        assert isinstance(found, dict)  # a list would be frames within frames, which DBC lacks
         return {
             name: value
             for name, value in found.items()
@@ -70,7 +70,7 @@ class Dbc:
         }
 
     def encode(self, frame: str, values: Mapping[str, float]) -> bytes:
-        """The payload with these values; every signal must be given. Raises ValueError."""
+        """Encode these values, of every signal, as the payload. Raises ValueError."""
         from cantools.database.errors import Error
 
         try:
@@ -83,13 +83,13 @@ class Dbc:
         return str(self._messages[frame].get_signal_by_name(signal).unit or "")
 
     def bounds(self, frame: str, signal: str) -> tuple[float, float]:
-        """The least and the greatest value that the file allows for a signal."""
+        """Return the file's minimum and maximum for a signal."""
         found = self._messages[frame].get_signal_by_name(signal)
         low, high = found.minimum, found.maximum
         return -math.inf if low is None else low, math.inf if high is None else high
 
     def sample(self, frame: str, signal: str, value: float) -> bytes | None:
-        """A frame whose one signal says this and all others 0; None where it has no such frame."""
+        """Encode a frame with this value in one signal, 0 in the others; None where impossible."""
         from cantools.database.errors import Error
 
         message = self._messages[frame]
@@ -101,12 +101,12 @@ class Dbc:
 
 
 def path(name: str) -> Path:
-    """The path of a DBC file: `name` if it is an absolute path, else a file of drivers/profiles/."""
+    """Return the path of a DBC file: `name` if it is absolute, else a file of drivers/profiles/."""
     return texts.FOLDER / name
 
 
 def load(name: str) -> Dbc:
-    """Load a file by its name (see `path`). Raises ValueError that says what is wrong."""
+    """Load a file by its name (see `path`). Raises ValueError with the problem."""
     file = path(name)
     return _understood(file, texts.text(file, lambda: _read(file)))
 

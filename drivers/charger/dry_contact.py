@@ -33,7 +33,7 @@ CUT_MUST_READ: Final = {
     "at_height": (False, "a pad that is down reads at its height, and is energised"),
     "range_ok": (False, "a robot that stands badly reads in range, and is energised"),
 }
-"""Signal -> (the level that a cut wire must read as, what goes wrong if it does not)."""
+"""Signal -> (the safe level of a cut wire, the consequence of the other level)."""
 ENABLE: Final = "enable"
 
 
@@ -90,7 +90,7 @@ def _unsafe(settings: DryContactChargerSettings) -> Iterator[Unsafe]:
 
 
 def tables(settings: DryContactChargerSettings) -> Iterator[Table]:
-    """What the contacts mean together, what a cut wire makes of it, and how the relay is driven."""
+    """Yield the meanings of the contacts together, also with a cut wire, and the relay's drive."""
     table = {wire.signal: wire for wire in wires(settings) if wire.direction == "in"}
     rows = []
     for on in itertools.product((False, True), repeat=len(table)):
@@ -105,7 +105,7 @@ def tables(settings: DryContactChargerSettings) -> Iterator[Table]:
 
 
 def _means(shown: Mapping[str, bool]) -> str:
-    """What the contacts mean: while the relay is off, and while it is on if that differs."""
+    """Describe the contacts' meaning with the relay off, and with the relay on if that differs."""
     off, on = (str(decode(shown, enabled).activity) for enabled in (False, True))
     return off if off == on else f"{off} ({on} while enabled)"
 
@@ -137,11 +137,11 @@ class DryContactCharger(OnPoints):
         self._enabled = False
 
     def read(self) -> ChargerSample:
-        """Every contact, read now."""
+        """Read every contact now."""
         return decode(self._points.read(), self._enabled)
 
     def write(self, outputs: ChargerOutputs) -> None:
-        """Set the relay; None leaves it as it is. Clears and range checks do not exist on contacts."""
+        """Set the relay; None leaves it unchanged. Contacts have no clear and no range check."""
         if outputs.power is not None:
             self._enabled = outputs.power
         self._points.write({ENABLE: self._enabled})

@@ -6,8 +6,8 @@ The interface of the first station (a wall-mounted transmitter, TPU):
     POST http://{api_base}/clear_error  ->  2xx
 
 It has no start, no stop and no receiver id, so it can only be observed: the station itself decides
-which robot it charges. For other makes the YAML gives paths and fields. `codes` says what the maker's
-states mean; an unlisted state is an error. A maker's state is never passed on as an RMF state.
+which robot it charges. For other makes the YAML gives paths and fields. `codes` gives the meanings of
+the maker's states; an unlisted state is an error. A maker's state is never passed on as an RMF state.
 """
 
 from collections.abc import Iterator
@@ -64,7 +64,7 @@ class HttpChargerSettings(ChargerSettings, frozen=True, kw_only=True, forbid_unk
     ] = None
 
     def off_after(self) -> tuple[float, tuple[str, ...]] | None:
-        """The power's timer (s) and its path in the YAML; None where it has none."""
+        """Return the power's timer (s) and its path in the YAML; None if there is no timer."""
         path = ("switches_off_after_s",)
         return None if self.switches_off_after_s is None else (self.switches_off_after_s, path)
 
@@ -98,7 +98,7 @@ def _place_problems(settings: HttpChargerSettings) -> Remarks:
 
 
 def _timer_problems(settings: HttpChargerSettings) -> Remarks:
-    """What has no state of its own is a relay: nothing but its timer knows that the network is gone."""
+    """Yield problems with the timer of a relay: only the timer can act when the network is gone."""
     timer = settings.switches_off_after_s
     if timer and not settings.start:
         yield ("switches_off_after_s",), "is set by start: give it, or leave this out"
@@ -118,7 +118,7 @@ def create(name: str, settings: HttpChargerSettings, bus: Calls) -> "HttpCharger
 
 
 def claims(settings: HttpChargerSettings) -> Iterator[tuple[str, tuple[str, ...]]]:
-    """The station's own state and commands, which no other charger can have."""
+    """Yield (place, path) of the station's own state and commands: no other charger may use them."""
     yield f"{settings.fields.state} of {settings.state_path}", ("state_path",)
     for name in ("start", "stop"):
         if call := getattr(settings, name):
@@ -152,7 +152,7 @@ def describe(
 
 
 def warnings(settings: HttpChargerSettings) -> Remarks:
-    """What the station cannot do with these settings, and what deserves a second look: (path, text)."""
+    """Yield (path, text) for missing abilities, and for settings that deserve a second look."""
     missing = [name for name in ("receiver_id", "stop") if _lacks(settings, name)]
     consequences = {
         "receiver_id": "the robot on the pad is not verified, a robot at the wrong station is not"
@@ -207,7 +207,7 @@ class HttpCharger:
         """Do nothing: a restart must not end a charge."""
 
     def read(self) -> ChargerSample:
-        """Read and decode the station's state. Raises DriverError for an answer that makes no sense."""
+        """Read and decode the station's state. Raises DriverError for an answer without sense."""
         answer = self._bus.get_json(self._settings.state_path)
         fields = self._settings.fields
         has_codes = self._settings.codes is not None
@@ -228,8 +228,8 @@ class HttpCharger:
     def write(self, outputs: ChargerOutputs) -> None:
         """Set the power, off first.
 
-        A clear or a range check counts as done before it is sent: if its answer is lost, it is not sent
-        again.
+        A clear or a range check is sent once, even if its answer is lost: it counts as done before it
+        is sent.
         """
         if outputs.power is False:
             self._stop_if_needed()

@@ -1,4 +1,4 @@
-"""Where a charging station's HTTP answer holds what, and the values that are read there."""
+"""The fields of a charging station's HTTP answer, and the values read from them."""
 
 import math
 from collections.abc import Iterator, Mapping
@@ -63,9 +63,9 @@ class Fields(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     ] = {}
 
     def code(self, answer: Answer, words: Mapping[str, int]) -> int | str:
-        """The maker's number for its state, or its word if `words` does not list it.
+        """Return the maker's number for its state, or its word if `words` does not list the word.
 
-        Raises DriverError for anything else.
+        Raises DriverError for any other value.
         """
         code = json_fields.needed(answer, self.state)
         if words and isinstance(code, str):
@@ -78,13 +78,13 @@ class Fields(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
         return code
 
     def error(self, answer: Answer) -> tuple[str, FaultSide]:
-        """The station's words for its error, and whose it is by these words. Raises DriverError."""
+        """Return the station's text for its error, and the error's side. Raises DriverError."""
         said = json_fields.text(answer, self.error_text)
         means = self.error_texts.get(said)
         return ("", "") if means == "none" else (said, means or "")
 
     def measured(self, answer: Answer) -> Measured:
-        """The receiver and the measurements. A flag of null is no. Raises DriverError."""
+        """Return the receiver and the measurements. A null flag is false. Raises DriverError."""
         celsius = ((name, _number(answer, at)) for name, at in self.temperatures.items())
         return Measured(
             receiver_id=self.receiver_id and json_fields.name(answer, self.receiver_id),
@@ -99,7 +99,7 @@ class Fields(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
         )
 
     def rows(self, has_codes: bool) -> Iterator[tuple[str, str]]:
-        """Rows for `check`; none when every field is where the first station has it."""
+        """Yield rows for `check`; none if all fields are those of the first station."""
         for name in self.__struct_fields__ if self != Fields() else ():
             place = getattr(self, name)
             if place and not isinstance(place, dict) and (has_codes or name != "state"):
@@ -113,7 +113,7 @@ class Fields(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
 def _number(
     answer: Answer, number: JsonNumber | None, most: float = math.inf, bounds: str = ""
 ) -> float | None:
-    """The value in our unit; where it has `bounds` it is 0 to `most`. Raises DriverError."""
+    """Return the value in our unit, from 0 to `most` where it has `bounds`. Raises DriverError."""
     value = json_fields.number(answer, number.field, number.scale) if number else None
     if number and value is not None and bounds and not 0 <= value <= most:
         raise json_fields.wrong(number.field, value, bounds)

@@ -78,7 +78,7 @@ class Registers:
         self.now = bus.now
 
     def alive(self) -> bool:
-        """Always False: Modbus has no heartbeat, so only a read shows whether the unit answers."""
+        """Always False: Modbus has no heartbeat. Only a read shows a lost unit."""
         return False
 
     def read(self, names: Iterable[str]) -> dict[str, int]:
@@ -88,7 +88,7 @@ class Registers:
         return {name: image[point] for name, point in wanted.items()}
 
     def write(self, name: str, value: int, safe: bool = False) -> None:
-        """Write, and compare the unit's echo. Raises HalError."""
+        """Write, and compare the unit's echo with the request. Raises HalError."""
         self._bus.write(self._points[name], value, safe)
 
 

@@ -1,7 +1,7 @@
 """A charging station of any make on Modbus registers, described by a register map.
 
-Power is a level: the driver writes it while the station shows a different one. It writes nothing when
-the daemon starts, so that a restart does not end a charge.
+Power is a level: the driver writes the level while the station shows a different one. The driver writes
+nothing when the daemon starts, so a restart does not end a charge.
 """
 
 from collections.abc import Iterator, Mapping
@@ -55,23 +55,23 @@ class RegisterChargerSettings(
 
 
 def charger_map(settings: RegisterChargerSettings) -> ChargerMap:
-    """The map: the one in the YAML, or the profile's."""
+    """Return the map in the YAML, or else the profile's."""
     return PROFILE.chosen(settings.profile, settings.map)
 
 
 def cells(settings: RegisterChargerSettings) -> dict[str, list[Point]]:
-    """Value -> its registers, or its coil or discrete input."""
+    """Return value -> its registers, or its coil or discrete input."""
     found: Mapping[str, RegisterNumber] = charger_map(settings).values
     return {name: [at(settings.unit, p) for p in n.places()] for name, n in found.items()}
 
 
 def orders(settings: RegisterChargerSettings) -> dict[str, Point]:
-    """Order -> the place that it is written to."""
+    """Return order -> the place that it is written to."""
     return {n: at(settings.unit, text) for n, text in charger_map(settings).orders().items()}
 
 
 def claims(settings: RegisterChargerSettings) -> Iterator[tuple[str, tuple[str, ...]]]:
-    """(place, path) of each place that is written; nothing while the map has problems."""
+    """Yield (place, path) of each written place; nothing while the map has problems."""
     if any(PROFILE.problems(settings.profile, settings.map)):
         return
     for name, text in charger_map(settings).orders().items():
@@ -81,7 +81,7 @@ def claims(settings: RegisterChargerSettings) -> Iterator[tuple[str, tuple[str, 
 
 
 def describe(settings: RegisterChargerSettings, bus: object) -> Iterator[tuple[str, str]]:
-    """Rows for `check`: each value's place, what is written, and what the numbers mean."""
+    """Yield rows for `check`: each value's place, the commands, and the meanings of the numbers."""
     found = charger_map(settings)
     for name, points in cells(settings).items():
         number = found.values[name]
@@ -103,7 +103,7 @@ def describe(settings: RegisterChargerSettings, bus: object) -> Iterator[tuple[s
 
 
 def tables(settings: RegisterChargerSettings) -> Iterator[Table]:
-    """Each value by a sample, to hold against the station's registers."""
+    """Yield a sample of each value, for comparison with the station's registers."""
     yield samples(charger_map(settings), cells(settings))
 
 
@@ -125,7 +125,7 @@ def create(name: str, settings: RegisterChargerSettings, bus: ModbusBus) -> "Reg
 
 
 class RegisterCharger:
-    """`drivers.Driver` for one station. `_power`: the level that it has; None while unknown."""
+    """`drivers.Driver` for one station. `_power`: the present level; None while unknown."""
 
     def __init__(self, settings: RegisterChargerSettings, bus: ModbusBus) -> None:
         self._settings = settings

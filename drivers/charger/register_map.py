@@ -1,4 +1,4 @@
-"""The register map of a charger, from a YAML or a profile: places and what the numbers mean."""
+"""The register map of a charger, from a YAML or a profile: places, and meanings of the numbers."""
 
 from collections.abc import Mapping
 from typing import Annotated, Final, Literal
@@ -18,7 +18,7 @@ from drivers.profiles import Profile
 
 MEASURED: Final = ("volts", "amps", "battery_percent", "time_to_full_s")
 KNOWN: Final = ("state", "receiver", "in_range", "range_ok", "at_height", *MEASURED)
-"""The values whose names have a meaning of their own."""
+"""The names with a fixed meaning in `values`."""
 
 
 class RegisterNumber(Placed, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -33,7 +33,7 @@ class RegisterNumber(Placed, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     ] = 1.0
 
     def problems(self) -> Remarks:
-        """An invalid place; options that do not fit its table or width."""
+        """Yield problems: an invalid place; options that do not fit its table or width."""
         yield from super().problems()
         of_registers = (self.words, self.signed, self.bit) != (1, False, None)
         if of_registers and self.is_in("coil", "discrete input"):
@@ -45,13 +45,13 @@ class RegisterNumber(Placed, frozen=True, kw_only=True, forbid_unknown_fields=Tr
             yield ("low_first",), "is for two registers: words: 2"
 
     def places(self) -> list[str]:
-        """Its registers, the high word's first."""
+        """Return its registers, the high word's first."""
         table, address = place(self.at)
         found = [f"{table} {address + n}" for n in range(self.words)]
         return found[::-1] if self.low_first else found
 
     def value(self, words: list[int]) -> float:
-        """The value of these words, which have the order of `places`."""
+        """Return the value of these words, in the order of `places`."""
         raw, bits = 0, BITS * self.words
         for word in words:
             raw = raw << BITS | word
@@ -62,7 +62,7 @@ class RegisterNumber(Placed, frozen=True, kw_only=True, forbid_unknown_fields=Tr
         return raw if self.scale == 1.0 else round(raw * self.scale, 6)
 
     def encoded(self, value: float) -> list[int]:
-        """The words that hold this value, for a fake station."""
+        """Encode a value as words, for a fake station."""
         raw = int(value) << self.bit if self.bit is not None else round(value / self.scale)
         raw &= (1 << BITS * self.words) - 1
         return [raw >> BITS * n & 0xFFFF for n in reversed(range(self.words))]
@@ -122,7 +122,7 @@ class ChargerMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
     ] = None
 
     def problems(self) -> Remarks:
-        """Names that are not in `values`, or that nothing uses; a map without a state."""
+        """Yield problems: names missing from `values`; unused names; a map without a state."""
         yield from by_rules.problems(self.rules, self.codes is not None)
         if self.codes and "state" not in self.values:
             yield ("values",), "needs 'state', of which codes speaks"
@@ -141,7 +141,7 @@ class ChargerMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
             yield ("range_check",), "needs the value in_range: where is its result?"
 
     def orders(self) -> Mapping[str, str]:
-        """Command -> its place, for each command that is given."""
+        """Return command -> its place, for each given command."""
         names = ("power", "clear_error", "range_check")
         return {name: part.at for name in names if (part := getattr(self, name)) is not None}
 

@@ -1,4 +1,4 @@
-"""A station's values as a table: what its registers hold when it shows a sample."""
+"""Tabulates a station's values: the contents of its registers for a sample of each."""
 
 from collections.abc import Iterator, Mapping
 from typing import Final, NamedTuple
@@ -9,7 +9,7 @@ from drivers.hal.modbus.points import Point
 
 
 class ShownValue(NamedTuple):
-    """A value that shows its scale and the order of its words, and its unit."""
+    """A sample that shows a value's scale and the order of its words, with its unit."""
 
     value: float
     unit: str
@@ -24,7 +24,7 @@ SAMPLES: Final = {
 
 
 def samples(found: ChargerMap, cells: Mapping[str, list[Point]]) -> Table:
-    """Each value of the map. `cells`: its registers, or its coil or discrete input."""
+    """Tabulate each value of the map. `cells`: its registers, or its coil or discrete input."""
     rows = (
         (name, " and ".join(map(str, points)), _held(found.values[name], points, value), means)
         for name, points in cells.items()
@@ -34,7 +34,7 @@ def samples(found: ChargerMap, cells: Mapping[str, list[Point]]) -> Table:
 
 
 def _meanings(found: ChargerMap, name: str, is_bit: bool) -> Iterator[tuple[float, str]]:
-    """The values that are shown, and what each means."""
+    """Yield the samples of a value with their meanings."""
     if name == "state" and found.codes:
         for code, (activity, side) in found.codes.meanings().items():
             means = f"{side}'s error" if side else str(activity)

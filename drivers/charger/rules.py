@@ -1,7 +1,7 @@
 """Rules for a charger's state, and its errors as numbers and bits: for HTTP, Modbus and CAN.
 
-A place is where a value is: a field of an HTTP answer, a name in a register map's `values`, a signal of
-a CAN frame. Rules are tried before `codes`: the first rule whose tests all hold gives the state.
+The place of a value is a field of an HTTP answer, a name in a register map's `values`, or a signal of a
+CAN frame. Rules are tried before `codes`: the first rule whose tests all hold gives the state.
 """
 
 from collections.abc import Callable, Iterator, Mapping
@@ -31,14 +31,14 @@ UNKNOWN: Final[Meaning] = (Activity.UNKNOWN, "")
 
 
 class Test(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A test of one value; every condition that is given must hold."""
+    """A test of one value; every given condition must hold."""
 
     one_of: Annotated[list[Value], tells("the value is one of these.")] = []
     above: Annotated[float | None, tells("the value is greater than this.")] = None
     below: Annotated[float | None, tells("the value is less than this.")] = None
 
     def problems(self) -> Remarks:
-        """A test without a condition, or one that no value passes."""
+        """Yield problems: a test without a condition; a test that no value passes."""
         if not self.one_of and self.above is None and self.below is None:
             yield (), "tests nothing: give one_of, above or below"
         if self.above is not None and self.below is not None and self.above >= self.below:
@@ -56,7 +56,7 @@ class Test(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
         return over and (self.below is None or value < self.below)
 
     def text(self) -> str:
-        """The text or rows that `check` prints."""
+        """Return the conditions as text, for `check`."""
         parts = [f"one of {', '.join(map(str, self.one_of))}"] if self.one_of else []
         parts += [f"above {self.above:g}"] if self.above is not None else []
         parts += [f"below {self.below:g}"] if self.below is not None else []
@@ -73,7 +73,7 @@ class Rule(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
     text: Annotated[Name | None, tells("the error's text, if `means` is an error.")] = None
 
     def problems(self) -> Remarks:
-        """An unknown meaning; a text for a state that is not an error."""
+        """Yield problems: an unknown meaning; a text for a state that is not an error."""
         if self.means not in MEANINGS:
             yield ("means",), f"is '{self.means}': write one of {', '.join(MEANINGS)}"
         elif self.text and MEANINGS[self.means][0] is not Activity.ERROR:
@@ -91,14 +91,14 @@ class ErrorNumber(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     ] = {}
 
     def problems(self) -> Remarks:
-        """A number with two meanings."""
+        """Yield a problem for each number with two meanings."""
         for number in self.station.keys() & self.robot.keys():
             yield ("robot", str(number)), f"{number} is a fault of the station already"
         for number in {*self.station, *self.robot}.intersection(self.well):
             yield ("well",), f"{number} is an error as well"
 
     def errors(self, value: object) -> Found:
-        """The error that this number means; none for a number of `well`."""
+        """Return the error for this number; none for a number of `well`."""
         if not isinstance(value, int | float) or value in self.well:
             return [] if isinstance(value, int | float) else [("", f"error {value}")]
         sides: tuple[tuple[FaultSide, Mapping[int, str]], ...] = (
@@ -122,12 +122,12 @@ class ErrorBits(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
     ] = {}
 
     def problems(self) -> Remarks:
-        """A bit with two meanings."""
+        """Yield a problem for each bit with two meanings."""
         for bit in self.station.keys() & self.robot.keys():
             yield ("robot", str(bit)), f"bit {bit} is a fault of the station already"
 
     def errors(self, value: object) -> Found:
-        """Each bit that is set: the station's first, the robot's last."""
+        """Return the errors of the set bits: the station's first, the robot's last."""
         if not isinstance(value, int | float) or value != int(value) or value < 0:
             return [("", f"error flags {value}")]
         on = [bit for bit in bits_on(int(value)) if bit not in self.ignore]
@@ -137,7 +137,7 @@ class ErrorBits(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
 
 
 class StationErrors(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Errors of the station or of the robot on it, whatever the state is."""
+    """Errors of the station or of the robot on it, in any state."""
 
     station: Annotated[
         dict[Name, Name], tells("place -> text: a value other than 0 is this fault of the station.")
@@ -149,7 +149,7 @@ class StationErrors(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
     bits: Annotated[list[ErrorBits], tells("errors as the bits of a flag byte or word.")] = []
 
     def found(self, read: Read) -> Found:
-        """All errors now, the station's first; a value of None is unknown and means no error."""
+        """Return all present errors, the station's first; None is unknown and means no error."""
         sides: tuple[tuple[FaultSide, Mapping[str, str]], ...] = (
             ("station", self.station),
             ("robot", self.robot),
@@ -164,7 +164,7 @@ class StationErrors(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
         return sorted([*flags, *numbers], key=lambda error: order.index(error[0]))
 
     def places(self) -> Iterator[tuple[tuple[str, ...], str]]:
-        """(path below this section, place) of each value that is read."""
+        """Yield (path below this section, place) of each value that is read."""
         for side in ("station", "robot"):
             for at in getattr(self, side):
                 yield (side, at), at
@@ -174,21 +174,21 @@ class StationErrors(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
 
 
 def places(rules: list[Rule]) -> Iterator[tuple[tuple[str, ...], str]]:
-    """(path below the rules, place) of each value that they test."""
+    """Yield (path below the rules, place) of each value that they test."""
     for n, rule in enumerate(rules):
         for at in rule.when:
             yield (str(n), "when", at), at
 
 
 def judge(rules: list[Rule], read: Read) -> Rule | None:
-    """The first rule that holds, or None."""
+    """Return the first rule that holds, or None."""
     return next((r for r in rules if all(t.holds(read(at)) for at, t in r.when.items())), None)
 
 
 class JudgedState(msgspec.Struct, frozen=True):
-    """What the station does, whose fault an error is, its code for texts, and what is wrong.
+    """The station's activity, the side of an error, the state's code for texts, and the errors.
 
-    `does`: what it does beneath an error.
+    `does`: the activity beneath an error.
     """
 
     activity: Activity
@@ -199,24 +199,24 @@ class JudgedState(msgspec.Struct, frozen=True):
 
     @property
     def charges(self) -> bool:
-        """It is at fault, and charges all the same."""
+        """Does the station charge in spite of an error?"""
         return self.activity is Activity.ERROR and self.does is Activity.CHARGING
 
 
 def judged(
     station: "StateRules", read: Read, code: int | str | None, told: FaultSide = ""
 ) -> JudgedState:
-    """The state from rules, codes and errors.
+    """Return the state from rules, codes and errors.
 
-    `code`: the maker's state, if there are codes. `told`: whose fault it is by the station's own text.
-    An entry of `errors` makes it an error, whatever the state is. Raises DriverError.
+    `code`: the maker's state, if there are codes. `told`: the error's side by the station's own text.
+    A present entry of `errors` makes any state an error. Raises DriverError.
     """
     meant = meaning(station.rules, station.codes, read, code)
     return with_errors(meant, station.errors.found(read), station.codes, told)
 
 
 class Meant(NamedTuple):
-    """What rules and codes say, its code for texts, and the text of the rule that holds."""
+    """The state from rules and codes, its code for texts, and the text of the matching rule."""
 
     activity: Activity
     side: FaultSide
@@ -225,7 +225,7 @@ class Meant(NamedTuple):
 
 
 def meaning(rules: list[Rule], codes: Codes | None, read: Read, code: int | str | None) -> Meant:
-    """The state from rules and codes. Raises DriverError."""
+    """Return the state from rules and codes. Raises DriverError."""
     rule = judge(rules, read)
     if rule is not None:
         return Meant(*MEANINGS[rule.means], f"rule {rules.index(rule) + 1}", rule.text or "")
@@ -237,7 +237,7 @@ def meaning(rules: list[Rule], codes: Codes | None, read: Read, code: int | str 
 def with_errors(
     meant: Meant, errors: Found, codes: Codes | None = None, told: FaultSide = ""
 ) -> JudgedState:
-    """The state with what is wrong. `told`: the side of an error that is told in words."""
+    """Return the state with the errors. `told`: the error's side by the station's own text."""
     wrong: Found = [(meant.side, meant.text), *errors] if meant.text else errors
     shown = Activity.ERROR if wrong else meant.activity
     side = first_side([meant.side, told, *(whose for whose, _ in wrong)])
@@ -251,7 +251,7 @@ class StateRules(Protocol):
 
     @property
     def codes(self) -> Codes | None:
-        """What the maker's state numbers mean."""
+        """The meanings of the maker's state numbers."""
 
     @property
     def rules(self) -> list[Rule]:
@@ -259,11 +259,11 @@ class StateRules(Protocol):
 
     @property
     def errors(self) -> StationErrors:
-        """The values that mean an error, whatever the state is."""
+        """The values that mean an error in any state."""
 
 
 def rows(rules: list[Rule], errors: StationErrors) -> Iterator[tuple[str, str]]:
-    """The rows that `check` prints."""
+    """Yield the rows for `check`."""
     for n, rule in enumerate(rules):
         tests = (f"{at} {test.text()}" for at, test in rule.when.items())
         text = f": {rule.text}" if rule.text else ""
@@ -278,7 +278,7 @@ def rows(rules: list[Rule], errors: StationErrors) -> Iterator[tuple[str, str]]:
 
 
 def problems(rules: list[Rule], has_codes: bool) -> Remarks:
-    """Rules that are never reached; a station without a state. Paths are below the station."""
+    """Yield problems: rules that are never reached; no state. Paths are below the station."""
     if not rules and not has_codes:
         yield ("codes",), "needs codes (what the maker's state numbers mean), or rules"
     for n, rule in enumerate(rules[:-1]):
@@ -294,10 +294,10 @@ def problems(rules: list[Rule], has_codes: bool) -> Remarks:
 
 
 def said(found: Found) -> str:
-    """The texts of all errors, in one line."""
+    """Return the texts of all errors in one line."""
     return "; ".join(text for _, text in found)
 
 
 def receiver_text(number: float | None) -> str | None:
-    """A receiver's id as text: "" for 0, no receiver; None where the map has no such value."""
+    """Return a receiver's id as text: "" for 0 (no receiver); None where the map has no such value."""
     return None if number is None else str(int(number)) if number else ""

@@ -1,4 +1,4 @@
-"""What a maker's state numbers of a charger mean: a table in the YAML that covers every number.
+"""The meanings of a charger's state numbers: a table in the YAML that covers every number.
 
 An unlisted number is an error and is shown. A maker's number is never passed on as an RMF state.
 """
@@ -20,7 +20,7 @@ ROBOT_ERROR: tuple[Activity, FaultSide] = (Activity.ERROR, "robot")
 
 
 class Codes(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """What the maker's state numbers mean. An unlisted number is an error and is shown."""
+    """The meanings of the maker's state numbers. An unlisted number is an error and is shown."""
 
     idle: Annotated[
         list[Code], msgspec.Meta(min_length=1), tells("nothing is on the pad: a robot may come.")
@@ -43,11 +43,11 @@ class Codes(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     ] = []
 
     def problems(self) -> Remarks:
-        """States that are listed twice."""
+        """Yield a problem for each state that is listed twice."""
         return listed_twice({name: getattr(self, name) for name in self.__struct_fields__})
 
     def meanings(self) -> dict[int | str, tuple[Activity, FaultSide]]:
-        """The maker's state -> (activity, the side of an error)."""
+        """Return the maker's state -> (activity, the side of an error)."""
         made: dict[int | str, tuple[Activity, FaultSide]] = {
             code: (activity, "") for activity, codes in self.lists().items() for code in codes
         }
@@ -56,13 +56,13 @@ class Codes(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
         return made
 
     def unnamed_side(self, code: object) -> FaultSide:
-        """Whose an error of this number is, if nothing else names a side: the station's, where the
-        robot's have numbers of their own."""
+        """Return the side of an error number that nothing else gives a side: the station, if the
+        robot's errors have numbers of their own."""
         told_apart = self.robot_error and not self.station_error
         return "station" if told_apart and code in self.error else ""
 
     def lists(self) -> Mapping[Activity, list[Code]]:
-        """Each meaning with its states, the errors of a known side apart."""
+        """Return meaning -> its states, without the errors of a known side."""
         return {
             Activity.IDLE: self.idle,
             Activity.HANDSHAKE: self.handshake,
@@ -73,7 +73,7 @@ class Codes(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
         }
 
     def rows(self) -> list[tuple[str, str]]:
-        """The text or rows that `check` prints."""
+        """Return the rows for `check`."""
         rows = [
             (f"state {meaning}", ", ".join(map(str, codes)) or "no code")
             for meaning, codes in self.lists().items()
@@ -90,6 +90,6 @@ class Codes(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
 
 
 def first_side(sides: Collection[FaultSide]) -> FaultSide:
-    """Whose an error is that several places tell of: the station's if one says so, else the robot's."""
+    """Return the side of an error with several sources: the station if any says so, else the robot."""
     known: tuple[FaultSide, ...] = ("station", "robot")
     return next((side for side in known if side in sides), "")

@@ -1,6 +1,6 @@
-"""Xnergy's receiver (RCU): what its numbers mean and how it is driven, on any bus.
+"""Xnergy's receiver (RCU): the meanings of its numbers and its commands, on any bus.
 
-`canopen.py` and `modbus.py` know the addresses of its numbers. The maker publishes no address for
+`canopen.py` and `modbus.py` have the addresses of the numbers. The maker publishes no address for
 clearing an error: an error ends by itself, or when the receiver's power is cycled.
 
 Facts: the maker's published ROS driver (`xnergy-charger-rcu`): state codes, error bits, addresses,
@@ -32,11 +32,11 @@ from drivers import DriverError
 ALWAYS: Final = ("state", "error_low", "error_high", "volts", "amps", "range")
 IN_ERROR: Final = ("latched_low", "latched_high")
 TEMPERATURES: Final[Mapping[str, str]] = {"device_c": "device", "coil_c": "coil"}
-"""ALWAYS is read in every scan; IN_ERROR also in an error: the error as the receiver latched it.
-TEMPERATURES (°C) are read in every scan where the wire has them."""
+"""ALWAYS is read in every scan. IN_ERROR is read too in an error state: the error that the receiver
+latched. TEMPERATURES (°C) are read in every scan where the wire has them."""
 ENABLE: Final = "enable"
 CHECK_RANGE: Final = "check_range"
-"""The two that are written: ENABLE with 1 or 0, CHECK_RANGE with 1."""
+"""The written values: ENABLE with 1 or 0, CHECK_RANGE with 1."""
 
 Words = Mapping[str, int]
 """Raw unsigned words by the names of ALWAYS and IN_ERROR."""
@@ -93,15 +93,15 @@ IN_RANGE: Final = 1
 
 
 def activity(code: int) -> Activity:
-    """What a state code means; UNKNOWN for an unpublished one."""
+    """Return the activity of a state code; UNKNOWN for an unpublished code."""
     return CODES.get(code, (Activity.UNKNOWN, ""))[0]
 
 
 def sample(words: Words, settled: bool = True) -> ChargerSample:
     """Decode one reading; never raises. `words` has at least state, error_low and error_high.
 
-    An error is one whatever the state says.
-    `settled`: the range check's result is that of the last check (`settled` below).
+    An error bit makes any state an error.
+    `settled`: the range result belongs to the last range check (`settled` below).
     """
     found, does = errors(error_number(words)), activity(words["state"])
     return ChargerSample(
@@ -122,7 +122,7 @@ def sample(words: Words, settled: bool = True) -> ChargerSample:
 
 
 def errors(number: int) -> list[tuple[FaultSide, str]]:
-    """Side and text of each bit that is set: the station's first, the robot's last.
+    """Return side and text of each set bit: the station's first, the robot's last.
 
     An unpublished bit has no side.
     """
@@ -135,7 +135,7 @@ def errors(number: int) -> list[tuple[FaultSide, str]]:
 
 
 def error_number(words: Words) -> int:
-    """The current error; in an error state without a current error, the latched one."""
+    """Return the current error; in an error state without a current error, the latched error."""
     now = words["error_high"] << 16 | words["error_low"]
     if now or activity(words["state"]) is not Activity.ERROR:
         return now
@@ -143,7 +143,7 @@ def error_number(words: Words) -> int:
 
 
 def _text(words: Words, found: list[tuple[FaultSide, str]]) -> str:
-    """The errors' texts; one whose side differs from the first error's has its side before it."""
+    """Return the errors' texts; an error of another side than the first has its side before it."""
     if found:
         main = found[0][0]
         return "; ".join(
@@ -166,14 +166,14 @@ def _units(word: int | None) -> float | None:
 # ---- starting and stopping
 
 RANGE_SETTLE_S: Final = 1.0
-"""How long after a range check its result is valid (s); until then the previous result is read."""
+"""The time after a range check until its result is valid (s); before, the last result is read."""
 
 
 class Written(Struct, frozen=True):
-    """What was last written to the receiver. `enabled`: the last ENABLE; None while unknown.
+    """The last commands written to the receiver. `enabled`: the last ENABLE; None while unknown.
 
-    `range_checks`: how many checks were requested; `asked_at`: when the last one was (monotonic s), inf
-    while one waits to be sent.
+    `range_checks`: the number of checks requested; `asked_at`: the time of the last check (monotonic
+    s), inf while a check waits to be sent.
     """
 
     enabled: bool | None = None
@@ -182,7 +182,7 @@ class Written(Struct, frozen=True):
 
 
 class Orders(Struct, frozen=True):
-    """What to write in this scan: `enable` (None: nothing), and whether to start a range check."""
+    """The commands of this scan: `enable` (None: no command), and a range check if one is to start."""
 
     enable: bool | None = None
     check_range: bool = False
@@ -196,10 +196,10 @@ def settled(written: Written, now: float) -> bool:
 def steer(
     written: Written, outputs: ChargerOutputs, code: int, now: float
 ) -> tuple[Written, Orders]:
-    """What to write in state `code`, and the record of it once it is written.
+    """Return the commands for state `code`, after the new `Written`, valid once they are written.
 
     A start and a range check are written only in state idle, each once. A stop is written once, and
-    again while the receiver still charges. `power` None writes neither start nor stop.
+    repeated while the receiver still charges. `power` None writes neither start nor stop.
     """
     ask = outputs.range_checks != written.range_checks
     if ask and code == IDLE:
@@ -234,10 +234,10 @@ class ReceiverAccess(Protocol):
         """True if the receiver has restarted since the last call. Raises DriverError if it is gone."""
 
     def read(self, names: Iterable[str]) -> dict[str, int]:
-        """The words of these names, read now. Raises DriverError."""
+        """Read the words of these names now. Raises DriverError."""
 
     def write(self, name: str, value: int, safe: bool = False) -> None:
-        """Write ENABLE or CHECK_RANGE. `safe`: it switches the power off. Raises DriverError."""
+        """Write ENABLE or CHECK_RANGE. `safe`: the write switches power off. Raises DriverError."""
 
     def insist(self) -> None:
         """Send the next request at once, without waiting for the backoff."""
@@ -270,7 +270,7 @@ class Receiver:
         return sample(words, settled(self._written, self._wire.now()))
 
     def write(self, outputs: ChargerOutputs) -> None:
-        """Start, stop or check the range, if it is due (`steer`). Raises DriverError."""
+        """Start, stop or check the range, whichever is due (`steer`). Raises DriverError."""
         written, orders = steer(self._written, outputs, self._code, self._wire.now())
         if orders.enable is not None:
             self._enable(orders.enable)
@@ -282,7 +282,7 @@ class Receiver:
         self._written = written
 
     def make_safe(self) -> None:
-        """Stop the receiver and have it acknowledged; with `on_death: keep` do nothing."""
+        """Stop the receiver and require its acknowledgement; with `on_death: keep` do nothing."""
         if self._settings.on_death == "stop":
             self._enable(False)
 
