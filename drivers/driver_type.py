@@ -30,14 +30,14 @@ class DriverType(msgspec.Struct, Generic[Settings, Sample, Outputs], frozen=True
     The rest is optional:
     `wires(settings)`: the wiring table that an electrician checks (`drivers/hal/points.py`).
     `debounce(settings)`: signal or group -> how long a change must last (s).
-    `describe(settings, bus's settings)`: rows for `check` (what, meaning) if there are no wires.
+    `describe(settings, bus's settings)`: rows for `check` (name, meaning) if there are no wires.
     `tables(settings)`: codes, pulses and frames, for `check` (`bridges/kinds/shared/table.py`).
-    `claims(settings)`: (place, path) of each place, besides the wires', that no other device may use.
+    `claims(settings)`: (place, path) of each exclusive place besides the wires' points.
     `warnings(settings)`: (path, text) of valid settings that may be a mistake.
-    `notes(settings)`: (path, text) of settings that a site may want, and should know about.
+    `notes(settings)`: (path, text) of intended settings with effects to know about.
     `unwired(settings)`: signals without a wire that `accept_unsafe` may name too.
     `fake`: the name of the module that stands in for the hardware in `run --simulate`
-    (`hal_fakes/fake.py`). Without a name, the kind's plant stands at the far end of the wires.
+    (`hal_fakes/fake.py`). Without a name, the kind's plant is at the far end of the wires.
     """
 
     settings: type[Settings]
@@ -55,4 +55,4 @@ class DriverType(msgspec.Struct, Generic[Settings, Sample, Outputs], frozen=True
 
 
 AnyDriver: TypeAlias = DriverType[Any, Any, Any]
-"""A driver found by its name; its kind determines its settings, sample and outputs."""
+"""A driver of any kind; the kind determines its settings, sample and outputs."""

@@ -1,11 +1,11 @@
 """A door operator on dry contacts: a relay holds it open, limit contacts show where it is.
 
 The contacts are on the GPIO header or on a Modbus I/O module (coils and discrete inputs).
-`drivers/hal/points.py` maps levels to signals and knows how a cut wire reads; the door core decides.
+`drivers/hal/points.py` maps levels to signals and knows the level of a cut wire; the door core decides.
 
-An operator may be triggered by pulses that the Modbus module times (`flash`). The driver requests each
-pulse once, because a repeat would prolong it. If the reply is lost, the next pulse is the next try. The
-module ends the pulse; if the hold ends earlier, the driver switches the relay off.
+The Modbus module may time the pulses that trigger an operator (`flash`). The driver requests each pulse
+once, because a repeat would prolong it. After a lost reply, the next try is the next pulse. The module
+ends the pulse; if the hold ends earlier, the driver switches the relay off.
 """
 
 from collections.abc import Iterator, Mapping
@@ -31,7 +31,7 @@ CUT_MUST_READ: Final = {
     "obstruction": (True, "somebody in the doorway is not seen"),
     "fire": (True, "a fire alarm reads clear"),
 }
-"""Signal -> (the level that a cut wire must read as, what goes wrong if it does not)."""
+"""Signal -> (the safe level of a cut wire, the consequence of the other level)."""
 
 
 class DoorInputWiring(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -118,7 +118,7 @@ def debounce(settings: DryContactDoorSettings) -> Mapping[str, float]:
 
 
 def tables(settings: DryContactDoorSettings) -> Iterator[Table]:
-    """How the relay is driven."""
+    """Yield the drive of the relay."""
     pulse = settings.pulse
     driven = "on while RMF holds the door"
     if pulse is not None:
@@ -158,7 +158,7 @@ class DryContactDoor(OnPoints):
         self._asked = False
 
     def read(self) -> DoorSample:
-        """Every contact, read now."""
+        """Read every contact now."""
         read = self._points.read().get
         return DoorSample(read("opened"), read("closed"), read("obstruction"), read("fire"))
 

@@ -54,7 +54,7 @@ class HttpDoorSettings(DoorSettings, frozen=True, kw_only=True, forbid_unknown_f
     ] = None
 
     def off_after(self) -> tuple[float, tuple[str, ...]] | None:
-        """The relay's timer (s) and its path in the YAML; None where it has none."""
+        """Return the relay's timer (s) and its path in the YAML; None if there is no timer."""
         path = ("switches_off_after_s",)
         return None if self.switches_off_after_s is None else (self.switches_off_after_s, path)
 
@@ -87,14 +87,14 @@ def _unsafe(settings: HttpDoorSettings) -> Iterator[Unsafe]:
 
 
 def claims(settings: HttpDoorSettings) -> Iterator[tuple[str, tuple[str, ...]]]:
-    """(command, path): a second door with these commands would release this one."""
+    """Yield (command, path) of the commands: another door's use of them would release this door."""
     yield claim(settings.hold), ("hold", "path")
     if settings.release != settings.hold:
         yield claim(settings.release), ("release", "path")
 
 
 def describe(settings: HttpDoorSettings, bus: http.HttpSettings) -> Iterator[tuple[str, str]]:
-    """Rows for `check`: what is read and what is sent."""
+    """Yield rows for `check`: the reading and the commands."""
     api = http.base(bus.api_base)
     yield "state", f"GET {api.url(settings.state_path)} every {bus.scan_s:g} s"
     for signal in settings.inputs.__struct_fields__:
@@ -152,7 +152,7 @@ class HttpDoor:
     def open(self) -> None:
         """Check that the controller answers; the first time, release the door.
 
-        After a failure it only reads: a held door must not be released because one answer was lost.
+        After a failure it only reads: a lost answer must not release a held door.
         """
         held = self._held(self._bus.get_json(self._settings.state_path))
         if not self._claimed and held is not False:
@@ -160,7 +160,7 @@ class HttpDoor:
         self._claimed = True
 
     def read(self) -> DoorSample:
-        """Every input, read now. Raises DriverError."""
+        """Read every input now. Raises DriverError."""
         told, self._told = self._told, None
         answer = self._bus.get_json(self._settings.state_path)
         sample = decode(self._settings, answer)
@@ -168,12 +168,12 @@ class HttpDoor:
         return sample
 
     def write(self, outputs: DoorOutputs) -> None:
-        """Hold the door or release it; where the relay has a timer, a hold is sent in every scan."""
+        """Hold or release the door; if the relay has a timer, send a hold in every scan."""
         if outputs.hold_open != self._told or (outputs.hold_open and self._renews):
             self._send(outputs.hold_open)
 
     def make_safe(self) -> None:
-        """Release the door, and verify it where the relay's state can be read."""
+        """Release the door, and verify the release where the relay's state can be read."""
         self._send(on=False)
         if self._settings.held and self._held(self._bus.get_json(self._settings.state_path)):
             raise DriverError("the relay is still on after it was switched off")
@@ -198,7 +198,7 @@ class HttpDoor:
 
 
 def decode(settings: HttpDoorSettings, answer: Mapping[str, object]) -> DoorSample:
-    """Decode the answer. Raises DriverError that names the field it cannot decode."""
+    """Decode the answer. Raises DriverError with the name of an invalid field."""
     found, said = settings.inputs, partial(json_fields.flag_if, answer)
     return DoorSample(
         said(found.opened), said(found.closed), said(found.obstruction), said(found.fire)

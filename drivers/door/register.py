@@ -1,8 +1,8 @@
 """A door operator that is read and commanded through Modbus registers.
 
 Its status is one number. The map lists the numbers for open, closed, moving and faults; an unlisted
-number is a fault too, because it does not say where the door is. A position, where there is one, must
-agree with the status. The command holds the door open or releases it; nothing drives it shut.
+number is a fault too, because it leaves the door's position open. A position value, if there is one,
+must agree with the status. The command holds the door open or releases it; nothing drives it shut.
 """
 
 from collections.abc import Iterator, Mapping
@@ -60,12 +60,12 @@ PROFILE: Final = Profile("door_register", "map", DoorMap)
 
 
 def door_map(settings: RegisterDoorSettings) -> DoorMap:
-    """The map: the one in the YAML, or the profile's."""
+    """Return the map in the YAML, or else the profile's."""
     return PROFILE.chosen(settings.profile, settings.map).changed(settings.changes)
 
 
 def points(settings: RegisterDoorSettings) -> dict[str, Point]:
-    """The register or coil of each part of the map at this operator, `command` included."""
+    """Return part of the map -> this operator's register or coil, `command` included."""
     return {
         part: at(settings.unit, text, settings.base_address)
         for part, text in door_map(settings).places().items()
@@ -73,7 +73,7 @@ def points(settings: RegisterDoorSettings) -> dict[str, Point]:
 
 
 def claims(settings: RegisterDoorSettings) -> Iterator[tuple[str, tuple[str, ...]]]:
-    """(place, path) of the command, for this device alone; nothing while the map has problems."""
+    """Yield (place, path) of the command, exclusive to this device; none for an invalid map."""
     if any(PROFILE.problems(settings.profile, settings.map)):
         return
     place_of_command = door_map(settings).command.at
@@ -84,7 +84,7 @@ def claims(settings: RegisterDoorSettings) -> Iterator[tuple[str, tuple[str, ...
 
 
 def describe(settings: RegisterDoorSettings, bus: object) -> Iterator[tuple[str, str]]:
-    """Rows for `check`: each part of the map, its place, and what its numbers mean."""
+    """Yield rows for `check`: each part of the map, its place, and the meanings of its numbers."""
     found = door_map(settings)
     meanings = {
         "position": "0 closed to 100 open",
@@ -100,7 +100,7 @@ def describe(settings: RegisterDoorSettings, bus: object) -> Iterator[tuple[str,
 
 
 def tables(settings: RegisterDoorSettings) -> Iterator[Table]:
-    """What each number of the status means, and each bit of the errors."""
+    """Yield the meanings of the status numbers, and of the error bits."""
     found = door_map(settings)
     rows = [(meaning, str(number)) for number, meaning in _meanings(found.status)]
     rows.append(("not known, with a fault", "any other"))
@@ -122,7 +122,7 @@ def warnings(settings: RegisterDoorSettings) -> Remarks:
 
 
 def _command_in(settings: RegisterDoorSettings) -> tuple[str, ...]:
-    """Where the YAML itself says what the command is; () where the profile does."""
+    """Return the path of the command in the YAML; () if the profile defines the command."""
     if settings.map:
         return "map", "command"
     return ("changes", "command") if settings.changes and settings.changes.command else ()
@@ -149,7 +149,7 @@ class RegisterDoor:
         self._lines.claim()
 
     def read(self) -> DoorSample:
-        """Every register, read now."""
+        """Read every register now."""
         return decode(self._map, self._lines.read())
 
     def write(self, outputs: DoorOutputs) -> None:
@@ -180,7 +180,7 @@ def decode(found: DoorMap, words: Mapping[str, int]) -> DoorSample:
 
 
 def _lost(found: DoorMap, words: Mapping[str, int]) -> str:
-    """Why these numbers do not tell where the door is; "" when they do."""
+    """Return the reason for an unknown position; "" if the position is known."""
     value, status = words["status"], found.status
     if value in status.faults:
         return f"status {value}: {status.faults[value]}"
@@ -212,7 +212,7 @@ def _address(text: str) -> int:
 
 
 def _meanings(status: Status) -> list[tuple[int, str]]:
-    """Each number and what it means, in the order of the numbers."""
+    """Return each number with its meaning, in the order of the numbers."""
     words = [(v, word) for word in ("closed", "moving", "open") for v in getattr(status, word)]
     faults = [(v, f"not known, with the fault: {text}") for v, text in status.faults.items()]
     return sorted([*words, *faults])

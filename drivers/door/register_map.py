@@ -1,4 +1,4 @@
-"""The register map of a door operator, from a YAML or a profile: places and what the numbers mean."""
+"""The register map of a door operator, from a YAML or a profile: places, and meanings of numbers."""
 
 from typing import Annotated
 
@@ -14,7 +14,7 @@ Percent = Annotated[int, msgspec.Meta(ge=0, le=100)]
 
 
 class Status(InRegister, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Where the door is, as one number; an unlisted number is a fault."""
+    """The door's state as one number; an unlisted number is a fault."""
 
     open: Annotated[list[Word], msgspec.Meta(min_length=1), tells("those of a fully open door.")]
     closed: Annotated[list[Word], msgspec.Meta(min_length=1), tells("those of a closed door.")]
@@ -28,7 +28,7 @@ class Status(InRegister, frozen=True, kw_only=True, forbid_unknown_fields=True):
     )
 
     def problems(self) -> Remarks:
-        """A place that is not a register; a number with two meanings."""
+        """Yield problems: a place that is not a register; a number with two meanings."""
         yield from super().problems()
         yield from listed_twice(
             {key: getattr(self, key) for key in ("open", "closed", "moving", "faults")}
@@ -36,7 +36,7 @@ class Status(InRegister, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
 
 class DoorPosition(InRegister, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """How far the door is open, from 0 (closed) to 100 (open); any other number is a fault."""
+    """The door's position, from 0 (closed) to 100 (open); any other number is a fault."""
 
     unknown: Annotated[
         Word | None, tells("the number for an unknown position; then only the status counts.")
@@ -49,7 +49,7 @@ class DoorPosition(InRegister, frozen=True, kw_only=True, forbid_unknown_fields=
     ] = 5
 
     def problems(self) -> Remarks:
-        """A place that is not a register; thresholds that overlap; `unknown` within 0 to 100."""
+        """Yield problems: no register; overlapping thresholds; `unknown` within 0 to 100."""
         yield from super().problems()
         if self.unknown is not None and self.unknown <= 100:
             yield ("unknown",), "0 to 100 are positions"
@@ -83,7 +83,7 @@ class HoldCommand(WrittenLevels, frozen=True, kw_only=True, forbid_unknown_field
 
 
 class Parts(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Parts that replace those of the profile's map; each is given in full."""
+    """Parts that replace parts of the profile's map; each is given in full."""
 
     status: Annotated[Status | None, tells("where the door is, as one number.")] = None
     position: Annotated[DoorPosition | None, tells("how far it is open.")] = None
@@ -101,11 +101,11 @@ class DoorMap(Parts, frozen=True, kw_only=True, forbid_unknown_fields=True):
     command: Annotated[HoldCommand, tells("what holds it open.")]
 
     def changed(self, parts: Parts | None) -> "DoorMap":
-        """This map with `parts` in place of its own."""
+        """Return this map with `parts` in place of its own."""
         given = {name: getattr(parts, name, None) for name in Parts.__struct_fields__}
         return msgspec.structs.replace(self, **{n: p for n, p in given.items() if p is not None})
 
     def places(self) -> dict[str, str]:
-        """Part -> its place, for each part that is given."""
+        """Return part -> its place, for each given part."""
         parts = {name: getattr(self, name) for name in Parts.__struct_fields__}
         return {name: part.at for name, part in parts.items() if part is not None}

@@ -1,4 +1,4 @@
-"""Buses: each in its own file or folder, the only code that imports vendor libraries, and only on use.
+"""Buses, each in its own file or folder. Only this code imports vendor libraries, and only on use.
 
 The file or folder is named after the bus `type:` of the YAML and holds a `BUS`. A Bus belongs to one
 thread. Every failure is a HalError, raised within the bus's I/O timeout. After a failure the bus backs
@@ -29,10 +29,10 @@ Settings = TypeVar("Settings", bound=msgspec.Struct)
 
 
 class Where(NamedTuple):
-    """Where a bus is in the building: two files with the same `Where` use the same hardware.
+    """The place of a bus in the building: two files with the same `Where` use the same hardware.
 
     `text`: its name for a person. `local`: it belongs to this machine, as a serial port does.
-    `clients`: how many daemons it takes at once; None if that depends on the make.
+    `clients`: the maximum number of daemons at once; None if the number depends on the make.
     """
 
     text: str
@@ -41,11 +41,11 @@ class Where(NamedTuple):
 
 
 class Needs(NamedTuple):
-    """What systemd must permit a daemon for a bus (`bridges/runtime/drop_in.py`).
+    """The permissions that a daemon needs from systemd for a bus (`bridges/runtime/drop_in.py`).
 
-    `devices`: as its DeviceAllow has them: a path, or a class whose devices may come and go
-    (`char-ttyUSB`). `modules`: the kernel modules that bring those classes. `group`: who may open
-    them. `family`: an address family beside those of IP. `host`: the one that it reaches over IP.
+    `devices`: in the form of DeviceAllow: a path, or a class whose devices may come and go
+    (`char-ttyUSB`). `modules`: the kernel modules of those classes. `group`: the group with access to
+    the devices. `family`: an address family besides IP's. `host`: the host reached over IP.
     """
 
     devices: tuple[str, ...] = ()
@@ -63,9 +63,9 @@ class UnwatchedOutputs(NamedTuple):
 
 
 class Bus:
-    """What every bus has; the rest depends on its type (`points.PointsBus`, HTTP calls…).
+    """The base of every bus; each type adds its own (`points.PointsBus`, HTTP calls…).
 
-    `calls`: how many calls have ended, with or without success; systemd's watchdog depends on it.
+    `calls`: the number of ended calls, successful or not; systemd's watchdog depends on it.
     """
 
     calls = 0
@@ -74,7 +74,7 @@ class Bus:
         """Call `wake` (from any thread) when an input may have changed; a polled bus never calls it."""
 
     def scanned(self) -> None:
-        """A scan has finished. A dead-man, where there is one, drops the outputs when scans stop."""
+        """Report a finished scan. A dead-man, if there is one, drops the outputs when scans stop."""
 
     def insist(self) -> None:
         """Make the next call at once, without waiting for the backoff: outputs are about to go off."""
@@ -86,30 +86,30 @@ class Bus:
 class BusSettings(
     msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, tag_field="type"
 ):
-    """What the section of every bus derives from; its `tag` is the YAML's `type:`."""
+    """The base of the section of every bus; its `tag` is the YAML's `type:`."""
 
 
 class BusType(msgspec.Struct, Generic[Settings], frozen=True):
     """One type of bus: a `BUS` at the end of `drivers/hal/<type>`, which needs no vendor library.
 
-    `settings`: the struct below the bus's name in the YAML, with `scan_s` (how often it is read).
+    `settings`: the struct below the bus's name in the YAML, with `scan_s` (the period of readings).
     `open_bus(settings)`: makes the bus, which sends nothing yet. Raises HalError.
-    `open_to_switch_off(settings)`: the same for a process that only switches off, where that is
-    quicker to load; else None.
-    `where(settings)`: what it is in the building; None where files never share it.
-    `needs(settings)`: what it needs of the machine, beside IP.
-    `warnings(settings)`: (path, text) of what is legal but worth a look. `fake`: the module with its
-    far side, by its name (`hal_fakes/fake.py`); without one it cannot be simulated. `fake_inside`: it
-    cannot leave the daemon's process, as pins cannot.
-    `unwatched(settings, places)`: which of these places, which the daemon writes, keep their value when
-    its machine or the network dies.
+    `open_to_switch_off(settings)`: the same for a process that only switches off, if there is a bus
+    that is quicker to load; else None.
+    `where(settings)`: its place in the building; None if files never share such a bus.
+    `needs(settings)`: its needs of the machine, beside IP.
+    `warnings(settings)`: (path, text) of legal settings that are worth a look. `fake`: the name of the
+    module with the far side (`hal_fakes/fake.py`); without a name there is no simulation.
+    `fake_inside`: the fake must run in the daemon's process, as for pins.
+    `unwatched(settings, places)`: remarks on those of `places`, written by the daemon, that keep their
+    value when its machine or the network dies.
 
     A bus with points also has
-    `canonical(point)`: the one spelling of a point; ValueError says what to write instead;
-    `describe(point)`: every spelling, for the table that an electrician reads;
-    `wire_problems(wire)`: what cannot be right about this wire on this bus;
-    `wire_warnings(wire)`: what is legal about it but worth a look;
-    `unreachable(settings, point)`: why no such bus reaches this point, which is in its one spelling.
+    `canonical(point)`: the canonical spelling of a point; the text of its ValueError has the fix;
+    `describe(point)`: every spelling, for the electrician's table;
+    `wire_problems(wire)`: the errors in this wire on this bus;
+    `wire_warnings(wire)`: legal properties of the wire that are worth a look;
+    `unreachable(settings, point)`: why a bus with these settings cannot reach this canonical point.
     """
 
     settings: type[Settings]
@@ -131,4 +131,4 @@ class BusType(msgspec.Struct, Generic[Settings], frozen=True):
 
 
 AnyBus: TypeAlias = BusType[Any]
-"""A bus type found by its name."""
+"""Any bus type."""

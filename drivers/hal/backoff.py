@@ -9,7 +9,7 @@ from drivers.hal.points import HalError
 BACKOFF_FIRST_S: Final = 0.5
 BACKOFF_MAX_S: Final = 30.0
 JITTER: Final = 0.2
-"""The fraction by which a pause may be shorter, so that many daemons do not call in step."""
+"""The maximum random cut of a pause, as a fraction; it keeps many daemons from calling in step."""
 
 
 class Backoff:
@@ -37,27 +37,27 @@ class Backoff:
 
     @property
     def probing(self) -> bool:
-        """Is the next attempt only to see whether it works again?"""
+        """Is the next attempt a probe after a failure?"""
         return self.failing and not self._insisted
 
     def check(self, not_yet: bool = False) -> None:
-        """Raises HalError with the last failure's text during the pause, or if `not_yet`."""
+        """Raise HalError with the last failure's text during the pause, or if `not_yet`."""
         if self._clock() < self._retry_at or not_yet:
             raise HalError(self._failure)
 
     def failed(self, text: str) -> HalError:
-        """Begin a pause, twice as long as the last; returns the HalError to raise."""
+        """Begin a pause, twice as long as the last; return the HalError to raise."""
         self._failure = text
         self._pause_s = min(max(2 * self._pause_s, BACKOFF_FIRST_S), BACKOFF_MAX_S)
         self._retry_at = self._clock() + self._pause_s * (1 - JITTER * self._jitter())
         return HalError(text)
 
     def mended(self) -> None:
-        """An attempt succeeded: end the pause, and begin with the shortest one next time."""
+        """Record a success: end the pause, and begin with the shortest pause next time."""
         self._pause_s, self._retry_at, self._insisted = 0.0, -math.inf, False
         self.proven = True
 
     def insist(self) -> None:
-        """End the pause for one attempt; without effect again until an attempt succeeds."""
+        """End the pause for one attempt; further calls have no effect until an attempt succeeds."""
         if not self._insisted:
             self._insisted, self._retry_at = True, -math.inf

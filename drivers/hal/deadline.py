@@ -1,8 +1,8 @@
-"""TCP connections on which a whole call ends by its deadline, whatever the far side does.
+"""TCP connections with one deadline for a whole call, whatever the far side does.
 
 A timeout of requests or of a socket covers a single wait: a server that sends a byte now and then keeps
-the caller waiting for ever. Here every wait of a call gets only the time that the call has left: the
-name lookup, the connection, each send and each receive.
+the caller waiting for ever. Here every wait of a call (the name lookup, the connection, each send and
+each receive) gets only the call's remaining time.
 """
 
 import ipaddress
@@ -28,7 +28,7 @@ class Resolve(Protocol):
     """socket.getaddrinfo, or a test's."""
 
     def __call__(self, host: str, port: int, *, type: int) -> Sequence[Address]:
-        """The addresses of this name. Raises OSError."""
+        """Return the addresses of this name. Raises OSError."""
 
 
 class Deadline:
@@ -38,11 +38,11 @@ class Deadline:
         self.at = 0.0
 
     def start(self, timeout_s: float) -> None:
-        """A call begins."""
+        """Begin a call."""
         self.at = time.monotonic() + timeout_s
 
     def left(self) -> float:
-        """Seconds until the call must be over. Raises TimeoutError when it already should."""
+        """Return the call's remaining time (s). Raises TimeoutError when there is none."""
         left_s = self.at - time.monotonic()
         if left_s <= 0:
             raise TimeoutError("the call's time is up")
@@ -54,25 +54,25 @@ class Deadline:
 
 
 class DeadlineSocket(socket.socket):
-    """A TCP socket whose every wait ends by the deadline of the current call."""
+    """A TCP socket; each of its waits ends by the deadline of the current call."""
 
     deadline: Deadline
 
     def recv_into(self, buffer: "WriteableBuffer", nbytes: int = 0, flags: int = 0) -> int:
-        """As socket.recv_into. All of http.client's reading comes through here."""
+        """Do socket.recv_into, through which http.client does all its reading."""
         self.settimeout(self.deadline.left())
         return super().recv_into(buffer, nbytes, flags)
 
     def sendall(self, data: "ReadableBuffer", flags: int = 0) -> None:
-        """As socket.sendall, whose timeout already covers the whole send."""
+        """Do socket.sendall, whose timeout already covers the whole send."""
         self.settimeout(self.deadline.left())
         super().sendall(data, flags)
 
 
 def tls_socket(deadline: Deadline) -> "type[ssl.SSLSocket]":
-    """A class of TLS sockets whose every wait ends by the deadline.
+    """Make a class of TLS sockets; each of their waits ends by the deadline.
 
-    A TLS socket wraps a plain socket and keeps only its timeout, so it checks the deadline itself.
+    A TLS socket takes only the timeout from the plain socket inside, so it checks the deadline itself.
     """
     import ssl
 
@@ -91,7 +91,7 @@ def tls_socket(deadline: Deadline) -> "type[ssl.SSLSocket]":
 
 
 class Dialler:
-    """Makes the connections to one host. `dialled` counts them, `failure` is why one failed.
+    """Makes the connections to one host. `dialled`: their number. `failure`: the last error.
 
     `resolve`: socket.getaddrinfo, or a test's.
     """
@@ -107,7 +107,7 @@ class Dialler:
         self._last: socket.socket | None = None
 
     def dial(self) -> socket.socket:
-        """A new connection; the addresses share the time that is left. Raises OSError."""
+        """Connect anew; the addresses share the remaining time. Raises OSError."""
         self.dialled += 1
         try:
             self._last = self._first_of(self._addresses())
@@ -117,7 +117,7 @@ class Dialler:
             raise
 
     def hang_up(self) -> None:
-        """End the last connection, whoever still holds a file of it."""
+        """End the last connection, even if a file of it is still open."""
         last, self._last = self._last, None
         descriptor = -1 if last is None else last.detach()
         if descriptor != -1:
@@ -147,7 +147,7 @@ class Dialler:
         return sock
 
     def _addresses(self) -> Sequence[Address]:
-        """The host's addresses. getaddrinfo has no timeout, so it runs in a thread."""
+        """Look up the host's addresses, in a thread, because getaddrinfo has no timeout."""
         if _is_numeric(self._host):
             return socket.getaddrinfo(self._host, self._port, type=socket.SOCK_STREAM)
         if self._lookup is not None and self._lookup.is_alive():

@@ -1,4 +1,4 @@
-"""Several steps that are all tried, even when one fails."""
+"""Tries several steps, all of them even when one fails."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -14,13 +14,13 @@ class Every:
 
     @contextmanager
     def one(self) -> Iterator[None]:
-        """One step; its HalError is kept for `check`."""
+        """Run one step; keep its HalError for `check`."""
         try:
             yield
         except HalError as error:
             self.failure = self.failure or error
 
     def check(self) -> None:
-        """Raises the first failure, if there was one."""
+        """Raise the first failure, if there was one."""
         if self.failure is not None:
             raise self.failure

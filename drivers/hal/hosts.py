@@ -1,11 +1,11 @@
-"""What can be said of a host from its text alone, on Modbus TCP and on HTTP."""
+"""Checks the text of a host's name or address, for Modbus TCP and HTTP."""
 
 import ipaddress
 import re
 
 
 def misspelt_address(host: str) -> str:
-    """Why numbers with dots between them are no IPv4 address; "" for an address, and for a name."""
+    """Return the error for dotted numbers that are no IPv4 address; "" for an address or a name."""
     if not re.fullmatch(r"[0-9]+(\.[0-9]+)+", host):
         return ""
     try:

@@ -40,7 +40,7 @@ HEADERS = {
 JSON = {"Content-Type": "application/json"}
 
 Method = Literal["POST", "PUT", "GET"]
-"""How a command is sent. Some makes take commands as a GET with a query."""
+"""The HTTP method of a command. Some makes take commands as a GET with a query."""
 Header = Annotated[
     str,
     msgspec.Meta(
@@ -114,7 +114,7 @@ def where(settings: HttpSettings) -> Where:
 
 
 class HttpBus(Bus):
-    """Calls to one controller. Every failure is a HalError that says what to check.
+    """Calls to one controller. Every failure is a HalError with the thing to check.
 
     Tests replace `clock` and `resolve`.
     """
@@ -132,7 +132,7 @@ class HttpBus(Bus):
         self._backoff, self._safe_backoff = (Backoff(clock, lambda: 0.0) for _ in range(2))
 
     def get_json(self, path: str) -> dict[str, object]:
-        """GET `api_base` + `path`, which must answer 200 with one JSON object."""
+        """GET `api_base` + `path`; return the JSON object of the answer, which must have status 200."""
         url = self._base.url(path)
         with self._attempt(self._backoff):
             return json_object(url, *self._call("GET", url, reads=True))
@@ -140,10 +140,10 @@ class HttpBus(Bus):
     def send(
         self, path: str, method: Method = "POST", body: str | None = None, safe: bool = False
     ) -> None:
-        """A command, with `body` (JSON) if any; any 2xx is success.
+        """Send a command, with `body` (JSON) if any; any 2xx is success.
 
-        Sent at most once, even when the answer is lost. `safe`: it switches an output off, so it does
-        not wait for the backoff of a failed reading.
+        It is sent at most once, even when the answer is lost. `safe`: the command switches an output
+        off, so it does not wait for the backoff of a failed reading.
         """
         url = self._base.url(path)
         with self._attempt(self._safe_backoff if safe else self._backoff):
@@ -155,11 +155,11 @@ class HttpBus(Bus):
         self._safe_backoff.insist()
 
     def close(self) -> None:
-        """No connection stays open between calls."""
+        """Do nothing: no connection stays open between calls."""
 
     @contextmanager
     def _attempt(self, backoff: Backoff) -> Iterator[None]:
-        """One attempt. During the backoff after a failure it fails at once, with the same text."""
+        """Guard one attempt: during the backoff after a failure, fail at once with the same text."""
         backoff.check()
         self._dialler.deadline.start(self._settings.timeout_s)
         try:
@@ -176,7 +176,7 @@ class HttpBus(Bus):
     def _call(
         self, method: str, url: str, sent: str | None = None, reads: bool = False
     ) -> tuple[str, bytes]:
-        """Content type and body of a good answer; a command's answer body is not read."""
+        """Return content type and body of a good answer; the body of a command's answer is not read."""
         import requests
 
         self._dialler.failure = None
@@ -191,7 +191,7 @@ class HttpBus(Bus):
                 body = _capped(answer.raw)
         except HalError:
             raise
-        except Exception as error:  # of a server's bytes the libraries make any, ValueError too
+        except Exception as error:  # a server's bytes make the libraries raise any, ValueError too
             raise self._explained(url, error) from error
         if len(body) > BODY_MAX:
             raise HalError(
@@ -200,7 +200,7 @@ class HttpBus(Bus):
         return answer.headers.get("Content-Type", ""), body
 
     def _authorization(self) -> dict[str, str]:
-        """The token is read for each call, so that it can be renewed while we run."""
+        """Read the token, for each call, because it may be renewed meanwhile."""
         file = self._settings.token_file
         if file is None:
             return {}
@@ -233,10 +233,10 @@ class HttpBus(Bus):
 
 
 def _adapter(dialler: Dialler, scheme: str) -> "HTTPAdapter":
-    """requests' HTTP adapter, on the dialler's connections.
+    """Make requests' HTTP adapter, on the dialler's connections.
 
-    There is no Session, because it reads the whole body of a redirect that it must not follow, keeps
-    cookies, and takes proxies and passwords from the environment.
+    There is no Session: a Session reads the whole body of a redirect even if it must not follow it,
+    keeps cookies, and takes proxies and passwords from the environment.
     """
     from requests.adapters import HTTPAdapter
     from urllib3 import HTTPConnectionPool, HTTPSConnectionPool
@@ -271,7 +271,7 @@ def _adapter(dialler: Dialler, scheme: str) -> "HTTPAdapter":
 
 
 def _tls_failure(error: BaseException | None, ca_file: str | None) -> str:
-    """Why TLS failed; "" if TLS is not the reason."""
+    """Return the cause of a TLS failure; "" if TLS did not fail."""
     import ssl
 
     if ca_file and not os.path.isfile(ca_file):
@@ -289,7 +289,7 @@ def _check_status(url: str, reads: bool, status: int) -> None:
 
 
 def _capped(raw: "BaseHTTPResponse") -> bytes:
-    """The whole body, or one byte more than is allowed. Reading on to its end detects a cut body."""
+    """Read the whole body, or one byte more than the limit: only reading to the end shows a cut body."""
     body = b""
     while len(body) <= BODY_MAX and (
         more := raw.read(BODY_MAX + 1 - len(body), decode_content=False)
@@ -299,7 +299,7 @@ def _capped(raw: "BaseHTTPResponse") -> bytes:
 
 
 def _cause(error: BaseException) -> str:
-    """The root cause below the exceptions that requests and urllib3 wrap around it."""
+    """Return the root cause inside the exceptions of requests and urllib3."""
     while (below := error.__cause__ or error.__context__) is not None:
         error = below
     return excerpt(str(error) or type(error).__name__)

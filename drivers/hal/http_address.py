@@ -1,4 +1,4 @@
-"""Where an HTTP API is: its `api_base`, and the paths of its resources below that."""
+"""The addresses of an HTTP API: its `api_base`, and the paths of its resources below that."""
 
 import re
 from typing import Annotated, Final, NamedTuple
@@ -15,7 +15,7 @@ Path = Annotated[
         extra={"pattern": "a path that begins with a slash (/relay/0?turn=on)"},
     ),
 ]
-"""What follows `api_base`, with its query if it has one."""
+"""A path below `api_base`, with its query if there is one."""
 
 PORTS: Final = {"http": 80, "https": 443}
 
@@ -36,14 +36,14 @@ class Base(NamedTuple):
     scheme: str = "http"
 
     def url(self, path: str) -> str:
-        """The address of one resource of the API."""
+        """Return the address of one resource of the API."""
         host = f"[{self.host}]" if ":" in self.host else self.host
         port = "" if self.port == PORTS[self.scheme] else f":{self.port}"
         return f"{self.scheme}://{host}{port}{self.path}{path}"
 
 
 def base(text: str) -> Base:
-    """The parts of an `api_base`. Raises ValueError with what to write instead."""
+    """Split an `api_base` into its parts. Raises ValueError with the right form."""
     if "@" in text:
         raise ValueError("no user or password here: put a bearer token in a file, as token_file")
     found = _BASE.fullmatch(text)

@@ -1,4 +1,4 @@
-"""Decoding an answer's body, which must be one JSON object."""
+"""Decodes an answer's body, which must be one JSON object."""
 
 import json
 from typing import NoReturn
@@ -7,12 +7,12 @@ from drivers.hal import HalError
 
 
 def excerpt(text: str) -> str:
-    """The beginning of a text, printable."""
+    """Return the beginning of a text, made printable."""
     return "".join(c if c.isprintable() else "?" for c in text[:80])
 
 
 def json_object(url: str, content_type: str, body: bytes) -> dict[str, object]:
-    """The answer's JSON object. Raises HalError if it is anything else."""
+    """Decode the answer's JSON object. Raises HalError if the answer is anything else."""
     sort = content_type.partition(";")[0].strip().lower()
     if sort != "application/json" and not sort.endswith("+json"):
         what = excerpt(sort) or "no content type"
@@ -33,7 +33,7 @@ def _no_number(word: str) -> NoReturn:
 
 
 def _without_doubles(pairs: list[tuple[str, object]]) -> dict[str, object]:
-    """Refuse an object with a duplicate key: which value counts is undefined."""
+    """Refuse an object with a duplicate key: JSON does not define the valid one."""
     found = dict(pairs)
     if len(found) < len(pairs):
         raise ValueError("a key occurs twice in one object")

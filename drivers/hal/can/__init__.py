@@ -1,8 +1,8 @@
 """CAN: one bus, on an interface of the kernel (SocketCAN) or an slcan adapter, through python-can.
 
-    settings.py    what a YAML says
+    settings.py    the settings in a YAML
     frames.py      frames, their ids and their names
-    bus.py         takes and gives out frames, pauses, and knows the bus's troubles
+    bus.py         receives and distributes frames, pauses, and tracks the bus's troubles
     link.py        python-can: opens, reads, sends
     broadcasts.py  one device that broadcasts its frames and needs periodic frames from us
     canopen.py     one CANopen node; sdo.py: the canopen library

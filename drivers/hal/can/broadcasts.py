@@ -1,4 +1,4 @@
-"""One device that broadcasts its frames, and works only while it receives periodic frames.
+"""A device that broadcasts its frames, and works only while it receives periodic frames.
 
 A broadcast is valid while it is fresh. The periodic frames are sent from the scan, never by a cyclic
 sender: when the daemon hangs, they cease.
@@ -17,7 +17,7 @@ NEVER = float("-inf")
 class Said(NamedTuple):
     """A frame that the device sends. `mask`: the bits of its id that count. `length`: in bytes.
 
-    `fresh_s`: how long it is valid (s). `needed`: without it there is no reading.
+    `fresh_s`: its validity (s). `needed`: a reading fails without this frame.
     """
 
     id: int
@@ -32,10 +32,10 @@ Values = Mapping[str, float]
 
 
 class Sequel(NamedTuple):
-    """Frames that explain what another frame says, and may come after it.
+    """Frames that explain another frame, such as an error, and may come after it.
 
-    `first`, `others`: that frame and these. `begins(values)`: does the first say what they explain?
-    `is_told(values)`: have they explained it?
+    `first`: the explained frame. `others`: the explaining frames. `begins(values)`: does `first` need
+    an explanation? `is_told(values)`: is the explanation there?
     """
 
     first: str
@@ -45,7 +45,7 @@ class Sequel(NamedTuple):
 
 
 class Broadcasts:
-    """The frames of one device by their names. `decode(frame, payload)`: the values of its signals."""
+    """The frames of one device by their names. `decode(frame, payload)`: signal -> value."""
 
     def __init__(
         self,
@@ -69,10 +69,10 @@ class Broadcasts:
             )
 
     def read(self) -> dict[str, float]:
-        """The values of every fresh frame, by Frame.Signal. Raises HalError, and what `decode` raises.
+        """Return the values of fresh frames, by Frame.Signal. Raises HalError and `decode`'s errors.
 
-        It waits for a frame that is needed, and when the sequel's first frame begins to say what the
-        others explain, once for these.
+        Waits for a needed frame; and, when the sequel's first frame begins to need an explanation,
+        once for the explaining frames.
         """
         self._bus.take()
         if self._missing():
@@ -97,7 +97,7 @@ class Broadcasts:
         )
 
     def check_pace(self, frame: str, every_s: float) -> None:
-        """Raises HalError if scans are too far apart to send this frame on time."""
+        """Raise HalError if scans are too far apart to send this frame on time."""
         scan_s = self._bus.settings.scan_s
         if every_s < scan_s:
             raise HalError(
@@ -106,7 +106,7 @@ class Broadcasts:
             )
 
     def feed(self, frame_id: int, every_s: float, payload: Callable[[], bytes]) -> bool:
-        """Send a frame if it is due in this scan; True if it was sent. Raises HalError."""
+        """Send a frame if it is due in this scan; return True if sent. Raises HalError."""
         now, slack_s = self._bus.now(), self._bus.settings.scan_s / 2
         if now < self._sent_at.get(frame_id, NEVER) + every_s - slack_s:
             return False
@@ -143,7 +143,7 @@ class Broadcasts:
         }
 
     def _missing(self) -> str:
-        """The first frame that is needed and not fresh; "" if there is none."""
+        """Return the first needed frame that is not fresh; "" if there is none."""
         needed = (name for name, said in self._frames.items() if said.needed)
         return next((name for name in needed if not self._is_fresh(name)), "")
 

@@ -1,9 +1,9 @@
 """CAN: one bus, on an interface of the kernel (SocketCAN) or an slcan adapter, through python-can.
 
-Everything runs in the loop's thread. A reading takes all frames that have come since the last one and
-gives each to the devices that want it. Ids that no device wants are kept for a while, so that an error
-can name what is heard instead. Frames are sent only from a scan, never by a cyclic sender of the kernel
-or the library, so that the daemon falls silent when it hangs.
+Everything runs in the loop's thread. A reading takes all frames since the last reading and gives each
+to the devices that want it. Ids that no device wants are kept for a while, for errors about missing
+frames. Frames are sent only from a scan, never by a cyclic sender of the kernel or the library: a
+daemon that hangs falls silent.
 
 An interface that is down, gone or bus-off is closed, and opened again after a backoff of 0.5 to 30 s,
 during which calls fail at once. A bus-off ends with the next frame, or when the controller reports it;
@@ -24,9 +24,9 @@ if TYPE_CHECKING:
     from drivers.hal.can.link import Link, Vendor
 
 FRAMES_AT_ONCE: Final = 20_000
-"""A reading takes no more: a bus at 1 Mbit/s has 8,000 a second."""
+"""The maximum number of frames in a reading: a bus at 1 Mbit/s has 8,000 a second."""
 HANG_S: Final = 1.0
-"""A reading this much too late (s) shows that the daemon hung."""
+"""A reading this late (s) shows that the daemon hung."""
 ROUTES_MAX: Final = 4096
 RECENT_S: Final = 5.0
 OTHERS_MAX: Final = 64
@@ -71,7 +71,7 @@ class CanBus(Bus):
         self._others.clear()
 
     def take(self) -> None:
-        """Hand out the frames that have come since the last call. Raises HalError.
+        """Distribute the frames received since the last call. Raises HalError.
 
         After a hang the age of these frames is unknown, so they are dropped.
         """
@@ -84,7 +84,7 @@ class CanBus(Bus):
             self._deaf, self._taken_at = False, self.now()
 
     def wait(self, heard: Callable[[], bool], within_s: float) -> bool:
-        """Take frames until `heard()`, or for so long (s); True if heard. Raises HalError."""
+        """Take frames until `heard()` or for `within_s`; True if heard. Raises HalError."""
         deadline = self.now() + within_s
         while not heard():
             left_s = deadline - self.now()
@@ -98,7 +98,7 @@ class CanBus(Bus):
         return True
 
     def send(self, frame: Frame) -> None:
-        """Send a frame. Raises HalError; then it may have been sent or not."""
+        """Send a frame. Raises HalError; then the frame may have been sent or not."""
         self._open()
         try:
             self._link.send(frame)
@@ -106,7 +106,7 @@ class CanBus(Bus):
             raise self._failed(str(error)) from error
 
     def silence(self) -> str:
-        """Why a device may not be heard: the bus's own trouble, or which ids are heard instead."""
+        """Describe a likely cause of a device's silence: the bus's trouble, or the ids on the bus."""
         if self._trouble.text and (
             self._trouble.bus_off or self.now() - self._trouble_at < RECENT_S
         ):
@@ -120,7 +120,7 @@ class CanBus(Bus):
         )
 
     def others(self) -> list[int]:
-        """The ids heard in the last RECENT_S that no device wants."""
+        """Return the ids that were heard in the last RECENT_S and that no device wants."""
         now = self.now()
         return sorted(found for found, at in self._others.items() if now - at < RECENT_S)
 
@@ -174,7 +174,7 @@ class CanBus(Bus):
         return made
 
     def _note(self, trouble: Trouble) -> None:
-        """The controller reports a trouble, or that it works again."""
+        """Note the controller's report of a trouble, or of its end."""
         self._trouble, self._trouble_at = trouble, self.now()
         if trouble.bus_off:
             raise self._failed(

@@ -1,12 +1,12 @@
 """One CANopen node: its heartbeat, and its objects by SDO (CiA 301), through the `canopen` library.
 
 The library encodes and decodes; this file sends, waits and backs off, in the loop's thread. The library
-alone would accept any frame with the reply's id, even a late one. Here
+alone would accept any frame with the reply's id, even a late reply. Here
 
 - a reply counts only if it has eight bytes and names the requested object; others are dropped, and
   named in the error if no reply comes;
-- after a request without a reply the node gets no request for LATE times the timeout, so that a late
-  reply is never taken for the reply to the next request;
+- after a request without a reply the node gets no request for LATE times the timeout: a late reply must
+  not pass for the reply to the next request;
 - no request is sent twice;
 - a write that switches power off is sent at once, even after a failed reading.
 
@@ -36,13 +36,13 @@ OPERATIONAL: Final = 5
 
 
 class Aborted(HalError):
-    """The node refused a transfer, so it is there."""
+    """The node refused a transfer: it is present, but the transfer is wrong."""
 
 
 class CanOpenNode:
     """One node of a bus. `heartbeat_timeout_s`: None for a node that has no heartbeat.
 
-    `starts`: how often the node has said that it starts anew.
+    `starts`: the number of restarts that the node has reported.
     """
 
     def __init__(self, bus: CanBus, node: int, heartbeat_timeout_s: float | None) -> None:
@@ -75,7 +75,7 @@ class CanOpenNode:
             if not self._bus.wait(self._beats, self._timeout_s):
                 raise self._beat_pause.failed(self._silent())
         if self._beat_pause.failing:
-            self.starts += 1  # nobody heard whether it has restarted meanwhile
+            self.starts += 1  # it may have restarted unheard
         self._beat_pause.mended()
         if self._state != OPERATIONAL:
             state = STATES.get(self._state, f"in state {self._state}")
@@ -96,9 +96,9 @@ class CanOpenNode:
     def write(
         self, index: int, subindex: int, octets: int, number: int, safe: bool = False
     ) -> None:
-        """Set an unsigned number. Raises HalError; then it may be set or not.
+        """Set an unsigned number. Raises HalError; then the number may be set or not.
 
-        `safe`: it switches power off, so it ignores the backoff of failed readings.
+        `safe`: the write switches power off, so it ignores the backoff of failed readings.
         """
         what = f"write 0x{index:04X}:{subindex:02X}"
         payload = number.to_bytes(octets, "little")
@@ -106,7 +106,7 @@ class CanOpenNode:
         self._exchanged(what, pause, lambda: self._client.download(index, subindex, payload))
 
     def _exchanged(self, what: str, pause: Backoff, transfer: Callable[[], Reply]) -> Reply:
-        """One SDO transfer by the library. Raises HalError."""
+        """Make one SDO transfer by the library. Raises HalError."""
         waits = pause is self._sdo_pause and not pause.insisting
         pause.check(not_yet=waits and self._bus.now() < self._late_until)
         text = f"{self._name()}, {what}: "

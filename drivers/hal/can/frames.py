@@ -4,7 +4,7 @@ from collections.abc import Callable
 from typing import Final, NamedTuple
 
 EXTENDED: Final = 1 << 31
-"""Set in an id of 29 bits: 0x123 and an extended 0x123 are different ids."""
+"""The mark of an id of 29 bits: 0x123 and an extended 0x123 are different ids."""
 
 
 class Frame(NamedTuple):
@@ -32,14 +32,14 @@ class FrameFilter(NamedTuple):
     mask: int = 0xFFFF_FFFF
 
     def fits(self, frame_id: int) -> bool:
-        """Is this one of their ids?"""
+        """Is this the id of one of these frames?"""
         return (frame_id ^ self.id) & self.mask == 0
 
 
 Hear = Callable[[Frame, float], None]
-"""Is called with a frame and the time it was read (monotonic s)."""
+"""A receiver: called with a frame and its reading time (monotonic s)."""
 
 
 def named(frame_id: int) -> str:
-    """An id as people write it: 0x58A, 0x18FF50E5."""
+    """Return an id as people write it: 0x58A, 0x18FF50E5."""
     return f"0x{frame_id & ~EXTENDED:08X}" if frame_id & EXTENDED else f"0x{frame_id:03X}"

@@ -1,11 +1,11 @@
 """One CAN bus by python-can: an interface of the kernel (SocketCAN), or an slcan adapter.
 
-python-can opens, reads and sends. This file makes good what it leaves open:
+python-can opens, reads and sends. This file adds what python-can lacks:
 
-- python-can's `recv` waits by the wall clock: on a silent bus it would wait for an hour more when the
-  clock is set back by one. So this file waits, and `recv` only reads what is there.
-- If an slcan adapter returns no frame, more may follow: it may have sent an acknowledgement.
-- Bytes that are not slcan break python-can's parser for good, so the adapter is opened again.
+- python-can's `recv` waits by the wall clock: on a silent bus, a clock set back by an hour would add an
+  hour. So this file waits, and `recv` only reads received data.
+- If an slcan adapter returns no frame, more may follow: the adapter may have sent an acknowledgement.
+- Bytes that are not slcan break python-can's parser permanently, so the adapter is opened again.
 - python-can's slcan write waits for the adapter without limit; here it has `timeout_s`.
 - An interface that is down or gone raises many types of exceptions. Here each is a LinkDown that says
   what to do.
@@ -32,9 +32,9 @@ from drivers.hal.can.settings import Slcan
 logging.getLogger("can").setLevel(logging.CRITICAL)  # our texts say it all
 
 FAILURES: Final = (can.CanError, serial.SerialException, OSError, ValueError, IndexError)
-"""What python-can and the libraries below it raise. Its parser raises ValueError and IndexError."""
+"""The errors of python-can and its libraries. Its parser raises ValueError and IndexError."""
 IN_ONE_GO: Final = 4096
-"""How many lines of an adapter that are not frames are read at once, at most."""
+"""The maximum number of lines other than frames that one call reads from an adapter."""
 
 BUS_OFF: Final = 0x40
 RESTARTED: Final = 0x100
@@ -55,14 +55,14 @@ Vendor = Callable[[], BusABC]
 
 
 def socketcan(interface: str) -> BusABC:
-    """An interface of the kernel, which has its bitrate from `ip link`."""
+    """Open an interface of the kernel; its bitrate comes from `ip link`."""
     from can.interfaces.socketcan import SocketcanBus
 
     return SocketcanBus(channel=interface)
 
 
 def slcan(settings: Slcan) -> BusABC:
-    """An adapter on a serial port, which no other program may open meanwhile."""
+    """Open an adapter on a serial port, exclusively."""
     return SlcanAdapter(
         settings.port,
         tty_baudrate=settings.baudrate,
@@ -87,7 +87,7 @@ class SlcanAdapter(slcanBus):
 
 
 class Link:
-    """One bus, opened again when it is needed. `where`: its name, for errors."""
+    """One bus, reopened when needed. `where`: its name, for errors."""
 
     def __init__(self, vendor: Vendor, where: str, timeout_s: float) -> None:
         self._vendor = vendor
@@ -97,7 +97,7 @@ class Link:
         self._readable: Callable[[float], bool] | None = None
 
     def open(self) -> None:
-        """Open it if it is not open. Raises LinkDown."""
+        """Open the bus if it is closed. Raises LinkDown."""
         if self._bus is not None:
             return
         try:
@@ -107,7 +107,7 @@ class Link:
         self._readable = _selecting(self._bus)
 
     def receive(self, wait_s: float) -> Frame | Trouble | None:
-        """The next frame or trouble; None if none comes within `wait_s`. Raises LinkDown."""
+        """Return the next frame or trouble; None after `wait_s` without any. Raises LinkDown."""
         assert self._bus is not None
         for _ in range(IN_ONE_GO):
             try:
@@ -123,7 +123,7 @@ class Link:
         return None
 
     def send(self, frame: Frame) -> None:
-        """Send a frame. Raises LinkDown. An interface may take a frame that no device reads."""
+        """Send a frame. Raises LinkDown. Success does not mean that any device has read the frame."""
         assert self._bus is not None
         message = can.Message(
             arbitration_id=frame.id & ~EXTENDED,
@@ -143,7 +143,7 @@ class Link:
         with suppress(*FAILURES):
             bus.shutdown()
         port = getattr(bus, "serialPortOrig", None)
-        if port is not None:  # python-can keeps the port of an adapter that has gone
+        if port is not None:  # python-can keeps the port of an unplugged adapter
             with suppress(*FAILURES):
                 port.close()
 
@@ -169,7 +169,7 @@ _HINTS: Final = {
 
 
 def _selecting(bus: BusABC) -> Callable[[float], bool] | None:
-    """How to wait for the next byte or frame; None for a bus of one process, which has no file."""
+    """Return a wait for the next byte or frame; None for a bus of one process, which has no file."""
     try:
         descriptor = bus.fileno()
     except NotImplementedError:
@@ -178,7 +178,7 @@ def _selecting(bus: BusABC) -> Callable[[float], bool] | None:
 
 
 def _meaning(message: Message) -> Frame | Trouble | None:
-    """A data frame or the controller's trouble; None for remote and FD frames, which no device uses."""
+    """Convert a data frame or the controller's trouble; None for remote and FD frames: unused."""
     if message.is_error_frame:
         found = message.arbitration_id
         if found & RESTARTED and not found & BUS_OFF:
@@ -192,7 +192,7 @@ def _meaning(message: Message) -> Frame | Trouble | None:
 
 
 def _code(error: BaseException | None) -> int:
-    """The errno of an error or of its cause; 0 if there is none."""
+    """Return the errno of an error or of its cause; 0 if there is none."""
     while error is not None:
         code = getattr(error, "error_code", None) or getattr(error, "errno", None)
         if isinstance(code, int):

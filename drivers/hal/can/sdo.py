@@ -14,9 +14,9 @@ logging.getLogger("canopen").setLevel(logging.CRITICAL)  # our HalErrors say it 
 
 
 class Client(SdoClient):
-    """`exchange`: sends eight bytes and returns the eight of the reply. `post`: sends without a reply.
+    """`exchange`: sends eight bytes and returns the reply's eight. `post`: sends without a reply.
 
-    It raises ABORTED if the node refuses, and FAILURES if the reply is not a reply.
+    Raises ABORTED if the node refuses, and FAILURES for an invalid reply.
     """
 
     ABORTED = SdoAbortedError
@@ -28,12 +28,12 @@ class Client(SdoClient):
         self._post = post
 
     def request_response(self, sdo_request: bytes) -> bytes:
-        """One request. Raises ABORTED, and what `exchange` raises."""
+        """Make one request. Raises ABORTED and the errors of `exchange`."""
         reply = self._exchange(bytes(sdo_request))
         if reply[0] == ABORT:
             raise SdoAbortedError(int.from_bytes(reply[4:8], "little"))
         return reply
 
     def send_request(self, request: bytes) -> None:
-        """A request without a reply."""
+        """Send a request without a reply."""
         self._post(bytes(request))

@@ -1,4 +1,4 @@
-"""`type: can` of a device YAML: which bus, and how long it may take."""
+"""`type: can` of a device YAML: the bus and its times."""
 
 from typing import Annotated, Final
 
@@ -81,19 +81,19 @@ def warnings(settings: CanSettings) -> Remarks:
 
 
 def where(settings: CanSettings) -> Where:
-    """The kernel's interface, which many may use, or an adapter's port."""
+    """Return the kernel's interface, which programs can share, or an adapter's port."""
     if settings.slcan:
         return Where(settings.slcan.port, local=True, clients="one")
     return Where(str(settings.socketcan), local=True)
 
 
 def needs(settings: CanSettings) -> Needs:
-    """CAN's own sockets, or an adapter's port."""
+    """Return CAN's sockets, or an adapter's port."""
     return serial_port.needs(settings.slcan.port) if settings.slcan else Needs(family="AF_CAN")
 
 
 def describe(settings: CanSettings) -> str:
-    """Where the bus is, for `check`."""
+    """Describe the bus's place, for `check`."""
     if settings.slcan:
         return f"{settings.slcan.port}, {settings.slcan.bitrate // 1000} kbit/s"
     return f"{settings.socketcan}, at the bitrate that `ip link` gave it"

@@ -3,11 +3,11 @@
 Outputs are claimed at their safe level in one call and are left at it (`drivers/hal/gpio/pins.py`).
 Inputs are sampled: an edge only calls `wake`, because lgpio loses edges.
 
-    header.py     how pins are spelled
+    header.py     the spelling of pins
     bus.py        claims, samples, drives and releases pins
     pins.py       gpiozero's pins on lgpio; imported when the header is opened
     bare.py       the same claims without gpiozero, to switch off from a new process
-    chip.py       which chip it is, and who holds a line
+    chip.py       finds the chip, and the holder of a line
     dead_man.py   drops the outputs when scans stop
 """
 
@@ -55,12 +55,12 @@ class GpioSettings(BusSettings, frozen=True, kw_only=True, forbid_unknown_fields
 
 
 def where(settings: GpioSettings) -> Where:
-    """The header, or another chip."""
+    """Return the header, or another chip."""
     return Where("the header" if settings.chip is None else f"gpiochip{settings.chip}", local=True)
 
 
 def needs(settings: GpioSettings) -> Needs:
-    """That chip; all of them where the header's is found by its label, which means to open each."""
+    """Return the chip of the settings; without one every chip, as each is opened to read its label."""
     chip = "char-gpiochip" if settings.chip is None else f"/dev/gpiochip{settings.chip}"
     return Needs((chip,), group="gpio")
 
@@ -70,7 +70,7 @@ def open_bus(
     factory: Factory | None = None,
     clock: Callable[[], float] = time.monotonic,
 ) -> "GpioBus":
-    """The header's pins. Raises HalError that says what to check.
+    """Open the header's pins. Raises HalError with the thing to check.
 
     `factory`: a gpiozero pin factory whose pins claim as those of `pins.py` do.
     """
@@ -82,7 +82,7 @@ def open_bus(
 
 
 def open_to_switch_off(settings: GpioSettings) -> "GpioBus":
-    """The same pins without gpiozero. Raises HalError."""
+    """Open the same pins without gpiozero. Raises HalError."""
     with _with_lgpio():
         from drivers.hal.gpio.bare import BareFactory
     return GpioBus(BareFactory(settings.chip), time.monotonic)
@@ -90,7 +90,7 @@ def open_to_switch_off(settings: GpioSettings) -> "GpioBus":
 
 @contextmanager
 def _with_lgpio() -> Iterator[None]:
-    """Around its import."""
+    """Turn errors of lgpio's import into HalError."""
     try:
         yield
     except ImportError as error:

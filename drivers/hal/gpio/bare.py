@@ -1,6 +1,6 @@
 """Pins on lgpio alone, to switch off from a new process: gpiozero takes a third of its time to load.
 
-The calls that claim, write and release an output are those of `pins.py`. No edge is asked for.
+Outputs are claimed, written and released by the same calls as in `pins.py`. There are no edges.
 """
 
 from collections.abc import Callable
@@ -23,7 +23,7 @@ class BarePin:
 
     @property
     def state(self) -> int:
-        """The line's level, read now."""
+        """Read the line's level now."""
         level: int = lgpio.gpio_read(self._handle, self._line)
         return level
 
@@ -32,7 +32,7 @@ class BarePin:
         lgpio.gpio_write(self._handle, self._line, int(level))
 
     def output_with_state(self, state: bool) -> None:
-        """Claim as an output at this level, which is its safe level and restored on close."""
+        """Claim as an output at this level, its safe level, restored on close."""
         self._claim(lgpio.gpio_claim_output, int(state))
         self._safe = int(state)
 
@@ -55,17 +55,17 @@ class BarePin:
 
 
 class BareFactory:
-    """The lines of an open chip. Who claims a pin twice in one process is refused by the kernel."""
+    """The lines of an open chip. The kernel refuses a second claim of a pin in one process."""
 
     def __init__(self, chip: int | None) -> None:
         """Open this chip, or the header's. Raises HalError."""
         self._handle, self._chip = open_chip(chip)
 
     def reserve_pins(self, requester: object, *pins: str) -> None:
-        """Nothing to do: the YAML was checked."""
+        """Do nothing: the YAML was checked."""
 
     def release_pins(self, requester: object, *pins: str) -> None:
-        """Nothing to do."""
+        """Do nothing."""
 
     def pin(self, name: str) -> BarePin:
         """The pin of this canonical name (`BCM17`)."""

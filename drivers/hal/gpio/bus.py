@@ -29,29 +29,29 @@ class Pin(Protocol):
     when_changed: Callable[[object, object], None] | None
 
     def output_with_state(self, state: bool) -> None:
-        """Claim it as an output, at this level from the first moment on."""
+        """Claim the pin as an output, at this level from the first moment on."""
 
     def input_with_pull(self, pull: str) -> None:
-        """Claim it as an input with this resistor: `up`, `down` or `floating`."""
+        """Claim the pin as an input with this resistor: `up`, `down` or `floating`."""
 
     def close(self) -> None:
-        """Let it go."""
+        """Release the pin."""
 
 
 class Factory(Protocol):
     """gpiozero's pin factory."""
 
     def reserve_pins(self, requester: object, *pins: str) -> None:
-        """Keep these pins for one requester. Raises GPIOZeroError where another has them."""
+        """Reserve these pins for one requester. Raises GPIOZeroError if another has them."""
 
     def release_pins(self, requester: object, *pins: str) -> None:
-        """Let others have them."""
+        """Release the reservation."""
 
     def pin(self, name: str) -> Pin:
         """The pin of this name."""
 
     def close(self) -> None:
-        """Let every pin go."""
+        """Release every pin."""
 
 
 class GpioBus(Bus):
@@ -66,7 +66,7 @@ class GpioBus(Bus):
         self._dead_man = GpioDeadMan(self._drop, clock)
 
     def lines(self, inputs: Mapping[str, Pull | None], outputs: Mapping[str, bool]) -> "GpioLines":
-        """Canonical inputs with their pull, outputs with their safe level (True is high)."""
+        """Return these lines: canonical inputs with their pull, outputs with their safe level."""
         self._devices.append(GpioLines(self, dict(inputs), dict(outputs)))
         return self._devices[-1]
 
@@ -75,7 +75,7 @@ class GpioBus(Bus):
         self._wake = wake
 
     def edge(self, ticks: object, state: object) -> None:
-        """An input has changed: gpiozero's signature."""
+        """Report a changed input, with gpiozero's signature."""
         if self._wake is not None:
             self._wake()
 
@@ -113,7 +113,7 @@ class GpioLines:
         self._dropped = False
 
     def claim(self) -> None:
-        """Claim the outputs at their safe level, each in one call, then the inputs: all, or none."""
+        """Claim the outputs at their safe level, each in one call, then the inputs: all or none."""
         self._release()
         self._dropped = False
         try:
@@ -128,12 +128,12 @@ class GpioLines:
             raise
 
     def read(self) -> dict[str, bool]:
-        """Every input's level, read now. Raises HalError."""
+        """Read every input's level now. Raises HalError."""
         self._check()
         return self._levels(self._pulls)
 
     def write(self, levels: Mapping[str, bool]) -> None:
-        """Drive these outputs; each that goes off is tried, even when others fail. Raises HalError."""
+        """Drive these outputs; try every switching off, even after a failure. Raises HalError."""
         every = Every()
         for point, level in levels.items():
             if level != self._safe[point]:
@@ -157,7 +157,7 @@ class GpioLines:
                     continue  # the others must still drop
 
     def outputs(self) -> dict[str, bool]:
-        """The outputs' levels, read from the chip. Raises HalError."""
+        """Read the outputs' levels from the chip. Raises HalError."""
         return self._levels(self._safe)
 
     def close(self) -> None:
@@ -183,7 +183,7 @@ class GpioLines:
         return self._claimed[point]
 
     def _pin(self, point: str) -> Pin:
-        """Reserve a pin before using it: gpiozero refuses one that another device holds."""
+        """Reserve a pin before using it: gpiozero refuses a pin that another device holds."""
         self._bus.factory.reserve_pins(self, point)
         self._claimed[point] = self._bus.factory.pin(point)
         return self._claimed[point]
@@ -195,7 +195,7 @@ class GpioLines:
         pin.when_changed = self._bus.edge
 
     def _conflicts_with(self, other: object) -> bool:
-        """gpiozero asks the requester of a pin about its holder."""
+        """Does `other` hold the pin? gpiozero asks the requester."""
         return other is not self
 
     def _release(self) -> None:
@@ -213,7 +213,7 @@ class GpioLines:
 
 
 def _failures() -> tuple[type[Exception], ...]:
-    """What gpiozero and lgpio raise, where they are loaded."""
+    """Return the errors of gpiozero and lgpio, as far as these are loaded."""
     gpiozero, lgpio = sys.modules.get("gpiozero"), sys.modules.get("lgpio")
     vendors = ((gpiozero, "GPIOZeroError"), (lgpio, "error"))
     return (OSError, *(getattr(vendor, name) for vendor, name in vendors if vendor))

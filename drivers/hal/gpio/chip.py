@@ -18,7 +18,7 @@ DEV = Path("/dev")
 
 
 def open_chip(chip: int | None, dev: Path = DEV) -> tuple[int, int]:
-    """This chip, or the header's, found by its label: (handle, number). Raises HalError."""
+    """Open this chip, or the header's by its label: (handle, number). Raises HalError."""
     if chip is not None:
         return _open(chip, dev), chip
     numbers = sorted(int(p.name[8:]) for p in dev.glob("gpiochip*") if p.name[8:].isdecimal())
@@ -38,7 +38,7 @@ def open_chip(chip: int | None, dev: Path = DEV) -> tuple[int, int]:
 def claim(
     call: Callable[[int, int, int], object], handle: int, chip: int, line: int, value: int
 ) -> None:
-    """Claim a line by this call of lgpio's. Raises HalError that names who holds it."""
+    """Claim a line by this call of lgpio's. Raises HalError with the name of the line's holder."""
     try:
         call(handle, line, value)
     except lgpio.error as error:
@@ -46,7 +46,7 @@ def claim(
 
 
 def _holder(handle: int, chip: int, line: int) -> str:
-    """Who holds the line: the processes with the chip open, else the kernel's label."""
+    """Name the line's holder: the processes with the chip open, else the kernel's label."""
     *_, label = lgpio.gpio_get_line_info(handle, line)
     if not label:
         return ""

@@ -25,14 +25,14 @@ class GpioDeadMan:
         self._thread: threading.Thread | None = None
 
     def fed(self) -> None:
-        """A scan has finished. The first one starts the watch."""
+        """Report a finished scan. The first scan starts the watch."""
         self._fed_at = self._clock()
         if self._thread is None:
             self._thread = threading.Thread(target=self._watch, name="dead-man", daemon=True)
             self._thread.start()
 
     def check(self) -> bool:
-        """Drop the outputs if the last scan is too old; True if so."""
+        """Drop the outputs if the last scan is too old; return True if dropped."""
         overdue = self._fed_at is not None and self._clock() - self._fed_at > AFTER_S
         if overdue:
             self._fed_at = None

@@ -1,4 +1,4 @@
-"""The 40-pin header: how its pins are spelled, and checks of the wires on them.
+"""The 40-pin header: the spelling of its pins, and checks of the wires on them.
 
 Points are `BCM17` or `J8:11`. A bare number is refused: mixing up position and BCM number is the most
 common wiring mistake.
@@ -34,7 +34,7 @@ SHARED = {
 
 
 def canonical(point: str) -> str:
-    """`J8:7` and `BCM4` are `BCM4`. Raises ValueError with what to write instead."""
+    """Return `BCM4` for `J8:7` and `BCM4`. Raises ValueError with the right spelling."""
     if found := re.fullmatch(r"BCM(0|[1-9][0-9]?)", point):
         if int(found[1]) in POSITION:
             return point
@@ -59,13 +59,13 @@ def _at(position: int) -> str:
 
 
 def describe(point: str) -> str:
-    """`BCM4 = J8:7`, for the table that an electrician reads."""
+    """Return `BCM4 = J8:7`, for the electrician's table."""
     name = canonical(point)
     return f"{name} = J8:{POSITION[int(name[3:])]}"
 
 
 def boot_level(point: str) -> bool:
-    """The level to which a pin is pulled from power-on until it is claimed.
+    """Return the level to which a pin is pulled from power-on until it is claimed.
 
     BCM0-8 up, BCM9-27 down (BCM2835 ARM Peripherals, table 6-31, and its successors).
     """
@@ -73,7 +73,7 @@ def boot_level(point: str) -> bool:
 
 
 def wire_problems(wire: Wire) -> Iterable[str]:
-    """What is wrong with this wire on a header pin."""
+    """Yield the errors in this wire on a header pin."""
     try:
         name = canonical(wire.point)
     except ValueError:
@@ -92,7 +92,7 @@ def wire_problems(wire: Wire) -> Iterable[str]:
 
 
 def wire_warnings(wire: Wire) -> Iterable[str]:
-    """What else may use this pin."""
+    """Yield the other uses of this pin."""
     try:
         name = canonical(wire.point)
     except ValueError:

@@ -1,4 +1,4 @@
-"""Which processes have a GPIO chip open: of a line's holder the kernel knows only a label ('lg')."""
+"""Finds the processes with a GPIO chip open: the kernel has only a label ('lg') of a line's holder."""
 
 import os
 from collections.abc import Iterator
@@ -6,7 +6,7 @@ from pathlib import Path
 
 
 def holders(chip: Path, proc: Path = Path("/proc")) -> list[str]:
-    """The other processes that have this device open, as far as this user may see them.
+    """Return the other processes with this device open, as far as this user may see them.
 
     A service has the name of its systemd unit, any other its process id and command.
     """

@@ -2,8 +2,8 @@
 
 The stock `LGPIOPin` claims an output as an input, then as an output at low, and only then writes
 its level: an active-low relay clicks at each start. On close it claims a floating input. These pins
-claim once, at the safe level, and stay at it after close: the kernel of Raspberry Pi OS keeps the level
-of a line that no process holds.
+claim once, at the safe level, and keep that level after close: the kernel of Raspberry Pi OS keeps the
+level of a line that no process holds.
 """
 
 from collections.abc import Callable
@@ -16,8 +16,8 @@ from gpiozero.pins.local import LocalPiFactory, LocalPiPin
 
 from drivers.hal.gpio.chip import DEV, PULLS, claim, open_chip
 
-# Any board with the 40-pin header: gpiozero wants one to name pins, and a hardened unit hides
-# /proc/cpuinfo, where it would look.
+# Any board with the 40-pin header: gpiozero needs a board for the names of pins, and a hardened unit
+# hides /proc/cpuinfo, gpiozero's own source.
 REVISION = 0xA02082
 
 
@@ -34,7 +34,7 @@ class HeldPin(LGPIOPin):  # type: ignore[misc]
         self._safe: int | None = None
 
     def output_with_state(self, state: bool) -> None:
-        """Claim as an output at this level, which is its safe level and restored on close."""
+        """Claim as an output at this level, its safe level, restored on close."""
         self._claim(lgpio.gpio_claim_output, int(state))
         self._safe = int(state)
 
@@ -78,5 +78,5 @@ class HeldFactory(LGPIOFactory):  # type: ignore[misc]
 
 
 def open_factory(chip: int | None, dev: Path = DEV) -> HeldFactory:
-    """The header's chip: this one, or the one found by its label. Raises HalError."""
+    """Open the header's chip, by this number or by its label. Raises HalError."""
     return HeldFactory(*open_chip(chip, dev))

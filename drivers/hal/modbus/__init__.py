@@ -3,8 +3,8 @@
     settings.py   settings of the YAML; connections.py: address or line; watchdog.py: modules' watchdogs
     points.py     spelling of contacts and relays; registers.py: spelling of a map's places
     bus.py        the units of one connection or line: retries, pauses
-    lines.py      one device's coils and registers: claim, read, write, read back, release. Two masters
-                  on one output: a fault of its own, and no relay that chatters
+    lines.py      one device's coils and registers: claim, read, write, read back, release; a second
+                  master on one output is a fault, and makes no relay chatter
     dead_man.py   arms and refreshes the modules' watchdogs
     wire.py       a request and its answer; tcp.py and rtu.py carry them, frames.py makes the frames
 

@@ -2,14 +2,14 @@
 
 - A request has `timeout_s` from the name lookup to the last byte of the reply, and up to `retries` more
   tries. Reads and writes may be repeated; a pulse is not, because a repeat would prolong it. `tcp.py`
-  (new connections) and `rtu.py` (silence) see that a late reply or half a frame is never taken for
-  the reply to another request.
-- If the connection or port cannot be opened, the whole bus backs off; if a unit fails, only that unit
-  does: for 0.5 to 30 s, while calls fail at once with the same text. After that a request gets
-  one try until the unit answers again, and so does the first reading of a unit that has never answered:
-  a dead unit costs the others one `timeout_s` per backoff. Between two such tries in vain the live
-  units have their turn.
-- Writes that switch off have their own backoff at each unit: a failed reading never delays the first.
+  (new connections) and `rtu.py` (silence) keep a late reply or half a frame from passing for the reply
+  to another request.
+- If the connection or port cannot be opened, the whole bus backs off for 0.5 to 30 s; if a unit fails,
+  only that unit does. Meanwhile calls fail at once with the same text. After that a request gets one
+  try until the unit answers again. A unit that has never answered gets one try too. So a dead unit costs
+  the others one `timeout_s` per backoff. Between two such failed tries the live units have their turn.
+- Writes that switch off have their own backoff at each unit: a failed reading never delays the first
+  such write.
 
 If a gateway waits for its serial units longer than `timeout_s`, the other units wait too: set the
 gateway's timeout below `timeout_s`.
@@ -44,8 +44,8 @@ from drivers.hal.modbus.wire import (
 from drivers.hal.points import Pull
 
 TURN_S: Final = 0.05
-"""After a try in vain no other unit that has failed is tried for so long: longer than what is left of a
-scan, and shorter than a scan's period.
+"""The pause after a failed try before another failed unit is tried: longer than the rest of a scan, and
+shorter than a scan's period.
 """
 
 
@@ -73,41 +73,41 @@ class ModbusBus(Bus):
         self._watchdogs = Watchdogs(self, settings.module_watchdog, clock)
 
     def lines(self, inputs: Mapping[str, Pull | None], outputs: Mapping[str, bool]) -> ModbusLines:
-        """Canonical inputs, and coils with their safe level (True is 1)."""
+        """Return these lines: canonical inputs, and coils with their safe level (True is 1)."""
         return ModbusLines(
             self, {n: parse(n) for n in inputs}, {n: parse(n) for n in outputs}, dict(outputs)
         )
 
     def read(self, asked: Range, safe: bool = False) -> dict[Point, int]:
-        """These bits (0 or 1) or registers, by one request. Raises HalError."""
+        """Read these bits (0 or 1) or registers by one request. Raises HalError."""
         question = UnitRequest(asked.unit, READS[asked.table], asked.start, asked.count)
         found = self._ask(f"read {asked}", question, safe)
         return dict(zip(asked.points(), found.values, strict=True))
 
     def cells(self, points: Iterable[Point]) -> dict[Point, int]:
-        """These bits and registers, in as few requests as possible. Raises HalError."""
+        """Read these bits and registers in as few requests as possible. Raises HalError."""
         return Image(self, points).read()
 
     def write(self, point: Point, value: int, safe: bool = False) -> None:
-        """Set this coil (0 or 1) or register. Raises HalError; then it may be set or not."""
+        """Set this coil (0 or 1) or register. Raises HalError; then its value is unknown."""
         coil = point.table == "coil"
         sent = (COIL_ON if value else 0) if coil else value
         what = f"write {'coil' if coil else 'register'} {point.address}"
         self._ask(what, UnitRequest(point.unit, WRITES[point.table], point.address, sent), safe)
 
     def flash(self, place: Point, on_s: float) -> None:
-        """Have the module time a pulse, by "flash on" of Waveshare's Modbus RTU Relay boards.
+        """Let the module time a pulse, by "flash on" of Waveshare's Modbus RTU Relay boards.
 
-        Function 5 at an address of its own for each relay (0x0200 and the relay's number, from 0), with
-        tenths of a second in place of a coil's two values; the reply is its echo. The maker's manual,
-        protocol V2: `01 05 02 00 00 07 8D B0` switches relay 0 of unit 1 on for 0.7 s. A repeat would
-        restart the time, so it is sent once. Raises HalError; then there may be a pulse.
+        Function 5 at an own address for each relay (0x0200 plus the relay's number, from 0), with
+        tenths of a second in place of a coil's two values; the reply is an echo. Source: the maker's
+        manual, protocol V2: `01 05 02 00 00 07 8D B0` switches relay 0 of unit 1 on for 0.7 s. A repeat
+        would restart the time, so the request is sent once. Raises HalError; then there may be a pulse.
         """
         question = UnitRequest(place.unit, WRITES["coil"], place.address, round(on_s * 10))
         self._ask(f"flash at coil {place.address:#x}", question, once=True)
 
     def guard(self, units: Iterable[int]) -> DeviceWatchdogs:
-        """The modules' own watchdogs, for a device with outputs at these units."""
+        """Return the modules' own watchdogs for a device with outputs at these units."""
         return self._watchdogs.guard(units)
 
     def scanned(self) -> None:
@@ -126,7 +126,7 @@ class ModbusBus(Bus):
     def _ask(
         self, what: str, question: UnitRequest, safe: bool = False, once: bool = False
     ) -> UnitReply:
-        """The unit's good answer. `once`: a repeat would change something. Raises HalError."""
+        """Return the unit's valid answer. `once`: do not repeat the request. Raises HalError."""
         unit = question.unit
         backoff = self._units.setdefault((unit, safe), self._backoff())
         self._link.check()
@@ -148,7 +148,7 @@ class ModbusBus(Bus):
         return answer
 
     def _tried(self, question: UnitRequest, tries: int) -> tuple[UnitReply | None, str]:
-        """An answer, or why there was none in so many tries. Raises HalError without a connection."""
+        """Return an answer, or the cause of its absence. Raises HalError without a connection."""
         reason = ""
         for _ in range(tries):
             try:
@@ -166,7 +166,7 @@ class ModbusBus(Bus):
         return None, reason
 
     def _refused(self, backoff: Backoff, unit: int, text: str, code: int) -> HalError:
-        """The error for an exception reply. Exceptions 1 to 3 show that the unit works: no backoff."""
+        """Return the error for an exception reply. No backoff after 1 to 3, which a working unit sends."""
         self._watchdogs.refused(unit, code)
         text += f"exception {code}, {EXCEPTIONS.get(code, UNDEFINED)}"
         if code not in (1, 2, 3):
@@ -175,7 +175,7 @@ class ModbusBus(Bus):
 
 
 def _way(settings: ModbusSettings) -> tuple[UnitWire, str]:
-    """The wire to the units, and its name for texts. Only this function imports the libraries."""
+    """Return the wire to the units and its name for texts. Only this function imports the libraries."""
     if settings.serial:
         from drivers.hal.modbus.rtu import SerialLine
 

@@ -1,4 +1,4 @@
-"""Where Modbus units are: behind a TCP address, or on a serial line."""
+"""The places of Modbus units: behind a TCP address, or on a serial line."""
 
 import re
 from typing import Annotated, Final, Literal
@@ -17,13 +17,13 @@ BAUDRATES: Final = (
 
 
 class Tcp(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Where the module or gateway listens."""
+    """The TCP address of a module or gateway."""
 
     host: Annotated[Name, tells("its address or name.")]
     port: Annotated[int, msgspec.Meta(ge=1, le=65535), tells("its TCP port.")] = 502
 
     def problems(self) -> Remarks:
-        """An invalid address."""
+        """Yield a problem for an invalid address."""
         if re.fullmatch(r"[^:]*:[0-9]+", self.host):
             yield ("host",), "write the host alone; its port goes into port"
         elif not re.fullmatch(r"[A-Za-z0-9_.:-]+", self.host):
@@ -42,7 +42,7 @@ class Serial(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     ignore_echo: Annotated[bool, tells("for an adapter that hears what it sends.")] = False
 
     def problems(self) -> Remarks:
-        """A relative path; a rate that no unit has."""
+        """Yield problems: a relative path; a rate that no unit has."""
         if not self.port.startswith("/"):
             text = "write the whole path, as `ls /dev/serial/by-id/*` prints it"
             yield ("port",), f"{self.port!r} is not a serial port: {text}"
@@ -53,20 +53,20 @@ class Serial(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
             yield ("baudrate",), text
 
     def warnings(self) -> Remarks:
-        """A path that may change after a reboot."""
+        """Yield a warning for a path that may change after a reboot."""
         if re.match(r"/dev/tty(USB|ACM)", self.port):
             text = "may be another adapter after the next start: write its /dev/serial/by-id path"
             yield ("port",), f"{self.port} {text}"
 
     @property
     def character_s(self) -> float:
-        """The time of one character on the wire (s): start, 8 data, parity and stop bits."""
+        """Return the time of one character on the wire (s): start, 8 data, parity and stop bits."""
         bits = 9 + (self.parity != "none") + self.stopbits
         return bits / self.baudrate
 
     @property
     def gap_s(self) -> float:
-        """The silence between two frames (s): 3.5 characters, or 1.75 ms above 19200 baud.
+        """Return the silence between two frames (s): 3.5 characters, or 1.75 ms above 19200 baud.
 
         Source: Modbus over Serial Line V1.02, 2.5.1.1.
         """

@@ -1,4 +1,4 @@
-"""Arms and refreshes the modules' own watchdogs (`watchdog.py` describes a make's).
+"""Arms and refreshes the modules' own watchdogs (`watchdog.py` has their settings).
 
 - A watchdog is armed before the first output is driven, and counts as armed only when read back.
 - Only a finished scan refreshes it: when the daemon hangs, the module drops its outputs. So one round
@@ -6,7 +6,7 @@
 - After a trip (read back, or exception 4) every output is unknown: the watchdog is armed again, each
   device on the unit fails one reading, and its outputs are written anew.
 
-When the daemon stops, the watchdog stays armed: the outputs are off by then, and stay off.
+After the daemon's end the watchdog stays armed: the outputs are off already, and stay off.
 """
 
 import itertools
@@ -22,11 +22,11 @@ if TYPE_CHECKING:
     from drivers.hal.modbus.bus import ModbusBus
 
 DEVICE_FAILURE: Final = 4
-"""The exception by which modules refuse outputs after their watchdog has tripped."""
+"""The exception with which modules refuse outputs after a trip of their watchdog."""
 
 
 class UnitWatchdog:
-    """The watchdog of one unit. `trips` counts the trips that were noticed."""
+    """The watchdog of one unit. `trips`: the number of observed trips."""
 
     def __init__(self, bus: "ModbusBus", unit: int, habits: Habits) -> None:
         self._bus = bus
@@ -38,7 +38,7 @@ class UnitWatchdog:
         self.trips = 0
 
     def arm(self) -> None:
-        """Arm it, and read back that it is armed. Raises HalError."""
+        """Arm the watchdog, and read back that it is armed. Raises HalError."""
         if self.armed:
             return
         habits = self._habits
@@ -50,7 +50,7 @@ class UnitWatchdog:
         self.armed = True
 
     def refresh(self, now: float) -> None:
-        """If it is time, refresh it and check that it has not tripped. Does not raise."""
+        """If due, refresh the watchdog and check it for a trip. Does not raise."""
         if not self.armed or now < self._refreshed_at + self._habits.refresh_s:
             return
         self._refreshed_at = now
@@ -61,7 +61,7 @@ class UnitWatchdog:
             self.tripped()
 
     def tripped(self) -> None:
-        """It has tripped: the outputs are unknown."""
+        """Record a trip: the outputs are unknown."""
         if self.armed:
             self.armed = False
             self.trips += 1
@@ -90,7 +90,7 @@ class DeviceWatchdogs:
         self._seen = {watchdog: watchdog.trips for watchdog in watchdogs}
 
     def check(self) -> None:
-        """Arm all. Raises HalError, also once after each trip, because outputs went off."""
+        """Arm all watchdogs. Raises HalError, also once after each trip, because outputs went off."""
         trips = [watchdog for watchdog, seen in self._seen.items() if watchdog.trips != seen]
         for watchdog in self._seen:
             watchdog.arm()
@@ -113,17 +113,17 @@ class Watchdogs:
             self._units = {unit: UnitWatchdog(bus, unit, habits) for unit in settings.units}
 
     def guard(self, units: Iterable[int]) -> DeviceWatchdogs:
-        """The view of a device with outputs at these units."""
+        """Return the view of a device with outputs at these units."""
         return DeviceWatchdogs(
             self._units[unit] for unit in sorted(set(units)) if unit in self._units
         )
 
     def refused(self, unit: int, code: int) -> None:
-        """A unit has answered with this exception."""
+        """Record a unit's answer with this exception."""
         if code == DEVICE_FAILURE and unit in self._units:
             self._units[unit].tripped()
 
     def scanned(self) -> None:
-        """A scan has finished."""
+        """Refresh the watchdogs after a finished scan."""
         for watchdog in self._units.values():
             watchdog.refresh(self._clock())

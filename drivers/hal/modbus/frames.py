@@ -1,9 +1,9 @@
 """Modbus frames and their contents, by pymodbus. Imported when a bus needs it.
 
-pymodbus's decoders accept wrong replies, so stricter ones decode them here. Its client is not used: its
-timeout starts again at each byte and follows the wall clock, its name lookup has no limit, it repeats
-requests on a connection that may still hold late replies, and it accepts a reply to another function.
-Its server costs 15 MB and is never imported.
+pymodbus's decoders accept wrong replies, so this file has stricter decoders. pymodbus's client is not
+used: its timeout starts again at each byte and follows the wall clock, its name lookup has no limit, it
+repeats requests on a connection that may still hold late replies, and it accepts a reply to another
+function. pymodbus's server costs 15 MB and is never imported.
 """
 
 import logging
@@ -34,14 +34,14 @@ from drivers.hal.modbus.wire import BadReply, UnitReply, UnitRequest
 logging.getLogger("pymodbus.logging").setLevel(logging.CRITICAL)  # our HalErrors say it all
 
 FAILURES: Final = (ModbusException, struct.error, IndexError, ValueError)
-"""What pymodbus raises for bytes that are not a reply."""
+"""The errors of pymodbus for bytes that are not a reply."""
 
 
 class AnyCoilRequest(WriteSingleCoilRequest):
     """Function 5 with any value. Some modules take a time there instead of on and off."""
 
     def encode(self) -> bytes:
-        """Address and value."""
+        """Encode address and value."""
         return struct.pack(">HH", self.address, *self.registers)
 
 
@@ -116,15 +116,15 @@ RTU: Final = FramerRTU(DECODER)
 
 
 def tcp_request(question: UnitRequest, number: int) -> bytes:
-    """The request's frame on TCP. `number`: the transaction's, not 0. Raises BadReply."""
+    """Return the request's frame on TCP. `number`: the transaction's, not 0. Raises BadReply."""
     return TCP.buildFrame(_request(question, number))
 
 
 def tcp_answer(question: UnitRequest, number: int, heard: bytes) -> tuple[int, UnitReply | None]:
-    """How many bytes were used, and the answer once it is complete. Raises BadReply.
+    """Return the number of used bytes, and the answer once it is complete. Raises BadReply.
 
-    Replies to other requests and of other units are dropped. pymodbus alone would take a reply numbered
-    0 for any request's, and to a request to unit 0 that of any unit.
+    Replies to other requests and of other units are dropped. pymodbus alone would accept a reply with
+    number 0 for any request, and any unit's reply to a request to unit 0.
     """
     used = 0
     while True:
@@ -139,17 +139,17 @@ def tcp_answer(question: UnitRequest, number: int, heard: bytes) -> tuple[int, U
 
 
 def rtu_request(question: UnitRequest) -> bytes:
-    """The request's frame on a serial line. Raises BadReply."""
+    """Return the request's frame on a serial line. Raises BadReply."""
     return RTU.buildFrame(_request(question))
 
 
 def rtu_answer(question: UnitRequest, frame: bytes) -> UnitReply:
-    """The answer in a frame whose CRC is right. Raises BadReply."""
+    """Return the answer in a frame with a valid CRC. Raises BadReply."""
     return _decoded(question, frame[1:-2])
 
 
 def rtu_size(heard: bytes) -> int:
-    """The size of the reply that these bytes begin with; 0 while too few are there. Raises BadReply."""
+    """Return the size of the reply at the beginning of `heard`; 0: too few bytes. Raises BadReply."""
     if len(heard) < 5:  # the shortest reply is an exception
         return 0
     try:
@@ -162,7 +162,7 @@ def rtu_size(heard: bytes) -> int:
 
 
 def crc_fits(frame: bytes) -> bool:
-    """Are these bytes a frame of a serial line?"""
+    """Are these bytes a frame with a valid CRC?"""
     crc = int.from_bytes(frame[-2:], "big")
     return len(frame) >= 4 and FramerRTU.check_CRC(frame[:-2], crc)
 
@@ -175,7 +175,7 @@ def _request(question: UnitRequest, number: int = 0) -> ModbusPDU:
 
 
 def _decoded(question: UnitRequest, content: bytes) -> UnitReply:
-    """The answer in a frame's function and data. Raises BadReply."""
+    """Decode the answer from a frame's function and data. Raises BadReply."""
     try:
         reply = DECODER.decode(content)
     except FAILURES as error:
@@ -186,7 +186,7 @@ def _decoded(question: UnitRequest, content: bytes) -> UnitReply:
 
 
 def _answer(question: UnitRequest, reply: ModbusPDU) -> UnitReply:
-    """The reply's answer. Raises BadReply if it does not belong to the request."""
+    """Return the reply's answer. Raises BadReply if the reply does not belong to the request."""
     function, asked = question.function, question.value
     if reply.function_code & 0x7F != function:
         raise BadReply(f"function {reply.function_code} instead of {function}")

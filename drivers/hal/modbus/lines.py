@@ -1,9 +1,9 @@
 """One device's coils and registers: the same claim, read, write, read-back and close for each driver.
 
-An output is written only after it has been read. It is read back after the write and compared in each
-reading. So a module that restarts with its outputs off is noticed, and so are a tripped watchdog and
-another master (`Rivals`). Every output that goes to its safe value is written, even if another
-output, an input or the unit's watchdog fails.
+An output is read before its first write, read back after each write, and compared in each reading. This
+reveals a module that restarts with its outputs off, a tripped watchdog, and another master (`Rivals`).
+Every output that goes to its safe value is written, even if another output, an input or the unit's
+watchdog fails.
 """
 
 import math
@@ -21,10 +21,10 @@ if TYPE_CHECKING:
     from drivers.hal.modbus.bus import ModbusBus
 
 AGAIN_S: Final = 5.0
-"""A contradiction later than this (s) after a pause counts as a first one."""
+"""A contradiction later than this (s) after a pause counts as the first contradiction."""
 FIRST_S: Final = 1.0
 LONGEST_S: Final = 30.0
-"""An output that another master writes is left alone for so long (s), at first and at most."""
+"""The first and the longest pause (s) in writing an output that another master writes too."""
 
 
 class Image:
@@ -36,9 +36,9 @@ class Image:
         self._ranges = ranges(self._points)
 
     def read(self, safe: bool = False, every: Every | None = None) -> dict[Point, int]:
-        """Bits (0 or 1) and registers, read now. Raises HalError.
+        """Read bits (0 or 1) and registers now. Raises HalError.
 
-        With `every`: the points that can be read, even if others fail.
+        With `every`: return the points that can be read, even if others fail.
         """
         image: dict[Point, int] = {}
         asked = list(self._ranges)
@@ -48,7 +48,7 @@ class Image:
         return image
 
     def _part(self, part: Range, asked: list[Range], safe: bool) -> dict[Point, int]:
-        """One request. If the module lacks addresses in a gap, later requests leave the gap out."""
+        """Make one request. If the module lacks addresses in a gap, later requests skip the gap."""
         try:
             return self._units.read(part, safe)
         except UnitException as refusal:
@@ -62,14 +62,14 @@ class Image:
 
 
 class Rivals:
-    """The outputs, by name, that another master writes too: each reads differently from what was
-    written, again and again.
+    """The outputs, by name, that another master writes too: each repeatedly contradicts its written
+    value.
 
-    After the first time the output is written again at once: the module may have restarted. If another
-    master writes the coil, that would switch the relay to and fro for ever. So after the second time
-    the output is left alone for 1 s, then for twice as long each time, up to 30 s. Meanwhile every
-    write of its device fails, and the error names the fault. Only safe values are still written, at
-    once and every time.
+    After the first contradiction the output is written again at once: the module may have restarted.
+    With another master, repeating this would switch the relay to and fro for ever. So after the second
+    contradiction the output is left alone for 1 s, then for twice as long each time, up to 30 s.
+    Meanwhile every write of its device fails, with an error that names the fault. Only safe values are
+    still written, at once and every time.
     """
 
     def __init__(self, now: Callable[[], float]) -> None:
@@ -78,14 +78,14 @@ class Rivals:
         self._at: dict[str, float] = {}
 
     def contradicted(self, name: str) -> None:
-        """This output reads differently from what was written."""
+        """Record that this output contradicts its written value."""
         now, before_s = self._now(), self._pause_s.get(name, 0.0)
         again = now - self._at.get(name, -math.inf) <= before_s + AGAIN_S
         self._at[name] = now
         self._pause_s[name] = min(max(FIRST_S, 2 * before_s), LONGEST_S) if again else 0.0
 
     def check(self, names: Iterable[str]) -> None:
-        """Raises HalError for the first of these outputs that is left alone now."""
+        """Raise HalError for the first of these outputs that is left alone now."""
         for name in names:
             if self._now() - self._at.get(name, -math.inf) < self._pause_s.get(name, 0.0):
                 raise HalError(
@@ -97,8 +97,8 @@ class Rivals:
 class ModbusLines:
     """One device's inputs and outputs by name (`drivers.hal.points.Lines`).
 
-    `safe`: each output's safe value. `readable`: outputs can be read back. Other outputs are written in
-    every scan, so that a controller that has restarted gets them again.
+    `safe`: each output's safe value. `readable`: outputs can be read back. If not, they are written in
+    every scan, for the case that the controller has restarted.
     """
 
     def __init__(
@@ -127,8 +127,7 @@ class ModbusLines:
         """Read each output and bring it to its safe value; once only.
 
         Where outputs cannot be read, inputs are read to check that the unit answers. A claim after a
-        failure only reads, and the outputs stay as they were: a held door must not be released because
-        one reply was lost.
+        failure only reads and leaves the outputs unchanged: a lost reply must not release a held door.
         """
         self._set.clear()
         every = Every()
@@ -144,7 +143,7 @@ class ModbusLines:
         self._claimed = True
 
     def read(self) -> dict[str, int]:
-        """Every input's value. Raises HalError, also if an output differs from what was written.
+        """Read every input. Raises HalError, also if an output contradicts its written value.
 
         After a failure the outputs count as unknown.
         """
@@ -158,26 +157,26 @@ class ModbusLines:
     def bring(self, values: Mapping[str, int]) -> None:
         """Set these outputs, except those known to have the value. Raises HalError.
 
-        It also raises while another master writes one of the device's outputs.
+        Also raises while another master writes one of the device's outputs.
         """
         changed = {n: value for n, value in values.items() if self._set.get(n) != value}
         self.write(changed if self._readable else values)
         self._rivals.check(map(str, self._outputs.values()))
 
     def write(self, values: Mapping[str, int]) -> None:
-        """Set these outputs, and read them back. Raises HalError; then they are unknown."""
+        """Set these outputs, and read them back. Raises HalError; then their values are unknown."""
         every = Every()
         self._write(values, every)
         every.check()
 
     def flash(self, point: str, flash: Flash) -> None:
-        """Request this pulse. The module switches the coil on and off, so it is not compared."""
+        """Request this pulse. The module switches the coil, so its value is not compared."""
         self._touched = True
         self._set.pop(point, None)
         self._units.flash(parse(flash.point), flash.on_s)
 
     def outputs(self) -> dict[str, int] | None:
-        """The outputs, read now; None where they cannot be read."""
+        """Read the outputs now; None where they cannot be read."""
         image = self._back.read()
         return {n: image[p] for n, p in self._outputs.items()} if self._readable else None
 
@@ -196,7 +195,7 @@ class ModbusLines:
                 self._units.write(point, self._safe[name], safe=True)
 
     def _write(self, values: Mapping[str, int], every: Every) -> None:
-        """Off first. After a failure nothing is switched on. Then each output is read back."""
+        """Write, off first, then read back each output. After a failure nothing is switched on."""
         self._touched = self._touched or bool(values)
         safe = {name for name, value in values.items() if value == self._safe[name]}
         written: dict[str, int] = {}

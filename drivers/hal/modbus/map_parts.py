@@ -1,6 +1,6 @@
-"""The parts of a register map, as a YAML or a profile gives them: a place, a bit, a command.
+"""The parts of a register map in a YAML or a profile: a place, a bit, a command.
 
-The maps of lifts, doors and chargers, and of modules' watchdogs, are made of these.
+The maps of lifts, doors and chargers, and of modules' watchdogs, consist of these parts.
 """
 
 from collections.abc import Collection
@@ -15,7 +15,7 @@ from drivers.numbers import Bit
 
 
 class Placed(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """What has a place. `TABLES`: the tables that it may be in."""
+    """A part with a place. `TABLES`: its allowed tables."""
 
     TABLES: ClassVar[Collection[str]] = tuple(TABLES)
 
@@ -24,7 +24,7 @@ class Placed(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     ]
 
     def problems(self) -> Remarks:
-        """An invalid place."""
+        """Yield a problem for an invalid place."""
         if reason := misplaced(self.at, self.TABLES):
             yield ("at",), reason
 
@@ -34,7 +34,7 @@ class Placed(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
 
 
 class InRegister(Placed, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """What is read from a register."""
+    """A part that is read from a register."""
 
     TABLES: ClassVar[Collection[str]] = REGISTERS
 
@@ -42,7 +42,7 @@ class InRegister(Placed, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
 
 class WrittenPlace(Placed, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """What is written."""
+    """A part that is written."""
 
     TABLES: ClassVar[Collection[str]] = WRITABLE
 
@@ -60,18 +60,18 @@ class RegisterBit(InRegister, frozen=True, kw_only=True, forbid_unknown_fields=T
 
 
 class WrittenLevels(WrittenPlace, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A command that is on or off. `ON`, `OFF`: the keys of the two values."""
+    """A command with an on and an off value. `ON`, `OFF`: the keys of the two values."""
 
     ON: ClassVar[str]
     OFF: ClassVar[str]
 
     def value(self, on: bool) -> int:
-        """The value that is written for on or off."""
+        """Return the value to write for on or off."""
         value: Word = getattr(self, self.ON if on else self.OFF)
         return value
 
     def problems(self) -> Remarks:
-        """A place that cannot be written; values that it cannot hold."""
+        """Yield problems: a place that cannot be written; values that it cannot hold."""
         yield from super().problems()
         if self.value(True) == self.value(False):
             yield (self.OFF,), f"is the value of {self.ON}"

@@ -1,9 +1,9 @@
-"""How a YAML spells a point of a Modbus module: unit, table and address.
+"""The spelling of a point of a Modbus module in a YAML: unit, table and address.
 
 A contact is a discrete input, a coil, or one bit of a register; a relay is a coil. Addresses are those
 on the wire: they begin at 0. Manuals often print the data model's numbers. These begin at 1, and their
 first digit is the table: coil 0 is 00001, discrete input 0 is 10001, input register 0 is 30001, holding
-register 0 is 40001. Such a number is refused, and the error says which address is probably meant.
+register 0 is 40001. Such a number is refused, and the error suggests the probable address.
 """
 
 import re
@@ -24,8 +24,8 @@ GAP_MAX: Final[dict[Table, int]] = {
     "holding register": 0,
     "input register": 0,
 }
-"""The widest gap between two points that are still read in one request. Registers are never read across
-a gap: a controller may lack those addresses, or take a reading for an acknowledgement.
+"""The widest gap between two points of one read request. Registers are never read across a gap: a
+controller may lack those addresses, or take a reading for an acknowledgement.
 """
 COUNT_MAX: Final[dict[Table, int]] = {
     "coil": 2000,
@@ -33,7 +33,7 @@ COUNT_MAX: Final[dict[Table, int]] = {
     "holding register": 125,
     "input register": 125,
 }
-"""The most that one reply can carry (Modbus Application Protocol V1.1b3, 6.1 to 6.4)."""
+"""The maximum number in one reply (Modbus Application Protocol V1.1b3, 6.1 to 6.4)."""
 
 _MODEL_DIGIT: Final[dict[Table, int]] = {
     "coil": 0,
@@ -74,11 +74,11 @@ class Point(Struct, frozen=True, order=True):
 
     @property
     def cell(self) -> "Point":
-        """The point to read for it: the whole register if it is one bit of a register."""
+        """Return the point to read: the whole register for one bit of a register."""
         return self if self.bit is None else Point(self.unit, self.table, self.address)
 
     def of(self, value: int) -> int:
-        """Its value in the value of its cell."""
+        """Extract the point's value from its cell's value."""
         return value if self.bit is None else value >> self.bit & 1
 
 
@@ -96,12 +96,12 @@ class Range(Struct, frozen=True):
         return f"{self.table}s {self.start} to {self.start + self.count - 1}"
 
     def points(self) -> list[Point]:
-        """Every point in it, in the order of the reply."""
+        """Return every point in the range, in the order of the reply."""
         return [Point(self.unit, self.table, self.start + i) for i in range(self.count)]
 
 
 def parse(text: str) -> Point:
-    """A point from any spelling of it. Raises ValueError with what to write instead."""
+    """Parse any spelling of a point. Raises ValueError with the right spelling."""
     words = _SPELLING.fullmatch(text.strip().lower())
     if not words:
         raise ValueError(f"{text!r} is not a Modbus point: {_how(text)}")
@@ -113,19 +113,19 @@ def parse(text: str) -> Point:
 
 
 def canonical(point: str) -> str:
-    """`Unit 1 COIL 0` is `unit 1 coil 0`. Raises ValueError with what to write instead."""
+    """Return `unit 1 coil 0` for `Unit 1 COIL 0`. Raises ValueError with the right spelling."""
     return str(parse(point))
 
 
 def describe(point: str) -> str:
-    """The point with the number that a manual prints: `unit 1 coil 0 (00001)`."""
+    """Return the point with its number in manuals: `unit 1 coil 0 (00001)`."""
     found = parse(point)
     digit, bit = _MODEL_DIGIT[found.table], "" if found.bit is None else f" bit {found.bit}"
     return f"{found} ({digit}{found.address + 1:04}{bit})"
 
 
 def wire_problems(wire: Wire) -> Iterable[str]:
-    """What is wrong with this wire on a Modbus module."""
+    """Yield the errors in this wire on a Modbus module."""
     try:
         point = parse(wire.point)
     except ValueError:
@@ -160,7 +160,7 @@ def _flash_problems(wire: Wire, output: Point) -> Iterable[str]:
 
 
 def ranges(points: Iterable[Point], gap: int | None = None) -> list[Range]:
-    """As few requests as possible that read all of these. Gaps up to `gap` are read as well.
+    """Return as few requests as possible that read all these points. Gaps up to `gap` are read too.
 
     `gap`: None for the table's GAP_MAX.
     """
@@ -175,7 +175,7 @@ def ranges(points: Iterable[Point], gap: int | None = None) -> list[Range]:
 
 
 def pieces(whole: Range, points: Iterable[Point]) -> Sequence[Range]:
-    """The parts of a range that hold only these points."""
+    """Return the parts of a range that hold only these points."""
     return ranges(set(points).intersection(whole.points()), gap=0)
 
 
@@ -196,7 +196,7 @@ def _table(text: str, words: str) -> Table:
 
 
 def _bit(text: str, table: Table, bit: str | None) -> int | None:
-    """The bit of a register; None for a coil or discrete input."""
+    """Return the bit of a register; None for a coil or discrete input."""
     if table in ("coil", "discrete input"):
         if bit is not None:
             raise ValueError(f"{text!r}: a {table} is one bit already: leave 'bit {bit}' out")
@@ -211,7 +211,7 @@ def _bit(text: str, table: Table, bit: str | None) -> int | None:
 
 
 def address(table: Table, text: str) -> int:
-    """An address of this table. Raises ValueError with what to write instead."""
+    """Parse an address of this table. Raises ValueError with the right spelling."""
     number = int(text, 16) if text.startswith("0x") else int(text)
     if number > 65535:
         raise ValueError(f"address {text} does not exist: addresses are 0 to 65535")

@@ -1,8 +1,8 @@
-"""How register maps and profiles spell a place: table and address (`holding register 4`, `coil 0`).
+"""The spelling of a place in register maps and profiles: `holding register 4`, `coil 0`.
 
-A place has no unit, because a map serves several units. Addresses are those on the wire, from 0. A
-number of the data model begins at 1 (40001 is holding register 0, 30001 input register 0). It is
-refused, and the error says which address is meant.
+A place has no unit, because a map serves several units. Addresses are those on the wire, from 0. The
+data model's numbers begin at 1 (40001 is holding register 0, 30001 input register 0). Such a number is
+refused, and the error names the right address.
 """
 
 import re
@@ -39,7 +39,7 @@ _SPELLING: Final = re.compile(r"(?P<table>[a-z][a-z _-]*?)[\s_]+(?P<address>0x[0
 
 
 def place(text: str, tables: Collection[str] = tuple(TABLES)) -> tuple[Table, int]:
-    """Table and address of a place. Raises ValueError with what to write instead."""
+    """Return table and address of a place. Raises ValueError with the right spelling."""
     how = " or ".join(f"'{table} 0'" for table in tables)
     words = _SPELLING.fullmatch(text.strip().lower())
     table = TABLES.get(re.sub(r"[\s_-]+", " ", words["table"])) if words else None
@@ -49,7 +49,7 @@ def place(text: str, tables: Collection[str] = tuple(TABLES)) -> tuple[Table, in
 
 
 def misplaced(text: str, tables: Collection[str]) -> str | None:
-    """What is wrong with a place, for a struct's `problems`."""
+    """Return the error in a place, for a struct's `problems`; None for a valid place."""
     try:
         place(text, tables)
     except ValueError as error:
@@ -58,6 +58,6 @@ def misplaced(text: str, tables: Collection[str]) -> str | None:
 
 
 def at(unit: int, text: str, base: int = 0) -> Point:
-    """A valid place at this unit. `base` is added to its address."""
+    """Return the point of a valid place at this unit. `base` is added to its address."""
     table, address = place(text)
     return Point(unit, table, address + base)

@@ -5,12 +5,12 @@ waits and times. It is imported when a bus needs it.
 
 RTU has no transaction number, so a late reply looks like a prompt one. Hence:
 
-- A request is sent only after 3.5 characters of silence; bytes that came before are dropped.
-- Frames of other units are dropped, and the wait goes on. Bytes that are not a frame may be the reply
-  in a collision with a late one: the try ends when the line is silent.
+- A request is sent only after 3.5 characters of silence; earlier bytes are dropped.
+- Frames of other units are dropped, and the wait goes on. Bytes that are no frame may be the reply in a
+  collision with a late reply: the try ends when the line is silent.
 - A unit that misses its timeout may answer late, until LATE x `timeout_s` after its request. Until then
-  it gets only repeats of the same request, within the same call. Whichever reply comes first, it was
-  sampled after the call began; the other one is dropped.
+  it gets only repeats of the same request, within the same call. The first reply counts, since both
+  were sampled after the call began; the second is dropped.
 
 A unit that answers even later needs a longer `timeout_s`.
 """
@@ -33,20 +33,20 @@ from drivers.hal.modbus.wire import BadReply, NoReply, UnitReply, UnitRequest, U
 LATE: Final = 3.0
 PARITY: Final = {"none": "N", "even": "E", "odd": "O"}
 WRITES: Final = (5, 6, 15, 16)
-"""The functions whose reply may begin with the same bytes as the request."""
+"""The functions with replies that may begin with the same bytes as the request."""
 UNITS: Final = range(1, 248)
 PAUSE_S: Final = 0.05
-"""The longest pause within a frame: adapters hold characters back for up to 16 ms."""
+"""The longest pause within a frame: adapters delay characters by up to 16 ms."""
 FRAME_MAX: Final = 256
-"""Characters of the longest frame (Modbus over Serial Line V1.02, 2.5.1)."""
+"""The number of characters in the longest frame (Modbus over Serial Line V1.02, 2.5.1)."""
 
 
 class Noise(BadReply):
-    """The bytes are no frame. The reply may still come."""
+    """The bytes are not a frame. The reply may still come."""
 
 
 class SerialLine:
-    """One serial port, opened again when it is needed, and for us alone."""
+    """One serial port, reopened when needed, exclusively."""
 
     def __init__(self, settings: Serial, timeout_s: float) -> None:
         self._settings = settings
@@ -63,7 +63,7 @@ class SerialLine:
         return time.monotonic() < self._late.get(unit, 0.0)
 
     def begin(self, unit: int) -> None:
-        """Before a new request to this unit: wait until no late reply to an older one can come."""
+        """Wait, before a new request to this unit, until no late reply to an older one can come."""
         time.sleep(max(0.0, self._late.pop(unit, 0.0) - time.monotonic()))
 
     def connect(self) -> None:
@@ -89,7 +89,7 @@ class SerialLine:
             raise NoReply(f"no Modbus reply to it ({error})") from error
 
     def exchange(self, request: bytes) -> bytes:
-        """Send this frame, and return the reply's frame, its CRC checked.
+        """Send this frame; return the reply's frame with a valid CRC.
 
         Raises TimeoutError, OSError when the port breaks, or BadReply.
         """
@@ -144,7 +144,7 @@ class SerialLine:
             raise OSError(errno.EIO, "it does not take what is sent")
 
     def _heard(self, within_s: float) -> bytes:
-        """The next bytes; none if none come within this time (s). Raises TimeoutError, OSError."""
+        """Return the next bytes; b"" after `within_s` without any. Raises TimeoutError, OSError."""
         left_s = min(max(0.0, within_s), self._deadline.left())
         assert self._port
         descriptor = self._port.fileno()
@@ -157,7 +157,7 @@ class SerialLine:
         return received
 
     def _without_echo(self, request: bytes) -> bytes:
-        """The bytes after the echo of our own request, which comes first."""
+        """Return the bytes after the echo of our own request."""
         heard = b""
         while len(heard) < len(request) and request.startswith(heard):
             heard += self._heard(self._timeout_s)
@@ -166,7 +166,7 @@ class SerialLine:
         return heard[len(request) :]
 
     def _answer(self, request: bytes, heard: bytes) -> bytes:
-        """The reply's frame. No byte may come before it; one of noise may come after it."""
+        """Return the reply's frame. No byte may precede it; one byte of noise may follow it."""
         while True:
             if not request[:1].startswith(heard[:1]) or not _answers(request, heard[1:2]):
                 self._drop(heard)
@@ -179,7 +179,7 @@ class SerialLine:
             heard += more
 
     def _checked(self, frame: bytes, request: bytes) -> bytes:
-        """This frame, if its CRC fits. Raises Noise where the echo of an earlier try came late, else
+        """Return this frame if its CRC is valid. Raises Noise for a late echo of an earlier try, else
         BadReply."""
         if frames.crc_fits(frame):
             return frame
@@ -192,7 +192,7 @@ class SerialLine:
         raise BadReply(f"CRC of {frame.hex(' ')} is wrong")
 
     def _drop(self, heard: bytes) -> None:
-        """Drop another unit's frame: all bytes until the line is silent. Raises Noise if it is none."""
+        """Drop another unit's frame: all bytes until silence. Raises Noise if they are no frame."""
         while more := self._heard(self._settings.gap_s):
             heard = (heard + more)[: 2 * FRAME_MAX]
         self._stray = heard
@@ -220,12 +220,12 @@ class SerialLine:
 
 
 def _answers(request: bytes, function: bytes) -> bool:
-    """May a reply to this have this function? True while the function has not come."""
+    """May a reply to this request have this function? True while the function is not received."""
     return not function or function[0] & 0x7F == request[1]
 
 
 def _complete(heard: bytes) -> int:
-    """The size of the frame that these bytes begin with; 0 until it is complete."""
+    """Return the size of the frame at the beginning of `heard`; 0 until it is complete."""
     size = frames.rtu_size(heard)
     return size if size <= len(heard) else 0
 
@@ -235,6 +235,6 @@ def _start(heard: bytes) -> str:
 
 
 def _why(error: Exception) -> str:
-    """The error's own text. pyserial wraps texts, and termios.error is not an OSError."""
+    """Return the error's own text. pyserial wraps texts, and termios.error is not an OSError."""
     text = getattr(error, "strerror", None) or (error.args[-1] if error.args else error)
     return str(text)

@@ -1,4 +1,4 @@
-"""`type: modbus` of a device YAML: where the units are, and how long they may take."""
+"""`type: modbus` of a device YAML: the place of the units, and the times."""
 
 from collections.abc import Iterable, Sequence
 from typing import Annotated
@@ -51,7 +51,7 @@ class ModbusSettings(
                 )
 
     def watched(self) -> Sequence[int]:
-        """The units whose own watchdog drops their outputs."""
+        """Return the units with a watchdog of their own, which drops their outputs."""
         return self.module_watchdog.units if self.module_watchdog else ()
 
 
@@ -64,7 +64,7 @@ def warnings(settings: ModbusSettings) -> Remarks:
 
 
 def unwatched(settings: ModbusSettings, places: Iterable[str]) -> UnwatchedOutputs:
-    """The written units whose outputs nothing drops but this daemon."""
+    """Report the written units without a watchdog: only this daemon switches their outputs off."""
     written = {int(place.split()[1]) for place in places}
     bare = sorted(written.difference(settings.watched(), settings.without_watchdog))
     warned = [((), _bare(bare))] if bare else []
@@ -89,7 +89,7 @@ def _bare(units: Sequence[int]) -> str:
 
 
 def unreachable(settings: ModbusSettings, point: str) -> str | None:
-    """Why this bus cannot reach the point: a line has units 1 to 247 (Modbus over Serial Line 2.2)."""
+    """Return an error for a unit beyond a line's 1 to 247 (Modbus over Serial Line 2.2), or None."""
     unit = int(point.split()[1])
     if settings.serial is None or 1 <= unit <= 247:
         return None
@@ -98,7 +98,7 @@ def unreachable(settings: ModbusSettings, point: str) -> str | None:
 
 
 def where(settings: ModbusSettings) -> Where:
-    """The gateway or module, or the line's port, which only one daemon can open."""
+    """Return the gateway or module, or the line's port, which only one daemon can open."""
     if settings.serial:
         return Where(settings.serial.port, local=True, clients="one")
     assert settings.tcp  # or `problems` has said so
@@ -106,7 +106,7 @@ def where(settings: ModbusSettings) -> Where:
 
 
 def needs(settings: ModbusSettings) -> Needs:
-    """The line's port, or the module's address."""
+    """Return the line's port, or the module's address."""
     if settings.serial:
         return serial_port.needs(settings.serial.port)
     assert settings.tcp  # or `problems` has said so

@@ -8,11 +8,11 @@ from drivers.hal.modbus import frames
 from drivers.hal.modbus.wire import BadReply, NoReply, UnitReply, UnitRequest, Unreachable
 
 NUMBERS: Final = 0xFFFF
-"""Transactions are numbered 1 to this. 0 is what a gateway sends that numbers no reply."""
+"""The highest transaction number; the lowest is 1. A gateway that does not number replies sends 0."""
 
 
 class Connection:
-    """The connection to one host, opened again when it is needed. Tests replace `resolve` (DNS)."""
+    """The connection to one host, reopened when needed. Tests replace `resolve` (DNS)."""
 
     def __init__(
         self, host: str, port: int, timeout_s: float, resolve: Resolve = socket.getaddrinfo
@@ -21,14 +21,14 @@ class Connection:
         self._where = f"{host}:{port}"
         self._dialler = Dialler(host, port, resolve)
         self._socket: socket.socket | None = None
-        self._number = 0  # counts on over connections, so that no late reply matches
+        self._number = 0  # counts on across connections: no late reply matches
 
     def owes(self, unit: int) -> bool:
-        """Never: replies have numbers, so a late one is not taken for another."""
+        """Always False: replies have numbers, so a late reply cannot pass for another."""
         return False
 
     def begin(self, unit: int) -> None:
-        """Nothing to wait for."""
+        """Do nothing: no late reply can pass for another."""
 
     def connect(self) -> None:
         """Connect if necessary, and start the time of one try. Raises Unreachable."""
@@ -40,7 +40,7 @@ class Connection:
                 raise Unreachable(self._unreachable(error)) from error
 
     def ask(self, question: UnitRequest) -> UnitReply:
-        """Send this request, and return its answer. Without one, close and raise NoReply."""
+        """Send this request, and return its answer. Without an answer, close and raise NoReply."""
         try:
             return self._answer(question)
         except (OSError, BadReply) as error:
@@ -54,7 +54,7 @@ class Connection:
             connection.close()
 
     def _answer(self, question: UnitRequest) -> UnitReply:
-        """Send the request, and read replies until one belongs to it. Raises OSError, BadReply."""
+        """Send the request, and read replies until its own comes. Raises OSError, BadReply."""
         assert self._socket is not None
         self._number = self._number % NUMBERS + 1
         self._socket.sendall(frames.tcp_request(question, self._number))
@@ -67,7 +67,7 @@ class Connection:
             heard = heard[used:]
 
     def _heard(self) -> bytes:
-        """The next bytes. Raises OSError; TimeoutError when the try's time is up."""
+        """Return the next bytes. Raises OSError; TimeoutError when the try's time is up."""
         assert self._socket is not None
         self._socket.settimeout(self._dialler.deadline.left())
         received = self._socket.recv(4096)

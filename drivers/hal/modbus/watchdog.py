@@ -1,6 +1,6 @@
 """`module_watchdog:` of a Modbus bus: the module's own watchdog for its outputs.
 
-A module that is not written to in time drops its outputs by itself. Each make has its own registers for
+Without timely writes the module drops its outputs by itself. Each make has its own registers for
 arming, refreshing and showing this, so they are in the YAML or a profile. `dead_man.py` uses them.
 """
 
@@ -22,7 +22,7 @@ class RegisterWrite(WrittenPlace, frozen=True, kw_only=True, forbid_unknown_fiel
 
 
 class Refresh(WrittenPlace, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """What keeps the watchdog from tripping."""
+    """The write that keeps the watchdog from tripping."""
 
     values: Annotated[
         list[Word],
@@ -32,13 +32,13 @@ class Refresh(WrittenPlace, frozen=True, kw_only=True, forbid_unknown_fields=Tru
 
 
 class Shows(Placed, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A place, and the values to look for."""
+    """A place, and its values that count."""
 
     values: Annotated[list[Word], msgspec.Meta(min_length=1), tells("any of these counts.")]
 
 
 class Habits(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """How a make's watchdog is used."""
+    """The use of a make's watchdog: its writes, readings and times."""
 
     time_s: Annotated[Period, tells("the time that `arm` gives the module.")]
     arm: Annotated[
@@ -53,7 +53,7 @@ class Habits(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     rearm: Annotated[list[RegisterWrite], tells("the writes that end a trip, before `arm`.")] = []
 
     def problems(self) -> Remarks:
-        """A refresh that comes too late."""
+        """Yield a problem for a refresh that comes too late."""
         if self.refresh_s > self.time_s / 2:
             text = (
                 f"one late scan would drop the outputs: at most {self.time_s / 2:g}, half of time_s"
@@ -69,17 +69,17 @@ class Watchdog(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     habits: Annotated[Habits | None, tells("its use, written here instead of a profile.")] = None
 
     def problems(self) -> Remarks:
-        """Neither or both of profile and habits; a profile with problems."""
+        """Yield problems: neither or both of profile and habits; a profile with problems."""
         if len(set(self.units)) < len(self.units):
             yield ("units",), "names a unit twice"
         yield from PROFILE.problems(self.profile, self.habits)
 
     def chosen(self) -> Habits:
-        """The habits: those in the YAML, or the profile's."""
+        """Return the habits in the YAML, or else the profile's."""
         return PROFILE.chosen(self.profile, self.habits)
 
     def warnings(self) -> Remarks:
-        """A profile that nobody has tried."""
+        """Yield a warning for a profile that nobody has tried."""
         if not any(PROFILE.problems(self.profile, self.habits)):
             advice = "pull the network cable, and see that the relays drop"
             yield from PROFILE.warnings(self.profile, advice)

@@ -37,7 +37,7 @@ ILLEGAL_ADDRESS: Final = 2
 
 
 class UnitRequest(Struct, frozen=True):
-    """One request. `value`: how many bits or registers are read, or what is sent to be written."""
+    """One request. `value`: the number of bits or registers to read, or the value to write."""
 
     unit: int
     function: int
@@ -53,11 +53,11 @@ class UnitReply(NamedTuple):
 
 
 class Unreachable(Exception):
-    """There is no connection. The text says why."""
+    """There is no connection. The text gives the cause."""
 
 
 class NoReply(Exception):
-    """No reply to the request came in time. The text says what came instead."""
+    """No reply to the request came in time. The text describes what came instead."""
 
 
 class BadReply(Exception):
@@ -73,13 +73,13 @@ class UnitException(HalError):
 
 
 class UnitWire(Protocol):
-    """The connection or line to some units. It is opened again when it is needed."""
+    """The connection or line to some units, reopened when needed."""
 
     def owes(self, unit: int) -> bool:
         """May this unit still reply to an older request? Then a new one should wait."""
 
     def begin(self, unit: int) -> None:
-        """Before a new request: wait until no late reply can be taken for the reply to it."""
+        """Wait, before a new request, until no late reply can pass for its reply."""
 
     def connect(self) -> None:
         """Connect if necessary, and start the time of one try. Raises Unreachable."""
