@@ -1,4 +1,4 @@
-"""Commands over HTTP: their settings in the YAML, and how a driver sends them."""
+"""Commands over HTTP: their settings in the YAML, and the driver's use of them."""
 
 import re
 from typing import Annotated, Protocol
@@ -21,7 +21,7 @@ class Call(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
     ] = None
 
     def problems(self) -> Remarks:
-        """A body that is not JSON."""
+        """Yield a problem for a body that is not JSON."""
         try:
             msgspec.json.decode(self.body or "{}")
         except msgspec.DecodeError as error:
@@ -29,15 +29,15 @@ class Call(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
 
 
 class Calls(Protocol):
-    """What a driver needs from an HTTP bus."""
+    """A driver's calls on an HTTP bus."""
 
     def get_json(self, path: str) -> dict[str, object]:
-        """One JSON object. Raises HalError."""
+        """Get one JSON object. Raises HalError."""
 
     def send(
         self, path: str, method: http.Method = "POST", body: str | None = None, safe: bool = False
     ) -> None:
-        """Send one request, without retry; `safe` when it switches an output off. Raises HalError."""
+        """Send one request, without retry. `safe`: it switches an output off. Raises HalError."""
 
 
 class InsistentCalls(Calls, Protocol):
@@ -54,16 +54,16 @@ def send(bus: Calls, call: Call | None, safe: bool = False) -> None:
 
 
 def claim(call: Call) -> str:
-    """The command as a claim: what no other device of this bus may send."""
+    """Return the command as a claim: no other device of this bus may send it."""
     return f"{call.method} {call.path}{f' {call.body}' if call.body else ''}"
 
 
 def timer_unseen(call: Call, off_s: float) -> bool:
-    """Is the relay's timer (s) no number of this command? In seconds, or in ms."""
+    """Does this command lack the number of the relay's timer, in seconds and in ms?"""
     numbers = re.findall(r"[0-9]+(?:\.[0-9]+)?", f"{call.path} {call.body or ''}")
     return not {off_s, 1000 * off_s}.intersection(map(float, numbers))
 
 
 def described(call: Call, api: http.Base) -> str:
-    """The command as `check` prints it: method, address and body."""
+    """Describe the command for `check`: method, address and body."""
     return f"{call.method} {api.url(call.path)}{f' {call.body}' if call.body else ''}"

@@ -1,6 +1,6 @@
-"""Typed values from one JSON object: a field is addressed by names with dots (`pad.receiver.id`).
+"""Reads typed values from one JSON object: a field is addressed by names with dots (`pad.receiver.id`).
 
-For any JSON, a value has the type that the caller asks for, or DriverError names the field.
+For any JSON, a value has the type that the caller asks for, or a DriverError names the field.
 """
 
 import math
@@ -43,7 +43,7 @@ class JsonFlag(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
 
 
 def flag(answer: Mapping[str, object], place: JsonFlag) -> bool:
-    """Yes or no; null means no. Raises DriverError for an absent field or a value of the wrong type."""
+    """Return yes or no; null means no. Raises DriverError for an absent field or a wrong type."""
     value = needed(answer, place.field)
     if value is None:
         return False
@@ -55,18 +55,18 @@ def flag(answer: Mapping[str, object], place: JsonFlag) -> bool:
 
 
 def flag_if(answer: Mapping[str, object], place: JsonFlag | None) -> bool | None:
-    """The same; None without a place."""
+    """Return the flag; None without a place. Raises DriverError as `flag` does."""
     return None if place is None else flag(answer, place)
 
 
 def place_text(place: JsonFlag) -> str:
-    """The flag as `check` prints it: its field, and the values that mean yes."""
+    """Describe the flag for `check`: its field, and the values that mean yes."""
     values = (str(yes).lower() if isinstance(yes, bool) else str(yes) for yes in place.when)
     return f"{place.field} is {', '.join(values) or 'true'}"
 
 
 def same(value: object, given: Value) -> bool:
-    """Are they the same JSON value? true differs from 1; 1.0 equals 1."""
+    """Are both the same JSON value? true differs from 1; 1.0 equals 1."""
     return isinstance(value, bool) == isinstance(given, bool) and value == given
 
 
@@ -80,7 +80,7 @@ def is_field(text: str) -> bool:
 
 
 def found(answer: object, field: str) -> object:
-    """The field's value, or ABSENT."""
+    """Return the field's value, or ABSENT."""
     for part in field.split("."):
         if isinstance(answer, dict):
             answer = answer.get(part, ABSENT)
@@ -92,7 +92,7 @@ def found(answer: object, field: str) -> object:
 
 
 def needed(answer: Mapping[str, object], field: str) -> object:
-    """The field's value. Raises DriverError that lists the fields that there are."""
+    """Return the field's value. Raises DriverError with a list of the present fields."""
     value = found(answer, field)
     if value is ABSENT:
         names = ", ".join(clean(name) for name in list(answer)[:5]) or "nothing"
@@ -101,7 +101,7 @@ def needed(answer: Mapping[str, object], field: str) -> object:
 
 
 def text(answer: Mapping[str, object], field: str) -> str:
-    """A text, made printable and put on one line; "" when absent or null."""
+    """Return a text, made printable and put on one line; "" if absent or null."""
     value = found(answer, field)
     if value is ABSENT or value is None:
         return ""
@@ -111,7 +111,7 @@ def text(answer: Mapping[str, object], field: str) -> str:
 
 
 def number(answer: Mapping[str, object], field: str, scale: float) -> float | None:
-    """A number times `scale`; None when absent or null. Raises DriverError for anything else."""
+    """Return a number times `scale`; None if absent or null. Raises DriverError for other values."""
     value = found(answer, field)
     if value is ABSENT or value is None:
         return None
@@ -127,7 +127,7 @@ def number(answer: Mapping[str, object], field: str, scale: float) -> float | No
 
 
 def name(answer: Mapping[str, object], field: str) -> str:
-    """An id as text; "" for null. Raises DriverError when it is absent or no id."""
+    """Return an id as text; "" for null. Raises DriverError if the field is absent or no id."""
     value = needed(answer, field)
     if value is None:
         return ""
@@ -137,12 +137,12 @@ def name(answer: Mapping[str, object], field: str) -> str:
 
 
 def wrong(field: str, value: object, wanted: str) -> DriverError:
-    """The error that names the field, its value and what is expected."""
+    """Return an error with the field, its value and the expected value."""
     return DriverError(f"'{field}' is {clean(reprlib.repr(value), 40)}, and {wanted} is expected")
 
 
 def clean(said: str, longest: int = TEXT_MAX) -> str:
-    """The text made printable, on one line and cut to `longest`, for messages and the log."""
+    """Make a text printable, on one line and cut to `longest`, for messages and the log."""
     said = "".join(c if c.isprintable() else " " for c in said[: 4 * longest])
     said = " ".join(said.split())
     return said if len(said) <= longest else f"{said[: longest - 1]}…"

@@ -1,4 +1,4 @@
-"""Bits, and tables of what numbers mean: for registers, frames and fields of an answer alike."""
+"""Bits, and checks of number tables: for registers, frames and fields of an answer."""
 
 from collections.abc import Collection, Mapping
 from typing import Annotated, Final
@@ -16,12 +16,12 @@ LongBit = Annotated[int, msgspec.Meta(ge=0, le=2 * BITS - 1)]
 
 
 def bits_on(number: int) -> list[int]:
-    """The bits of a number that are set, the least significant first."""
+    """Return the set bits of a number, the least significant first."""
     return [bit for bit in range(number.bit_length()) if number >> bit & 1]
 
 
 def listed_twice(lists: Mapping[str, Collection[int]]) -> Remarks:
-    """A number that stands in two lists, or twice in one. `lists`: by their keys in the YAML."""
+    """Yield a problem for each number listed twice, in one list or in two. `lists`: by YAML key."""
     first: dict[int, str] = {}
     for key, numbers in lists.items():
         for i, number in enumerate(numbers):

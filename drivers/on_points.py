@@ -1,4 +1,4 @@
-"""What every driver on contacts does alike; `read` and `write` are its own."""
+"""The common part of every driver on contacts; each driver adds `read` and `write`."""
 
 from collections.abc import Mapping
 
@@ -16,7 +16,7 @@ class OnPoints:
         self._points.open()
 
     def contacts(self) -> Mapping[str, bool]:
-        """Each contact and relay as it was read or written last."""
+        """Return each contact's last reading and each relay's last written value."""
         return self._points.last_known()
 
     def make_safe(self) -> None:

@@ -1,4 +1,4 @@
-"""What one broken wire makes of a code on several lines: for checks, and for the tables of `check`."""
+"""Finds the readings of a code on several lines with one broken wire, for checks and their tables."""
 
 from collections.abc import Iterator, Mapping, Sequence
 
@@ -9,15 +9,15 @@ Lines = Mapping[str, bool]
 
 
 def lines_on(shown: Lines) -> str:
-    """The signals that are asserted: `floor_bit0, floor_bit2`."""
+    """Return the asserted signals: `floor_bit0, floor_bit2`."""
     return ", ".join(signal for signal, on in shown.items() if on) or "none"
 
 
 def breaks(shown: Lines, wires: Mapping[str, Wire]) -> Iterator[tuple[str, str, dict[str, bool]]]:
-    """Each line broken so that it reads wrong: (signal, `cut` or `shorted`, what is shown then).
+    """Yield the reading of the code with each line broken: (signal, `cut` or `shorted`, the lines).
 
-    A cut line reads as its wiring makes it read (`Wire.broken_reads`); a shorted line, or one with a
-    stuck contact, reads the opposite. A line that floats (`pull: none`) may read either way when cut.
+    A cut line's reading depends on its wiring (`Wire.broken_reads`); a shorted line, or a line with a
+    stuck contact, reads the opposite. A cut line that floats (`pull: none`) may read either way.
     """
     for signal, on in shown.items():
         how = "shorted" if wires[signal].broken_reads() is on else "cut"
@@ -25,12 +25,12 @@ def breaks(shown: Lines, wires: Mapping[str, Wire]) -> Iterator[tuple[str, str, 
 
 
 def one_cut(shown: Lines, wires: Mapping[str, Wire]) -> Iterator[tuple[str, dict[str, bool]]]:
-    """Each signal whose cut wire changes what is shown, and what is shown then."""
+    """Yield each signal with a cut wire that changes the reading, and the changed reading."""
     return ((signal, then) for signal, how, then in breaks(shown, wires) if how == "cut")
 
 
 def told_of_cuts(readings: Sequence[tuple[str, str]]) -> str:
-    """(signal, what a cut of it reads as) as one text: `L1: floor_bit1; a fault: floor_bit0`."""
+    """Join (signal, reading with it cut) to one text: `L1: floor_bit1; a fault: floor_bit0`."""
     by_reading: dict[str, list[str]] = {}
     for signal, reading in readings:
         by_reading.setdefault(reading, []).append(signal)

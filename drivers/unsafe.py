@@ -14,11 +14,11 @@ ALARM_WITHIN_S: Final = 1.0
 """`check` warns of an alarm whose debounce is longer than this (s)."""
 
 Unsafe = tuple[str, tuple[str, ...], str]
-"""A signal, its path in the YAML, and what is unsafe about it."""
+"""A signal, its path in the YAML, and its danger as a text."""
 
 
 def cut_must_read(wire: Wire, asserted: bool, meaning: str) -> Iterator[Unsafe]:
-    """Unsafe unless a cut wire reads as `asserted`; `meaning` says what it is taken for otherwise."""
+    """Yield the wire unless a cut reads as `asserted`. `meaning`: the false reading, as a text."""
     reads = wire.broken_reads()
     if reads is None:
         yield wire.signal, wire.path, f"a cut wire floats (pull: none), and {meaning}"
@@ -27,7 +27,7 @@ def cut_must_read(wire: Wire, asserted: bool, meaning: str) -> Iterator[Unsafe]:
 
 
 def energised_at_boot(wires: Iterable[Wire]) -> Iterator[Unsafe]:
-    """Outputs whose relay is energised from power-on until the daemon claims them."""
+    """Yield outputs with a relay that is energised from power-on until the daemon's claim."""
     for wire in wires:
         if wire.direction == "in":
             continue
@@ -46,7 +46,7 @@ def energised_at_boot(wires: Iterable[Wire]) -> Iterator[Unsafe]:
 
 
 def unsafe_wires(wires: list[Wire], must_read: Mapping[str, tuple[bool, str]]) -> Iterator[Unsafe]:
-    """Both of the above. `must_read`: signal -> the two arguments of `cut_must_read`."""
+    """Yield both kinds above. `must_read`: signal -> `cut_must_read`'s `asserted` and `meaning`."""
     for wire in wires:
         if wire.signal in must_read:
             yield from cut_must_read(wire, *must_read[wire.signal])
@@ -54,7 +54,7 @@ def unsafe_wires(wires: list[Wire], must_read: Mapping[str, tuple[bool, str]]) -
 
 
 def slow_alarms(wires: Iterable[Wire]) -> Remarks:
-    """Alarms with a long debounce, as (path, text)."""
+    """Yield alarms with a long debounce, as (path, text)."""
     for wire in wires:
         if wire.debounce_s is not None and wire.debounce_s > ALARM_WITHIN_S:
             text = f"{wire.signal} is believed only after {wire.debounce_s:g} s"
@@ -62,13 +62,13 @@ def slow_alarms(wires: Iterable[Wire]) -> Remarks:
 
 
 def needlessly_accepted(found: Iterable[Unsafe], accepted: Mapping[str, str]) -> Remarks:
-    """What `accept_unsafe` names though nothing is unsafe about it, as (path, text)."""
+    """Yield the safe signals that `accept_unsafe` names, as (path, text)."""
     for signal in accepted.keys() - {signal for signal, _, _ in found}:
         yield ("accept_unsafe", signal), f"nothing is unsafe about {signal}: delete this"
 
 
 def unaccepted(found: Iterable[Unsafe], accepted: Mapping[str, str]) -> Remarks:
-    """The unsafe choices that `accept_unsafe` does not name, each with the two ways to resolve it."""
+    """Yield the unsafe choices that `accept_unsafe` does not name, each with its two fixes."""
     for signal, path, text in found:
         if signal not in accepted:
             yield path, f"unsafe: {text}; or accept_unsafe: {{{signal}: <why it is safe here>}}"

@@ -289,7 +289,7 @@ def _check_status(url: str, reads: bool, status: int) -> None:
 
 
 def _capped(raw: "BaseHTTPResponse") -> bytes:
-    """Read the whole body, or one byte more than the limit: only reading to the end shows a cut body."""
+    """Read the whole body, or one byte beyond the limit: only reading to the end shows a cut body."""
     body = b""
     while len(body) <= BODY_MAX and (
         more := raw.read(BODY_MAX + 1 - len(body), decode_content=False)

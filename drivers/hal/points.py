@@ -16,7 +16,7 @@ from drivers import DriverError
 Active = Literal["high", "low"]
 Pull = Literal["up", "down", "none"]
 Point = Annotated[str, msgspec.Meta(extra={"check": "point"})]
-"""A contact's address. While the YAML is read, the bus's `canonical` checks it."""
+"""A contact's address. The bus's `canonical` checks it while the YAML is read."""
 DebounceSeconds = Annotated[float, msgspec.Meta(ge=0, le=10, extra={"unit": "s"})]
 
 
@@ -36,7 +36,7 @@ class Input(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     ] = None
 
     def wire(self, signal: str, path: tuple[str, ...], debounce_s: float | None) -> "Wire":
-        """Its row of the wiring table; `debounce_s` is the default."""
+        """Return its row of the wiring table; `debounce_s` is the default."""
         own_s = debounce_s if self.debounce_s is None else self.debounce_s
         return Wire(signal, "in", self.point, self.active, self.pull, own_s, path)
 
@@ -50,25 +50,25 @@ class Output(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     active: Annotated[Active, tells("the level at which it is asserted.")]
 
     def wire(self, signal: str, path: tuple[str, ...], flash: "Flash | None" = None) -> "Wire":
-        """Its row of the wiring table."""
+        """Return its row of the wiring table."""
         return Wire(signal, "out", self.point, self.active, path=path, flash=flash)
 
 
 def input_wires(inputs: msgspec.Struct, debounce_s: float | None = None) -> list["Wire"]:
-    """The rows of a YAML's `inputs`: each field that is an Input; `debounce_s` is the default."""
+    """Return a row for each Input of a YAML's `inputs`; `debounce_s` is the default."""
     fields = ((signal, getattr(inputs, signal)) for signal in inputs.__struct_fields__)
     return [line.wire(s, ("inputs", s), debounce_s) for s, line in fields if line is not None]
 
 
 class Flash(msgspec.Struct, frozen=True):
-    """A pulse that the module times: the point where it is requested, and how long it lasts (s)."""
+    """A pulse that the module times: the point of the request, and the duration (s)."""
 
     point: str
     on_s: float
 
 
 class Wire(msgspec.Struct, frozen=True):
-    """One row of the wiring table: a signal, where it is, and what its level means."""
+    """One row of the wiring table: a signal, its point, and the meaning of its level."""
 
     signal: str
     direction: Literal["in", "out"]
@@ -77,19 +77,19 @@ class Wire(msgspec.Struct, frozen=True):
     pull: Pull | None = None
     debounce_s: float | None = None
     path: tuple[str, ...] = ()
-    """Where the YAML names it, from the device downwards: for error messages."""
+    """The wire's path in the YAML, from the device downwards, for error messages."""
     flash: Flash | None = None
 
     def level(self, asserted: bool) -> bool:
-        """The electrical level (True is high) for this meaning."""
+        """Return the electrical level (True is high) for this meaning."""
         return asserted == (self.active == "high")
 
     def asserted(self, level: int) -> bool:
-        """What this electrical level (1 is high) means."""
+        """Does this electrical level (1 is high) mean asserted?"""
         return level == (self.active == "high")
 
     def broken_reads(self) -> bool | None:
-        """What a cut wire reads as: asserted, not asserted, or None when it floats.
+        """Return the reading of a cut wire: asserted or not; None if it floats.
 
         A GPIO input goes to the level of its pull; an open contact at a Modbus module reads 0.
         """
@@ -107,16 +107,16 @@ class Lines(Protocol):
         """Take every output at its safe level in one step, and every input. Raises HalError."""
 
     def read(self) -> Mapping[str, int]:
-        """Every input's level by its canonical point, read now. Raises HalError."""
+        """Read every input's level now, by its canonical point. Raises HalError."""
 
     def write(self, levels: Mapping[str, bool]) -> None:
-        """Drive these outputs. Raises HalError; then the levels written are unknown.
+        """Drive these outputs. Raises HalError; then their levels are unknown.
 
-        Every output that goes to its safe level is tried, even when others fail.
+        Tries every output that goes to its safe level, even when others fail.
         """
 
     def outputs(self) -> Mapping[str, int] | None:
-        """The outputs' levels as read back from the bus; None where they cannot be read."""
+        """Read the outputs' levels back from the bus; None where they cannot be read."""
 
     def close(self) -> None:
         """Set the outputs to their safe level and release every line. Does not raise."""
@@ -127,9 +127,9 @@ class FlashLines(Protocol):
     """Lines of a bus whose modules can time a pulse."""
 
     def flash(self, point: str, flash: Flash) -> None:
-        """Have the module switch this output on, and off again by itself; requested once.
+        """Request once that the module switches this output on, and off again by itself.
 
-        Raises HalError; then it may be on.
+        Raises HalError; then the output may be on.
         """
 
 
@@ -137,10 +137,10 @@ class PointsBus(Protocol):
     """A bus that has points: GPIO, or Modbus."""
 
     def canonical(self, point: str) -> str:
-        """One spelling for a point. Raises ValueError with what to write instead."""
+        """Return the canonical spelling of a point. Raises ValueError with the right spelling."""
 
     def lines(self, inputs: Mapping[str, Pull | None], outputs: Mapping[str, bool]) -> Lines:
-        """A set of canonical points for one device; outputs with their safe levels."""
+        """Return the lines of one device: canonical points; outputs with their safe levels."""
 
 
 class HalError(DriverError):
@@ -148,7 +148,7 @@ class HalError(DriverError):
 
 
 class Points:
-    """The signals of one device on its bus, in terms of asserted or not."""
+    """The signals of one device on its bus, as asserted or not."""
 
     def __init__(self, wires: Sequence[Wire], bus: PointsBus) -> None:
         self._in = {w.signal: (w, bus.canonical(w.point)) for w in wires if w.direction == "in"}
@@ -166,7 +166,7 @@ class Points:
         self._lines.claim()
 
     def read(self) -> dict[str, bool]:
-        """Each input signal: asserted or not. After a failure the outputs are written again."""
+        """Read signal -> asserted for each input. After a failure the outputs are written again."""
         written, self._written = self._written, None
         levels = self._lines.read()
         self._written = written
@@ -174,11 +174,11 @@ class Points:
         return self._read
 
     def last_known(self) -> dict[str, bool]:
-        """Each input as it was read last, and each output as it was written, if that is known."""
+        """Return each input's last reading, and each output's last written value if known."""
         return {**self._read, **(self._written or {})}
 
     def write(self, asserted: Mapping[str, bool]) -> None:
-        """Set every output, off first, so that exclusive outputs never overlap."""
+        """Set every output, off first: exclusive outputs never overlap."""
         wanted = {signal: asserted.get(signal, False) for signal in self._out}
         known = self._written or {}
         changed = [s for s in wanted if known.get(s) != wanted[s]]
@@ -194,9 +194,9 @@ class Points:
         self._written = wanted
 
     def flash(self, signal: str) -> None:
-        """Have the module time a pulse of this output; its level is unknown from now on.
+        """Let the module time a pulse of this output; its level is unknown from now on.
 
-        Raises HalError; then there may be a pulse, which a second request would prolong.
+        Raises HalError; then there may be a pulse, and a second request would prolong it.
         """
         wire, point = self._out[signal]
         assert wire.flash  # or the driver would not ask
@@ -205,7 +205,7 @@ class Points:
         self._lines.flash(point, wire.flash)
 
     def make_safe(self) -> None:
-        """Write every output off, even one believed off, and read it back where the bus can."""
+        """Write every output off, even those believed off, and read them back where possible."""
         self._written = None
         self.write({})
         levels = self._lines.outputs()

@@ -8,18 +8,18 @@ from drivers.hal import Needs
 USB: Final = ("ttyUSB", "ttyACM")
 BOARD: Final = ("ttyAMA", "ttyS")
 MODULES: Final = {"ttyUSB": "usbserial", "ttyACM": "cdc_acm"}
-"""Adapters on USB bring a class of device with their kernel module, which may come after the daemon."""
+"""USB adapters: their kernel module, which may load after the daemon's start, adds a device class."""
 
 
 def needs(port: str) -> Needs:
-    """What the daemon needs for the serial port of this path."""
+    """Return the daemon's needs for the serial port at this path."""
     classes = _classes(PurePath(port))
     modules = tuple(MODULES[name] for name in classes if name in MODULES)
     return Needs(tuple(f"char-{name}" for name in classes), modules, "dialout")
 
 
 def _classes(port: PurePath) -> tuple[str, ...]:
-    """The classes of device (as in /proc/devices) that may stand behind it."""
+    """Return the possible classes of device (as in /proc/devices) behind a port."""
     named = tuple(name for name in (*USB, *BOARD) if port.name.startswith(name))
     if named:
         return named

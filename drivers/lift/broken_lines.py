@@ -1,7 +1,7 @@
-"""What a lift's codes read as when one of their lines is cut or shorted.
+"""Finds misreadings of a lift's codes when one of their lines is cut or shorted.
 
-A service or motion code that then reads safer than the lift really is, is unsafe. A floor code that
-then reads as another floor gives a warning.
+A service or motion code is unsafe if it then shows a safer state than the lift's real one. A floor code
+gives a warning if it then shows another floor.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -14,7 +14,7 @@ from drivers.tables import Lines, breaks
 from drivers.unsafe import Unsafe
 
 SERVES = {"agv_mode": 0, "normal": 1, "overload": 1}
-"""How much a state restricts RMF; every state that is not listed takes the lift away from RMF."""
+"""A state's restriction of RMF; every unlisted state takes the lift away from RMF."""
 TAKEN_AWAY = 2
 
 
@@ -32,7 +32,7 @@ def misread(
     read: Callable[[Lines], str | None],
     table: Mapping[str, Wire],
 ) -> Iterator[Misread]:
-    """Each misreading by one broken line. `shown`: meaning -> its codes; `read` decodes a code."""
+    """Yield each misreading by one broken line. `shown`: meaning -> its codes; `read`: the decoder."""
     for meaning, numbers in shown.items():
         for lines in numbers:
             for line, how, then in breaks(lines, table):
@@ -42,7 +42,7 @@ def misread(
 
 
 def unsafe_codes(wiring: LiftWiring, table: Mapping[str, Wire]) -> Iterator[Unsafe]:
-    """The lines of the service and motion codes that `accept_unsafe` must name."""
+    """Yield the lines of the service and motion codes that `accept_unsafe` must name."""
     for name, code in (("service", wiring.inputs.service), ("motion", wiring.inputs.motion)):
         if code is None or any(number >> len(code.bits) for number in code.codes):
             continue
@@ -55,7 +55,7 @@ def unsafe_codes(wiring: LiftWiring, table: Mapping[str, Wire]) -> Iterator[Unsa
 
 
 def floor_warnings(code: FloorCode, table: Mapping[str, Wire]) -> str:
-    """The floors that read as another floor when one line is broken, as a text; "" for none."""
+    """Describe the floors that read as another floor with one broken line; "" for none."""
     shown: dict[str, list[Lines]] = {}
     for _, level, lines in code.shows():
         if level is not None:
@@ -64,7 +64,7 @@ def floor_warnings(code: FloorCode, table: Mapping[str, Wire]) -> str:
 
 
 def sentence(found: Iterator[Misread]) -> str:
-    """The misreadings as one sentence, grouped by broken line."""
+    """Return the misreadings as one sentence, grouped by broken line."""
     broken: dict[str, list[str]] = {}
     for line, how, shown, reads in sorted(found):
         broken.setdefault(f"with {line} {how}", []).append(f"{shown} reads as {reads}")
@@ -72,12 +72,12 @@ def sentence(found: Iterator[Misread]) -> str:
 
 
 def _danger(state: str) -> int:
-    """How strictly a state keeps robots away (greater is stricter); a moving car is the strictest."""
+    """Rank a state by its restriction of robots (greater is stricter; a moving car is strictest)."""
     return 0 if state == "stopped" else SERVES.get(state, TAKEN_AWAY)
 
 
 def _shown(name: str, code: ServiceCode | MotionCode) -> dict[str, list[Lines]]:
-    """Each state's codes as lines, without the codes that the controller never shows."""
+    """Return state -> its codes as lines, without the codes that the controller never shows."""
     shown: dict[str, list[Lines]] = {}
     for number, state in code.codes.items():
         if state != "fault":

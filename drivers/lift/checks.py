@@ -21,11 +21,11 @@ from drivers.unsafe import (
 )
 
 ALARMED = (Hazard.FIRE, Hazard.CODE_BLUE, Hazard.EARTHQUAKE, Hazard.EMERGENCY)
-"""Those that `alarm_on` may name."""
+"""The hazards that `alarm_on` may name."""
 
 
 def problems(wiring: LiftWiring) -> Remarks:
-    """The problems that keep the daemon from starting, unaccepted unsafe choices included."""
+    """Yield the problems that keep the daemon from starting, with unaccepted unsafe choices."""
     yield from floors(wiring)
     yield from alarm(wiring)
     yield from _floor_code(wiring.floor_code, wiring.levels())
@@ -38,7 +38,7 @@ def problems(wiring: LiftWiring) -> Remarks:
 
 
 def warnings(wiring: LiftWiring) -> Remarks:
-    """Valid wiring that deserves a second look."""
+    """Yield valid wiring that deserves a second look."""
     table = {w.signal: w for w in wires(wiring)}
     told = wiring.inputs.agv_mode is not None or _in_service(wiring, "agv_mode")
     fire = sees(wiring, Hazard.FIRE)
@@ -62,7 +62,7 @@ def warnings(wiring: LiftWiring) -> Remarks:
 def missing(
     settings: LiftSettings, path: tuple[str, ...], told: bool, asks: bool, fire: bool, holds: bool
 ) -> Remarks:
-    """Optional signals whose absence deserves a warning.
+    """Yield a warning for each absent optional signal.
 
     `told`: the lift reports AGV mode. `asks`: an output requests AGV mode. `fire`: the lift reports a
     fire. `holds`: an output holds the door open. `path`: the section that lacks them.
@@ -83,11 +83,11 @@ def missing(
 
 
 Sees = Callable[[str], bool]
-"""Does the lift report this hazard, by a line or by a code?"""
+"""A question to the lift's settings: does the lift report this hazard, by a line or by a code?"""
 
 
 def notes(settings: LiftSettings, sees: Sees) -> Remarks:
-    """Choices that the site makes and should know of."""
+    """Yield intended choices with effects that the site should know."""
     if sees(Hazard.FIRE) and settings.alarm == "none":
         text = (
             "a fire stops this lift for robots, and no topic tells the fleets of it (alarm: none)"
@@ -101,13 +101,13 @@ def notes(settings: LiftSettings, sees: Sees) -> Remarks:
 
 
 def alarm(settings: LiftSettings) -> Remarks:
-    """`alarm_on` without a topic to tell it on."""
+    """Yield a problem for `alarm_on` without a topic for its alarms."""
     if settings.alarm == "none" and settings.alarm_on != [Hazard.FIRE]:
         yield ("alarm_on",), "nothing is told with alarm: none; write alarm: emergency_signal"
 
 
 def unseen(settings: LiftSettings, sees: Sees) -> Remarks:
-    """Hazards of `alarm_on` that the lift does not report."""
+    """Yield a problem for each hazard of `alarm_on` that the lift does not report."""
     for n, hazard in enumerate(settings.alarm_on if settings.alarm != "none" else ()):
         if not sees(hazard):
             path = ("alarm_on", str(n)) if settings.alarm_on != [Hazard.FIRE] else ("alarm",)
@@ -115,7 +115,7 @@ def unseen(settings: LiftSettings, sees: Sees) -> Remarks:
 
 
 def by_call(settings: LiftSettings, told: bool, asks: bool, request: tuple[str, ...]) -> Remarks:
-    """`by_call`: the lift must report AGV mode, and no output may request it. `request`: its path."""
+    """Check `by_call`: the lift reports AGV mode, and no output requests it. `request`: its path."""
     if settings.agv_mode == "by_call" and not told:
         text = "by_call needs an agv_mode input: nothing else tells that a call was taken"
         yield ("agv_mode",), text
@@ -124,7 +124,7 @@ def by_call(settings: LiftSettings, told: bool, asks: bool, request: tuple[str, 
 
 
 def unsafe(wiring: LiftWiring) -> Iterator[Unsafe]:
-    """What `accept_unsafe` must name, because a cut wire or a power-on could cause harm."""
+    """Yield the wiring that `accept_unsafe` must name: a cut wire or a power-on could cause harm."""
     table = {w.signal: w for w in wires(wiring)}
     yield from _cut(table, Hazard.FIRE, True, "a fire alarm reads clear")
     yield from _cut(table, "agv_mode", False, "AGV mode reads on")
@@ -145,7 +145,7 @@ def _cut(table: Mapping[str, Wire], signal: str, asserted: bool, meaning: str) -
 
 
 def floors(wiring: LiftSettings) -> Remarks:
-    """A lift without floors; a floor, or one door of a landing, that is named twice."""
+    """Yield problems: no floors; a floor, or one door of a landing, that is named twice."""
     stops = wiring.stops()
     if not stops:
         yield ("floors",), "no floors: name those of RMF's map that this lift serves"
@@ -164,7 +164,7 @@ def floors(wiring: LiftSettings) -> Remarks:
 def named(
     what: str, section: tuple[str, ...], given: Collection[str], levels: Collection[str]
 ) -> Remarks:
-    """Every landing must be in `given`, and nothing else. `what`: the missing entry, for the text."""
+    """Check that `given` has every landing and nothing else. `what`: the missing entry's name."""
     for level in given:
         if level not in levels:
             yield section, f"{level!r} is not a landing of this lift, which has {', '.join(levels)}"
@@ -291,7 +291,7 @@ def _in_service(wiring: LiftWiring, state: str) -> bool:
 
 
 def _dead_code(code: FloorCode, table: Mapping[str, Wire]) -> Iterator[Unsafe]:
-    """With all lines cut at once (the cable, the supply) the code must not read as a floor."""
+    """Check that the code reads as no floor with all lines cut at once (the cable, the supply)."""
     lines = [signal for signal, _, _ in code.inputs()]
     level, _ = code.read({signal: bool(table[signal].broken_reads()) for signal in lines})
     if level is not None:

@@ -1,4 +1,4 @@
-"""Numbers on several lines, least significant first, as lifts show floors: binary, Gray, BCD."""
+"""Converts numbers on several lines, least significant first: binary, Gray, BCD, as for floors."""
 
 from collections.abc import Mapping, Sequence
 from typing import Literal
@@ -7,7 +7,7 @@ Encoding = Literal["binary", "gray", "bcd"]
 
 
 def decode(encoding: Encoding, lines: Sequence[bool]) -> int | None:
-    """The number that these lines show; None for a BCD digit above 9."""
+    """Return the number on these lines; None for a BCD digit above 9."""
     number = sum(on << place for place, on in enumerate(lines))
     if encoding == "gray":
         return _from_gray(number)
@@ -15,7 +15,7 @@ def decode(encoding: Encoding, lines: Sequence[bool]) -> int | None:
 
 
 def encode(encoding: Encoding, number: int, width: int) -> tuple[bool, ...]:
-    """The lines that show a number. Raises ValueError when it needs more lines than `width`."""
+    """Return the lines for a number. Raises ValueError if it needs more lines than `width`."""
     pattern = number
     if encoding == "gray":
         pattern = number ^ (number >> 1)
@@ -27,12 +27,12 @@ def encode(encoding: Encoding, number: int, width: int) -> tuple[bool, ...]:
 
 
 def shown_number(prefix: str, shown: Mapping[str, bool], width: int) -> int:
-    """The number on the binary lines `<prefix>_bit0`…"""
+    """Return the number on the binary lines `<prefix>_bit0`…"""
     return sum(shown[f"{prefix}_bit{i}"] << i for i in range(width))
 
 
 def lines(prefix: str, number: int, width: int) -> dict[str, bool]:
-    """Signal -> asserted, for a number on the binary lines `<prefix>_bit0`…"""
+    """Return signal -> asserted, for a number on the binary lines `<prefix>_bit0`…"""
     return {f"{prefix}_bit{i}": bool(number >> i & 1) for i in range(width)}
 
 

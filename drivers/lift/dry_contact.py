@@ -1,4 +1,4 @@
-"""A lift on dry contacts: one line for each signal, or numbers on several lines, as the YAML says.
+"""A lift on dry contacts: one line for each signal, or numbers on several lines, by the YAML.
 
 The lines are GPIO pins, or coils and discrete inputs of a Modbus I/O module.
 """
@@ -37,7 +37,7 @@ class DryContactLiftSettings(LiftWiring, frozen=True, kw_only=True, forbid_unkno
     """A lift on dry contacts."""
 
     def problems(self) -> Remarks:
-        """Wiring that cannot work, and unsafe choices that `accept_unsafe` does not name."""
+        """Yield invalid wiring, and unsafe choices that `accept_unsafe` does not name."""
         return lift_checks.problems(self)
 
 
@@ -45,7 +45,7 @@ wires, debounce, warnings = lift_table.wires, lift_table.debounce, lift_checks.w
 
 
 def notes(settings: DryContactLiftSettings) -> Remarks:
-    """Choices that the site makes and should know of: (path below the device, text)."""
+    """Yield intended choices with effects to know about: (path below the device, text)."""
     return lift_checks.notes(settings, partial(lift_checks.sees, settings))
 
 
@@ -63,16 +63,16 @@ class DryContactLift(OnPoints):
         self._conditional = lift_table.conditional(settings)
 
     def read(self) -> LiftSample:
-        """Every input, read now and decoded."""
+        """Read and decode every input now."""
         return decode(self._settings, self._points.read(), self._conditional)
 
     def write(self, outputs: LiftOutputs) -> None:
-        """Set every output to this level, those that go off first."""
+        """Set every output to this level, switching off first."""
         self._points.write(encode(self._settings, outputs))
 
 
 def encode(settings: DryContactLiftSettings, outputs: LiftOutputs) -> dict[str, bool]:
-    """Signal -> asserted, also for signals without a wire, which `Points` leaves out."""
+    """Return signal -> asserted, also for signals without a wire, which `Points` leaves out."""
     calls = {f"call_{level}": level == outputs.call for level in settings.calls}
     if settings.call_code:
         calls = settings.call_code.lines(outputs.call)

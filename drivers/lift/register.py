@@ -1,7 +1,7 @@
 """A lift behind the Modbus registers of a gateway.
 
-Floor, door, motion and service state are numbers, hazards are bits, commands are registers or coils. A
-number that the map does not list is a fault; it never means a floor, an open door or a standing car.
+Floor, door, motion and service state are numbers, hazards are bits, commands are registers or coils. An
+unlisted number is a fault; it never means a floor, an open door or a standing car.
 """
 
 from collections.abc import Iterable, Iterator, Mapping
@@ -84,17 +84,17 @@ def warnings(settings: RegisterLiftSettings) -> Remarks:
 
 
 def notes(settings: RegisterLiftSettings) -> Remarks:
-    """Choices that the site makes and should know of: (path below the device, text)."""
+    """Yield intended choices with effects to know about: (path below the device, text)."""
     return checks.notes(settings, settings.map.shows)
 
 
 def debounce(settings: RegisterLiftSettings) -> Mapping[str, float]:
-    """How long a change must last (s), as for contacts: a gateway may show a half-changed number."""
+    """Return debounce times (s), as for contacts: a gateway may show a half-changed number."""
     return {**DEBOUNCE_S, **dict.fromkeys(Hazard, HAZARD_DEBOUNCE_S)}
 
 
 def claims(settings: RegisterLiftSettings) -> Iterator[tuple[str, tuple[str, ...]]]:
-    """(place, path) of each command; no other device may write there."""
+    """Yield (place, path) of each command; no other device may write there."""
     seen: set[str] = set()
     for path, where, _ in settings.map.commands.places():
         if where not in seen and misplaced(where, WRITABLE) is None:
@@ -103,7 +103,7 @@ def claims(settings: RegisterLiftSettings) -> Iterator[tuple[str, tuple[str, ...
 
 
 def describe(settings: RegisterLiftSettings, bus: object) -> Iterator[tuple[str, str]]:
-    """Rows for `check`: the place of each part of the map, and of each command."""
+    """Yield rows for `check`: the place of each part of the map, and of each command."""
     for name, part in settings.map.parts().items():
         yield name, f"{at(settings.unit, part.at)}{_meaning(part)}"
     commands = settings.map.commands
@@ -116,7 +116,7 @@ def describe(settings: RegisterLiftSettings, bus: object) -> Iterator[tuple[str,
 
 
 def tables(settings: RegisterLiftSettings) -> Iterator[Table]:
-    """The floors from the lowest up, each part's numbers, and what is written for each command."""
+    """Yield the floors from the lowest up, each part's numbers, and each command's values."""
     yield floors(settings)
     for name, part in settings.map.parts().items():
         if isinstance(part, Number):
@@ -143,7 +143,7 @@ def _unlisted(part: Number) -> str:
 
 
 def _outputs(settings: RegisterLiftSettings) -> Table:
-    """Commands that share a register are written as one value; here each is alone."""
+    """Tabulate each command alone, though commands that share a register are written as one value."""
     commands, off = settings.map.commands, settings.map.commands.words((), None)
     levels = settings.levels()
     rows = []
@@ -189,11 +189,11 @@ class RegisterLift:
         self._lines.claim()
 
     def read(self) -> LiftSample:
-        """Every register, read now and decoded."""
+        """Read and decode every register now."""
         return decode(self._map, self._lines.read())
 
     def write(self, outputs: LiftOutputs) -> None:
-        """Set every command to this level, those that go off first."""
+        """Set every command to this level, switching off first."""
         self._lines.bring(encode(self._map, outputs))
 
     def make_safe(self) -> None:
@@ -206,7 +206,7 @@ class RegisterLift:
 
 
 def encode(found: LiftMap, outputs: LiftOutputs) -> dict[str, int]:
-    """Place -> value. The values of commands that share a register are combined with OR."""
+    """Return place -> value. The values of commands that share a register are combined with OR."""
     asserted = {"agv_mode_request"} if outputs.agv_request else set()
     if outputs.hold_door:
         asserted.add(HOLD[outputs.hold_door])

@@ -1,4 +1,4 @@
-"""The register map of a lift's gateway, as the YAML gives it: places and what the numbers mean."""
+"""The register map of a lift's gateway in the YAML: places, and meanings of the numbers."""
 
 import functools
 import operator
@@ -27,19 +27,19 @@ class NumberField(InRegister, frozen=True, kw_only=True, forbid_unknown_fields=T
     ] = None
 
     def number(self, word: int) -> int:
-        """The number in a register's value."""
+        """Extract the number from a register's value."""
         if not self.bits:
             return word
         return sum((word >> bit & 1) << i for i, bit in enumerate(self.bits))
 
     def word(self, number: int) -> int:
-        """The register's value that shows a number."""
+        """Return the register's value for a number."""
         if not self.bits:
             return number
         return sum((number >> i & 1) << bit for i, bit in enumerate(self.bits))
 
     def fits(self, numbers: Collection[int], key: str) -> Remarks:
-        """An invalid place, a bit that is listed twice, numbers of `key` that do not fit."""
+        """Yield problems: an invalid place, a bit listed twice, numbers of `key` that do not fit."""
         yield from InRegister.problems(self)
         if len(set(self.bits)) < len(self.bits):
             yield ("bits",), "a bit stands here twice"
@@ -49,7 +49,7 @@ class NumberField(InRegister, frozen=True, kw_only=True, forbid_unknown_fields=T
 
 
 class FloorField(NumberField, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Where the car is."""
+    """The car's position."""
 
     codes: Annotated[dict[Word, Name], tells("number -> landing; an unlisted number is a fault.")]
     between_floors: Annotated[list[Word], tells("the numbers for a car between floors.")] = (
@@ -57,7 +57,7 @@ class FloorField(NumberField, frozen=True, kw_only=True, forbid_unknown_fields=T
     )
 
     def problems(self) -> Remarks:
-        """What `fits` finds; a number with two meanings."""
+        """Yield problems: those of `fits`; a number with two meanings."""
         yield from self.fits([*self.codes, *self.between_floors], "codes")
         for number in self.codes:
             if number in self.between_floors:
@@ -73,7 +73,7 @@ class DoorField(NumberField, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     ]
 
     def problems(self) -> Remarks:
-        """What `fits` finds; a door without a code for open or for closed."""
+        """Yield problems: those of `fits`; a door without a code for open or for closed."""
         yield from self.fits(self.codes, "codes")
         if not {"open", "closed"} <= set(self.codes.values()):
             yield ("codes",), "needs a code for open and one for closed"
@@ -88,7 +88,7 @@ class MotionField(NumberField, frozen=True, kw_only=True, forbid_unknown_fields=
     ]
 
     def problems(self) -> Remarks:
-        """What `fits` finds; a car that never stands, or never moves."""
+        """Yield problems: those of `fits`; no code for standing, or none for moving."""
         yield from self.fits(self.codes, "codes")
         shown = set(self.codes.values())
         if "stopped" not in shown or not ("moving" in shown or {"up", "down"} <= shown):
@@ -104,11 +104,11 @@ class ServiceField(NumberField, frozen=True, kw_only=True, forbid_unknown_fields
     ]
 
     def problems(self) -> Remarks:
-        """What `fits` finds."""
+        """Yield the problems of `fits`."""
         yield from self.fits(self.codes, "codes")
 
     def means(self, number: int) -> str:
-        """The state that a number shows."""
+        """Return the state for a number."""
         state = self.codes.get(number, "fault")
         return Hazard.OUT_OF_SERVICE if state == "fault" else state
 
@@ -130,11 +130,11 @@ class LiftFlag(Placed, frozen=True, kw_only=True, forbid_unknown_fields=True):
         return bool(word >> (self.bit or 0) & 1) == (self.active == "high")
 
     def word(self, asserted: bool) -> int:
-        """The value of its register or bit that shows this."""
+        """Return the value of its register or bit for an asserted or clear flag."""
         return (asserted == (self.active == "high")) << (self.bit or 0)
 
     def problems(self) -> Remarks:
-        """An invalid place; a register without its bit, or a coil with one."""
+        """Yield problems: an invalid place; a register without a bit; a coil with a bit."""
         yield from super().problems()
         if self.is_in(*REGISTERS) and self.bit is None:
             yield ("bit",), "a flag is one bit of a register: say which"
@@ -143,7 +143,7 @@ class LiftFlag(Placed, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
 
 class LiftCommand(WrittenLevels, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """One thing that is asked of the lift."""
+    """One request to the lift."""
 
     ON = "ask"
     OFF = "release"
@@ -167,7 +167,7 @@ class CallCommand(WrittenPlace, frozen=True, kw_only=True, forbid_unknown_fields
     none: Annotated[Word, tells("the value for no call.")] = 0
 
     def problems(self) -> Remarks:
-        """A place that cannot be written; a landing whose number means no call."""
+        """Yield problems: a place that cannot be written; a landing with the number of no call."""
         yield from super().problems()
         if self.none in self.codes:
             yield ("codes", str(self.none)), f"{self.none} is no call, as none says"
@@ -196,7 +196,7 @@ class Commands(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     ] = True
 
     def singles(self) -> Iterator[tuple[str, tuple[str, ...], LiftCommand]]:
-        """Each command except `call`: its signal, its path below this section, and the command."""
+        """Yield each command except `call`: its signal, its path below this section, the command."""
         for name in ("agv_mode_request", "door_open", "rear_door_open"):
             command: LiftCommand | None = getattr(self, name)
             if command:
@@ -205,7 +205,7 @@ class Commands(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
             yield f"call_{level}", ("calls", level), command
 
     def places(self) -> Iterator[tuple[tuple[str, ...], str, int]]:
-        """Each command's path below this section, its place, and the bits that it uses there."""
+        """Yield each command's path below this section, its place, and the bits it uses there."""
         for _, path, command in self.singles():
             yield path, command.at, command.ask | command.release
         if self.call:
@@ -213,7 +213,7 @@ class Commands(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
             yield ("call",), self.call.at, bits
 
     def words(self, asserted: Collection[str], call: str | None) -> dict[str, int]:
-        """Place -> value, with these signals asserted and a call to this landing (None: no call)."""
+        """Return place -> value for these asserted signals and this landing's call (None: no call)."""
         found: dict[str, int] = {}
         for signal, _, command in self.singles():
             found[command.at] = found.get(command.at, 0) | command.value(signal in asserted)
@@ -224,7 +224,7 @@ class Commands(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
         return found
 
     def problems(self) -> Remarks:
-        """Both `calls` and `call`; commands that use the same bit of a register."""
+        """Yield problems: both `calls` and `call`; commands that use the same bit of a register."""
         if self.calls and self.call:
             yield ("calls",), "calls and call are two ways of calling: keep one"
         taken: dict[str, int] = {}
@@ -268,7 +268,7 @@ class LiftMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=T
     commands: Annotated[Commands, tells("the commands to the lift.")]
 
     def parts(self) -> dict[str, Number | LiftFlag]:
-        """Name -> part, for each part that is read and given."""
+        """Return name -> part, for each given part that is read."""
         read = [name for name in self.__struct_fields__ if name != "commands"]
         found = {name: getattr(self, name) for name in read}
         return {name: part for name, part in found.items() if part is not None}

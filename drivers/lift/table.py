@@ -1,4 +1,4 @@
-"""A lift's wiring as a table: one row for each line, with its signal, point and debounce."""
+"""Tabulates a lift's wiring: one row for each line, with its signal, point and debounce."""
 
 from collections.abc import Iterator
 
@@ -7,7 +7,7 @@ from drivers.hal.points import Output, Wire
 from drivers.lift.wiring import LiftInput, LiftWiring
 
 DEBOUNCE_S = {"floor": 0.08, "door": 0.1, "rear_door": 0.1, "motion": 0.05, "agv_mode": 0.05}
-"""Each group's default debounce (s); HAZARD_DEBOUNCE_S is that of hazards and service codes.
+"""Each group's default debounce (s); HAZARD_DEBOUNCE_S is the default for hazards and service codes.
 
 A door that reads open for 50 ms while the car passes a floor is a glitch. Without a motion line only
 the debounce filters it out.
@@ -20,7 +20,7 @@ Row = tuple[str, tuple[str, ...], LiftInput]
 
 
 def input_rows(wiring: LiftWiring) -> Iterator[Row]:
-    """Each input line: its signal, its path below the device, and the line."""
+    """Yield each input line: its signal, its path below the device, and the line."""
     for name in wiring.inputs.__struct_fields__:
         found = getattr(wiring.inputs, name)
         if isinstance(found, LiftInput):
@@ -33,7 +33,7 @@ def input_rows(wiring: LiftWiring) -> Iterator[Row]:
 
 
 def output_rows(wiring: LiftWiring) -> Iterator[tuple[str, tuple[str, ...], Output]]:
-    """Each output line: its signal, its path below the device, and the line."""
+    """Yield each output line: its signal, its path below the device, and the line."""
     for name in wiring.outputs.__struct_fields__:
         output = getattr(wiring.outputs, name)
         if output is not None:
@@ -45,7 +45,7 @@ def output_rows(wiring: LiftWiring) -> Iterator[tuple[str, tuple[str, ...], Outp
 
 
 def wires(wiring: LiftWiring) -> list[Wire]:
-    """The wiring table, inputs first, with default debounces filled in."""
+    """Return the wiring table, inputs first, with default debounces filled in."""
     return [
         *(line.wire(s, path, _debounce_s(s, line)) for s, path, line in input_rows(wiring)),
         *(line.wire(signal, path) for signal, path, line in output_rows(wiring)),
@@ -53,7 +53,7 @@ def wires(wiring: LiftWiring) -> list[Wire]:
 
 
 def group(signal: str) -> str:
-    """A signal's group: `floor`, `door`, `rear_door`, `motion`, `service`, or the signal itself."""
+    """Return a signal's group: `floor`, `door`, `rear_door`, `motion`, `service`, or the signal."""
     for name in ("floor", "door", "rear_door", "motion", "service"):
         if signal == name or signal.startswith(f"{name}_"):
             return name
@@ -61,7 +61,7 @@ def group(signal: str) -> str:
 
 
 def debounce(wiring: LiftWiring) -> dict[str, float]:
-    """How long a change of each group must last (s): the longest of its lines.
+    """Return each group's debounce (s): the longest of its lines.
 
     A state of the service code has the debounce of the code's lines.
     """
@@ -78,7 +78,7 @@ def debounce(wiring: LiftWiring) -> dict[str, float]:
 
 
 def conditional(wiring: LiftWiring) -> frozenset[str]:
-    """The groups that are valid only in AGV mode."""
+    """Return the groups that are valid only in AGV mode."""
     return frozenset(group(s) for s, _, line in input_rows(wiring) if line.valid_when)
 
 

@@ -1,4 +1,4 @@
-"""A lift's codes and outputs as tables: each number with its lines, and what a cut makes of it."""
+"""Tabulates a lift's codes and outputs: each number with its lines, and its readings with a cut."""
 
 from collections.abc import Iterator, Mapping, Sequence
 
@@ -17,7 +17,7 @@ BETWEEN = "between floors"
 
 
 def tables(wiring: LiftWiring) -> Iterator[Table]:
-    """The floors from the lowest up, the other codes, and how each output is driven."""
+    """Yield the floors from the lowest up, the other codes, and the drive of each output."""
     table = {wire.signal: wire for wire in wires(wiring)}
     yield floors(wiring)
     yield _floor_code(wiring, table)
@@ -28,7 +28,7 @@ def tables(wiring: LiftWiring) -> Iterator[Table]:
 
 
 def floors(wiring: LiftSettings) -> Table:
-    """RMF's floors, so that a list that is upside down shows."""
+    """Tabulate RMF's floors from below, to reveal a list in the wrong order."""
     stops = list(wiring.stops().items())
     rows = [
         (_place(i, len(stops)), name, stop.level, "rear door" if stop.side is Side.REAR else "door")
@@ -55,7 +55,7 @@ def _floor_code(wiring: LiftWiring, table: Mapping[str, Wire]) -> Table:
 
 
 def _height(level: str | None, levels: Sequence[str]) -> int:
-    """Between floors first, then the landings from the lowest up."""
+    """Return a sort key: between floors first, then the landings from the lowest up."""
     return -1 if level is None else levels.index(level)
 
 
@@ -65,7 +65,7 @@ def _landing(code: FloorCode, shown: Mapping[str, bool]) -> str:
 
 
 def _code(name: str, width: int, meanings: Mapping[int, str], table: Mapping[str, Wire]) -> Table:
-    """A number on plain binary lines: every number that the lines can show."""
+    """Tabulate every number that plain binary lines can show."""
 
     def read(shown: Mapping[str, bool]) -> str:
         return meanings.get(codes.shown_number(name, shown, width), FAULT)
@@ -96,7 +96,7 @@ _DRIVEN = {
 
 
 def how_long(settings: LiftSettings, output: str) -> str:
-    """For how long an output is driven; one that is not listed is a call."""
+    """Describe an output's time of being driven; an unlisted output is a call."""
     limits = settings.limits
     if output in _DRIVEN:
         return _DRIVEN[output].format(grace_s=limits.release_grace_s)

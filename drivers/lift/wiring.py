@@ -79,7 +79,7 @@ class ServiceCode(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     ]
 
     def means(self, number: int) -> str:
-        """The state that a number shows."""
+        """Return the state for a number."""
         state = self.codes[number]
         return Hazard.OUT_OF_SERVICE if state == "fault" else state
 
@@ -138,7 +138,7 @@ class LiftInputWiring(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_
 
 
 class FloorCode(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Where the car is."""
+    """The car's position."""
 
     encoding: Annotated[
         Literal["binary", "gray", "bcd", "one_hot"],
@@ -156,7 +156,7 @@ class FloorCode(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
     ] = msgspec.field(default_factory=lambda: [0])
 
     def inputs(self) -> Iterator[tuple[str, tuple[str, ...], LiftInput]]:
-        """Each line: its signal, its path below this section, and the line."""
+        """Yield each line: its signal, its path below this section, and the line."""
         for i, bit in enumerate(self.bits):
             yield f"floor_bit{i}", ("bits", str(i)), bit
         for level, line in self.lines.items():
@@ -165,7 +165,7 @@ class FloorCode(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
             yield "floor_parity", ("parity",), self.parity
 
     def read(self, shown: Mapping[str, bool]) -> tuple[str | None, str]:
-        """The landing (None between floors), and "" or why the code is a fault."""
+        """Return the landing (None between floors), and the code's fault ("" for none)."""
         if self.encoding == "one_hot":
             on = [level for level in self.lines if shown[f"floor_{level}"]]
             if len(on) > 1:
@@ -182,14 +182,14 @@ class FloorCode(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
         return None, "" if number in self.between_floors else f"code {number} is not a floor's"
 
     def show(self, level: str | None) -> dict[str, bool]:
-        """Signal -> asserted at a landing (None: between floors). ValueError if it has no code."""
+        """Return signal -> asserted at a landing (None: between floors). ValueError without a code."""
         for _, shown_level, shown in self.shows():
             if shown_level == level:
                 return shown
         raise ValueError(f"no code for {level or 'between floors'}")
 
     def shows(self) -> Iterator[tuple[int | None, str | None, dict[str, bool]]]:
-        """All that the controller shows: (number, landing or None between floors, its lines).
+        """Yield each code of the controller: (number, landing or None between floors, its lines).
 
         `one_hot` has no numbers. Raises ValueError for a number that does not fit on the lines.
         """
@@ -217,7 +217,7 @@ class CallCode(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     codes: Annotated[dict[Number, Name], tells("number -> landing.")]
 
     def lines(self, level: str | None) -> dict[str, bool]:
-        """Signal -> asserted, for a call to this landing (None: no call)."""
+        """Return signal -> asserted, for a call to this landing (None: no call)."""
         number = next((n for n, name in self.codes.items() if name == level), 0)
         return codes.lines("call", number, len(self.bits))
 

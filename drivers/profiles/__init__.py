@@ -5,8 +5,8 @@
     source: "..."            where its numbers come from
     map: {...}               the content, under the key that holds it in a device YAML
 
-It is parsed like a device YAML, so each problem has its file, line and column. What parses it is
-imported then: who switches off by a record on contacts needs none of it.
+A profile is parsed like a device YAML, so each problem has its file, line and column. The parser is
+imported only then: switching off contacts by a daemon's record needs no parser.
 """
 
 import functools
@@ -27,7 +27,7 @@ Content = TypeVar("Content", bound=msgspec.Struct, covariant=True)
 
 
 class Profile(Generic[Content]):
-    """One type of profile. `reader`: its `for:`; `key`: where its content is; `content`: its struct."""
+    """One type of profile. `reader`: its `for:`; `key`: its content's key; `content`: its struct."""
 
     def __init__(self, reader: str, key: str, content: type[Content]) -> None:
         self.reader = reader
@@ -35,23 +35,23 @@ class Profile(Generic[Content]):
         self._content = content
 
     def names(self, folder: Path = FOLDER) -> list[str]:
-        """The names of the profiles of this type."""
+        """Return the names of the profiles of this type."""
         first = f"for: {self.reader}"
         files = sorted({*folder.glob("*.yaml"), *texts.known_in(folder)})
         return [f.stem for f in files if f.suffix == ".yaml" and first in _lines(f)]
 
     def load(self, name: str, folder: Path = FOLDER) -> Content:
-        """A profile's content, as its struct. Raises SettingsError with every problem of the file."""
+        """Load a profile's content as its struct. Raises SettingsError with every problem."""
         found = self._read(folder / f"{name}.yaml")[self.key]
         assert isinstance(found, self._content)
         return found
 
     def chosen(self, name: str | None, inline: Content | None) -> Content:
-        """The content: the one in the YAML, or the profile's. Raises SettingsError."""
+        """Return the content in the YAML, or else the profile's. Raises SettingsError."""
         return inline or self.load(name or "")
 
     def problems(self, name: str | None, inline: object) -> Remarks:
-        """Problems of `profile:` and of the key that may replace it (`map`)."""
+        """Yield problems of `profile:` and of the key that may replace it (`map`)."""
         if name is None and inline is None:
             text = f"needs '{self.key}', or a profile: {either(self.names())}"
             yield ("profile",), text
@@ -67,7 +67,7 @@ class Profile(Generic[Content]):
                     yield ("profile",), f"the profile is not right: {problem}"
 
     def warnings(self, name: str | None, advice: str) -> Remarks:
-        """A profile of a real make that nobody has tried on its hardware; `advice`: how to try it."""
+        """Yield a warning for a make's profile that nobody has tried; `advice`: the test to do."""
         if name and self._read(FOLDER / f"{name}.yaml")["hardware"] == "untried":
             text = f"nobody has tried the profile {name} on hardware: {advice}"
             yield ("profile",), text

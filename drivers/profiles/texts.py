@@ -1,7 +1,7 @@
-"""The texts of profiles and DBC files: those that this process has read, or was given.
+"""Stores the texts of profiles and DBC files that this process has read or received.
 
 A daemon records these texts together with its claims. `outputs-off` may run much later, even after an
-upgrade that changed the files; it gets the recorded texts and so reads the maps as the daemon did.
+upgrade that changed the files; with the recorded texts it reads the same maps as the daemon.
 
 A file of drivers/profiles/ is stored under its name, any other under its path.
 """
@@ -15,24 +15,24 @@ _texts: dict[str, bytes] = {}
 
 
 def text(file: Path, read: Callable[[], bytes]) -> bytes:
-    """A file's text: the stored one, or what `read` returns, which is then stored."""
+    """Return a file's stored text; without one, call `read` and store its result."""
     if _name(file) not in _texts:
         _texts[_name(file)] = read()
     return _texts[_name(file)]
 
 
 def known(file: Path) -> bytes | None:
-    """A file's stored text, or None."""
+    """Return a file's stored text, or None."""
     return _texts.get(_name(file))
 
 
 def known_in(folder: Path) -> list[Path]:
-    """The files of a folder whose texts are stored."""
+    """Return the files of a folder that have a stored text."""
     return [file for name in _texts if (file := FOLDER / name).parent == folder]
 
 
 def all_known() -> dict[str, bytes]:
-    """Name -> text of every stored file."""
+    """Return name -> text of every stored file."""
     return dict(_texts)
 
 

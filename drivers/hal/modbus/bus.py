@@ -6,7 +6,7 @@
   to another request.
 - If the connection or port cannot be opened, the whole bus backs off for 0.5 to 30 s; if a unit fails,
   only that unit does. Meanwhile calls fail at once with the same text. After that a request gets one
-  try until the unit answers again. A unit that has never answered gets one try too. So a dead unit costs
+  try until the unit answers again. A unit that has never answered gets one try too. A dead unit costs
   the others one `timeout_s` per backoff. Between two such failed tries the live units have their turn.
 - Writes that switch off have their own backoff at each unit: a failed reading never delays the first
   such write.
@@ -166,7 +166,7 @@ class ModbusBus(Bus):
         return None, reason
 
     def _refused(self, backoff: Backoff, unit: int, text: str, code: int) -> HalError:
-        """Return the error for an exception reply. No backoff after 1 to 3, which a working unit sends."""
+        """Return the error for an exception reply. No backoff after 1 to 3: the unit works."""
         self._watchdogs.refused(unit, code)
         text += f"exception {code}, {EXCEPTIONS.get(code, UNDEFINED)}"
         if code not in (1, 2, 3):
