@@ -30,7 +30,7 @@ class DriverType(msgspec.Struct, Generic[Settings, Sample, Outputs], frozen=True
     The rest is optional:
     `wires(settings)`: the wiring table that an electrician checks (`drivers/hal/points.py`).
     `debounce(settings)`: signal or group -> how long a change must last (s).
-    `describe(settings, bus's settings)`: rows for `check` (name, meaning) if there are no wires.
+    `describe(settings, bus's settings)`: rows for `check` (subject, meaning) if there are no wires.
     `tables(settings)`: codes, pulses and frames, for `check` (`bridges/kinds/shared/table.py`).
     `claims(settings)`: (place, path) of each exclusive place besides the wires' points.
     `warnings(settings)`: (path, text) of valid settings that may be a mistake.

@@ -94,7 +94,7 @@ class Triggers:
 
 
 def _codes(faults: Tree) -> dict[str, str]:
-    """Code -> detail of the faults in a report."""
+    """Return code -> detail of the faults in a report."""
     listed = faults if isinstance(faults, list) else []
     found = [fault for fault in listed if isinstance(fault, dict)]
     return {str(fault.get("code")): str(fault.get("detail", "")) for fault in found}

@@ -73,7 +73,7 @@ def _other(value: object) -> Tree:
 
 
 def value(found: Tree) -> Any:
-    """The value of a tree. Raises UnknownValue."""
+    """Return the value of a tree. Raises UnknownValue."""
     try:
         return _value(found)
     except (TypeError, KeyError, AttributeError, ValueError, RecursionError) as error:
@@ -131,7 +131,7 @@ def first_difference(one: Tree, other: Tree, path: str = "") -> tuple[str, Tree,
 
 
 def _struct(kind: type[Any]) -> Struct | None:
-    """The fields of a type; None if it has none."""
+    """Return the fields of a type; None if it has none."""
     if kind not in _structs:
         _structs[kind] = _found(kind)
     return _structs[kind]
@@ -146,7 +146,7 @@ def _found(kind: type[Any]) -> Struct | None:
 
 @cache
 def name_of(kind: type) -> str:
-    """The name of a type in recordings. Raises TypeError if it has none."""
+    """Return the name of a type in recordings. Raises TypeError if it has none."""
     package = sys.modules[kind.__module__.rpartition(".")[0] or kind.__module__]
     for name, named in (*SHARED.items(), *getattr(package, "RECORDED", {}).items()):
         if named is kind:

@@ -145,7 +145,7 @@ def _below(node: Node, key: str) -> Node | None:
 
 
 def _param(item: SequenceNode, key: str) -> ScalarNode | None:
-    """A parameter of a vertex or an edge, from its last item: `V`, or `[type, V]`."""
+    """Return a parameter of a vertex or an edge, from its last item: `V`, or `[type, V]`."""
     found = _below(item.value[-1], key) if item.value else None
     if isinstance(found, SequenceNode) and len(found.value) == 2:
         found = found.value[1]

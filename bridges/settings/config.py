@@ -39,29 +39,29 @@ class Config(Struct, frozen=True):
     recording: RecordingSettings = RecordingSettings()
 
     def bus_of(self, device_name: str) -> str:
-        """The name of the bus that a device is on."""
+        """Return the name of the bus that a device is on."""
         named_bus: str | None = self.devices[device_name].bus
         return named_bus or next(iter(self.buses))
 
     def devices_on(self, bus: str) -> list[str]:
-        """The names of the devices on this bus."""
+        """Return the names of the devices on this bus."""
         return [name for name in self.devices if self.bus_of(name) == bus]
 
     def driver_type(self, device_name: str) -> AnyDriver:
-        """The driver of a device: its own, or the file's."""
+        """Return the driver of a device: its own, or the file's."""
         own: str | None = self.devices[device_name].driver
         return named.driver_called(self.kind, own or self.driver)
 
     def wires(self, device_name: str) -> list[Wire]:
-        """A device's wiring table; empty where its driver has none."""
+        """Return a device's wiring table; empty where its driver has none."""
         return list(self.driver_type(device_name).wires(self.devices[device_name]))
 
     def bus_type(self, name: str) -> AnyBus:
-        """The type of the bus of this name."""
+        """Return the type of the bus of this name."""
         return named.bus_called(self.bus_types[name])
 
     def open_bus(self, name: str) -> Bus:
-        """The real bus of this name. Raises HalError."""
+        """Return the real bus of this name. Raises HalError."""
         return self.bus_type(name).open_bus(self.buses[name])
 
     def open_to_switch_off(self, name: str) -> Bus:

@@ -116,7 +116,7 @@ def _claims(config: Config, one_machine: bool) -> Iterator[ExclusiveUse]:
 
 
 def _places(config: Config, bus: str, device: str) -> Iterator[tuple[str, Path]]:
-    """Every point and claim of a device, in its bus's canonical spelling."""
+    """Yield every point and claim of a device, in its bus's canonical spelling."""
     canonical = config.bus_type(bus).canonical
     for wire in config.wires(device):
         yield canonical(wire.point), (*wire.path, "point")

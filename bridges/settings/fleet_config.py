@@ -98,7 +98,7 @@ class FleetFile(msgspec.Struct, frozen=True):
         return self.contents.rmf_fleet
 
     def robots(self) -> Iterator[tuple[Path, str, RobotConfig]]:
-        """Each robot's path, name and settings."""
+        """Yield each robot's path, name and settings."""
         for top, found in (
             (("rmf_fleet", "robots"), self.fleet.robots),
             (("robots",), self.contents.robots),
@@ -111,7 +111,7 @@ class FleetFile(msgspec.Struct, frozen=True):
         return self.contents.reference_coordinates or {}
 
     def problem(self, path: Path, text: str) -> Problem:
-        """A problem at this path."""
+        """Return a problem at this path."""
         return _problem(self.file, self.root, path, text)
 
 

@@ -237,7 +237,7 @@ class _DeviceReading:
         return False
 
     def _bus_name(self, device: MappingEntry) -> str | None:
-        """The bus of a device; None if it cannot be determined."""
+        """Return the bus of a device; None if it cannot be determined."""
         entry = below(device.value, "bus")
         if entry is None or is_none(entry.value):
             if len(self._buses) > 1 and isinstance(device.value, MappingNode):

@@ -65,7 +65,7 @@ def _is_plain(value: object) -> bool:
 
 
 def _unit(info: mi.Type) -> str:
-    """The unit of a number; "" if it has none."""
+    """Return the unit of a number; "" if it has none."""
     if isinstance(info, mi.Metadata):
         return (info.extra or {}).get("unit", "") or _unit(info.type)
     if isinstance(info, mi.UnionType):

@@ -43,7 +43,7 @@ class FrameChargerSettings(ChargerSettings, frozen=True, kw_only=True, forbid_un
     ] = msgspec.field(default_factory=dict)
 
     def problems(self) -> Remarks:
-        """Problems that involve more than one field."""
+        """Yield problems that involve more than one field."""
         yield from super().problems()
         if self.on_death == "keep":
             yield (
@@ -132,7 +132,7 @@ def claims(settings: FrameChargerSettings) -> Iterator[tuple[str, tuple[str, ...
 def describe(
     settings: FrameChargerSettings, bus_settings: can.CanSettings
 ) -> list[tuple[str, str]]:
-    """Rows that `check` prints instead of a wiring table: (what, meaning)."""
+    """Return rows that `check` prints instead of a wiring table: (subject, meaning)."""
     found = frame_map(settings)
     stops_s = settings.limits.peer_internal_timeout_s
     after = "a time to be asked of the maker" if stops_s is None else f"{stops_s:g} s"
@@ -145,12 +145,12 @@ def describe(
 
 
 def frame_tables(settings: FrameChargerSettings) -> Iterator[Table]:
-    """The frames as bytes."""
+    """Yield the frames as bytes."""
     return tables(frame_map(settings), settings.setpoints)
 
 
 def warnings(settings: FrameChargerSettings) -> Remarks:
-    """Valid settings that deserve a second look: (path, text)."""
+    """Yield valid settings that deserve a second look: (path, text)."""
     yield from PROFILE.warnings(settings.profile, "watch the first charge")
     found = frame_map(settings)
     if found.receiver is None and settings.receivers:

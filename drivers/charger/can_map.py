@@ -188,7 +188,7 @@ class FrameMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
             yield ("rules", *path), signal
 
     def error_frames(self) -> set[str]:
-        """The frames that carry errors."""
+        """Return the frames that carry errors."""
         return {signal.split(".")[0] for _, signal in self.errors.places()}
 
     def state_frames(self) -> list[str]:
@@ -198,11 +198,11 @@ class FrameMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
         return list(dict.fromkeys(signal.split(".")[0] for signal in signals))
 
     def frames(self) -> list[str]:
-        """The frames that are read."""
+        """Return the frames that are read."""
         return list(dict.fromkeys(signal.split(".")[0] for _, signal in self.signals()))
 
     def wanted_setpoints(self) -> set[str]:
-        """The names that a device's `setpoints` must give."""
+        """Return the names that a device's `setpoints` must give."""
         return {name for sent in self.send for name in sent.setpoints.values()}
 
 
@@ -217,7 +217,7 @@ def _lacks(found: dbc.Dbc, path: tuple[str, ...], frame: str, signal: str = "") 
 
 
 def rows(found: FrameMap) -> Iterator[tuple[str, str]]:
-    """Rows for `check`: the signals that are read: (what, meaning)."""
+    """Yield rows for `check`: the signals that are read: (subject, meaning)."""
     frames = dbc.load(found.dbc)
     yield "frames", str(dbc.path(found.dbc))
     for path, signal in found.signals():

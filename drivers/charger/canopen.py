@@ -71,7 +71,7 @@ def claims(settings: CanOpenChargerSettings) -> Iterable[tuple[str, tuple[str, .
 def describe(
     settings: CanOpenChargerSettings, bus_settings: can.CanSettings
 ) -> list[tuple[str, str]]:
-    """Rows that `check` prints instead of a wiring table: (what, meaning)."""
+    """Return rows that `check` prints instead of a wiring table: (subject, meaning)."""
     rows = [("bus", f"{can.describe(bus_settings)}; node {settings.node}")]
     if settings.heartbeat == "required":
         lost = f"lost after {settings.heartbeat_timeout_s:g} s"
@@ -80,7 +80,7 @@ def describe(
 
 
 def warnings(settings: CanOpenChargerSettings) -> Remarks:
-    """Valid settings that deserve a second look: (path, text)."""
+    """Yield valid settings that deserve a second look: (path, text)."""
     found = list(xnergy.warnings(settings, "CAN"))
     if settings.heartbeat == "none":
         found.append((("heartbeat",), "without it a receiver that restarts is not noticed"))
@@ -88,7 +88,7 @@ def warnings(settings: CanOpenChargerSettings) -> Remarks:
 
 
 def create(name: str, settings: CanOpenChargerSettings, bus: can.CanBus) -> xnergy.Receiver:
-    """The receiver's driver on its bus; it sends nothing before the first reading."""
+    """Make the receiver's driver on its bus; it sends nothing before the first reading."""
     return xnergy.Receiver(settings, Objects(settings, bus))
 
 

@@ -38,11 +38,11 @@ class Dbc:
         }
 
     def frames(self) -> list[str]:
-        """The names of its frames."""
+        """Return the names of its frames."""
         return list(self._messages)
 
     def signals(self, frame: str) -> list[str]:
-        """The names of a frame's signals."""
+        """Return the names of a frame's signals."""
         return [signal.name for signal in self._messages[frame].signals]
 
     def id(self, frame: str) -> int:
@@ -51,11 +51,11 @@ class Dbc:
         return int(message.frame_id) | (EXTENDED if message.is_extended_frame else 0)
 
     def length(self, frame: str) -> int:
-        """A frame's length in bytes."""
+        """Return a frame's length in bytes."""
         return int(self._messages[frame].length)
 
     def decode(self, frame: str, payload: bytes) -> dict[str, float]:
-        """Signal -> value, for each signal with a finite number. Raises DriverError."""
+        """Return signal -> value, for each signal with a finite number. Raises DriverError."""
         from cantools.database.errors import Error
 
         try:
@@ -79,7 +79,7 @@ class Dbc:
             raise ValueError(f"{frame}: {' '.join(str(error).split())}") from None
 
     def unit(self, frame: str, signal: str) -> str:
-        """A signal's unit, or ""."""
+        """Return a signal's unit, or ""."""
         return str(self._messages[frame].get_signal_by_name(signal).unit or "")
 
     def bounds(self, frame: str, signal: str) -> tuple[float, float]:

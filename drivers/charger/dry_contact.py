@@ -70,7 +70,7 @@ class DryContactChargerSettings(
     outputs: Annotated[ChargerOutputWiring, tells("the relay that is driven.")]
 
     def problems(self) -> Remarks:
-        """Problems that involve more than one field."""
+        """Yield problems that involve more than one field."""
         yield from super().problems()
         if self.on_death == "keep":
             yield ("on_death",), "its relay is off without the daemon: leave this out"
@@ -80,7 +80,7 @@ class DryContactChargerSettings(
 
 
 def wires(settings: DryContactChargerSettings) -> list[Wire]:
-    """The wiring table, inputs first."""
+    """Return the wiring table, inputs first."""
     relay = settings.outputs.enable.wire(ENABLE, ("outputs", ENABLE))
     return [*input_wires(settings.inputs, debounce_s=0.0), relay]
 
@@ -111,7 +111,7 @@ def _means(shown: Mapping[str, bool]) -> str:
 
 
 def warnings(settings: DryContactChargerSettings) -> Remarks:
-    """Valid settings to review before the station goes into service: (path, text)."""
+    """Yield valid settings to review before the station goes into service: (path, text)."""
     for wire in wires(settings):
         if wire.debounce_s:
             text = "contacts of a charger are not debounced: the next scan corrects a bounce"
@@ -125,7 +125,7 @@ def warnings(settings: DryContactChargerSettings) -> Remarks:
 
 
 def create(name: str, settings: DryContactChargerSettings, bus: PointsBus) -> "DryContactCharger":
-    """The station's driver on its bus; it touches nothing before `open`."""
+    """Make the station's driver on its bus; it touches nothing before `open`."""
     return DryContactCharger(Points(wires(settings), bus))
 
 

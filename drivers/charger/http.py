@@ -73,7 +73,7 @@ class HttpChargerSettings(ChargerSettings, frozen=True, kw_only=True, forbid_unk
         return self.stop is not None
 
     def problems(self) -> Remarks:
-        """Problems that involve more than one field."""
+        """Yield problems that involve more than one field."""
         yield from super().problems()
         yield from rules.problems(self.rules, self.codes is not None)
         yield from _place_problems(self)
@@ -113,7 +113,7 @@ def _timer_problems(settings: HttpChargerSettings) -> Remarks:
 
 
 def create(name: str, settings: HttpChargerSettings, bus: Calls) -> "HttpCharger":
-    """The station's driver on its bus; it sends nothing before the first reading."""
+    """Make the station's driver on its bus; it sends nothing before the first reading."""
     return HttpCharger(settings, bus)
 
 
@@ -128,7 +128,7 @@ def claims(settings: HttpChargerSettings) -> Iterator[tuple[str, tuple[str, ...]
 def describe(
     settings: HttpChargerSettings, bus_settings: http.HttpSettings
 ) -> list[tuple[str, str]]:
-    """Rows that `check` prints instead of a wiring table: (what, meaning)."""
+    """Return rows that `check` prints instead of a wiring table: (subject, meaning)."""
     api = http.base(bus_settings.api_base)
     rows = [("state", f"GET {api.url(settings.state_path)} every {bus_settings.scan_s:g} s")]
     for what in ("start", "stop", "range_check"):

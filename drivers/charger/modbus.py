@@ -39,12 +39,12 @@ class ModbusChargerSettings(ChargerSettings, frozen=True, kw_only=True, forbid_u
 
 
 def points(settings: ModbusChargerSettings) -> dict[str, Point]:
-    """Name -> its register or coil."""
+    """Return name -> its register or coil."""
     return {name: at(settings.unit, place) for name, place in PLACES.items()}
 
 
 def claims(settings: ModbusChargerSettings) -> Iterator[tuple[str, tuple[str, ...]]]:
-    """(place, path) of its coils, which no other device may use."""
+    """Yield (place, path) of its coils, which no other device may use."""
     for name in (xnergy.ENABLE, xnergy.CHECK_RANGE):
         yield str(points(settings)[name]), ("unit",)
 
@@ -52,17 +52,17 @@ def claims(settings: ModbusChargerSettings) -> Iterator[tuple[str, tuple[str, ..
 def describe(
     settings: ModbusChargerSettings, bus_settings: modbus.ModbusSettings
 ) -> list[tuple[str, str]]:
-    """Rows that `check` prints instead of a wiring table: (what, meaning)."""
+    """Return rows that `check` prints instead of a wiring table: (subject, meaning)."""
     return xnergy.rows(settings, {name: str(point) for name, point in points(settings).items()})
 
 
 def warnings(settings: ModbusChargerSettings) -> Remarks:
-    """Valid settings that deserve a second look: (path, text)."""
+    """Yield valid settings that deserve a second look: (path, text)."""
     return xnergy.warnings(settings, "bus")
 
 
 def create(name: str, settings: ModbusChargerSettings, bus: modbus.ModbusBus) -> xnergy.Receiver:
-    """The receiver's driver on its bus; it sends nothing before the first reading."""
+    """Make the receiver's driver on its bus; it sends nothing before the first reading."""
     return xnergy.Receiver(settings, Registers(settings, bus))
 
 

@@ -41,7 +41,7 @@ class RegisterChargerSettings(
         return charger_map(self).power is not None
 
     def problems(self) -> Remarks:
-        """Problems that involve more than one field."""
+        """Yield problems that involve more than one field."""
         yield from super().problems()
         before = list(PROFILE.problems(self.profile, self.map))
         yield from before
@@ -108,7 +108,7 @@ def tables(settings: RegisterChargerSettings) -> Iterator[Table]:
 
 
 def warnings(settings: RegisterChargerSettings) -> Remarks:
-    """Valid settings that deserve a second look: (path, text)."""
+    """Yield valid settings that deserve a second look: (path, text)."""
     yield from PROFILE.warnings(settings.profile, "watch the first charge")
     found = charger_map(settings)
     if found.power is None:
@@ -120,7 +120,7 @@ def warnings(settings: RegisterChargerSettings) -> Remarks:
 
 
 def create(name: str, settings: RegisterChargerSettings, bus: ModbusBus) -> "RegisterCharger":
-    """The station's driver on its bus; it sends nothing before the first reading."""
+    """Make the station's driver on its bus; it sends nothing before the first reading."""
     return RegisterCharger(settings, bus)
 
 

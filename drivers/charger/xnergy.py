@@ -303,7 +303,7 @@ class Receiver:
 
 
 def rows(settings: ChargerSettings, where: Mapping[str, str]) -> list[tuple[str, str]]:
-    """Rows for `check`: (what, meaning). `where`: name -> its address as text."""
+    """Return rows for `check`: (subject, meaning). `where`: name -> its address as text."""
     return [
         *((name, f"read {where[name]}") for name in (*ALWAYS, *TEMPERATURES) if name in where),
         *((name, f"the same in an error: {where[name]}") for name in IN_ERROR),
@@ -324,7 +324,7 @@ def _state_rows() -> Iterator[tuple[str, str]]:
 
 
 def warnings(settings: ChargerSettings, wire: str) -> Remarks:
-    """Valid settings that deserve a second look: (path, text). `wire`: the plug to pull in the test."""
+    """Yield valid settings that deserve a second look: (path, text). `wire`: the test's plug to pull."""
     text = (
         "the maker's published numbers are not tried on hardware: watch the first charge, and pull"
     )

@@ -6,4 +6,4 @@ CLOSING: Final = (
     "closing",
     "nothing is driven: a released door stays open unless its operator closes it by itself",
 )
-"""A row for `check`: (what, meaning)."""
+"""A row for `check`: (subject, meaning)."""

@@ -69,7 +69,7 @@ class DryContactDoorSettings(DoorSettings, frozen=True, kw_only=True, forbid_unk
     outputs: Annotated[DoorOutputWiring, tells("the relay that is driven.")]
 
     def problems(self) -> Remarks:
-        """Problems that involve more than one field."""
+        """Yield problems that involve more than one field."""
         yield from super().problems()
         yield from self._feedback_problems()
         if self.inputs.fire and self.on_fire is None:
@@ -103,7 +103,7 @@ class DryContactDoorSettings(DoorSettings, frozen=True, kw_only=True, forbid_unk
 
 
 def wires(settings: DryContactDoorSettings) -> list[Wire]:
-    """The wiring table, inputs first."""
+    """Return the wiring table, inputs first."""
     relay = settings.outputs.hold_open
     flash = None
     if relay.flash is not None and settings.pulse is not None:
@@ -113,7 +113,7 @@ def wires(settings: DryContactDoorSettings) -> list[Wire]:
 
 
 def debounce(settings: DryContactDoorSettings) -> Mapping[str, float]:
-    """The debounce time of each input (s), by signal."""
+    """Return the debounce time of each input (s), by signal."""
     return {w.signal: w.debounce_s for w in wires(settings) if w.debounce_s is not None}
 
 
@@ -129,7 +129,7 @@ def tables(settings: DryContactDoorSettings) -> Iterator[Table]:
 
 
 def warnings(settings: DryContactDoorSettings) -> Remarks:
-    """Valid settings to review before the door goes into service: (path, text)."""
+    """Yield valid settings to review before the door goes into service: (path, text)."""
     for wire in wires(settings):
         if wire.signal == "closed" and wire.broken_reads() is not False:
             yield (
@@ -143,7 +143,7 @@ def warnings(settings: DryContactDoorSettings) -> Remarks:
 
 
 def create(name: str, settings: DryContactDoorSettings, bus: PointsBus) -> "DryContactDoor":
-    """The door's driver on its bus; it touches nothing before `open`."""
+    """Make the door's driver on its bus; it touches nothing before `open`."""
     return DryContactDoor(
         Points(wires(settings), bus), flashes=settings.outputs.hold_open.flash is not None
     )

@@ -59,7 +59,7 @@ class HttpDoorSettings(DoorSettings, frozen=True, kw_only=True, forbid_unknown_f
         return None if self.switches_off_after_s is None else (self.switches_off_after_s, path)
 
     def problems(self) -> Remarks:
-        """Problems that involve more than one field."""
+        """Yield problems that involve more than one field."""
         yield from super().problems()
         missing = [
             signal for signal in ("opened", "closed") if getattr(self.inputs, signal) is None
@@ -115,7 +115,7 @@ def _renewed(settings: HttpDoorSettings, bus: http.HttpSettings) -> str:
 
 
 def warnings(settings: HttpDoorSettings) -> Remarks:
-    """Valid settings to review before the door goes into service: (path, text)."""
+    """Yield valid settings to review before the door goes into service: (path, text)."""
     if settings.switches_off_after_s is not None:
         text = (
             "pull the network plug while the door is held, and see that it is released in this time"
@@ -134,7 +134,7 @@ def warnings(settings: HttpDoorSettings) -> Remarks:
 
 
 def create(name: str, settings: HttpDoorSettings, bus: InsistentCalls) -> "HttpDoor":
-    """The door's driver on its bus; it sends nothing before `open`."""
+    """Make the door's driver on its bus; it sends nothing before `open`."""
     return HttpDoor(settings, bus)
 
 

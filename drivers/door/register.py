@@ -40,7 +40,7 @@ class RegisterDoorSettings(DoorSettings, frozen=True, kw_only=True, forbid_unkno
     ] = 0
 
     def problems(self) -> Remarks:
-        """Problems that involve more than one field."""
+        """Yield problems that involve more than one field."""
         yield from super().problems()
         before = list(PROFILE.problems(self.profile, self.map))
         yield from before
@@ -113,7 +113,7 @@ def tables(settings: RegisterDoorSettings) -> Iterator[Table]:
 
 
 def warnings(settings: RegisterDoorSettings) -> Remarks:
-    """Valid settings to review before the door goes into service: (path, text)."""
+    """Yield valid settings to review before the door goes into service: (path, text)."""
     yield from PROFILE.warnings(settings.profile, "watch the door move")
     if not door_map(settings).command.read_back:
         written = _command_in(settings)
@@ -129,7 +129,7 @@ def _command_in(settings: RegisterDoorSettings) -> tuple[str, ...]:
 
 
 def create(name: str, settings: RegisterDoorSettings, bus: ModbusBus) -> "RegisterDoor":
-    """The door's driver on its bus; it sends nothing before `open`."""
+    """Make the door's driver on its bus; it sends nothing before `open`."""
     found = points(settings)
     command, outputs = door_map(settings).command, {"command": found.pop("command")}
     safe = {"command": command.release}

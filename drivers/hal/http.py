@@ -81,7 +81,7 @@ class HttpSettings(BusSettings, frozen=True, kw_only=True, forbid_unknown_fields
     ] = None
 
     def problems(self) -> Remarks:
-        """An invalid address; settings that have no effect."""
+        """Yield problems: an invalid address; settings without effect."""
         try:
             tls = base(self.api_base).scheme == "https"
         except ValueError as error:
@@ -94,7 +94,7 @@ class HttpSettings(BusSettings, frozen=True, kw_only=True, forbid_unknown_fields
 
 
 def warnings(settings: HttpSettings) -> Remarks:
-    """Valid settings that deserve a second look: (path, text)."""
+    """Yield valid settings that deserve a second look: (path, text)."""
     if settings.token_file and base(settings.api_base).scheme == "http":
         text = (
             "the token goes over the network unencrypted: write https://… where the controller has"
@@ -104,12 +104,12 @@ def warnings(settings: HttpSettings) -> Remarks:
 
 
 def needs(settings: HttpSettings) -> Needs:
-    """The controller's address."""
+    """Return the controller's address."""
     return Needs(host=base(settings.api_base).host)
 
 
 def where(settings: HttpSettings) -> Where:
-    """The controller's address."""
+    """Return the controller's address."""
     return Where(base(settings.api_base).url(""), local=False)
 
 

@@ -50,7 +50,7 @@ def notes(settings: DryContactLiftSettings) -> Remarks:
 
 
 def create(name: str, settings: DryContactLiftSettings, bus: PointsBus) -> "DryContactLift":
-    """The lift's driver on its GPIO or Modbus bus; it touches nothing before `open`."""
+    """Make the lift's driver on its GPIO or Modbus bus; it touches nothing before `open`."""
     return DryContactLift(settings, bus)
 
 

@@ -37,7 +37,7 @@ class RegisterLiftSettings(LiftSettings, frozen=True, kw_only=True, forbid_unkno
     map: Annotated[LiftMap, tells("the gateway's register map.")]
 
     def problems(self) -> Remarks:
-        """Problems that involve more than one field."""
+        """Yield problems that involve more than one field."""
         levels, commands = self.levels(), self.map.commands
         yield from checks.floors(self)
         yield from checks.alarm(self)
@@ -72,7 +72,7 @@ def _rear_door(settings: RegisterLiftSettings) -> Remarks:
 
 
 def warnings(settings: RegisterLiftSettings) -> Remarks:
-    """Valid settings that deserve a second look: (path below the device, text)."""
+    """Yield valid settings that deserve a second look: (path below the device, text)."""
     found, commands = settings.map, settings.map.commands
     fire, told = found.shows(Hazard.FIRE), found.shows("agv_mode")
     asks, holds = bool(commands.agv_mode_request), bool(commands.door_open)
@@ -169,7 +169,7 @@ def _meaning(part: Number | LiftFlag) -> str:
 
 
 def create(name: str, settings: RegisterLiftSettings, bus: ModbusBus) -> "RegisterLift":
-    """The lift's driver on its bus; it sends nothing before `open`."""
+    """Make the lift's driver on its bus; it sends nothing before `open`."""
     inputs = {part: at(settings.unit, p.at) for part, p in settings.map.parts().items()}
     safe = encode(settings.map, LiftOutputs())
     outputs = {where: at(settings.unit, where) for where in safe}

@@ -59,7 +59,7 @@ class CanBus(Bus):
         self._deaf = False
 
     def backoff(self) -> Backoff:
-        """The backoff of one device; `insist` ends it too."""
+        """Return the backoff of one device; `insist` ends it too."""
         made = Backoff(self.now, self._jitter)
         self._backoffs.append(made)
         return made
@@ -195,7 +195,7 @@ class CanBus(Bus):
 
 
 def _link(settings: CanSettings, where: str, vendor: "Vendor | None") -> "Link":
-    """The link to the bus. Only this function imports python-can."""
+    """Return the link to the bus. Only this function imports python-can."""
     from drivers.hal.can.link import Link, slcan, socketcan
 
     place = settings.slcan

@@ -181,7 +181,7 @@ class CanOpenNode:
 
 
 def _client(node: CanOpenNode) -> "Client":
-    """The library's client, imported only here."""
+    """Return the library's client, imported only here."""
     from drivers.hal.can.sdo import Client
 
     return Client(node.exchange, node.post)

@@ -59,7 +59,7 @@ class CanSettings(BusSettings, frozen=True, kw_only=True, forbid_unknown_fields=
     scan_s: Annotated[Period, tells("how often devices are read and frames sent.")] = 0.2
 
     def problems(self) -> Remarks:
-        """Problems that involve more than one field."""
+        """Yield problems that involve more than one field."""
         if self.socketcan is None and self.slcan is None:
             yield (), "needs an interface: write socketcan: can0, or slcan: {port: …, bitrate: …}"
         elif self.socketcan and self.slcan:
@@ -73,7 +73,7 @@ class CanSettings(BusSettings, frozen=True, kw_only=True, forbid_unknown_fields=
 
 
 def warnings(settings: CanSettings) -> Remarks:
-    """Valid settings that deserve a second look: (path, text)."""
+    """Yield valid settings that deserve a second look: (path, text)."""
     if settings.slcan and not settings.slcan.port.startswith("/dev/serial/by-"):
         port = settings.slcan.port
         text = f"{port} may be another adapter after a reboot: use a path of /dev/serial/by-id"

@@ -68,7 +68,7 @@ class BareFactory:
         """Do nothing."""
 
     def pin(self, name: str) -> BarePin:
-        """The pin of this canonical name (`BCM17`)."""
+        """Return the pin of this canonical name (`BCM17`)."""
         return BarePin(self._handle, self._chip, int(name.removeprefix("BCM")))
 
     def close(self) -> None:

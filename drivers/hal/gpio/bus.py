@@ -48,7 +48,7 @@ class Factory(Protocol):
         """Release the reservation."""
 
     def pin(self, name: str) -> Pin:
-        """The pin of this name."""
+        """Return the pin of this name."""
 
     def close(self) -> None:
         """Release every pin."""

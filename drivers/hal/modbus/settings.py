@@ -38,7 +38,7 @@ class ModbusSettings(
     ] = msgspec.field(default_factory=dict)
 
     def problems(self) -> Remarks:
-        """Problems that involve more than one field."""
+        """Yield problems that involve more than one field."""
         if self.tcp is None and self.serial is None:
             yield (), "needs a connection: write tcp: {host: …} or serial: {port: …}"
         elif self.tcp and self.serial:
@@ -56,7 +56,7 @@ class ModbusSettings(
 
 
 def warnings(settings: ModbusSettings) -> Remarks:
-    """Valid settings that deserve a second look: (path, text)."""
+    """Yield valid settings that deserve a second look: (path, text)."""
     for path, text in settings.serial.warnings() if settings.serial else ():
         yield ("serial", *path), text
     for path, text in settings.module_watchdog.warnings() if settings.module_watchdog else ():
