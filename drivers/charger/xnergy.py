@@ -324,7 +324,7 @@ def _state_rows() -> Iterator[tuple[str, str]]:
 
 
 def warnings(settings: ChargerSettings, wire: str) -> Remarks:
-    """Yield valid settings that deserve a second look: (path, text). `wire`: the test's plug to pull."""
+    """Yield valid settings that deserve a second look: (path, text). `wire`: the plug in the test."""
     text = (
         "the maker's published numbers are not tried on hardware: watch the first charge, and pull"
     )
