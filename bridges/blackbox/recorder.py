@@ -25,7 +25,7 @@ log = logging.getLogger(__name__)
 LATE_S: Final = 60.0
 """Entries older than this at the first look at a ring were handled by an earlier recorder."""
 GRACE_S: Final = 2.0
-"""After this extra time, the entries to be included are certainly in the ring."""
+"""The extra wait until the ring certainly has all entries of a recording."""
 PART_S: Final = 300.0
 """The length of one file of `keep: continuous`."""
 

@@ -40,8 +40,8 @@ Frames = dbc.Dbc
 class State(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """The charger's state, as one number."""
 
-    at: Annotated[Signal, tells("the signal that holds it.")]
-    codes: Annotated[Codes, tells("what its numbers mean.")]
+    at: Annotated[Signal, tells("the state's signal.")]
+    codes: Annotated[Codes, tells("the meanings of its numbers.")]
 
 
 class Sent(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -51,7 +51,7 @@ class Sent(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
     every_s: Annotated[Period, tells("how often it is sent.")]
     on: Annotated[
         dict[Name, float] | None,
-        tells("signal -> value while the charger may charge; not sent then when absent."),
+        tells("signal -> value while the charger may charge; when absent, nothing is sent then."),
     ] = None
     setpoints: Annotated[
         dict[Name, Name],
@@ -59,7 +59,7 @@ class Sent(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
     ] = {}
     off: Annotated[
         dict[Name, float] | None,
-        tells("signal -> value while the charger must not charge; not sent then when absent."),
+        tells("signal -> value while it must not charge; when absent, nothing is sent then."),
     ] = None
 
     def problems(self) -> Remarks:
@@ -95,10 +95,10 @@ class FrameMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     ] = {}
     state: Annotated[State | None, tells("its state as a number; not needed with `rules`.")] = None
     state_timeout_s: Annotated[
-        Fresh, tells("after how long without its frame, or one of a rule, the state is stale.")
+        Fresh, tells("the state is stale after this time without its frame, or a frame of a rule.")
     ]
     others_timeout_s: Annotated[
-        Fresh, tells("after how long without its frame any other value is stale.")
+        Fresh, tells("any other value is stale after this time without its frame.")
     ] = 5.0
     volts: Annotated[Signal | None, tells("the voltage at the battery.")] = None
     amps: Annotated[Signal | None, tells("the current into the battery.")] = None
@@ -118,8 +118,8 @@ class FrameMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     ] = None
     at_height: Annotated[
         Signal | None,
-        tells("""not 0 while a pad that the charger moves is where it charges. While it is 0 there
-        is no power; without its frame there is no reading."""),
+        tells("""not 0 while the charger's moving pad is in its charging position. While it is 0
+        there is no power; without its frame there is no reading."""),
     ] = None
     temperatures: Annotated[
         dict[Name, Signal],
@@ -133,8 +133,7 @@ class FrameMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     wake: Annotated[
         list[Wake],
         msgspec.Meta(max_length=8),
-        tells("""for a charger that says nothing before it is woken: the frames that do it, such as
-        CANopen's NMT start."""),
+        tells("the frames that wake a silent charger, such as CANopen's NMT start."),
     ] = []
 
     def problems(self) -> Remarks:

@@ -56,7 +56,7 @@ class CanOpenChargerSettings(
         int, msgspec.Meta(ge=1, le=127), tells("its CANopen node id; the maker's default is 10.")
     ]
     heartbeat: Annotated[
-        Literal["required", "none"], tells("`none` for a receiver whose old firmware sends none.")
+        Literal["required", "none"], tells("`none` for old firmware, which sends no heartbeat.")
     ] = "required"
     heartbeat_timeout_s: Annotated[
         BeatTimeout, tells("the receiver counts as lost this long after its last heartbeat.")
@@ -83,7 +83,7 @@ def warnings(settings: CanOpenChargerSettings) -> Remarks:
     """Yield valid settings that deserve a second look: (path, text)."""
     found = list(xnergy.warnings(settings, "CAN"))
     if settings.heartbeat == "none":
-        found.append((("heartbeat",), "without it a receiver that restarts is not noticed"))
+        found.append((("heartbeat",), "without it the restart of a receiver is not noticed"))
     return sorted(found)
 
 

@@ -75,7 +75,7 @@ class DryContactChargerSettings(
         if self.on_death == "keep":
             yield ("on_death",), "its relay is off without the daemon: leave this out"
         if self.receivers:
-            yield ("receivers",), "contacts tell nobody's receiver: leave this out"
+            yield ("receivers",), "contacts show no receiver's id: leave this out"
         yield from unaccepted(_unsafe(self), self.accept_unsafe)
 
 
@@ -121,7 +121,7 @@ def warnings(settings: DryContactChargerSettings) -> Remarks:
     if settings.inputs.fault is None:
         yield ("inputs",), "without a fault contact a station that is out of order reads idle"
     yield from needlessly_accepted(_unsafe(settings), settings.accept_unsafe)
-    yield (), "contacts tell nobody's receiver: the robot on the pad is not verified"
+    yield (), "contacts show no receiver's id: the robot on the pad is not verified"
 
 
 def create(name: str, settings: DryContactChargerSettings, bus: PointsBus) -> "DryContactCharger":

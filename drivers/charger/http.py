@@ -36,7 +36,7 @@ class HttpChargerSettings(ChargerSettings, frozen=True, kw_only=True, forbid_unk
     """One station. The paths follow the bus's `api_base`."""
 
     codes: Annotated[
-        Codes | None, tells("what the maker's state numbers mean; not needed with `rules`.")
+        Codes | None, tells("the meanings of the maker's state numbers; not needed with `rules`.")
     ] = None
     rules: Annotated[
         list[Rule], tells("derive the state from other fields of the answer; tried before `codes`.")
@@ -60,7 +60,7 @@ class HttpChargerSettings(ChargerSettings, frozen=True, kw_only=True, forbid_unk
     ] = None
     stop: Annotated[Call | None, tells("switches the power off.")] = None
     range_check: Annotated[
-        Call | None, tells("makes the station check where the robot stands, if it must be told.")
+        Call | None, tells("orders a check of the robot's position, if the station needs an order.")
     ] = None
 
     def off_after(self) -> tuple[float, tuple[str, ...]] | None:

@@ -75,9 +75,9 @@ class Power(WrittenLevels, frozen=True, kw_only=True, forbid_unknown_fields=True
     OFF = "stop"
 
     start: Annotated[Word, tells("the value that lets it charge.")]
-    stop: Annotated[Word, tells("the value that does not.")]
+    stop: Annotated[Word, tells("the value that keeps it from charging.")]
     read_back: Annotated[
-        bool, tells("false where it can only be written; then it is, in every scan.")
+        bool, tells("false where it can only be written; then it is written in every scan.")
     ] = True
 
 
@@ -101,7 +101,7 @@ class ChargerMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
         Rules and errors may use any name."""),
     ]
     codes: Annotated[
-        Codes | None, tells("what the numbers of `state` mean; not needed with `rules`.")
+        Codes | None, tells("the meanings of `state`'s numbers; not needed with `rules`.")
     ] = None
     rules: Annotated[
         list[Rule], tells("derive the state from other `values`; tried before `codes`.")
@@ -118,14 +118,15 @@ class ChargerMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
     ] = None
     clear_error: Annotated[Order | None, tells("the command that clears its error.")] = None
     range_check: Annotated[
-        Order | None, tells("makes it check where the robot stands, if it must be told.")
+        Order | None,
+        tells("orders a check of the robot's position, if the station needs an order."),
     ] = None
 
     def problems(self) -> Remarks:
         """Yield problems: names missing from `values`; unused names; a map without a state."""
         yield from by_rules.problems(self.rules, self.codes is not None)
         if self.codes and "state" not in self.values:
-            yield ("values",), "needs 'state', of which codes speaks"
+            yield ("values",), "needs 'state', because codes is given"
         looked_at = [(("rules", *path), at) for path, at in by_rules.places(self.rules)]
         looked_at += [(("errors", *path), at) for path, at in self.errors.places()]
         looked_at += [(("temperatures", name), at) for name, at in self.temperatures.items()]

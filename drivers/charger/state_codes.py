@@ -31,12 +31,12 @@ class Codes(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     released: Annotated[list[Code], tells("disconnected, not ready for another robot yet.")] = []
     error: Annotated[
         list[Code],
-        tells("out of service, manual too; the station's own, if `robot_error` has others."),
+        tells("out of service, also by hand; with `robot_error`, errors of the station."),
     ] = []
     station_error: Annotated[
         list[Code],
-        tells("""out of service by an error that the maker calls the station's own; with these,
-        `error` may be either side's."""),
+        tells("""out of service by an error that the maker assigns to the station; if given, `error`
+        may be of either side."""),
     ] = []
     robot_error: Annotated[
         list[Code], tells("an error of the robot's side: the station itself is well.")

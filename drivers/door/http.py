@@ -45,7 +45,7 @@ class HttpDoorSettings(DoorSettings, frozen=True, kw_only=True, forbid_unknown_f
     hold: Annotated[Call, tells("switches on the relay that holds the door open.")]
     release: Annotated[Call, tells("switches it off, so that the door closes by its own rules.")]
     held: Annotated[
-        JsonFlag | None, tells("says that the relay is on; without it nothing proves it off.")
+        JsonFlag | None, tells("the relay is on; without this field nothing proves that it is off.")
     ] = None
     switches_off_after_s: Annotated[
         Timeout | None,

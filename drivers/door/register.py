@@ -65,7 +65,7 @@ def door_map(settings: RegisterDoorSettings) -> DoorMap:
 
 
 def points(settings: RegisterDoorSettings) -> dict[str, Point]:
-    """Return part of the map -> this operator's register or coil, `command` included."""
+    """Return the place at this operator of each part of the map, by the part's name."""
     return {
         part: at(settings.unit, text, settings.base_address)
         for part, text in door_map(settings).places().items()

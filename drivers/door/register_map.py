@@ -16,14 +16,14 @@ Percent = Annotated[int, msgspec.Meta(ge=0, le=100)]
 class Status(InRegister, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """The door's state as one number; an unlisted number is a fault."""
 
-    open: Annotated[list[Word], msgspec.Meta(min_length=1), tells("those of a fully open door.")]
-    closed: Annotated[list[Word], msgspec.Meta(min_length=1), tells("those of a closed door.")]
+    open: Annotated[list[Word], msgspec.Meta(min_length=1), tells("numbers of a fully open door.")]
+    closed: Annotated[list[Word], msgspec.Meta(min_length=1), tells("numbers of a closed door.")]
     moving: Annotated[
         list[Word],
         msgspec.Meta(min_length=1),
-        tells("those of a door between its ends, without a fault."),
+        tells("numbers of a door between its ends, without a fault."),
     ]
-    faults: Annotated[dict[Word, Name], tells("number -> what is wrong.")] = msgspec.field(
+    faults: Annotated[dict[Word, Name], tells("number -> fault.")] = msgspec.field(
         default_factory=dict
     )
 
@@ -85,20 +85,20 @@ class HoldCommand(WrittenLevels, frozen=True, kw_only=True, forbid_unknown_field
 class Parts(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Parts that replace parts of the profile's map; each is given in full."""
 
-    status: Annotated[Status | None, tells("where the door is, as one number.")] = None
-    position: Annotated[DoorPosition | None, tells("how far it is open.")] = None
-    errors: Annotated[OperatorFaults | None, tells("the faults that it reports.")] = None
+    status: Annotated[Status | None, tells("the door's state as one number.")] = None
+    position: Annotated[DoorPosition | None, tells("the door's position.")] = None
+    errors: Annotated[OperatorFaults | None, tells("the operator's faults.")] = None
     obstruction: Annotated[
         RegisterBit | None, tells("somebody is in the doorway: a hold lasts until it is clear.")
     ] = None
-    command: Annotated[HoldCommand | None, tells("what holds it open.")] = None
+    command: Annotated[HoldCommand | None, tells("the command that holds the door open.")] = None
 
 
 class DoorMap(Parts, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """An operator's register map. Addresses begin at 0."""
 
-    status: Annotated[Status, tells("where the door is, as one number.")]
-    command: Annotated[HoldCommand, tells("what holds it open.")]
+    status: Annotated[Status, tells("the door's state as one number.")]
+    command: Annotated[HoldCommand, tells("the command that holds the door open.")]
 
     def changed(self, parts: Parts | None) -> "DoorMap":
         """Return this map with `parts` in place of its own."""

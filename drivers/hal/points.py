@@ -32,7 +32,7 @@ class Input(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     ] = None
     debounce_s: Annotated[
         DebounceSeconds | None,
-        tells("how long a change must last; as the kind has it when absent."),
+        tells("how long a change must last; the kind's default when absent."),
     ] = None
 
     def wire(self, signal: str, path: tuple[str, ...], debounce_s: float | None) -> "Wire":

@@ -153,8 +153,8 @@ class LiftCommand(WrittenLevels, frozen=True, kw_only=True, forbid_unknown_field
         tells("""`coil N` or `holding register N`. Commands may share a register: their values are
         joined, bit by bit."""),
     ]
-    ask: Annotated[Word, tells("the value that asks for it.")] = 1
-    release: Annotated[Word, tells("the value that does not; its safe value.")] = 0
+    ask: Annotated[Word, tells("the value of the request.")] = 1
+    release: Annotated[Word, tells("the value for no request, its safe value.")] = 0
 
 
 class CallCommand(WrittenPlace, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -242,7 +242,7 @@ class Commands(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
 class LiftMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """The gateway's register map. Addresses begin at 0."""
 
-    floor: Annotated[FloorField, tells("where the car is.")]
+    floor: Annotated[FloorField, tells("the car's position.")]
     door: Annotated[DoorField, tells("the car's door.")]
     rear_door: Annotated[DoorField | None, tells("the car's rear door.")] = None
     motion: Annotated[MotionField | None, tells("the car's motion.")] = None

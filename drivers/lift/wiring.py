@@ -40,7 +40,7 @@ class ParityInput(LiftInput, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     """A parity line, which reveals a broken line of the code."""
 
     total: Annotated[
-        Literal["even", "odd"], tells("what the number of asserted lines is, with this one.")
+        Literal["even", "odd"], tells("the number of asserted lines, this line included.")
     ]
 
 
@@ -240,7 +240,7 @@ class LiftWiring(LiftSettings, frozen=True, kw_only=True, forbid_unknown_fields=
     """A lift on dry contacts, on GPIO pins or a Modbus I/O module."""
 
     inputs: Annotated[LiftInputWiring, tells("the lines from the lift.")]
-    floor_code: Annotated[FloorCode, tells("where the car is.")]
+    floor_code: Annotated[FloorCode, tells("the car's position.")]
     outputs: Annotated[LiftOutputWiring, tells("the lines to the lift, except calls.")]
     calls: Annotated[
         dict[Name, Output], tells("landing -> its line. Give either `calls` or `call_code`.")

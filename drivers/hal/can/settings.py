@@ -35,7 +35,9 @@ class Slcan(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
 
     port: Annotated[Name, tells("its path; one in /dev/serial/by-id stays the same.")]
     bitrate: Annotated[
-        int, msgspec.Meta(ge=10_000, le=1_000_000, extra={"unit": "bit/s"}), tells("the CAN bus's.")
+        int,
+        msgspec.Meta(ge=10_000, le=1_000_000, extra={"unit": "bit/s"}),
+        tells("the CAN bus's bitrate."),
     ]
     baudrate: Annotated[
         int,
@@ -54,7 +56,7 @@ class CanSettings(BusSettings, frozen=True, kw_only=True, forbid_unknown_fields=
     ] = None
     slcan: Annotated[Slcan | None, tells("an adapter on a serial port.")] = None
     timeout_s: Annotated[
-        Timeout, tells("how long a reply, or an adapter that takes a frame, may take.")
+        Timeout, tells("the time limit for a reply, and for an adapter to take a frame.")
     ] = 0.2
     scan_s: Annotated[Period, tells("how often devices are read and frames sent.")] = 0.2
 

@@ -86,7 +86,7 @@ def wire_problems(wire: Wire) -> Iterable[str]:
     elif wire.pull is not None:
         yield "an output has no pull"
     elif wire.flash is not None:
-        yield "flash is for modules that time pulses; a pin's are timed here: leave it out"
+        yield "flash is for modules that time pulses; the daemon times a pin's pulses: leave flash out"
     elif name in HAT_EEPROM:
         yield f"{name} belongs to the HAT EEPROM, and the firmware drives it at boot: use another"
 

@@ -97,7 +97,9 @@ class DeviceWatchdogs:
         for watchdog in trips:
             self._seen[watchdog] = watchdog.trips
         if trips:
-            raise HalError("the module's watchdog had tripped: its outputs were off; armed again")
+            raise HalError(
+                "the module's watchdog tripped and switched its outputs off; it is armed again"
+            )
 
 
 class Watchdogs:

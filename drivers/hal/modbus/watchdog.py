@@ -18,7 +18,7 @@ from drivers.profiles import Profile
 class RegisterWrite(WrittenPlace, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """One write."""
 
-    value: Annotated[Word, tells("what is written.")]
+    value: Annotated[Word, tells("the value to write.")]
 
 
 class Refresh(WrittenPlace, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -32,9 +32,9 @@ class Refresh(WrittenPlace, frozen=True, kw_only=True, forbid_unknown_fields=Tru
 
 
 class Shows(Placed, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A place, and its values that count."""
+    """A place, and the values to match."""
 
-    values: Annotated[list[Word], msgspec.Meta(min_length=1), tells("any of these counts.")]
+    values: Annotated[list[Word], msgspec.Meta(min_length=1), tells("one of them must match.")]
 
 
 class Habits(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -47,9 +47,9 @@ class Habits(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     armed: Annotated[
         list[Shows], msgspec.Meta(min_length=1), tells("places that all read so while it is armed.")
     ]
-    refresh: Annotated[Refresh, tells("what keeps it from tripping.")]
-    refresh_s: Annotated[Period, tells("how often that is done; at most half of `time_s`.")]
-    tripped: Annotated[list[Shows], tells("places of which any reads like this after a trip.")] = []
+    refresh: Annotated[Refresh, tells("the write that keeps it from tripping.")]
+    refresh_s: Annotated[Period, tells("how often it is refreshed; at most half of `time_s`.")]
+    tripped: Annotated[list[Shows], tells("places; one of them reads so after a trip.")] = []
     rearm: Annotated[list[RegisterWrite], tells("the writes that end a trip, before `arm`.")] = []
 
     def problems(self) -> Remarks:

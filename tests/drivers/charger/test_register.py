@@ -93,7 +93,7 @@ def test_two_receivers_with_long_ids_are_two() -> None:
 WRONG: dict[str, tuple[str, str]] = {
     "state: {at: input register 0}": (
         "stat: {at: input register 0}",
-        "'values' needs 'state', of which codes speaks",
+        "'values' needs 'state', because codes is given",
     ),
     "{at: flags, ignore": ("{at: flagz, ignore", "unknown value 'flagz': did you mean 'flags'?"),
     "{at: coil 0, start: 1, stop: 0}": (
