@@ -150,7 +150,7 @@ def test_a_trip_makes_the_outputs_unknown_and_the_door_is_held_again(site: Site)
         return failures[-1] == "" and site.bench.relay() == [True, False, True]
 
     wait_until(held_again, "held again")
-    assert "watchdog had tripped: its outputs were off; armed again" in "".join(failures)
+    assert "watchdog tripped and switched its outputs off; it is armed again" in "".join(failures)
     assert site.register(STATE) == RUNNING
     wait_until(lambda: site.bench.ends() == OPEN, "open again")
 
@@ -161,7 +161,7 @@ def test_a_trip_that_nobody_drives_through_is_seen_by_reading_back(site: Site) -
     wait_until(lambda: site.register(STATE) == TRIPPED, "tripped")
     site.bench.clock.now += 60.0
     site.bus.scanned()
-    with pytest.raises(DriverError, match="had tripped"):
+    with pytest.raises(DriverError, match="watchdog tripped"):
         site.bench.driver.read()
     assert site.register(STATE) == RUNNING
     assert site.bench.ends() == CLOSED
