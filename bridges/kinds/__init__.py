@@ -1,6 +1,6 @@
-"""What a bridge can be, a folder for each kind. Their rules are pure; this file finds them.
+"""The kinds of bridges, a folder for each. Their rules are pure; this file finds the folders.
 
-A kind is found by the name in a YAML. Only names of existing folders are imported: there is no table to
+A kind is found by its name in a YAML. Only existing folders are imported: there is no table to
 edit, and no other file imports a kind by its name.
 """
 
@@ -18,20 +18,20 @@ if TYPE_CHECKING:
 
 
 def kind_names() -> list[str]:
-    """What `kind:` may be: the folders here that hold a `KIND`."""
+    """List the values of `kind:`: the folders here that hold a `KIND`."""
     return holding(__path__, "*/__init__.py", "KIND", lambda path: path.parent.name)
 
 
 def holding(
     roots: Iterable[str], pattern: str, record: str, name: Callable[[Path], str]
 ) -> list[str]:
-    """Names of the files in these folders that hold such a record."""
+    """List the names of the files in these folders that define `record`."""
     return sorted({name(path) for path in _files(tuple(roots), pattern, record)})
 
 
 @cache
 def _files(roots: tuple[str, ...], pattern: str, record: str) -> list[Path]:
-    """The files that hold such a record. They are read, once, and not imported: some need a vendor's
+    """Find the files that define `record`. They are read once, and not imported: some need a vendor's
     library."""
     found = (path for root in roots for path in Path(root).glob(pattern))
     holds = re.compile(rf"^{record}(:| =)", re.MULTILINE).search
@@ -39,13 +39,13 @@ def _files(roots: tuple[str, ...], pattern: str, record: str) -> list[Path]:
 
 
 def kind_called(name: str) -> "AnyKind":
-    """The kind that `kind:` names; one of `kind_names()`."""
+    """Return the kind with this name, one of `kind_names()`."""
     kind: AnyKind = _package(name).KIND
     return kind
 
 
 def recorded(kind: str) -> "Recorded":
-    """The names of a kind's values in recordings; none if its values are those of another kind."""
+    """Return the recorded names of a kind's values; none if it uses the values of another kind."""
     found: Recorded = getattr(_package(kind), "RECORDED", {})
     return found
 

@@ -1,31 +1,32 @@
-"""The charger's decision core: who has the station, whether it may energise, and what RMF is told.
+"""The charger's decision core: its request, its power, and its report to RMF.
 
 CHARGER-1. The states are IDLE → ASSIGNED → CHARGING → RELEASED → IDLE, and ERROR from any of them. A
    request leads to ASSIGNED only; every other state comes from the station's readings. CHARGING lasts
-   as long as current flows, also while it ramps down. In RELEASED the station is disconnected from its
+   as long as current flows, even while it ramps down. In RELEASED the station is disconnected from its
    robot, and the pad is not clear yet.
-CHARGER-2. A request is granted while the state is IDLE. Its repeats change nothing, and do not start it
-   again once it is over. Other requests are refused until the station is IDLE. There is one exception:
-   the robot on the pad, if the station can tell which robot that is (`pad.py`).
-CHARGER-3. `start_timeout` counts from the grant. A request that has not charged by then ends, through
+CHARGER-2. A request is granted while the state is IDLE. Its repeats change nothing, even after its end.
+   Other requests are refused until the station is IDLE. There is one exception: a request for the robot
+   on the pad, if the station can identify that robot (`pad.py`).
+CHARGER-3. `start_timeout` counts from the grant. A request without a charge by then ends, through
    RELEASED to IDLE. The reason is shown as a fault, as RMF's error message is blank unless the state is
    ERROR.
-CHARGER-4. A cancel ends the request that it names and no other. If current flows, the power is switched
+CHARGER-4. A cancel ends only the request that it names. If current flows, the power is switched
    off, and the state stays CHARGING until the station has stopped. A full battery ends a request
    likewise.
-CHARGER-5. The station is energised only for the robot that it is assigned to, once that robot is seen
-   on the pad and in range, and while a pad that moves is at its height. Another robot gets no power:
-   the state is ERROR with its name, and the request goes on waiting.
-CHARGER-6. At a fault the power is switched off before the fault is reported. It comes back only with a
+CHARGER-5. The station is energised only for its assigned robot, once that robot is seen on the pad and
+   in range, and while a movable pad is at its height. Another robot gets no power: the state is ERROR
+   with that robot's name, and the request goes on waiting.
+CHARGER-6. At a fault the power is switched off before the fault is reported. Power returns only with a
    new request. A station that is at fault, or that goes on charging when told to stop, is out of
    service (PROTECTION): the state is ERROR until its errors have been cleared and a good reading
    follows. A fault of the robot does not take the station out of service.
-CHARGER-7. Failed polls say nothing about the charge. After `misses` of them the state is ERROR, and
-   robot and request stay. Only a good reading ends a request or frees a station. An operator can do so
-   too, once the station must have switched off by itself (`peer_internal_timeout_s`).
+CHARGER-7. Failed polls say nothing about the charge. After `misses` failed polls the state is ERROR,
+   and robot and request stay. Only a good reading ends a request or frees a station; or an operator,
+   after the station must have switched off by itself (`peer_internal_timeout_s`).
 CHARGER-8. If a charge is under way when the daemon starts, or when it reaches the station again, it is
    shown and not stopped. The next request gets that charge only if its robot is seen on the pad.
-CHARGER-9. Errors are cleared when an operator says so, or at most `clear_errors_per_h` times an hour.
+CHARGER-9. Errors are cleared by an operator's order, and by the daemon at most `clear_errors_per_h`
+   times an hour.
 CHARGER-10. While another node publishes states under this charger's name, the power is off, no error is
    cleared, and the state is ERROR.
 """
@@ -63,20 +64,20 @@ from bridges.kinds.shared.decision import (
 from bridges.kinds.shared.durations import AGES_AGO, NEVER, RIVAL_QUIET_S
 
 REMEMBERED = 8
-"""How many ended requests are remembered, so that their late repeats are refused."""
+"""The number of ended requests remembered, to refuse their late repeats."""
 CLEARED_WITHIN_S = 30.0
-"""How long after a clearing a good reading still proves that it has helped."""
+"""A good reading proves the success of a clearing up to this long after it."""
 
 
 def initial(limits: ChargerLimits, now: float) -> ChargerMemory:
-    """Nothing has been read, and no request holds the station."""
+    """Return the memory at start: no reading, and no request."""
     return ChargerMemory()
 
 
 def decide(
     memory: ChargerMemory, event: Event, now: float, limits: ChargerLimits
 ) -> Decision[ChargerMemory, ChargerOutputs, ChargerReport]:
-    """One scan: take the event in, then derive outputs and report afresh."""
+    """Decide one scan: take the event in, then derive outputs and report afresh."""
     memory, refused = _take(memory, event, now, limits)
     memory = replace(memory, power=_power(memory, now, limits))
     outputs = ChargerOutputs(memory.power, memory.clear_errors, memory.range_checks)
@@ -134,7 +135,7 @@ def _sampled(
 
 
 def _held(memory: ChargerMemory, holder: ChargeSession | None) -> ChargerMemory:
-    """The memory with this session. If it is None, the ended request is remembered in `over`."""
+    """Set the session. If it is None, remember the ended request in `over`."""
     if holder or not memory.holder:
         return replace(memory, holder=holder)
     ended = memory.holder.request.request_id
@@ -143,7 +144,7 @@ def _held(memory: ChargerMemory, holder: ChargeSession | None) -> ChargerMemory:
 
 
 def _watched(memory: ChargerMemory, now: float) -> ChargerMemory:
-    """Note since when the station charges although it was told not to."""
+    """Note the start of a charge against our order to stop."""
     sample = memory.sample
     charges = sample and (sample.activity is Activity.CHARGING or sample.charges)
     if memory.power is not False or not charges:
@@ -153,8 +154,8 @@ def _watched(memory: ChargerMemory, now: float) -> ChargerMemory:
 
 
 def _protected(memory: ChargerMemory, now: float, limits: ChargerLimits) -> ChargerMemory:
-    """The memory in or out of service: a station's fault starts it, a good reading after a clearing
-    ends it."""
+    """Take the station out of service at its fault, and into service at a good reading after a
+    clearing."""
     sample, since = memory.sample, memory.disobeyed_since
     assert sample
     if not limits.can_stop:
@@ -221,7 +222,7 @@ def _granted(
 
 
 def _in_the_way(memory: ChargerMemory, on_pad: bool, now: float, limits: ChargerLimits) -> bool:
-    """Is there an error that granting this request would not clear?"""
+    """Is there an error that a grant of this request would not clear?"""
     found = report.errors(memory, now, limits)
     return any(not (on_pad and fault.code == pad.WRONG_DOCKING) for fault in found)
 
@@ -249,7 +250,7 @@ def _reset(memory: ChargerMemory, now: float, limits: ChargerLimits) -> tuple[Ch
 
 
 def _freed(memory: ChargerMemory, now: float, limits: ChargerLimits) -> tuple[ChargerMemory, str]:
-    """An operator frees a silent station, once it must have switched off by itself."""
+    """Free a silent station by an operator's order, if it must have switched off by itself."""
     after_s = limits.t.peer_internal_timeout_s
     silent_s = NEVER if memory.read_at is None else now - memory.read_at
     if memory.holder is None or after_s is None or silent_s < after_s:
@@ -277,7 +278,7 @@ def _clear(memory: ChargerMemory, now: float) -> ChargerMemory:
 
 
 def _power(memory: ChargerMemory, now: float, limits: ChargerLimits) -> bool | None:
-    """May the station energise? None: leave it as it is."""
+    """May the station energise? None: change nothing."""
     holder = memory.holder
     if rivalled(memory, now) or memory.protection or (holder and holder.over):
         return False

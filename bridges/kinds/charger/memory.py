@@ -1,4 +1,4 @@
-"""What the charger's core remembers from scan to scan, and the limits that it is given."""
+"""The charger core's memory from scan to scan, and its limits."""
 
 from collections.abc import Mapping
 from typing import Literal
@@ -17,7 +17,7 @@ from bridges.kinds.shared.durations import AGES_AGO, RIVAL_QUIET_S
 
 
 class ChargerLimits(msgspec.Struct, frozen=True):
-    """What the core needs of a charger's settings. `t`: durations and counts.
+    """The core's share of a charger's settings. `t`: durations and counts.
 
     `receivers`: receiver id -> robot; empty if robots are not verified. `can_stop`: the station obeys
     `power`.
@@ -32,18 +32,18 @@ class ChargerLimits(msgspec.Struct, frozen=True):
     def of(
         cls, settings: ChargerSettings, debounce: Mapping[str, float] | None = None
     ) -> "ChargerLimits":
-        """From the YAML; a charger has no contacts to debounce."""
+        """Make the limits from the YAML; a charger has no contacts to debounce."""
         known = {receiver: robot(text) for receiver, text in settings.receivers.items()}
         return cls(settings.limits, known, settings.unrequested, settings.can_stop())
 
 
 class ChargeSession(msgspec.Struct, frozen=True):
-    """A request that holds the station, and how far its charge has come.
+    """The request that holds the station, and the progress of its charge.
 
-    `start_by`: when charging must have started (monotonic s). `paused_at`: since when another robot on
-    the pad has kept it from starting. `checked_at`: when its robot's position was last asked for.
-    `started`: current has flowed for it. `failed`: the station was at fault, so this request gets no
-    more power. `ended`: why it is over. `released_at`: since when its robot is disconnected.
+    `start_by`: the time limit for the start of charging (monotonic s). `paused_at`: the time since which
+    another robot on the pad prevents the start. `checked_at`: the time of its last range check.
+    `started`: current has flowed for this request. `failed`: the station was at fault, so this request
+    gets no more power. `ended`: the reason of its end. `released_at`: the time of the disconnection.
     """
 
     request: ChargeRequested
@@ -57,19 +57,19 @@ class ChargeSession(msgspec.Struct, frozen=True):
 
     @property
     def over(self) -> bool:
-        """This request gets no more power."""
+        """Will this request get no more power?"""
         return self.failed or bool(self.ended) or self.released_at is not None
 
 
 class ChargerMemory(msgspec.Struct, frozen=True):
     """Everything that outlives a scan. `sample`: the last good reading, taken at `read_at`.
 
-    `misses`: polls that failed in a row. `write_misses`: scans in a row whose commands failed;
-    `write_failed`: this scan's did. `power`: as last decided; `disobeyed_since`: since when the station
-    charges although `power` is off. `adopted`: the station was charging when we reached it, and that
-    charge is left alone. `protection`: why the station is out of service, "" while it is in service;
-    `clear_by`: until when a good reading proves that a clearing has helped. `over`: the last requests
-    that have ended.
+    `misses`: failed polls in a row. `write_misses`: scans in a row with failed commands;
+    `write_failed`: this scan's commands failed. `power`: as last decided; `disobeyed_since`: the start
+    of a charge although `power` is off. `adopted`: the station was charging when we reached it, and
+    that charge is left alone. `protection`: the reason why the station is out of service, "" while it is
+    in service; `clear_by`: a good reading until then proves the success of a clearing. `over`: the
+    requests that ended last.
     """
 
     sample: ChargerSample | None = None

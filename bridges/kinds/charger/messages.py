@@ -18,11 +18,11 @@ from bridges.messages.definitions import (
 from bridges.messages.stamps import duration, in_seconds
 
 LONGEST_TIMEOUT_S = 86400.0
-"""A day. A longer timeout must be a mistaken unit."""
+"""One day. A longer timeout must be in a wrong unit."""
 
 
 def accept_request(request: ChargerRequest, settings: ChargerSettings) -> ChargeRequested:
-    """The ChargerRequest as an event. Raises RequestRefused if it is malformed.
+    """Turn a ChargerRequest into an event. Raises RequestRefused if it is malformed.
 
     A start_timeout of zero means the configured default.
     """
@@ -40,9 +40,9 @@ def accept_request(request: ChargerRequest, settings: ChargerSettings) -> Charge
 
 
 def accept_cancel(cancel: ChargerCancel, settings: ChargerSettings) -> Cancelled:
-    """The ChargerCancel as an event. Raises RequestRefused if it is malformed.
+    """Turn a ChargerCancel into an event. Raises RequestRefused if it is malformed.
 
-    A charge without a request is cancelled by the request id under which its state is published.
+    To cancel a charge without a request, give the request id of its published state.
     """
     _check("request_id", cancel.request_id)
     if cancel.request_id == UNREQUESTED + cancel.charger_name:
@@ -68,14 +68,14 @@ def _start_timeout_s(timeout: Duration) -> float:
 
 
 def device_name(message: ChargerRequest | ChargerCancel | ChargerState) -> str:
-    """Which charger a message is about."""
+    """Return the charger that a message is about."""
     return message.charger_name
 
 
 def state_message(
     name: str, settings: ChargerSettings, report: ChargerReport, stamp: Time
 ) -> ChargerState:
-    """The report as RMF reads it; `stamp` is when the station was read."""
+    """Convert the report to RMF's message; `stamp` is the time of the station's reading."""
     request_id = report.request_id
     if not request_id and report.state is not ChargerStateValue.CHARGER_IDLE:
         request_id = UNREQUESTED + name
@@ -92,9 +92,8 @@ def state_message(
 
 
 def summary(report: ChargerReport) -> Mapping[str, str]:
-    """The report in one line, for a person. A robot is marked unverified unless the station has seen
-    its receiver.
-    """
+    """Summarise the report in one line, for a person. A robot is marked unverified unless the station
+    has seen its receiver."""
     measured = report.measured
     seen = "" if report.verified else " (unverified)"
     texts = {

@@ -1,16 +1,16 @@
-"""Who stands on the pad, and may the pad be energised?
+"""The robot on the pad, and the permission to energise the pad.
 
 Does the receiver that the station sees belong to the request's robot? Without `receivers` in the YAML
-no robot is verified: any robot counts as the one of the request. With `receivers`, a station that does
-not say which receiver it sees charges nobody.
+no robot is verified: any robot counts as the request's robot. With `receivers`, a station charges nobody
+if it does not identify the receiver that it sees.
 
-A station that moves its pad, or that says whether a robot is in range, gives no power unless the pad is
-at its height and the robot in range. Nothing announces that a robot leaves, so both are only read: a
-pad that has left its height while current flows is a fault of the station.
+A station that moves its pad, or checks the robot's range, gives no power unless the pad is at its
+height and the robot in range. Nothing announces that a robot leaves, so height and range are only read:
+a pad that has left its height while current flows is a fault of the station.
 
-If something stands on the pad that should not, ChargerState's error_message says so.
-`Misplaced.text` writes that text and `misplaced_in` reads it. An id that would make the text
-ambiguous is quoted as in JSON, so every id can be read back.
+A wrong robot or receiver on the pad is named in ChargerState's error_message. `Misplaced.text` writes
+that text and `misplaced_in` reads it. An id that would make the text ambiguous is quoted as in JSON, so
+every id can be read back.
 """
 
 import json
@@ -42,10 +42,10 @@ _TEXT = re.compile(
 
 
 class PadOccupant(msgspec.Struct, frozen=True):
-    """What stands on the pad. `unverified`: the YAML has no receivers. `mute`: the station does not say
-    which receiver it sees. `stranger`: a receiver that the YAML does not list.
+    """The occupant of the pad. `unverified`: the YAML has no receivers. `mute`: the station does not
+    identify the receiver. `stranger`: a receiver that the YAML does not list.
 
-    `receiver`: the id that it sees. `robot`: whose receiver that is, None if it is not listed.
+    `receiver`: the id that the station sees. `robot`: the receiver's robot, None if not listed.
     """
 
     sort: Literal["unverified", "mute", "empty", "robot", "stranger"]
@@ -62,7 +62,7 @@ class PadOccupant(msgspec.Struct, frozen=True):
 
 
 def seen(sample: ChargerSample | None, limits: ChargerLimits) -> PadOccupant:
-    """The pad as one reading shows it."""
+    """Identify the pad's occupant from one reading."""
     if not limits.receivers:
         return PadOccupant("unverified")
     receiver = sample.measured.receiver_id if sample else None
@@ -75,14 +75,14 @@ def seen(sample: ChargerSample | None, limits: ChargerLimits) -> PadOccupant:
 
 
 def not_ready(sample: ChargerSample) -> str:
-    """Why the pad must not be energised for anybody; "" if the station says nothing against it."""
+    """Explain why the pad must not be energised for any robot; "" if nothing in the reading forbids it."""
     if sample.measured.at_height is False:
         return "the pad is not at its height"
     return "the robot is not in range" if sample.measured.range_ok is False else ""
 
 
 def judged(sample: ChargerSample) -> ChargerSample:
-    """The reading, as a fault of the station if the pad has left its height under power."""
+    """Turn the reading into a fault of the station if the pad has left its height under power."""
     if sample.activity is not Activity.CHARGING or sample.measured.at_height is not False:
         return sample
     return replace(
@@ -95,9 +95,9 @@ def judged(sample: ChargerSample) -> ChargerSample:
 
 
 class Misplaced(msgspec.Struct, frozen=True):
-    """What stands on the pad and should not: a known `robot`, else an unknown `receiver`.
+    """A wrong occupant of the pad: a known `robot`, else an unknown `receiver`.
 
-    `expected`: the robot that the station waits for, None if it waits for none.
+    `expected`: the robot for which the station waits, None if it waits for none.
     """
 
     robot: RobotName | None
@@ -115,7 +115,7 @@ class Misplaced(msgspec.Struct, frozen=True):
 
 
 def misplaced_in(text: str) -> Misplaced | None:
-    """The Misplaced that `Misplaced.text` wrote; None for any other text."""
+    """Read a text of `Misplaced.text`; None for any other text."""
     found = _TEXT.fullmatch(text)
     if found is None:
         return None
@@ -139,7 +139,7 @@ def _read(part: str) -> str:
 
 
 def misplaced(memory: ChargerMemory, limits: ChargerLimits) -> Fault | None:
-    """Why the station must not energise for what is on the pad; None if it may."""
+    """Return the fault of a wrong occupant that must get no power; None if power is allowed."""
     pad, holder = seen(memory.sample, limits), memory.holder
     expected = holder.request.who if holder and not holder.over else None
     if pad.sort == "mute":
@@ -154,7 +154,7 @@ def misplaced(memory: ChargerMemory, limits: ChargerLimits) -> Fault | None:
 
 
 def left_alone(memory: ChargerMemory, limits: ChargerLimits) -> bool:
-    """Does current flow without a request, in a case where we do not stop it?"""
+    """Does current flow without a request, and do we leave it on?"""
     if memory.sample is None or memory.sample.activity not in CURRENT_FLOWS:
         return False
     return memory.adopted or not limits.can_stop or limits.unrequested == "serve_known"

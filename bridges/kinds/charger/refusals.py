@@ -1,8 +1,8 @@
-"""The answer to a ChargerRequest that is refused: what is published, and how it is read.
+"""The published answer to a refused ChargerRequest, and its reader.
 
-ChargerState shows the station's truth and nothing else, and RMF has no message for a refusal. So a
-refusal goes out as a diagnostic_msgs/DiagnosticStatus on a topic of ours, `charger_refusals`: a type
-that every ROS machine has, whose fields `ros2 topic echo` shows by their names.
+ChargerState shows only the station's true state, and RMF has no message for a refusal. So a refusal is
+published as a diagnostic_msgs/DiagnosticStatus on our own topic `charger_refusals`: every ROS machine
+has this type, and `ros2 topic echo` shows its fields by their names.
 """
 
 from collections.abc import Mapping
@@ -20,14 +20,14 @@ from bridges.messages.words import LONGEST_NAME
 
 NAME = "ChargerRequest refused"
 OCCUPIED = "charger occupied"
-"""The one reason that ends when the charger is released."""
+"""The only reason that ends with the charger's release."""
 LONGEST_REASON = 500
 
 
 class ChargerRefusal(msgspec.Struct, frozen=True, kw_only=True):
-    """Why a request was refused, and who has the charger.
+    """The reason of a refusal, and the charger's holder.
 
-    `robot`: FLEET/ROBOT that the request was for. `state`: the charger's, in RMF's word. `held_by`,
+    `robot`: the request's FLEET/ROBOT. `state`: the charger's state, in RMF's word. `held_by`,
     `held_request`: the robot that has the charger and the id of its request, "" for nobody. `error`:
     the charger's error text, "" if it has none.
     """
@@ -43,23 +43,23 @@ class ChargerRefusal(msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def text(self) -> str:
-        """In one line: `charger occupied: tiny/AMR01 has it (request req-1)`."""
+        """Summarise in one line: `charger occupied: tiny/AMR01 has it (request req-1)`."""
         request = f" (request {self.held_request})" if self.held_request else ""
         who = f"{self.held_by or 'a robot'} has it{request}" if self.held_by or request else ""
         return ": ".join(filter(None, (self.reason, "; ".join(filter(None, (who, self.error))))))
 
     def message(self) -> DiagnosticStatus:
-        """As it is published: the values are the fields, by their names."""
+        """Make the published message: its values are the fields, by their names."""
         values = tuple(KeyValue(key, value) for key, value in self.fields().items())
         return DiagnosticStatus(int(DiagnosticLevel.WARN), NAME, self.text, self.charger, values)
 
     def fields(self) -> Mapping[str, str]:
-        """The fields, for the status file."""
+        """Return the fields, for the status file."""
         return {key: getattr(self, key) for key in self.__struct_fields__}
 
 
 def read(status: DiagnosticStatus) -> ChargerRefusal | None:
-    """The ChargerRefusal that `message` wrote; None for any other status."""
+    """Read a message of `ChargerRefusal.message`; None for any other status."""
     values = {pair.key: pair.value for pair in status.values}
     if status.name != NAME or not {"request_id", "charger", "robot", "reason"} <= values.keys():
         return None
@@ -67,7 +67,7 @@ def read(status: DiagnosticStatus) -> ChargerRefusal | None:
 
 
 def refused(request_id: str, charger: str, who: RobotName, reason: str) -> ChargerRefusal:
-    """The refusal of a request, which may be malformed: a name may be of any length."""
+    """Make the refusal of a request. It may be malformed, with names of any length."""
     return ChargerRefusal(
         request_id=_cut(request_id),
         charger=_cut(charger),
@@ -77,10 +77,10 @@ def refused(request_id: str, charger: str, who: RobotName, reason: str) -> Charg
 
 
 def answer(name: str, request: object, reason: str, report: ChargerReport) -> RefusalAnswer | None:
-    """What is published when charger `name` refuses this; None for anything but a request.
+    """Make the published answer to a request that charger `name` refuses; None for other messages.
 
-    `request`: the message, if it is malformed, else the core's event. `report`: the charger as it
-    is now.
+    `request`: the message, if it is malformed, else the core's event. `report`: the charger's present
+    report.
     """
     match request:
         case ChargerRequest():

@@ -1,8 +1,8 @@
-"""What RMF, the log and the status file are told of a charger, and how an error's text is read.
+"""A charger's report to RMF, the log and the status file; and the reader of its error texts.
 
-RMF's ChargerState has one text for everything that is wrong. From that text the coordinator
-(`bridges/kinds/charger_coordinator/`) must find out which side is at fault: `error_message` writes
-it and `diagnosis` reads it.
+RMF's ChargerState has one text for all errors. From that text the coordinator
+(`bridges/kinds/charger_coordinator/`) must find the side at fault: `error_message` writes
+the text and `diagnosis` reads it.
 """
 
 from enum import StrEnum
@@ -26,23 +26,23 @@ ERROR = ChargerStateValue.CHARGER_ERROR
 
 UNREQUESTED = "unrequested/"
 """ChargerState has a request id in every state but IDLE. Without a request (an error of a free
-station, a charge that nobody requested) the id is this, followed by the charger's name."""
+station, an unrequested charge) the id is this prefix and the charger's name."""
 
 LOST = {
     "TWO_NODES_FOR_ONE_DEVICE": "two nodes for one device",
     "CHARGER_UNREACHABLE": "Charger unreachable",
     "CHARGER_NOT_COMMANDED": "Charger takes no commands",
 }
-"""The error message of a station that is not reached. It is a fixed text; the fault has the reason."""
+"""Fixed error messages of unreachable stations and the like; the fault has the reason."""
 OUT_OF_SERVICE = "out of service after: "
 
 
 class FaultCause(StrEnum):
-    """Which side is at fault.
+    """The side at fault.
 
-    PAD: what stands on the pad should not be there. LOST: the station cannot be reached or commanded,
-    which says nothing about station or robot. UNCLEAR: the text does not tell. Then a second station
-    shows it: a robot that fails there too is the one at fault.
+    PAD: a wrong robot or receiver is on the pad. LOST: the station cannot be reached or commanded,
+    which says nothing about station or robot. UNCLEAR: the text names no side. Then a second station
+    decides: a robot that fails there too is at fault.
     """
 
     NONE = ""
@@ -65,12 +65,12 @@ _BEGINNINGS = {
 
 
 def error_message(fault: Fault) -> str:
-    """ChargerState's error_message for this fault."""
+    """Write ChargerState's error_message for this fault."""
     return LOST.get(fault.code, fault.detail)
 
 
 def diagnosis(message: str) -> FaultCause:
-    """Which side is at fault, by a ChargerState's error_message; a text of another node is UNCLEAR."""
+    """Find the side at fault in a ChargerState's error_message; another node's text is UNCLEAR."""
     found = (whose for start, whose in _BEGINNINGS.items() if message.startswith(start))
     return next(found, FaultCause.UNCLEAR)
 
@@ -80,9 +80,9 @@ class ChargerReport(msgspec.Struct, frozen=True):
 
     `read_at`: monotonic seconds of the last good reading, None before the first. `error_message`:
     blank unless `state` is CHARGER_ERROR. `request_id`: blank while no request holds the station.
-    `fleet`, `robot`: the request's robot; without a request, the one on the pad of a station that is
-    not idle. `verified`: the station sees that robot's receiver. `waits`: what the request waits
-    for; "" without one, and while it is charged, over or in ERROR.
+    `fleet`, `robot`: the request's robot; without a request, the robot on the pad of a station that is
+    not idle. `verified`: the station sees that robot's receiver. `waits`: the reason why the request is
+    not charged yet; "" without a request, and while it is charged, over or in ERROR.
     """
 
     read_at: float | None
@@ -97,14 +97,13 @@ class ChargerReport(msgspec.Struct, frozen=True):
     waits: str = ""
 
     def news(self) -> object:
-        """All but the age, the measurements and what is waited for, which change while RMF is shown
-        the same."""
+        """Return all but the age, the measurements and `waits`, which RMF does not see."""
         measured = Measured(receiver_id=self.measured.receiver_id)
         return replace(self, read_at=None, measured=measured, waits="")
 
 
 def report(memory: ChargerMemory, now: float, limits: ChargerLimits) -> ChargerReport:
-    """The report as it is now."""
+    """Report the present state."""
     found = errors(memory, now, limits)
     shown = ERROR if found else state(memory)
     lost = unreachable(memory, limits)
@@ -125,7 +124,7 @@ def report(memory: ChargerMemory, now: float, limits: ChargerLimits) -> ChargerR
 
 
 def _waits(memory: ChargerMemory, shown: ChargerStateValue, limits: ChargerLimits) -> str:
-    """What the request waits for that is not charged yet, or must not be charged now."""
+    """Explain why the request is not charged yet, or must not be charged now."""
     holder, sample = memory.holder, memory.sample
     if not holder or not sample or shown not in (ASSIGNED, CHARGING):
         return ""
@@ -143,7 +142,7 @@ def _waits(memory: ChargerMemory, shown: ChargerStateValue, limits: ChargerLimit
 
 
 def state(memory: ChargerMemory) -> ChargerStateValue:
-    """RMF's state of a station without an error."""
+    """Return RMF's state of a station without an error."""
     sample, holder = memory.sample, memory.holder
     if sample is not None and sample.activity in CURRENT_FLOWS:
         return CHARGING
@@ -154,7 +153,7 @@ def state(memory: ChargerMemory) -> ChargerStateValue:
 
 
 def errors(memory: ChargerMemory, now: float, limits: ChargerLimits) -> list[Fault]:
-    """Why the state is ERROR, most serious first."""
+    """List the reasons for the state ERROR, most serious first."""
     found = []
     if rivalled(memory, now):
         what = "another node publishes this charger's states"
@@ -177,7 +176,7 @@ def errors(memory: ChargerMemory, now: float, limits: ChargerLimits) -> list[Fau
 
 
 def error_text(sample: ChargerSample) -> str:
-    """A station's error in its own words, after the side that is at fault."""
+    """Return a station's error in its own words, after the side at fault."""
     text = sample.error_text or f"the charger reports an error (vendor state {sample.code})"
     if diagnosis(text) in (FaultCause.PAD, FaultCause.LOST):
         text = f"the charger says: {text}"
@@ -188,7 +187,7 @@ def error_text(sample: ChargerSample) -> str:
 def _irregular(
     memory: ChargerMemory, shown: ChargerStateValue, limits: ChargerLimits
 ) -> list[Fault]:
-    """What is wrong although the state is not ERROR."""
+    """List faults that do not make the state ERROR."""
     holder = memory.holder
     if holder is None:
         who = pad.seen(memory.sample, limits).robot or "the robot is not known"
@@ -209,7 +208,7 @@ def _irregular(
 def _who(
     memory: ChargerMemory, shown: ChargerStateValue, limits: ChargerLimits
 ) -> RobotName | None:
-    """The request's robot. Without a request: the robot on the pad, or the last one seen charging."""
+    """Return the request's robot; without a request, the robot on the pad or last seen charging."""
     if memory.holder:
         return memory.holder.request.who
     if shown is IDLE or (unreachable(memory, limits) and not memory.adopted):

@@ -17,14 +17,14 @@ RANGE_EVERY_S = 5.0
 
 
 def granted(request: ChargeRequested, now: float, limits: ChargerLimits) -> ChargeSession:
-    """A request that has just got the station; its `start_timeout` counts from now."""
+    """Grant the station to a request; its `start_timeout` counts from now."""
     return ChargeSession(request, now + _patience_s(request, limits))
 
 
 def taken_over(
     holder: ChargeSession, request: ChargeRequested, now: float, limits: ChargerLimits
 ) -> ChargeSession:
-    """The session of a robot that was served without a request, and now has one."""
+    """Continue the session of a robot that was served without a request, by its new request."""
     return replace(holder, request=request, start_by=now + _patience_s(request, limits))
 
 
@@ -35,7 +35,7 @@ def _patience_s(request: ChargeRequested, limits: ChargerLimits) -> float:
 def follow(
     holder: ChargeSession, sample: ChargerSample, now: float, limits: ChargerLimits
 ) -> ChargeSession | None:
-    """The session after one reading; None when it is over and the station is free."""
+    """Advance the session by one reading; None when it is over and the station is free."""
     on_pad = pad.seen(sample, limits)
     another = on_pad.is_another(holder.request.who)
     if sample.activity in AT_FAULT and not (another and sample.side == "robot"):
@@ -62,7 +62,8 @@ def shown_released(holder: ChargeSession, now: float, limits: ChargerLimits) -> 
 def _beside_another(
     holder: ChargeSession, now: float, limits: ChargerLimits
 ) -> ChargeSession | None:
-    """Another robot is on the pad. A robot that waits keeps waiting; one that was charged has left."""
+    """Advance the session with another robot on the pad: a waiting robot waits on, a charged one has
+    left."""
     if shown_released(holder, now, limits):
         return None
     if holder.released_at is not None:
@@ -85,7 +86,7 @@ def _flowing(holder: ChargeSession, sample: ChargerSample, limits: ChargerLimits
 
 
 def _sought_again(holder: ChargeSession, now: float, limits: ChargerLimits) -> ChargeSession:
-    """The station has lost the receiver and looks for it: the request waits for its start again."""
+    """Wait for the start again: the station has lost the receiver and looks for it."""
     by = now + _patience_s(holder.request, limits)
     return replace(holder, started=False, start_by=by, checked_at=None)
 
@@ -102,11 +103,11 @@ def _pending(
     return holder
 
 
-# ---- may it start?
+# ---- permission to start
 
 
 def cleared_to_start(memory: ChargerMemory, limits: ChargerLimits) -> bool:
-    """The right robot is on the pad and in range, as far as the station can tell."""
+    """Is the right robot on the pad and in range, as far as the station can tell?"""
     holder, sample = memory.holder, memory.sample
     if holder is None or sample is None or memory.read_at is None:
         return False
@@ -119,7 +120,7 @@ def cleared_to_start(memory: ChargerMemory, limits: ChargerLimits) -> bool:
 
 
 def range_checked(memory: ChargerMemory, now: float, limits: ChargerLimits) -> ChargerMemory:
-    """Ask for a range check if only that is missing. A result from before the check does not count."""
+    """Order a range check if nothing else is missing. Results from before the check do not count."""
     holder, sample = memory.holder, memory.sample
     if holder is None or sample is None or holder.started or holder.over:
         return memory

@@ -24,7 +24,7 @@ Unrequested = Literal["serve_known", "refuse"]
 
 
 class RobotName(NamedTuple):
-    """A robot as RMF names it."""
+    """A robot's names in RMF."""
 
     fleet: str
     name: str
@@ -34,7 +34,7 @@ class RobotName(NamedTuple):
 
 
 def robot(text: str) -> RobotName:
-    """FLEET/ROBOT in its parts. Raises ValueError."""
+    """Split FLEET/ROBOT into its parts. Raises ValueError."""
     fleet, slash, name = text.partition("/")
     if not (fleet and slash and name):
         raise ValueError(f"{text!r} is not a robot: write FLEET/ROBOT, as RMF names them")
@@ -74,7 +74,7 @@ class ChargerDurations(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown
 
 
 class ChargerSettings(DeviceSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """What every charger has, whatever its driver."""
+    """Settings of every charger with any driver."""
 
     limits: Annotated[ChargerDurations, tells("what differs from the defaults.")] = (
         ChargerDurations()
@@ -94,11 +94,11 @@ class ChargerSettings(DeviceSettings, frozen=True, kw_only=True, forbid_unknown_
     ] = "stop"
 
     def can_stop(self) -> bool:
-        """Can this station be told to stop? Drivers of stations that cannot override this."""
+        """Does this station obey an order to stop? Drivers override this for stations that do not."""
         return True
 
     def problems(self) -> Remarks:
-        """Names that are not FLEET/ROBOT. A robot may have two receivers: one may be a spare."""
+        """Yield names not of the form FLEET/ROBOT. A robot may have two receivers, for a spare."""
         for receiver, text in self.receivers.items():
             try:
                 robot(text)

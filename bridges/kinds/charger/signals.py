@@ -1,4 +1,4 @@
-"""What passes between a charger's driver and its core in one scan, and the core's events.
+"""A charger's sample, outputs and events: the interface of its core.
 
 The simplest stations on HTTP give only their activity and an error text. Other controllers (CANopen,
 Modbus, another make's JSON) also fill in `measured` and obey `power`.
@@ -14,7 +14,7 @@ from bridges.kinds.shared.decision import IoFailed, OperatorReset, RivalSeen, Sa
 
 
 class Activity(StrEnum):
-    """What a station says it is doing. The names are those of the YAML, except UNKNOWN.
+    """A station's activity, as reported by itself. All names but UNKNOWN are also used in the YAML.
 
     STOPPING: told to stop or ramping down, and current still flows. RELEASED: disconnected from the
     robot, and not yet ready for another. UNKNOWN: a code that the YAML does not list.
@@ -33,17 +33,16 @@ CURRENT_FLOWS = frozenset({Activity.CHARGING, Activity.STOPPING})
 AT_FAULT = frozenset({Activity.ERROR, Activity.UNKNOWN})
 
 FaultSide = Literal["", "station", "robot"]
-"""Which side is at fault, by the controller's own diagnosis; "" if it does not say."""
+"""The side at fault by the controller's own diagnosis; "" if unknown."""
 
 
 class Measured(msgspec.Struct, frozen=True):
-    """What a controller reports besides its state; None where it does not say.
+    """A controller's reports beside its state; None if it does not report a value.
 
-    `receiver_id`: the receiver on the pad, "" if there is none. `in_range`: the robot's coil is where
-    it can be charged; False too until a range check has shown that. `range_ok`: the same where the
-    station says so all the time, without a check. `at_height`: a pad that the station moves is where
-    it charges. `volts`, `amps`: at the battery. `battery_percent`: its charge. `temperatures`: name
-    and °C.
+    `receiver_id`: the receiver on the pad, "" for none. `in_range`: a range check has shown the robot's
+    coil in range for charging; False before the check. `range_ok`: the same for stations that report
+    the range all the time, without a check. `at_height`: a movable pad is at its height for charging.
+    `volts`, `amps`: at the battery. `battery_percent`: its charge. `temperatures`: name and °C.
     """
 
     receiver_id: str | None = None
@@ -61,8 +60,8 @@ class ChargerSample(msgspec.Struct, frozen=True):
     """One reading of one station.
 
     `code`: the vendor's number or word, for texts only. `error_text`: the station's own words,
-    printable and of bounded length. `side`: which side is at fault. `charges`: the station is at fault
-    and yet says that it charges.
+    printable and of bounded length. `side`: the side at fault. `charges`: the station reports a charge
+    in spite of its fault.
     """
 
     activity: Activity
@@ -76,10 +75,10 @@ class ChargerSample(msgspec.Struct, frozen=True):
 class ChargerOutputs(msgspec.Struct, frozen=True):
     """Every command to a station.
 
-    `power`: may it energise? None changes nothing: a charge that we did not start, or a station that
-    does not answer, is neither started nor stopped blindly.
-    `clear_errors`, `range_checks`: how many clearings of errors and checks of the robot's position
-    have been ordered since the daemon started. The commands are not idempotent, so they are counts: a
+    `power`: may it energise? None changes nothing: neither a charge that we did not start nor a station
+    that does not answer is started or stopped blindly.
+    `clear_errors`, `range_checks`: the numbers of clearings of errors and of range checks
+    ordered since the daemon's start. The commands are not idempotent, so they are counts: a
     driver sends one command when a count rises, and never repeats it, even if it failed. A station
     that always knows the position ignores `range_checks`.
     """
@@ -92,7 +91,7 @@ class ChargerOutputs(msgspec.Struct, frozen=True):
 class ChargeRequested(msgspec.Struct, frozen=True):
     """A well-formed ChargerRequest for this charger; `start_timeout_s` 0 is the configured default.
 
-    The session of a robot that is served without a request has one with an empty `request_id`.
+    The session of a robot served without a request holds a ChargeRequested with an empty `request_id`.
     """
 
     request_id: str
@@ -102,7 +101,7 @@ class ChargeRequested(msgspec.Struct, frozen=True):
 
     @property
     def who(self) -> RobotName:
-        """The robot that it is for."""
+        """The request's robot."""
         return RobotName(self.fleet, self.robot)
 
 

@@ -65,7 +65,7 @@ class SiteLimits:
 
     @classmethod
     def of(cls, settings: CoordinatorSettings) -> "SiteLimits":
-        """From the YAML."""
+        """Make the limits from the YAML."""
         robots = settings.robots()
         return cls(
             robots={who: tuple(robot.stations) for who, robot in robots.items()},

@@ -153,7 +153,7 @@ def subject(message: object) -> str:
 
 
 def stamped(message: d.Message, time: Time) -> d.Message:
-    """The message with its time of sending."""
+    """Add the time of sending to a message."""
     if isinstance(message, d.Alert):
         return replace(message, id=f"{message.id}/{time.sec}")
     return message

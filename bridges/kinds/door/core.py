@@ -5,8 +5,8 @@ DOOR-1. OPEN latches the hold, from any requester and any number of times. CLOSE
    `close_grace_s`. An OPEN in that time cancels the CLOSE; a repeated CLOSE does not prolong it. (The
    reason: RMF's supervisor, restarted while a robot stands in the doorway, first sends a CLOSE.)
 DOOR-2. Nothing ever drives the door shut. Silence never releases the hold: RMF is silent while a robot
-   passes. If the site has set `supervisor_lost_s`, the hold ends when for so long no node has been
-   there that publishes door requests.
+   passes. If the site has set `supervisor_lost_s`, the hold ends after that time without any publisher
+   of door requests.
 DOOR-3. After the hold has ended, and until the door is seen closed, an obstruction switches it on
    again.
 DOOR-4. In a fire alarm the site's `on_fire` decides. `open` holds the door open, and no CLOSE releases
@@ -14,13 +14,13 @@ DOOR-4. In a fire alarm the site's `on_fire` decides. `open` holds the door open
    robot enters a door that is about to close, and RMF's supervisor stops repeating its request.
 DOOR-5. Without a fresh reading the state is OFFLINE and the hold is off. The latch is kept, and the
    hold comes on again with the first good reading.
-DOOR-6. The state is OPEN only if the contact of the fully open door says so. If both contacts are
-   closed it is UNKNOWN. If neither is, it is MOVING, and UNKNOWN after `travel_s`. If the controller
-   does not say where the door is, it is UNKNOWN.
+DOOR-6. The state is OPEN only if the contact of the fully open door says so. With both limit contacts
+   active it is UNKNOWN. With neither it is MOVING, and UNKNOWN after `travel_s`. If the controller does
+   not tell the door's position, it is UNKNOWN.
 DOOR-7. While another node publishes states under this door's name, the state is OFFLINE and the hold is
    off.
 
-A fault only describes; it changes no output. It lasts as long as its cause, so an operator has nothing
+A fault is only a description; it changes no output. It lasts as long as its cause, so there is nothing
 to reset.
 """
 
@@ -55,14 +55,14 @@ from bridges.kinds.shared.durations import NEVER, RIVAL_QUIET_S
 
 
 def initial(limits: DoorLimits, now: float) -> DoorMemory:
-    """At start nothing is known, and the hold is off."""
+    """Return the memory at start: nothing is known, and the hold is off."""
     return DoorMemory(held_since=now)
 
 
 def decide(
     memory: DoorMemory, event: Event, now: float, limits: DoorLimits
 ) -> Decision[DoorMemory, DoorOutputs, DoorReport]:
-    """One scan. `now`: monotonic s, never before that of the last scan. Never raises."""
+    """Decide one scan. `now`: monotonic s, never earlier than in the last scan. Never raises."""
     memory, refused = _hear(memory, event, now, limits)
     memory = _let_go(memory, now, limits)
     memory = _hold(memory, _look(memory, now, limits), now, limits)
@@ -131,7 +131,7 @@ def _look(memory: DoorMemory, now: float, limits: DoorLimits) -> BelievedDoor:
 
 
 def _hold(memory: DoorMemory, view: BelievedDoor, now: float, limits: DoorLimits) -> DoorMemory:
-    """The memory with the hold on or off, and with what the next decision needs."""
+    """Switch the hold on or off, and note the start times for the next decision."""
     if released_by_fire(view, limits):
         memory = replace(memory, latched_at=None, close_at=None)
     able = view.fresh and not rivalled(memory, now)
@@ -170,7 +170,7 @@ def _pulse_is_on(memory: DoorMemory, now: float, pulse: Pulse | None) -> bool:
 def _wakes(
     memory: DoorMemory, view: BelievedDoor, now: float, limits: DoorLimits
 ) -> Iterator[float]:
-    """Each time at which the decision may change without an event."""
+    """Yield each time at which the decision may change without an event."""
     yield view.changes_at
     yield NEVER if memory.close_at is None else memory.close_at
     yield NEVER if memory.rival_at is None else memory.rival_at + RIVAL_QUIET_S

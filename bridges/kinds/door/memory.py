@@ -1,4 +1,4 @@
-"""What the door's core remembers from scan to scan, and the limits that it is given."""
+"""The door core's memory from scan to scan, and its limits."""
 
 from collections.abc import Mapping
 from typing import Literal
@@ -11,9 +11,9 @@ from bridges.kinds.shared.durations import NEVER, RIVAL_QUIET_S
 
 
 class DoorLimits(msgspec.Struct, frozen=True):
-    """What the core needs of a door's settings. `t`: the durations. `debounce`: signal -> s.
+    """The core's share of a door's settings. `t`: the durations. `debounce`: signal -> s.
 
-    `estimated`: a missing limit contact is estimated by time.
+    `estimated`: time replaces a missing limit contact.
     """
 
     t: DoorDurations = DoorDurations()
@@ -24,7 +24,7 @@ class DoorLimits(msgspec.Struct, frozen=True):
 
     @classmethod
     def of(cls, settings: DoorSettings, debounce: Mapping[str, float]) -> "DoorLimits":
-        """From the YAML, and from the wiring table's debounce (signal -> s)."""
+        """Make the limits from the YAML and the wiring table's debounce (signal -> s)."""
         return cls(
             settings.limits,
             debounce,
@@ -39,10 +39,10 @@ Contact = Settled[bool | None]
 
 
 class DoorSenses(msgspec.Struct, frozen=True):
-    """Each contact; None before it was first read.
+    """Each contact; None before its first reading.
 
-    `read_at`: when all were last read. `linked_since`: since when no read or write has failed; None
-    while one has. `lost`, `errors`: those of the last `DoorSample`.
+    `read_at`: the time of the last reading. `linked_since`: the time since which no read or write has
+    failed; None after a failure. `lost`, `errors`: from the last `DoorSample`.
     """
 
     opened: Contact | None = None
@@ -58,11 +58,11 @@ class DoorSenses(msgspec.Struct, frozen=True):
 class DoorMemory(msgspec.Struct, frozen=True):
     """Everything that the next decision needs to know of the past. Times are monotonic seconds.
 
-    `latched_at`: since when RMF wants the door open. `close_at`: when a CLOSE releases the hold.
-    `held`: the hold is on; `held_since`: when it was last switched on or off. `closing`: the hold has
-    ended, and the door has not been seen closed since. `between_since`: since when the door is at
-    neither end position. `shut_since`: since when it is not fully open. `unattended_since`: since when
-    no node publishes door requests.
+    `latched_at`: the time since which RMF wants the door open. `close_at`: the time when a CLOSE
+    releases the hold. `held`: the hold is on; `held_since`: its last switching on or off.
+    `closing`: the hold has ended, and the door was not seen closed since. `between_since`: the start of
+    its stay between the end positions; `shut_since`: of its time not fully open; `unattended_since`: of
+    the time without publishers of door requests.
     """
 
     latched_at: float | None = None
@@ -84,29 +84,29 @@ def rivalled(memory: DoorMemory, now: float) -> bool:
 
 
 def travel_ends_at(memory: DoorMemory, limits: DoorLimits) -> float:
-    """When a door at neither end position has taken too long; a change of the hold restarts the
-    time."""
+    """Return the time limit of a door at neither end position; a change of the hold restarts it."""
     if memory.between_since is None:
         return NEVER
     return max(memory.between_since, memory.held_since) + limits.t.travel_s
 
 
 def opening_ends_at(memory: DoorMemory, limits: DoorLimits) -> float:
-    """When a held door should have opened; NEVER if it is open or not held."""
+    """Return the time limit for opening a held door; NEVER if it is open or not held."""
     if memory.shut_since is None or not memory.held:
         return NEVER
     return max(memory.shut_since, memory.held_since) + limits.t.open_timeout_s
 
 
 def too_long_at(memory: DoorMemory, limits: DoorLimits) -> float:
-    """When RMF will have held the door for `max_hold_s`; NEVER if there is no such limit."""
+    """Return the end of `max_hold_s` of a hold by RMF; NEVER without this limit or a hold."""
     if memory.latched_at is None or limits.t.max_hold_s is None:
         return NEVER
     return memory.latched_at + limits.t.max_hold_s
 
 
 def lost_at(memory: DoorMemory, limits: DoorLimits) -> float:
-    """When the supervisor has been gone for `supervisor_lost_s`; NEVER if there is no such limit."""
+    """Return the end of `supervisor_lost_s` without a supervisor; NEVER if the limit is not set or a
+    supervisor is there."""
     if memory.unattended_since is None or limits.t.supervisor_lost_s is None:
         return NEVER
     return memory.unattended_since + limits.t.supervisor_lost_s

@@ -11,7 +11,7 @@ from bridges.messages.definitions import DoorMode, DoorModeValue, DoorRequest, D
 
 
 def accept(message: DoorRequest, settings: DoorSettings) -> OpenRequested | CloseRequested:
-    """The request as an event. Raises RequestRefused if it is malformed.
+    """Turn a request into an event. Raises RequestRefused if it is malformed.
 
     A door obeys every requester, but a request without a requester_id is refused: its fields were not
     filled in, and its default mode, 0, would mean CLOSE.
@@ -30,12 +30,12 @@ def accept(message: DoorRequest, settings: DoorSettings) -> OpenRequested | Clos
 
 
 def state_message(name: str, settings: object, report: DoorReport, stamp: Time) -> DoorState:
-    """The report as RMF reads it; `stamp` is when the door was last read."""
+    """Convert the report to RMF's message; `stamp` is the time of the door's last reading."""
     return DoorState(door_time=stamp, door_name=name, current_mode=DoorMode(int(report.mode)))
 
 
 def summary(report: DoorReport) -> Mapping[str, str]:
-    """The report in one line, for the log, the status file and `watch`."""
+    """Summarise the report in one line, for the log, the status file and `watch`."""
     words = {"mode": report.mode.name.removeprefix("MODE_"), "hold": "on" if report.hold else "off"}
     words |= {"feedback": "estimated"} if report.estimated else {}
     return {**words, "waits": report.waits} if report.waits else words

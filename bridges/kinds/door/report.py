@@ -1,4 +1,4 @@
-"""What RMF, the log and the status file are told of a door."""
+"""A door's report to RMF, the log and the status file."""
 
 from collections.abc import Iterator
 
@@ -19,10 +19,10 @@ from bridges.messages.definitions import DoorModeValue
 
 
 class DoorReport(msgspec.Struct, frozen=True):
-    """What RMF and the status file are told. `hold`: we hold the door open, also between pulses.
+    """The door's state for RMF and the status file. `hold`: we hold the door open, even between pulses.
 
-    `estimated`: no contact proves `mode`. `waits`: what RMF's OPEN waits for; "" without one, or once
-    the door is OPEN.
+    `estimated`: no contact proves `mode`. `waits`: the reason why RMF's OPEN is not yet fulfilled; ""
+    without an OPEN, or when the door is OPEN.
     """
 
     mode: DoorModeValue
@@ -33,12 +33,12 @@ class DoorReport(msgspec.Struct, frozen=True):
     waits: str = ""
 
     def news(self) -> object:
-        """The report without its age, and without what is waited for, which RMF is not shown."""
+        """Return the report without its age and without `waits`, which RMF does not see."""
         return self.mode, self.faults, self.hold, self.estimated
 
 
 def report(memory: DoorMemory, view: BelievedDoor, now: float, limits: DoorLimits) -> DoorReport:
-    """The door as it is now."""
+    """Report the present state of the door."""
     mode = _mode(memory, view, now, limits)
     return DoorReport(
         mode=mode,
@@ -87,7 +87,7 @@ def _mode(memory: DoorMemory, view: BelievedDoor, now: float, limits: DoorLimits
 def _faults(
     memory: DoorMemory, view: BelievedDoor, now: float, limits: DoorLimits
 ) -> Iterator[Fault]:
-    """Everything that is wrong now, most serious first. No text counts up: a changed text is news."""
+    """Yield all present faults, most serious first. No text counts up: a changed text is news."""
     if rivalled(memory, now):
         yield Fault("TWO_NODES_FOR_ONE_DEVICE", "another node publishes states of this door")
     if not view.fresh:

@@ -1,15 +1,15 @@
-"""What to believe of a door's inputs: debounce, age, and estimates where no contact is wired.
+"""Judgement of a door's inputs: debounce, age, and estimates for contacts that are not wired.
 
 Rules:
 DOOR-SENSING-1. A change counts once it has lasted for its signal's debounce. The end of a fire alarm or
    an obstruction counts once it has lasted for `hazard_clear_s`. Until such an input has settled for
    the first time, a single reading of the hazard counts.
-DOOR-SENSING-2. After `stale_after_s` without a reading, what was believed is forgotten: the door may
-   have moved.
+DOOR-SENSING-2. After `stale_after_s` without a reading all inputs are unknown again: the door may have
+   moved.
 DOOR-SENSING-3. A missing limit contact is estimated only if the YAML says so, from how long the relay
    has been on or off. A failed read or write starts that time again.
-DOOR-SENSING-4. If a controller does not say where the door is (`lost`), that counts at once, without
-   debounce.
+DOOR-SENSING-4. A controller's report that the door's position is unknown (`lost`) counts at once,
+   without debounce.
 """
 
 from collections.abc import Iterator
@@ -29,9 +29,10 @@ HAZARDS = ("obstruction", "fire")
 class BelievedDoor(msgspec.Struct, frozen=True):
     """The inputs as they are believed at one instant.
 
-    `fresh`: they were read within `stale_after_s`. `seen`: and each has settled, so the door's position
-    can be told. `estimated`: the end positions that no contact proves. `changes_at`: when the view
-    may change without a new reading (s). `lost`, `errors`: see DoorSample.
+    `fresh`: the last reading is younger than `stale_after_s`. `seen`: `fresh`, and each input has
+    settled, so the door's position is known. `estimated`: the end positions without a contact.
+    `changes_at`: the next time when the view may change without a reading (s). `lost`, `errors`: see
+    DoorSample.
     """
 
     fresh: bool
@@ -66,7 +67,7 @@ def take(senses: DoorSenses, sample: DoorSample, now: float, limits: DoorLimits)
 
 
 def miss(senses: DoorSenses) -> DoorSenses:
-    """A read has failed: the debounce and the estimates' time start again."""
+    """Restart the debounce and the estimates' time after a failed read."""
     return replace(
         senses,
         opened=forget(senses.opened),
@@ -85,7 +86,7 @@ def is_fresh(senses: DoorSenses, now: float, limits: DoorLimits) -> bool:
 def look(
     senses: DoorSenses, held: bool, held_since: float, now: float, limits: DoorLimits
 ) -> BelievedDoor:
-    """What is believed now. The relay has been on (`held`) or off since `held_since`."""
+    """Judge the inputs now. The relay has been on (`held`) or off since `held_since`."""
     opened, closed = _believed(senses.opened), _believed(senses.closed)
     opened_at, closed_at = _estimates(senses, held, held_since, limits)
     guessed = frozenset(s for s in ("opened", "closed") if _unwired(getattr(senses, s)))
@@ -110,7 +111,7 @@ def released_by_fire(view: BelievedDoor, limits: DoorLimits) -> bool:
 
 
 def _hold_s(before: Contact | None, seen: bool | None, signal: str, limits: DoorLimits) -> float:
-    """How long `seen` must last: longer for the end of a hazard than for its start."""
+    """Return the debounce of `seen` (s): longer for the end of a hazard than for its start."""
     hold_s = limits.debounce.get(signal, 0.0)
     clearing = signal in HAZARDS and seen is False and before is not None and before.value
     return max(hold_s, limits.t.hazard_clear_s) if clearing else hold_s
@@ -138,7 +139,7 @@ def _feared(contact: Contact | None) -> bool:
 def _estimates(
     senses: DoorSenses, held: bool, held_since: float, limits: DoorLimits
 ) -> tuple[float, float]:
-    """When a door without contacts counts as open, and when as closed; NEVER for "not at all"."""
+    """Return the times from which a door without contacts counts as open and as closed (NEVER: not)."""
     if not limits.estimated or senses.linked_since is None:
         return NEVER, NEVER
     since = max(held_since, senses.linked_since)
@@ -149,7 +150,7 @@ def _estimates(
 def _changes(
     senses: DoorSenses, limits: DoorLimits, now: float, *estimates: float
 ) -> Iterator[float]:
-    """When a reading goes stale, an estimate becomes due or a contact settles (s)."""
+    """Yield the times when a reading goes stale, an estimate is due or a contact settles (s)."""
     stale_at = NEVER if senses.read_at is None else senses.read_at + limits.t.stale_after_s
     due = [stale_at, *estimates]
     for signal in SIGNALS:

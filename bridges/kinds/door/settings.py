@@ -74,7 +74,7 @@ class DoorSettings(DeviceSettings, frozen=True, kw_only=True, forbid_unknown_fie
         return self.limits.stale_after_s
 
     def problems(self) -> Remarks:
-        """Fields that contradict each other."""
+        """Yield contradictory fields."""
         if self.pulse and self.pulse.on_s >= self.pulse.every_s:
             yield (
                 ("pulse", "on_s"),

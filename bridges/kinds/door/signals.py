@@ -1,4 +1,4 @@
-"""What passes between a door's driver and its core in one scan, and the core's events."""
+"""A door's sample, outputs and events: the interface of its core."""
 
 import msgspec
 
@@ -6,11 +6,11 @@ from bridges.kinds.shared.decision import Attended, IoFailed, OperatorReset, Riv
 
 
 class DoorSample(msgspec.Struct, frozen=True):
-    """Every input of one door, polarity resolved but not debounced; None where not wired.
+    """Every input of one door, polarity resolved but not debounced; None if not wired.
 
     `opened`, `closed`: the limit contacts of the fully open and the fully closed door.
     `obstruction`: somebody or something is in the doorway. `fire`: the fire alarm's contact.
-    `lost`: why the controller did not say where the door is; "" if it did.
+    `lost`: the reason why the controller gave no position; "" if it gave one.
     `errors`: the faults that the controller itself reports.
     """
 
@@ -25,7 +25,7 @@ class DoorSample(msgspec.Struct, frozen=True):
 class DoorOutputs(msgspec.Struct, frozen=True):
     """Every output of one door. There is no command to close: the door operator closes by itself.
 
-    `hold_open`: the relay is on. `between_pulses`: the relay is off until the next pulse, and the door
+    `hold_open`: the relay is on. `between_pulses`: the relay is off until the next pulse of a door that
     is still held.
     """
 

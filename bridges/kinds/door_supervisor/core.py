@@ -1,12 +1,12 @@
-"""The door supervisor's core, for one door: who holds it open, and what the door's node is sent.
+"""The door supervisor's core, for one door: its holders, and the requests to the door's node.
 
 It replaces RMF's own (rmf_ros2, door_supervisor/Node.cpp). Fleet adapters and web users send their
 requests on `adapter_door_requests`; the supervisor sends its own on `door_requests`, as
 "door_supervisor". Rules:
-DOOR-SUPERVISOR-1. OPEN adds its requester to the holders, or renews its stamp. CLOSE removes it. A
-   stale request (`bridges/kinds/shared/freshness.py`) does neither.
-DOOR-SUPERVISOR-2. The first holder causes an OPEN to the door's node, and the last one that goes causes
-   a CLOSE.
+DOOR-SUPERVISOR-1. OPEN adds its requester to the holders, or renews its stamp. CLOSE removes the
+   requester. A stale request (`bridges/kinds/shared/freshness.py`) does neither.
+DOOR-SUPERVISOR-2. The first holder causes an OPEN to the door's node, and the departure of the last
+   holder causes a CLOSE.
    - The request is repeated when a requester repeats OPEN, and when the door's state contradicts it:
      held, but CLOSED or MOVING; not held, but OPEN or MOVING.
    - For INSIST_S after a holder has come, OPEN is repeated at every state. The first OPEN may have been
@@ -16,12 +16,12 @@ DOOR-SUPERVISOR-3. Silence ends no hold: a robot in the doorway is silent. After
    is shown, and the door stays open.
 DOOR-SUPERVISOR-4. During the quiet start, and while another supervisor publishes, it only listens.
    After that it sends OPEN for a door with holders at once. It sends CLOSE only when a new state of the
-   door calls for it. A door that was held before the restart, and that is not seen CLOSED, is held from
-   the start unless another supervisor is there: its own node may have died too, with a robot in the
+   door calls for it. A door that was held before the restart, and is not seen CLOSED, is held from the
+   start unless another supervisor is there: the door's node may have died too, with a robot in the
    doorway.
 DOOR-SUPERVISOR-5. Two messages are at least GAP_S apart, and a message is repeated unchanged after
    REPEAT_S at the earliest.
-The heartbeat (`report.py`) says who holds the doors, and `keep.py` saves that across a restart.
+The heartbeat (`report.py`) lists the holders of all doors, and `keep.py` saves them across a restart.
 """
 
 from typing import Final
@@ -44,7 +44,7 @@ from bridges.messages.definitions import DoorMode, DoorRequest
 from bridges.messages.topics import DOOR_REQUESTS
 
 REQUESTER_ID: Final = "door_supervisor"
-"""The requester_id that RMF's own uses (door_supervisor/Node.hpp)."""
+"""The requester_id of RMF's own door supervisor (door_supervisor/Node.hpp)."""
 INSIST_S: Final = 5.0
 RULES: Final = Rules(retained=False)
 
@@ -52,12 +52,12 @@ Decided = Decision[SupervisedDoor, None, DoorHoldReport]
 
 
 def initial(door: str, started_at: float) -> SupervisedDoor:
-    """Nothing has been heard, and we may not publish yet."""
+    """Return the memory at start: nothing has been heard, and we may not publish yet."""
     return SupervisedDoor(door)
 
 
 def idle(memory: SupervisedDoor, now: float) -> bool:
-    """May this door be forgotten? Nobody holds it, and nothing was heard of it for FORGOTTEN_S."""
+    """May this door be forgotten? True without holders after FORGOTTEN_S without a message about it."""
     heard = [memory.shown_at, *(who.heard_at for who in memory.requesters.values())]
     return not memory.holders and now >= max(heard) + FORGOTTEN_S
 
@@ -70,7 +70,7 @@ def urgent(memory: SupervisedDoor) -> bool:
 def decide(
     memory: SupervisedDoor, event: Event, now: float, limits: DoorSupervisorLimits
 ) -> Decided:
-    """Take the event in, and send what is due: at most one message. Never raises."""
+    """Take the event in, and send the message that is due, if any. Never raises."""
     memory, refused = _take(memory, event, now)
     publish: tuple[Said, ...] = ()
     if now >= _due_at(memory):
@@ -86,7 +86,7 @@ def decide(
     )
 
 
-# --- what is heard -----------------------------------------------------------------------------
+# --- messages in -------------------------------------------------------------------------------
 
 
 def _take(memory: SupervisedDoor, event: Event, now: float) -> tuple[SupervisedDoor, str]:
@@ -117,7 +117,7 @@ def _hear(
 
 
 def _enter(memory: SupervisedDoor, event: RequesterOpens, now: float) -> SupervisedDoor:
-    """Add a holder, or note that one has repeated its OPEN."""
+    """Add a holder, or note a holder's repeated OPEN."""
     before = memory.holder(event.requester)
     if before:
         after = before.repeats(event.stamp, now)
@@ -128,16 +128,16 @@ def _enter(memory: SupervisedDoor, event: RequesterOpens, now: float) -> Supervi
 
 
 def _see(memory: SupervisedDoor, now: float) -> SupervisedDoor:
-    """A state has come: should the last request be repeated?"""
+    """Decide after a new state whether to repeat the last request."""
     insists = any(now < holder.since + INSIST_S for holder in memory.holders)
     return replace(memory, prompted=memory.disagrees or insists)
 
 
-# --- what is sent ------------------------------------------------------------------------------
+# --- messages out ------------------------------------------------------------------------------
 
 
 def _request(memory: SupervisedDoor) -> DoorRequest:
-    """The request to the door's node, without its stamp."""
+    """Make the request to the door's node, without its stamp."""
     return DoorRequest(
         requester_id=REQUESTER_ID,
         door_name=memory.door,
@@ -146,14 +146,14 @@ def _request(memory: SupervisedDoor) -> DoorRequest:
 
 
 def _due_at(memory: SupervisedDoor) -> float:
-    """When the next request is due."""
+    """Return the time of the next request."""
     if not memory.may_send:
         return NEVER
     return due_at(memory.sent_at, new=memory.owed, again=memory.prompted)
 
 
 def _wake_at(memory: SupervisedDoor, now: float, limits: DoorSupervisorLimits) -> float:
-    """When the decision may change without an event."""
+    """Return the next time at which the decision may change without an event."""
     due = [_due_at(memory), memory.silent_at]
     due += [holder.since + limits.open_alarm_s for holder in memory.holders]
     return min((at for at in due if at > now), default=NEVER)

@@ -1,6 +1,6 @@
-"""Who holds which door, saved across a restart.
+"""The doors' holders, saved across a restart.
 
-It is saved before the heartbeat announces it: a robot drives on once the heartbeat lists it.
+They are saved before the heartbeat lists them: a robot drives on as soon as it is listed.
 """
 
 from collections.abc import Mapping
@@ -27,7 +27,7 @@ class KeptDoors(keep.Kept, frozen=True, forbid_unknown_fields=True):
 
 
 def persist(memories: Mapping[str, SupervisedDoor]) -> bytes:
-    """What the next start needs. The bytes stay the same until a holder comes or goes."""
+    """Encode the holders for the next start. The bytes stay the same until a holder comes or goes."""
     doors = {
         name: {holder.requester: holder.visit for holder in by_name(memory)}
         for name, memory in sorted(memories.items())
@@ -37,10 +37,10 @@ def persist(memories: Mapping[str, SupervisedDoor]) -> bytes:
 
 
 def restore(kept: bytes, settings: DoorSupervisorSettings, now: float) -> dict[str, SupervisedDoor]:
-    """The memories at start, from the bytes of `persist`, for the doors still served.
+    """Make the memories at start from the bytes of `persist`, for the doors still served.
 
-    ValueError for any other bytes. How long each has held its door counts from now: the monotonic
-    clock before the restart means nothing any more.
+    Raises ValueError for other bytes. All holds count from now: times on the monotonic clock from
+    before the restart are meaningless.
     """
     found = keep.read(kept, KeptDoors, VERSION, "a table of who holds which door")
     served = found.doors if settings.doors is None else set(settings.doors)

@@ -1,4 +1,4 @@
-"""What the door supervisor's core remembers of one door, and the limits that it is given."""
+"""The door supervisor's memory of one door, and its limits."""
 
 from typing import Final
 
@@ -26,15 +26,15 @@ class DoorSupervisorLimits(msgspec.Struct, frozen=True):
 
     @classmethod
     def of(cls, settings: DoorSupervisorSettings) -> "DoorSupervisorLimits":
-        """From the YAML."""
+        """Make the limits from the YAML."""
         return cls(settings.open_alarm_s)
 
 
 class Holder(msgspec.Struct, frozen=True):
-    """A requester that holds the door open, `since` when (our clock). `stamp`: of its latest OPEN.
+    """A requester that holds the door open since `since` (our clock).
 
-    `asked_at`: when that OPEN came. `visit`: the stamp of the first OPEN of its present visit; repeats
-    do not change it. `restored`: it held the door before our restart.
+    `stamp`: the stamp of its latest OPEN, which came at `asked_at`. `visit`: the stamp of the first
+    OPEN of its present visit, unchanged by repeats. `restored`: it held the door before our restart.
     """
 
     requester: str
@@ -45,7 +45,7 @@ class Holder(msgspec.Struct, frozen=True):
     restored: bool = False
 
     def repeats(self, stamp: int, now: float) -> "Holder":
-        """The holder after another OPEN."""
+        """Return the holder after another OPEN."""
         again = now > self.asked_at + VISIT_S
         return replace(self, asked_at=now, stamp=stamp, visit=stamp if again else self.visit)
 
@@ -53,11 +53,10 @@ class Holder(msgspec.Struct, frozen=True):
 class SupervisedDoor(msgspec.Struct, frozen=True):
     """Everything that outlives an event.
 
-    `passive`: what those wait for that wait for us, while we may not publish.
-    `holders`: in the order in which they came. `requesters`: what was lately heard of each. `mode`:
-    the door's last mode, heard at `shown_at`. `at_once`: what was restored need not wait until we may
-    publish. `sent`: the last request to the door's node since we may publish. `prompted`: something
-    calls for a repeat of it.
+    `passive`: the reason why requesters wait while we may not publish. `holders`: in the order of
+    arrival. `requesters`: the recent record of each. `mode`: the door's last mode, heard at `shown_at`.
+    `at_once`: a restored hold may be sent before we may publish. `sent`: the last request to the door's
+    node since we may publish; `prompted`: it is to be repeated.
     """
 
     door: str
@@ -79,8 +78,8 @@ class SupervisedDoor(msgspec.Struct, frozen=True):
 
     @property
     def may_send(self) -> bool:
-        """May we send to the door's node now? During the quiet start only for restored holders, and
-        only if the door is not closed: a robot may stand in its doorway."""
+        """May we send to the door's node now? In the quiet start only for restored holders of a door
+        that is not closed: a robot may stand in its doorway."""
         stands_open = self.mode not in (None, CLOSED)
         return self.may_speak or (self.at_once and stands_open and self.holds_restored)
 
@@ -101,11 +100,11 @@ class SupervisedDoor(msgspec.Struct, frozen=True):
 
     @property
     def silent_at(self) -> float:
-        """When a held door will have been silent for too long; NEVER if nobody holds it."""
+        """The time from which a held door is silent for too long; NEVER if nobody holds it."""
         if not self.holders:
             return NEVER
         return max(self.shown_at, self.holders[0].since) + SILENT_S
 
     def holder(self, requester: str) -> Holder | None:
-        """This requester's entry among the holders; None if it does not hold the door."""
+        """Find this requester among the holders; None if it does not hold the door."""
         return next((h for h in self.holders if h.requester == requester), None)

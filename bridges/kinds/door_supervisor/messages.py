@@ -23,12 +23,12 @@ from bridges.messages.definitions import (
 def accept_request(
     request: DoorRequest, settings: DoorSupervisorSettings, wall: float
 ) -> RequesterOpens | RequesterCloses:
-    """An adapter's request as an event. Raises RequestRefused. `wall` is not used: stamps are compared
-    with those of the same requester only.
+    """Turn an adapter's request into an event. Raises RequestRefused. `wall` is not used: stamps are
+    compared only with stamps of the same requester.
 
     A request without a requester_id is refused: its fields were not filled in, and its default mode,
-    0, would mean CLOSE. A request with our own requester_id is one of those that we send to the doors,
-    and came back through a renamed topic.
+    0, would mean CLOSE. A request with our own requester_id is our own request to a door, which came
+    back through a renamed topic.
     """
     check_listed("door", request.door_name, settings.doors)
     who = request.requester_id
@@ -48,7 +48,7 @@ def accept_request(
 
 
 def accept_state(state: DoorState, settings: DoorSupervisorSettings, wall: float) -> DoorStateHeard:
-    """A door's state as an event. Raises RequestRefused."""
+    """Turn a door's state into an event. Raises RequestRefused."""
     check_listed("door", state.door_name, settings.doors)
     mode = state.current_mode.value
     if mode not in set(DoorModeValue):
@@ -57,26 +57,26 @@ def accept_state(state: DoorState, settings: DoorSupervisorSettings, wall: float
 
 
 def device_name(message: DoorRequest | DoorState) -> str:
-    """Which door a message is about."""
+    """Return the door that a message is about."""
     return message.door_name
 
 
 def requester(event: RequesterOpens | RequesterCloses | DoorStateHeard) -> str:
-    """Who sends this request; "" for a state."""
+    """Return the sender of a request; "" for a state."""
     return "" if isinstance(event, DoorStateHeard) else event.requester
 
 
 def stamped(
     message: DoorRequest | SupervisorHeartbeat, time: Time
 ) -> DoorRequest | SupervisorHeartbeat:
-    """The message with its time of sending. A heartbeat has only its requesters' stamps."""
+    """Add the time of sending to a message. A heartbeat has only its requesters' stamps."""
     if isinstance(message, SupervisorHeartbeat):
         return message
     return replace(message, request_time=time)
 
 
 def summary(report: DoorHoldReport, now: float) -> Mapping[str, str]:
-    """One door in one line, for a person."""
+    """Summarise one door in one line, for a person."""
     mode = "-" if report.mode is None else report.mode.name.removeprefix("MODE_")
     held = ", ".join(f"{who} ({now - since:.0f} s)" for who, since in report.holders)
     said = {"mode": mode, "held_by": held or "-"}

@@ -1,9 +1,10 @@
-"""What the heartbeat, the log and the status file say of doors and their holders.
+"""Doors and their holders, as reported by the heartbeat, the log and the status file.
 
-Fleet adapters rely on the heartbeat. Their phase DoorOpen ends only when it lists the robot, and
-DoorClose when it does not. A robot that is listed for a door it does not hold sends CLOSE (rmf_ros2,
-RobotContext.cpp _check_door_supervisor). RMF's own supervisor sends the heartbeat only after adapter
-requests, so the sessions of a restarted fleet adapter stay for ever. Ours is also sent each second.
+Fleet adapters rely on the heartbeat. Their phase DoorOpen ends only when the heartbeat lists the robot,
+and DoorClose when it no longer does. A robot listed for a door that it does not hold sends CLOSE
+(rmf_ros2, RobotContext.cpp _check_door_supervisor). RMF's own supervisor sends the heartbeat only after
+adapter requests, so the sessions of a restarted fleet adapter stay for ever. Ours also sends it each
+second.
 """
 
 from collections.abc import Iterator, Mapping
@@ -26,8 +27,8 @@ from bridges.messages.topics import DOOR_SUPERVISOR_HEARTBEAT, AnyTopic
 class DoorHoldReport(msgspec.Struct, frozen=True):
     """One door, for the log and the status file. Times are monotonic seconds.
 
-    `holders`: each requester, and since when it holds the door. `mode`: the door's last, of `read_at`.
-    `waits`: what the holders wait for while nothing is sent to the door.
+    `holders`: (requester, start of its hold). `mode`: the door's last mode, heard at `read_at`.
+    `waits`: the reason why nothing is sent to the door for the holders; "" otherwise.
     """
 
     read_at: float | None
@@ -37,12 +38,12 @@ class DoorHoldReport(msgspec.Struct, frozen=True):
     waits: str = ""
 
     def news(self) -> object:
-        """What is worth a line in the log."""
+        """Return the facts whose change is logged."""
         return self.mode, tuple(requester for requester, _ in self.holders)
 
 
 def report(memory: SupervisedDoor, now: float, limits: DoorSupervisorLimits) -> DoorHoldReport:
-    """One door as it is now."""
+    """Report the present state of one door."""
     return DoorHoldReport(
         read_at=None if memory.mode is None else memory.shown_at,
         mode=memory.mode,
@@ -61,7 +62,7 @@ def _faults(memory: SupervisedDoor, now: float, limits: DoorSupervisorLimits) ->
 
 
 def heartbeat(memories: Mapping[str, SupervisedDoor]) -> tuple[AnyTopic, SupervisorHeartbeat]:
-    """All held doors with their holders, in the order of names."""
+    """List all held doors with their holders, in the order of names."""
     doors = tuple(
         DoorSessions(name, tuple(map(_session, by_name(memory))))
         for name, memory in sorted(memories.items())
@@ -71,7 +72,7 @@ def heartbeat(memories: Mapping[str, SupervisedDoor]) -> tuple[AnyTopic, Supervi
 
 
 def by_name(memory: SupervisedDoor) -> list[Holder]:
-    """The door's holders in the order of names."""
+    """Sort the door's holders by name."""
     return sorted(memory.holders, key=lambda holder: holder.requester)
 
 

@@ -23,12 +23,12 @@ class DoorSupervisorSettings(GraphSettings, frozen=True, kw_only=True, forbid_un
     ] = 600.0
 
     def problems(self) -> Remarks:
-        """An empty list of doors."""
+        """Yield an empty list of doors."""
         if self.doors == []:
             yield ("doors",), "is empty: name the doors, or leave it out to serve every door"
 
 
 def speaks_of(settings: DoorSupervisorSettings) -> Iterable[Place]:
-    """The doors that it is to serve."""
+    """Yield the doors to be served."""
     for i, name in enumerate(settings.doors or ()):
         yield ("doors", str(i)), "door", name

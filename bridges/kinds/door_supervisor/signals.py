@@ -1,4 +1,4 @@
-"""What the door supervisor's core hears from the graph: adapters' requests and doors' states."""
+"""Events of the door supervisor's core: adapters' requests and doors' states."""
 
 import msgspec
 

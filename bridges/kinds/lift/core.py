@@ -1,4 +1,4 @@
-"""The lift's decision core: who holds the lift, what its relays do, and what RMF is told.
+"""The lift's decision core: its session, its outputs, and its report to RMF.
 
 Rules, in the order in which they are applied:
 LIFT-1. While the lift is free, the first request gets a session, unless an obstacle (LIFT-4) is
@@ -6,31 +6,31 @@ LIFT-1. While the lift is free, the first request gets a session, unless an obst
    END ends a session: no hazard, fault or timeout does. A session in HUMAN mode has no outputs.
 LIFT-2. END ends the session at once, unless it is older than the session. AGV mode and the door's hold
    may stay on for `release_grace_s`. During that time only the same session is granted, even in a fire.
-   The reason: a supervisor that restarts sends END for a robot that is still inside, and that robot
-   must get out. For the same reason (`bridges/kinds/lift/forgotten.py`):
-   - An END on `lift_requests` does not end the session of a robot that may be inside while that robot
-     itself goes on asking. The session ends by the robot's own END, a person's, or its silence.
-   - If RMF's supervisor asks for a session other than the one that has the lift, or has ended it, the
+   The reason: a restarted supervisor sends END for a robot that is still inside and must get out. For
+   the same reason (`bridges/kinds/lift/forgotten.py`):
+   - An END on `lift_requests` does not end a session if the robot may be inside and goes on asking
+     itself. The session ends by the robot's own END, by a person's END, or by the robot's silence.
+   - If RMF's supervisor asks for another session than the holder's, or has ended the holder's, the
      requests and END of the holder's own robot count as well.
-   - After an END in mid-ride, as a new fleet adapter sends it, the lift waits longer for that robot:
-     until IN_CAR_S after its last word. Nothing is energised after `release_grace_s`.
+   - After an END in mid-ride, as sent by a new fleet adapter, the lift waits longer for that robot:
+     until IN_CAR_S after its last message. Nothing is energised after `release_grace_s`.
 LIFT-3. A request sets the destination and the mode. While the door is held, another destination may
-   have to wait (`bridges/kinds/lift/replayed.py`). `bridges/kinds/lift/drive.py` says what may be
-   energised.
+   have to wait (`bridges/kinds/lift/replayed.py`). `bridges/kinds/lift/drive.py` has the rules for the
+   outputs.
 LIFT-4. An obstacle switches every output off and never changes the session. Obstacles are: fire (and
    its latch, if an operator must reset it), code blue, earthquake, emergency, out of service, manual
    mode, a second node for this lift, inputs that cannot be believed, outputs that cannot be written. A
    gap in reading or writing shorter than `stale_after_s` is no obstacle. Overload only delays.
 LIFT-5. RMF is told OPEN when fresh inputs show that the car stands at a known floor with its door open.
-   - Until OPEN has been published at a session's destination, its robot is outside. Then OPEN also
-     needs AGV mode and no fault: a robot looks only at session, floor and door, and must not board a
-     lift in a fire.
-   - After that a robot may be inside. The true door is shown in any mode, so that it can get out.
+   - Until OPEN has been published at a session's destination, its robot is outside. During that time
+     OPEN also needs AGV mode and no fault: a robot looks only at session, floor and door, and must not
+     board a lift in a fire.
+   - After that a robot may be inside. It needs the true door in any mode, to get out.
    - A door is not shown OPEN while its hold is wanted but the relay must rest first: such a door may
      close by itself while a robot drives through.
-   - A door that nobody holds is not shown OPEN either, if it is at the floor that the robot itself asks
-     for and the car is about to leave for the session: RMF's supervisor may be passing on an earlier
-     ride, and the robot would drive in.
+   - A door that nobody holds is not shown OPEN at the floor for which the robot itself asks, if the
+     session is about to send the car elsewhere: RMF's supervisor may be passing on an earlier ride, and
+     the robot would drive in.
 """
 
 from msgspec.structs import replace
@@ -77,14 +77,14 @@ NOT_RMFS = frozenset(
 
 
 def initial(limits: LiftLimits, now: float) -> LiftMemory:
-    """Nothing has been read, there is no session, every output is off."""
+    """Return the memory at start: no reading, no session, every output off."""
     return LiftMemory()
 
 
 def decide(
     memory: LiftMemory, event: Event, now: float, limits: LiftLimits
 ) -> Decision[LiftMemory, LiftOutputs, LiftReport]:
-    """One scan: take in the event, look at the inputs, derive outputs and report afresh."""
+    """Decide one scan: take in the event, judge the inputs, derive outputs and report afresh."""
     alarmed_before = memory.alarmed
     memory, refused = _take(sessions.lapse(memory, now, limits), event, now, limits)
     view = look(memory.senses, now, limits)
@@ -102,7 +102,7 @@ def decide(
 
 
 def published(memory: LiftMemory, shown: LiftReport) -> LiftMemory:
-    """The memory once this report was sent. After OPEN at the destination a robot may be inside."""
+    """Note that this report was sent. After OPEN at the destination a robot may be inside."""
     session = memory.session
     if session is None or not shown.open_at:
         return memory
@@ -115,7 +115,7 @@ def published(memory: LiftMemory, shown: LiftReport) -> LiftMemory:
 def obstacles(
     memory: LiftMemory, view: BelievedLift, now: float, limits: LiftLimits
 ) -> tuple[Fault, ...]:
-    """What forbids every output now, most serious first."""
+    """List the present obstacles to all outputs, most serious first."""
     found = []
     if memory.fire_latched and Hazard.FIRE not in view.hazards:
         found.append(Fault("FIRE_LATCHED", "rmf-bridge reset when it is safe"))
@@ -130,7 +130,7 @@ def obstacles(
 
 
 def _unwritten_at(memory: LiftMemory, limits: LiftLimits) -> float:
-    """When failed writes become an obstacle; NEVER if the last write succeeded."""
+    """Return the time when failed writes become an obstacle; NEVER if the last write succeeded."""
     since = memory.unwritten_since
     return NEVER if since is None else since + limits.t.stale_after_s
 
@@ -138,7 +138,7 @@ def _unwritten_at(memory: LiftMemory, limits: LiftLimits) -> float:
 def _drive(
     memory: LiftMemory, view: BelievedLift, allowed: bool, now: float, limits: LiftLimits
 ) -> tuple[LiftMemory, LiftOutputs]:
-    """The memory with the next state of the relays, and the outputs that are wanted."""
+    """Move the relays to their next state; also return the wanted outputs."""
     session, grace, relays = memory.session, memory.grace, memory.relays
     outputs = LiftOutputs()
     if session and drive.serves(session, allowed, now, limits):
@@ -181,7 +181,7 @@ def _take(
 
 
 def _read(memory: LiftMemory, sample: LiftSample, now: float, limits: LiftLimits) -> LiftMemory:
-    """Take in a reading. If no write has failed since the last one, the outputs are written."""
+    """Take in a reading. Without a failed write since the last reading the outputs were written."""
     return replace(
         memory,
         senses=take(memory.senses, sample, now, limits),
@@ -192,7 +192,7 @@ def _read(memory: LiftMemory, sample: LiftSample, now: float, limits: LiftLimits
 
 
 def _why_not(memory: LiftMemory, now: float, limits: LiftLimits) -> str:
-    """Why nobody gets a lift that is free; "" if somebody may."""
+    """Explain why nobody gets a free lift; "" if the next request may get it."""
     view = look(memory.senses, now, limits)
     why_not = obstacles(memory, view, now, limits)
     if not why_not:
@@ -202,11 +202,11 @@ def _why_not(memory: LiftMemory, now: float, limits: LiftLimits) -> str:
 
 
 def _reset(memory: LiftMemory, now: float, limits: LiftLimits) -> LiftMemory:
-    """An operator says that it is safe: clear the latches, unless their cause may still be present."""
+    """Clear the latches by an operator's order, unless their cause may still be present."""
     session = memory.session
     if session and session.fault:
         session = replace(drive.paused(session), tries=0, retry_at=None, fault=None)
-    # A fire that the inputs show latches again in this decision. Stale inputs may hide a fire.
+    # A fire in fresh inputs latches again in this decision. Stale inputs may hide a fire.
     unseen = not look(memory.senses, now, limits).fresh
     return replace(
         memory,
@@ -232,7 +232,7 @@ def _latch(memory: LiftMemory, view: BelievedLift, now: float, limits: LiftLimit
 
 
 def _alarms(before: bool, memory: LiftMemory, limits: LiftLimits) -> tuple[Said, ...]:
-    """`true` once when a hazard of `alarm_on` comes; `false` once when an operator resets."""
+    """Publish `true` once when a hazard of `alarm_on` comes, `false` once when an operator resets."""
     if memory.alarmed == before or limits.alarm == "none":
         return ()
     if limits.alarm == FIRE_ALARM_TRIGGER.name:
@@ -259,7 +259,7 @@ def _faults(
 
 
 def _faults_of_rmf(session: LiftSession, now: float, limits: LiftLimits) -> list[Fault]:
-    """A supervisor that asks for another session explains why no request comes for this one."""
+    """List faults of RMF. If its supervisor asks for another session, that explains the silence."""
     if session.forgotten:
         fault = forgotten.fault(session, now)
         return [fault] if fault else []

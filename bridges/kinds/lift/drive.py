@@ -1,9 +1,9 @@
-"""Which outputs a session needs, from its request and from what the inputs show.
+"""The outputs for a session, derived from its request and the inputs.
 
 Rules:
 LIFT-DRIVE-1. Without a session no output is switched on. All outputs are off under an obstacle
-   (`core.py`), for a session in HUMAN mode, while RMF is silent and the robot is outside, and while a
-   fault waits for its next try. For `release_grace_s` after END, AGV mode and the door's hold stay on
+   (`core.py`), for a session in HUMAN mode, while RMF is silent and the robot is outside, and between
+   the tries after a fault. For `release_grace_s` after END, AGV mode and the door's hold stay on
    if they were on; the hold ends `dead_time_s` before AGV mode.
 LIFT-DRIVE-2. The order is: AGV mode, then the call to the destination, then, once the car stands there,
    the door's hold. With `by_call` a call brings AGV mode, so the call comes first, even if the car
@@ -15,7 +15,7 @@ LIFT-DRIVE-3. A call is given only in AGV mode (except with `by_call`), away fro
 LIFT-DRIVE-4. A call is held until the car stands at its destination, or pulsed. It is given again after
    every interruption, and when the car had arrived but is then seen at another floor. While the floor
    code is changing no new call is given: the car may just be arriving.
-LIFT-DRIVE-5. AGV mode, the floor and the open door each have a timeout. When it ends, the outputs go
+LIFT-DRIVE-5. AGV mode, the arrival and the open door each have a timeout. At its end the outputs go
    off and a fault is shown. Three more tries follow, 10, 30 and 60 s later; then the fault latches.
    Losing AGV mode during the ride is such a fault too. With `by_call` AGV mode may end between two
    destinations, while neither a call nor the hold is on. During an overload no timeout runs.
@@ -36,7 +36,7 @@ RETRY_AFTER_S = (10.0, 30.0, 60.0)
 
 
 def at_destination(session: LiftSession, view: BelievedLift, limits: LiftLimits) -> bool:
-    """Does the car stand at the landing that the session asked for?"""
+    """Does the car stand at the session's destination?"""
     return view.stopped and view.level == limits.stops[session.destination].level
 
 
@@ -46,7 +46,7 @@ def agv_ok(view: BelievedLift) -> bool:
 
 
 def silent(session: LiftSession, now: float, limits: LiftLimits) -> bool:
-    """RMF has not repeated its request for too long."""
+    """Has RMF not repeated its request for too long?"""
     return now >= session.asked_at + limits.t.request_timeout_s
 
 
@@ -57,14 +57,14 @@ def serves(session: LiftSession, allowed: bool, now: float, limits: LiftLimits) 
 
 
 def paused(session: LiftSession) -> LiftSession:
-    """The session with its ride interrupted: it starts anew when outputs are allowed again."""
+    """Interrupt the session's ride: it starts anew when outputs are allowed again."""
     return replace(session, agv_seen=False, arrived=False, call_at=None, waiting=None)
 
 
 def advance(
     session: LiftSession, view: BelievedLift, relays: Relays, now: float, limits: LiftLimits
 ) -> LiftSession:
-    """The session after this scan's inputs: arrivals, timeouts and retries.
+    """Advance the session by this scan's inputs: arrivals, timeouts and retries.
 
     `relays`: their state before this scan.
     """
@@ -90,7 +90,7 @@ def advance(
 
 
 def wanted(session: LiftSession, view: BelievedLift, now: float, limits: LiftLimits) -> LiftOutputs:
-    """The outputs for a session that is served."""
+    """Choose the outputs for a served session."""
     if session.retry_at is not None:
         return LiftOutputs()
     if not (agv_ok(view) or limits.by_call):
@@ -108,7 +108,7 @@ def wanted(session: LiftSession, view: BelievedLift, now: float, limits: LiftLim
 def stays_on(
     grace: Grace, relays: Relays, view: BelievedLift, now: float, limits: LiftLimits
 ) -> LiftOutputs:
-    """The outputs in the grace after END."""
+    """Choose the outputs in the grace after END."""
     if now >= grace.off_at:
         return LiftOutputs()
     standing = agv_ok(view) and at_destination(grace.session, view, limits)
@@ -117,12 +117,12 @@ def stays_on(
 
 
 def let_go_at(grace: Grace, limits: LiftLimits) -> float:
-    """When the door's hold ends."""
+    """Return the end of the door's hold."""
     return min(grace.off_at, grace.until) - limits.t.dead_time_s
 
 
 def next_at(session: LiftSession, limits: LiftLimits) -> tuple[float, ...]:
-    """When time alone may change this session's outputs or report."""
+    """Return the times when this session's outputs or report may change without an event."""
     waits = NEVER if session.waiting is None else session.since + _time_for(session.waiting, limits)
     return (
         session.asked_at + limits.t.request_timeout_s,
@@ -140,10 +140,9 @@ def _requested(session: LiftSession, relays: Relays, limits: LiftLimits) -> bool
 
 
 def _arrive(session: LiftSession, view: BelievedLift, limits: LiftLimits) -> LiftSession:
-    """A car that stands at the destination ends the call. If it is then seen elsewhere, it is called
-    again.
+    """End the call when the car stands at the destination; call again if it is then seen elsewhere.
 
-    With `by_call`, a car that stands there already does not end the call before AGV mode is on.
+    With `by_call`, a car already at the destination does not end the call before AGV mode is on.
     """
     if limits.by_call and not agv_ok(view):
         return replace(session, arrived=False)
@@ -185,7 +184,7 @@ def _trip(session: LiftSession, fault: Fault, now: float) -> LiftSession:
 
 
 def _pulse_ends_at(session: LiftSession, limits: LiftLimits) -> float:
-    """When a pulsed call ends; NEVER for one that is held."""
+    """Return the end of a pulsed call; NEVER for a held call."""
     if session.call_at is None or limits.t.call_pulse_s is None:
         return NEVER
     return session.call_at + limits.t.call_pulse_s

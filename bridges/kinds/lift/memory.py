@@ -1,4 +1,4 @@
-"""What the lift's core remembers from scan to scan, and the limits that it is given."""
+"""The lift core's memory from scan to scan, and its limits."""
 
 from collections.abc import Mapping
 from functools import cached_property
@@ -18,7 +18,7 @@ Waiting = Literal["agv", "floor", "door"]
 
 
 class LiftLimits(msgspec.Struct, frozen=True, dict=True):
-    """What the core needs of a lift's settings.
+    """The core's share of a lift's settings.
 
     `stops`: RMF's floor name -> landing and door, from the lowest up. `t`: the durations.
     `debounce`: signal -> s. `alarm_on`: the hazards that are published on the topic `alarm`.
@@ -35,7 +35,7 @@ class LiftLimits(msgspec.Struct, frozen=True, dict=True):
 
     @classmethod
     def of(cls, settings: LiftSettings, debounce: Mapping[str, float]) -> "LiftLimits":
-        """From the YAML, and from the wiring table's debounce (signal -> s)."""
+        """Make the limits from the YAML and the wiring table's debounce (signal -> s)."""
         return cls(
             settings.stops(),
             settings.limits,
@@ -47,7 +47,7 @@ class LiftLimits(msgspec.Struct, frozen=True, dict=True):
         )
 
     def debounce_s(self, signal: str) -> float:
-        """How long a change of this signal must last."""
+        """Return the time for which a change of this signal must last."""
         return self.debounce.get(signal, 0.0)
 
     @cached_property
@@ -57,25 +57,25 @@ class LiftLimits(msgspec.Struct, frozen=True, dict=True):
         return {level: place for place, level in enumerate(landings)}
 
     def floors_between(self, level: str, other: str) -> int:
-        """How many landings lie between these two."""
+        """Count the landings between these two."""
         return abs(self.levels[level] - self.levels[other]) - 1
 
     def floor_name(self, level: str, preferred: str) -> str:
-        """RMF's name for a landing: `preferred` if that is one of its names, else the first."""
+        """Return RMF's name for a landing: `preferred` if that is one of its names, else the first."""
         if preferred in self.stops and self.stops[preferred].level == level:
             return preferred
         return next(name for name, stop in self.stops.items() if stop.level == level)
 
     def side(self, floor: str) -> Side:
-        """Which of the car's doors serves this floor."""
+        """Return the side of the door that serves this floor."""
         return self.stops[floor].side
 
 
 class CarPosition(msgspec.Struct, frozen=True):
-    """Where the car is. `trusted`: the landing last believed, last seen at `seen_at`. `suspect`: one
-    that the floor code shows, but that the car cannot have reached.
+    """The car's position. `trusted`: the landing last believed, last seen at `seen_at`. `suspect`: a
+    landing in the floor code that the car cannot have reached.
 
-    `moved_at`: when a reading last did not show the car standing.
+    `moved_at`: the time of the last reading in which the car did not stand.
     """
 
     trusted: str | None = None
@@ -85,7 +85,7 @@ class CarPosition(msgspec.Struct, frozen=True):
 
 
 class LiftSenses(msgspec.Struct, frozen=True):
-    """Every input, debounced, and when all were last read."""
+    """Every input, debounced, and the time of the last reading."""
 
     read_at: float | None = None
     code: Settled[tuple[str | None, str]] | None = None
@@ -100,9 +100,10 @@ class LiftSenses(msgspec.Struct, frozen=True):
 
 
 class ForgottenSession(msgspec.Struct, frozen=True):
-    """RMF's supervisor asks for another session instead (`by`, "" for none), or has ended this one
-    while its robot goes on asking (`disowned`), `since` when. `ended`: the robot's own END was heard
-    once (`bridges/kinds/lift/forgotten.py`)."""
+    """The session without RMF's supervisor, `since` a time (`bridges/kinds/lift/forgotten.py`).
+
+    `by`: the session for which the supervisor asks instead, "" for none. `disowned`: it has ended this
+    session while the robot goes on asking. `ended`: the robot's own END was heard once."""
 
     by: str
     since: float
@@ -111,9 +112,11 @@ class ForgottenSession(msgspec.Struct, frozen=True):
 
 
 class OwnWords(msgspec.Struct, frozen=True):
-    """What a robot's own adapter has said. `stamp`: the newest (ns), by its clock. `asked_at`: when it
-    last asked for the lift. `ended_at`: when it first sent END after that. `floor`: where it would go.
-    `opened`: OPEN has been published there since. `told`: it has asked again after that."""
+    """The messages of a robot's own adapter. `stamp`: the newest stamp (ns), by the adapter's clock.
+
+    `asked_at`: the time of its last request for the lift. `ended_at`: of its first END after that.
+    `floor`: its destination. `opened`: OPEN has been published there since. `told`: it has asked again
+    after OPEN."""
 
     stamp: int = 0
     asked_at: float = AGES_AGO
@@ -124,7 +127,7 @@ class OwnWords(msgspec.Struct, frozen=True):
 
 
 class Doubted(msgspec.Struct, frozen=True):
-    """A destination, asked for `since`, that may be of an earlier ride
+    """A destination, requested at `since`, that may belong to an earlier ride
     (`bridges/kinds/lift/replayed.py`)."""
 
     destination: str
@@ -132,14 +135,14 @@ class Doubted(msgspec.Struct, frozen=True):
 
 
 class LiftSession(msgspec.Struct, frozen=True):
-    """Who holds the lift, what was requested, and how far the ride has come.
+    """The lift's holder, its request, and the progress of its ride.
 
     `boarded`: OPEN at the destination has been published for this session, so a robot may be inside.
     `agv_seen`: AGV mode has come on for our request. `arrived`: the car has stood at the destination.
-    `call_at`: when the present call began. `waiting`, `since`: what we wait for, and since when.
-    `tries`: how often that has failed. `retry_at`: outputs stay off until then (inf: latched).
-    `forgotten`: RMF's supervisor does not ask for it. `robot`: what its own adapter has said.
-    `doubted`: a destination that does not count yet. `ends`: which stamps its END may have.
+    `call_at`: the start of the present call. `waiting`, `since`: the step for which we wait, and its
+    start. `tries`: the failures of that step. `retry_at`: outputs stay off until then (inf: latched).
+    `forgotten`: RMF's supervisor does not ask for this session. `robot`: its own adapter's messages.
+    `doubted`: a destination that does not count yet. `ends`: the stamps that its END may have.
     """
 
     id: str
@@ -162,7 +165,7 @@ class LiftSession(msgspec.Struct, frozen=True):
 
 
 class Grace(msgspec.Struct, frozen=True):
-    """After END: this session, and only this one, is granted again until `until`. Its outputs go off at
+    """The time after END: only the ended session is granted again until `until`. Its outputs go off at
     `off_at`. `in_car`: its robot may still be inside, and may resume by its own requests too."""
 
     session: LiftSession
@@ -174,9 +177,9 @@ class Grace(msgspec.Struct, frozen=True):
 class LiftMemory(msgspec.Struct, frozen=True):
     """Everything that outlives a scan.
 
-    `io_fault`: why the last read or write failed; "" if both succeeded. `unwritten_since`: since when
-    writes have failed in every scan. `write_failed`: the last scan's write failed. `own`: where each
-    robot itself last asked the lift to go, by its session.
+    `io_fault`: the error of the last read or write; "" if both succeeded. `unwritten_since`: the start
+    of failed writes in every scan. `write_failed`: the last scan's write failed. `own`: session -> the
+    destination last requested by the robot itself.
     """
 
     senses: LiftSenses = LiftSenses()

@@ -25,17 +25,17 @@ from bridges.messages.topics import (
 )
 
 OWN_REQUESTS = ADAPTER_LIFT_REQUESTS.live()
-"""What fleet adapters send to RMF's supervisor. We listen to it for the robot that has the lift."""
+"""Fleet adapters' requests to RMF's supervisor. We listen there to the robot that has the lift."""
 AVAILABLE_MODES = (int(LiftMode.MODE_HUMAN), int(LiftMode.MODE_AGV))
 
 
 def accept(request: LiftRequest, settings: LiftSettings) -> LiftRequested | EndRequested:
-    """The request as an event. Raises RequestRefused if it is malformed or asks for the impossible.
+    """Turn a request into an event. Raises RequestRefused if it is malformed or impossible.
 
-    An END_SESSION counts whatever its floor and door are: fleet adapters send "" and 0
-    (rmf_fleet_adapter RobotContext.cpp). Jazzy's supervisor sends one without a session at each state
-    of a lift that nobody has (lift_supervisor/Node.cpp); it ends nothing. One with DOOR_OPEN, which no
-    node of RMF's sends, is a person's (`rmf-bridge send`, rmf-web).
+    An END_SESSION counts with any floor and door: fleet adapters send "" and 0 (rmf_fleet_adapter
+    RobotContext.cpp). Jazzy's supervisor sends an END_SESSION without a session at each state of a free
+    lift (lift_supervisor/Node.cpp); it ends nothing. An END_SESSION with DOOR_OPEN comes from a person
+    (`rmf-bridge send`, rmf-web): no node of RMF sends that.
     """
     check_length(session_id=request.session_id)
     stamp = _stamp(request)
@@ -58,12 +58,12 @@ def accept(request: LiftRequest, settings: LiftSettings) -> LiftRequested | EndR
 
 
 def accept_adapters(request: LiftRequest, settings: LiftSettings) -> FromAdapter:
-    """A fleet adapter's request, before RMF's supervisor has decided on it. Raises RequestRefused."""
+    """Turn a fleet adapter's request to RMF's supervisor into an event. Raises RequestRefused."""
     return FromAdapter(accept(request, settings))
 
 
 def _stamp(request: LiftRequest) -> int:
-    """Its request_time (ns); 0 for one that no clock shows: an END counts all the same."""
+    """Return the request_time (ns); 0 for an impossible time, as an END counts all the same."""
     try:
         return in_ns(request.request_time)
     except RequestRefused:
@@ -71,17 +71,17 @@ def _stamp(request: LiftRequest) -> int:
 
 
 def alarm_topics(settings: LiftSettings) -> tuple[Topic[Message], ...]:
-    """The topic on which this lift tells the fleets of a fire; empty if it does not."""
+    """Return the topic of this lift's alarms to the fleets; empty if it publishes none."""
     return tuple(t for t in (FIRE_ALARM_TRIGGER, EMERGENCY_SIGNAL) if t.name == settings.alarm)
 
 
 def device_name(message: LiftRequest | LiftState) -> str:
-    """Which lift a message is about."""
+    """Return the lift that a message is about."""
     return message.lift_name
 
 
 def state_message(name: str, settings: LiftSettings, report: LiftReport, stamp: Time) -> LiftState:
-    """The report as RMF reads it; `stamp` is when the inputs were read."""
+    """Convert the report to RMF's message; `stamp` is the time of the inputs' reading."""
     return LiftState(
         lift_time=stamp,
         lift_name=name,
@@ -97,7 +97,7 @@ def state_message(name: str, settings: LiftSettings, report: LiftReport, stamp: 
 
 
 def summary(report: LiftReport) -> Mapping[str, str]:
-    """The report in one line, for a person."""
+    """Summarise the report in one line, for a person."""
     door = report.door.name.removeprefix("DOOR_").lower()
     return {
         "mode": report.mode.name.removeprefix("MODE_"),

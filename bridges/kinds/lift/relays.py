@@ -1,5 +1,5 @@
-"""The lift's outputs from scan to scan: what rests before it comes on, how often it may, and what is
-never on together. Off never waits."""
+"""The lift's outputs from scan to scan: rest before switching on, limits per minute, and exclusions.
+Switching off never waits."""
 
 import math
 from collections.abc import Iterator
@@ -16,9 +16,10 @@ T = TypeVar("T")
 
 
 class Channel(msgspec.Struct, Generic[T], frozen=True):
-    """One output, or a group of which one at a time may be on.
+    """One output, or a group of outputs of which at most one is on.
 
-    `on`: what is on now. `off_at`: when it last went off. `ons`: the latest times it was switched on.
+    `on`: the output that is on now. `off_at`: the time of the last switching off. `ons`: the latest
+    times of switching on.
     """
 
     on: T | None = None
@@ -26,7 +27,7 @@ class Channel(msgspec.Struct, Generic[T], frozen=True):
     ons: tuple[float, ...] = ()
 
     def step(self, wanted: T | None, now: float, ready_at: float, t: LiftDurations) -> "Channel[T]":
-        """The next state. It goes off at once. It comes on, or changes, only after its rest and after
+        """Return the next state. Off comes at once; on, or a change, only after the rest and after
         `ready_at`."""
         if self.on is not None:
             return self if wanted == self.on else replace(self, on=None, off_at=now)
@@ -35,11 +36,11 @@ class Channel(msgspec.Struct, Generic[T], frozen=True):
         return Channel(wanted, self.off_at, (*self.recent(now), now))
 
     def recent(self, now: float) -> tuple[float, ...]:
-        """When it was switched on during the last minute."""
+        """Return the times of switching on within the last minute."""
         return tuple(at for at in self.ons if now - at < 60.0)
 
     def may_switch_on_at(self, now: float, ready_at: float, t: LiftDurations) -> float:
-        """The earliest time at which it may be energised."""
+        """Return the earliest time at which it may be energised."""
         recent = self.recent(now)
         most = t.max_cycles_per_min
         rested_at = recent[-most] + 60.0 if len(recent) >= most else AGES_AGO
@@ -54,11 +55,11 @@ class Relays(msgspec.Struct, frozen=True):
     hold: Channel[Side] = Channel()
 
     def outputs(self) -> LiftOutputs:
-        """What the driver is to write."""
+        """Return the outputs for the driver to write."""
         return LiftOutputs(bool(self.agv.on), self.call.on, self.hold.on)
 
     def step(self, wanted: LiftOutputs, now: float, t: LiftDurations) -> "Relays":
-        """Move every output towards what is wanted, as far as is allowed now."""
+        """Move every output towards the wanted state, as far as is allowed now."""
         agv = self.agv.step(wanted.agv_request or None, now, AGES_AGO, t)
         rested_at = self._rested_at(t) if agv.on else NEVER
         call_ready_at = NEVER if self.hold.on else rested_at
@@ -68,14 +69,14 @@ class Relays(msgspec.Struct, frozen=True):
         return Relays(agv, call, hold)
 
     def changes_at(self, wanted: LiftOutputs, now: float, t: LiftDurations) -> float:
-        """When an output that is wanted and still off may come on; always later than `now`."""
+        """Return the time when a wanted output may come on; always later than `now`."""
         off = self._still_off(wanted, now, t)
         due = [channel.may_switch_on_at(now, ready_at, t) for _, channel, ready_at in off]
         return max(min(due, default=NEVER), math.nextafter(now, NEVER))
 
     def resting(self, wanted: LiftOutputs, now: float, t: LiftDurations) -> tuple[str, bool]:
-        """The first output that is wanted and must rest before it comes on, and whether
-        `max_cycles_per_min` is why; "" for none."""
+        """Return the first wanted output that must rest ("" for none), and True if
+        `max_cycles_per_min` is the reason."""
         for name, channel, ready_at in self._still_off(wanted, now, t):
             unused = replace(channel, ons=())
             at = channel.may_switch_on_at(now, ready_at, t)
@@ -85,7 +86,7 @@ class Relays(msgspec.Struct, frozen=True):
     def _still_off(
         self, wanted: LiftOutputs, now: float, t: LiftDurations
     ) -> Iterator[tuple[str, Channel[Any], float]]:
-        """Each output that is wanted and off, its name, and when the others let it come on."""
+        """Yield each wanted output that is off, its name, and the time when the others allow it."""
         agv_at = now if self.agv.on else self.agv.may_switch_on_at(now, AGES_AGO, t)
         ready_at = max(agv_at, self._rested_at(t))
         if wanted.agv_request and not self.agv.on:
@@ -96,5 +97,5 @@ class Relays(msgspec.Struct, frozen=True):
             yield "the door", self.hold, ready_at
 
     def _rested_at(self, t: LiftDurations) -> float:
-        """When call and door command will both have been off for `dead_time_s`."""
+        """Return the time at which call and door command have both been off for `dead_time_s`."""
         return max(self.call.off_at, self.hold.off_at) + t.dead_time_s

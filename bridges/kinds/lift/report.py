@@ -1,4 +1,4 @@
-"""What RMF is told about a lift: the content of LiftState."""
+"""A lift's report to RMF: the content of LiftState."""
 
 import msgspec
 from msgspec.structs import replace
@@ -17,11 +17,11 @@ OFFLINE = frozenset({"OUTPUTS_NOT_WRITTEN", "TWO_NODES_FOR_ONE_DEVICE"})
 
 
 class LiftReport(msgspec.Struct, frozen=True):
-    """LiftState without its name, floors and stamp, and what only the status file shows.
+    """LiftState without its name, floors and stamp, and the extra facts of the status file.
 
     `floor`: RMF's name, "" when unknown. `read_at`: monotonic seconds, None before the first reading.
-    `estimated`: no contact proves what `door` shows. `boarded`: a robot may be inside. `waits`: what
-    the session's request waits for; "" without one, or once RMF is shown what was asked.
+    `estimated`: no contact proves `door`. `boarded`: a robot may be inside. `waits`: the reason why the
+    session's request is not fulfilled yet; "" without a request, or once RMF sees it fulfilled.
     """
 
     read_at: float | None
@@ -38,11 +38,11 @@ class LiftReport(msgspec.Struct, frozen=True):
 
     @property
     def open_at(self) -> str:
-        """The floor at which the door is shown open, "" when it is not."""
+        """The floor at which the door is shown open; "" for a door not shown open."""
         return self.floor if self.door is LiftDoor.DOOR_OPEN else ""
 
     def news(self) -> object:
-        """All but the age and the faults' details, which may change with each reading."""
+        """Return all but the age and the faults' details, which may change with each reading."""
         shown = (self.floor, self.destination, self.door, self.motion, self.mode, self.session)
         return *shown, self.estimated, tuple(fault.code for fault in self.faults)
 
@@ -55,7 +55,7 @@ def report(
     now: float,
     limits: LiftLimits,
 ) -> LiftReport:
-    """The state as it is shown now. `wanted`: the outputs that would be on if no relay had to rest."""
+    """Report the present state. `wanted`: the outputs that would be on if no relay had to rest."""
     session, relays = memory.session, memory.relays
     destination = session.destination if session else ""
     floor = limits.floor_name(view.level, destination) if view.fresh and view.level else ""
@@ -81,7 +81,7 @@ def report(
 
 
 def _worn(relays: Relays, wanted: LiftOutputs, now: float, limits: LiftLimits) -> tuple[Fault, ...]:
-    """A relay was switched on too often, so that the lift stands. It hides no open door."""
+    """Return a fault if a relay was switched on too often and now rests. It hides no open door."""
     output, worn = relays.resting(wanted, now, limits.t)
     most = f"its relay came on {limits.t.max_cycles_per_min} times within a minute"
     return (Fault("RELAY_RESTS", f"{output}: {most}"),) if worn else ()
@@ -96,7 +96,7 @@ def _waits(
     now: float,
     limits: LiftLimits,
 ) -> str:
-    """What a request waits for that RMF does not see fulfilled."""
+    """Explain why a request is not fulfilled yet."""
     if session.doubted:
         return f"for the robot to ask for {session.doubted.destination} itself: it may have ridden"
     if not session.agv:
@@ -125,10 +125,10 @@ def _may_enter(
     """May an open door be shown as OPEN? A robot that sees OPEN drives through.
 
     Not while the hold is wanted and its relay must rest: the door stands open only for its own dwell
-    time, and would then close on the robot. Nor, while the session is served, at the floor that the
-    robot itself asks for, if the car is about to leave it: RMF's supervisor may be passing on an
-    earlier ride. A session that has not boarded must also be served, in AGV mode, and without a fault;
-    being forgotten by RMF's supervisor does not count as one.
+    time, and would then close on the robot. While the session is served, also not at the floor for
+    which the robot itself asks, if the car is about to leave: RMF's supervisor may be passing on an
+    earlier ride. A session that has not boarded must also be served, in AGV mode, and without a fault,
+    except that RMF's supervisor has forgotten it.
     """
     session, held = memory.session, memory.relays.hold.on is not None
     if wanted.hold_door is not None and not held:
@@ -143,7 +143,7 @@ def _may_enter(
 
 
 def _mode(view: BelievedLift, faults: tuple[Fault, ...], relays: Relays) -> LiftMode:
-    """RMF's mode. If no AGV mode status is wired, our own request for it counts as the status."""
+    """Return RMF's mode. If no AGV mode status is wired, our own request counts as the status."""
     codes = {fault.code for fault in faults}
     if codes & {"FIRE", "FIRE_LATCHED"}:
         return LiftMode.MODE_FIRE
@@ -160,9 +160,9 @@ def _mode(view: BelievedLift, faults: tuple[Fault, ...], relays: Relays) -> Lift
 def _door(
     session: LiftSession | None, view: BelievedLift, floor: str, limits: LiftLimits
 ) -> tuple[LiftDoor, bool]:
-    """The door as the inputs show it, and whether that is an estimate.
+    """Return the door's state by the inputs, and True if it is an estimate.
 
-    With a session and a known floor, only the door that serves that floor counts.
+    With a session and a known floor, only the door at that floor counts.
     """
     if not view.fresh:
         return LiftDoor.DOOR_MOVING, False
@@ -180,7 +180,7 @@ def _door(
 
 
 def _motion(view: BelievedLift, door: LiftDoor) -> LiftMotion:
-    """From the motion lines. Without them, a car with an open door at a floor is stopped."""
+    """Read the motion from its lines. Without lines, a car with an open door at a floor is stopped."""
     if not view.fresh:
         return LiftMotion.MOTION_UNKNOWN
     if view.motion is None:

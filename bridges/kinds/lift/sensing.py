@@ -1,21 +1,22 @@
-"""What to believe of a lift's inputs: debounce, age, and whether they can be true together.
+"""Judgement of a lift's inputs: debounce, age, and contradictions.
 
 Rules:
 LIFT-SENSING-1. A change counts once it has lasted for its signal's debounce. The end of a hazard counts
-   once it has lasted for `hazard_clear_s`. No input is believed before every input has settled once, or
-   while any input has kept changing for longer than `RESTLESS_S`. The time that inputs take to settle
-   after the start is no fault.
-LIFT-SENSING-2. After `stale_after_s` without a reading, what was believed is forgotten: the car may be
-   anywhere. After a shorter gap the values stay, and a debounce that had begun starts again.
-LIFT-SENSING-3. A floor code is believed only if the car can have reached that floor. It cannot if the
-   code skips floors faster than a car travels, or (with motion lines) changes while the car stands.
-   Then the position is unknown until the code shows the last trusted floor, or one that the car can
-   have reached, or until an operator resets.
-LIFT-SENSING-4. While the floor code is not valid (`valid_when`) for longer than its debounce, the car
-   may go anywhere unseen. The next floor that the code shows is believed.
-LIFT-SENSING-5. A door is open when the contact that proves it says so. With only one contact the other
-   end position is estimated from the door's travel time, and marked as an estimate.
-LIFT-SENSING-6. A car stands when the motion lines say so. Without motion lines it is taken to stand.
+   once it has lasted for `hazard_clear_s`. All inputs are unknown until every input has settled once,
+   and while any input has been changing for longer than `RESTLESS_S`. Settling after the start is no
+   fault.
+LIFT-SENSING-2. After `stale_after_s` without a reading all inputs are unknown: the car may be anywhere.
+   After a shorter gap the values stay, and a running debounce starts again.
+LIFT-SENSING-3. A floor code is believed only if the car can have reached that floor. It is rejected if
+   it skips floors faster than a car travels, or (with motion lines) changes while the car stands.
+   Then the position is unknown until the code shows the last trusted floor or another reachable floor,
+   or until an operator resets.
+LIFT-SENSING-4. While the floor code is invalid (`valid_when`) for longer than its debounce, the car
+   may go anywhere unseen. After that the next floor code is believed.
+LIFT-SENSING-5. A door is open when the contact for the open door says so. With only one contact the
+   other end position is estimated from the door's travel time, and marked as an estimate.
+LIFT-SENSING-6. A car stands when the motion lines say so. Without motion lines it always counts as
+   standing.
 """
 
 from collections.abc import Iterator, Sequence
@@ -32,14 +33,14 @@ from bridges.kinds.shared.durations import AGES_AGO, NEVER
 HAZARDS = tuple(Hazard)
 
 MOTION_MEMORY_S = 2.0
-"""How long after the car was last seen moving a new floor code is still possible."""
+"""A new floor code is possible until this long after the car's last seen motion."""
 
 RESTLESS_S = 2.0
-"""An input that does not settle within this time keeps changing: a loose wire, or interference."""
+"""An input that takes longer to settle is restless: a loose wire, or interference."""
 
 
 class DoorSeen(msgspec.Struct, frozen=True):
-    """One door: open, closed or moving (neither). `settles_at`: when an estimate will be ready (s)."""
+    """One door: open, closed or moving (neither). `settles_at`: the time of the next estimate (s)."""
 
     open: bool
     closed: bool
@@ -50,10 +51,10 @@ class DoorSeen(msgspec.Struct, frozen=True):
 class BelievedLift(msgspec.Struct, frozen=True):
     """The inputs as they are believed at one instant.
 
-    `blind`: why no input can be believed, "" when all can. `settling`: the only reason is that they
-    have not settled since the start. `level`: the landing, None when unknown. `level_settles`: the
-    floor code is changing. `agv`: None where not wired. `changes_at`: when the view may change
-    without a new reading (s).
+    `blind`: the reason why no input is believed, "" if all are. `settling`: the only reason is that
+    inputs still settle after the start. `level`: the landing, None when unknown. `level_settles`: the
+    floor code is changing. `agv`: None if not wired. `changes_at`: the next time when the view may
+    change without a reading (s).
     """
 
     blind: str
@@ -75,7 +76,7 @@ class BelievedLift(msgspec.Struct, frozen=True):
         return not self.blind
 
     def door(self, side: Side) -> DoorSeen:
-        """The door on that side; a side that is not wired is never open."""
+        """Return the door on that side; a side without wires is never open."""
         if side is Side.FRONT:
             return self.front
         return self.rear or DoorSeen(open=False, closed=False)
@@ -105,7 +106,7 @@ def take(senses: LiftSenses, sample: LiftSample, now: float, limits: LiftLimits)
 
 
 def gap(senses: LiftSenses, now: float) -> LiftSenses:
-    """A read has failed: the debounce starts again, and the car may have moved."""
+    """Restart the debounce after a failed read; the car may have moved."""
     return LiftSenses(
         senses.read_at,
         forget(senses.code),
@@ -118,12 +119,12 @@ def gap(senses: LiftSenses, now: float) -> LiftSenses:
 
 
 def unsure(senses: LiftSenses, now: float) -> LiftSenses:
-    """After a long time without a reading: forget everything but the last landing."""
+    """Forget everything but the last landing, after a long time without a reading."""
     return LiftSenses(position=replace(senses.position, moved_at=now))
 
 
 def trust(senses: LiftSenses) -> LiftSenses:
-    """An operator says that the floor code is right."""
+    """Believe the floor code, by an operator's reset."""
     position = senses.position
     if position.suspect is None:
         return senses
@@ -132,7 +133,7 @@ def trust(senses: LiftSenses) -> LiftSenses:
 
 
 def look(senses: LiftSenses, now: float, limits: LiftLimits) -> BelievedLift:
-    """What is believed now."""
+    """Judge the inputs now."""
     stale = now >= stale_at(senses, limits)
     motion = senses.motion.value if senses.motion else None
     front = _door(senses.doors[0], now, limits)
@@ -160,7 +161,7 @@ def look(senses: LiftSenses, now: float, limits: LiftLimits) -> BelievedLift:
 
 
 def stale_at(senses: LiftSenses, limits: LiftLimits) -> float:
-    """When the last reading becomes stale (s); -inf before the first."""
+    """Return the time when the last reading becomes stale (s); -inf before the first reading."""
     return AGES_AGO if senses.read_at is None else senses.read_at + limits.t.stale_after_s
 
 
@@ -173,7 +174,7 @@ def _settle_hazard(
 def _hazard_hold_s(
     before: Settled[bool] | None, hazard: Hazard, seen: bool, limits: LiftLimits
 ) -> float:
-    """How long the reading must last: longer for the end of a hazard than for its start."""
+    """Return the debounce of a hazard input (s): longer for the end of a hazard than for its start."""
     hold_s = limits.debounce_s(hazard)
     clearing = before is not None and bool(before.value) and not seen
     return max(hold_s, limits.t.hazard_clear_s) if clearing else hold_s
@@ -186,7 +187,7 @@ def _locate(
     now: float,
     limits: LiftLimits,
 ) -> CarPosition:
-    """Follow the car from floor to floor. A floor that it cannot have reached is only suspected."""
+    """Follow the car from floor to floor. An unreachable floor is only suspected."""
     if sample.motion is not Motion.STOPPED:
         before = replace(before, moved_at=now)
     level = code.value[0] if code.value else None
@@ -237,7 +238,7 @@ def _door(seen: Settled[DoorReading | None] | None, now: float, limits: LiftLimi
 class Unsettled(msgspec.Struct, frozen=True):
     """An input that is changing, or has never settled (`new`).
 
-    `due_at`: when it settles if it does not change again. `torn_at`: when it counts as restless. In s.
+    `due_at`: the time when it settles without another change. `torn_at`: when it is restless. In s.
     """
 
     name: str
@@ -284,7 +285,7 @@ def _blind(
 
 
 def _settling(unsettled: Sequence[Unsettled], now: float) -> bool:
-    """Has an input not settled since the start, and is none restless?"""
+    """Is an input still settling after the start, with none restless?"""
     first = any(wait.new for wait in unsettled)
     return first and not any(now >= wait.torn_at for wait in unsettled)
 

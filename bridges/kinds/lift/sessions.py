@@ -1,7 +1,7 @@
-"""Who has the lift: grants, refusals, END, and the grace after it.
+"""The lift's sessions: grants, refusals, END, and the grace after END.
 
-The rules are 1 and 2 of `core.py`; `forgotten.py` has those of a robot that RMF's supervisor forgets,
-`replayed.py` those of requests that it hears again.
+The rules are LIFT-1 and LIFT-2 of `core.py`, those of `forgotten.py` for robots that RMF's supervisor
+forgets, and those of `replayed.py` for replayed requests.
 """
 
 from collections.abc import Callable
@@ -21,8 +21,8 @@ LEFT_IN_CAR: Final = "released in mid-ride"
 def ask(
     memory: LiftMemory, request: LiftRequested, now: float, why_not: Callable[[], str]
 ) -> tuple[LiftMemory, str]:
-    """Take a request of `lift_requests`; also why it is refused, "" if it is not. `why_not`: why nobody
-    gets the lift now."""
+    """Take a request from `lift_requests`; also return the reason for a refusal, "" for none.
+    `why_not`: the reason why nobody gets a free lift now."""
     held, grace = memory.session, memory.grace
     if held and held.id != request.session_id:
         session = forgotten.overruled(held, request.session_id, now)
@@ -44,7 +44,7 @@ def ask(
 def _heed(
     memory: LiftMemory, session: LiftSession, request: LiftRequested, now: float
 ) -> LiftSession:
-    """The session once `lift_requests` asks for it."""
+    """Apply a request from `lift_requests` to its session."""
     own = memory.own.get(session.id, "")
     held_open = memory.relays.hold.on is not None
     doubted = replayed.doubt(session, request, own, held_open, now)
@@ -55,8 +55,8 @@ def _heed(
 def hear_adapter(
     memory: LiftMemory, asked: LiftRequested | EndRequested, now: float, limits: LiftLimits
 ) -> LiftMemory:
-    """A robot's own request: it counts for the session that has the lift, if that is forgotten or
-    disowned, or if it settles a doubt; and for a robot that was left in the car."""
+    """Take a robot's own request. It counts for the session that has the lift, if the session is
+    forgotten or disowned or the request settles a doubt; and for a robot that was left in the car."""
     held = memory.session
     memory = replace(memory, own=replayed.noted(memory.own, asked))
     if held is None:
@@ -72,7 +72,7 @@ def hear_adapter(
 
 
 def _come_back(memory: LiftMemory, asked: LiftRequested | EndRequested, now: float) -> LiftMemory:
-    """A robot that may have been left in the car asks again by itself, within the grace."""
+    """Restore the session of a robot that may have been left in the car and asks within the grace."""
     grace = memory.grace
     if grace is None or not grace.in_car or now >= grace.until:
         return memory
@@ -86,7 +86,7 @@ def _come_back(memory: LiftMemory, asked: LiftRequested | EndRequested, now: flo
 
 
 def _refresh(session: LiftSession, request: LiftRequested, now: float) -> LiftSession:
-    """A repeat only shows that RMF is alive. A different destination or mode is a new request."""
+    """Refresh the session by a repeat; start anew for a different destination or mode."""
     if (request.agv, request.destination) == (session.agv, session.destination):
         return replace(session, asked_at=now)
     fresh = replace(_anew(session, now), agv=request.agv, destination=request.destination)
@@ -94,7 +94,7 @@ def _refresh(session: LiftSession, request: LiftRequested, now: float) -> LiftSe
 
 
 def _anew(session: LiftSession, now: float) -> LiftSession:
-    """The session as if it were granted now, but for what is known of its robot."""
+    """Return the session as if granted now; only the facts about its robot stay."""
     return LiftSession(
         session.id,
         session.agv,
@@ -109,7 +109,7 @@ def _anew(session: LiftSession, now: float) -> LiftSession:
 def end(
     memory: LiftMemory, ended: EndRequested, now: float, limits: LiftLimits
 ) -> tuple[LiftMemory, str]:
-    """Take an END of `lift_requests`; also why it is refused, "" if it is not."""
+    """Take an END from `lift_requests`; also return the reason for a refusal, "" for none."""
     held, grace = memory.session, memory.grace
     if held is None and grace and ended.by_person and ended.session_id == grace.session.id:
         return replace(memory, grace=replace(grace, until=grace.off_at, in_car=False)), ""
@@ -127,7 +127,7 @@ def end(
 
 
 def lapse(memory: LiftMemory, now: float, limits: LiftLimits) -> LiftMemory:
-    """A disowned session ends when its robot has been silent for too long."""
+    """End a disowned session after its robot's silence."""
     held = memory.session
     if held is None or now < forgotten.lapses_at(held):
         return memory
@@ -137,7 +137,7 @@ def lapse(memory: LiftMemory, now: float, limits: LiftLimits) -> LiftMemory:
 def _let_go(
     memory: LiftMemory, held: LiftSession, by_person: bool, now: float, limits: LiftLimits
 ) -> LiftMemory:
-    """The session is over, and its grace begins."""
+    """End the session, and begin its grace."""
     grace = None
     if memory.relays.agv.on or held.boarded:
         off_at = now + limits.t.release_grace_s

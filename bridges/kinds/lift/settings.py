@@ -16,7 +16,7 @@ AlarmOn = Annotated[
 
 
 class Floor(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A floor whose landing has another name, or that the car's rear door serves."""
+    """A floor that is served by the rear door, or whose landing has another name."""
 
     level: Annotated[
         Name | None, tells("the landing's name in the floor code; the floor's own when absent.")
@@ -112,17 +112,17 @@ class LiftSettings(DeviceSettings, frozen=True, kw_only=True, forbid_unknown_fie
         return self.limits.stale_after_s
 
     def on_map(self) -> list[Place]:
-        """The floors, which RMF's map must name too."""
+        """List the floors, which must be on RMF's map too."""
         if isinstance(self.floors, list):
             return [(("floors", str(i)), FLOOR, name) for i, name in enumerate(self.floors)]
         return [(("floors", name), FLOOR, name) for name in self.floors]
 
     def stops(self) -> Mapping[str, Stop]:
-        """RMF's floor name -> landing and door, from the lowest up."""
+        """Map RMF's floor name -> landing and door, from the lowest up."""
         if isinstance(self.floors, list):
             return {name: Stop(name) for name in self.floors}
         return {name: Stop(f.level or name, f.side) for name, f in self.floors.items()}
 
     def levels(self) -> list[str]:
-        """The landings, from the lowest up."""
+        """List the landings, from the lowest up."""
         return list(dict.fromkeys(stop.level for stop in self.stops().values()))

@@ -1,4 +1,4 @@
-"""What passes between a lift's driver and its core in one scan, and the core's events."""
+"""A lift's sample, outputs and events: the interface of its core."""
 
 from enum import Enum, StrEnum
 
@@ -8,11 +8,11 @@ from bridges.kinds.shared.decision import IoFailed, OperatorReset, RivalSeen, Sa
 
 
 class DoorReading(Enum):
-    """What the door contacts say at one instant.
+    """The reading of the door contacts at one instant.
 
-    With two contacts: OPEN, CLOSED, BETWEEN (neither) or BOTH (a fault). With one that proves open:
-    OPEN or NOT_OPEN. With one that proves closed: CLOSED or NOT_CLOSED. If the door is read as a
-    number, a number that the YAML does not list is UNKNOWN (a fault).
+    With two contacts: OPEN, CLOSED, BETWEEN (neither) or BOTH (a fault). With a contact for open only:
+    OPEN or NOT_OPEN. With a contact for closed only: CLOSED or NOT_CLOSED. For a door read as a number:
+    UNKNOWN (a fault) if the YAML does not list the number.
     """
 
     OPEN = "open"
@@ -25,7 +25,7 @@ class DoorReading(Enum):
 
 
 class Motion(Enum):
-    """What the motion lines say. CONTRADICTORY: they cannot all be true (up and down at once)."""
+    """The reading of the motion lines. CONTRADICTORY: they cannot all be true (up and down at once)."""
 
     STOPPED = "stopped"
     UP = "up"
@@ -50,9 +50,9 @@ class LiftSample(msgspec.Struct, frozen=True):
     """Every input of one lift, decoded but not debounced.
 
     `level`: the landing that the floor code names, None for no code (between floors).
-    `code_fault`: why the code is illegal (not listed, two of one-hot, parity), "" if it is not.
-    `floor_valid`: the code is valid now; while it is not, the car may go anywhere unseen.
-    `motion`, `agv`, `rear_door`: None where not wired. `agv` is also None while its line is not valid.
+    `code_fault`: the reason why the code is illegal (not listed, two of one-hot, parity), "" if legal.
+    `floor_valid`: the code is valid now; without it the car may go anywhere unseen.
+    `motion`, `agv`, `rear_door`: None if not wired. `agv` is also None while its line is not valid.
     """
 
     level: str | None
@@ -66,14 +66,14 @@ class LiftSample(msgspec.Struct, frozen=True):
 
 
 class Side(Enum):
-    """Which of the car's doors."""
+    """The car's front or rear door."""
 
     FRONT = "front"
     REAR = "rear"
 
 
 class Stop(msgspec.Struct, frozen=True):
-    """One of this lift's floors: the landing that the floor code names, and the door that serves it."""
+    """One of this lift's floors: its landing's name in the floor code, and the side of its door."""
 
     level: str
     side: Side = Side.FRONT
@@ -82,7 +82,7 @@ class Stop(msgspec.Struct, frozen=True):
 class LiftOutputs(msgspec.Struct, frozen=True):
     """Every output of one lift. The default is all off.
 
-    `call`: the landing whose call is energised. `hold_door`: the door whose open command is.
+    `call`: the landing whose call is energised. `hold_door`: the door whose open command is energised.
     """
 
     agv_request: bool = False
@@ -91,7 +91,7 @@ class LiftOutputs(msgspec.Struct, frozen=True):
 
 
 class LiftRequested(msgspec.Struct, frozen=True):
-    """A well-formed LiftRequest for AGV or HUMAN mode, for this lift and a floor that it serves.
+    """A well-formed LiftRequest for AGV or HUMAN mode, for this lift and one of its floors.
 
     `stamp`: its request_time (ns), by its sender's clock; 0 without one.
     """
@@ -103,7 +103,7 @@ class LiftRequested(msgspec.Struct, frozen=True):
 
 
 class EndRequested(msgspec.Struct, frozen=True):
-    """A LiftRequest for END_SESSION, whatever its floor says. `by_person`: a person has sent it, with
+    """A LiftRequest for END_SESSION, with any floor. `by_person`: a person sent it, with
     `rmf-bridge send` or `release`."""
 
     session_id: str
@@ -118,6 +118,6 @@ class FromAdapter(msgspec.Struct, frozen=True):
 
 
 Asked = LiftRequested | EndRequested | FromAdapter
-"""What requests become."""
+"""The events made from requests."""
 
 Event = Sampled[LiftSample] | IoFailed | RivalSeen | OperatorReset | Asked

@@ -1,25 +1,25 @@
-"""The lift supervisor's core, for one lift: which session gets it, and what the lift's node is sent.
+"""The lift supervisor's core, for one lift: the order of sessions, and the requests to the lift's node.
 
 It replaces RMF's own (rmf_ros2, lift_supervisor/Node.cpp). Fleet adapters send their requests on
-`adapter_lift_requests`. The supervisor passes on those of one session at a time to the lift's node,
-on `lift_requests`, until the lift's states show that they were obeyed.
-`bridges/kinds/shared/freshness.py` says which requests count. Rules:
+`adapter_lift_requests`. The supervisor passes on the requests of one session at a time to the lift's
+node, on `lift_requests`, until the lift's states show that they were obeyed.
+`bridges/kinds/shared/freshness.py` rejects stale requests. Rules:
 LIFT-SUPERVISOR-1. Sessions are served in the order of their first requests. A session leaves the queue
    by END, or after `silent_after_s` without a request. While the lift is silent this time does not run,
    as adapters repeat their requests only when the lift's states come.
-LIFT-SUPERVISOR-2. The lift's states say which session has the lift. That session goes before the queue
-   if its robot still requests it. If nobody has requested it for `orphan_after_s`, the supervisor ends
-   it.
+LIFT-SUPERVISOR-2. The lift's states name the session that has the lift. This session goes before the
+   queue if its robot still requests it. After `orphan_after_s` without a request for this session the
+   supervisor ends it.
 LIFT-SUPERVISOR-3. One session at a time has its turn. Its request is sent when it is new or has
-   changed. It is repeated when the lift's state does not show what was requested, and when the adapter
-   has repeated it (else the lift's node would take RMF to be silent). It is never sent while the lift
-   shows another session.
-LIFT-SUPERVISOR-4. A turn ends by END. Usually the holder sends it, wherever the lift is and in any
-   mode. The supervisor sends it for a silent holder that the lift has never accepted, and after
-   `holder_ttl_s` if the site has set that. END is repeated until a later state shows another session,
-   or none. Only then is the next session served.
+   changed. The request is repeated when the lift's state does not fulfil it, and when the adapter has
+   repeated it (else the lift's node would consider RMF silent). It is never sent while the lift shows
+   another session.
+LIFT-SUPERVISOR-4. A turn ends by END. Usually the holder sends END, wherever the lift is and in any
+   mode. The supervisor sends END for a silent holder that the lift has never accepted, and, for any
+   silent holder, after `holder_ttl_s` if the site has set that. END is repeated until a later state
+   shows another session or none. Only after that is the next session served.
 LIFT-SUPERVISOR-5. While the lift is in fire, emergency or offline mode, no robot is sent to it and the
-   queue waits. END is passed on. So is HUMAN mode, which calls no robot to the lift.
+   queue waits. END is passed on, and so are requests for HUMAN mode, as they call no robot to the lift.
 LIFT-SUPERVISOR-6. During the quiet start, and while another supervisor publishes, it only listens. Then
    it starts from the lift's states and from the requests it has heard, so a restart ends no ride.
 LIFT-SUPERVISOR-7. Two messages are at least GAP_S apart, and a message is repeated unchanged after
@@ -55,15 +55,16 @@ Decided = Decision[SupervisedLift, None, SupervisorReport]
 
 
 def initial(lift: str, started_at: float) -> SupervisedLift:
-    """Nothing has been heard, and we may not publish yet."""
+    """Return the memory at start: nothing has been heard, and we may not publish yet."""
     return SupervisedLift(lift, started_at)
 
 
 def idle(memory: SupervisedLift, now: float) -> bool:
-    """May this lift be forgotten? No session requests it, and it has been silent for a while.
+    """May this lift be forgotten? True after a long silence.
 
-    If the lift comes back, its states show again a session that is still to be ended. A robot that
-    only waits for a lift is forgotten after a longer time; it requests again when the lift is back.
+    FORGOTTEN_S suffices without claims: if the lift comes back, its states show a session that is still
+    to be ended. Robots that only wait are forgotten after 10 times as long; they request again when the
+    lift is back. A lift with claims that shows a session is never forgotten.
     """
     heard_at = max(memory.heard_at, memory.shown_at)
     has_it = memory.session_shown or (memory.turn and memory.turn.seen)
@@ -74,7 +75,7 @@ def idle(memory: SupervisedLift, now: float) -> bool:
 def decide(
     memory: SupervisedLift, event: Event, now: float, limits: LiftSupervisorLimits
 ) -> Decided:
-    """Take the event in, decide whose turn it is, and send what is due: at most one message."""
+    """Take the event in, choose the session with the turn, and send the message that is due, if any."""
     memory, refused = _take(memory, event, now, limits)
     memory = _forget_silent(memory, now, limits)
     memory = _take_turns(memory, now, limits)
@@ -93,7 +94,7 @@ def decide(
     )
 
 
-# --- what is heard -----------------------------------------------------------------------------
+# --- messages in -------------------------------------------------------------------------------
 
 
 def _take(
@@ -121,7 +122,7 @@ def _listen(
     now: float,
     limits: LiftSupervisorLimits,
 ) -> tuple[SupervisedLift, str]:
-    """Does this request count?"""
+    """Note the request's stamp; also return the reason for a refusal, "" if the request counts."""
     requesters, refused = hear(
         memory.requesters,
         event.session,
@@ -136,7 +137,7 @@ def _listen(
 
 
 def _ask(memory: SupervisedLift, request: RideRequested, now: float) -> tuple[SupervisedLift, str]:
-    """Enter the queue, or repeat or change the request without losing the place in it."""
+    """Enter the session into the queue; a repeated or changed request keeps its place."""
     before = memory.claim(request.session)
     served = memory.shown.floors if memory.shown else ()
     if served and request.target.request_type == AGV and request.target.floor not in served:
@@ -151,7 +152,7 @@ def _ask(memory: SupervisedLift, request: RideRequested, now: float) -> tuple[Su
 
 
 def _still_there(memory: SupervisedLift, before: SessionClaim | None, now: float) -> SupervisedLift:
-    """A request that cannot be obeyed still shows that its requester is alive."""
+    """Note that the requester of a refused request is alive."""
     return memory if before is None else _with(memory, before, replace(before, heard_at=now))
 
 
@@ -164,7 +165,7 @@ def _with(
 
 
 def _end(memory: SupervisedLift, ended: RideEnded, now: float) -> SupervisedLift:
-    """The session leaves the queue. If it has the lift or its turn, the node is sent END."""
+    """Remove the session from the queue. If it has the lift or the turn, send END to the node."""
     session = ended.session
     memory, turn = _without(memory, session), memory.turn
     has_it = session in (memory.session_shown, turn.session if turn else "")
@@ -178,7 +179,7 @@ def _without(memory: SupervisedLift, session: str) -> SupervisedLift:
 
 
 def _see(memory: SupervisedLift, shown: LiftStateHeard, now: float) -> SupervisedLift:
-    """A state: it may confirm an END, call for a repeat, or show another session."""
+    """Take a state in: it may confirm an END, call for a repeat, or show another session."""
     flowed = now <= memory.shown_at + SILENT_S
     same = flowed and shown.session == memory.session_shown
     turn, prompted = memory.turn, memory.prompted
@@ -202,18 +203,18 @@ def _see(memory: SupervisedLift, shown: LiftStateHeard, now: float) -> Supervise
 
 
 def _speak(memory: SupervisedLift, yes: bool, passive: str) -> SupervisedLift:
-    """While we may not publish nobody has a turn. Later the lift's states show who has the lift."""
+    """Take the turn away while we may not publish. Later the lift's states show the holder."""
     turn = memory.turn if yes else None
     return replace(memory, may_speak=yes, passive=passive, turn=turn)
 
 
-# --- whose turn it is --------------------------------------------------------------------------
+# --- turns -------------------------------------------------------------------------------------
 
 
 def _forget_silent(
     memory: SupervisedLift, now: float, limits: LiftSupervisorLimits
 ) -> SupervisedLift:
-    """Drop the claims of silent sessions that wait. A holder leaves by END only."""
+    """Drop the claims of silent waiting sessions. A holder leaves by END only."""
     holder = memory.turn.session if memory.turn and not memory.turn.ends else ""
     staying = tuple(
         claim
@@ -243,7 +244,7 @@ def _take_turns(memory: SupervisedLift, now: float, limits: LiftSupervisorLimits
 def _obey_the_lift(
     memory: SupervisedLift, shown: str, now: float, limits: LiftSupervisorLimits
 ) -> SupervisedLift:
-    """The lift shows a session without a turn: after our restart, or after another node's request."""
+    """Serve or end a session that the lift shows: one from before our restart, or of another node."""
     if memory.claim(shown):
         return _begin(memory, Turn(shown, now, seen=True))
     if memory.shown_at >= memory.session_since + limits.orphan_after_s:
@@ -264,11 +265,11 @@ def _let_go(
     return _begin(_without(memory, turn.session), Turn(turn.session, now, ends=True))
 
 
-# --- what is sent ------------------------------------------------------------------------------
+# --- messages out ------------------------------------------------------------------------------
 
 
 def wanted(memory: SupervisedLift) -> LiftRequest | None:
-    """The request that the lift's node should have now, without its stamp."""
+    """Make the present request to the lift's node, without its stamp; None for no request."""
     turn = memory.turn
     if turn is None:
         return None
@@ -292,7 +293,7 @@ def wanted(memory: SupervisedLift) -> LiftRequest | None:
 
 
 def _due_at(memory: SupervisedLift, message: LiftRequest | None) -> float:
-    """When to send this request. An END that names another floor is a repeat, not a new one."""
+    """Return the time to send this request. An END with another floor is only a repeat."""
     if message is None:
         return NEVER
     new = memory.sent is None or (message != memory.sent and message.request_type != END)
@@ -303,7 +304,7 @@ def _due_at(memory: SupervisedLift, message: LiftRequest | None) -> float:
 def _wake_at(
     memory: SupervisedLift, due: list[float], now: float, limits: LiftSupervisorLimits
 ) -> float:
-    """When the decision may change without an event."""
+    """Return the next time at which the decision may change without an event."""
     if memory.shown is not None and memory.flows(now):
         due.append(math.nextafter(memory.shown_at + SILENT_S, NEVER))
     for claim in memory.claims:

@@ -1,4 +1,4 @@
-"""What the lift supervisor's core remembers of one lift, and the limits that it is given."""
+"""The lift supervisor's memory of one lift, and its limits."""
 
 from typing import Final
 
@@ -12,7 +12,7 @@ from bridges.kinds.shared.graph_kind import LISTENS
 from bridges.messages.definitions import LiftMode, LiftRequest
 
 NOBODY_IS_SENT: Final = (LiftMode.MODE_FIRE, LiftMode.MODE_EMERGENCY, LiftMode.MODE_OFFLINE)
-"""The modes in which no robot is sent to a lift."""
+"""In these modes no robot is sent to a lift."""
 
 
 class LiftSupervisorLimits(msgspec.Struct, frozen=True):
@@ -27,7 +27,7 @@ class LiftSupervisorLimits(msgspec.Struct, frozen=True):
 
     @classmethod
     def of(cls, settings: LiftSupervisorSettings) -> "LiftSupervisorLimits":
-        """From the YAML."""
+        """Make the limits from the YAML."""
         ttl_s = settings.holder_ttl_s
         return cls(
             silent_after_s=settings.silent_after_s,
@@ -40,7 +40,7 @@ class LiftSupervisorLimits(msgspec.Struct, frozen=True):
 
 
 class SessionClaim(msgspec.Struct, frozen=True):
-    """A session that wants the lift: its last request, and when its first and last requests came."""
+    """A session that wants the lift: its last request, and the times of its first and last request."""
 
     session: str
     target: Target
@@ -49,8 +49,8 @@ class SessionClaim(msgspec.Struct, frozen=True):
 
 
 class Turn(msgspec.Struct, frozen=True):
-    """The session whose request we pass on. `ends`: we send its END, which a person has asked for
-    if `by_person`. `seen`: the lift has shown it."""
+    """The session whose requests we pass on. `ends`: we send its END, which came from a person if
+    `by_person`. `seen`: the lift's states have shown this session."""
 
     session: str
     since: float
@@ -62,12 +62,12 @@ class Turn(msgspec.Struct, frozen=True):
 class SupervisedLift(msgspec.Struct, frozen=True):
     """Everything that outlives an event.
 
-    `passive`: what those wait for that wait for us, while we may not publish.
-    `claims`: in the order of first requests, with the holder's. `heard_at`: when an adapter was last
-    heard. `requesters`: what was heard of each. `shown`: the latest state, which came at `shown_at`;
-    `session_since`: since when it shows this session. `flowing_since`: since when states come without
-    a gap. `sent`: the last request of this turn; `last_sent`: of any turn, at `sent_at`. `prompted`:
-    something calls for a repeat.
+    `passive`: the reason why requesters wait while we may not publish. `claims`: in the order of first
+    requests, including the holder's claim. `heard_at`: the time of the last adapter request.
+    `requesters`: the record of each. `shown`: the latest state, which came at `shown_at`;
+    `session_since`: the time since which states show this session. `flowing_since`: the start of states
+    without a gap. `sent`: the last request of this turn; `last_sent`: the last request of any turn, at
+    `sent_at`. `prompted`: the request is to be repeated.
     """
 
     lift: str
@@ -88,31 +88,31 @@ class SupervisedLift(msgspec.Struct, frozen=True):
     prompted: bool = False
 
     def claim(self, session: str) -> SessionClaim | None:
-        """The claim of this session; None where it has none."""
+        """Find the claim of this session; None if it has none."""
         return next((claim for claim in self.claims if claim.session == session), None)
 
     @property
     def session_shown(self) -> str:
-        """The session that the lift shows; "" for none."""
+        """The session in the lift's latest state; "" for none."""
         return self.shown.session if self.shown else ""
 
     @property
     def nobody_is_sent(self) -> bool:
-        """Is the lift in a mode in which no robot is sent to it?"""
+        """Does the lift's mode forbid sending a robot to it?"""
         return self.shown is not None and self.shown.mode in NOBODY_IS_SENT
 
     def flows(self, now: float) -> bool:
-        """Do the lift's states come? True before the first one."""
+        """Do the lift's states arrive? True before the first state."""
         return self.shown is None or now <= self.shown_at + SILENT_S
 
     def gone_at(self, claim: SessionClaim, now: float, after_s: float) -> float:
-        """When this requester will have been silent for `after_s`; NEVER while the lift is silent."""
+        """Return the end of `after_s` of this requester's silence; NEVER while the lift is silent."""
         if not self.flows(now):
             return NEVER
         return max(claim.heard_at, self.flowing_since) + after_s
 
     def rules(self, now: float, limits: LiftSupervisorLimits) -> Rules:
-        """How the stamps of adapters' requests are judged now."""
+        """Return the present rules for the stamps of adapters' requests."""
         if limits.clock_synchronised:
             return Rules(limits.max_request_age_s, known_clocks=False)
         return Rules(now - self.started_at, future_s=NEVER if self.may_speak else FUTURE_S)

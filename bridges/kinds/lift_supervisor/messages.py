@@ -25,9 +25,10 @@ MAX_FLOORS: Final = 1000
 def accept_request(
     request: LiftRequest, settings: LiftSupervisorSettings, wall: float
 ) -> RideRequested | RideEnded:
-    """An adapter's request as an event; `wall` is our clock (s since the epoch). Raises RequestRefused.
+    """Turn an adapter's request into an event. Raises RequestRefused. `wall`: our clock (s since the
+    epoch).
 
-    Of an END_SESSION only the session counts: fleet adapters send no floor with it
+    In an END_SESSION only the session counts: fleet adapters send no floor with it
     (rmf_fleet_adapter RobotContext.cpp).
     """
     check_listed("lift", request.lift_name, settings.lifts)
@@ -50,7 +51,7 @@ def accept_request(
 
 
 def accept_state(state: LiftState, settings: LiftSupervisorSettings, wall: float) -> LiftStateHeard:
-    """A lift's state as an event. Raises RequestRefused."""
+    """Turn a lift's state into an event. Raises RequestRefused."""
     check_listed("lift", state.lift_name, settings.lifts)
     check_length(
         session_id=state.session_id,
@@ -71,22 +72,22 @@ def accept_state(state: LiftState, settings: LiftSupervisorSettings, wall: float
 
 
 def device_name(message: LiftRequest | LiftState) -> str:
-    """Which lift a message is about."""
+    """Return the lift that a message is about."""
     return message.lift_name
 
 
 def requester(event: RideRequested | RideEnded | LiftStateHeard) -> str:
-    """The session of this request; "" for a state."""
+    """Return the session of a request; "" for a state."""
     return "" if isinstance(event, LiftStateHeard) else event.session
 
 
 def stamped(message: LiftRequest, time: Time) -> LiftRequest:
-    """The message with its time of sending."""
+    """Add the time of sending to a message."""
     return replace(message, request_time=time)
 
 
 def summary(report: SupervisorReport, now: float) -> Mapping[str, str]:
-    """One lift in one line, for a person."""
+    """Summarise one lift in one line, for a person."""
     word = "ending" if report.ending else "holder"
     held = f"{report.holder} ({now - report.since:.0f} s)" if report.holder else "-"
     waiting = ", ".join(f"{session} ({now - since:.0f} s)" for session, since in report.waiting)

@@ -1,4 +1,4 @@
-"""What the log and the status file are told of one lift: who has it, who waits, what is wrong."""
+"""One lift's report to the log and the status file: its holder, its queue, its faults."""
 
 from collections.abc import Iterable, Iterator
 from typing import Final
@@ -12,15 +12,15 @@ from bridges.messages.definitions import LiftMode
 
 SILENT: Final = "LIFT_SILENT"
 OVERDUE_S: Final = 30.0
-"""A lift that has not obeyed for this long is at fault."""
+"""After this long without obeying, a lift is at fault."""
 
 
 class SupervisorReport(msgspec.Struct, frozen=True):
     """One lift, for the log and the status file. Times are monotonic seconds.
 
-    `shown`: the session in the lift's state. `holder`: the session whose turn it is, `since` when.
-    `ending`: we send its END. `waiting`: the queue, with the time of each first request. `read_at`:
-    when the lift's last state came. `waits`: what those wait for that ask and are not served.
+    `shown`: the session in the lift's state. `holder`: the session with the turn, begun at `since`.
+    `ending`: we send its END. `waiting`: the queue, as (session, time of its first request). `read_at`:
+    the time of the lift's last state. `waits`: the reason why the requesters are not served yet.
     """
 
     read_at: float | None
@@ -33,12 +33,12 @@ class SupervisorReport(msgspec.Struct, frozen=True):
     waits: str = ""
 
     def news(self) -> object:
-        """What is worth a line in the log."""
+        """Return the facts whose change is logged."""
         return self.shown, self.holder, self.ending, tuple(session for session, _ in self.waiting)
 
 
 def report(memory: SupervisedLift, faults: Iterable[Fault]) -> SupervisorReport:
-    """The lift as it is now, with these faults."""
+    """Report the present state of the lift, with these faults."""
     turn, faults = memory.turn, tuple(faults)
     waiting = tuple(
         (claim.session, claim.since)
@@ -58,7 +58,7 @@ def report(memory: SupervisedLift, faults: Iterable[Fault]) -> SupervisorReport:
 
 
 def _waits(memory: SupervisedLift, faults: tuple[Fault, ...], *, queued: bool) -> str:
-    """What the first in the queue waits for; without a queue, the one whose turn it is."""
+    """Explain why the first session in the queue waits, or, without a queue, the one with the turn."""
     turn, shown = memory.turn, memory.session_shown
     if not memory.claims:
         return ""
@@ -81,7 +81,7 @@ def _waits(memory: SupervisedLift, faults: tuple[Fault, ...], *, queued: bool) -
 def alarms(
     memory: SupervisedLift, now: float, limits: LiftSupervisorLimits
 ) -> Iterator[tuple[float, Fault]]:
-    """Each fault that may come, and when it will if nothing changes."""
+    """Yield each possible fault, with the time when it comes if nothing changes."""
     turn = memory.turn
     if not memory.flows(now):
         if turn or memory.claims:

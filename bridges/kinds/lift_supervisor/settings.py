@@ -44,7 +44,7 @@ class LiftSupervisorSettings(GraphSettings, frozen=True, kw_only=True, forbid_un
     ] = 10.0
 
     def problems(self) -> Remarks:
-        """An alarm after what it warns of, or an empty list of lifts."""
+        """Yield an alarm that would come after the end of its session, or an empty list of lifts."""
         if self.holder_ttl_s is not None and self.holder_ttl_s <= self.holder_alarm_s:
             text = f"must be more than 'holder_alarm_s' ({self.holder_alarm_s:g} s): alarm first"
             yield ("holder_ttl_s",), text
@@ -53,6 +53,6 @@ class LiftSupervisorSettings(GraphSettings, frozen=True, kw_only=True, forbid_un
 
 
 def speaks_of(settings: LiftSupervisorSettings) -> Iterable[Place]:
-    """The lifts that it is to serve."""
+    """Yield the lifts to be served."""
     for i, name in enumerate(settings.lifts or ()):
         yield ("lifts", str(i)), "lift", name

@@ -1,4 +1,4 @@
-"""What the lift supervisor's core hears from the graph: adapters' requests and lifts' states."""
+"""Events of the lift supervisor's core: adapters' requests and lifts' states."""
 
 import msgspec
 
@@ -7,7 +7,7 @@ from bridges.kinds.shared.graph_kind import MaySpeak, Woken
 
 
 class Target(msgspec.Struct, frozen=True):
-    """What a session requests of the lift, in the terms of LiftRequest."""
+    """A session's destination, in the terms of LiftRequest."""
 
     request_type: int
     floor: str
@@ -24,8 +24,8 @@ class RideRequested(msgspec.Struct, frozen=True):
 
 
 class RideEnded(msgspec.Struct, frozen=True):
-    """An END_SESSION of an adapter or an operator, whatever its floor says. `by_person`: it has
-    DOOR_OPEN, which the lift's node takes for a person's."""
+    """An END_SESSION of an adapter or an operator, with any floor. `by_person`: it has DOOR_OPEN, which
+    the lift's node understands as a person's END."""
 
     session: str
     stamp: float
@@ -44,7 +44,7 @@ class LiftStateHeard(msgspec.Struct, frozen=True):
     floors: tuple[str, ...] = ()
 
     def satisfies(self, session: str, target: Target) -> bool:
-        """Does the state show what was requested? The rule is rmf_lift_supervisor's."""
+        """Does the state fulfil the request? The rule is rmf_lift_supervisor's."""
         there = target.floor == self.floor and not self.destination
         return (
             (target.floor == self.destination or there)

@@ -1,1 +1,1 @@
-"""What every decision core shares: decisions, debounce, kinds, and the fields of a device YAML."""
+"""Shared by all decision cores: decisions, debounce, kinds, and the fields of a device YAML."""

@@ -1,4 +1,4 @@
-"""Debounce: a reading is believed when it has been seen unchanged for long enough.
+"""Debounce: a reading is believed after it has stayed unchanged for long enough.
 
 Pure: it works on samples, so one rule serves GPIO pins and polled Modbus inputs. gpiozero's own
 debounce drops edges, and its mock pins have none.
@@ -18,8 +18,8 @@ T_co = TypeVar("T_co", covariant=True)
 class Settled(msgspec.Struct, Generic[T_co], frozen=True):
     """`value` is believed, and `candidate` has been seen since `since` (s).
 
-    `steady_at`: when `value` was last confirmed; None before the first time. `torn_since`: since when
-    the readings have not been steady; None while they are.
+    `steady_at`: when `value` was last confirmed; None before the first time. `torn_since`: the start of
+    unsteady readings; None while they are steady.
     """
 
     value: T_co | None
@@ -29,12 +29,12 @@ class Settled(msgspec.Struct, Generic[T_co], frozen=True):
     torn_since: float | None = None
 
     def due_at(self, hold_s: float) -> float:
-        """When the candidate will count if it lasts; inf when it counts already."""
+        """Return the time when the candidate will count if it lasts; inf if it already counts."""
         return NEVER if self.torn_since is None else self.since + hold_s
 
 
 def settle(before: "Settled[T] | None", seen: T, now: float, hold_s: float) -> "Settled[T]":
-    """Take one sample. A value must be seen for `hold_s` seconds before it counts; 0: at once."""
+    """Take one sample. A value counts after it was seen for `hold_s` seconds; 0: at once."""
     if before is None:
         before = Settled(None, seen, now, torn_since=now)
     elif seen != before.candidate:
@@ -46,7 +46,7 @@ def settle(before: "Settled[T] | None", seen: T, now: float, hold_s: float) -> "
 
 
 def forget(before: "Settled[T] | None") -> "Settled[T] | None":
-    """After a gap in the readings the value stays, and a candidate's debounce starts again."""
+    """Keep the value after a gap in the readings, and restart a candidate's debounce."""
     if before is None or before.steady_at is None:
         return None
     return replace(before, candidate=cast(T, before.value), torn_since=None)

@@ -2,8 +2,7 @@
 
 A core is one pure function, `decide(memory, event, now, limits) -> Decision`. It has no I/O, no
 clock and no log. `now` is monotonic seconds. Each call derives the whole set of outputs and the
-whole report afresh, so a repeated, lost or reordered event cannot leave a relay where it should
-not be.
+whole report afresh, so a repeated, lost or reordered event cannot leave a relay in a wrong position.
 """
 
 from typing import Generic, Protocol, TypeVar
@@ -18,7 +17,7 @@ X = TypeVar("X")
 M = TypeVar("M")
 """A core's memory."""
 O = TypeVar("O")  # noqa: E741
-"""A core's outputs; None for one that moves no hardware."""
+"""A core's outputs; None for a core without hardware."""
 R = TypeVar("R", bound="Report")
 """A core's report."""
 
@@ -62,7 +61,7 @@ class RivalSeen(msgspec.Struct, frozen=True):
 
 
 class Attended(msgspec.Struct, frozen=True):
-    """Whether any node publishes the requests that this device obeys."""
+    """Does any node publish the requests that this device obeys?"""
 
     yes: bool
 
@@ -72,27 +71,27 @@ class OperatorReset(msgspec.Struct, frozen=True):
 
 
 class Report(Protocol):
-    """What RMF and the status file are told."""
+    """The content of RMF's state message and of the status file."""
 
     @property
     def read_at(self) -> float | None:
-        """Monotonic time of the reading that the report rests on; None before the first."""
+        """Monotonic time of the reading behind the report; None before the first."""
 
     @property
     def faults(self) -> tuple[Fault, ...]:
         """Everything that is wrong now, most serious first."""
 
     def news(self) -> object:
-        """The part of the report whose change is published at once: all but its age."""
+        """Return the part whose change is published at once: all but the age."""
 
 
 class Decision(msgspec.Struct, Generic[M, O, R], frozen=True):
     """The result of one scan.
 
     `outputs`: the whole set, to be written as it is. `wake_at`: decide again at this time at the
-    latest (monotonic seconds; `inf` when only an event can change anything). `refused`: why the event
-    was not obeyed, as `kind` or `kind: detail`, where `kind` is a short fixed name to count by; ""
-    when it was obeyed. `publish`: messages beside the state, each sent once.
+    latest (monotonic seconds; `inf` when only an event can change anything). `refused`: the reason for
+    a refusal, as `kind` or `kind: detail`, where `kind` is a short fixed name to count by; "" for an
+    obeyed event. `publish`: messages beside the state, each sent once.
     """
 
     memory: M
@@ -106,14 +105,14 @@ class Decision(msgspec.Struct, Generic[M, O, R], frozen=True):
 RELEASED_LATELY = "released a moment ago"
 STARTING = "inputs settle after the start"
 EXPECTED = frozenset({RELEASED_LATELY, STARTING})
-"""Kinds of refusal that belong to every handover and every start: they are counted, and no warning."""
+"""Refusals at every normal handover and start: they are counted, and cause no warning."""
 
 LONGEST_DETAIL = 300
 
 
 class RequestRefused(Exception):
-    """A message that is not obeyed. `kind`: a short fixed name, by which refusals are counted; each
-    kind is logged once.
+    """A message is not obeyed. `kind`: a short fixed name; refusals are counted by kind, and each kind
+    is logged once.
 
     `detail` may quote the message, which anybody can send: it is cut to LONGEST_DETAIL characters.
     """

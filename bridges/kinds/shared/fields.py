@@ -1,9 +1,9 @@
 """The building blocks of every device YAML: numbers with units, names, common structs.
 
-`bridges/settings/load.py` reads a file into these; the kinds and drivers derive their own from them.
-A struct may have `problems() -> Remarks`. It checks what no field can
-check alone, and gives (path below the struct, text with the fix). It is called once every field is
-present and of the right type, even if a struct below has problems of its own.
+`bridges/settings/load.py` reads a file into these; the kinds and drivers derive their own structs.
+A struct may have `problems() -> Remarks`. It checks several fields together, and yields (path below the
+struct, text with the fix). It is called when every field is present and of the right type, even if a
+struct below has problems of its own.
 """
 
 from typing import Annotated
@@ -20,7 +20,7 @@ Name = Annotated[
         extra={"pattern": "text without control characters, or spaces at its ends"},
     ),
 ]
-"""A name that RMF uses: any text, quoted in YAML where YAML would read something else."""
+"""A name in RMF: any text; quoted in YAML if YAML would otherwise read a number or another type."""
 AbsolutePath = Annotated[
     str,
     Meta(
@@ -33,22 +33,22 @@ AbsolutePath = Annotated[
 Seconds = Annotated[float, Meta(ge=0, le=86400, extra={"unit": "s"})]
 """A duration that may be zero."""
 Timeout = Annotated[float, Meta(ge=1, le=86400, extra={"unit": "s"})]
-"""After how long something is given up. Zero is not allowed: nothing would ever be tried."""
+"""A time limit for an attempt. Zero is not allowed: nothing would ever be tried."""
 Period = Annotated[float, Meta(ge=0.01, le=60, extra={"unit": "s"})]
 """A repetition period."""
 QuietStart = Annotated[float, Meta(ge=3, le=60, extra={"unit": "s"})]
-"""How long a node without hardware only listens at first."""
+"""The time after its start in which a node without hardware only listens."""
 Patience = Annotated[float, Meta(ge=3, le=86400, extra={"unit": "s"})]
-"""How long a silence or a state may last before the daemon acts on it."""
+"""The longest silence or state on which the daemon does not act."""
 
 
 def tells(text: str) -> Meta:
-    """What a key means, for the schema, the reference and an editor; line breaks count as spaces."""
+    """Describe a key, for the schema, the reference and an editor; line breaks count as spaces."""
     return Meta(description=" ".join(text.split()))
 
 
 class DeviceSettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """What every lift, door and charger has, whatever its driver."""
+    """Settings of every lift, door and charger with any driver."""
 
     bus: Annotated[Name | None, tells("its bus; not needed if the file has only one.")] = None
     driver: Annotated[
@@ -60,17 +60,18 @@ class DeviceSettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_f
     ] = {}
 
     def off_after(self) -> tuple[float, tuple[str, ...]] | None:
-        """How long (s) without a command until its outputs go off by themselves, and the path of the
-        setting that says so; None where they do not."""
+        """Return the time (s) without a command after which the outputs go off by themselves, and the
+        path of that setting; None for outputs that stay on."""
         return None
 
     def stale_after(self) -> float | None:
-        """After how long (s) without a reading it is out of service; None if no time decides that."""
+        """Return the time (s) without a reading after which the device is out of service; None if no
+        time decides that."""
         return None
 
 
 class GraphSettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """What every kind without hardware has."""
+    """Settings of every kind without hardware."""
 
     quiet_start_s: Annotated[
         QuietStart,
@@ -79,5 +80,5 @@ class GraphSettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
 
 
 def quiet_s(settings: GraphSettings) -> float:
-    """How long the node only listens before it sends its first message (s)."""
+    """Return the time (s) in which the node only listens, before its first message."""
     return settings.quiet_start_s

@@ -1,7 +1,7 @@
 """Does an adapter's request count, or is it a replay of an old one?
 
-A stamp is by the requester's clock, which need not agree with ours. So a stamp is first compared with
-the earlier stamps of the same requester. Rules:
+A stamp comes from the requester's clock, which may disagree with ours. So a stamp is first compared
+with the earlier stamps of the same requester. Rules:
 FRESHNESS-1. A request counts if it is newer than every earlier request of its requester that counted.
    An END is compared with earlier ENDs only: an operator may end a robot's session, by another clock.
 FRESHNESS-2. A retained topic (`adapter_lift_requests`) replays up to 100 old requests of every adapter
@@ -9,16 +9,16 @@ FRESHNESS-2. A retained topic (`adapter_lift_requests`) replays up to 100 old re
    replay, and a requester's first request counts only if it was sent after our own start. Once a
    requester has counted, only its own stamps are compared. With `clock_synchronised` every request's
    age is judged too.
-FRESHNESS-3. On a topic that is not retained (`adapter_door_requests`) an old request was late or came
-   twice. There an equal stamp counts, as a requester without a clock always sends 0. A requester's
-   first request counts. A requester that has been silent for FORGOTTEN_S and holds nothing is new
-   again.
+FRESHNESS-3. On a topic that is not retained (`adapter_door_requests`) an old request was delayed or
+   arrived twice. There an equal stamp counts, as a requester without a clock always sends 0. A
+   requester's first request counts. A requester that holds nothing is new again after a silence of
+   FORGOTTEN_S.
 FRESHNESS-4. During the quiet start on a retained topic a stamp from the future does not count: our
    clock may not be set yet, and then every replayed request looks new.
-FRESHNESS-5. A request that does not count may come from a live requester whose clock is wrong or was
-   set back. It counts once it has been repeated for long enough, with stamps that rise or are all 0.
-   Long enough is longer than a replay lasts (REPLAY_S, retained), or than a message can be late
-   (LATE_S). After a pause of BROKEN_OFF_S, or when a stamp does not rise, that time starts again.
+FRESHNESS-5. A rejected request may come from a live requester whose clock is wrong or was set back. It
+   counts after repeats, with stamps that rise or are all 0, for longer than a replay lasts (REPLAY_S,
+   retained topics), or than a message can be late (LATE_S, other topics). After a pause of
+   BROKEN_OFF_S, or a stamp that does not rise, that time starts again.
 """
 
 from collections.abc import Collection, Mapping
@@ -42,10 +42,10 @@ SECOND_NS: Final = 10**9
 
 
 class Rules(msgspec.Struct, frozen=True):
-    """How a topic's requests are judged.
+    """The rules for judging a topic's requests.
 
-    `most_s`: how old a request may be by its stamp. `known_clocks`: a requester that has counted
-    before is judged by its own stamps only. `future_s`: how far ahead of our clock a stamp may be.
+    `most_s`: the greatest age of a request, by its stamp. `known_clocks`: a requester that has counted
+    before is judged by its own stamps only. `future_s`: the farthest a stamp may be ahead of our clock.
     `retained`: old requests are replayed on this topic.
     """
 
@@ -56,16 +56,16 @@ class Rules(msgspec.Struct, frozen=True):
 
     @property
     def doubt_s(self) -> float:
-        """How long a requester must repeat itself before it is believed."""
+        """The time for which a requester must repeat itself before it is believed (s)."""
         return REPLAY_S if self.retained else LATE_S
 
 
 class Requester(msgspec.Struct, frozen=True):
-    """What has been heard of one requester. Its stamps are all in one unit, by its clock.
+    """The record of one requester. Its stamps are all in one unit, by its own clock.
 
     `newest`, `newest_end`: the newest stamp that counted, of all requests and of ENDs. `heard_at`:
-    when a request last counted. `doubted`: the stamp of the last request that did not count;
-    `doubted_since`, `doubted_at`: when its row of repeats began, and when the last of them came.
+    the time when a request last counted. `doubted`: the stamp of the last request that did not count;
+    `doubted_since`, `doubted_at`: the times of its first and its latest repeat.
     Times ending in `_at` or `_since` are in s by our clock.
     """
 
@@ -79,7 +79,7 @@ class Requester(msgspec.Struct, frozen=True):
     def hears(
         self, stamp: float, age_s: float, now: float, rules: Rules, *, ends: bool = False
     ) -> tuple["Requester", bool]:
-        """Take one request, `age_s` old by our clock. True if it counts."""
+        """Take one request, `age_s` old by our clock. Return the requester, and True if it counts."""
         if self._is_live(stamp, age_s, rules, ends=ends):
             newest = max(self.newest, stamp)
             newest_end = max(self.newest_end, stamp) if ends else self.newest_end
@@ -118,11 +118,11 @@ def hear(
     ends: bool = False,
     holders: Collection[str] = (),
 ) -> tuple[Requesters, str]:
-    """Take one request into the table. Returns the table, and why the request does not count ("" if
-    it does).
+    """Take one request into the table. Return the table, and the reason against the request ("" if it
+    counts).
 
-    Anybody can make names up, so the table has a bound: the requester heard longest ago makes room,
-    but never a holder.
+    Anybody can invent names, so the table has a bound: the requester heard longest ago is dropped, but
+    never a holder.
     """
     known = {
         name: requester
@@ -140,7 +140,7 @@ def hear(
 
 
 def in_ns(stamp: Time) -> int:
-    """A request_time in ns. Raises RequestRefused for one that no clock shows."""
+    """Return a request_time in ns. Raises RequestRefused for an impossible time."""
     if stamp.sec < 0 or stamp.nanosec >= SECOND_NS:
         raise RequestRefused("impossible request_time", f"{stamp.sec} s {stamp.nanosec} ns")
     return stamp.sec * SECOND_NS + stamp.nanosec

@@ -1,7 +1,7 @@
 """The record of a kind without hardware: topics in, topics out, and the core between them.
 
-A supervisor or coordinator has no driver and no bus. It learns from messages which subjects (lifts,
-doors) there are, and keeps one core memory for each. `bridges/kinds/<kind>/__init__.py` holds the
+A supervisor or coordinator has no driver and no bus. It learns its subjects (lifts, doors) from
+messages, and keeps one core memory for each. `bridges/kinds/<kind>/__init__.py` holds the
 `KIND`; `bridges/runtime/graph_node.py` serves it.
 """
 
@@ -21,11 +21,11 @@ LISTENS: Final = "for the end of the quiet start"
 
 
 class MaySpeak(Struct, frozen=True):
-    """Whether the core may publish. It may not during the quiet start or while a rival publishes.
+    """May the core publish? It may not during the quiet start or while a rival publishes.
 
-    `waits`: what those wait for that wait for us, while it may not.
-    `at_once`: during the quiet start what a restart must not interrupt may be sent: no rival is there.
-    `alone`: no other node publishes on a topic of `yields`.
+    `waits`: the reason why requesters wait while the core may not publish.
+    `at_once`: no rival is there, so messages that a restart must not interrupt may be sent even during
+    the quiet start. `alone`: no other node publishes on a topic of `yields`.
     """
 
     yes: bool
@@ -35,45 +35,46 @@ class MaySpeak(Struct, frozen=True):
 
 
 class Woken(Struct, frozen=True):
-    """The core's `wake_at` has come, and nothing was heard."""
+    """The core's `wake_at` has come without a message."""
 
 
 GraphEvent = Union[MaySpeak, Woken, OperatorReset, E]  # noqa: UP007
-"""Every event that such a core takes."""
+"""All events of a core without hardware."""
 
 
 class GraphKind(Struct, Generic[S, L, M, E, R], frozen=True):
     """One kind that lives on RMF's graph alone: its settings, limits, memory, events and report.
 
-    `devices_key`: the YAML's section of its settings. `settings`: the struct that reads it.
+    `devices_key`: the YAML's section of its settings. `settings`: the struct that reads this section.
     `requests`: each topic heard, with `accept(message, settings, wall) -> event`, which raises
     RequestRefused; `wall` is our clock (s since the epoch).
-    `publishes`: the topics that it sends on. `sole`: those on which only one node may have a publisher;
-    while another node has one, ours only listens. `yields`: those on which it alone falls silent then.
-    `device_name`: which subject a message is about. `shown_by`: the topic on which a subject publishes
+    `publishes`: the topics on which it publishes. `sole`: topics that allow one publisher; while
+    another node publishes there, ours only listens. `yields`: topics on which ours is silent while
+    another node publishes there; it goes on with the others.
+    `device_name`: a message's subject. `shown_by`: the topic on which a subject publishes
     its own states, which proves that it exists (a request may name anything); None if there is only
     one subject. `reserved(settings)`: the subjects that the YAML names.
-    `requester(event)`: who sends this request; "" for a state. `requesters(memory)`: whom the subject
-    remembers. Anybody can make them up, so all subjects together have a bound.
-    `quiet_s(settings)`: how long it only listens after its start.
-    `limits(settings)`: what the core needs of the settings.
+    `requester(event)`: the sender of a request; "" for a state. `requesters(memory)`: the requesters
+    that the subject remembers. Anybody can invent them, so all subjects together have a bound.
+    `quiet_s(settings)`: the time in which it only listens after its start.
+    `limits(settings)`: the core's share of the settings.
     `initial(subject, started_at)`: a subject's memory; `started_at` is the daemon's start.
     `decide`: the core. Its messages have no stamps: `stamped(message, time)` adds them when they are
     sent. `summary(report, now)`: key -> value for the status file and `watch`. `idle(memory, now)`:
     may this subject be forgotten?
-    `answer(request, reason)`: what is published when a request is refused; None for nothing.
+    `answer(request, reason)`: the published answer to a refused request; None for nothing.
     `request`: the message if it was refused at once, else the event.
-    `on_map(settings)`: which settings name a place on RMF's map (`bridges/kinds/shared/kind.py`).
+    `on_map(settings)`: settings that name a place on RMF's map (`bridges/kinds/shared/kind.py`).
 
     For a kind with one message about all its subjects: `together(memories)`, sent each second and
-    whenever it has changed. For a kind whose memory must survive a restart: `persist(memories)`, which
-    gives the same bytes until something worth keeping changes, and `restore(kept, settings, now)`,
+    at every change. For a kind whose memory must survive a restart: `persist(memories)`, which
+    returns the same bytes until something worth keeping changes, and `restore(kept, settings, now)`,
     which raises ValueError for any other bytes. The memory is saved before `together` is sent.
     `urgent(memory)`: does it hold something that a restart must not interrupt (`MaySpeak.at_once`)?
 
     For a kind with more settings than a few numbers: `tables(settings)`, for `check`, and
-    `warnings(settings)`, (path, text) of what is legal but may be a mistake. `speaks_of(settings)`: the
-    devices that it names, as (path, their kind, name); some file of the site must have each of them.
+    `warnings(settings)`, (path, text) of legal settings that may be mistakes. `speaks_of(settings)`:
+    the devices that it names, as (path, kind, name); some file of the site must define each device.
     """
 
     name: str
@@ -108,4 +109,4 @@ class GraphKind(Struct, Generic[S, L, M, E, R], frozen=True):
 
 AnyGraphKind = GraphKind[Any, Any, Any, Any, Any]
 AnyKind = AnyDeviceKind | AnyGraphKind
-"""A kind that is looked up by its name."""
+"""A kind found by its name, its types unknown."""

@@ -1,4 +1,4 @@
-"""What a kind keeps across a restart: JSON with a version. It is read completely, or refused."""
+"""A kind's memory across a restart: JSON with a version. It is read completely, or refused."""
 
 from typing import Annotated, TypeVar
 
@@ -18,7 +18,7 @@ R = TypeVar("R", bound=Kept)
 
 
 def read(kept: bytes, record: type[R], version: int, what: str) -> R:
-    """The record in these bytes. ValueError if they are not `what` in this version."""
+    """Decode the record. Raises ValueError if the bytes are not `what` in this version."""
     try:
         found = msgspec.json.decode(kept, type=record)
     except msgspec.MsgspecError as error:

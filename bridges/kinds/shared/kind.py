@@ -26,22 +26,22 @@ from bridges.messages.topics import Topic
 S = TypeVar("S")
 """The settings of one device, or of a kind without hardware."""
 L = TypeVar("L")
-"""The limits: what the core needs of the settings."""
+"""The limits: the core's share of the settings."""
 E = TypeVar("E")
-"""The events that `accept` makes of requests."""
+"""The events into which `accept` turns requests."""
 
 DeviceEvent = Union[Sampled[X], IoFailed, RivalSeen, OperatorReset, E]  # noqa: UP007
-"""Every event that the core of a device takes."""
+"""All events of a device's core."""
 
 FLOOR, LIFT, DOOR, CHARGER, WAYPOINT = "floor", "lift", "door", "charger", "waypoint"
-"""What a name on RMF's map can name."""
+"""Kinds of names on RMF's map."""
 
 Place = tuple[tuple[str, ...], str, str]
-"""A setting that names something on RMF's map: its path, what it is (`FLOOR`, …), the name."""
+"""A setting that names something on RMF's map: its path, the kind of name (`FLOOR`, …), the name."""
 
 
 class RefusalAnswer(NamedTuple):
-    """The answer to a refused request: its topic, the message, and the same for the status file."""
+    """The answer to a refused request: its topic, its message, and its text for the status file."""
 
     topic: Topic[Message]
     message: Message
@@ -53,20 +53,21 @@ class Kind(Struct, Generic[S, L, M, X, E, O, R], frozen=True):
 
     `devices_key`: the YAML's section of the devices. `states`: the topic of their state messages.
     `requests`: each topic that it obeys, with `accept(message, settings) -> event`, which raises
-    RequestRefused for a message that is malformed or cannot be asked of this device.
-    `device_name`: which device a message (request or state) is about. `sender`: for whom a request
-    was sent. If several requests wait for the next scan, only the last of each sender counts.
+    RequestRefused for a message that is malformed or impossible for this device.
+    `device_name`: the device named in a message (request or state). `sender`: the requester behind a
+    request. If several requests wait for the next scan, only the last of each sender counts.
     `limits(settings, debounce_s)`: the core's durations, from the device's settings and the wiring
     table's per-signal debounce. `initial(limits, now)`: the core's memory at start.
     `decide`: the core. `state_message(name, settings, report, stamp)`: the report as RMF's message.
     `summary(report)`: key -> value for the log line, the status file and `watch`.
     `published(memory, report)`: the memory after this report has gone out to RMF.
-    `publishes(settings)`: what a device publishes beside its states.
-    `answer(name, request, reason, report)`: what is published when a request is refused; None for
+    `publishes(settings)`: the topics of a device beside its states.
+    `answer(name, request, reason, report)`: the published answer to a refused request; None for
     nothing. `request`: the message if it is malformed, else the event.
-    `on_map(settings)`: which of its settings name a place on RMF's map, as (path, what it is, name).
-    The device's own name is checked for every kind.
-    `attended_by`: the topic of requests whose publishers the core is told of (`Attended`), if any.
+    `on_map(settings)`: settings that name a place on RMF's map, as `Place`s. The device's own name is
+    checked for every kind.
+    `attended_by`: the topic of requests of which the core hears (`Attended`) whether it has publishers;
+    None for no such topic.
     """
 
     name: str
@@ -90,4 +91,4 @@ class Kind(Struct, Generic[S, L, M, X, E, O, R], frozen=True):
 
 
 AnyDeviceKind = Kind[Any, Any, Any, Any, Any, Any, Any]
-"""A kind that is looked up by its name."""
+"""A kind found by its name, its types unknown."""

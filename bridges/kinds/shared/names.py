@@ -1,4 +1,4 @@
-"""Checks names and texts from the graph. Anybody can send them, and they are stored."""
+"""Checks of names and texts from the graph: anybody can send them, and they are stored."""
 
 from collections.abc import Collection
 from typing import Final

@@ -1,7 +1,7 @@
-"""The names of values in rings and recordings. A name that was once written stays for ever; what it
-names may be moved and renamed. So every version reads the files of all earlier ones.
+"""The names of values in rings and recordings. A recorded name never changes, even if its class moves
+or is renamed. So every version reads the files of all earlier versions.
 
-The values of a kind are in `RECORDED` of its folder. Here are those that all kinds use.
+The values of a kind are in `RECORDED` of its folder. The values here are shared by all kinds.
 """
 
 from collections.abc import Mapping
@@ -12,7 +12,7 @@ from bridges.messages import constants
 from bridges.messages.definitions import PACKAGES
 
 Recorded = Mapping[str, type[Any]]
-"""Name -> type. A type has one name, under which it is written; it begins with that of its kind."""
+"""Recorded name -> type. Each type has one name, which begins with the name of its kind."""
 
 SHARED: Final[Recorded] = {
     "core.debounce.Settled": debounce.Settled,

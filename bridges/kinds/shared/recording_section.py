@@ -1,4 +1,4 @@
-"""The `recording:` section of a YAML: what is recorded, and how much of it is stored."""
+"""The `recording:` section of a YAML: the extent of recordings, and their limits on disk."""
 
 from typing import Annotated, Literal
 
@@ -14,7 +14,7 @@ Patience = Annotated[float, Meta(ge=10, le=86400, extra={"unit": "s"})]
 
 
 class RecordingSettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """What is recorded of the daemon's work. Nothing is written to a disk while all is well."""
+    """Recording of the daemon's work. Nothing is written to a disk while all is well."""
 
     keep: Annotated[
         Literal["nothing", "ring", "continuous"],

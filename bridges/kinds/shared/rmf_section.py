@@ -1,4 +1,4 @@
-"""The `rmf:` section of a YAML: which transport reaches Open-RMF, and how."""
+"""The `rmf:` section of a YAML: the transport to Open-RMF and its settings."""
 
 import argparse
 from typing import Annotated, Literal
@@ -35,13 +35,13 @@ class ZenohTls(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     ] = None
 
     def problems(self) -> Remarks:
-        """A certificate and its key go together."""
+        """Yield a certificate without its key, or a key without its certificate."""
         if (self.certificate is None) != (self.private_key is None):
             yield (), "certificate and private_key go together: give both, or none"
 
 
 class Zenoh(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """How transport `zenoh` reaches the other nodes."""
+    """Connection of transport `zenoh` to the other nodes."""
 
     keys: Annotated[
         Literal["rmw_zenoh", "ros2dds"],
@@ -70,7 +70,7 @@ class Zenoh(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     ] = None
 
     def problems(self) -> Remarks:
-        """What cannot go together."""
+        """Yield invalid combinations."""
         if (self.user is None) != (self.password_file is None):
             yield (), "user and password_file go together: give both, or none"
         if self.tls and not any(map(_is_encrypted, (*self.connect, *self.listen))):
@@ -84,7 +84,7 @@ def _is_encrypted(endpoint: str) -> bool:
 
 
 class Rmf(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """How the daemon reaches Open-RMF."""
+    """The daemon's connection to Open-RMF."""
 
     transport: Annotated[
         Literal["auto", "ros2", "dds", "zenoh"],
@@ -117,7 +117,7 @@ class Rmf(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     ] = "auto"
 
     def problems(self) -> Remarks:
-        """What would have no effect."""
+        """Yield settings without effect."""
         if self.release != "auto" and self.transport == "ros2":
             yield ("release",), "transport ros2 takes what is installed: leave it out"
         if self.zenoh and self.transport in ("ros2", "dds"):
@@ -128,7 +128,7 @@ TRANSPORTS = ("auto", "ros2", "dds", "zenoh")
 
 
 def overridden(rmf: Rmf, args: argparse.Namespace) -> Rmf:
-    """A YAML's `rmf:` section, changed by the options of the command line."""
+    """Return a YAML's `rmf:` section with the command line's options applied."""
     if args.domain_id is not None:
         rmf = msgspec.structs.replace(rmf, domain_id=args.domain_id)
     if args.transport is not None:

@@ -1,4 +1,4 @@
-"""A table that a person compares with a controller: `check` prints it, with boxes on its sheet."""
+"""A table for comparison with a controller: `check` prints it, with boxes to tick on its sheet."""
 
 from msgspec import Struct
 
@@ -11,7 +11,7 @@ class Table(Struct, frozen=True):
     rows: tuple[tuple[str, ...], ...]
 
     def filled(self) -> "Table":
-        """The same without the columns that are empty in every row."""
+        """Return the table without empty columns."""
         kept = [i for i in range(len(self.headings)) if any(row[i] for row in self.rows)]
         headings, *rows = (tuple(row[i] for i in kept) for row in (self.headings, *self.rows))
         return Table(self.title, headings, tuple(rows))
