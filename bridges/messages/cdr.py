@@ -3,10 +3,10 @@
 Four bytes of header (`00 01 00 00` little endian, `00 00 00 00` big endian), then the fields in
 their order. A number is aligned to its own size, counted from the end of the header; a string is its
 length with the closing NUL as uint32, the UTF-8 bytes and the NUL; a sequence is its length as uint32
-and its elements. Source: OMG DDS-XTypes 1.3, 7.4.3, and what rmw_cyclonedds and rmw_fastrtps send.
+and its elements. Source: OMG DDS-XTypes 1.3, 7.4.3, and samples of rmw_cyclonedds and rmw_fastrtps.
 
 The encoder and decoder of each type and release are built once, from the annotations in
-`definitions.py`. A field that a release lacks is not sent, and is read as its default.
+`definitions.py`. Fields that a release lacks are not sent, and are read as their defaults.
 """
 
 import struct
@@ -28,23 +28,23 @@ LITTLE_ENDIAN = b"\x00\x01\x00\x00"
 BIG_ENDIAN = b"\x00\x00\x00\x00"
 HEADER = 4
 LONGEST: Final = 1 << 20
-"""The longest sample (bytes) that is taken from the network. A FleetState of 200 robots takes 46 kB,
-and 0.7 MB with 50 places ahead of each of them."""
+"""The longest sample (bytes) accepted from the network. A FleetState of 200 robots takes 46 kB, and
+0.7 MB with 50 places ahead of each robot."""
 LONGEST_FLAT: Final = 1 << 16
-"""The longest sample of a type that lists no other messages: a hundred of these may wait."""
+"""The longest sample (bytes) of a type without lists of messages: a hundred of these may wait."""
 CODES = {"int32": "i", "uint32": "I", "uint64": "Q", "float32": "f"}
 BYTES = ("uint8", "byte")
 
 
 class CdrError(ValueError):
-    """These bytes are not a message of this type, or this message cannot be encoded."""
+    """The bytes are not a message of the type, or the message cannot be encoded."""
 
 
 def encode(message_type: type, message: object, release: Release = NEWEST) -> bytes:
-    """The message as little endian CDR with its header.
+    """Encode the message as little endian CDR with its header.
 
-    Characters that no string on the wire can hold (a NUL, half a surrogate pair) become `?`: a strange
-    text from a device must not stop the state that contains it. Raises CdrError for a number out of
+    Characters that are impossible on the wire (a NUL, half a surrogate pair) become `?`: a strange
+    text from a device must not prevent the device's state. Raises CdrError for a number out of
     range, or a value of another type.
     """
     out = bytearray(LITTLE_ENDIAN)
@@ -57,13 +57,13 @@ def encode(message_type: type, message: object, release: Release = NEWEST) -> by
 
 @cache
 def longest(message_type: type) -> int:
-    """The longest sample (bytes) of this type that is taken."""
+    """Return the longest accepted sample (bytes) of this type."""
     listed = (typing.get_args(kind)[:1] for kind in field_types(message_type).values())
     return LONGEST if any(one and one[0] in PACKAGES for one in listed) else LONGEST_FLAT
 
 
 def decode(message_type: type[T], sample: bytes, release: Release = NEWEST) -> T:
-    """The message in a sample, of either byte order. Raises CdrError for anything else.
+    """Decode the message in a sample of either byte order. Raises CdrError for other samples.
 
     Up to three bytes may follow the last field, because RTPS pads payloads to a multiple of four.
     """
@@ -84,7 +84,7 @@ def decode(message_type: type[T], sample: bytes, release: Release = NEWEST) -> T
 
 
 def decode_text(sample: bytes) -> str:
-    """The text in a std_msgs/String. Raises CdrError."""
+    """Decode the text in a std_msgs/String. Raises CdrError."""
     order = _ORDERS.get(sample[:2])
     try:
         return str(_get(str, order or "<", NEWEST)(sample, 4)[0])
@@ -97,7 +97,7 @@ _ORDERS = {LITTLE_ENDIAN[:2]: "<", BIG_ENDIAN[:2]: ">"}
 
 @cache
 def _put(kind: type, release: Release) -> Put:
-    """The function that appends a value of this type."""
+    """Make the function that appends a value of this type."""
     if typing.get_origin(kind) is typing.Annotated:
         name = typing.get_args(kind)[1]
         return _put_byte if name in BYTES else _putting_number(CODES[name])
@@ -161,7 +161,7 @@ def _putting_struct(members: list[tuple[str, Put]]) -> Put:
 
 @cache
 def _get(kind: type, order: str, release: Release) -> Get:
-    """The function that reads a value of this type at a position: it returns the value and its end."""
+    """Make the function that reads a value of this type at a position: it returns value and end."""
     if typing.get_origin(kind) is typing.Annotated:
         name = typing.get_args(kind)[1]
         return _get_byte if name in BYTES else _getting_number(order + CODES[name])
@@ -227,7 +227,7 @@ def _getting_sequence(get_element: Get, order: str) -> Get:
 
 def _getting_struct(kind: type, members: dict[str, Get]) -> Get:
     gets, names = tuple(members.values()), tuple(members)
-    whole = names == tuple(field_types(kind))  # else the release lacks some of its fields
+    whole = names == tuple(field_types(kind))  # else the release lacks some fields
 
     def get(sample: bytes, at: int) -> tuple[object, int]:
         values = []

@@ -1,6 +1,6 @@
 """The constants of RMF's messages, as the `.msg` files number them. Type hashes do not cover them.
 
-Source: as `definitions.py`. No release has numbered any of them otherwise; Jazzy's RobotMode ends with
+Source: see `definitions.py`. The numbers are the same in all releases; Jazzy's RobotMode ends with
 MODE_CLEANING.
 """
 

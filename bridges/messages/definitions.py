@@ -1,8 +1,8 @@
 """RMF's messages, as the `.msg` files define them: fields in their order, and their types.
 
-This is the only table of them, with the constants of `constants.py`. The transports make their own
-types from it (field by field, from the annotations), and the RIHS01 type hashes are computed from it.
-It holds what any release of RMF has; `releases.py` says which of it a release lacks.
+This is the only table of messages, with the constants of `constants.py`. The transports make their own
+types from this table (field by field, from the annotations), and the RIHS01 type hashes are computed
+from it. It holds the messages of all releases of RMF; `releases.py` lists those that a release lacks.
 
 Source: rmf_internal_msgs 3d4df02 (4.1.0), builtin_interfaces, std_msgs and diagnostic_msgs of ROS 2
 Jazzy.
@@ -196,7 +196,7 @@ class AlertParameter(Struct, frozen=True, gc=False):
 
 
 class Alert(Struct, frozen=True, gc=False):
-    """What RMF's dashboard shows a person; its `id` is used once."""
+    """A notice to a person on RMF's dashboard; its `id` is used once."""
 
     id: str = ""
     title: str = ""
@@ -290,5 +290,5 @@ PACKAGES: Final[dict[type, str]] = {
 
 
 def field_types(message_type: type) -> dict[str, type]:
-    """Field -> type, in the message's order: as annotated, so a number is an `Annotated`."""
+    """Map field -> type, in the message's order: as annotated, so a number is an `Annotated`."""
     return dict(message_type.__annotations__)

@@ -1,7 +1,7 @@
-"""What is sent where RMF's release lacks a message: the nearest message that it has.
+"""Substitutes for messages that RMF's release lacks: the nearest message of that release.
 
 - EmergencySignal to all fleets: `fire_alarm_trigger`, which every release's fleet adapters hear.
-- Alert: the log. What it is about is among the daemon's faults too, and so in its diagnostics.
+- Alert: the log. Its cause is also among the daemon's faults, and so in its diagnostics.
 """
 
 from typing import Final
@@ -11,16 +11,16 @@ from bridges.messages.releases import RELEASES
 from bridges.messages.topics import EMERGENCY_SIGNAL, FIRE_ALARM_TRIGGER, AnyTopic
 
 INSTEAD: Final[dict[str, AnyTopic]] = {EMERGENCY_SIGNAL.name: FIRE_ALARM_TRIGGER}
-"""Topic -> the one that serves the same purpose in every release."""
+"""Topic -> its substitute in every release."""
 
 
 def converted(message: Message) -> Message | None:
-    """The message for the topic in INSTEAD. None for one that goes into the log."""
+    """Convert a message for the topic in INSTEAD; None for a message that goes into the log."""
     return Bool(message.is_emergency) if isinstance(message, EmergencySignal) else None
 
 
 def remarks(topic: AnyTopic, wanted: str) -> list[str]:
-    """Remarks for `check` on a topic whose message a release lacks. `wanted`: the YAML's `release`."""
+    """Write remarks for `check` on a topic whose message a release lacks. `wanted`: the YAML's release."""
     names = RELEASES if wanted == "auto" else [wanted]
     way = (
         f"goes out on {INSTEAD[topic.name].name}" if topic.name in INSTEAD else "goes into the log"

@@ -1,7 +1,7 @@
-"""One message of RMF's graph, as everything that looks at a graph or a recording gets it.
+"""One message of RMF's graph, the same from a live graph and from every kind of recording.
 
-A live graph and every kind of recording give the same values in the same order, so what judges,
-explains or draws does not know where they come from.
+Both yield the same values in the same order, so code that judges, explains or draws needs not know the
+source.
 """
 
 from operator import is_
@@ -16,17 +16,17 @@ from bridges.messages.words import LONGEST_NAME
 FREE_TEXTS: Final = frozenset(
     {"error_message", "message", "title", "subtitle", "value", "performing_action", "model"}
 )
-"""Fields of messages that hold sentences, not names."""
+"""Fields of messages with sentences instead of names."""
 LONGEST_SENTENCE: Final = 1000
 MOST_PARTS: Final = 500
 """The most elements of a sequence; a legal FleetState has 200 robots."""
 
 
 class Heard(Struct, frozen=True):
-    """A message, its topic's ROS name, and when it arrived.
+    """A message, its topic's ROS name, and the time of its arrival.
 
     `at`: s on a clock that never steps, from any zero. `wall`: s since the epoch, by the clock of the
-    listening machine, so that stamps can be compared with it.
+    listening machine, for comparison with stamps.
     """
 
     at: float
@@ -36,9 +36,9 @@ class Heard(Struct, frozen=True):
 
 
 class Own(Struct, frozen=True):
-    """A text that our recorder wrote beside the messages: JSON of what a daemon noted.
+    """A text of our recorder beside the messages: a daemon's note in JSON.
 
-    `topic`: such as `rmf_bridge/outputs`. Times as of `Heard`.
+    `topic`: such as `rmf_bridge/outputs`. Times as in `Heard`.
     """
 
     at: float
@@ -48,10 +48,10 @@ class Own(Struct, frozen=True):
 
 
 def bounded(part: Any, longest: int = LONGEST_NAME) -> Any:
-    """A message, or a part of one, as it is kept and shown: anybody can send names of a megabyte.
+    """Shorten a message, or a part of it, for memory and display: anybody can send megabytes of name.
 
-    A name of more than LONGEST_NAME characters, and a sentence of more than LONGEST_SENTENCE, ends with
-    its length; a sequence has at most MOST_PARTS elements. What is within these is not copied.
+    A name of more than LONGEST_NAME characters, or a sentence of more than LONGEST_SENTENCE, is cut and
+    ends with its length; a sequence is cut to MOST_PARTS elements. Parts within limits are not copied.
     """
     if isinstance(part, str):
         return part if len(part) <= longest else f"{part[:longest]}… ({len(part)} characters)"

@@ -1,4 +1,4 @@
-"""The releases of RMF's message packages, and what of `definitions.py` each of them lacks.
+"""The releases of RMF's message packages, and the parts of `definitions.py` that each lacks.
 
 Read in open-rmf/rmf_internal_msgs, every line of the messages in `definitions.py`:
 - jazzy: 3.3.1 (a351d51602383eb09a8138d302827a76241630a5), branch jazzy at
@@ -6,8 +6,8 @@ Read in open-rmf/rmf_internal_msgs, every line of the messages in `definitions.p
 - kilted: 3.5.0 (branch kilted at c0f72ce5e2129411d2868414b25f6fab1460fcdb). Lyrical's 4.1.0
   (3d4df023bacaf7a091564e98f4aff0776f72a612) is the same.
 
-Two nodes of different releases do not hear each other where a message differs. Each announces the type
-hash of every end, so the hashes on a graph tell which release RMF has there.
+Two nodes of different releases do not hear each other's messages of a type that differs. Each node
+announces the type hash of every endpoint, so the hashes on a graph reveal RMF's release.
 """
 
 from typing import Final
@@ -25,18 +25,18 @@ from bridges.messages.definitions import (
 
 
 class Release(Struct, frozen=True, eq=False):
-    """One release. `lacks`: messages that it does not have; `without`: fields, as (message, field)."""
+    """One release. `lacks`: missing messages; `without`: missing fields, as (message, field)."""
 
     name: str
     lacks: frozenset[type] = frozenset()
     without: frozenset[tuple[type, str]] = frozenset()
 
     def has(self, message_type: type) -> bool:
-        """Does it have this message?"""
+        """Does the release have this message?"""
         return message_type not in self.lacks
 
     def fields(self, message_type: type) -> dict[str, type]:
-        """Field -> type, in the message's order in this release."""
+        """Map field -> type, in the message's order in this release."""
         return {
             name: kind
             for name, kind in field_types(message_type).items()
@@ -44,7 +44,7 @@ class Release(Struct, frozen=True, eq=False):
         }
 
     def messages(self) -> list[type]:
-        """Every message that it has."""
+        """List the messages of the release."""
         return [kind for kind in PACKAGES if self.has(kind)]
 
 
@@ -56,7 +56,7 @@ JAZZY: Final = Release(
 KILTED: Final = Release("kilted")
 RELEASES: Final = {release.name: release for release in (JAZZY, KILTED)}
 DEFAULT: Final = JAZZY
-"""The release to speak while no fleet adapter shows one: most sites have it."""
+"""The release used until a fleet adapter shows another: the release of most sites."""
 DIFFERING: Final = frozenset[type]().union(
     *(release.lacks | {message for message, _ in release.without} for release in RELEASES.values())
 )

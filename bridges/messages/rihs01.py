@@ -32,7 +32,7 @@ UNBOUNDED_SEQUENCE = 144
 
 
 def type_hash(message_type: type, release: Release = NEWEST) -> str:
-    """`RIHS01_` and 64 hexadecimal digits."""
+    """Compute the hash: `RIHS01_` and 64 hexadecimal digits."""
     return _hash(message_type, release)
 
 
@@ -48,7 +48,7 @@ def _hash(message_type: Hashable, release: Release) -> str:
 
 
 def releases_of(hashed: str) -> list[Release]:
-    """The releases that have a message with this hash."""
+    """List the releases with a message of this hash."""
     return _by_hash().get(hashed, [])
 
 
@@ -62,14 +62,14 @@ def _by_hash() -> dict[str, list[Release]]:
 
 
 def type_name(message_type: type) -> str:
-    """As ROS writes it: package/msg/Name."""
+    """Return the name in ROS: package/msg/Name."""
     return f"{PACKAGES[message_type]}/msg/{message_type.__name__}"
 
 
 MESSAGES: Final[dict[str, type[Message]]] = {
     type_name(message_type): message_type for message_type in typing.get_args(Message)
 }
-"""By the ROS type's name, as `rmf_lift_msgs/msg/LiftState`."""
+"""By the type's name in ROS, such as `rmf_lift_msgs/msg/LiftState`."""
 
 
 def _description(message_type: type, release: Release) -> dict[str, object]:
@@ -95,7 +95,7 @@ def _field_type(kind: type) -> dict[str, object]:
 
 
 def _element(kind: type) -> type:
-    """The type of a sequence's elements, or the type itself; a number type as its ROS name."""
+    """Return the type of a sequence's elements, or the type itself; a number type as its ROS name."""
     if typing.get_origin(kind) is tuple:
         kind = typing.get_args(kind)[0]
     return typing.get_args(kind)[1] if typing.get_origin(kind) is typing.Annotated else kind

@@ -1,4 +1,4 @@
-"""Converts seconds (float) to RMF's Time and Duration, and back."""
+"""Conversion of seconds (float) to RMF's Time and Duration, and back."""
 
 import math
 from typing import Final
@@ -10,11 +10,11 @@ ENDS: Final = 2**31
 
 
 class ClockError(Exception):
-    """The wall clock shows a time that no stamp can hold."""
+    """The wall clock is beyond the range of stamps."""
 
 
 def stamp(wall: float) -> Time:
-    """Seconds since the epoch as RMF's Time; at least 0, which means never. Raises ClockError."""
+    """Convert seconds since the epoch to RMF's Time, at least 0 (never). Raises ClockError."""
     if not wall < ENDS:
         raise ClockError(
             "the clock is past 2038-01-19, the last day that RMF's stamps can hold: set the clock"
@@ -24,11 +24,11 @@ def stamp(wall: float) -> Time:
 
 
 def duration(seconds: float) -> Duration:
-    """Seconds as RMF's Duration; may be negative."""
+    """Convert seconds, which may be negative, to RMF's Duration."""
     whole = math.floor(seconds)
     return Duration(sec=whole, nanosec=int((seconds - whole) * 1e9))
 
 
 def in_seconds(value: Time | Duration) -> float:
-    """Seconds; of a Time, since the epoch."""
+    """Convert to seconds; a Time to seconds since the epoch."""
     return value.sec + value.nanosec * 1e-9

@@ -1,7 +1,7 @@
-"""Message definitions as ROS writes them in recordings: made from our table, and found in it.
+"""Texts of message definitions, as in ROS recordings: written from our table, and matched with it.
 
-A text has the message's fields, a line each, then for each type below it a line of `=`, a line
-`MSG: package/Name`, and its fields (the `ros2msg` schema of MCAP, as rosbag2 concatenates it).
+A text has the message's fields, a line each, then for each nested type a line of `=`, a line
+`MSG: package/Name`, and the type's fields (the `ros2msg` schema of MCAP, as rosbag2 concatenates it).
 """
 
 import re
@@ -16,18 +16,18 @@ from bridges.messages.rihs01 import type_name
 RULE: Final = "=" * 80
 LONGEST: Final = 1 << 20
 DEEPEST: Final = 8
-"""Types below types; a definition that names itself would go on forever."""
+"""The greatest depth of nested types; a definition that names itself would never end."""
 
 Shape = tuple[tuple[str, object], ...]
-"""(field, its type's name or Shape); a sequence's type ends with `[]`, or is a tuple of one Shape."""
+"""Pairs (field, type's name or Shape); a sequence's type ends with `[]`, or is a tuple of one Shape."""
 
 
 class UnknownDefinition(ValueError):
-    """The text is no definition, or one that no release of ours has."""
+    """The text is no definition, or matches none of our releases."""
 
 
 def text(message_type: type, release: Release) -> str:
-    """The definition of a message, with those of all types below it."""
+    """Write the definition of a message and of all nested types."""
     parts = [_fields(message_type, release)]
     for nested in _below(message_type, release):
         parts += [RULE, f"MSG: {_short(nested)}", _fields(nested, release)]
@@ -35,7 +35,7 @@ def text(message_type: type, release: Release) -> str:
 
 
 def releases_of(message_type: type, definition: str) -> list[Release]:
-    """The releases whose definition of a message this is, the newest first; empty for none."""
+    """List the releases with this definition of the message, the newest first; empty for none."""
     try:
         found = _read(_short(message_type), definition)
     except UnknownDefinition:
@@ -55,7 +55,7 @@ def _fields(message_type: type, release: Release) -> str:
 
 
 def _ros_type(kind: type) -> str:
-    """The type of a field, as a definition names it."""
+    """Return the name of a field's type in a definition."""
     if typing.get_origin(kind) is tuple:
         return _ros_type(typing.get_args(kind)[0]) + "[]"
     if kind in PACKAGES:
@@ -70,7 +70,7 @@ def _element(kind: type) -> type:
 
 
 def _below(message_type: type, release: Release) -> list[type]:
-    """The types below a message, each once, in the order in which they are first named."""
+    """List the nested types of a message, each once, in the order of first mention."""
     found: dict[type, None] = {}
     for kind in map(_element, release.fields(message_type).values()):
         if kind in PACKAGES:
@@ -94,11 +94,11 @@ def _shape_of(kind: type, release: Release) -> object:
 
 
 FIELD: Final = re.compile(r"([A-Za-z][\w/]*)(?:<=\d+)?(\[(?:<=)?\d*\])?\s+([a-z]\w*)\b(?!\s*=)")
-"""A field: type, `[]`, name. A constant has a `=` after its name; a default has none."""
+"""A field: type, `[]`, name. A constant has a `=` after its name; a field with a default has none."""
 
 
 def _read(name: str, definition: str) -> Shape:
-    """Raises UnknownDefinition."""
+    """Read a definition's shape. Raises UnknownDefinition."""
     if len(definition) > LONGEST:
         raise UnknownDefinition("longer than any message's")
     sections = re.split(r"^=+$\n?", definition, flags=re.MULTILINE)

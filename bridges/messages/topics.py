@@ -1,8 +1,8 @@
 """Every topic that we publish or subscribe, with its type and QoS.
 
-The QoS is what RMF's own endpoints match (rmf_ros2 9dedd0f; agv/Node.cpp, lift_supervisor/Node.cpp,
-door_supervisor/Node.cpp). All endpoints are RELIABLE with KEEP_LAST history; what differs is the
-durability and the depth.
+The QoS matches RMF's own endpoints (rmf_ros2 9dedd0f; agv/Node.cpp, lift_supervisor/Node.cpp,
+door_supervisor/Node.cpp). All endpoints are RELIABLE with KEEP_LAST history; only durability and depth
+differ.
 """
 
 from typing import Generic, Literal, TypeVar
@@ -35,11 +35,11 @@ class Topic(Struct, Generic[M_co], frozen=True):
     subscribe: Qos = VOLATILE
 
     def named(self, name: str) -> "Topic[M_co]":
-        """The same topic under another name."""
+        """Return the same topic under another name."""
         return replace(self, name=name)
 
     def live(self) -> "Topic[M_co]":
-        """The same topic for a subscriber that wants no retained messages."""
+        """Return the same topic for a subscription without retained messages."""
         return replace(self, subscribe=VOLATILE)
 
 
@@ -60,12 +60,12 @@ DOOR_SUPERVISOR_HEARTBEAT = Topic("door_supervisor_heartbeat", d.SupervisorHeart
 CHARGER_STATES = Topic("charger_states", d.ChargerState)
 CHARGER_REQUESTS = Topic("charger_requests", d.ChargerRequest)
 CHARGER_CANCELS = Topic("charger_cancels", d.ChargerCancel)
-# Ours: RMF has no message that answers a request.
+# Ours: RMF has no message to answer a request.
 CHARGER_REFUSALS = Topic("charger_refusals", d.DiagnosticStatus)
 # Requests to the charger coordinator; RMF has no such topics.
 ADAPTER_CHARGER_REQUESTS = Topic("adapter_charger_requests", d.ChargerRequest)
 ADAPTER_CHARGER_CANCELS = Topic("adapter_charger_cancels", d.ChargerCancel)
-# Nothing is sent on it. Its publisher shows that a coordinator serves the graph: a second one waits.
+# A topic without messages. Its publisher shows that a coordinator serves the graph: a second one waits.
 CHARGER_COORDINATOR = Topic("charger_coordinator", d.Bool)
 FLEET_STATES = Topic("fleet_states", d.FleetState)
 # rmf_charging_schedule retains it, for fleet adapters that start later.
@@ -83,5 +83,5 @@ DIAGNOSTICS = Topic("diagnostics", d.DiagnosticArray)
 
 
 def every() -> list[AnyTopic]:
-    """All of them, in the order above."""
+    """List all topics, in the order above."""
     return [topic for topic in globals().values() if isinstance(topic, Topic)]

@@ -1,7 +1,7 @@
-"""RMF's messages as one line of text: what `watch`, `send` and the demo print.
+"""RMF's messages as one line of text, for `watch`, `send` and the demo.
 
 The words are RMF's constants without their prefix, in lower case except for a lift's mode: DOOR_OPEN is
-`open`, MODE_AGV is `AGV`. A number that RMF does not define is shown as a number. Names come from the
+`open`, MODE_AGV is `AGV`. A number without a constant is shown as a number. Names come from the
 network, so control characters are escaped.
 """
 
@@ -14,20 +14,20 @@ from bridges.messages.stamps import in_seconds
 Stated = d.LiftState | d.DoorState | d.ChargerState
 Requested = d.LiftRequest | d.DoorRequest | d.ChargerRequest | d.ChargerCancel
 LONGEST_NAME: Final = 256
-"""What is kept and shown of a name: anybody can send one of a megabyte."""
+"""The longest part of a name (characters) that is kept and shown: anybody can send a megabyte."""
 Kind = Literal["lift", "door", "charger"]
 KINDS: Final[tuple[Kind, ...]] = ("lift", "door", "charger")
 
 
 def printable(text: str) -> str:
-    """The text on one line, with control characters escaped, so that no name can move the cursor."""
+    """Return the text on one line, with control characters escaped: no name may move the cursor."""
     if text.isprintable():
         return text
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
 
 
 def word(enum: type[IntEnum], value: int) -> str:
-    """`DOOR_OPEN` as `OPEN`; a number without a constant as `7?`."""
+    """Write `DOOR_OPEN` as `OPEN`, and a number without a constant as `7?`."""
     try:
         return enum(value).name.split("_", 1)[1]
     except ValueError:
@@ -35,7 +35,7 @@ def word(enum: type[IntEnum], value: int) -> str:
 
 
 def device(message: Stated | Requested) -> str:
-    """The device that a state or request is about, as RMF names it."""
+    """Return RMF's name of the device of a state or request."""
     match message:
         case d.LiftState() | d.LiftRequest():
             return message.lift_name
@@ -46,7 +46,7 @@ def device(message: Stated | Requested) -> str:
 
 
 def kind(message: Stated | Requested) -> Kind:
-    """The kind of device that a state or request is about."""
+    """Return the kind of device of a state or request."""
     match message:
         case d.LiftState() | d.LiftRequest():
             return "lift"
@@ -57,7 +57,7 @@ def kind(message: Stated | Requested) -> Kind:
 
 
 def stamped_at(state: Stated) -> float:
-    """When the hardware was read, in seconds since the epoch; 0 for never."""
+    """Return the time of the hardware's reading, in seconds since the epoch; 0 for never."""
     match state:
         case d.LiftState():
             return in_seconds(state.lift_time)
@@ -68,7 +68,7 @@ def stamped_at(state: Stated) -> float:
 
 
 def condition(state: Stated) -> str:
-    """The state without its holder: `car at L1, door open, mode AGV`, `moving`, `error: too hot`."""
+    """Describe the state without its holder: `car at L1, door open, mode AGV`, `error: too hot`."""
     match state:
         case d.LiftState():
             return _lift_condition(state)
@@ -79,7 +79,7 @@ def condition(state: Stated) -> str:
 
 
 def plain(enum: type[IntEnum], value: int) -> str:
-    """`DOOR_OPEN` as `open`; a number without a constant as `7?`."""
+    """Write `DOOR_OPEN` as `open`, and a number without a constant as `7?`."""
     return word(enum, value).lower()
 
 
@@ -108,7 +108,7 @@ def _charger_condition(state: d.ChargerState) -> str:
 
 
 def holder(state: Stated) -> str:
-    """Who holds the device: a lift's session, or a charger's robot and request; "" for nobody."""
+    """Return the device's holder: a lift's session, or a charger's robot and request; "" for none."""
     match state:
         case d.LiftState():
             return printable(state.session_id)
@@ -122,14 +122,14 @@ def holder(state: Stated) -> str:
 
 
 def described(state: Stated) -> str:
-    """A state and its holder: `car at L1, door open, mode AGV, held by fleet/robot`; `idle`."""
+    """Describe a state with its holder: `car at L1, door open, mode AGV, held by fleet/robot`."""
     who = holder(state)
     has = "for" if isinstance(state, d.ChargerState) else "held by"
     return condition(state) + (f", {has} {who}" if who else "")
 
 
 def request(message: Requested) -> str:
-    """What is requested: `mode AGV, car to L3, door open, for fleet/robot`."""
+    """Describe the request: `mode AGV, car to L3, door open, for fleet/robot`."""
     match message:
         case d.LiftRequest():
             return _lift_request(message)

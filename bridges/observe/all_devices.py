@@ -1,4 +1,4 @@
-"""All devices that were heard, in bounds, whatever names are made up."""
+"""All devices heard, in bounds even if names are invented."""
 
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping
@@ -25,10 +25,10 @@ Key = tuple[words.Kind, str]
 class ObservedGraph(Generic[D]):
     """`known`: every device, by kind and name; at most `most` of each kind.
 
-    Where there is no room, one that was only asked for gives way to one that has states, and one whose
-    states stopped FORGOTTEN_S ago to a new one; otherwise those heard first stay. `crowded`: the kinds
-    of which some had no room. `steps`: when the listener's clock was stepped, and by how much (s).
-    `nodes`: what daemons and coordinators of ours say of themselves, by `<node>: <device>`.
+    In a full table a device without states is replaced by one with states, and a device whose states
+    stopped FORGOTTEN_S ago by a new one; otherwise the devices heard first stay. `crowded`: kinds with
+    devices left out. `steps`: the times of steps of the listener's clock, and their size (s).
+    `nodes`: reports of our daemons and coordinators on themselves, by `<node>: <device>`.
     """
 
     makes: ClassVar[Mapping[words.Kind, Callable[[str, Moment], Any]]]
@@ -46,7 +46,7 @@ class ObservedGraph(Generic[D]):
         self._full_until: dict[tuple[words.Kind, bool], float] = {}
 
     def hear(self, heard: Heard) -> list[tuple[D, list[News]]]:
-        """Take a message. Returns the devices that it is about, and what it changed of each."""
+        """Take a message. Return its devices, and the news of each."""
         moment, message = self.moment(heard), heard.message
         topic = heard.topic.rpartition("/")[2]
         if isinstance(message, d.SupervisorHeartbeat):
@@ -57,7 +57,7 @@ class ObservedGraph(Generic[D]):
         return [(device, device.hear(moment, topic, message)) for device in found]
 
     def moment(self, heard: Heard | Own) -> Moment:
-        """Its time. One that a recording has in the wrong order counts as of now."""
+        """Return the message's time; a message out of order in a recording counts as of now."""
         at = heard.at if self.began is None else max(heard.at, self.now.at)
         offset = heard.wall - heard.at
         if self.began is None:
@@ -70,17 +70,17 @@ class ObservedGraph(Generic[D]):
         return self.now
 
     def pass_time(self, at: float, wall: float) -> None:
-        """Note that time has passed and nothing was heard."""
+        """Let time pass without a message."""
         self.now = Moment(max(at, self.now.at), wall)
         self.began = self.began or Moment(at, wall, seen=False)
 
     def stated(self, kind: words.Kind | None = None) -> list[D]:
-        """The devices that have published a state, of this kind, in the order in which they came."""
+        """List the devices of this kind that have published a state, in the order of arrival."""
         every = self.known.values()
         return [one for one in every if kind in (None, one.kind) and one.state is not None]
 
     def make(self, kind: words.Kind, name: str) -> D:
-        """A device of which nothing was heard yet."""
+        """Make a device without any message yet."""
         made: D = self.makes[kind](name, self.began or self.now)
         return made
 
@@ -106,7 +106,7 @@ class ObservedGraph(Generic[D]):
     def device(
         self, kind: words.Kind, name: str, moment: Moment, *, stated: bool = False
     ) -> D | None:
-        """The device of this name. A new one is made if there is room for it."""
+        """Find the device of this name, or make it if there is room."""
         found = self.known.get((kind, name))
         if found is not None or not name:
             return found
@@ -135,11 +135,11 @@ class ObservedGraph(Generic[D]):
 
 
 def _heard_at(device: AnyDevice) -> float:
-    """When its last state came (s)."""
+    """Return the time of its last state (s)."""
     return device.last_state.at if device.last_state else float("-inf")
 
 
 class PlainGraph(ObservedGraph[AnyDevice]):
-    """Every device, and nothing but what was heard of it."""
+    """Every device, with observed facts only."""
 
     makes: ClassVar = {"lift": ObservedLift, "door": ObservedDoor, "charger": ObservedCharger}

@@ -1,4 +1,4 @@
-"""What is remembered of a charger: who asked for it, who has it, and whether it charges."""
+"""Observation of a charger: its requesters, its holder, its charge."""
 
 from collections.abc import Iterator
 from typing import Final
@@ -14,8 +14,8 @@ NOBODY: Final = "nobody"
 
 
 class ObservedCharger(ObservedDevice[d.ChargerState]):
-    """`condition`: RMF's word for its state. `robot`: the robot that has it; before the first state and
-    in a silence that is unknown. `request`: the id that it serves. Its requesters are known by
+    """`condition`: RMF's word for its state. `robot`: the robot that has it, unknown before the first
+    state and in a silence. `request`: the id of the present request. Its requesters are known by
     the ids of their requests, and want a robot charged."""
 
     kind = "charger"
@@ -28,7 +28,7 @@ class ObservedCharger(ObservedDevice[d.ChargerState]):
         self.error = Fact("", began)
 
     def facts(self, state: d.ChargerState) -> dict[str, str]:
-        """Condition, robot, error and request."""
+        """Return condition, robot, error and request."""
         robot = f"{state.robot_fleet}/{state.robot_name}" if state.robot_name else NOBODY
         return {
             "condition": words.plain(d.ChargerStateValue, state.state),
@@ -38,7 +38,7 @@ class ObservedCharger(ObservedDevice[d.ChargerState]):
         }
 
     def waits(self, now: Moment) -> Iterator[Wait]:
-        """Whoever it is assigned to; its request comes once."""
+        """Yield the wait of an assigned charger's request, which comes only once."""
         if self.condition.value == "assigned":
             since = max(self.condition.since, self.request.since, key=lambda one: one.at)
             yield Wait(self.request.value, "CHARGING", since)

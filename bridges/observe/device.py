@@ -1,4 +1,4 @@
-"""What is remembered of every kind of device: its states, their pace and age, who asks, who waits."""
+"""Observation of any kind of device: its states, their pace and age, its requesters and waits."""
 
 from abc import ABC, abstractmethod
 from collections import deque
@@ -16,7 +16,7 @@ T = TypeVar("T", d.LiftState, d.DoorState, d.ChargerState)
 
 
 class Check(NamedTuple):
-    """One of the things that a phase of RMF waits for: what is shown, and what is wanted."""
+    """One condition of a phase of RMF: the shown and the wanted value."""
 
     name: str
     shown: str
@@ -25,7 +25,7 @@ class Check(NamedTuple):
 
 
 class Wait(NamedTuple):
-    """Somebody waits for something: a floor, OPEN, CHARGING."""
+    """A requester's wait for a floor, OPEN or CHARGING."""
 
     who: str
     wants: str
@@ -33,7 +33,7 @@ class Wait(NamedTuple):
 
 
 def reading_age(stamped_at: float, wall: float) -> str:
-    """What is wrong with the age of a state's reading, such as `is old`; "" if nothing is."""
+    """Return the fault of a reading's age, such as `is old`; "" for none."""
     if stamped_at <= 0.0:
         return "was never read"
     if wall - stamped_at > OLD_S:
@@ -42,11 +42,11 @@ def reading_age(stamped_at: float, wall: float) -> str:
 
 
 class ObservedDevice(ABC, Generic[T]):
-    """One device as it was heard. `id`: its name on the graph. `began`: when anything was heard first.
+    """One device as heard. `id`: its name on the graph. `began`: the time of its first message.
 
-    `state`, `before`: the two latest states; `gap_s` lies between them. `first_state`, `last_state`:
-    when the first and the latest came. `changed`: fact -> its value before the latest state.
-    `diagnoses`: what nodes of ours say of it, by `<node>: <device>`.
+    `state`, `before`: the two latest states, `gap_s` apart. `first_state`, `last_state`: the times of
+    the first and the latest state. `changed`: fact -> its value before the latest state.
+    `diagnoses`: reports of our nodes on the device, by `<node>: <device>`.
     """
 
     kind: ClassVar[words.Kind]
@@ -67,13 +67,13 @@ class ObservedDevice(ABC, Generic[T]):
         self._back: deque[tuple[float, float]] = deque(maxlen=8)
 
     def hear(self, moment: Moment, topic: str, message: d.Message) -> list[News]:
-        """Take a message about it. `topic`: its last part."""
+        """Take a message about the device. `topic`: the last part of its name."""
         if isinstance(message, words.Stated):
             return [*self._hear_state(moment, message)]  # type: ignore[arg-type]
         return [*self._hear_other(moment, topic, message)]
 
     def diagnose(self, moment: Moment, status: d.DiagnosticStatus) -> list[News]:
-        """Take a status about it, of a node of ours."""
+        """Take a status about the device from one of our nodes."""
         seen = status.name in self.diagnoses or moment.at - self.began.at > SILENT_S
         moment = Moment(moment.at, moment.wall, seen)
         said = report(self.diagnoses, MOST_NODES, status, moment)
@@ -82,40 +82,40 @@ class ObservedDevice(ABC, Generic[T]):
         return list(said.take(moment, status, self.text))
 
     def text(self, name: str) -> str:
-        """A name from the network as it is remembered; `explain` keeps what can be shown."""
+        """Return the remembered form of a name from the network; in `explain` the printable form."""
         return name
 
     def is_silent(self, now: Moment, after_s: float = SILENT_S) -> bool:
-        """Have its states stopped? False before the first one."""
+        """Have its states stopped? False before the first state."""
         return self.silent_s(now) > after_s
 
     def silent_s(self, now: Moment) -> float:
-        """How long ago its last state came (s)."""
+        """Return the age of its last state (s)."""
         return 0.0 if self.last_state is None else now.at - self.last_state.at
 
     def steps_back(self, now: float, by_s: float, within_s: float) -> int:
-        """How often the stamps went back by more than this lately, as those of two nodes do."""
+        """Count recent steps back of the stamps by more than `by_s`, as with two nodes."""
         return sum(by > by_s and now - at < within_s for at, by in self._back)
 
     def checks(self, one: DeviceRequester) -> tuple[Check, ...]:
-        """What RMF's phase of this requester looks at; nothing where RMF has none."""
+        """List the conditions of RMF's phase of this requester; empty if RMF has no such phase."""
         return ()
 
     def matches(self, one: DeviceRequester) -> bool:
-        """Does RMF see what this requester waits for?"""
+        """Does RMF see this requester's wish fulfilled?"""
         return all(check.met for check in self.checks(one))
 
     @abstractmethod
     def waits(self, now: Moment) -> Iterator[Wait]:
-        """Who waits, for what, since when."""
+        """Yield each requester that waits, its wish, and the start of its wait."""
 
     @abstractmethod
     def facts(self, state: T) -> dict[str, str]:
-        """What a state shows, by the names of our `Fact`s."""
+        """Return the facts of a state, by the names of our `Fact`s."""
 
     @abstractmethod
     def _settle(self, moment: Moment) -> Iterator[News]:
-        """What the new state means; `changed` is set, and `before` is None at the first one."""
+        """Yield the news of a new state; `changed` is set, and `before` is None at the first state."""
 
     @abstractmethod
     def _hear_other(self, moment: Moment, topic: str, message: d.Message) -> Iterator[News]:

@@ -1,4 +1,4 @@
-"""What our nodes say on `/diagnostics` of a device, or of themselves: the latest of each."""
+"""The latest reports of our nodes on `/diagnostics`, about a device or themselves."""
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
@@ -17,33 +17,33 @@ REFUSED: Final = "refused "
 
 
 def faults(status: DiagnosticStatus) -> tuple[str, ...]:
-    """The codes of the faults in a device's status."""
+    """Return the codes of the faults in a device's status."""
     shown = status.message if status.level == DiagnosticLevel.ERROR else ""
     return tuple(code for code in shown.split(", ") if code)
 
 
 def kind_in(status: DiagnosticStatus) -> str:
-    """The kind of the daemon of ours that says it; "" for another's."""
+    """Return the kind of our daemon that sent the status; "" for other senders."""
     return next((pair.value for pair in status.values if pair.key == "kind"), "")
 
 
 def about(status: DiagnosticStatus) -> tuple[Kind, str] | None:
-    """The device that a status of ours is about; of a supervisor: its lift or door."""
+    """Return the device of a status of ours; for a supervisor its lift or door."""
     kind = kind_in(status).removesuffix("_supervisor")
     found = next((known for known in KINDS if known == kind), None)
     return (found, status.hardware_id) if found else None
 
 
 def of_node(status: DiagnosticStatus) -> bool:
-    """Is it about one of our daemons itself, or about all that a coordinator serves?"""
+    """Is the status about one of our daemons itself, or about a coordinator's whole site?"""
     kind = kind_in(status)
     return kind == COORDINATOR or (bool(kind) and status.name == f"{status.hardware_id}: daemon")
 
 
 @dataclass(slots=True)
 class Diagnosis:
-    """What one node says. `kind`: its daemon's. `name`: `<node>: <device>`. `last`: when it came last.
-    `faults`: code -> detail, and since when. `refused`: reason -> how often, and when last."""
+    """One node's report. `kind`: its daemon's kind. `name`: `<node>: <device>`. `last`: the time of its
+    last status. `faults`: code -> (detail, start). `refused`: reason -> (count, last time)."""
 
     kind: str
     last: Moment
@@ -54,18 +54,18 @@ class Diagnosis:
     refused: dict[str, tuple[int, Moment]] = field(default_factory=dict)
 
     def is_current(self, now: float) -> bool:
-        """Was it said so lately that it counts?"""
+        """Is the report recent enough to count?"""
         return now - self.last.at <= SILENT_S
 
     def value(self, key: str) -> str:
-        """The value of this key; "" if it is missing or "-"."""
+        """Return the value of this key; "" if it is missing or "-"."""
         found = self.values.get(key, "")
         return "" if found == "-" else found
 
     def take(
         self, moment: Moment, status: DiagnosticStatus, text: Callable[[str], str] = str
     ) -> Iterator[News]:
-        """Its next status. `text`: a name from the network as it is remembered."""
+        """Take the next status. `text`: converts a name from the network to its remembered form."""
         self.kind, self.last, self.message = kind_in(status), moment, status.message
         self.values = {pair.key: pair.value for pair in status.values[:MOST_VALUES]}
         codes = faults(status)[:MOST_CODES]
@@ -75,7 +75,7 @@ class Diagnosis:
                 yield from self.refuses(moment, text(key.removeprefix(REFUSED)), int(value))
 
     def has(self, moment: Moment, codes: Mapping[str, str]) -> Iterator[News]:
-        """Its present faults, with their details."""
+        """Take the present faults, with their details."""
         over, new = self.faults.keys() - codes.keys(), codes.keys() - self.faults.keys()
         gone = [code for code in self.faults if code in over]
         self.faults = {
@@ -86,7 +86,7 @@ class Diagnosis:
         yield from (News("fault", moment, self.name, code) for code in codes if code in new)
 
     def refuses(self, moment: Moment, reason: str, count: int | None = None) -> Iterator[News]:
-        """It has refused for this reason, `count` times, or once more."""
+        """Note refusals for this reason, `count` in all, or one more."""
         before, last = self.refused.get(reason, (0, None))
         if (last is None and len(self.refused) >= MOST_CODES) or (last and before == count):
             return
@@ -98,7 +98,7 @@ class Diagnosis:
 def report(
     known: dict[str, Diagnosis], most: int, status: DiagnosticStatus, moment: Moment
 ) -> Diagnosis | None:
-    """The memory of who says this; a silent one gives way. None if there is no room."""
+    """Find or make the status's diagnosis; in a full table it replaces a silent one, or is None."""
     if status.name not in known:
         silent = (name for name, one in known.items() if not one.is_current(moment.at))
         if len(known) >= most and known.pop(next(silent, ""), None) is None:

@@ -1,5 +1,5 @@
-"""What is remembered of a door: who asks for it, who holds it by the supervisor's heartbeat, what was
-asked of it, and what RMF's DoorOpen and DoorClose still miss."""
+"""Observation of a door: its requesters, its holders by the supervisor's heartbeat, its last request,
+and the unmet conditions of RMF's DoorOpen and DoorClose."""
 
 from collections.abc import Iterator
 from typing import Final
@@ -16,11 +16,11 @@ CLOSED: Final = "closed"
 LISTS: Final = "lists it"
 LISTS_NOT: Final = "does not list it"
 SUPERVISOR: Final = "door_supervisor"
-"""The requester_id that RMF's own uses on `door_requests` (door_supervisor/Node.hpp), and ours."""
+"""The requester_id of RMF's supervisor (door_supervisor/Node.hpp) and of ours on `door_requests`."""
 
 
 def listed(heartbeat: d.SupervisorHeartbeat, door: str) -> list[str]:
-    """Who holds the door, by the supervisor's heartbeat (rmf_ros2, SupervisorHasSession.cpp)."""
+    """List the door's holders, by the supervisor's heartbeat (rmf_ros2, SupervisorHasSession.cpp)."""
     return [
         session.requester_id
         for sessions in heartbeat.all_sessions
@@ -30,7 +30,7 @@ def listed(heartbeat: d.SupervisorHeartbeat, door: str) -> list[str]:
 
 
 def door_open(mode: str, heartbeat: str) -> tuple[Check, ...]:
-    """What DoorOpen waits for (rmf_ros2, DoorOpen.cpp). `heartbeat`: LISTS, or anything else."""
+    """List the conditions of DoorOpen (rmf_ros2, DoorOpen.cpp). `heartbeat`: LISTS, or another text."""
     return (
         Check("door", mode, OPEN, mode == OPEN),
         Check("heartbeat", heartbeat, LISTS, heartbeat == LISTS),
@@ -38,14 +38,13 @@ def door_open(mode: str, heartbeat: str) -> tuple[Check, ...]:
 
 
 def door_close(heartbeat: str) -> tuple[Check, ...]:
-    """What DoorClose waits for (rmf_ros2, DoorClose.cpp): not for the door."""
+    """List the conditions of DoorClose (rmf_ros2, DoorClose.cpp): none on the door itself."""
     return (Check("heartbeat", heartbeat, LISTS_NOT, heartbeat != LISTS),)
 
 
 class ObservedDoor(ObservedDevice[d.DoorState]):
-    """`holders`: who the heartbeat lists, and since when. `asked`: what was asked last on
-    `door_requests`, by `sender`, at `asked_last` at last.
-    """
+    """`holders`: the requesters in the heartbeat, and the start of their holds. `asked`: the last mode
+    requested on `door_requests`, by `sender`; `asked_last`: the time of its latest repeat."""
 
     kind = "door"
 
@@ -59,24 +58,24 @@ class ObservedDoor(ObservedDevice[d.DoorState]):
         self.sender = ""
 
     def facts(self, state: d.DoorState) -> dict[str, str]:
-        """The mode."""
+        """Return the mode."""
         return {"mode": words.plain(d.DoorModeValue, state.current_mode.value)}
 
     def checks(self, one: DeviceRequester) -> tuple[Check, ...]:
-        """What DoorOpen or DoorClose of this requester looks at."""
+        """List the conditions of this requester's DoorOpen or DoorClose."""
         heartbeat = LISTS if one.who in self.holders else LISTS_NOT
         if self.last_heartbeat is None:
             heartbeat = "not heard"
         return door_open(self.mode.value, heartbeat) if one.wants == OPEN else door_close(heartbeat)
 
     def asking(self, now: Moment) -> list[DeviceRequester]:
-        """Those who repeat their request now and still wait, the earliest first."""
+        """List requesters that repeat their request now and still wait, the earliest first."""
         asks = [one for one in self.requesters if one.asks(now) and not self.matches(one)]
         return sorted(asks, key=lambda one: one.since.at)
 
     def waits(self, now: Moment) -> Iterator[Wait]:
-        """Whoever waits for OPEN; the supervisor too. A daemon that hears no heartbeat knows only of
-        the door."""
+        """Yield each wait for OPEN, even the supervisor's. Without a heartbeat only the door's state
+        counts."""
         opened = self.mode.value == OPEN
         for one in self.asking(now):
             if one.wants == OPEN and not (opened and self.last_heartbeat is None):

@@ -1,5 +1,5 @@
-"""What is remembered of a lift: who asks for it, who has it, what the supervisor asks for, and what
-RMF's RequestLift still misses."""
+"""Observation of a lift: its requesters, its session, the supervisor's request, and the unmet
+conditions of RMF's RequestLift."""
 
 from collections.abc import Iterator
 from typing import Final
@@ -16,19 +16,19 @@ NOBODY: Final = "nobody"
 NO_FLOOR: Final = "no known floor"
 OPEN: Final = "open"
 HAZARDS: Final = (d.LiftMode.MODE_FIRE, d.LiftMode.MODE_OFFLINE, d.LiftMode.MODE_EMERGENCY)
-"""The modes in which no robot is let in."""
+"""In these modes no robot is let in."""
 
 
 def request_lift(session: str, floor: str, door: str, who: str, wants: str) -> tuple[Check, ...]:
-    """What RequestLift looks at, and nothing else, to let `who` drive at the floor that it `wants`
-    (rmf_ros2, RequestLift.cpp:322-326); the lift's name is what was heard."""
+    """List all conditions of RequestLift to let `who` drive at the floor that it `wants` (rmf_ros2,
+    RequestLift.cpp:322-326), except the lift's name, which always matches here."""
     fields = (("session", session, who), ("floor", floor, wants), ("door", door, OPEN))
     return tuple(Check(*field, field[1] == field[2]) for field in fields)
 
 
 class ObservedLift(ObservedDevice[d.LiftState]):
-    """`adapters_heard`: a fleet adapter was. `supervisor`: the session that it asks for ("" after an
-    END), as far as it was heard on `lift_requests`, at `supervisor_last` at last."""
+    """`adapters_heard`: a fleet adapter was heard. `supervisor`: the session in the supervisor's last
+    request on `lift_requests` ("" after an END), heard last at `supervisor_last`."""
 
     kind = "lift"
 
@@ -45,7 +45,7 @@ class ObservedLift(ObservedDevice[d.LiftState]):
         self.supervisor_last: Moment | None = None
 
     def facts(self, state: d.LiftState) -> dict[str, str]:
-        """Session, mode, floor, motion, destination and door."""
+        """Return session, mode, floor, motion, destination and door."""
         return {
             "session": self.text(state.session_id) or NOBODY,
             "mode": words.word(d.LiftMode, state.current_mode),
@@ -56,13 +56,13 @@ class ObservedLift(ObservedDevice[d.LiftState]):
         }
 
     def checks(self, one: DeviceRequester) -> tuple[Check, ...]:
-        """What RequestLift of this requester looks at."""
+        """List the conditions of this requester's RequestLift."""
         wants = one.wants or "no floor"
         return request_lift(self.session.value, self.floor.value, self.door.value, one.who, wants)
 
     def asking(self, now: Moment) -> list[DeviceRequester]:
-        """Those who ask now, the earliest first. While no state comes nobody repeats itself, and all
-        wait."""
+        """List requesters that ask now, the earliest first. Without states nobody repeats a request, so
+        all of them wait."""
         stands = self.last_state is None or self.is_silent(now)
         asks = [
             one
@@ -72,7 +72,7 @@ class ObservedLift(ObservedDevice[d.LiftState]):
         return sorted(asks, key=lambda one: one.first.at)
 
     def waits(self, now: Moment) -> Iterator[Wait]:
-        """Whoever asks, and is not shown what it asks for."""
+        """Yield each requester whose wish the lift's states do not show as fulfilled."""
         for one in self.asking(now):
             if self.is_silent(now) or not self.matches(one):
                 yield Wait(one.who, one.wants, one.lacks)

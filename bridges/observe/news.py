@@ -1,4 +1,4 @@
-"""What one message changed of what is known of a device."""
+"""News of a device: the changes by one message."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -6,28 +6,28 @@ from typing import Literal
 from bridges.observe.requesters import DeviceRequester, Moment
 
 What = Literal[
-    "first state",  # of a device that was silent until then
-    "states again",  # `gap_s` after the one before
-    "read",  # the age of its readings is another now: `text`
-    "changed",  # facts in `changed` are others than in the state before
-    "asks",  # for something new; of a lift: in the mode `text`
+    "first state",  # of a device without states before
+    "states again",  # `gap_s` after the state before
+    "read",  # the judgement of its readings' age is now `text`
+    "changed",  # the facts in `changed` differ from the state before
+    "asks",  # a requester asks for something new; of a lift: in the mode `text`
     "passed on",  # the supervisor asks for something new
-    "ends",  # a requester; `passed_on` by the supervisor
-    "has",  # a requester has it now
-    "lost",  # `text` had it until now
-    "met",  # RMF sees what a requester waits for
-    "gone",  # a requester asks no more, without END
-    "over",  # a requester's visit
-    "fault",  # of the code `text`, as `who` says, one of its diagnoses
+    "ends",  # a requester sends END; `passed_on`: the supervisor does
+    "has",  # a requester has the device now
+    "lost",  # `text` had the device until now
+    "met",  # RMF sees a requester's wish fulfilled
+    "gone",  # a requester has stopped asking, without END
+    "over",  # a requester's visit is over
+    "fault",  # the diagnosis `who` reports a new fault with the code `text`
     "fault over",
-    "refused",  # a request, by the node that says so: for the reason `text`
+    "refused",  # the node of the diagnosis `who` has refused a request, for the reason `text`
 ]
 
 
 @dataclass(frozen=True, slots=True)
 class News:
-    """One thing that a message changed. `who`: the requester, as a text; `requester`: its memory, if it
-    has asked. `text`: as `What` says; `gap_s`: how long that had lasted."""
+    """One change by a message. `who`: the requester, as a text; `requester`: its memory, if it has
+    asked. `text`: as `What` says; `gap_s`: the length of the silence or hold that ended."""
 
     what: What
     at: Moment

@@ -1,4 +1,4 @@
-"""Who asks for a device, for what, since when, and whether they still do."""
+"""The requesters of a device: their wishes, the start of each, and their present activity."""
 
 from collections import OrderedDict
 from collections.abc import Iterator
@@ -11,8 +11,8 @@ from bridges.observe.limits import ASKS_WITHIN_S, GIVEN_UP_S, MOST_REQUESTERS, R
 
 @dataclass(frozen=True, slots=True)
 class Moment:
-    """When something began. `at`: s on `Heard.at`'s clock. `wall`: s since the epoch. `seen`: False if
-    it was so already when the first message came.
+    """The beginning of something. `at`: s on `Heard.at`'s clock. `wall`: s since the epoch. `seen`:
+    False if it was before the first message.
     """
 
     at: float
@@ -22,13 +22,13 @@ class Moment:
 
 @dataclass(slots=True)
 class Fact:
-    """Something that is so, and since when."""
+    """A present value and its beginning."""
 
     value: str
     since: Moment
 
     def say(self, value: str, moment: Moment) -> bool:
-        """Set its present value. True if that is a change."""
+        """Set the present value. Return True for a change."""
         if value == self.value:
             return False
         self.value, self.since = value, moment
@@ -37,12 +37,12 @@ class Fact:
 
 @dataclass(slots=True)
 class DeviceRequester:
-    """What one requester asks for. `wants`: a floor, or whatever else. `first`: when its visit began;
-    `since`: when it began to ask for this; `lacks`: since when it has been without it, though it asks;
-    `last`: when it asked last. `times`: how often it asked.
-    `passed_on`: when the supervisor last asked for it. `own`: it was heard itself, not only through
-    the supervisor. `met`: when RMF saw what it waits for. `granted`: when it had the device. `ended`:
-    its END; `end_passed_on`: the supervisor passed that on. `gone`: it stopped without END.
+    """One requester and its wish. `wants`: a floor, a door's mode, and the like. Times: `first`, the
+    start of its visit; `since`, its first request for this wish; `lacks`, the start of its wait;
+    `last`, its last request; `passed_on`, the supervisor's last request for it; `met`, the wish seen
+    fulfilled by RMF; `granted`, its hold of the device; `ended`, its END. `end_passed_on`: the
+    supervisor has passed on that END. `gone`: it has stopped without END. `times`: the number of its
+    requests. `own`: it was heard itself, not only through the supervisor.
     `stamp_age_s`: the age by our clock of its last request, if that was `stamped`.
     """
 
@@ -64,19 +64,19 @@ class DeviceRequester:
     stamp_age_s: float = 0.0
 
     def asks(self, now: Moment) -> bool:
-        """Does it still ask?"""
+        """Does the requester still ask?"""
         return self.ended is None and now.at - self.last.at <= ASKS_WITHIN_S
 
     def stamp(self, moment: Moment, stamp: Time) -> None:
-        """Note how old its request is, by our clock."""
+        """Note the age of its request, by our clock."""
         self.stamped = stamp != Time()
         self.stamp_age_s = moment.wall - in_seconds(stamp)
 
 
 class DeviceRequesters:
-    """All requesters of one device. A flood of names pushes out the one that was silent the longest.
+    """All requesters of one device. A flood of names drops the requester silent for the longest time.
 
-    `began`: when we began to listen.
+    `began`: the time when we began to listen.
     """
 
     def __init__(self, began: Moment) -> None:
@@ -87,14 +87,14 @@ class DeviceRequesters:
         return iter([*self._all.values()])
 
     def get(self, who: str) -> DeviceRequester | None:
-        """This requester, while its visit lasts."""
+        """Find this requester, while its visit lasts."""
         return self._all.get(who)
 
     def ask(
         self, who: str, wants: str, moment: Moment, keep: str = "", *, stands: bool = False
     ) -> tuple[DeviceRequester, bool]:
-        """It asks for this. Returns the requester, and whether it asks for something new. `keep`: who
-        must stay. `stands`: no state comes, so nobody repeats itself."""
+        """Take a request. Return the requester, and True for a new wish. `keep`: the requester that
+        must stay. `stands`: no states arrive, so nobody repeats a request."""
         found = self._all.get(who)
         if found is not None and not stands and moment.at - found.last.at > GIVEN_UP_S:
             found.ended = found.ended or found.last
@@ -113,5 +113,5 @@ class DeviceRequesters:
         return found, new
 
     def drop(self, who: str) -> None:
-        """It is forgotten."""
+        """Forget a requester."""
         self._all.pop(who, None)

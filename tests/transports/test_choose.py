@@ -209,7 +209,7 @@ def test_the_yamls_zenoh_section_reaches_the_transport(tmp_path: Path) -> None:
         ("{password: x}", ["unknown key 'password'"]),
         ("{user: lift}", ["'zenoh': user and password_file go together: give both, or none"]),
         ("{tls: {}}", ["no endpoint is encrypted: write connect: [tls/host:port]"]),
-        ("{listen: [tls/0.0.0.0:7447]}", ["who listens with TLS needs tls: {certificate: "]),
+        ("{listen: [tls/0.0.0.0:7447]}", ["listening with TLS needs tls: {certificate: "]),
         (
             "{connect: [tls/rmf:7447], tls: {certificate: /c.pem}}",
             ["'tls': certificate and private_key go together: give both, or none"],

@@ -40,8 +40,8 @@ class ChargerLimits(msgspec.Struct, frozen=True):
 class ChargeSession(msgspec.Struct, frozen=True):
     """The request that holds the station, and the progress of its charge.
 
-    `start_by`: the time limit for the start of charging (monotonic s). `paused_at`: the time since which
-    another robot on the pad prevents the start. `checked_at`: the time of its last range check.
+    `start_by`: the time limit for the start of charging (monotonic s). `paused_at`: the time since
+    which another robot on the pad prevents the start. `checked_at`: the time of its last range check.
     `started`: current has flowed for this request. `failed`: the station was at fault, so this request
     gets no more power. `ended`: the reason of its end. `released_at`: the time of the disconnection.
     """
@@ -67,8 +67,8 @@ class ChargerMemory(msgspec.Struct, frozen=True):
     `misses`: failed polls in a row. `write_misses`: scans in a row with failed commands;
     `write_failed`: this scan's commands failed. `power`: as last decided; `disobeyed_since`: the start
     of a charge although `power` is off. `adopted`: the station was charging when we reached it, and
-    that charge is left alone. `protection`: the reason why the station is out of service, "" while it is
-    in service; `clear_by`: a good reading until then proves the success of a clearing. `over`: the
+    that charge is left alone. `protection`: the reason why the station is out of service, "" while in
+    service; `clear_by`: a good reading until then proves the success of a clearing. `over`: the
     requests that ended last.
     """
 

@@ -1,8 +1,8 @@
 """The robot on the pad, and the permission to energise the pad.
 
 Does the receiver that the station sees belong to the request's robot? Without `receivers` in the YAML
-no robot is verified: any robot counts as the request's robot. With `receivers`, a station charges nobody
-if it does not identify the receiver that it sees.
+no robot is verified: any robot counts as the request's robot. With `receivers`, a station charges
+nobody if it does not identify the receiver that it sees.
 
 A station that moves its pad, or checks the robot's range, gives no power unless the pad is at its
 height and the robot in range. Nothing announces that a robot leaves, so height and range are only read:
@@ -75,7 +75,7 @@ def seen(sample: ChargerSample | None, limits: ChargerLimits) -> PadOccupant:
 
 
 def not_ready(sample: ChargerSample) -> str:
-    """Explain why the pad must not be energised for any robot; "" if nothing in the reading forbids it."""
+    """Explain why the pad must not be energised for any robot; "" if the reading does not forbid it."""
     if sample.measured.at_height is False:
         return "the pad is not at its height"
     return "the robot is not in range" if sample.measured.range_ok is False else ""

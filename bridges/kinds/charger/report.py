@@ -33,7 +33,7 @@ LOST = {
     "CHARGER_UNREACHABLE": "Charger unreachable",
     "CHARGER_NOT_COMMANDED": "Charger takes no commands",
 }
-"""Fixed error messages of unreachable stations and the like; the fault has the reason."""
+"""Fixed error messages of stations out of reach or control; the fault has the reason."""
 OUT_OF_SERVICE = "out of service after: "
 
 
@@ -97,7 +97,7 @@ class ChargerReport(msgspec.Struct, frozen=True):
     waits: str = ""
 
     def news(self) -> object:
-        """Return all but the age, the measurements and `waits`, which RMF does not see."""
+        """Return all but the age, the measurements and `waits`, which change without news for RMF."""
         measured = Measured(receiver_id=self.measured.receiver_id)
         return replace(self, read_at=None, measured=measured, waits="")
 

@@ -47,7 +47,7 @@ class ChargerDurations(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown
     misses: Annotated[
         Misses,
         tells("""after so many failed polls in a row the charger is shown as unreachable; after so
-        many failed commands in a row, as one that takes no commands."""),
+        many failed commands in a row, as a charger that takes no commands."""),
     ] = 3
     start_timeout_s: Annotated[
         StartTimeout, tells("how long charging may take to start, if the request does not say.")
@@ -105,4 +105,4 @@ class ChargerSettings(DeviceSettings, frozen=True, kw_only=True, forbid_unknown_
             except ValueError as error:
                 yield ("receivers", receiver), str(error)
         if self.unrequested == "serve_known" and not self.receivers:
-            yield ("unrequested",), "serve_known needs receivers: whom does the station know?"
+            yield ("unrequested",), "serve_known needs receivers: without them no robot is known"

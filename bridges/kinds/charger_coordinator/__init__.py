@@ -1,4 +1,4 @@
-"""The charger coordinator: which robot charges where, and who waits, for all chargers of a site."""
+"""The charger coordinator: the allotment of all chargers of a site, and the queue."""
 
 from bridges.kinds.charger_coordinator import (
     core,

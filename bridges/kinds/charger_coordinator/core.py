@@ -1,22 +1,21 @@
-"""The coordinator's core: which robot charges where, for all stations of a site.
+"""The coordinator's core: it allots all stations of a site to robots.
 
 Its inputs are FleetState, ChargerState and the requests of operators. It sends ChargerRequest and
-ChargerCancel, which no part of RMF does. A wish is a robot's need to be charged. Rules:
-COORDINATOR-1. Who has a wish is in `wishes.py`. An operator's wish lasts until its request is over or
-   the robot is full.
+ChargerCancel; no part of RMF sends these. A wish is a robot's need to be charged. Rules:
+COORDINATOR-1. `wishes.py` finds the robots with a wish. An operator's wish lasts until its request is
+   over or the robot is full.
 COORDINATOR-2. Wishes are served first come, first served, among the suitable stations (`queue.py`). A
-   station has one robot at a time. It is given to another only after its state shows that it has let
-   the first go.
+   station has one robot at a time. Another robot gets the station only after the station's state shows
+   the release of the first.
 COORDINATOR-3. A request is repeated until the station shows it. A station that does not take it within
    TAKEN_S is passed over for SHUNNED_S, and the wish goes to the end of the queue.
-COORDINATOR-4. How a request ends, and who is at fault, is read from the stations' states
+COORDINATOR-4. The end of a request, and the side at fault, are read from the stations' states
    (`stations.py`).
-COORDINATOR-5. A robot on a pad that is not its own is told to leave it, or a person is
-   (`wrong_pad.py`).
+COORDINATOR-5. A robot on a wrong pad is told to leave the pad, or a person is alerted (`wrong_pad.py`).
 COORDINATOR-6. A request for one of our robots counts as that robot's, even if another node has made it.
-COORDINATOR-7. During the quiet start it only listens. Beside another node that publishes charging
-   assignments (RMF's rmf_charging_schedule) it sends none, and asks for the stations that those
-   dedicate.
+COORDINATOR-7. During the quiet start it only listens. Beside another publisher of charging assignments
+   (RMF's rmf_charging_schedule) it sends no assignments, and requests the stations dedicated by that
+   publisher.
 """
 
 from msgspec.structs import replace
@@ -42,17 +41,17 @@ Decided = Decision[SiteMemory, None, SiteReport]
 
 
 def initial(subject: str, started_at: float) -> SiteMemory:
-    """Nothing has been heard."""
+    """Return the memory at start: nothing has been heard."""
     return SiteMemory(began_at=started_at)
 
 
 def idle(memory: SiteMemory, now: float) -> bool:
-    """Never: the one subject is the site."""
+    """Return False: the one subject, the site, is never forgotten."""
     return False
 
 
 def decide(memory: SiteMemory, event: Event, now: float, site: SiteLimits) -> Decided:
-    """Take the event in, allot free stations, and send what is due. Never raises."""
+    """Take the event in, allot free stations, and send the messages that are due. Never raises."""
     memory, refused = _take(memory, event, now, site)
     memory = stations.in_time(stations.adopted(memory, now, site), now, site)
     if memory.may_speak:
@@ -89,7 +88,7 @@ def _take(memory: SiteMemory, event: Event, now: float, site: SiteLimits) -> tup
 
 
 def _may_speak(memory: SiteMemory, yes: bool, alone: bool, now: float) -> SiteMemory:
-    """A request that no station has shown yet counts from now; assignments are published again."""
+    """Start or stop publishing. Requests not shown yet count from now; assignments are sent again."""
     grants = {
         name: grant if grant.shown else replace(grant, made_at=now)
         for name, grant in memory.grants.items()
@@ -98,7 +97,7 @@ def _may_speak(memory: SiteMemory, yes: bool, alone: bool, now: float) -> SiteMe
 
 
 def _as_dedicated(memory: SiteMemory, site: SiteLimits) -> SiteMemory:
-    """Beside a schedule: give up stations at which RMF will not bring their robots."""
+    """Beside another node's schedule, give up stations to which RMF will not bring their robots."""
     if memory.alone:
         return memory
     for name, grant in memory.grants.items():

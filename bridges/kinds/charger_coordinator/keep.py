@@ -1,7 +1,7 @@
-"""What is saved across a restart: the queue, who has which station, and who has failed where.
+"""The memory across a restart: the queue, the stations' robots, and robots' failures at stations.
 
 States of robots and stations come again within a second. A request that was sent but not saved is
-recognised by its id when its station shows it.
+recognised by its id in the station's state.
 """
 
 from collections.abc import Mapping
@@ -33,7 +33,7 @@ class WishRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class GrantRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A Grant, without what the station's states show again."""
+    """A Grant without the facts that the station's next state shows."""
 
     robot: Text
     request_id: str
@@ -55,7 +55,7 @@ class KeptCoordinator(keep.Kept, frozen=True, forbid_unknown_fields=True):
 
 
 def persist(memories: Mapping[str, SiteMemory]) -> bytes:
-    """What the next start needs. The bytes stay the same until some of it changes."""
+    """Encode the memory for the next start. The bytes stay the same until a kept part changes."""
     memory = memories.get(SITE, SiteMemory())
     record = KeptCoordinator(
         VERSION,
@@ -81,9 +81,9 @@ def _grant(g: Grant) -> GrantRecord:
 
 
 def restore(kept: bytes, settings: CoordinatorSettings, now: float) -> dict[str, SiteMemory]:
-    """The memory at start, for the robots and stations that are still in the YAML.
+    """Make the memory at start, for the robots and stations that are still in the YAML.
 
-    ValueError if the bytes are not those of `persist`. Durations count from now.
+    Raises ValueError for bytes not made by `persist`. Durations count from now.
     """
     found = keep.read(kept, KeptCoordinator, VERSION, "a coordinator's memory")
     return {SITE: _memory(found, settings, now)}

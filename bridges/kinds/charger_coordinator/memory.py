@@ -1,4 +1,4 @@
-"""What the coordinator remembers, and what it needs of its settings."""
+"""The coordinator's memory and its limits."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -34,10 +34,10 @@ ERROR: Final = ChargerStateValue.CHARGER_ERROR
 
 @dataclass(frozen=True, slots=True)
 class SiteLimits:
-    """What the core needs of the settings.
+    """The core's share of the settings.
 
-    `robots`: robot -> the stations that suit it, best first. `waits_at`: robot -> the waypoint where
-    it waits. `places`: station -> fleet -> waypoint. `receivers`: receiver id -> robot.
+    `robots`: robot -> its suitable stations, best first. `waits_at`: robot -> its waypoint for
+    waiting. `places`: station -> fleet -> waypoint. `receivers`: receiver id -> robot.
     """
 
     robots: Mapping[RobotName, tuple[str, ...]]
@@ -60,7 +60,7 @@ class SiteLimits:
         object.__setattr__(self, "_stations", found)
 
     def station_at(self, fleet: str, place: str | None) -> str | None:
-        """Which station is at this waypoint of the fleet's graph; None for none."""
+        """Find the station at this waypoint of the fleet's graph; None for none."""
         return self._stations.get((fleet, place or ""))
 
     @classmethod
@@ -89,12 +89,11 @@ WHOSE: Final[Mapping[By, str]] = {
 
 
 class Wish(msgspec.Struct, frozen=True):
-    """One robot's need to be charged. `by`: its fleet's state shows it, a schedule says so, or an
-    operator requested it.
+    """One robot's need to be charged. `by`: its origin (the fleet's state, schedule, or an operator).
 
-    `task_id`: the robot's task, if not by an operator. `called`: that task began after the robot was
-    given a station, so it is the drive there. `station`, `request_id`, `start_timeout_s`: those of the
-    operator's request.
+    `task_id`: the robot's task, unless an operator wants the charge. `called`: that task began after
+    the robot was given a station, so it is the drive there. `station`, `request_id`, `start_timeout_s`:
+    from the operator's request.
     """
 
     robot: RobotName
@@ -107,7 +106,7 @@ class Wish(msgspec.Struct, frozen=True):
 
     @classmethod
     def of(cls, wanted: ChargeWanted) -> "Wish":
-        """The wish of an operator's request."""
+        """Make the wish of an operator's request."""
         return cls(
             wanted.robot,
             "operator",
@@ -121,9 +120,9 @@ class Grant(msgspec.Struct, frozen=True):
     """A station given to a robot, since `made_at`, by the request `request_id`.
 
     `shown`: the station's state has shown the request. `started`: current has flowed. `over`: the
-    robot no longer has the station, but no other robot gets it until the station has let go.
-    `sent_at`: when the last request or cancel was sent. `forgotten_at`: when the station's daemon last
-    forgot it, so that it is made again.
+    robot no longer has the station, but no other robot gets it until the station's release.
+    `sent_at`: the time of the last request or cancel. `forgotten_at`: the time when the station's
+    daemon last forgot the request, which was then sent again.
     """
 
     robot: RobotName
@@ -138,8 +137,8 @@ class Grant(msgspec.Struct, frozen=True):
 
 
 class Standing(msgspec.Struct, frozen=True):
-    """A robot as its fleet showed it at `at`. `since`: since when place, mode and task are the same;
-    `here_since`: since when the place is (-inf: since its first state)."""
+    """A robot as its fleet showed it at `at`. `since`: the last change of place, mode or task;
+    `here_since`: the last change of place (-inf: none since the first state)."""
 
     sighting: Sighting
     at: float
@@ -148,13 +147,13 @@ class Standing(msgspec.Struct, frozen=True):
 
     @property
     def works(self) -> bool:
-        """Is it in a task other than charging, as far as its fleet shows?"""
+        """Does its fleet show it in a task other than charging?"""
         return bool(self.sighting.task_id) and not self.sighting.charges
 
 
 class StationSeen(msgspec.Struct, frozen=True):
-    """A station's last state, heard at `at`. `since`: since when state and error are the same.
-    `full_in_s`: as it said then."""
+    """A station's last state, heard at `at`. `since`: the last change of state or error.
+    `full_in_s`: the station's own figure at `at`."""
 
     state: ChargerStateValue
     request_id: str
@@ -166,13 +165,13 @@ class StationSeen(msgspec.Struct, frozen=True):
 
     @property
     def diagnosis(self) -> FaultCause:
-        """Which side is at fault; NONE without an error."""
+        """The side at fault; NONE without an error."""
         return diagnosis(self.error) if self.state is ERROR else FaultCause.NONE
 
 
 class Nudge(msgspec.Struct, frozen=True):
-    """That a robot was told to leave a pad. `why`: the request of its own station, or the station that
-    it blocks. `count`: how often. `at`: the last time."""
+    """Orders to a robot to leave a pad. `why`: the request of its own station, or the station that it
+    blocks. `count`: their number. `at`: the time of the last one."""
 
     why: str
     count: int
@@ -182,19 +181,19 @@ class Nudge(msgspec.Struct, frozen=True):
 class SiteMemory(msgspec.Struct, frozen=True):
     """Everything that outlives an event.
 
-    `may_speak`: it may publish. `passive`: what those wait for that wait for us, while it may not.
+    `may_speak`: it may publish. `passive`: the reason why requesters wait while it may not publish.
     `alone`: no other node publishes charging assignments.
 
-    `wishes`: in the order in which they are served. `grants`: by station. `strikes`: robot -> the
-    stations where it has failed. `served`: robot -> the task in which it was charged. `rested`: robots
-    that the schedule need not charge again before it ends. `absent`: robot -> until when it is not
-    called again, because it did not leave its place. `over`: ids of the last operators' requests that
-    have ended, so that late repeats are refused. `count`: requests made so far. `robots`,
-    `stations`: as last heard, and when. `shunned`: station -> until when it is passed over, because
-    it took no request. `preferred`: robot -> the station that another node has dedicated to it.
+    `wishes`: in the order of service. `grants`: by station. `strikes`: robot -> the stations where it
+    has failed. `served`: robot -> the task in which it was charged. `rested`: robots that the schedule
+    does not charge again in its present time. `absent`: robot -> end of the time without a new call, as
+    it did not leave its place. `over`: ids of the operators' requests that ended last, to refuse late
+    repeats. `count`: requests made so far. `robots`, `stations`: as last heard, and when. `shunned`:
+    station -> end of the time in which it is passed over, because it took no request. `preferred`:
+    robot -> the station dedicated to it by another node.
     `nudges`: robots told to leave a pad. `receivers`: robot -> the error of its own receiver.
-    `when`: the local time. `assigned`: the assignments last published, and when:
-    `assigned_at`. `alerts`: the faults that a person has been told of.
+    `when`: the local time. `assigned`: the assignments published last, at `assigned_at`.
+    `alerts`: the faults of which a person was alerted.
     """
 
     began_at: float = 0.0
@@ -221,49 +220,49 @@ class SiteMemory(msgspec.Struct, frozen=True):
     alerts: frozenset[str] = frozenset()
 
     def wish(self, robot: RobotName) -> Wish | None:
-        """This robot's wish; None where it has none."""
+        """Find this robot's wish; None for none."""
         return next((wish for wish in self.wishes if wish.robot == robot), None)
 
     def station_of(self, robot: RobotName) -> str | None:
-        """The station that it has; None where it has none."""
+        """Find this robot's station; None for none."""
         return next((s for s, g in self.grants.items() if g.robot == robot and not g.over), None)
 
     def place_of(self, robot: RobotName) -> str | None:
-        """The waypoint of ours at which its fleet saw it last."""
+        """Return the waypoint of our YAML at which its fleet last saw this robot; None for none."""
         standing = self.robots.get(robot)
         return standing.sighting.place if standing else None
 
     def stands_at(self, robot: RobotName, site: SiteLimits) -> str | None:
-        """The station at which its fleet saw it last; None for none."""
+        """Return the station at which its fleet last saw this robot; None for none."""
         return site.station_at(robot.fleet, self.place_of(robot))
 
     @property
     def assigns(self) -> bool:
-        """May it tell the robots where to charge?"""
+        """May the coordinator assign charging places to robots?"""
         return self.may_speak and self.alone
 
     def faulty(self, robot: RobotName) -> bool:
-        """Has it failed too often? It is not tried again until an operator resets."""
+        """Has this robot failed too often? It is not tried again until an operator resets."""
         return len(self.strikes.get(robot, ())) >= STRIKES
 
     def speaks(self, station: str, now: float) -> bool:
-        """Has this station's state come lately?"""
+        """Has this station's state arrived lately?"""
         return station in self.stations and now < self.stations[station].at + STATION_SILENT_S
 
     def silent_since(self, station: str) -> float:
-        """When it fell silent, or will if no more states come."""
+        """Return the time of the station's silence, in the future if it is not silent yet."""
         seen = self.stations.get(station)
         return STATION_SILENT_S + (self.began_at if seen is None else seen.at)
 
     # ---- changed copies
 
     def with_grant(self, station: str, grant: Grant | None) -> "SiteMemory":
-        """The memory with this grant of the station; None: it is granted to nobody."""
+        """Return the memory with this grant of the station; None: granted to nobody."""
         rest = without(self.grants, station)
         return replace(self, grants=rest | ({} if grant is None else {station: grant}))
 
     def without_wish(self, robot: RobotName) -> "SiteMemory":
-        """The memory without this robot's wish."""
+        """Return the memory without this robot's wish."""
         wish = self.wish(robot)
         if wish is None:
             return self
@@ -271,14 +270,14 @@ class SiteMemory(msgspec.Struct, frozen=True):
         return replace(self, wishes=tuple(w for w in self.wishes if w is not wish), over=over)
 
     def last_in_queue(self, robot: RobotName) -> "SiteMemory":
-        """The memory with this robot's wish at the end of the queue."""
+        """Return the memory with this robot's wish at the end of the queue."""
         wish = self.wish(robot)
         if wish is None:
             return self
         return replace(self, wishes=(*(w for w in self.wishes if w is not wish), wish))
 
     def takes_back(self, robot: RobotName) -> "SiteMemory":
-        """The memory in which this robot's station is to release it."""
+        """Return the memory with an order to this robot's station to release it."""
         station = self.station_of(robot)
         if station is None:
             return self
@@ -286,5 +285,5 @@ class SiteMemory(msgspec.Struct, frozen=True):
 
 
 def without(table: Mapping[K, V], key: K) -> dict[K, V]:
-    """A copy of the table without this key."""
+    """Copy the table without this key."""
     return {k: v for k, v in table.items() if k != key}

@@ -1,4 +1,4 @@
-"""Messages of fleets, stations, schedules and operators in. Is each well formed, and for this site?"""
+"""Messages of fleets, stations, schedules and operators in: each well formed, and for this site."""
 
 import math
 from collections.abc import Mapping
@@ -37,7 +37,7 @@ CHARGES = (d.RobotModeValue.MODE_CHARGING, d.RobotModeValue.MODE_DOCKING)
 
 
 def accept_fleet(state: d.FleetState, settings: CoordinatorSettings, wall: float) -> FleetSeen:
-    """A FleetState as an event. Robots that the YAML does not name are left out."""
+    """Turn a FleetState into an event, without the robots that are not in the YAML."""
     fleet = settings.fleets.get(state.name)
     if fleet is None:
         raise RequestRefused("fleet not ours", f"{state.name!r}")
@@ -52,9 +52,9 @@ def accept_fleet(state: d.FleetState, settings: CoordinatorSettings, wall: float
 
 
 def local_time(wall: float, timezone: str | None) -> LocalTime:
-    """The local time of day, and the day.
+    """Return the local day and time of day.
 
-    `wall`: s since the epoch. `timezone`: its name; None for the machine's.
+    `wall`: s since the epoch. `timezone`: the zone's name; None for the machine's zone.
     """
     at = datetime.fromtimestamp(wall, ZoneInfo(timezone) if timezone else None)
     return LocalTime(at.weekday(), at.hour * 60 + at.minute)
@@ -74,7 +74,7 @@ def _sighting(
 
 
 def _nearest(at: d.Location, fleet: FleetSettings, places: set[str], near_m: float) -> str | None:
-    """The nearest of these waypoints within `near_m`; None if there is none."""
+    """Find the nearest of these waypoints within `near_m`; None for none."""
     away = {
         name: math.dist((at.x, at.y), (waypoint.x, waypoint.y))
         for name, waypoint in fleet.waypoints.items()
@@ -87,7 +87,7 @@ def _nearest(at: d.Location, fleet: FleetSettings, places: set[str], near_m: flo
 def accept_state(
     state: d.ChargerState, settings: CoordinatorSettings, wall: float
 ) -> ChargerStateHeard | ReceiverHeard:
-    """The ChargerState of a station, or of a robot's receiver, as an event. Raises RequestRefused."""
+    """Turn a station's, or a robot's receiver's, ChargerState into an event. Raises RequestRefused."""
     receiver_of = settings.rcus().get(state.charger_name)
     if receiver_of is None and state.charger_name not in settings.stations:
         raise RequestRefused("station not ours", f"{state.charger_name!r}")
@@ -114,7 +114,7 @@ def accept_state(
 def accept_request(
     request: d.ChargerRequest, settings: CoordinatorSettings, wall: float
 ) -> ChargeWanted:
-    """An operator's request as an event. An empty charger_name means any suitable station."""
+    """Turn an operator's request into an event. An empty charger_name means any suitable station."""
     check_length(charger_name=request.charger_name)
     asked = accept_charger_request(request, ChargerSettings())
     if asked.who not in settings.robots():
@@ -125,7 +125,7 @@ def accept_request(
 def accept_withdrawal(
     cancel: d.ChargerCancel, settings: CoordinatorSettings, wall: float
 ) -> ChargeUnwanted:
-    """An operator's cancel as an event. Raises RequestRefused."""
+    """Turn an operator's cancel into an event. Raises RequestRefused."""
     if not cancel.request_id:
         raise RequestRefused("empty request_id", "which request is withdrawn?")
     check_length(request_id=cancel.request_id)
@@ -135,7 +135,7 @@ def accept_withdrawal(
 def accept_assignments(
     message: d.ChargingAssignments, settings: CoordinatorSettings, wall: float
 ) -> Dedicated:
-    """Another node's charging assignments as an event: which of our stations each of our robots has."""
+    """Turn another node's charging assignments into an event: the station of each of our robots."""
     fleet, known = message.fleet_name, settings.robots()
     stations = {places.get(fleet): name for name, places in settings.places().items()}
     return Dedicated(
@@ -148,7 +148,7 @@ def accept_assignments(
 
 
 def subject(message: object) -> str:
-    """Every message is about the site: the queue spans its stations."""
+    """Return the site for every message: the queue spans its stations."""
     return SITE
 
 
@@ -160,7 +160,7 @@ def stamped(message: d.Message, time: Time) -> d.Message:
 
 
 def summary(report: SiteReport, now: float) -> Mapping[str, str]:
-    """The stations, the schedule, and the queue with its reasons."""
+    """Summarise the stations, the schedule, and the queue with its reasons."""
     return {
         **dict(report.stations),
         "assigns": report.assigns,
@@ -171,7 +171,7 @@ def summary(report: SiteReport, now: float) -> Mapping[str, str]:
 
 
 def answer(request: object, reason: str) -> RefusalAnswer | None:
-    """What is published when a request for any charger is refused; None for anything else."""
+    """Make the published answer to a refused request for any charger; None for other messages."""
     match request:
         case d.ChargerRequest():
             who, station, request_id = (

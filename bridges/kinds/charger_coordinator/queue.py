@@ -1,15 +1,15 @@
-"""Who gets which station: first come, first served, among the suitable stations.
+"""The allotment of stations: first come, first served, among the suitable stations.
 
 A station is free if its last state is IDLE and no older than STATION_SILENT_S, no robot has it, it has
-not just failed to take a request, and no other robot stands there. A robot that stands on a station's
-pad without a request, so that the station shows an error or a charge that nobody requested, may have
-that very station. So may one that a station has released, and that still stands there.
+not just failed to take a request, and no other robot stands there. A robot on a station's pad without
+a request (the station shows an error or an unrequested charge) may have that very station. So may a
+released robot that still stands there.
 
-A station where a robot has failed is tried again only if no other one suits the robot: a second
-station shows which side was at fault.
+A station where a robot has failed is tried again only if no other station suits the robot: a second
+station shows the side at fault.
 
 Beside another node's charging schedule, a robot gets the station that the schedule has dedicated to it:
-RMF drives it to no other. A robot that the schedule does not name may have the one where it stands.
+RMF drives it to no other. A robot without a dedicated station may have the station where it stands.
 """
 
 from collections.abc import Mapping, Sequence
@@ -32,13 +32,13 @@ from bridges.kinds.charger_coordinator.memory import (
 )
 
 REMEMBERED_S: Final = 30.0
-"""How long a robot's last place counts after its fleet has shown it."""
+"""A robot's place counts for this long after its fleet's last state."""
 Here = Mapping[str, Sequence[RobotName]]
-"""Station -> the robots that stand there."""
+"""Station -> the robots standing there."""
 
 
 def allot(memory: SiteMemory, now: float, site: SiteLimits) -> SiteMemory:
-    """Give the free stations to the robots that wait, in the order of the queue."""
+    """Give the free stations to the waiting robots, in the order of the queue."""
     here = standing(memory, now, site)
     for wish in memory.wishes:
         if memory.station_of(wish.robot) is None:
@@ -60,8 +60,8 @@ def _granted(
 
 
 def suiting(memory: SiteMemory, wish: Wish, site: SiteLimits) -> list[str]:
-    """The stations to try, best first: the operator's, the one where it stands, the dedicated one, then
-    the YAML's order."""
+    """List the stations to try, best first: the operator's, the present place, the dedicated station,
+    then the YAML's order."""
     here = memory.stands_at(wish.robot, site)
     dedicated = memory.preferred.get(wish.robot)
     if not memory.alone:
@@ -90,7 +90,7 @@ def _free(memory: SiteMemory, station: str, robot: RobotName, now: float, here: 
 
 
 def standing(memory: SiteMemory, now: float, site: SiteLimits) -> Here:
-    """The robots that stand at each station, by their fleets' states of the last REMEMBERED_S."""
+    """List the robots standing at each station, by their fleets' states of the last REMEMBERED_S."""
     here: dict[str, list[RobotName]] = {}
     for who, seen in memory.robots.items():
         station = memory.stands_at(who, site)
@@ -100,5 +100,5 @@ def standing(memory: SiteMemory, now: float, site: SiteLimits) -> Here:
 
 
 def in_the_way(here: Here, station: str, robot: RobotName) -> RobotName | None:
-    """Another robot that stands at the station; None if there is none."""
+    """Find another robot standing at the station; None for none."""
     return next((who for who in here.get(station, ()) if who != robot), None)

@@ -1,8 +1,7 @@
-"""The queue as it is shown: who waits, who wanted that, what for, and until when.
+"""The queue as shown: each waiting robot with the origin of its wish, its obstacles, and its wait.
 
-A charge's end is known only if the station reports it. Each robot is shown with the station that it
-will probably get: of those that suit it, the one that is free first and that no robot before it
-will get.
+A charge's end is known only if the station reports it. Each robot is shown with its probable station:
+the suitable station that is free first and goes to no robot ahead in the queue.
 """
 
 from collections.abc import Iterator
@@ -21,16 +20,17 @@ from bridges.kinds.charger_coordinator.queue import Here, in_the_way, standing, 
 from bridges.kinds.shared.durations import NEVER
 
 MOST: Final = 4
-"""For at most this many stations the queue says why the robot does not have them."""
+"""The most stations whose obstacles the queue shows for one robot."""
 
 
 def queued(memory: SiteMemory) -> list[Wish]:
-    """The wishes without a station, in the order in which they are served."""
+    """List the wishes without a station, in the order of service."""
     return [wish for wish in memory.wishes if memory.station_of(wish.robot) is None]
 
 
 def reasons(memory: SiteMemory, now: float, site: SiteLimits) -> Iterator[str]:
-    """`tiny/AMR03 by the robot: charger_b charges tiny/AMR01, free in 12 min` for each that waits."""
+    """Yield for each waiting robot:
+    `tiny/AMR03 by the robot: charger_b charges tiny/AMR01, free in 12 min`."""
     taken: set[str] = set()
     here = standing(memory, now, site)
     for wish in queued(memory):
@@ -49,7 +49,7 @@ def reasons(memory: SiteMemory, now: float, site: SiteLimits) -> Iterator[str]:
 
 
 def free_in_s(memory: SiteMemory, station: str, now: float) -> float:
-    """How long its charge will still take, as it says; NEVER: that is not known."""
+    """Return the rest of the station's charge (s), by its own figure; NEVER: not known."""
     seen = memory.stations.get(station)
     if seen is None or seen.state is not CHARGING or not seen.full_in_s:
         return NEVER
@@ -57,7 +57,7 @@ def free_in_s(memory: SiteMemory, station: str, now: float) -> float:
 
 
 def _obstacle(memory: SiteMemory, station: str, robot: RobotName, now: float, here: Here) -> str:
-    """Why the robot does not have this station."""
+    """Explain why the robot does not have this station."""
     seen, grant = memory.stations.get(station), memory.grants.get(station)
     if seen is None or not memory.speaks(station, now):
         return f"{station} is silent"

@@ -1,11 +1,11 @@
-"""What is sent to stations, fleet adapters and technicians, and what log and status file show.
+"""Messages to stations, fleet adapters and technicians, and the report to the log and status file.
 
 COORDINATOR-REPORT-1. A request is repeated each second until its station shows it. A cancel is repeated
    each second while the station still shows the request.
-COORDINATOR-REPORT-2. Every robot is assigned one place, and no place has two robots: its station
-   (MODE_CHARGE), else the waypoint where it waits (MODE_WAIT). When a place changes, the assignments of
-   all fleets are published, so that a fleet adapter that starts later finds them retained. RMF drives
-   the robot there if it has a charging task (rmf_ros2 9dedd0f, ChargeBattery.cpp, _consider_restart).
+COORDINATOR-REPORT-2. Every robot is assigned one place of its own: its station (MODE_CHARGE), else its
+   waypoint for waiting (MODE_WAIT). When a place changes, the assignments of all fleets are published:
+   they are retained for fleet adapters that start later. RMF drives the robot to the place if it has a
+   charging task (rmf_ros2 9dedd0f, ChargeBattery.cpp, _consider_restart).
 COORDINATOR-REPORT-3. Each fault is sent as an Alert once; rmf-web shows it to a person.
 """
 
@@ -54,16 +54,17 @@ TITLES: Final = {
     "REQUEST_NOT_TAKEN": "A charger takes no request",
 }
 ASKS_S: Final = 5.0
+"""A robot that comes to a pad unannounced requests it by its fleet's state a few seconds later."""
 AGAIN_S: Final = 15.0
-"""A robot that comes to a pad unannounced asks for it by its fleet's state, a few seconds later."""
 ERRORS: Final = ("ROBOT_FAULTY", "STATION_OUT_OF_SERVICE")
 
 
 class SiteReport(msgspec.Struct, frozen=True):
-    """The site as it is shown. `read_at`: when a station was last heard (monotonic s). `stations`:
-    (station, its state, its robot and who wanted that). `queue`: the robots that wait, in order, each
-    with what it waits for. `waiting`: the same robots alone. `assigns`: who tells the robots where to
-    charge. `schedule`: its times. `absent`: robots that were called and did not come."""
+    """The site as shown. `read_at`: the time of the last station's state (monotonic s). `stations`:
+    (station, text of its state, its robot and the origin of the wish). `queue`: the waiting robots in
+    order, with their reasons. `waiting`: the same robots alone. `assigns`: the robots' places are
+    assigned by us, or by another node. `schedule`: its times. `absent`: robots that did not come when
+    called."""
 
     read_at: float | None
     stations: tuple[tuple[str, str], ...] = ()
@@ -75,12 +76,12 @@ class SiteReport(msgspec.Struct, frozen=True):
     faults: tuple[Fault, ...] = ()
 
     def news(self) -> object:
-        """What is worth a line in the log: everything but running times."""
+        """Return the facts whose change is logged: everything but running times."""
         return self.stations, self.waiting, self.assigns, self.schedule, self.absent
 
 
 def report(memory: SiteMemory, now: float, site: SiteLimits) -> SiteReport:
-    """The site as it is now."""
+    """Report the present state of the site."""
     waiting = queued(memory)
     return SiteReport(
         read_at=max((seen.at for seen in memory.stations.values()), default=None),
@@ -101,7 +102,7 @@ def _assigns(memory: SiteMemory) -> str:
 
 
 def _of(memory: SiteMemory, name: str, now: float) -> str:
-    """`CHARGING fleet/robot, by the schedule`, `IDLE`, or `?` before the first state."""
+    """Describe a station: `CHARGING fleet/robot, by the schedule`, `IDLE`, or `?` before any state."""
     seen, grant = memory.stations.get(name), memory.grants.get(name)
     state = "?" if seen is None else seen.state.name.removeprefix("CHARGER_")
     if grant is None or grant.over:
@@ -135,7 +136,7 @@ def _faults(memory: SiteMemory, now: float, site: SiteLimits) -> Iterator[Fault]
 def _faults_of(
     memory: SiteMemory, name: str, seen: StationSeen, now: float, site: SiteLimits
 ) -> Iterator[Fault]:
-    """Faults that a station's state shows."""
+    """Yield the faults in a station's state."""
     if seen.diagnosis in (FaultCause.STATION, FaultCause.LOST, FaultCause.UNCLEAR):
         yield Fault("STATION_OUT_OF_SERVICE", f"{name}: {seen.error}")
     if seen.diagnosis is not FaultCause.PAD:
@@ -168,7 +169,7 @@ def _stranger(error: str) -> str:
 def messages(
     memory: SiteMemory, faults: tuple[Fault, ...], now: float, site: SiteLimits
 ) -> tuple[SiteMemory, Messages]:
-    """The messages that are due; none while it may not publish."""
+    """List the messages that are due; none while the coordinator may not publish."""
     if not memory.may_speak:
         return memory, ()
     found: list[tuple[AnyTopic, d.Message]] = []
@@ -188,11 +189,11 @@ def messages(
 
 
 def _again_at(memory: SiteMemory, site: SiteLimits) -> Iterator[float]:
-    """When the assignment of a robot that stands elsewhere without a task is published again.
+    """Yield times to repeat the assignments of robots that stand elsewhere without a task.
 
-    An EasyFullControl adapter that starts takes the retained assignment, and a moment later the charger
-    of its own file in its place (seen with Jazzy's). Nothing shows when it does, so the assignment is
-    published every AGAIN_S until the robot moves, or has lost the station.
+    An EasyFullControl adapter takes the retained assignment at its start, and a moment later replaces
+    it by the charger of its own file (seen with Jazzy's). No message shows this moment, so the
+    assignment is published every AGAIN_S until the robot moves, or has lost the station.
     """
     for name, grant in memory.grants.items():
         standing = memory.robots.get(grant.robot)
@@ -204,7 +205,7 @@ def _again_at(memory: SiteMemory, site: SiteLimits) -> Iterator[float]:
 
 
 def due(memory: SiteMemory, site: SiteLimits) -> list[float]:
-    """When requests, cancels, assignments and faults are due."""
+    """List the times when requests, cancels, assignments and faults are due."""
     if not memory.may_speak:
         return []
     asks = [seen.since + ASKS_S for seen in memory.stations.values()]
@@ -231,8 +232,8 @@ def _to_station(name: str, grant: Grant) -> tuple[AnyTopic, d.Message]:
 def _assignments(
     memory: SiteMemory, now: float, site: SiteLimits
 ) -> Iterator[d.ChargingAssignments]:
-    """Every robot's place, fleet by fleet, in the order of names. One that is told to leave a pad has
-    for a moment another mode (`wrong_pad.py`)."""
+    """Assign every robot's place, fleet by fleet, in the order of names. A robot told to leave a pad
+    has another mode for a moment (`wrong_pad.py`)."""
     fleets: dict[str, list[d.ChargingAssignment]] = {}
     for who in sorted(site.robots):
         station, told = memory.station_of(who), wrong_pad.is_nudged(memory, who, now)
@@ -245,7 +246,7 @@ def _assignments(
 
 
 def _alert(fault: Fault) -> d.Alert:
-    """The Alert of a fault. `stamped` appends the time to its id: rmf-web drops an id it knows."""
+    """Make the Alert of a fault. `stamped` appends the time to its id: rmf-web drops known ids."""
     tier = d.AlertTier.TIER_ERROR if fault.code in ERRORS else d.AlertTier.TIER_WARNING
     return d.Alert(
         id=f"{NODE}/{fault.code}/{fault.detail}",

@@ -1,7 +1,7 @@
-"""The coordinator's own charging schedule: at which times of the week robots are charged, and how far.
+"""The coordinator's own charging schedule: times of the week for charging robots, and their target.
 
-Pure: the local time of day and the day of the week are inputs. A time that ends at or before its
-beginning ends on the next day, and belongs to the day on which it begins.
+Pure: the local time of day and the day of the week are inputs. An end at or before the beginning is on
+the next day; the whole time belongs to the day on which it begins.
 """
 
 from collections.abc import Iterable
@@ -52,7 +52,7 @@ class Charging(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     percent: Annotated[Target, tells("how far they are charged.")] = 100.0
 
     def concerns(self, who: RobotName) -> bool:
-        """Is it for this robot?"""
+        """Does it apply to this robot?"""
         everybody = not self.fleets and not self.robots
         return everybody or who.fleet in self.fleets or str(who) in self.robots
 
@@ -64,11 +64,11 @@ class Charging(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
         return began_today or (yesterday in self.days and when.minute + DAY_MIN - begins < lasts)
 
     def lasts_min(self) -> int:
-        """How long it lasts, in minutes: at most a day."""
+        """Its length in minutes: at most a day."""
         return (_minute(self.until) - _minute(self.at) - 1) % DAY_MIN + 1
 
     def text(self, when: LocalTime | None) -> str:
-        """`22:00-05:00 mon tue tiny to 100 %: under way`."""
+        """Describe it: `22:00-05:00 mon tue tiny to 100 %: under way`."""
         days = "" if set(self.days) == set(DAYS) else f" {' '.join(self.days)}"
         whom = " ".join([*self.fleets, *self.robots]) or "everybody"
         now = "" if when is None else f": {'under way' if self.under_way(when) else 'not now'}"
@@ -76,7 +76,7 @@ class Charging(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
 
 
 def target(schedule: Iterable[Charging], who: RobotName, when: LocalTime | None) -> float:
-    """How far the schedule charges this robot at this time (%); 0 where it does not."""
+    """Return the schedule's target for this robot at this time (%); 0 for no charging."""
     if when is None:
         return 0.0
     found = (c.percent for c in schedule if c.concerns(who) and c.under_way(when))
@@ -90,7 +90,7 @@ def problems(
     least: float,
     most: float,
 ) -> Remarks:
-    """Unknown names, and targets that mean nothing between `again_percent` and `full_percent`."""
+    """Yield unknown names, and targets that are not between `again_percent` and `full_percent`."""
     known = {"fleets": set(fleets), "robots": set(map(str, robots))}
     for i, one in enumerate(schedule):
         for key, named in (("fleets", one.fleets), ("robots", one.robots)):

@@ -1,6 +1,6 @@
 """The coordinator's section of its YAML: stations, and each fleet's waypoints and robots.
 
-`check` prints what `tables` and `warnings` give.
+`check` prints the results of `tables` and `warnings`.
 """
 
 import math
@@ -27,7 +27,7 @@ Stations = Annotated[list[Name], Meta(min_length=1)]
 
 
 class Waypoint(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A named vertex of the fleet's navigation graph, where the graph has it."""
+    """A named vertex of the fleet's navigation graph, with the graph's coordinates."""
 
     level: Annotated[Name, tells("its level's name.")]
     x: Annotated[Metres, tells("its x coordinate in the graph.")]
@@ -35,20 +35,20 @@ class Waypoint(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
 
 
 class StationSettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A charger, under the name that its own daemon publishes."""
+    """A charger, under the name published by its own daemon."""
 
     waypoint: Annotated[
-        Name | None, tells("what the navigation graphs call the place; the same name when absent.")
+        Name | None, tells("the place's name in the navigation graphs; the charger's when absent.")
     ] = None
     waypoints: Annotated[
-        dict[Name, Name], tells("fleet -> what that fleet's graph calls it, where it differs.")
+        dict[Name, Name], tells("fleet -> the place's name in that fleet's graph, if different.")
     ] = {}
 
 
 class RobotSettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """One robot."""
 
-    stations: Annotated[Stations, tells("those that suit it, best first.")]
+    stations: Annotated[Stations, tells("its suitable stations, best first.")]
     waits_at: Annotated[
         Name, tells("its own waypoint, where it waits for a station and stays when it needs none.")
     ]
@@ -69,12 +69,12 @@ class FleetSettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
         crashes on a name that its graph does not have, so it is sent no other names."""),
     ]
     robots: Annotated[
-        dict[Name, RobotSettings], tells("those that charge, by the adapter's names.")
+        dict[Name, RobotSettings], tells("the robots that charge, by the adapter's names.")
     ]
 
 
 class CoordinatorSettings(GraphSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Which robots charge where."""
+    """The stations of a site, the fleets that use them, and the charging policy."""
 
     stations: Annotated[
         dict[Name, StationSettings],
@@ -90,8 +90,8 @@ class CoordinatorSettings(GraphSettings, frozen=True, kw_only=True, forbid_unkno
     full_percent: Annotated[Full, tells("the charge at which a robot leaves its station.")] = 100.0
     again_percent: Annotated[
         Low,
-        tells("""below this a robot without a task is charged. One that was charged comes back in
-        its task only below this."""),
+        tells("""below this a robot without a task is charged. A robot charged in its task comes
+        back in the same task only below this."""),
     ] = 90.0
     leaves_s: Annotated[
         Timeout, tells("how long a robot may stay on a pad without need while another waits.")
@@ -100,11 +100,11 @@ class CoordinatorSettings(GraphSettings, frozen=True, kw_only=True, forbid_unkno
         list[Charging], tells("times of the week at which robots without a task are charged.")
     ] = msgspec.field(default_factory=list)
     timezone: Annotated[
-        Name | None, tells("the schedule's (Asia/Singapore); this machine's when absent.")
+        Name | None, tells("the schedule's time zone (Asia/Singapore); this machine's when absent.")
     ] = None
 
     def on_map(self) -> Iterator[Place]:
-        """The stations' places and each fleet's waypoints, which RMF's map must name too."""
+        """Yield the stations' places and each fleet's waypoints, which must be on RMF's map too."""
         for name, station in self.stations.items():
             if set(self.fleets) - set(station.waypoints):
                 path = ("stations", name, *(["waypoint"] if station.waypoint else []))
@@ -116,7 +116,7 @@ class CoordinatorSettings(GraphSettings, frozen=True, kw_only=True, forbid_unkno
                 yield ("fleets", fleet, "waypoints", name), WAYPOINT, name
 
     def problems(self) -> Remarks:
-        """Unknown names, places given twice, contradictory percentages."""
+        """Yield unknown names, places given twice, and contradictory percentages."""
         for key in ("stations", "fleets"):
             if not getattr(self, key):
                 yield (key,), f"'{key}' is empty: there is nothing to coordinate"
@@ -145,7 +145,7 @@ class CoordinatorSettings(GraphSettings, frozen=True, kw_only=True, forbid_unkno
                 yield ("waypoints", fleet), f"'{places[fleet]}' is not in that fleet's waypoints"
 
     def _graphs_with(self, station: str) -> list[str]:
-        """The fleets that know the station's place."""
+        """List the fleets that know the station's place."""
         places = self.places()[station]
         return [name for name, fleet in self.fleets.items() if places[name] in fleet.waypoints]
 
@@ -169,7 +169,7 @@ class CoordinatorSettings(GraphSettings, frozen=True, kw_only=True, forbid_unkno
                     yield path, f"'{station}' is at '{place}', not in this fleet's list ({known})"
 
     def _doubles(self) -> Remarks:
-        """One place, one robot; one receiver, one robot; one name, one station or receiver."""
+        """Yield places or receivers of two robots, and names of two stations or receivers."""
         taken: dict[tuple[str, str], str] = {}
         for station, places in self.places().items():
             for fleet, place in places.items():
@@ -200,7 +200,7 @@ class CoordinatorSettings(GraphSettings, frozen=True, kw_only=True, forbid_unkno
             yield ("timezone",), f"no time zone '{self.timezone}' on this machine (Asia/Singapore)"
 
     def robots(self) -> dict[RobotName, RobotSettings]:
-        """Every robot, by fleet and name."""
+        """Map every robot, by fleet and name, to its settings."""
         return {
             RobotName(fleet_name, name): robot
             for fleet_name, fleet in self.fleets.items()
@@ -208,19 +208,19 @@ class CoordinatorSettings(GraphSettings, frozen=True, kw_only=True, forbid_unkno
         }
 
     def places(self) -> dict[str, dict[str, str]]:
-        """Station -> fleet -> the waypoint where it is."""
+        """Map station -> fleet -> the station's waypoint."""
         return {
             name: {fleet: at.waypoints.get(fleet, at.waypoint or name) for fleet in self.fleets}
             for name, at in self.stations.items()
         }
 
     def rcus(self) -> dict[str, RobotName]:
-        """The name under which a robot's own receiver publishes -> the robot."""
+        """Map the published name of a robot's own receiver -> the robot."""
         return {robot.rcu: who for who, robot in self.robots().items() if robot.rcu}
 
 
 def tables(settings: CoordinatorSettings) -> Iterator[Table]:
-    """Each robot and its places, each station and its waypoint, and the schedule."""
+    """Yield tables of each robot and its places, each station and its waypoint, and the schedule."""
     yield Table(
         "robots",
         ("robot", "charges at", "waits at", "receivers"),
@@ -240,7 +240,7 @@ def tables(settings: CoordinatorSettings) -> Iterator[Table]:
 
 
 def _named(places: dict[str, str]) -> str:
-    """`dock_b`, or `tiny: dock_b, big: station_2` where the fleets differ."""
+    """Write `dock_b`, or `tiny: dock_b, big: station_2` if the fleets differ."""
     names = set(places.values())
     if len(names) == 1:
         return names.pop()
@@ -248,13 +248,13 @@ def _named(places: dict[str, str]) -> str:
 
 
 def speaks_of(settings: CoordinatorSettings) -> Iterator[Place]:
-    """Its stations are chargers' daemons."""
+    """Yield the stations: each must be a charger of some daemon."""
     for name in settings.stations:
         yield ("stations", name), CHARGER, name
 
 
 def warnings(settings: CoordinatorSettings) -> Remarks:
-    """What is legal but may be a mistake."""
+    """Yield legal settings that may be mistakes."""
     used = {name for robot in settings.robots().values() for name in robot.stations}
     for name in settings.stations:
         if name not in used:
@@ -271,7 +271,7 @@ def warnings(settings: CoordinatorSettings) -> Remarks:
 
 
 def _near(settings: CoordinatorSettings) -> Remarks:
-    """Places so close together that a robot's position cannot tell them apart."""
+    """Yield places too close together for a robot's position to distinguish."""
     for fleet_name, fleet in settings.fleets.items():
         names = list(fleet.waypoints)
         for i, name in enumerate(names):

@@ -1,4 +1,4 @@
-"""What the coordinator's core hears from the graph: fleets, stations, schedules and operators."""
+"""Events of the coordinator's core: from fleets, stations, schedules and operators."""
 
 import re
 from typing import Final
@@ -17,13 +17,13 @@ Charge and a UUID (rmf_ros2 jazzy 7eef65a, Dispatcher.cpp; rmf_task jazzy, Charg
 
 
 def is_dispatched(task_id: str) -> bool:
-    """Did RMF's dispatcher give this task? Then it is a patrol or a delivery, never a charge."""
+    """Did RMF's dispatcher give this task? Such a task is a patrol or a delivery, never a charge."""
     return _DISPATCHED.match(task_id) is not None
 
 
 class Sighting(msgspec.Struct, frozen=True):
-    """One robot of a FleetState. `charges`: its mode is CHARGING or DOCKING, and its task is not one
-    that RMF's dispatcher gave it. `place`: which of our waypoints it stands at; None for none."""
+    """One robot of a FleetState. `charges`: its mode is CHARGING or DOCKING, and its task did not come
+    from RMF's dispatcher. `place`: the waypoint of our YAML where it stands; None for none."""
 
     who: RobotName
     charges: bool
@@ -40,7 +40,7 @@ class FleetSeen(msgspec.Struct, frozen=True):
 
 
 class ChargerStateHeard(msgspec.Struct, frozen=True):
-    """A ChargerState. `robot`: None where it names none. `full_in_s`: 0 where it is not known."""
+    """A ChargerState. `robot`: None if not named. `full_in_s`: 0 if not known."""
 
     station: str
     state: ChargerStateValue
@@ -51,7 +51,7 @@ class ChargerStateHeard(msgspec.Struct, frozen=True):
 
 
 class ReceiverHeard(msgspec.Struct, frozen=True):
-    """A ChargerState of a robot's own receiver, which is no station. `error`: "" without one."""
+    """A ChargerState of a robot's own receiver, which is no station. `error`: "" for none."""
 
     robot: RobotName
     error: str
@@ -73,7 +73,7 @@ class ChargeUnwanted(msgspec.Struct, frozen=True):
 
 
 class Dedicated(msgspec.Struct, frozen=True):
-    """Another node's charging assignments: each robot and the station that it is to use, or ""."""
+    """Another node's charging assignments: each robot and its station, or ""."""
 
     stations: tuple[tuple[RobotName, str], ...]
 

@@ -1,24 +1,24 @@
-"""Who wants to be charged. Place, battery and task decide; the mode is a hint.
+"""Robots that want to be charged. Place, battery and task decide; the mode is a hint.
 
 RMF's fleet adapter shows the mode CHARGING from the first charge on, in every later task too, and
 IDLE in none (rmf_ros2 9dedd0f: TaskManager::robot_mode; RobotContext::current_mode, which WaitForCharge
-and DockRobot alone set). The id of a task that RMF's dispatcher gave says that it is no charge. So, of
-a robot that has stood at one of our waypoints for SETTLES_S:
+and DockRobot alone set). The id of a task shows if it came from RMF's dispatcher, and so is no charge.
+For a robot that has stood at one of our waypoints for SETTLES_S:
 COORDINATOR-WISHES-1. Below `again_percent` it wants to be charged, if it has no task, or shows CHARGING
    or DOCKING.
 COORDINATOR-WISHES-2. Above that, and below `full_percent`, only a task that shows CHARGING or DOCKING
-   is believed. A robot that was charged in that task is not served again. One that was charged, and has
-   not left our waypoints since, may be waiting for traffic on its pad: it is believed after LINGERS_S.
-COORDINATOR-WISHES-3. Without a task, it wants to be charged where a schedule says so; after that, not
-   again in the same time before it has worked.
-COORDINATOR-WISHES-4. A wish lasts while this is so, and while the robot drives to its station: in the
-   same task, or without one while a station is assigned to it. A task that begins within COMES_S of the
-   call is that drive: RMF's automatic retreat, or its ChargeBattery started again. A dispatched task is
-   not.
-COORDINATOR-WISHES-5. RMF moves no robot without a task under `finishing_request: nothing`, until its
-   battery is very low; nor under `park`, except Jazzy's, which drives to the assigned place. Such a
-   robot keeps its place when it is called. After COMES_S it loses the station, and ABSENT_S later it is
-   called again.
+   is believed. A robot that was charged in that task is not served again. A robot that has not left our
+   waypoints since its charge may be waiting for traffic on its pad: it is believed after LINGERS_S.
+COORDINATOR-WISHES-3. Without a task, it wants to be charged when the schedule says so, and not again in
+   the same time of the schedule until it has worked.
+COORDINATOR-WISHES-4. A wish lasts while these rules hold, and while the robot drives to its station: in
+   the same task, or without a task while a station is assigned to it. A task that begins within COMES_S
+   of the call is that drive: RMF's automatic retreat, or its ChargeBattery started again; but never a
+   dispatched task.
+COORDINATOR-WISHES-5. Under `finishing_request: nothing` RMF moves no robot without a task until its
+   battery is very low. The same holds under `park`, except in Jazzy, which drives to the assigned
+   place. Such a robot stays where it is when called. After COMES_S it loses the station, and ABSENT_S
+   later it is called again.
 """
 
 from typing import Final
@@ -41,14 +41,14 @@ from bridges.kinds.charger_coordinator.signals import ChargeWanted, Sighting, is
 SETTLES_S: Final = 2.0
 """A robot that passes by on another task may still show the mode CHARGING."""
 LINGERS_S: Final = 300.0
-"""No traffic jam lasts this long: a robot that stands there even longer waits for its battery."""
+"""Longer than any traffic jam: a robot that stands there even longer waits for its battery."""
 COMES_S: Final = 60.0
-"""RMF acts on a charging assignment at once, or not at all."""
+"""RMF acts on a charging assignment within this time, or not at all."""
 ABSENT_S: Final = 600.0
 
 
 def sighted(memory: SiteMemory, sighting: Sighting, now: float, site: SiteLimits) -> SiteMemory:
-    """A fleet has shown one robot."""
+    """Take one robot of a fleet's state in."""
     who = sighting.who
     standing = _standing(memory.robots.get(who), sighting, now)
     memory = replace(memory, robots={**memory.robots, who: standing})
@@ -66,7 +66,7 @@ def sighted(memory: SiteMemory, sighting: Sighting, now: float, site: SiteLimits
 
 
 def wanted(memory: SiteMemory, event: ChargeWanted, site: SiteLimits) -> tuple[SiteMemory, str]:
-    """An operator wants this robot charged."""
+    """Take an operator's request in; also return the reason for a refusal, "" for none."""
     who = event.robot
     if event.request_id in memory.over:
         return memory, "request is over"
@@ -85,7 +85,7 @@ def wanted(memory: SiteMemory, event: ChargeWanted, site: SiteLimits) -> tuple[S
 
 
 def unwanted(memory: SiteMemory, request_id: str) -> tuple[SiteMemory, str]:
-    """An operator withdraws a request."""
+    """Withdraw an operator's request."""
     wish = next((w for w in memory.wishes if request_id and w.request_id == request_id), None)
     grants = memory.grants.values()
     granted = next((g.robot for g in grants if g.request_id == request_id and not g.over), None)
@@ -96,7 +96,7 @@ def unwanted(memory: SiteMemory, request_id: str) -> tuple[SiteMemory, str]:
 
 
 def fulfilled(memory: SiteMemory, who: RobotName, site: SiteLimits) -> SiteMemory:
-    """The robot was charged in its present task, so its failures are forgotten."""
+    """Note the robot's charge in its present task, and forget its failures."""
     standing = memory.robots.get(who)
     served = {**memory.served, who: standing.sighting.task_id if standing else ""}
     memory = replace(memory, served=served, strikes=without(memory.strikes, who))
@@ -106,7 +106,7 @@ def fulfilled(memory: SiteMemory, who: RobotName, site: SiteLimits) -> SiteMemor
 
 
 def stays_away(memory: SiteMemory, station: str, grant: Grant, site: SiteLimits) -> bool:
-    """Has a robot without a task not left its place since it was called?"""
+    """Is the robot, without a task, still where it was when called?"""
     standing, wish = memory.robots.get(grant.robot), memory.wish(grant.robot)
     if standing is None or wish is None or wish.by == "operator" or standing.sighting.task_id:
         return False
@@ -115,7 +115,7 @@ def stays_away(memory: SiteMemory, station: str, grant: Grant, site: SiteLimits)
 
 
 def gives_up(memory: SiteMemory, who: RobotName, now: float) -> SiteMemory:
-    """It did not come when it was called: the station is for others."""
+    """Take the station from a robot that did not come when called."""
     absent = {**memory.absent, who: now + ABSENT_S}
     return replace(memory.takes_back(who).without_wish(who), absent=absent)
 
@@ -135,7 +135,7 @@ def _standing(before: Standing | None, sighting: Sighting, now: float) -> Standi
 
 
 def _served(memory: SiteMemory, sighting: Sighting) -> SiteMemory:
-    """Forget in which task a robot was charged, once it has left in another one."""
+    """Forget the task in which a robot was charged, after it has left in another task."""
     who, task = sighting.who, sighting.task_id
     if sighting.place is None and task and memory.served.get(who, task) != task:
         return replace(memory, served=without(memory.served, who))
@@ -143,8 +143,8 @@ def _served(memory: SiteMemory, sighting: Sighting) -> SiteMemory:
 
 
 def _rested(memory: SiteMemory, sighting: Sighting, site: SiteLimits) -> SiteMemory:
-    """Note whether the robot is full enough for the schedule now. That holds until the schedule's
-    time is over, or the robot has worked."""
+    """Note if the robot is full enough for the schedule. This holds until the schedule's time is over,
+    or the robot has worked."""
     who = sighting.who
     aim = schedule.target(site.schedule, who, memory.when)
     worked = bool(sighting.task_id) and sighting.place is None
@@ -156,8 +156,8 @@ def _rested(memory: SiteMemory, sighting: Sighting, site: SiteLimits) -> SiteMem
 
 
 def _called(memory: SiteMemory, sighting: Sighting, now: float) -> SiteMemory:
-    """A task that begins when the robot is called is its drive to the station, unless the dispatcher
-    gave it."""
+    """Note a task that begins after the call as the robot's drive to the station, unless the dispatcher
+    gave the task."""
     who, task = sighting.who, sighting.task_id
     wish, station = memory.wish(who), memory.station_of(who)
     if wish is None or wish.by == "operator" or wish.task_id or not task or station is None:
@@ -180,7 +180,7 @@ def _begun(memory: SiteMemory, standing: Standing, now: float, site: SiteLimits)
 
 
 def _asks(memory: SiteMemory, standing: Standing, now: float, site: SiteLimits) -> By | None:
-    """Who wants this robot charged, by its fleet's state and the schedule; None for nobody."""
+    """Return the origin of this robot's wish, its fleet's state or the schedule; None for no wish."""
     s = standing.sighting
     if s.place is None or s.battery_percent >= site.full_percent:
         return None
@@ -206,7 +206,7 @@ def _believed(memory: SiteMemory, standing: Standing, now: float) -> bool:
 
 
 def _lasts(memory: SiteMemory, wish: Wish, s: Sighting, site: SiteLimits) -> bool:
-    """Does it still want to be charged, and stand at one of our waypoints or drive there?"""
+    """Does the robot still want to be charged, and stand at one of our waypoints or drive there?"""
     if s.battery_percent >= _goal(memory, wish, site):
         return False
     same = s.task_id == wish.task_id
@@ -216,7 +216,7 @@ def _lasts(memory: SiteMemory, wish: Wish, s: Sighting, site: SiteLimits) -> boo
 
 
 def _goal(memory: SiteMemory, wish: Wish, site: SiteLimits) -> float:
-    """The battery charge (%) at which the wish is fulfilled."""
+    """Return the battery charge (%) that fulfils the wish."""
     if wish.by != "schedule" or not site.schedule:
         return site.full_percent
     aim = schedule.target(site.schedule, wish.robot, memory.when)
@@ -224,7 +224,7 @@ def _goal(memory: SiteMemory, wish: Wish, site: SiteLimits) -> float:
 
 
 def _full(memory: SiteMemory, wish: Wish, site: SiteLimits) -> bool:
-    """Has its robot been charged, and does its fleet show that the goal is reached?"""
+    """Has the wish's robot been charged, and does its fleet show the goal as reached?"""
     grant = memory.grants.get(memory.station_of(wish.robot) or "")
     percent = memory.robots[wish.robot].sighting.battery_percent
     return grant is not None and grant.started and percent >= _goal(memory, wish, site)

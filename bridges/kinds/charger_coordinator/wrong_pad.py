@@ -1,18 +1,18 @@
-"""Robots on a pad that is not theirs, and what makes them leave.
+"""Robots on a wrong pad, and the orders that make them leave.
 
 RMF's fleet adapter starts a robot's ChargeBattery again when the waypoint or the mode of its charging
 assignment changes (rmf_ros2 9dedd0f, ChargeBattery.cpp, _consider_restart). That moves a robot, but
 only while its ChargeBattery runs: as a task, or as `finishing_request: charge`. Rules:
-COORDINATOR-WRONG-PAD-1. A robot that is expected at one station and comes to another, or does not
-   leave it for LEAVES_S, is told to wait, and TOLD_S later to charge at its own. Not more than
-   twice for one request.
-COORDINATOR-WRONG-PAD-2. A robot that has no station, and stands on a pad that another waits for, is
-   told to wait again, by the other mode for TOLD_S. This happens `leaves_s` after it came or the
-   station let it go.
-COORDINATOR-WRONG-PAD-3. Where we may not assign, or the robot is in another task, nothing is told: RMF
+COORDINATOR-WRONG-PAD-1. A robot expected at one station that comes to another, or does not leave
+   another for LEAVES_S, is told to wait, and TOLD_S later to charge at its own station. This happens at
+   most twice for one request.
+COORDINATOR-WRONG-PAD-2. A robot without a station, on a pad that another robot waits for, is told to
+   wait again, by the other mode for TOLD_S. This happens `leaves_s` after its arrival or its release by
+   the station.
+COORDINATOR-WRONG-PAD-3. If we may not assign, or the robot is in another task, nothing is told: RMF
    would not move it.
 COORDINATOR-WRONG-PAD-4. If it still stands there OBEYS_S later, or cannot be told, a person is alerted.
-Who stands where is the fleet's word (FleetState's position), or the station's, if it reads receivers.
+A robot's place is known from its fleet (FleetState's position), or from a station that reads receivers.
 """
 
 from collections.abc import Iterator, Mapping
@@ -35,8 +35,8 @@ TRIES: Final = 2
 
 
 class OnWrongPad(NamedTuple):
-    """`who` has stood at `station` since `since`. `expected`: the station that it has; None if it has
-    none, and `waiter` waits for this one. `tries`: how often it may be told to leave."""
+    """A robot `who` at `station` since `since`. `expected`: its own station; None if it has none, and
+    `waiter` waits for `station`. `tries`: the greatest number of orders to leave."""
 
     who: RobotName
     station: str
@@ -48,8 +48,8 @@ class OnWrongPad(NamedTuple):
 
 
 def found(memory: SiteMemory, now: float, site: SiteLimits) -> dict[RobotName, OnWrongPad]:
-    """Every robot that stands at the wrong station or in another robot's way. If `now` is NEVER, also
-    those that will count as such unless somebody moves."""
+    """Find every robot at the wrong station or in another robot's way. If `now` is NEVER, also robots
+    that will count as such unless somebody moves."""
     astray: dict[RobotName, OnWrongPad] = {}
     for one in (*_strayed(memory, now, site), *_blocking(memory, now, site)):
         astray.setdefault(one.who, one)
@@ -57,7 +57,7 @@ def found(memory: SiteMemory, now: float, site: SiteLimits) -> dict[RobotName, O
 
 
 def nudged(memory: SiteMemory, now: float, site: SiteLimits) -> SiteMemory:
-    """Nudge the robots that are to leave, and forget those that have left."""
+    """Nudge the robots that are to leave, and forget the nudges of robots that have left."""
     astray = found(memory, now, site)
     nudges = {who: n for who, n in memory.nudges.items() if _matters(memory, who, n, astray)}
     for who, one in astray.items():
@@ -69,7 +69,7 @@ def nudged(memory: SiteMemory, now: float, site: SiteLimits) -> SiteMemory:
 
 
 def is_nudged(memory: SiteMemory, who: RobotName, now: float) -> bool:
-    """Is it being told to leave now, by an assignment that is not its own?"""
+    """Is the robot now told to leave, by a changed assignment?"""
     return who in memory.nudges and now < memory.nudges[who].at + TOLD_S
 
 
@@ -79,7 +79,7 @@ def alarming(memory: SiteMemory, one: OnWrongPad, now: float) -> bool:
 
 
 def due(memory: SiteMemory, now: float, site: SiteLimits) -> Iterator[float]:
-    """When any of this changes without an event."""
+    """Yield the times of the next orders and alerts."""
     for nudge in memory.nudges.values():
         yield nudge.at + TOLD_S
     for one in found(memory, NEVER, site).values():
@@ -92,7 +92,7 @@ def due(memory: SiteMemory, now: float, site: SiteLimits) -> Iterator[float]:
 
 
 def _strayed(memory: SiteMemory, now: float, site: SiteLimits) -> Iterator[OnWrongPad]:
-    """Those that have a station, were not charged there yet, and stand at another."""
+    """Yield robots that have a station, were not charged there yet, and stand at another."""
     for name, grant in memory.grants.items():
         if grant.over or grant.started:
             continue
@@ -105,7 +105,7 @@ def _strayed(memory: SiteMemory, now: float, site: SiteLimits) -> Iterator[OnWro
 def _stands(
     memory: SiteMemory, who: RobotName, site: SiteLimits
 ) -> tuple[str | None, float, float]:
-    """The station where it stands, by its fleet or by that station; since when; from when it counts."""
+    """Return the station where the robot stands, its arrival, and the time when its stay counts."""
     for name, seen in memory.stations.items():
         if seen.diagnosis is FaultCause.PAD and on_pad(seen.error, site) == who:
             return name, seen.since, seen.since
@@ -115,7 +115,7 @@ def _stands(
 
 
 def _blocking(memory: SiteMemory, now: float, site: SiteLimits) -> Iterator[OnWrongPad]:
-    """Those that have no station, and stand on a pad that another robot waits for."""
+    """Yield robots without a station on a pad that another robot waits for."""
     here = standing(memory, AGES_AGO if now == NEVER else now, site)
     idle = {name: who for name in here if (who := _idle_at(memory, name, here)) is not None}
     for wish in memory.wishes if idle else ():
@@ -131,7 +131,7 @@ def _blocking(memory: SiteMemory, now: float, site: SiteLimits) -> Iterator[OnWr
 
 
 def _idle_at(memory: SiteMemory, station: str, here: Here) -> RobotName | None:
-    """A robot without a station that stands at this one, which nobody has."""
+    """Find a robot without a station that stands at this free station."""
     grant, seen = memory.grants.get(station), memory.stations.get(station)
     if seen is None or seen.state is CHARGING or (grant is not None and not grant.over):
         return None
@@ -141,8 +141,8 @@ def _idle_at(memory: SiteMemory, station: str, here: Here) -> RobotName | None:
 def _matters(
     memory: SiteMemory, who: RobotName, nudge: Nudge, astray: Mapping[RobotName, OnWrongPad]
 ) -> bool:
-    """Does this nudge still count? While a robot has a station, its nudges count until it gets another
-    request: a robot that goes astray twice is not told more often."""
+    """Does this nudge still count? The nudges of a robot with a station count until its next request,
+    even if it goes astray twice."""
     station = memory.station_of(who)
     if station is not None:
         return memory.grants[station].request_id == nudge.why
@@ -155,7 +155,7 @@ def _can_be_nudged(memory: SiteMemory, who: RobotName) -> bool:
 
 
 def _next_at(memory: SiteMemory, one: OnWrongPad) -> float:
-    """When it is told to leave, or told again; NEVER if it was told often enough, or cannot be."""
+    """Return the time of the next order to leave; NEVER if it was told often enough, or cannot be."""
     nudge = memory.nudges.get(one.who)
     if not _can_be_nudged(memory, one.who):
         return NEVER
@@ -174,7 +174,7 @@ def _alarm_at(memory: SiteMemory, one: OnWrongPad) -> float:
 
 
 def on_pad(error: str, site: SiteLimits) -> RobotName | None:
-    """Which of our robots stands on the pad, by the station's error; None if it is none of ours."""
+    """Find our robot on the pad by the station's error; None if it is none of ours."""
     seen = misplaced_in(error)
     if seen is None:
         return None

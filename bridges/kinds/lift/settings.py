@@ -103,7 +103,7 @@ class LiftSettings(DeviceSettings, frozen=True, kw_only=True, forbid_unknown_fie
     ] = "none"
     alarm_on: Annotated[
         AlarmOn,
-        tells("""the hazards that are such an alarm. All robots then leave the lifts and stop
+        tells("""the hazards that raise this alarm. All robots then leave the lifts and stop
         elsewhere, until `rmf-bridge reset`."""),
     ] = msgspec.field(default_factory=lambda: ["fire_alarm"])
 

@@ -19,12 +19,12 @@ class RecordingSettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknow
     keep: Annotated[
         Literal["nothing", "ring", "continuous"],
         tells("""`ring` keeps the last minutes in memory, and the recorder makes a file of them when
-        something goes wrong; `continuous` makes files of everything, the oldest of which go;
+        something goes wrong; `continuous` makes files of everything, and drops the oldest;
         `nothing` keeps nothing."""),
     ] = "ring"
     ring_mb: Annotated[Megabytes, tells("its size. 1 MB is 10 minutes or more of a lift.")] = 1.0
     files: Annotated[Files, tells("how many files of this daemon the recorder keeps.")] = 40
     files_mb: Annotated[Space, tells("how large these files may be together.")] = 100.0
     waiting_s: Annotated[
-        Patience, tells("a file is made when somebody has waited this long for what was requested.")
+        Patience, tells("a file is made when a requester has waited this long.")
     ] = 180.0

@@ -76,7 +76,7 @@ class Zenoh(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
         if self.tls and not any(map(_is_encrypted, (*self.connect, *self.listen))):
             yield ("tls",), "no endpoint is encrypted: write connect: [tls/host:port]"
         if any(map(_is_encrypted, self.listen)) and not (self.tls and self.tls.certificate):
-            yield ("listen",), "who listens with TLS needs tls: {certificate: …, private_key: …}"
+            yield ("listen",), "listening with TLS needs tls: {certificate: …, private_key: …}"
 
 
 def _is_encrypted(endpoint: str) -> bool:
@@ -101,8 +101,8 @@ class Rmf(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     ] = "subnet"
     ros_setup: Annotated[
         AbsolutePath | None,
-        tells("""ROS's setup file, sourced before the daemon starts, as a service has no shell that
-        has done so. Not for `dds` and `zenoh`. If `auto` does not find the file, it logs that."""),
+        tells("""ROS's setup file, sourced before the daemon starts, as a service starts without a
+        shell. Not for `dds` and `zenoh`. If `auto` does not find the file, it logs that."""),
     ] = None
     diagnostics: Annotated[
         bool, tells("publish the health of daemon and devices each second on `/diagnostics`.")
@@ -111,7 +111,7 @@ class Rmf(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     zenoh: Annotated[Zenoh | None, tells("routers, keys and certificates of `zenoh`.")] = None
     release: Annotated[
         Literal["auto", "jazzy", "kilted"],
-        tells("""of which release RMF's messages are: `jazzy` (Humble, Iron and Jazzy) or `kilted`
+        tells("""the release of RMF's messages: `jazzy` (Humble, Iron and Jazzy) or `kilted`
         (Kilted, Lyrical and newer). `auto` follows the fleet adapters on the graph, and is `jazzy`
         without one. Transport `ros2` takes what is installed."""),
     ] = "auto"

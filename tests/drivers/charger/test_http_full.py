@@ -299,7 +299,7 @@ def test_keep_needs_a_station_that_can_be_stopped_and_serve_known_needs_receiver
         codes=Codes(idle=[0], charging=[5]), on_death="keep", unrequested="serve_known"
     )
     assert list(seed.problems()) == [
-        (("unrequested",), "serve_known needs receivers: whom does the station know?"),
+        (("unrequested",), "serve_known needs receivers: without them no robot is known"),
         (("on_death",), "this station cannot be stopped: leave this out"),
     ]
 
