@@ -1,1 +1,1 @@
-"""RMF's messages: definitions, bytes, topic names and QoS, and what each release lacks."""
+"""RMF's messages: definitions, bytes, topic names and QoS, and the gaps of each release."""

@@ -44,7 +44,7 @@ def encode(message_type: type, message: object, release: Release = NEWEST) -> by
     """Encode the message as little endian CDR with its header.
 
     Characters that are impossible on the wire (a NUL, half a surrogate pair) become `?`: a strange
-    text from a device must not prevent the device's state. Raises CdrError for a number out of
+    text from a device must not block the device's state message. Raises CdrError for a number out of
     range, or a value of another type.
     """
     out = bytearray(LITTLE_ENDIAN)

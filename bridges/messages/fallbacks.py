@@ -20,7 +20,7 @@ def converted(message: Message) -> Message | None:
 
 
 def remarks(topic: AnyTopic, wanted: str) -> list[str]:
-    """Write remarks for `check` on a topic whose message a release lacks. `wanted`: the YAML's release."""
+    """Write remarks for `check` on a topic whose message a release lacks (`wanted`: the YAML's)."""
     names = RELEASES if wanted == "auto" else [wanted]
     way = (
         f"goes out on {INSTEAD[topic.name].name}" if topic.name in INSTEAD else "goes into the log"

@@ -115,7 +115,7 @@ class ObservedLift(ObservedDevice[d.LiftState]):
 
     def _end(self, moment: Moment, who: str, passed_on: bool) -> Iterator[News]:
         one, holds = self.requesters.get(who), who == self.session.value
-        if one is None and who and holds:  # it was not heard asking
+        if one is None and who and holds:  # a holder whose request was not heard
             one, _ = self.requesters.ask(who, "", moment)
             one.granted, one.ended, one.own = self.session.since, moment, not passed_on
             one.end_passed_on = passed_on

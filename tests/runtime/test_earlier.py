@@ -86,7 +86,7 @@ def test_what_a_later_version_kept_is_refused_by_name() -> None:
     kept = msgspec.json.decode((EARLIER[-1] / "door_supervisor.json").read_bytes())
     later = msgspec.json.encode(kept | {"version": 2})
     with pytest.raises(
-        ValueError, match="version 2 of a table of who holds which door; this daemon"
+        ValueError, match="version 2 of a table of doors and their holders; this daemon"
     ):
         doors.restore(later, DoorSupervisor(doors=None), 5.0)
     added = msgspec.json.encode(kept | {"since": {}})

@@ -193,7 +193,7 @@ class SiteMemory(msgspec.Struct, frozen=True):
     robot -> the station dedicated to it by another node.
     `nudges`: robots told to leave a pad. `receivers`: robot -> the error of its own receiver.
     `when`: the local time. `assigned`: the assignments published last, at `assigned_at`.
-    `alerts`: the faults of which a person was alerted.
+    `alerts`: the faults already sent as alerts.
     """
 
     began_at: float = 0.0

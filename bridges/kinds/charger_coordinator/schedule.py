@@ -43,13 +43,13 @@ class Charging(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
         msgspec.field(default_factory=lambda: list(DAYS))
     )
     fleets: Annotated[
-        list[Name], tells("the fleets that it is for; everybody when `robots` is absent too.")
+        list[Name], tells("the fleets to be charged; all when `robots` is absent too.")
     ] = []
     robots: Annotated[
         list[Name],
-        tells("the robots that it is for, as FLEET/ROBOT; everybody when `fleets` is absent too."),
+        tells("the robots to be charged, as FLEET/ROBOT; all when `fleets` is absent too."),
     ] = []
-    percent: Annotated[Target, tells("how far they are charged.")] = 100.0
+    percent: Annotated[Target, tells("the battery charge up to which they are charged.")] = 100.0
 
     def concerns(self, who: RobotName) -> bool:
         """Does it apply to this robot?"""
@@ -64,7 +64,7 @@ class Charging(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
         return began_today or (yesterday in self.days and when.minute + DAY_MIN - begins < lasts)
 
     def lasts_min(self) -> int:
-        """Its length in minutes: at most a day."""
+        """Return its length in minutes: at most a day."""
         return (_minute(self.until) - _minute(self.at) - 1) % DAY_MIN + 1
 
     def text(self, when: LocalTime | None) -> str:

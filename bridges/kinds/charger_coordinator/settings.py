@@ -90,8 +90,8 @@ class CoordinatorSettings(GraphSettings, frozen=True, kw_only=True, forbid_unkno
     full_percent: Annotated[Full, tells("the charge at which a robot leaves its station.")] = 100.0
     again_percent: Annotated[
         Low,
-        tells("""below this a robot without a task is charged. A robot charged in its task comes
-        back in the same task only below this."""),
+        tells("""below this charge a robot without a task is charged. A robot that was charged
+        during a task is charged again in the same task only below this."""),
     ] = 90.0
     leaves_s: Annotated[
         Timeout, tells("how long a robot may stay on a pad without need while another waits.")

@@ -115,7 +115,7 @@ def _followed(
 
 
 def _ended(memory: SiteMemory, name: str, grant: Grant, now: float, site: SiteLimits) -> SiteMemory:
-    """Take the end of a request without our cancel."""
+    """Handle a request's end without our cancel."""
     who, wish = grant.robot, memory.wish(grant.robot)
     if grant.started and now < grant.forgotten_at + PROVEN_S:
         return memory

@@ -70,7 +70,7 @@ class DoorSettings(DeviceSettings, frozen=True, kw_only=True, forbid_unknown_fie
     ] = None
 
     def stale_after(self) -> float:
-        """Its limits' `stale_after_s`."""
+        """Return its limits' `stale_after_s`."""
         return self.limits.stale_after_s
 
     def problems(self) -> Remarks:

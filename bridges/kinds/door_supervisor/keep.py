@@ -42,7 +42,7 @@ def restore(kept: bytes, settings: DoorSupervisorSettings, now: float) -> dict[s
     Raises ValueError for other bytes. All holds count from now: times on the monotonic clock from
     before the restart are meaningless.
     """
-    found = keep.read(kept, KeptDoors, VERSION, "a table of who holds which door")
+    found = keep.read(kept, KeptDoors, VERSION, "a table of doors and their holders")
     served = found.doors if settings.doors is None else set(settings.doors)
     return {
         door: _restored(door, holders, now)

@@ -95,7 +95,7 @@ class SupervisedDoor(msgspec.Struct, frozen=True):
 
     @property
     def disagrees(self) -> bool:
-        """Does the door's state contradict what is wanted? OFFLINE and UNKNOWN do not."""
+        """Does the door's state contradict the wanted mode? OFFLINE and UNKNOWN do not."""
         return self.mode == MOVING or self.mode == (CLOSED if self.holders else OPEN)
 
     @property

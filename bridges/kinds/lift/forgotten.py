@@ -39,8 +39,8 @@ from bridges.kinds.shared.freshness import SECOND_NS, Requester, Rules
 NAMED_AFTER_S: Final = 3.0
 """At a handover the supervisor may ask for the next robot for a moment."""
 ASKS_S: Final = 5.0
-"""Five repeats are missing: states go out each second, and a fleet adapter repeats its request at each
-LiftState (RobotContext.cpp, _check_lift_state)."""
+"""After this silence five repeats are missing: states go out each second, and a fleet adapter repeats
+its request at each LiftState (RobotContext.cpp, _check_lift_state)."""
 IN_CAR_S: Final = 60.0
 """20 s after it was killed, a fleet adapter has its robot on a task again (docs/how-to/ros.md)."""
 FORWARDED_S: Final = 3.0

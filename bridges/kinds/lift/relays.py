@@ -16,7 +16,7 @@ T = TypeVar("T")
 
 
 class Channel(msgspec.Struct, Generic[T], frozen=True):
-    """One output, or a group of outputs of which at most one is on.
+    """One output, or a group of outputs with at most one on.
 
     `on`: the output that is on now. `off_at`: the time of the last switching off. `ons`: the latest
     times of switching on.

@@ -108,7 +108,7 @@ class LiftSettings(DeviceSettings, frozen=True, kw_only=True, forbid_unknown_fie
     ] = msgspec.field(default_factory=lambda: ["fire_alarm"])
 
     def stale_after(self) -> float:
-        """Its limits' `stale_after_s`."""
+        """Return its limits' `stale_after_s`."""
         return self.limits.stale_after_s
 
     def on_map(self) -> list[Place]:

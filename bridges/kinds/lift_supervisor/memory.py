@@ -16,7 +16,7 @@ NOBODY_IS_SENT: Final = (LiftMode.MODE_FIRE, LiftMode.MODE_EMERGENCY, LiftMode.M
 
 
 class LiftSupervisorLimits(msgspec.Struct, frozen=True):
-    """The durations (s) that the site has set, and whether its clocks agree."""
+    """The durations (s) set by the site, and the agreement of its clocks."""
 
     silent_after_s: float = 10.0
     orphan_after_s: float = 3.0

@@ -66,8 +66,7 @@ class Kind(Struct, Generic[S, L, M, X, E, O, R], frozen=True):
     nothing. `request`: the message if it is malformed, else the event.
     `on_map(settings)`: settings that name a place on RMF's map, as `Place`s. The device's own name is
     checked for every kind.
-    `attended_by`: the topic of requests of which the core hears (`Attended`) whether it has publishers;
-    None for no such topic.
+    `attended_by`: a topic of requests; the core gets `Attended` when its publishers appear or vanish.
     """
 
     name: str

@@ -17,7 +17,7 @@ Endpoint = Annotated[
         extra={"pattern": "protocol/host:port (tcp/192.168.1.5:7447, tls/rmf.local:7447)"},
     ),
 ]
-"""Where a zenoh program listens or is reached."""
+"""The address of a zenoh program."""
 
 
 class ZenohTls(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

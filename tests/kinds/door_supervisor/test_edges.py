@@ -193,5 +193,5 @@ def test_a_table_that_is_cut_or_damaged_is_refused_as_a_whole(kept: bytes) -> No
 
 
 def test_a_file_that_is_not_a_table_is_refused_with_what_it_should_be() -> None:
-    with pytest.raises(ValueError, match=r"^not a table of who holds which door: "):
+    with pytest.raises(ValueError, match=r"^not a table of doors and their holders: "):
         keep.restore(b"[]", DoorSupervisorSettings(), 0.0)
