@@ -90,7 +90,7 @@ def test_what_a_later_version_kept_is_refused_by_name() -> None:
     ):
         doors.restore(later, DoorSupervisor(doors=None), 5.0)
     added = msgspec.json.encode(kept | {"since": {}})
-    with pytest.raises(ValueError, match=r"not a table of who .*unknown field `since`"):
+    with pytest.raises(ValueError, match=r"not a table of doors .*unknown field `since`"):
         doors.restore(added, DoorSupervisor(doors=None), 5.0)
 
 
