@@ -9,7 +9,7 @@ export PYTHONDONTWRITEBYTECODE :=
 .PHONY: help demo demo-charging demo-page test test-page suite deep test-ros lint style types docs reference man deb format bench flood soak torture test-vm mutate clean
 help:
 	@echo "make demo    a robot goes through a door, rides a lift and charges, on fake hardware"
-	@echo "             (TRANSPORT=zenoh make demo: on zenoh, as without being asked on a Raspberry Pi)"
+	@echo "             (TRANSPORT=zenoh make demo: on zenoh, the default on a Raspberry Pi)"
 	@echo "make demo-charging  two fleets, two chargers and their coordinator: the scenarios by number, 100 s"
 	@echo "make demo-page  a site with lifts, doors, chargers and robots that ride for ever, and the web page of it"
 	@echo "make test    lint, format, types, import contracts, links of docs/ and all tests: what CI runs"
@@ -19,13 +19,13 @@ help:
 	@echo "make bench   latency and memory, beside a bare transport node"
 	@echo "make flood   ten thousand requests a second to a lift for a minute: memory, states, the last word"
 	@echo "make soak    a whole site for a day in virtual time: SEED=7 HOURS=24 plays one day again; RMF=jazzy: its supervisors"
-	@echo "             (KILL_EVERY=27: nothing goes wrong but that RMF's lift supervisor dies so often)"
+	@echo "             (KILL_EVERY=27: no trouble but a kill of RMF's lift supervisor each 27 s)"
 	@echo "make torture  kill, starve and lie to real daemons for ten minutes, and print docs/explanation/reliability.md's table"
 	@echo "make test-vm  boot Debian 13 in QEMU, install our packages, and kill and hang it there (ARCH=arm64)"
 	@echo "             (one of its machines: ONLY=lift, site or upgrade)"
-	@echo "make mutate  break the cores in every small way, and list what no test noticed (docs/explanation/mutation.md)"
+	@echo "make mutate  break the cores in every small way, and list breaks that no test noticed (docs/explanation/mutation.md)"
 	@echo "make docs    the documentation as a site, build/site/index.html; a broken link is an error"
-	@echo "make reference  write the pages of docs/ that are made from the program"
+	@echo "make reference  write the generated pages of docs/"
 	@echo "make man     the manual page, build/rmf-bridge.1"
 	@echo "make deb     Debian packages in dist/, for Debian 12 and 13 and Ubuntu 24.04, amd64 and arm64"
 	@echo "             (one of them: make deb ARCHS=arm64 PYTHONS=3.11)"
@@ -49,7 +49,7 @@ demo-charging: .venv/ready
 demo-page: .venv/ready
 	@$(BIN)/python -m hal_fakes.demo page
 
-# Many tests wait for a process or a wire: more of them than there are cores run side by side.
+# Many tests wait for a process or a wire, so more tests than cores run side by side.
 # Each test goes with all its parameters to the next free worker, in the mixed order of conftest.py.
 SIDE_BY_SIDE := -n 8 --dist loadscope --no-loadscope-reorder
 # mypy uses one core only, so it runs beside the tests.
@@ -96,10 +96,10 @@ style: .venv/ready
 types: .venv/ready
 	$(BIN)/mypy
 
-# Links, anchors and files that no page names are checked. What is built needs no network.
+# Links, anchors and unlinked files are checked. The built site needs no network.
 docs: .venv/ready
 	@NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --clean
-	@rm -r build/site/assets/javascripts/lunr  # languages that no page is written in
+	@rm -r build/site/assets/javascripts/lunr  # languages of no page
 	@find build/site/assets -name "*.map" -delete
 
 reference: .venv/ready
@@ -111,7 +111,7 @@ man: .venv/ready
 	  --project-name rmf-bridges --description "connect Open-RMF to lifts, doors and chargers" \
 	  --manual-section 1 --manual-title "rmf-bridges manual" --output build/rmf-bridge.1
 
-# Built here for every machine; nothing of it runs here.
+# Built here for every architecture; none of the result runs here.
 ARCHS ?= amd64 arm64
 PYTHONS ?= 3.11 3.12 3.13
 deb: man docs
@@ -135,7 +135,7 @@ soak: .venv/ready
 torture: .venv/ready
 	@$(BIN)/python -m tests.torture $(if $(SEED),--seed $(SEED))
 
-# The packages that were built last; they are built if there are none. The image is built once, in build/vm.
+# Tests the packages built last, or builds them if there are none. The image is built once, in build/vm.
 ARCH ?= amd64
 test-vm: .venv/ready
 	@ls dist/*+deb13_$(ARCH).deb >/dev/null 2>&1 || $(MAKE) --no-print-directory deb ARCHS=$(ARCH) PYTHONS=3.13

@@ -8,7 +8,7 @@ set -eu
 arch=$1 python=$2
 case $python in
   3.11) release=deb12 ;; 3.12) release=ubuntu24.04 ;; 3.13) release=deb13 ;;
-  *) echo "Python $python: no release of Debian or Ubuntu that this is for" >&2; exit 1 ;;
+  *) echo "Python $python: not the Python of a supported release of Debian or Ubuntu" >&2; exit 1 ;;
 esac
 here=$(cd "$(dirname "$0")/.." && pwd)
 bin=$here/.venv/bin
@@ -24,9 +24,8 @@ rm -rf "$work" "$here"/build/lib "$here"/build/bdist.* # else a wheel keeps modu
 umask 022
 mkdir -p "$root/DEBIAN" "$bench/DEBIAN" "$page/DEBIAN" "$root/$lib/bin" "$root/usr/bin" "$tree/bin" "$work/wheel" "$wheels"
 
-# The libraries: the workbench's are those that the daemons have not, the page's those that neither has. Left out is what
-# only Cyclone's own commands import, and what colorzero was built with: half of the byte code that an installation would
-# have to make.
+# The libraries: the workbench gets those that the daemons lack, the page those that both lack. Left out: libraries of
+# Cyclone's own commands, and colorzero's build tools. They would double the byte code that an installation must make.
 [ "$python" != 3.13 ] || "$here/deb/lgpio.sh" "$arch" "$wheels"
 "$bin/pip" wheel --quiet --disable-pip-version-check --no-deps --wheel-dir "$work/wheel" "$here"
 version=$(basename "$work"/wheel/*.whl | cut -d- -f2)+$release # it has the commit: setup.py
@@ -35,7 +34,7 @@ fill() {
   "$bin/python" "$here/deb/wheels.py" "$work"/wheel/*.whl --arch "$arch" --python "$python" \
     --find-links "$wheels" --without cyclonedds:rich-click --without colorzero:setuptools --target "$into" "$@"
 }
-# without PLACE OTHER: leaves in PLACE what OTHER has not.
+# without PLACE OTHER: removes from PLACE every file that OTHER has too.
 without() { (cd "$2" && find . ! -type d -print0) | (cd "$1" && xargs -0 rm -f); }
 in_bench=$bench/usr/lib/rmf-bridges-workbench/$version in_page=$page/usr/lib/rmf-bridges-page/$version
 mkdir -p "$in_bench" "$in_page"
@@ -99,8 +98,8 @@ gzip -9nc "$here/build/rmf-bridge.1" > "$root/usr/share/man/man1/rmf-bridge.1.gz
 mkdir -p "$bench/usr/share/doc/rmf-bridges-workbench"
 cp -R "$here/build/site" "$bench/usr/share/doc/rmf-bridges-workbench/html" # `make docs`
 
-# package NAME ROOT DEPENDS SUMMARY [TREE]: its control files, changelog, copyright and lintian's overrides; description
-# on stdin. TREE is what its postinst unpacks.
+# package NAME ROOT DEPENDS SUMMARY [TREE]: builds a package with control files, changelog, copyright and lintian's
+# overrides; description on stdin. TREE: the tree that its postinst unpacks.
 package() {
   doc=$2/usr/share/doc/$1
   mkdir -p "$doc"
@@ -129,7 +128,7 @@ CONTROL
   dpkg-deb --root-owner-group -Zxz --build "$2" "$here/dist/$1_${version}_$arch.deb"
   ! command -v lintian > /dev/null || lintian --allow-root --fail-on error "$here/dist/$1_${version}_$arch.deb"
 }
-# Of that Python and not of `python3`, which is another one in the next release: its upgrade keeps ours, and serving.
+# Depend on that Python, not on `python3`, whose version changes with the release: so an upgrade of Debian keeps us installed.
 libc='libc6 (>= 2.34)' # of the wheels' tags (wheels.py, lgpio.sh)
 package rmf-bridges "$root" "python$python, $libc, systemd (>= 252)" \
   "connect Open-RMF to lifts, doors and chargers" "$tree" <<'DESCRIPTION'
@@ -144,6 +143,6 @@ package rmf-bridges-workbench "$bench" "rmf-bridges (= $version), $libc" \
 DESCRIPTION
 package rmf-bridges-page "$page" "rmf-bridges-workbench (= $version), $libc" \
   "web page of Open-RMF's lifts, doors and chargers" <<'DESCRIPTION'
- What rmf-bridge page needs: a web page of what is on RMF's graph, of each
- device and of what was recorded, as a service with a user of its own.
+ The web page of rmf-bridge page: RMF's graph, each device and recordings, as
+ a service with a user of its own.
 DESCRIPTION

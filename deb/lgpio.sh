@@ -1,5 +1,5 @@
 #!/bin/sh
-# Builds lgpio's wheel for a Python that PyPI has none for: deb/lgpio.sh ARCH DIRECTORY.
+# Builds lgpio's wheel for a Python without a wheel on PyPI: deb/lgpio.sh ARCH DIRECTORY.
 # From its sdist, with swig and the cross compiler zig, both from PyPI: as an ordinary user, on any machine. The
 # module keeps to CPython's stable ABI, so that this machine's Python.h serves every later Python as well.
 set -eu

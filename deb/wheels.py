@@ -1,8 +1,8 @@
-"""Installs a wheel and all that it needs for another machine: python deb/wheels.py --help.
+"""Installs a wheel and its requirements for another machine: python deb/wheels.py --help.
 
 pip can fetch wheels of another platform, but judges conditions (`; platform_machine == ...`) by the
-machine that it runs on. So each round here asks what is still missing on the machine that is meant, and
-has pip fetch just that.
+machine that it runs on. So each round here finds the requirements still missing for the target machine,
+and fetches them with pip.
 """
 
 import argparse
@@ -20,10 +20,10 @@ from packaging.utils import canonicalize_name
 
 MACHINES = {"amd64": "x86_64", "arm64": "aarch64"}
 GLIBC = (34, 31, 28, 27, 24, 17)
-"""Of the manylinux tags: Debian 12 has 2.36. A tag means that version or a newer one."""
+"""Minor versions in manylinux tags: Debian 12 has 2.36. A tag means that version or a newer one."""
 
 Without = Collection[tuple[str, ...]]
-"""By whom it is not really needed, and what."""
+"""Pairs of a distribution and a requirement that it declares but does not need."""
 
 
 def main() -> int:
@@ -60,13 +60,13 @@ def _arguments() -> argparse.Namespace:
         action="append",
         default=[],
         metavar="BY:NEED",
-        help="what a distribution says that it needs, and does not where it goes",
+        help="a requirement that a distribution declares, but does not need on the target",
     )
     return parser.parse_args()
 
 
 def _fetch(what: list[str], args: argparse.Namespace) -> None:
-    """Install these, and nothing that they need."""
+    """Install these without their requirements."""
     machine = MACHINES[args.arch]
     platforms = [f"manylinux_2_{minor}_{machine}" for minor in GLIBC] + [f"manylinux2014_{machine}"]
     options = [word for platform in platforms for word in ("--platform", platform)]
@@ -85,7 +85,7 @@ def _fetch(what: list[str], args: argparse.Namespace) -> None:
 def _needed(
     target: Path, machine: dict[str, str], extras: dict[str, tuple[str, ...]], without: Without
 ) -> Iterator[Requirement]:
-    """What the distributions there need on that machine."""
+    """Yield the requirements of the distributions in the target on that machine."""
     for found in distributions(path=[str(target)]):
         asked = extras.get(canonicalize_name(found.name), ())
         for text in found.requires or ():
@@ -117,7 +117,7 @@ def _missing(
 def _wrong(
     target: Path, machine: dict[str, str], extras: dict[str, tuple[str, ...]], without: Without
 ) -> Iterator[str]:
-    """Requirements that what is there does not meet: two packages want different versions."""
+    """Yield requirements unmet by the installed version: two packages want different versions."""
     there = _there(target)
     for need in _needed(target, machine, extras, without):
         version = there[canonicalize_name(need.name)].version

@@ -1,6 +1,6 @@
 """The ROS package, for colcon: the packages of the folder above, the marker, launch files, examples.
 
-pip does not read this file; its own is pyproject.toml, above, which lists packages and data for both.
+pip does not read this file, but pyproject.toml above, which lists packages and data for both.
 """
 
 import os
@@ -17,7 +17,7 @@ VERSION = re.search(r'__version__ = "(.*)"', (ABOVE / "bridges/__init__.py").rea
 
 
 def files(pattern: str) -> list[str]:
-    """Paths below the project's folder, as setuptools wants them: relative."""
+    """Return paths below the project's folder, relative as setuptools requires."""
     return sorted(map(str, ABOVE.glob(pattern)))
 
 

@@ -4,5 +4,5 @@ from bridges.runtime.ros_launch import LaunchDescription, daemon
 
 
 def generate_launch_description() -> LaunchDescription:
-    """What ROS's launch asks for."""
+    """Describe the launch of the daemon."""
     return daemon("door_supervisor")
