@@ -12,7 +12,7 @@ from collections.abc import Iterable, Sequence
 from typing import NoReturn
 
 from bridges import VERSION, exit_codes
-from bridges.host.installed import NotInstalled, is_there, of_workbench
+from bridges.system.installed import NotInstalled, is_there, of_workbench
 
 EX_PIPE = 141
 """The exit code when the reader of our output has gone, as a shell shows after SIGPIPE."""

@@ -18,8 +18,8 @@ from collections.abc import Iterator, Sequence
 from contextlib import closing, contextmanager
 from pathlib import Path
 
-from bridges.host import log
 from bridges.settings.load import SettingsError, load
+from bridges.system import log
 from drivers import DriverError
 from hal_fakes.control import Control
 from hal_fakes.fake import Outside, far_side, plants_on, stations_on

@@ -22,7 +22,7 @@ from typing import cast
 
 import msgspec
 
-from bridges.host.log import pairs
+from bridges.system.log import pairs
 from drivers.hal.points import HalError
 from hal_fakes.plants.plant import Edge, FailureMode, Plant
 

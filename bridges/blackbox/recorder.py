@@ -17,8 +17,8 @@ from bridges.blackbox.recordings import CONTINUOUS, Recordings
 from bridges.blackbox.ring import DIED as DIED_NAME
 from bridges.blackbox.ring import NAME, RingContent, RingError, Tail
 from bridges.blackbox.triggers import AGAIN_S, DIED, Triggers
-from bridges.host.log import pairs
 from bridges.kinds.shared.durations import AGES_AGO
+from bridges.system.log import pairs
 
 log = logging.getLogger(__name__)
 

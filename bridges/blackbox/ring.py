@@ -16,7 +16,7 @@ from typing import IO, Final
 
 from bridges.blackbox import entries
 from bridges.blackbox.entries import AnyEntry, Head
-from bridges.host import user_files
+from bridges.system import user_files
 
 MAGIC: Final = b"RMFRING1"
 SEGMENTS: Final = 8

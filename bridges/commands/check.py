@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING
 
 import msgspec
 
-from bridges.host.written import not_written
 from bridges.settings.cross_file_checks import Found, across
 from bridges.settings.load import Config, Problem, SettingsError, load
 from bridges.settings.sheets import text
 from bridges.settings.sheets.findings import Findings, findings, wrong
+from bridges.system.written import not_written
 
 if TYPE_CHECKING:
     from bridges.settings.building_map import BuildingMap

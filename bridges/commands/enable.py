@@ -13,7 +13,6 @@ from collections.abc import Collection, Iterable, Iterator
 from contextlib import suppress
 from pathlib import Path
 
-from bridges.host.directories import GROUPS
 from bridges.runtime import drop_in
 from bridges.runtime.services import (
     CONFIG,
@@ -30,6 +29,7 @@ from bridges.runtime.services import (
 )
 from bridges.settings.cross_file_checks import taken
 from bridges.settings.load import Config, Problem, SettingsError, load
+from bridges.system.directories import GROUPS
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

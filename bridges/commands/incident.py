@@ -9,12 +9,12 @@ from pathlib import Path
 
 from bridges.blackbox.incident import AFTER_S, BEFORE_S, INSTALL, Incident, Note, part
 from bridges.blackbox.ring import DIED, NAME, RingContent, RingError
-from bridges.host.installed import of_workbench
-from bridges.host.written import no_folder, not_written
 from bridges.runtime import holder
 from bridges.runtime.clock import machine_s
 from bridges.runtime.runtime_directory import find
 from bridges.settings.load import SettingsError
+from bridges.system.installed import of_workbench
+from bridges.system.written import no_folder, not_written
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -8,11 +8,11 @@ import time
 from pathlib import Path
 from typing import NoReturn
 
-from bridges.host.directories import runtimes
-from bridges.host.log import pairs
 from bridges.runtime.completers import completed_by, device_names, service_names
 from bridges.runtime.daemons import daemons, units
 from bridges.runtime.services import CONFIG
+from bridges.system.directories import runtimes
+from bridges.system.log import pairs
 
 ETC = Path("/") / CONFIG
 

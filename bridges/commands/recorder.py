@@ -9,10 +9,10 @@ from pathlib import Path
 from bridges.blackbox.incident import INSTALL
 from bridges.blackbox.recorder import Recorder
 from bridges.blackbox.recordings import Recordings
-from bridges.host import directories, log
 from bridges.runtime import signals
 from bridges.runtime.clock import machine_s
 from bridges.runtime.notify import notify
+from bridges.system import directories, log
 
 EVERY_S = 1.0
 

@@ -5,10 +5,10 @@ import os
 import sys
 from pathlib import Path
 
-from bridges.host.directories import Directories, act_as_owner
 from bridges.runtime import holder
 from bridges.runtime.runtime_directory import find
 from bridges.runtime.signals import RESET
+from bridges.system.directories import Directories, act_as_owner
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -8,13 +8,13 @@ from pathlib import Path
 
 from msgspec.structs import replace
 
-from bridges.host import directories, log
-from bridges.host.installed import of_workbench
 from bridges.kinds.shared.rmf_section import TRANSPORTS, overridden
 from bridges.runtime import drop_in, guard, signals
 from bridges.runtime import runtime_directory as runtime
 from bridges.runtime.notify import watchdog_s
 from bridges.settings.load import Config, SettingsError, load
+from bridges.system import directories, log
+from bridges.system.installed import of_workbench
 from bridges.transports.ros2 import setup as ros_setup
 from bridges.transports.transport import TransportError
 from drivers.hal import HalError

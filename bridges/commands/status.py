@@ -14,12 +14,12 @@ from typing import Final, TextIO
 
 import msgspec
 
-from bridges.host.directories import runtimes
-from bridges.host.paint import bold, red
 from bridges.messages.words import printable
 from bridges.runtime.daemons import NONE, DaemonStatus, daemons, units
 from bridges.runtime.faults import Remedy, here, remedies, values
 from bridges.runtime.subject import Status
+from bridges.system.directories import runtimes
+from bridges.system.paint import bold, red
 
 NOT_TOLD: Final = ("contacts", "faults", "input_age_s", "outputs", "refused")
 

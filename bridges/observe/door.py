@@ -7,7 +7,7 @@ from typing import Final
 from bridges.messages import definitions as d
 from bridges.messages import words
 from bridges.observe.device import Check, ObservedDevice, Wait
-from bridges.observe.limits import ASKS_WITHIN_S, MOST_HOLDERS
+from bridges.observe.limits import MOST_HOLDERS, REQUESTER_SILENT_S
 from bridges.observe.news import News
 from bridges.observe.requesters import DeviceRequester, Fact, Moment
 
@@ -81,7 +81,12 @@ class ObservedDoor(ObservedDevice[d.DoorState]):
             if one.wants == OPEN and not (opened and self.last_heartbeat is None):
                 yield Wait(one.who, "OPEN", one.since)
         asked = self.asked is not None and self.asked.value == OPEN
-        if self.asked and asked and not opened and now.at - self.asked_last.at <= ASKS_WITHIN_S:
+        if (
+            self.asked
+            and asked
+            and not opened
+            and now.at - self.asked_last.at <= REQUESTER_SILENT_S
+        ):
             yield Wait(self.sender, "OPEN", self.asked.since)
 
     def _hear_other(self, moment: Moment, topic: str, message: d.Message) -> Iterator[News]:
@@ -109,7 +114,7 @@ class ObservedDoor(ObservedDevice[d.DoorState]):
     def _hear_heartbeat(self, moment: Moment, heartbeat: d.SupervisorHeartbeat) -> Iterator[News]:
         first, self.last_heartbeat = self.last_heartbeat is None, moment
         found = [self.text(who) for who in listed(heartbeat, self.id)[:MOST_HOLDERS]]
-        seen = not first or moment.at - self.began.at > ASKS_WITHIN_S
+        seen = not first or moment.at - self.began.at > REQUESTER_SILENT_S
         since = Moment(moment.at, moment.wall, seen)
         for who in [who for who in self.holders if who not in found]:
             yield News("lost", moment, who, gap_s=moment.at - self.holders.pop(who).at)

@@ -7,7 +7,7 @@ from typing import Final
 from bridges.messages import definitions as d
 from bridges.messages import words
 from bridges.observe.device import Check, ObservedDevice, Wait
-from bridges.observe.limits import ASKS_WITHIN_S
+from bridges.observe.limits import REQUESTER_SILENT_S
 from bridges.observe.news import News
 from bridges.observe.requesters import DeviceRequester, Fact, Moment
 
@@ -150,7 +150,7 @@ class ObservedLift(ObservedDevice[d.LiftState]):
                     yield News("met", moment, one.who, requester=one)
             elif one.ended is None:
                 one.met = None
-            silent = moment.at - one.last.at > ASKS_WITHIN_S
+            silent = moment.at - one.last.at > REQUESTER_SILENT_S
             if silent and one.ended is None and not one.gone:
                 one.gone = True
                 yield News("gone", moment, one.who, requester=one)

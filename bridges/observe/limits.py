@@ -9,7 +9,7 @@ SILENT_S: Final = durations.SILENT_S
 SLOWEST_S: Final = 5.0
 """RMF's contract permits one state every 2 s at the slowest (docs/how-to/judge.md, RATE): after this
 long two states are missing from any make of node."""
-ASKS_WITHIN_S: Final = 3.5
+REQUESTER_SILENT_S: Final = 3.5
 """A waiting requester repeats itself at each state or each second (rmf_ros2, RobotContext.cpp:1732 and
 DoorOpen.cpp). After three missed repeats it has stopped."""
 REPEATS_S: Final = 1.5

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from bridges.messages.definitions import Time
 from bridges.messages.stamps import in_seconds
-from bridges.observe.limits import ASKS_WITHIN_S, GIVEN_UP_S, MOST_REQUESTERS, REPEATS_S
+from bridges.observe.limits import GIVEN_UP_S, MOST_REQUESTERS, REPEATS_S, REQUESTER_SILENT_S
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,7 +65,7 @@ class DeviceRequester:
 
     def asks(self, now: Moment) -> bool:
         """Does the requester still ask?"""
-        return self.ended is None and now.at - self.last.at <= ASKS_WITHIN_S
+        return self.ended is None and now.at - self.last.at <= REQUESTER_SILENT_S
 
     def stamp(self, moment: Moment, stamp: Time) -> None:
         """Note the age of its request, by our clock."""

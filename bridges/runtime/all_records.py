@@ -16,11 +16,11 @@ from collections.abc import Collection
 from contextlib import suppress
 from pathlib import Path
 
-from bridges.host import log
-from bridges.host.directories import SERVICE_STATE
-from bridges.host.log import pairs
 from bridges.runtime import dead_daemon
 from bridges.runtime.record import PATTERN, read
+from bridges.system import log
+from bridges.system.directories import SERVICE_STATE
+from bridges.system.log import pairs
 from bridges.yaml.problems import SettingsError
 from drivers.profiles import texts
 

@@ -9,10 +9,10 @@ import logging
 from collections.abc import Callable, Mapping
 from typing import Final, Generic, TypeVar
 
-from bridges.host.log import pairs
 from bridges.kinds.shared.decision import O, X
 from bridges.kinds.shared.durations import AGES_AGO
 from bridges.runtime.clock import Clock
+from bridges.system.log import pairs
 from drivers import Driver, DriverError, OnContacts
 
 log = logging.getLogger(__name__)

@@ -17,7 +17,6 @@ import msgspec
 from bridges import VERSION
 from bridges.blackbox.entries import Head
 from bridges.blackbox.ring import Ring
-from bridges.host.log import pairs
 from bridges.messages.definitions import DiagnosticArray
 from bridges.messages.stamps import ClockError, stamp
 from bridges.messages.topics import DIAGNOSTICS
@@ -32,6 +31,7 @@ from bridges.runtime.runtime_directory import KEPT, MemoryFile, Once, RuntimeDir
 from bridges.runtime.service import OpenBus, clock_of, named_by, service
 from bridges.runtime.serving import stop
 from bridges.settings.load import Config
+from bridges.system.log import pairs
 from bridges.transports.choose import open_transport
 from bridges.transports.transport import Publisher, TransportError
 

@@ -10,11 +10,11 @@ from typing import Any, Final, cast
 
 import msgspec
 
-from bridges.host import files
-from bridges.host.directories import SERVICE_RUN, SERVICE_STATE, Directories, owner_of, state_base
 from bridges.runtime import holder
 from bridges.runtime.record import paths, read
 from bridges.runtime.subject import Status
+from bridges.system import files
+from bridges.system.directories import SERVICE_RUN, SERVICE_STATE, Directories, owner_of, state_base
 
 UNIT: Final = "rmf-bridge@"
 

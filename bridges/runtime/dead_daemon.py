@@ -12,16 +12,16 @@ from pathlib import Path
 
 import msgspec
 
-from bridges.host import log
-from bridges.host.directories import Directories, act_as_owner, by_hand, work_somewhere
-from bridges.host.files import read
-from bridges.host.log import pairs
 from bridges.runtime import last_mark, signals
 from bridges.runtime import runtime_directory as runtime
 from bridges.runtime.holder import STATUS, STATUS_MAX
 from bridges.runtime.record import ClaimRecord, Records
 from bridges.runtime.switch_off import outputs_off
 from bridges.settings.config import Config
+from bridges.system import log
+from bridges.system.directories import Directories, act_as_owner, by_hand, work_somewhere
+from bridges.system.files import read
+from bridges.system.log import pairs
 from bridges.yaml.problems import SettingsError
 
 TIMEOUT_S = 5.0

@@ -8,7 +8,6 @@ import logging
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any, Generic
 
-from bridges.host.log import pairs, plain
 from bridges.kinds.shared.decision import (
     Fault,
     IoFailed,
@@ -34,6 +33,7 @@ from bridges.runtime.contained import Contained
 from bridges.runtime.refusals import Refusals
 from bridges.runtime.ring_writer import NOBODY, NoWriter
 from bridges.runtime.subject import Publish, Status, Subject, SubjectCore
+from bridges.system.log import pairs, plain
 from drivers import Driver, DriverError
 
 NotSent = Callable[[Topic[Message], Exception], None]

@@ -15,7 +15,6 @@ from collections.abc import Iterator, Mapping
 from itertools import islice
 from typing import Final
 
-from bridges.host.log import plain
 from bridges.messages.definitions import (
     DiagnosticArray,
     DiagnosticLevel,
@@ -26,6 +25,7 @@ from bridges.messages.definitions import (
 )
 from bridges.observe.diagnosis import PASSIVE, SIMULATED
 from bridges.runtime.subject import Status
+from bridges.system.log import plain
 
 MOST: Final = 100
 """At most this many devices: a supervisor learns names from the network, which may flood it."""

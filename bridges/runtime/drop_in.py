@@ -9,9 +9,9 @@ import ipaddress
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from typing import Final
 
-from bridges.host.directories import GROUPS
 from bridges.kinds.shared.rmf_section import Rmf, Zenoh
 from bridges.settings.config import Config
+from bridges.system.directories import GROUPS
 from bridges.transports.zenoh.config import mode
 from drivers.hal import Needs
 

@@ -9,7 +9,6 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any, Generic
 
-from bridges.host.log import pairs
 from bridges.kinds.shared.decision import Fault, M, OperatorReset, R, RequestRefused
 from bridges.kinds.shared.durations import NEVER
 from bridges.kinds.shared.graph_kind import GraphEvent, GraphKind, MaySpeak, Woken
@@ -26,6 +25,7 @@ from bridges.runtime.presence import Presence
 from bridges.runtime.refusals import Refusals
 from bridges.runtime.ring_writer import NOBODY, NoWriter
 from bridges.runtime.subject import Status, Subject, SubjectCore
+from bridges.system.log import pairs
 from bridges.transports.transport import Subscription, Transport
 
 log = logging.getLogger(__name__)

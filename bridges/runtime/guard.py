@@ -13,7 +13,7 @@ from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 
-from bridges.host.log import pairs
+from bridges.system.log import pairs
 
 log = logging.getLogger(__name__)
 

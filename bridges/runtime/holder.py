@@ -12,8 +12,8 @@ from typing import Final
 
 import msgspec
 
-from bridges.host.directories import Directories, Distrusted, cannot_be_seen, named, opened
-from bridges.host.files import read
+from bridges.system.directories import Directories, Distrusted, cannot_be_seen, named, opened
+from bridges.system.files import read
 
 HOLDER: Final = "holder.json"
 STATUS: Final = "status.json"

@@ -8,13 +8,13 @@ import logging
 from collections.abc import Mapping
 from typing import Final, Generic, Protocol
 
-from bridges.host.log import pairs
 from bridges.kinds.shared.decision import Fault, M, R
 from bridges.kinds.shared.durations import AGES_AGO, NEVER
 from bridges.kinds.shared.graph_kind import GraphKind
 from bridges.kinds.shared.kind import E, L, S
 from bridges.runtime.clock import PublishPace
 from bridges.runtime.subject import Publish
+from bridges.system.log import pairs
 
 log = logging.getLogger(__name__)
 

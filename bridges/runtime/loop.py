@@ -11,13 +11,13 @@ devices that answer.
 import logging
 from collections.abc import Collection, Sequence
 
-from bridges.host.log import pairs
 from bridges.kinds.shared.durations import AGES_AGO, NEVER
 from bridges.runtime.clock import Clock
 from bridges.runtime.device import AnyNode
 from bridges.runtime.inbox import Inbox
 from bridges.runtime.ring_writer import NOBODY, NoWriter
 from bridges.runtime.serving import LEAST_GAP_S
+from bridges.system.log import pairs
 from drivers.hal import Bus
 
 log = logging.getLogger(__name__)

@@ -4,13 +4,13 @@ import logging
 import threading
 from collections.abc import Callable, Iterable
 
-from bridges.host.log import pairs
 from bridges.kinds.shared.decision import Fault
 from bridges.messages.definitions import Alert, Message
 from bridges.messages.fallbacks import INSTEAD, converted
 from bridges.messages.topics import Topic
 from bridges.runtime.ring_writer import NOBODY, NoWriter
 from bridges.runtime.runtime_directory import Once
+from bridges.system.log import pairs
 from bridges.transports.transport import Publisher, Transport, TransportError
 
 log = logging.getLogger(__name__)

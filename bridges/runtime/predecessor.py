@@ -13,8 +13,8 @@ import time
 from collections.abc import Callable, Collection, Sequence
 from typing import Any
 
-from bridges.host.log import pairs
 from bridges.runtime.record import ClaimRecord, Records
+from bridges.system.log import pairs
 from drivers import Driver
 
 log = logging.getLogger(__name__)

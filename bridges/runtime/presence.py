@@ -9,13 +9,13 @@ import random
 from collections.abc import Iterable
 from typing import Final
 
-from bridges.host.log import pairs
 from bridges.kinds.shared.decision import Fault
 from bridges.kinds.shared.durations import AGES_AGO, NEVER
 from bridges.kinds.shared.graph_kind import LISTENS
 from bridges.messages.definitions import Message
 from bridges.messages.topics import Topic
 from bridges.messages.words import LONGEST_NAME, printable
+from bridges.system.log import pairs
 from bridges.transports.transport import Subscription, Transport
 
 log = logging.getLogger(__name__)

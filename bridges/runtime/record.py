@@ -18,12 +18,12 @@ from pathlib import Path
 import msgspec
 
 from bridges import BUILD, VERSION
-from bridges.host import files
-from bridges.host.directories import Directories, named, opened
-from bridges.host.log import pairs
 from bridges.kinds.shared.rmf_section import Rmf
 from bridges.settings import names
 from bridges.settings.config import Config
+from bridges.system import files
+from bridges.system.directories import Directories, named, opened
+from bridges.system.log import pairs
 from drivers.profiles import texts
 
 log = logging.getLogger(__name__)

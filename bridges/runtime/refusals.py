@@ -4,8 +4,8 @@ import logging
 import threading
 from collections import Counter
 
-from bridges.host.log import pairs
 from bridges.kinds.shared.decision import EXPECTED
+from bridges.system.log import pairs
 
 log = logging.getLogger(__name__)
 

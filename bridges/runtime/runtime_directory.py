@@ -19,8 +19,11 @@ from pathlib import Path
 
 import msgspec
 
-from bridges.host import files
-from bridges.host.directories import (
+from bridges.runtime import holder
+from bridges.runtime.holder import HOLDER, STATUS, LockHolder
+from bridges.runtime.record import ClaimRecord, Records, paths, read
+from bridges.system import files
+from bridges.system.directories import (
     SERVICE_RUN,
     SERVICE_STATE,
     Directories,
@@ -32,10 +35,7 @@ from bridges.host.directories import (
     opened,
     state_base,
 )
-from bridges.host.log import pairs
-from bridges.runtime import holder
-from bridges.runtime.holder import HOLDER, STATUS, LockHolder
-from bridges.runtime.record import ClaimRecord, Records, paths, read
+from bridges.system.log import pairs
 
 log = logging.getLogger(__name__)
 
@@ -52,7 +52,7 @@ class AlreadyRunning(Exception):
 
 
 def find(file: Path, given: str | None) -> Directories:
-    """Return the directories of this file's daemon, by the rule in `bridges/host/directories.py`.
+    """Return the directories of this file's daemon, by the rule in `bridges/system/directories.py`.
 
     Raises PermissionError if the service's directory cannot be read.
     """

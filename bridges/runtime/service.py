@@ -9,7 +9,6 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from functools import partial
 from typing import Any, Protocol
 
-from bridges.host.log import pairs
 from bridges.kinds import kind_called
 from bridges.kinds.shared.decision import Attended, OperatorReset, RequestRefused, RivalSeen
 from bridges.kinds.shared.graph_kind import GraphKind
@@ -28,6 +27,7 @@ from bridges.runtime.ring_writer import NOBODY, NoWriter
 from bridges.runtime.serving import Serving
 from bridges.runtime.subject import Status
 from bridges.settings.load import Config
+from bridges.system.log import pairs
 from bridges.transports.transport import Subscription, Transport
 from drivers.hal import Bus
 

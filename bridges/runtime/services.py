@@ -11,9 +11,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from bridges.host.directories import SERVICE_STATE
-from bridges.host.files import replace
 from bridges.runtime.record import PATTERN
+from bridges.system.directories import SERVICE_STATE
+from bridges.system.files import replace
 
 CONFIG: Final = Path("etc/rmf-bridges")
 INSTANCE: Final = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]*")

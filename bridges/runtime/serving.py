@@ -6,10 +6,10 @@ import time
 from collections.abc import Sequence
 from typing import Any, Protocol
 
-from bridges.host.log import pairs
 from bridges.runtime.clock import Clock
 from bridges.runtime.contained import LeftOn
 from bridges.runtime.inbox import Inbox
+from bridges.system.log import pairs
 
 log = logging.getLogger(__name__)
 

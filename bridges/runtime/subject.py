@@ -7,7 +7,6 @@ from typing import Any, Generic, TypeVar
 
 from msgspec import Struct
 
-from bridges.host.log import pairs, plain
 from bridges.kinds.shared.decision import Decision, Fault, M, O, R
 from bridges.kinds.shared.durations import NEVER
 from bridges.messages.definitions import Message
@@ -15,6 +14,7 @@ from bridges.messages.topics import Topic
 from bridges.runtime.clock import Clock
 from bridges.runtime.refusals import Refusals
 from bridges.runtime.ring_writer import NOBODY, NoWriter
+from bridges.system.log import pairs, plain
 
 log = logging.getLogger(__name__)
 

@@ -10,8 +10,8 @@ import threading
 import time
 from collections.abc import Collection, Mapping, Sequence
 
-from bridges.host.log import pairs
 from bridges.settings.config import Config
+from bridges.system.log import pairs
 from drivers import DriverError
 from drivers.hal import Bus, HalError
 

@@ -21,7 +21,7 @@ from msgspec import Struct, field
 from yaml import CollectionNode, MappingNode, Node, ScalarNode, SequenceNode
 
 from bridges.kinds.shared.kind import CHARGER, DOOR, FLOOR, LIFT, WAYPOINT
-from bridges.yaml.nodes import Sort, YamlFile, compose, read
+from bridges.yaml.parsing import Sort, YamlFile, compose, read
 
 MAP = Sort("building map or navigation graph", "levels: ...", 1024 * 1024, 100_000)
 """A file of this size takes some seconds to read; longer ones are refused at once."""

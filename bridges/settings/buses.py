@@ -6,7 +6,7 @@ from yaml import MappingNode, ScalarNode
 from bridges.kinds.shared.remarks import Remarks
 from bridges.settings import names as named
 from bridges.settings.top import word
-from bridges.yaml.nodes import YamlFile
+from bridges.yaml.parsing import YamlFile
 from bridges.yaml.positions import MappingEntry, below
 from bridges.yaml.spelling import either, nearest, unknown
 from bridges.yaml.values import BROKEN, Values

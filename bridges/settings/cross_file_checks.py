@@ -11,7 +11,7 @@ from msgspec import Struct
 from bridges.kinds import kind_called
 from bridges.kinds.shared.graph_kind import GraphKind
 from bridges.settings.load import Config
-from bridges.yaml.nodes import Problem, YamlFile, compose
+from bridges.yaml.parsing import Problem, YamlFile, compose
 from bridges.yaml.positions import Spot, locate
 from bridges.yaml.spelling import unknown
 from drivers.hal import Where

@@ -22,7 +22,7 @@ from yaml import MappingNode, YAMLError
 from yaml.constructor import SafeConstructor
 
 from bridges.settings.similarity import Point
-from bridges.yaml.nodes import Problem, SettingsError, Sort, YamlFile, compose, read
+from bridges.yaml.parsing import Problem, SettingsError, Sort, YamlFile, compose, read
 from bridges.yaml.positions import Spot, locate
 
 FLEET = Sort("fleet configuration", "rmf_fleet: ...", 256 * 1024, 20_000)

@@ -17,7 +17,7 @@ from bridges.settings.building_map import BuildingMap
 from bridges.settings.config import Config
 from bridges.settings.fleet_config import EVERY_LEVEL, FleetFile
 from bridges.settings.similarity import Point, Similarity, estimate
-from bridges.yaml.nodes import Problem, YamlFile, compose
+from bridges.yaml.parsing import Problem, YamlFile, compose
 from bridges.yaml.positions import Spot, locate
 from bridges.yaml.spelling import unknown
 

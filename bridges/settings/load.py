@@ -31,7 +31,7 @@ from bridges.settings.config import Config
 from bridges.settings.plausible import milliseconds, out_of_step
 from bridges.settings.top import MAPPING, keys_below, top_keys, word
 from bridges.settings.wiring import Use, WiringCheck, note_conflicts, note_unknown_signals
-from bridges.yaml.nodes import Problem, SettingsError, YamlFile, compose, read
+from bridges.yaml.parsing import Problem, SettingsError, YamlFile, compose, read
 from bridges.yaml.positions import MappingEntry, Spot, below, is_none, locate
 from bridges.yaml.spelling import either, unknown
 from bridges.yaml.values import BROKEN, Broken, Values

@@ -12,7 +12,7 @@ from bridges.kinds.shared.graph_kind import GraphKind
 from bridges.kinds.shared.kind import CHARGER, DOOR, FLOOR, LIFT, WAYPOINT, Place
 from bridges.settings.building_map import BuildingMap
 from bridges.settings.load import Config
-from bridges.yaml.nodes import Problem, YamlFile, compose
+from bridges.yaml.parsing import Problem, YamlFile, compose
 from bridges.yaml.positions import Spot, locate
 from bridges.yaml.spelling import nearest, short
 

@@ -9,7 +9,7 @@ from collections.abc import Iterable
 from msgspec import Struct
 from yaml import Node
 
-from bridges.yaml.nodes import YamlFile
+from bridges.yaml.parsing import YamlFile
 from bridges.yaml.positions import Spot, below, locate
 from bridges.yaml.spelling import unknown
 from bridges.yaml.values import BROKEN, Check

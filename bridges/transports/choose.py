@@ -11,10 +11,10 @@ import os
 import re
 from collections.abc import Mapping, Sequence
 
-from bridges.host.log import pairs
 from bridges.kinds.shared.rmf_section import Rmf
 from bridges.messages.definitions import PACKAGES
 from bridges.messages.releases import RELEASES, Release
+from bridges.system.log import pairs
 from bridges.transports.cyclone import static_peers
 from bridges.transports.transport import Transport, TransportError
 

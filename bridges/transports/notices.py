@@ -2,10 +2,10 @@
 
 import logging
 
-from bridges.host.log import pairs
 from bridges.messages.cdr import CdrError
 from bridges.messages.definitions import Message
 from bridges.messages.topics import AnyTopic
+from bridges.system.log import pairs
 from bridges.transports.transport import Receive
 
 log = logging.getLogger(__name__)

@@ -14,11 +14,11 @@ from typing import Final
 
 from msgspec import Struct
 
-from bridges.host.log import pairs
 from bridges.messages.definitions import Alert, EmergencySignal, FleetState
 from bridges.messages.releases import DEFAULT, Release
 from bridges.messages.rihs01 import releases_of, type_hash, type_name
 from bridges.messages.topics import AnyTopic
+from bridges.system.log import pairs
 from bridges.transports import notices
 
 log = logging.getLogger(__name__)

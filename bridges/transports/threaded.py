@@ -8,8 +8,8 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import ClassVar, Final
 
-from bridges.host.log import pairs
 from bridges.messages.releases import Release
+from bridges.system.log import pairs
 from bridges.transports import addresses
 from bridges.transports.peers import Peers
 from bridges.transports.transport import TransportError

@@ -5,7 +5,7 @@ from collections.abc import Iterable
 from msgspec import Struct
 from yaml import MappingNode, Node, ScalarNode, SequenceNode
 
-from bridges.yaml.nodes import is_plain
+from bridges.yaml.parsing import is_plain
 from bridges.yaml.scalars import is_null_word
 from bridges.yaml.spelling import short
 

@@ -26,7 +26,7 @@ from msgspec.inspect import (
 )
 from yaml import Node, ScalarNode, SequenceNode
 
-from bridges.yaml.nodes import is_plain
+from bridges.yaml.parsing import is_plain
 from bridges.yaml.scalars import TRUTHS, number, reads_as, whole_number
 from bridges.yaml.spelling import either, nearest, short
 from bridges.yaml.typo_hints import has_unit, number_meant

@@ -23,7 +23,7 @@ from msgspec.inspect import (
 )
 from yaml import MappingNode, Node, ScalarNode, SequenceNode
 
-from bridges.yaml.nodes import YamlFile, is_plain
+from bridges.yaml.parsing import YamlFile, is_plain
 from bridges.yaml.positions import MappingEntry, Spot, is_none, locate
 from bridges.yaml.scalar_types import Extra, WrongScalar, leaf, looks, wanted_text
 from bridges.yaml.scalars import is_null

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-from bridges.host import user_files
+from bridges.system import user_files
 from drivers import DriverError
 from drivers.profiles import texts
 

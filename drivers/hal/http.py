@@ -15,9 +15,9 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import msgspec
 
-from bridges.host import user_files
 from bridges.kinds.shared.fields import AbsolutePath, Name, Period, tells
 from bridges.kinds.shared.remarks import Remarks
+from bridges.system import user_files
 from drivers.hal import Bus, BusSettings, BusType, HalError, Needs, Where
 from drivers.hal.backoff import Backoff
 from drivers.hal.deadline import Dialler, Resolve, tls_socket

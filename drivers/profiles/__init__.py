@@ -73,7 +73,7 @@ class Profile(Generic[Content]):
             yield ("profile",), text
 
     def _read(self, file: Path) -> dict[str, object]:
-        from bridges.yaml.nodes import read
+        from bridges.yaml.parsing import read
 
         text = texts.text(file, lambda: read(str(file)))
         return _understood(str(file), text, self.reader, self.key, self._content)
@@ -87,7 +87,7 @@ def _lines(file: Path) -> list[str]:
 def _understood(
     file: str, text: bytes, reader: str, key: str, content: type[msgspec.Struct]
 ) -> dict[str, object]:
-    from bridges.yaml.nodes import YamlFile, compose
+    from bridges.yaml.parsing import YamlFile, compose
     from bridges.yaml.positions import Spot
     from bridges.yaml.values import BROKEN, Values
 

@@ -35,7 +35,7 @@ from pymodbus.exceptions import NoSuchIdException
 from pymodbus.framer import FramerRTU
 from pymodbus.pdu import DecodePDU
 
-from drivers.hal.modbus.connections import Serial
+from drivers.hal.modbus.tcp_or_serial import Serial
 from hal_fakes.modbus.flash import TimedCoilRequest
 from hal_fakes.modbus.units import FakeUnits, FarSide
 from hal_fakes.plants.plant import FailureMode

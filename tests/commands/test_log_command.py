@@ -12,9 +12,9 @@ import pytest
 
 from bridges import cli
 from bridges.commands import log
-from bridges.host.directories import by_hand
-from bridges.host.log import pairs
 from bridges.runtime.runtime_directory import RuntimeDirectory
+from bridges.system.directories import by_hand
+from bridges.system.log import pairs
 
 LINES = [
     pairs("state", device="Lift1", mode="AGV"),

@@ -10,13 +10,13 @@ import pytest
 
 from bridges import cli
 from bridges.commands.status import show
-from bridges.host.directories import Directories
 from bridges.runtime import daemons as on_machine
 from bridges.runtime import faults
 from bridges.runtime.daemons import DOWN, FAULTY, NONE, WELL, DaemonStatus, daemons
 from bridges.runtime.holder import HOLDER
 from bridges.runtime.record import Records, of
 from bridges.settings.load import load
+from bridges.system.directories import Directories
 from tests.commands.runtime import served
 
 ROOT = Path(__file__).parents[2]

@@ -3,7 +3,7 @@
 import pytest
 
 from bridges.observe.lift import ObservedLift, request_lift
-from bridges.observe.limits import ASKS_WITHIN_S, GIVEN_UP_S, MOST_REQUESTERS, SILENT_S
+from bridges.observe.limits import GIVEN_UP_S, MOST_REQUESTERS, REQUESTER_SILENT_S, SILENT_S
 from tests.observe.story import BLUE, CLOSED, OPEN, RED, Story
 
 
@@ -122,4 +122,4 @@ def test_silence_is_told_by_states_and_ends_with_the_next() -> None:
     assert lift.is_silent(story.graph.now)
     story.lift()
     assert story.told() == ["3.5 asks fleet/red AGV", "3.5 states again"]
-    assert ASKS_WITHIN_S > SILENT_S
+    assert REQUESTER_SILENT_S > SILENT_S

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from bridges.host import directories
+from bridges.system import directories
 from tests.runtime.site import Graph, Module
 
 

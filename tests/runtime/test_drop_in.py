@@ -5,9 +5,9 @@ from pathlib import Path
 import pytest
 
 from bridges.commands.run import too_slow
-from bridges.host.directories import GROUPS
 from bridges.runtime.drop_in import FITS, fits, misfit, text, watchdog_s
 from bridges.settings.load import Config, load, understood
+from bridges.system.directories import GROUPS
 from workbench.commissioning.examples import device_yamls
 
 CONFIG = Path(__file__).parents[2] / "config"

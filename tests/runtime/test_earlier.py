@@ -11,13 +11,13 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from bridges.host.directories import Directories
 from bridges.kinds.charger_coordinator import keep as coordinator
 from bridges.kinds.door_supervisor import keep as doors
 from bridges.kinds.door_supervisor.settings import DoorSupervisorSettings as DoorSupervisor
 from bridges.runtime.drop_in import FITS, misfit
 from bridges.runtime.record import PATTERN, Records, read
 from bridges.settings.load import load
+from bridges.system.directories import Directories
 from drivers.profiles import texts
 
 EARLIER = sorted((Path(__file__).parent / "earlier").iterdir())

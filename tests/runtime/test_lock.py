@@ -11,11 +11,11 @@ from pathlib import Path
 
 import pytest
 
-from bridges.host.directories import Directories
 from bridges.runtime import record
 from bridges.runtime.holder import HOLDER
 from bridges.runtime.runtime_directory import LOCK, RuntimeDirectory
 from bridges.settings.load import load
+from bridges.system.directories import Directories
 from tests.runtime.hostile import NOBODY, group_member, unit
 from tests.runtime.site import Graph, Module, command, daemon, environment, hold_open
 from tests.waiting import wait_until

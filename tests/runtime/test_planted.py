@@ -9,12 +9,12 @@ from pathlib import Path
 import pytest
 
 from bridges import cli
-from bridges.host import directories
-from bridges.host.directories import Directories, Distrusted, opened
 from bridges.runtime import daemons as status
 from bridges.runtime import holder, runtime_directory
 from bridges.runtime.record import ClaimRecord
 from bridges.runtime.runtime_directory import KEPT, MemoryFile, RuntimeDirectory, state_file
+from bridges.system import directories
+from bridges.system.directories import Directories, Distrusted, opened
 
 NOBODY = 65534
 FILE = Path("/etc/rmf-bridges/lift.yaml")

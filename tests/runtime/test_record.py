@@ -6,11 +6,11 @@ from threading import Event
 
 import pytest
 
-from bridges.host.directories import Directories
 from bridges.runtime import record
 from bridges.runtime.predecessor import Predecessor, SafeFirst
 from bridges.runtime.record import ClaimRecord, Records
 from bridges.settings.load import SettingsError, load
+from bridges.system.directories import Directories
 from drivers import DriverError
 from drivers.charger import can_frames, dbc
 from drivers.profiles import texts

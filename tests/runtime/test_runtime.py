@@ -11,7 +11,6 @@ import msgspec
 import pytest
 from msgspec.structs import replace
 
-from bridges.host.directories import Directories
 from bridges.runtime.holder import HOLDER, LockHolder, look, ourselves
 from bridges.runtime.record import ClaimRecord
 from bridges.runtime.runtime_directory import (
@@ -22,6 +21,7 @@ from bridges.runtime.runtime_directory import (
     find,
     state_file,
 )
+from bridges.system.directories import Directories
 from tests.depth import depth
 
 FILE = Path("/etc/rmf-bridges/lift.yaml")
@@ -184,7 +184,7 @@ def test_a_directory_that_was_removed_is_made_again_with_its_lock_and_its_record
 def test_a_start_waits_while_outputs_are_being_switched_off(tmp_path: Path) -> None:
     text = (
         "import sys; from pathlib import Path; from bridges.runtime.runtime_directory import *;"
-        "from bridges.host.directories import Directories; p = Path(sys.argv[1]);"
+        "from bridges.system.directories import Directories; p = Path(sys.argv[1]);"
         "d = RuntimeDirectory(Directories(p, p), Path('x'), serves=False);"
         "print('held', flush=True); sys.stdin.read()"
     )

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from bridges.host.directories import Directories
 from bridges.runtime.dead_daemon import ages
 from bridges.runtime.switch_off import outputs_off
 from bridges.settings.load import load
+from bridges.system.directories import Directories
 from tests.drivers.hal.modbus.module import Module, door
 from tests.runtime.test_silent_units import BUSES, DOOR, YAML
 

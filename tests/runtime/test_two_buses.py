@@ -10,11 +10,11 @@ from pathlib import Path
 import pytest
 from msgspec.structs import replace
 
-from bridges.host.directories import Directories
 from bridges.messages.definitions import DoorModeValue
 from bridges.runtime import dead_daemon, record
 from bridges.runtime.record import Records
 from bridges.settings.load import Config, load
+from bridges.system.directories import Directories
 from tests.depth import depth
 from tests.runtime.hostile import live_before_dead, with_a_dead_bus_first
 from tests.runtime.site import ROOT, SERVICE, Graph, Module, command, daemon, environment, hold_open

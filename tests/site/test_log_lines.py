@@ -10,9 +10,9 @@ from collections.abc import Callable
 
 import pytest
 
-from bridges.host import log
 from bridges.messages import definitions as d
 from bridges.messages import topics
+from bridges.system import log
 from bridges.transports.transport import TransportError
 from tests.site.daemons import GraphDaemon
 from tests.site.network import Place

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from bridges.host.directories import GROUPS
 from bridges.runtime.drop_in import text
 from bridges.settings.load import load
+from bridges.system.directories import GROUPS
 from workbench.commissioning.examples import device_yamls
 
 ROOT = Path(__file__).parents[2]

@@ -8,9 +8,9 @@ import tempfile
 import threading
 from pathlib import Path
 
-from bridges.host.directories import Directories, Distrusted
 from bridges.runtime import holder
 from bridges.runtime.runtime_directory import RuntimeDirectory
+from bridges.system.directories import Directories, Distrusted
 from tests.runtime.hostile import (
     NOBODY,
     group_member,

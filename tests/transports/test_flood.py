@@ -11,7 +11,7 @@ from tests.waiting import PATIENCE_S
 
 NODE = """
 import sys
-from bridges.host import log
+from bridges.system import log
 from bridges.transports.dds.transport import DdsTransport
 log.start()
 node = DdsTransport("node", int(sys.argv[1]), loopback=True)
@@ -51,7 +51,7 @@ def test_malformed_datagrams_do_not_each_cause_a_log_line(domain: int, tmp_path:
 
 def test_each_line_of_a_library_is_logged_once_and_every_line_of_ours(tmp_path: Path) -> None:
     text = (
-        "import logging; from bridges.host import log; log.start()\n"
+        "import logging; from bridges.system import log; log.start()\n"
         "for n in range(3):\n"
         "    logging.getLogger('pymodbus').warning('bad frame %s', n, exc_info=ValueError())\n"
         "    logging.getLogger('bridges.runtime').warning('ours %s', n)\n"

@@ -15,12 +15,12 @@ from typing import TYPE_CHECKING, Final, TextIO
 import msgspec
 from msgspec.structs import replace
 
-from bridges.host import log
-from bridges.host.paint import bold, red
 from bridges.kinds.shared.rmf_section import TRANSPORTS, overridden
 from bridges.messages.words import printable
 from bridges.runtime.completers import completed_by, device_names
 from bridges.settings.load import Config, SettingsError, load
+from bridges.system import log
+from bridges.system.paint import bold, red
 from workbench.commissioning.doctor.finding import Finding, exit_code
 from workbench.graph.join import command_line, interruptible, seconds
 from workbench.graph.which_device import NoDevice, device_of
@@ -101,7 +101,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _form(config: Config, found: Sequence[Finding], out: Path) -> int:
-    from bridges.host.written import not_written
+    from bridges.system.written import not_written
     from workbench.commissioning.doctor.form import form
     from workbench.commissioning.doctor.machine import Machine
 

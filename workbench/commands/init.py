@@ -13,10 +13,10 @@ from pathlib import Path
 from typing import Any, Final, get_args
 
 from bridges import __version__
-from bridges.host.written import no_folder, not_written
 from bridges.settings.building_map import BuildingMap, load_map
 from bridges.settings.load import understood
-from bridges.yaml.nodes import SettingsError
+from bridges.system.written import no_folder, not_written
+from bridges.yaml.parsing import SettingsError
 from workbench.commissioning.init import ADDRESSES, WIRINGS, draft
 from workbench.commissioning.init.answers import (
     LIFT_INPUTS,

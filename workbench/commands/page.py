@@ -14,8 +14,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Final
 
-from bridges.host import directories, log
-from bridges.host.installed import how_to_install
+from bridges.system import directories, log
+from bridges.system.installed import how_to_install
 from workbench.graph.join import add_graph_arguments, command_line, complain, open_graph
 
 PORT: Final = 8080

@@ -12,8 +12,8 @@ from typing import Final
 
 from bridges.blackbox.entries import Head
 from bridges.blackbox.value_codec import Tree, UnknownValue, value
-from bridges.host.log import plain
 from bridges.settings.load import SettingsError, load
+from bridges.system.log import plain
 from workbench.replay.files import opened
 from workbench.replay.recordings import unreadable
 from workbench.replay.replayed import Course, Difference, Replay, ReplayedCores, of_head

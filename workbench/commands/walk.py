@@ -15,11 +15,11 @@ from contextlib import ExitStack
 from datetime import datetime
 from pathlib import Path
 
-from bridges.host import log
 from bridges.runtime import guard, signals
 from bridges.runtime import runtime_directory as runtime
 from bridges.runtime.completers import completed_by, device_names
 from bridges.settings.load import Config, SettingsError, load
+from bridges.system import log
 from drivers.hal import Bus, HalError
 from workbench.commissioning.manual_control import guarded
 from workbench.graph.which_device import NoDevice, device_of

@@ -15,8 +15,8 @@ from typing import TextIO
 
 from msgspec.structs import asdict
 
-from bridges.host.paint import coloured
 from bridges.messages import topics
+from bridges.system.paint import coloured
 from bridges.transports.transport import Transport, TransportError
 from workbench.graph.board import Board, BoardRow, change_line, changes, json_line, repaint, table
 from workbench.graph.join import add_graph_arguments, complain, interruptible, open_graph

@@ -3,9 +3,9 @@
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from bridges.host import directories
 from bridges.runtime import guard, record, runtime_directory
 from bridges.settings.load import Config
+from bridges.system import directories
 from drivers import Driver, DriverError
 from drivers.hal import Bus
 

@@ -19,7 +19,7 @@ from bridges.messages.words import Kind
 from bridges.observe.device import reading_age
 from bridges.observe.diagnosis import Diagnosis, about, report
 from bridges.observe.door import listed
-from bridges.observe.limits import ASKS_WITHIN_S, MOST_NODES, STEP_S
+from bridges.observe.limits import MOST_NODES, REQUESTER_SILENT_S, STEP_S
 from bridges.observe.requesters import Moment
 from workbench.explain.noted import levels, noted
 from workbench.explain.rows import LaneRow, label
@@ -120,7 +120,12 @@ class Drawing:
         self._wall = offset
 
     def _row(
-        self, lane: LaneName, part: str = "", keeps_s: float = ASKS_WITHIN_S, *, fills: bool = False
+        self,
+        lane: LaneName,
+        part: str = "",
+        keeps_s: float = REQUESTER_SILENT_S,
+        *,
+        fills: bool = False,
     ) -> LaneRow:
         """Return the row of this name. Without room, the row silent for the longest is dropped."""
         rows, part = self._rows[lane], label(part)
@@ -272,7 +277,7 @@ def _floor(floor: str, runs: Tone) -> Tone:
 
 
 def _outputs(told: str) -> Iterator[tuple[str, str]]:
-    """`agv_request yes, call L3` as the status file says it (`bridges.host.log.plain`)."""
+    """`agv_request yes, call L3` as the status file says it (`bridges.system.log.plain`)."""
     for part in told.split(", ") if told != "-" else ():
         name, _, value = part.partition(" ")
         if value != "0":  # of a counter

@@ -13,8 +13,6 @@ from typing import Any, Final
 from msgspec import Struct
 from msgspec.structs import asdict
 
-from bridges.host.columns import aligned, clipped, width
-from bridges.host.paint import repainted
 from bridges.messages import definitions as d
 from bridges.messages import words
 from bridges.messages.heard import Heard
@@ -22,6 +20,8 @@ from bridges.observe.all_devices import AnyDevice, ObservedGraph, PlainGraph
 from bridges.observe.diagnosis import COORDINATOR, PASSIVE, SIMULATED, Diagnosis
 from bridges.observe.door import ObservedDoor
 from bridges.observe.limits import SILENT_S
+from bridges.system.columns import aligned, clipped, width
+from bridges.system.paint import repainted
 
 SETTLES_S: Final = 1.5
 """A daemon's diagnostics come at 1 Hz."""

@@ -9,8 +9,8 @@ import sys
 from contextlib import suppress
 from pathlib import Path
 
-from bridges.host.directories import as_given, by_hand, opened
 from bridges.runtime.completers import Completer, completed_by, device_names
+from bridges.system.directories import as_given, by_hand, opened
 
 ANSWER_S = 5.0
 

@@ -16,8 +16,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from bridges.host.files import replace
-from bridges.host.user_files import OTHERS, read
+from bridges.system.files import replace
+from bridges.system.user_files import OTHERS, read
 
 COST: Final = (2**14, 8, 1)
 """N, r and p: 16 MB and about 50 ms for one try."""

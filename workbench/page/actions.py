@@ -18,9 +18,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from bridges.host.log import pairs
 from bridges.messages import definitions as d
 from bridges.messages.words import printable
+from bridges.system.log import pairs
 from workbench.page.live_site import DeviceView
 
 log = logging.getLogger(__name__)

@@ -8,10 +8,10 @@ from contextlib import closing
 from queue import Empty, Full, Queue
 from typing import Final
 
-from bridges.host.log import pairs
 from bridges.messages.definitions import Message
 from bridges.messages.heard import Heard, bounded
 from bridges.messages.topics import AnyTopic
+from bridges.system.log import pairs
 from bridges.transports.transport import Transport, TransportError
 from workbench.page.live_site import HEARD, LiveSite
 

@@ -11,9 +11,9 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from bridges.host.directories import runtimes
 from bridges.runtime.daemons import DaemonStatus, daemons
 from bridges.runtime.diagnostics import CONTACTS
+from bridges.system.directories import runtimes
 from workbench.graph.plants import ask
 from workbench.page.actions import Local
 from workbench.page.levels import Levels, Rows

@@ -23,20 +23,20 @@ from nicegui import Client, app, core, ui
 from nicegui.server import Server
 from starlette.types import Scope
 
-from bridges.host.log import pairs
 from bridges.kinds.shared.durations import AGES_AGO
+from bridges.system.log import pairs
 from bridges.transports.transport import Transport
 from workbench.graph.join import interruptible
 from workbench.page.access import PasswordCheck
 from workbench.page.actions import Deeds
 from workbench.page.cards import Cards
 from workbench.page.guard import HttpRefusal, RequestGuard
+from workbench.page.idle_connections import Silent
 from workbench.page.incident_views import IncidentViews
 from workbench.page.listener import Listener
 from workbench.page.live_site import LiveSite
 from workbench.page.local_daemons import LocalDaemons
 from workbench.page.login import STYLE, Login
-from workbench.page.silent import Silent
 from workbench.page.site_views import SiteViews
 
 log = logging.getLogger(__name__)

@@ -17,10 +17,10 @@ from bridges.blackbox.entries import Spoken
 from bridges.blackbox.incident import INSTALL, timed
 from bridges.blackbox.recordings import CONTINUOUS
 from bridges.blackbox.ring import MAGIC, RingContent, RingError
-from bridges.host import user_files
-from bridges.host.log import pairs
 from bridges.messages import cdr
 from bridges.messages.heard import Heard, Own, bounded
+from bridges.system import user_files
+from bridges.system.log import pairs
 from workbench.replay.sources import BagError, Notes, Raw, releases, source
 
 __all__ = ["BagError", "Keep", "Notes", "all_in", "heard_in"]

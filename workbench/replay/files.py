@@ -6,7 +6,7 @@ from pathlib import Path
 from bridges.blackbox.entries import AnyEntry, Head
 from bridges.blackbox.incident import INSTALL
 from bridges.blackbox.ring import MAGIC, RingContent, RingError
-from bridges.host import user_files
+from bridges.system import user_files
 from workbench.replay.bags import continuous
 from workbench.replay.sources import BagError, Notes
 

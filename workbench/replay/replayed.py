@@ -23,12 +23,12 @@ from bridges.blackbox.entries import (
     SubjectForgotten,
 )
 from bridges.blackbox.value_codec import Tree, UnknownValue, first_difference, tree
-from bridges.host.log import plain
 from bridges.kinds import kind_called
 from bridges.kinds.shared.decision import Decision, IoFailed, Sampled
 from bridges.kinds.shared.graph_kind import GraphKind
 from bridges.settings.config import Config
 from bridges.settings.load import understood
+from bridges.system.log import plain
 from drivers.profiles import texts
 from workbench.replay.typed import typed, types_of
 

@@ -11,7 +11,7 @@ from bridges.kinds.shared.table import Table
 from bridges.messages import fallbacks
 from bridges.settings.load import Config
 from bridges.settings.shown import choices_of, plain
-from bridges.yaml.nodes import Problem
+from bridges.yaml.parsing import Problem
 from drivers.hal.points import Wire
 
 HEADINGS = ("signal", "point", "direction", "active", "pull", "debounce", "at rest", "wire broken")

@@ -2,9 +2,9 @@
 
 from collections.abc import Iterator, Sequence
 
-from bridges.host.columns import aligned
 from bridges.kinds.shared.table import Table
 from bridges.settings.sheets.findings import MEANINGS, WIRES, BusShown, Findings, Part
+from bridges.system.columns import aligned
 
 
 def lines(findings: Findings) -> list[str]:

@@ -26,9 +26,9 @@ from cyclonedds.pub import DataWriter
 from cyclonedds.qos import Policy, Qos
 from cyclonedds.topic import Topic as DdsTopic
 
-from bridges.host.log import pairs
 from bridges.messages.releases import Release
 from bridges.messages.topics import AnyTopic, Topic
+from bridges.system.log import pairs
 from bridges.transports import addresses, cyclone, notices
 from bridges.transports.dds.discovery import NodeOnGraph
 from bridges.transports.dds.ends import DdsPublisher, DdsSubscription

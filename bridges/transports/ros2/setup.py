@@ -9,8 +9,8 @@ import logging
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from bridges.host.log import pairs
 from bridges.kinds.shared.rmf_section import Rmf
+from bridges.system.log import pairs
 from bridges.transports.transport import TransportError
 
 log = logging.getLogger(__name__)

@@ -16,8 +16,8 @@ from typing import Final
 
 from rclpy.node import Node
 
-from bridges.host.log import pairs
 from bridges.messages.topics import AnyTopic, Topic
+from bridges.system.log import pairs
 from bridges.transports import addresses, notices
 from bridges.transports.ros2 import peers as ros_peers
 from bridges.transports.ros2.ends import Ends, Ros2Publisher, Ros2Subscription

@@ -7,8 +7,8 @@ Source: ros2/rmw_zenoh, jazzy, DEFAULT_RMW_ZENOH_SESSION_CONFIG.json5; zenoh's D
 import re
 from typing import Final
 
-from bridges.host import user_files
 from bridges.kinds.shared.rmf_section import Zenoh, ZenohTls
+from bridges.system import user_files
 from bridges.transports.transport import TransportError
 
 Configuration = dict[str, object]

@@ -13,7 +13,7 @@ from typing import Final
 import zenoh
 from zenoh.handlers import Callback
 
-from bridges.host.log import pairs
+from bridges.system.log import pairs
 from bridges.transports.peers import Announced, Peers
 from bridges.transports.zenoh.keys import Keys, Peer
 

@@ -22,10 +22,10 @@ from typing import Final
 import zenoh
 from zenoh.handlers import Callback
 
-from bridges.host.log import pairs
 from bridges.kinds.shared.rmf_section import Zenoh
 from bridges.messages.releases import Release
 from bridges.messages.topics import AnyTopic, Topic
+from bridges.system.log import pairs
 from bridges.transports import addresses, notices
 from bridges.transports.threaded import LOOK_EVERY_S, Threaded
 from bridges.transports.transport import M, TransportError, any_type

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Protocol
 
-from bridges.host.log import pairs
+from bridges.system.log import pairs
 from drivers.hal import Bus, HalError
 from drivers.hal.every import Every
 from drivers.hal.gpio.dead_man import AFTER_S, GpioDeadMan

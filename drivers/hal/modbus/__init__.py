@@ -1,6 +1,6 @@
 """Modbus: the coils, discrete inputs and registers of units, over TCP or on a serial line (RTU).
 
-    settings.py   settings of the YAML; connections.py: address or line; watchdog.py: modules' watchdogs
+    settings.py   settings of the YAML; tcp_or_serial.py: address or line; watchdog.py: dead-man timers
     points.py     spelling of contacts and relays; registers.py: spelling of a map's places
     bus.py        the units of one connection or line: retries, pauses
     lines.py      one device's coils and registers: claim, read, write, read back, release; a second
@@ -13,7 +13,6 @@ Only frames.py (pymodbus) and rtu.py (pyserial) import a library. They are impor
 
 from drivers.hal import BusType
 from drivers.hal.modbus.bus import ModbusBus
-from drivers.hal.modbus.connections import Serial, Tcp
 from drivers.hal.modbus.points import canonical, describe, wire_problems
 from drivers.hal.modbus.settings import (
     ModbusSettings,
@@ -23,6 +22,7 @@ from drivers.hal.modbus.settings import (
     warnings,
     where,
 )
+from drivers.hal.modbus.tcp_or_serial import Serial, Tcp
 
 __all__ = [
     "BUS",

@@ -27,7 +27,7 @@ import serial
 
 from drivers.hal.deadline import Deadline
 from drivers.hal.modbus import frames
-from drivers.hal.modbus.connections import Serial
+from drivers.hal.modbus.tcp_or_serial import Serial
 from drivers.hal.modbus.wire import BadReply, NoReply, UnitReply, UnitRequest, Unreachable
 
 LATE: Final = 3.0

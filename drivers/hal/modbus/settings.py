@@ -8,8 +8,8 @@ import msgspec
 from bridges.kinds.shared.fields import Name, Period, tells
 from bridges.kinds.shared.remarks import Remarks
 from drivers.hal import BusSettings, Needs, UnwatchedOutputs, Where, serial_port
-from drivers.hal.modbus.connections import Serial, Tcp
 from drivers.hal.modbus.registers import Unit
+from drivers.hal.modbus.tcp_or_serial import Serial, Tcp
 from drivers.hal.modbus.watchdog import Watchdog
 
 Timeout = Annotated[float, msgspec.Meta(ge=0.05, le=5, extra={"unit": "s"})]

@@ -6,11 +6,11 @@ import json
 import pytest
 from msgspec.structs import replace
 
-from bridges.host.columns import width
 from bridges.messages import definitions as d
 from bridges.messages.heard import Heard
 from bridges.messages.stamps import stamp
 from bridges.runtime.diagnostics import diagnosis
+from bridges.system.columns import width
 from workbench.commands import watch
 from workbench.graph.board import (
     MOST_PLACES,

@@ -10,7 +10,7 @@ from msgspec import inspect as mi
 
 from bridges.kinds.shared.rmf_section import Rmf
 from bridges.settings import names as named
-from bridges.yaml.nodes import YamlFile
+from bridges.yaml.parsing import YamlFile
 from bridges.yaml.positions import Spot
 from bridges.yaml.values import Values
 from workbench.commissioning import reference

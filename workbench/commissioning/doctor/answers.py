@@ -11,8 +11,8 @@ from typing import Any, Final
 
 import msgspec
 
-from bridges.host.log import plain
 from bridges.settings.load import Config
+from bridges.system.log import plain
 from drivers import DriverError
 from drivers.hal import Bus, HalError
 from workbench.commissioning.doctor.finding import Finding, note, ok, warning, wrong

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-from bridges.host import directories as kept
-from bridges.host.directories import Directories
 from bridges.runtime import runtime_directory
 from bridges.settings.load import Config
+from bridges.system import directories as kept
+from bridges.system.directories import Directories
 from drivers.hal.gpio.header import canonical
 from workbench.commissioning.doctor import can, gpio, health, ports
 from workbench.commissioning.doctor.answers import answers, numbers

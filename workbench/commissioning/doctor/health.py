@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Final
 
-from bridges.host.directories import Directories
+from bridges.system.directories import Directories
 from workbench.commissioning.doctor.finding import Finding, note, ok, warning, wrong
 from workbench.commissioning.doctor.machine import Machine
 from workbench.commissioning.doctor.users import User

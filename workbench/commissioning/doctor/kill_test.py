@@ -16,8 +16,8 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Final
 
-from bridges.host.directories import Directories
 from bridges.runtime.record import Records
+from bridges.system.directories import Directories
 from workbench.commissioning.doctor.finding import Finding, ok, warning, wrong
 from workbench.commissioning.walk.core import WalkStep
 

@@ -8,12 +8,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final
 
-from bridges.host.directories import Directories
 from bridges.runtime import holder
 from bridges.runtime.daemons import DaemonStatus, daemons
 from bridges.runtime.faults import remedies
 from bridges.runtime.record import Records
 from bridges.runtime.subject import Status
+from bridges.system.directories import Directories
 from workbench.commissioning.doctor.finding import Finding, note, ok, warning, wrong
 
 DAEMON: Final = "daemon"

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Final
 
-from bridges.host.directories import GROUPS, SERVICE_USER
+from bridges.system.directories import GROUPS, SERVICE_USER
 from workbench.commissioning.doctor.finding import Finding, note, ok, wrong
 from workbench.commissioning.doctor.machine import Machine
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
-from bridges.host.log import plain
+from bridges.system.log import plain
 from drivers import Driver, DriverError
 from drivers.hal.points import Wire
 from workbench.commissioning.manual_control import not_off

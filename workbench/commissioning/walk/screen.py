@@ -11,8 +11,8 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Final, NamedTuple
 
-from bridges.host.columns import aligned, clipped, width, wrapped
-from bridges.host.paint import coloured, repainted
+from bridges.system.columns import aligned, clipped, width, wrapped
+from bridges.system.paint import coloured, repainted
 from workbench.commissioning.walk.bench import Bench, ContactReading
 from workbench.commissioning.walk.core import ByEye, Switch
 from workbench.commissioning.walk.signed import NOT_TRIED
@@ -27,7 +27,7 @@ UP, DOWN = "\x1b[A", "\x1b[B"
 KEY: Final = re.compile(r"\x1b\[[A-Z]|.", re.S)
 
 Lines = list[tuple[str, str]]
-"""Texts, each with its style (`bridges/host/paint.py`)."""
+"""Texts, each with its style (`bridges/system/paint.py`)."""
 
 
 class Screen:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from bridges import VERSION
-from bridges.host.files import replace
+from bridges.system.files import replace
 from workbench.commissioning.walk.bench import ContactReading
 from workbench.commissioning.walk.core import WalkMemory, WalkStep
 

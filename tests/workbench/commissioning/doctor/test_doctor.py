@@ -17,13 +17,13 @@ from typing import Any
 import pytest
 
 from bridges import cli
-from bridges.host.directories import Directories
 from bridges.messages.definitions import DoorMode, DoorModeValue, DoorState, Time
 from bridges.messages.topics import DOOR_REQUESTS, DOOR_STATES
 from bridges.runtime import record
 from bridges.runtime.holder import HOLDER
 from bridges.runtime.record import Records
 from bridges.settings.load import load
+from bridges.system.directories import Directories
 from hal_fakes.__main__ import served as served_by
 from hal_fakes.caller import Caller
 from hal_fakes.wire import join, wire

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from bridges.host.directories import Directories
+from bridges.system.directories import Directories
 from tests.workbench.commissioning.doctor.made_up import OTHERS, OURS, MadeUp
 from workbench.commissioning.doctor import health
 from workbench.commissioning.doctor.can import interface

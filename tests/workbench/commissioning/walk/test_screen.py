@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from bridges.host.columns import width
+from bridges.system.columns import width
 from drivers.hal.points import Wire
 from workbench.commissioning.walk.bench import Bench, ContactReading
 from workbench.commissioning.walk.core import Switch, WalkStep, decide

@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 from bridges import cli
-from bridges.host.directories import Directories
 from bridges.runtime.record import Records, of
 from bridges.settings.load import load
+from bridges.system.directories import Directories
 from tests.commands.terminal import Terminal
 from tests.processes import running
 from tests.runtime.site import Module, daemon, environment

@@ -7,11 +7,11 @@ from datetime import datetime
 import pytest
 from msgspec import Struct
 
-from bridges.host.log import Seldom, _Formatter, _Json, pairs, plain
 from bridges.kinds.door.signals import DoorOutputs
 from bridges.kinds.lift.signals import LiftOutputs, Side
 from bridges.kinds.shared.decision import OperatorReset
 from bridges.messages.definitions import LiftMode
+from bridges.system.log import Seldom, _Formatter, _Json, pairs, plain
 
 
 class Asked(Struct, frozen=True):

@@ -14,8 +14,8 @@ from msgspec import Struct
 from yaml import AliasEvent, MappingNode, Mark, MarkedYAMLError, Node, ScalarNode, SequenceNode
 from yaml.reader import ReaderError
 
-from bridges.host import user_files
 from bridges.messages.words import printable
+from bridges.system import user_files
 from bridges.yaml import typo_hints
 from bridges.yaml.problems import Problem as Problem
 from bridges.yaml.problems import SettingsError as SettingsError

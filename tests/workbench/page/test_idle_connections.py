@@ -1,6 +1,6 @@
 """Which connections wait too long: those that have asked for nothing yet."""
 
-from workbench.page.silent import MOST_SILENT_S, Silent
+from workbench.page.idle_connections import MOST_SILENT_S, Silent
 
 
 def test_an_idle_connection_is_listed_after_a_while_and_a_closed_one_is_forgotten() -> None:
