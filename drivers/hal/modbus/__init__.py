@@ -1,6 +1,6 @@
 """Modbus: the coils, discrete inputs and registers of units, over TCP or on a serial line (RTU).
 
-    settings.py   settings of the YAML: tcp_or_serial.py has the address or line, watchdog.py the watchdogs
+    settings.py   settings of the YAML; also tcp_or_serial.py (address or line) and watchdog.py
     points.py     spelling of contacts and relays; registers.py: spelling of a map's places
     bus.py        the units of one connection or line: retries, pauses
     lines.py      one device's coils and registers: claim, read, write, read back, release; a second
