@@ -1,4 +1,4 @@
-"""Find values for a charger's fields that the driver's rules and errors read as the wanted activity.
+"""Choose values for a charger's fields: the driver's rules and errors must read the wanted activity.
 
 Values are tried until the driver's own rules give that activity.
 """

@@ -1,7 +1,6 @@
-"""A charging station on HTTP: its plant's state in the maker's numbers or words and fields.
+"""A charging station on HTTP: it shows its plant's state in the maker's fields, as numbers or words.
 
-`GET state_path` answers the station's activity; the commands are clearing, start, stop and range check.
-
+`GET state_path` answers this state; the commands clear an error, start, stop and check the range.
 """
 
 import json

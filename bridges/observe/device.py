@@ -115,7 +115,7 @@ class ObservedDevice(ABC, Generic[T]):
 
     @abstractmethod
     def _settle(self, moment: Moment) -> Iterator[News]:
-        """Yield the news of a new state; `changed` is set, and `before` is None at the first state."""
+        """Yield the news of a new state. `changed` is up to date; at a first state `before` is None."""
 
     @abstractmethod
     def _hear_other(self, moment: Moment, topic: str, message: d.Message) -> Iterator[News]:

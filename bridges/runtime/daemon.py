@@ -83,8 +83,8 @@ class Daemon:
         self._writer = self._writer_of(ours)
         self._service = service(config, self._transport, open_bus, kept, unsafe, self._writer)
         self._loops = self._service.loops
-        # `outputs-off` reads the record. It is written once every bus is open, so a bus that cannot be
-        # opened leaves none; and before `serve`, which claims the outputs.
+        # The record, which `outputs-off` reads, is written once every bus is open: if a bus cannot be
+        # opened, there is none. It is written before `serve`, because `serve` claims the outputs.
         if config.buses and not simulated:
             self._convenience("mark", partial(last_mark.leave, name=last_mark.CLAIMED))
             runtime.claim(ours)

@@ -160,7 +160,7 @@ class FrameCharger:
     def _by_rules(
         self, reading: Reading, natural: Mapping[str, float], wrong: bool
     ) -> dict[str, float]:
-        """Return the values of the signals of rules, error numbers and error flags."""
+        """Return values for the signals of rules, error numbers and error bits; no error flags."""
         known = self._map
         flags = (*known.errors.station, *known.errors.robot)
         numbers = StationErrors(codes=known.errors.codes, bits=known.errors.bits)

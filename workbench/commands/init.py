@@ -230,8 +230,8 @@ def _ask(question: Question, offered: str, given: Given, found: BuildingMap | No
         import questionary
     except ModuleNotFoundError:
         raise Impossible(
-            "to ask, it needs questionary: in the clone, .venv/bin/pip install '.[laptop]'; or give"
-            " every answer as an option, or --yes"
+            "asking needs questionary: in the clone, .venv/bin/pip install '.[laptop]'. Without it,"
+            " give every answer as an option, or --yes"
         ) from None
     choices = question.choices(given)
     if found is not None and question.name == "name":

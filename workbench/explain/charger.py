@@ -20,7 +20,7 @@ from workbench.explain.rows import label
 REFUSED_LATELY_S: Final = 60.0
 
 Coordinator = Mapping[str, str]
-"""The coordinator's diagnostics: each charger's state, `queue`, `schedule`, `assigns`."""
+"""The coordinator's diagnostics: each charger's state, and the keys `queue`, `schedule`, `assigns`."""
 
 
 def answer(

@@ -1,4 +1,4 @@
-"""Decide when `send` sends and ends, and its text if the request has no effect.
+"""Decide when `send` publishes, when it ends, and what it prints if the request has no effect.
 
 Pure: `step(request, seen, now)`. A request is repeated at 1 Hz until its effect is seen, as in RMF.
 Only a state heard after the first request counts, because an earlier one may show the same for another

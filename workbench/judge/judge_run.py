@@ -17,7 +17,7 @@ from workbench.rmf_model import NEVER, Said
 LISTENS_S: Final = 4.0
 """Wait (s) before a play, for the device's state and other nodes."""
 APPEARS_S: Final = 15.0
-"""Time limit (s) of the first state: nodes must find each other."""
+"""Longest wait (s) for the device's first state: nodes must find each other."""
 SETTLES_S: Final = 4.0
 """Listening time (s) after a play, in which breaches may still show."""
 

@@ -66,7 +66,7 @@ class SiteWall:
     def rebuild(self) -> None:
         """Draw all cards that match the search, by kind and name."""
         self._missed = not self._client.has_socket_connection
-        self._built += 1  # equal content would not be sent
+        self._built += 1  # makes the content differ: equal content would not be sent
         wanted = str(self._find.value or "").lower()
         html = "".join(self._section(*section, wanted) for section in SECTIONS)
         none = "<p>No device is shown.</p>"

@@ -16,7 +16,7 @@ LONGEST = 100
 
 @cache
 def types_of(decide: Callable[..., Any]) -> Mapping[str, Any]:
-    """Return a core's types of `memory`, `event`, `outputs`, `report`; the last two may be None."""
+    """Return a core's types: `memory`, `event`, `outputs`, `report`. The last two also allow None."""
     hints = get_type_hints(decide)
     memory, outputs, report = get_args(hints["return"])
     told = {"outputs": Union[outputs, None], "report": Union[report, None]}  # noqa: UP007

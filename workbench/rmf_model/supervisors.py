@@ -82,7 +82,7 @@ def _satisfies(state: d.LiftState, held: d.LiftRequest) -> bool:
 
 
 class DoorSupervisor(Party):
-    """rmf_door_supervisor: the sessions of each door, with their beginnings.
+    """rmf_door_supervisor: each door's sessions, each with the time of its newest open request.
 
     The heartbeat is published on each adapter request and at no other time.
     """

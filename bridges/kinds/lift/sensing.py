@@ -124,7 +124,7 @@ def unsure(senses: LiftSenses, now: float) -> LiftSenses:
 
 
 def trust(senses: LiftSenses) -> LiftSenses:
-    """Believe the floor code, by an operator's reset."""
+    """Trust the suspected floor, because an operator has reset the lift."""
     position = senses.position
     if position.suspect is None:
         return senses

@@ -58,7 +58,7 @@ def report(memory: SupervisedLift, faults: Iterable[Fault]) -> SupervisorReport:
 
 
 def _waits(memory: SupervisedLift, faults: tuple[Fault, ...], *, queued: bool) -> str:
-    """Explain why the first session in the queue waits, or, without a queue, the one with the turn."""
+    """Say what the first session in the queue waits for; without a queue, the session with the turn."""
     turn, shown = memory.turn, memory.session_shown
     if not memory.claims:
         return ""

@@ -6,9 +6,8 @@ FRESHNESS-1. A request counts if it is newer than every earlier request of its r
    An END is compared with earlier ENDs only: an operator may end a robot's session, by another clock.
 FRESHNESS-2. A retained topic (`adapter_lift_requests`) replays up to 100 old requests of every adapter
    to each new subscriber, and again when an adapter's network comes back. There an equal stamp is a
-   replay, and a requester's first request counts only if it was sent after our own start. Once a
-   requester has counted, only its own stamps are compared. With `clock_synchronised` every request's
-   age is judged too.
+   replay. A requester's first request counts only if it was sent after our own start; its later ones
+   are compared with its own stamps only. With `clock_synchronised` every request's age is judged too.
 FRESHNESS-3. On a topic that is not retained (`adapter_door_requests`) an old request was delayed or
    arrived twice. There an equal stamp counts, as a requester without a clock always sends 0. A
    requester's first request counts. A requester that holds nothing is new again after a silence of
@@ -16,9 +15,9 @@ FRESHNESS-3. On a topic that is not retained (`adapter_door_requests`) an old re
 FRESHNESS-4. During the quiet start on a retained topic a stamp from the future does not count: our
    clock may not be set yet, and then every replayed request looks new.
 FRESHNESS-5. A rejected request may come from a live requester whose clock is wrong or was set back. It
-   counts after repeats, with stamps that rise or are all 0, for longer than a replay lasts (REPLAY_S,
-   retained topics), or than a message can be late (LATE_S, other topics). After a pause of
-   BROKEN_OFF_S, or a stamp that does not rise, that time starts again.
+   counts once it has been repeated for longer than a replay lasts (REPLAY_S, retained topics) or than
+   a message can be late (LATE_S, other topics). The repeats' stamps must rise, or all be 0. A pause of
+   BROKEN_OFF_S, or a stamp that does not rise, restarts that time.
 """
 
 from collections.abc import Collection, Mapping

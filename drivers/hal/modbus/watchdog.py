@@ -65,8 +65,8 @@ class Watchdog(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     """The modules' own watchdogs."""
 
     units: Annotated[list[Unit], msgspec.Meta(min_length=1), tells("the units that have one.")]
-    profile: Annotated[Name | None, tells("a file of drivers/profiles/ with its use.")] = None
-    habits: Annotated[Habits | None, tells("its use, written here instead of a profile.")] = None
+    profile: Annotated[Name | None, tells("a file of drivers/profiles/ for the watchdog.")] = None
+    habits: Annotated[Habits | None, tells("how to use it, written here, not in a profile.")] = None
 
     def problems(self) -> Remarks:
         """Yield problems: neither or both of profile and habits; a profile with problems."""
