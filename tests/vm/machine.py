@@ -120,10 +120,11 @@ class Machine:
         self.booted()
 
     def booted(self) -> None:
-        """Wait until the machine says that it is up."""
+        """Wait until the machine says that it is up. Raises Unusable."""
         self._port.settimeout(BOOT_S)
-        while "booted" not in self._heard():
-            continue
+        while "booted" not in (heard := self._heard()):
+            if not heard["passed"]:  # of a check that ends with a restart
+                raise Unusable(f"{heard['found']}\n{heard['log']}")
 
     def check(self, name: str) -> dict[str, Any]:
         """Run one check; how it ended."""
@@ -132,7 +133,7 @@ class Machine:
         return self._heard()
 
     def restarts(self, check: str) -> None:
-        """Run a check that ends with a restart of the machine."""
+        """Run a check that ends with a restart of the machine. Raises Unusable if it fails."""
         self._port.sendall(check.encode() + b"\n")
         self.booted()
 
