@@ -65,8 +65,9 @@ class ClaimRecord(Claimed, frozen=True):
     @property
     def name(self) -> str:
         """The name of the record's file, a hash of the claim."""
-        claimed = msgspec.json.encode(msgspec.structs.replace(self, safe=(), tried=False))
-        return f"claimed-{hashlib.sha256(claimed).hexdigest()[:16]}.json"
+        claimed = msgspec.structs.asdict(self) | {"safe": ()}
+        del claimed["tried"]  # newer than the names: every version gives a record the same one
+        return f"claimed-{hashlib.sha256(msgspec.json.encode(claimed)).hexdigest()[:16]}.json"
 
     def config(self) -> Config:
         """Return the claimed Config. Raises SettingsError.

@@ -277,7 +277,7 @@ def test_a_fleet_configuration_without_a_coordinator_is_compared_with_nothing(
         main(["check", "-q", "config/lift_one_hot.yaml", "--fleet-config", str(theirs)])
         == os.EX_CONFIG
     )
-    assert "no FILE is one" in capsys.readouterr().err
+    assert "no FILE is a charger coordinator's YAML" in capsys.readouterr().err
 
 
 def test_the_shipped_fleet_agrees_with_the_shipped_coordinator(
