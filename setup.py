@@ -1,4 +1,4 @@
-"""What pyproject.toml cannot say: the version names the commit that is built.
+"""Add the commit to the version, which pyproject.toml cannot do.
 
 `0.1.0+r900.gabcdef0` is the 900th commit; `.m` and the time of the last change follow for a checkout
 with changes. Where there is no git, the build is unknown: the version is 0.1.0, and the built `bridges`
@@ -30,7 +30,7 @@ def build() -> str:
 
 
 def _last_change(files: list[str]) -> str:
-    """When one of these, or its folder for one that is gone, was changed last."""
+    """Return the time of the last change to these files; a deleted one counts as its checkout."""
     there = [path if path.exists() else HERE for path in map(HERE.joinpath, files)]
     at = time.gmtime(max(path.stat().st_mtime for path in there))
     return time.strftime(".m%Y%m%d%H%M%S", at)

@@ -80,7 +80,7 @@ class Cards:
                 wall.change(told)
 
     def status(self) -> str:
-        """Return one line: the devices heard, and those that need attention."""
+        """Return the numbers of heard devices and of those that need attention, as one line."""
         told = " · ".join(self._told())
         return f'<p class="status" role="status">{told}</p>'
 
