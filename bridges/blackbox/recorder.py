@@ -13,7 +13,7 @@ from typing import Final
 
 from bridges.blackbox.entries import AnyEntry, Clocks, DaemonDied, DaemonEnded, Decided, Head, Known
 from bridges.blackbox.incident import AFTER_S, BEFORE_S, Incident, Note, part
-from bridges.blackbox.recordings import CONTINUOUS, Recordings
+from bridges.blackbox.recordings import CONTINUOUS, DEATH, Recordings, reason
 from bridges.blackbox.ring import DIED as DIED_NAME
 from bridges.blackbox.ring import NAME, RingContent, RingError, Tail
 from bridges.blackbox.triggers import AGAIN_S, DIED, Triggers
@@ -105,29 +105,30 @@ class Recorder:
         if served and not read.ended and self._is_first(read.head):
             at = entries[-1].at
             note = Note(at, DIED, _last_words(entries))
-            self._put(Incident(read.head, part(entries, at - BEFORE_S, at), (note,)), DIED)
+            self._put(Incident(read.head, part(entries, at - BEFORE_S, at), (note,)), DEATH)
 
     def _is_first(self, head: Head) -> bool:
         """Is this death still unrecorded, and not one of many in a row?"""
         last = self._died_at.get(head.file, AGES_AGO)
-        if self._recordings.has(head, DIED) or self._now() < last + AGAIN_S:
+        if self._recordings.has_death(head) or self._now() < last + AGAIN_S:
             return False
         self._died_at[head.file] = self._now()
         return True
 
-    def _put(self, incident: Incident, code: str) -> None:
+    def _put(self, incident: Incident, why: str) -> None:
         """Write a file. A failure is logged once, and the recording is lost."""
+        others = [followed.head.recording for followed in self._followed.values()]
         try:
-            path = self._recordings.put(incident, wall_of(incident.entries), code)
+            path = self._recordings.put(incident, wall_of(incident.entries), why, others)
         except OSError as error:
             if not self._failing:
                 log.warning(pairs("not_recorded", folder=self._recordings.folder, reason=error))
             self._failing = True
             return
         self._failing = False
-        if code != CONTINUOUS:
-            why = "; ".join(f"{n.subject} {n.code} {n.text}".strip() for n in incident.notes)
-            log.info(pairs("recorded", file=path, why=why))
+        if why != CONTINUOUS:
+            told = "; ".join(f"{n.subject} {n.code} {n.text}".strip() for n in incident.notes)
+            log.info(pairs("recorded", file=path, why=told))
 
 
 class _Followed:
@@ -176,7 +177,7 @@ class _Followed:
         self._notes = [note for note in self._notes if note.at > end_at]
         read, self._kept = self._read(), None
         entries = part(list(read.entries()), first.at - BEFORE_S, end_at)
-        return Incident(read.head, entries, notes), first.code
+        return Incident(read.head, entries, notes), reason(first.code, first.text)
 
     def _read(self) -> RingContent:
         """Read the ring; if it is gone, return its first content."""

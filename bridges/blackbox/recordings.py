@@ -1,21 +1,46 @@
-"""The store of recordings: their names, and limits that spare an SD card."""
+"""The store of recordings: their names, and limits that spare an SD card.
+
+All daemons of a machine share one store and one bound. Files of little value go first: files of
+`keep: continuous`, then repeats of a fault, then repeated deaths, then the first file of each cause,
+and the first death of a daemon last. Among equals the oldest goes first, by the time in its name.
+Files with other names are a person's: they are neither counted nor removed.
+"""
 
 import os
+import re
+import time
+from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from datetime import datetime
 from pathlib import Path
-from typing import Final
+from typing import Final, NamedTuple
 
 from bridges.blackbox.entries import Head
 from bridges.blackbox.incident import Incident
+from bridges.kinds.shared.recording_section import RecordingSettings
 
 LEAST_FREE: Final = 100_000_000
 """No recording is written to a disk with less room than this (bytes)."""
 SUFFIX: Final = ".mcap"
+CONTINUOUS: Final = "all"
+"""The word in the names of `keep: continuous` files; other files have their cause there."""
+DEATH: Final = "died"
+_NAME: Final = re.compile(r"(.+_)(\d+-\d+-\d+_\d+-\d+-\d+)_([^_]+)_[^_]+")
+_TIME: Final = "%Y-%m-%d_%H-%M-%S"
 
 
 class DiskFull(OSError):
     """The disk has too little room for a recording."""
+
+
+class Stored(NamedTuple):
+    """A file of the store. `at`: the time in its name (s since the epoch). `cause`: daemon and reason.
+    `size`: bytes."""
+
+    path: Path
+    at: float
+    cause: tuple[str, str]
+    size: int
 
 
 class Recordings:
@@ -30,24 +55,28 @@ class Recordings:
             with suppress(OSError):
                 begun.unlink()
 
-    def name(self, head: Head, wall: float, code: str) -> str:
+    def name(self, head: Head, wall: float, why: str) -> str:
         """Return `<file>_<day>_<time>_<why>_<run>.mcap`, in the machine's own time."""
-        when = datetime.fromtimestamp(wall).strftime("%Y-%m-%d_%H-%M-%S")
-        return f"{_stem(head)}_{when}_{code.lower()}_{head.run[:8]}{SUFFIX}"
+        when = datetime.fromtimestamp(wall).strftime(_TIME)
+        return f"{Path(head.file).stem}_{when}_{why}_{head.run[:8]}{SUFFIX}"
 
-    def has(self, head: Head, code: str) -> bool:
-        """Is there a recording of this run and for this reason already?"""
-        return any(self.folder.glob(f"*_{code.lower()}_{head.run[:8]}{SUFFIX}"))
+    def has_death(self, head: Head) -> bool:
+        """Is there a recording of this run's death already?"""
+        return any(self.folder.glob(f"*_{DEATH}_{head.run[:8]}{SUFFIX}"))
 
-    def put(self, incident: Incident, wall: float, code: str) -> Path:
-        """Write a recording, and remove the same daemon's oldest beyond its limits. Raises OSError."""
+    def put(
+        self, incident: Incident, wall: float, why: str, others: Iterable[RecordingSettings] = ()
+    ) -> Path:
+        """Write a recording, and remove files of little value beyond the machine's bound: the largest
+        of this daemon's and of the `others`. Raises OSError."""
         from bridges.blackbox import mcap_write
 
         self.folder.mkdir(mode=0o750, parents=True, exist_ok=True)
         self._require_room()
-        path = self.folder / self.name(incident.head, wall, code)
+        path = self.folder / self.name(incident.head, wall, why)
         mcap_write.write(path, incident)
-        self._prune(incident.head, path)
+        settings = (incident.head.recording, *others)
+        self._prune(path, max(s.files for s in settings), max(s.files_mb for s in settings) * 1e6)
         return path
 
     def _require_room(self) -> None:
@@ -55,28 +84,44 @@ class Recordings:
         if disk.f_bavail * disk.f_frsize < LEAST_FREE:
             raise DiskFull(f"less than {LEAST_FREE // 1_000_000} MB are free on {self.folder}")
 
-    def _prune(self, head: Head, newest: Path) -> None:
-        """Remove a daemon's oldest recordings beyond its limits, but never the newest."""
-        keep = head.recording
-        of_daemon = [p for p in self.folder.glob(f"{_stem(head)}_*{SUFFIX}") if _is_of(p, head)]
-        sized = sorted((p.stat().st_mtime_ns, p.stat().st_size, p) for p in of_daemon)
-        files, size = len(sized), sum(bytes_ for _, bytes_, _ in sized)
-        for _, bytes_, path in sized:
-            if files <= keep.files and size <= keep.files_mb * 1e6:
+    def _prune(self, newest: Path, most_files: int, most_bytes: float) -> None:
+        """Remove files beyond these limits, but never the newest."""
+        stored = [found for path in self.folder.glob(f"*{SUFFIX}") if (found := _stored(path))]
+        files, size = len(stored), sum(one.size for one in stored)
+        for one in least_valuable_first(stored, time.time()):
+            if files <= most_files and size <= most_bytes:
                 return
-            if path != newest:
-                path.unlink(missing_ok=True)
-                files, size = files - 1, size - bytes_
+            if one.path != newest:
+                one.path.unlink(missing_ok=True)
+                files, size = files - 1, size - one.size
 
 
-def _stem(head: Head) -> str:
-    return Path(head.file).stem
+def least_valuable_first(stored: Sequence[Stored], now: float) -> list[Stored]:
+    """Return the files in the order of their removal. `now`: s since the epoch; a file from the future
+    was written before the clock was set back, so that it counts as the oldest."""
+    by_age = sorted(stored, key=lambda one: (one.at <= now, one.at))
+    first = {one.cause: one for one in reversed(by_age)}
+
+    def value(one: Stored) -> tuple[bool, bool, bool]:
+        why = one.cause[1]
+        if why == CONTINUOUS:
+            return False, False, False
+        return True, first[one.cause] is one, why == DEATH
+
+    return sorted(by_age, key=value)
 
 
-def _is_of(path: Path, head: Head) -> bool:
-    """Is this a file of that daemon? A file of `door_1` is not one of `door`."""
-    return path.stem.rsplit("_", 4)[0] == _stem(head)
+def reason(code: str, text: str = "") -> str:
+    """Return a note's reason as a part of a file's name, such as `fault-lift-door-stuck`."""
+    cause = text.partition(":")[0] if code in ("FAULT", "REFUSED") else ""
+    return re.sub(r"[^a-z0-9]+", "-", f"{code} {cause}".lower()).strip("-")[:60]
 
 
-CONTINUOUS: Final = "all"
-"""The word in the names of `keep: continuous` files; other files have their cause there."""
+def _stored(path: Path) -> Stored | None:
+    """Return the file's name read; None for the name of a person's file."""
+    named = _NAME.fullmatch(path.stem)
+    with suppress(OSError, ValueError, OverflowError):
+        if named:
+            at = datetime.strptime(named[2], _TIME).timestamp()
+            return Stored(path, at, (named[1], named[3]), path.stat().st_size)
+    return None

@@ -1,6 +1,7 @@
 """The recorder: when a file is made, what is in it, and how many there may be."""
 
 import os
+import re
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -11,7 +12,7 @@ from msgspec.structs import replace
 from bridges.blackbox import recordings as stored
 from bridges.blackbox.entries import Decided, Head
 from bridges.blackbox.recorder import Recorder
-from bridges.blackbox.recordings import Recordings
+from bridges.blackbox.recordings import Recordings, Stored, least_valuable_first, reason
 from bridges.blackbox.ring import DIED, Ring, RingContent
 from bridges.kinds.lift.report import LiftReport
 from bridges.kinds.lift.signals import DoorReading, LiftOutputs, LiftRequested, LiftSample
@@ -32,7 +33,7 @@ from bridges.runtime.ring_writer import RingWriter
 from workbench.replay.bags import Notes, heard_in
 from workbench.replay.incidents import entries_in, head_of, notes_in
 
-WALL = 1_800_000_000.0
+WALL = 1_700_000_000.0
 REPORT = LiftReport(
     0.0, "L1", "", LiftDoor.DOOR_CLOSED, LiftMotion.MOTION_STOPPED, LiftMode.MODE_HUMAN, ""
 )
@@ -131,7 +132,7 @@ def test_a_fault_makes_one_file_with_what_went_before_and_what_followed(machine:
     machine.live(2, state)
 
     path = machine.only()
-    assert path.name.endswith("_fault_00000001.mcap")
+    assert path.name.endswith("_fault-fire_00000001.mcap")
     assert reasons(path) == [("FAULT", "Lift1", "FIRE")]
     assert head_of(path).run == "00000001"
     times = [one.wall - WALL for one in heard_in(path)]
@@ -156,7 +157,7 @@ def test_refusals_and_faults_are_reasons_for_a_recording_and_handovers_are_not(
     happens(machine)
     machine.live(40)
 
-    assert [name.split("_")[-2] for name in machine.files()] == ([why.lower()] if why else [])
+    assert [name.split("_")[-2].split("-")[0] for name in machine.files()] == ([why.lower()] if why else [])
 
 
 def test_the_same_cause_makes_no_second_file_within_ten_minutes(machine: Machine) -> None:
@@ -270,20 +271,93 @@ def test_a_daemon_that_ends_before_the_30_s_are_over_is_recorded_up_to_its_end(
     assert reasons(machine.only()) == [("FAULT", "Lift1", "FIRE")]
 
 
-def test_the_oldest_recordings_of_a_daemon_make_room_and_those_of_others_stay(
+def test_all_daemons_of_a_machine_share_one_bound_and_the_largest_in_a_yaml_counts(
     tmp_path: Path,
 ) -> None:
-    machine = Machine(tmp_path, RecordingSettings(files=2))
+    machine = Machine(tmp_path, RecordingSettings(files=3))
     machine.out.mkdir()
-    other = machine.out / "lift1_b_2026-01-01_00-00-00_fault_abcdefab.mcap"
-    other.touch()
-    made = []
-    for number in range(4):
-        machine.decide(SAMPLE, "", Fault(f"F{number}"))
-        machine.live(40)
-        made.append(max(set(machine.files()) - {other.name}))
+    (machine.out / "a_persons_own.mcap").touch()
+    others = [
+        "door_2026-01-01_00-00-00_waiting_abcdefab.mcap",
+        "door_2026-01-02_00-00-00_waiting_abcdefab.mcap",
+    ]
+    for name in others:
+        (machine.out / name).touch()
+    for _ in range(2):
+        machine.decide(SAMPLE, "", Fault("FIRE"))
+        machine.live(700)
+        machine.decide(SAMPLE)
+        machine.live(1)
 
-    assert machine.files() == sorted([other.name, *made[2:]])
+    first, again = [name for name in machine.files() if name.startswith("lift1")]
+    assert ["_fault-fire_" in name for name in (first, again)] == [True, True]
+    assert machine.files() == sorted(["a_persons_own.mcap", others[0], first, again])
+    assert Recordings(machine.out).has_death(head_of(machine.out / first)) is False
+
+
+def file(name: str, at: float, size: int = 1) -> Stored:
+    """Return a stored file with the name `<daemon> <reason>`."""
+    daemon, why = name.split(" ")
+    return Stored(Path(f"{daemon}_{why}_{at:.0f}"), at, (daemon, why), size)
+
+
+def removed(*files: Stored, now: float = 1000.0) -> list[str]:
+    return [one.path.name for one in least_valuable_first(files, now)]
+
+
+def test_repeats_of_a_flapping_fault_go_before_deaths_and_first_occurrences() -> None:
+    flapping = [file("lift fault-offline", at) for at in range(10, 50, 10)]
+    death, once = file("lift died", 5), file("door refused-malformed", 1)
+
+    assert removed(death, *flapping, once) == [
+        "lift_fault-offline_20",
+        "lift_fault-offline_30",
+        "lift_fault-offline_40",
+        "door_refused-malformed_1",
+        "lift_fault-offline_10",
+        "lift_died_5",
+    ]
+
+
+def test_files_of_everything_go_before_every_incident() -> None:
+    everything = [file("lift all", at) for at in (500, 600)]
+
+    assert removed(file("lift fault-fire", 1), file("lift fault-fire", 2), *everything) == [
+        "lift_all_500",
+        "lift_all_600",
+        "lift_fault-fire_2",
+        "lift_fault-fire_1",
+    ]
+
+
+def test_a_file_from_the_future_counts_as_the_oldest_so_that_new_files_stay() -> None:
+    by_wrong_clock = [file("lift fault-fire", at) for at in (9000, 9001, 9002)]
+    new = [file("lift fault-fire", at) for at in (998, 999)]
+
+    assert removed(*new, *by_wrong_clock) == [
+        "lift_fault-fire_9001",
+        "lift_fault-fire_9002",
+        "lift_fault-fire_998",
+        "lift_fault-fire_999",
+        "lift_fault-fire_9000",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("code", "text", "named"),
+    [
+        ("FAULT", "DOOR_STUCK: no end for 10 s", "fault-door-stuck"),
+        ("REFUSED", "unknown floor: L9", "refused-unknown-floor"),
+        ("REFUSED", "../" * 30 + "L9", "refused"),
+        ("WAITING", "fleet/r1 has waited for L3 for 181 s", "waiting"),
+        ("DIED", "it ended without an entry", "died"),
+    ],
+)
+def test_a_files_name_has_the_reason_and_nothing_from_the_network(
+    code: str, text: str, named: str
+) -> None:
+    assert reason(code, text).startswith(named)
+    assert re.fullmatch("[a-z0-9-]{1,60}", reason(code, text))
 
 
 def test_a_full_disk_loses_recordings_and_is_logged_once(

@@ -23,8 +23,15 @@ class RecordingSettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknow
         `nothing` keeps nothing."""),
     ] = "ring"
     ring_mb: Annotated[Megabytes, tells("its size. 1 MB is 10 minutes or more of a lift.")] = 1.0
-    files: Annotated[Files, tells("how many files of this daemon the recorder keeps.")] = 40
-    files_mb: Annotated[Space, tells("how large these files may be together.")] = 100.0
+    files: Annotated[
+        Files,
+        tells("""how many files the recorder keeps, of all daemons of the machine together. If their
+        YAMLs differ, the largest number counts."""),
+    ] = 400
+    files_mb: Annotated[
+        Space,
+        tells("how large these files may be together. The largest number counts here too."),
+    ] = 200.0
     waiting_s: Annotated[
         Patience, tells("a file is made when a requester has waited this long.")
     ] = 180.0
