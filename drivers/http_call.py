@@ -58,10 +58,15 @@ def claim(call: Call) -> str:
     return f"{call.method} {call.path}{f' {call.body}' if call.body else ''}"
 
 
-def timer_unseen(call: Call, off_s: float) -> bool:
-    """Does this command lack the number of the relay's timer, in seconds and in ms?"""
-    numbers = re.findall(r"[0-9]+(?:\.[0-9]+)?", f"{call.path} {call.body or ''}")
-    return not {off_s, 1000 * off_s}.intersection(map(float, numbers))
+def timer_unseen(call: Call, off_s: float) -> str:
+    """Describe a command without the number of the relay's timer, in seconds or in ms; "" with it."""
+    written = f"{call.path} {call.body or ''}".strip()
+    numbers = re.findall(r"[0-9]+(?:\.[0-9]+)?", written)
+    if {off_s, 1000 * off_s}.intersection(map(float, numbers)):
+        return ""
+    return (
+        f"no timer of {off_s:g} s (switches_off_after_s) can be seen in {written}: compare the two"
+    )
 
 
 def described(call: Call, api: http.Base) -> str:

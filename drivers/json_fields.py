@@ -137,8 +137,12 @@ def name(answer: Mapping[str, object], field: str) -> str:
 
 
 def wrong(field: str, value: object, wanted: str) -> DriverError:
-    """Return an error with the field, its value and the expected value."""
-    return DriverError(f"'{field}' is {clean(reprlib.repr(value), 40)}, and {wanted} is expected")
+    """Return an error with the field, its value as JSON has it, and the expected value."""
+    words = {"True": "true", "False": "false", "None": "null"}
+    shown = reprlib.repr(value)
+    return DriverError(
+        f"'{field}' is {clean(words.get(shown, shown), 40)}, and {wanted} is expected"
+    )
 
 
 def clean(said: str, longest: int = TEXT_MAX) -> str:

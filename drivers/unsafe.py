@@ -40,8 +40,8 @@ def energised_at_boot(wires: Iterable[Wire]) -> Iterator[Unsafe]:
             yield (
                 wire.signal,
                 wire.path,
-                f"{gpio.describe(wire.point)} is pulled {pulled} from power-on until the daemon"
-                f" starts, and its relay is on at {pulled}: use {use}, or the other active level",
+                f"{gpio.describe(wire.point)} is pulled {pulled} from power-on through boot, and"
+                f" its relay is on at {pulled}: use {use}, or the other active level",
             )
 
 

@@ -13,6 +13,7 @@ Structs define the content of a section (`bridges/yaml/values.py`); this file an
 sections against each other. The daemon takes nothing else from the file, and checks nothing again.
 """
 
+from functools import partial
 from pathlib import Path
 from typing import Final
 
@@ -24,6 +25,7 @@ from bridges.kinds.shared.fields import DeviceSettings, Name
 from bridges.kinds.shared.graph_kind import AnyGraphKind, AnyKind, GraphKind
 from bridges.kinds.shared.recording_section import RecordingSettings
 from bridges.kinds.shared.rmf_section import Rmf
+from bridges.kinds.shared.rmf_section import warnings as rmf_warnings
 from bridges.messages import topics
 from bridges.settings import names as named
 from bridges.settings.buses import BusRead, read_bus
@@ -34,7 +36,7 @@ from bridges.settings.wiring import Use, WiringCheck, note_conflicts, note_unkno
 from bridges.yaml.parsing import Problem, SettingsError, YamlFile, compose, read
 from bridges.yaml.positions import MappingEntry, Spot, below, is_none, locate
 from bridges.yaml.spelling import either, unknown
-from bridges.yaml.values import BROKEN, Broken, Values
+from bridges.yaml.values import BROKEN, Broken, Values, field_names
 from drivers.driver_type import AnyDriver
 from drivers.hal.points import Wire
 
@@ -173,6 +175,8 @@ class _DeviceReading:
             if name not in TOPICS:
                 key = locate(spot, ("topics", name)).key
                 self._page.note(key, unknown("topic", name, TOPICS))
+        for path, text in rmf_warnings(rmf):
+            self._warn(locate(spot, path).where(), text)
 
     def _read_section(self, entry: MappingEntry | None, kind: AnyGraphKind) -> None:
         """Read the settings of a kind without devices; the section may be optional."""
@@ -214,6 +218,7 @@ class _DeviceReading:
 
     def _read_devices(self, spot: Spot) -> None:
         entries = self._names(spot, (self._kind.name if self._kind else ""))
+        entries = self._without_sections(entries)
         buses = [self._bus_name(entry) for entry in entries]
         for entry, bus in zip(entries, buses, strict=True):
             driver = self._driver_of(entry.name)
@@ -225,6 +230,16 @@ class _DeviceReading:
             if entries and name not in buses and None not in buses:
                 text = f"no device uses the bus '{name}': delete it, or name it in a 'bus:'"
                 self._page.note(self._buses[name].entry.key, text)
+
+    def _without_sections(self, entries: list[MappingEntry]) -> list[MappingEntry]:
+        """Return the devices; note each section of a device that stands beside it."""
+        keys = field_names(self._driver.settings) if self._driver else set()
+        devices = [entry for entry in entries if entry.name not in keys]
+        for entry in entries if devices else ():
+            if entry.name in keys:
+                text = f"'{entry.name}' stands beside '{devices[0].name}': indent it below"
+                self._page.note(entry.key, f"{text} '{devices[0].name}'")
+        return devices or entries
 
     def _can_stand(self, device: MappingEntry, bus: str | None, driver: AnyDriver) -> bool:
         """Can the device's own driver use its bus? The file's driver was checked with the bus."""
@@ -257,7 +272,7 @@ class _DeviceReading:
         spot = Spot(entry.value, entry.key, entry.spot().label)
         hal = self._buses[bus].hal if bus else None
         wiring = WiringCheck(self._page, entry.name, bus or "", hal)
-        values = Values(self._page, wiring.checks)
+        values = Values(self._page, wiring.checks, partial(named.owner, self._kind_name))
         before = len(self._page.problems)
         settings = values.make(driver.settings, spot)
         if settings is BROKEN:
@@ -312,11 +327,21 @@ class _DeviceReading:
         for name, bus in () if self._page.problems else self._buses.items():
             assert bus.hal
             unwatched = bus.hal.unwatched(bus.settings, self._written.get(name, ()))
-            for path, text in unwatched.warnings:
+            paced = bus.hal.paced(bus.settings, self._on_bus(name), self._points(name))
+            for path, text in (*unwatched.warnings, *paced):
                 self._warn(locate(bus.entry.spot(), path).where(), f"bus '{name}': {text}")
             for path, text in unwatched.notes:
                 node = locate(bus.entry.spot(), path).where()
                 self._notes.append(self._page.problem(node, f"note: bus '{name}': {text}"))
+
+    def _on_bus(self, bus: str) -> list[DeviceSettings]:
+        """Return the devices on this bus."""
+        found = self._devices.values()
+        return [device for device in found if device.bus in (bus, None)]
+
+    def _points(self, bus: str) -> list[str]:
+        """Return the canonical points in use on this bus."""
+        return [use.point for use in self._uses if use.bus == bus]
 
     def _warn(self, node: Node, text: str) -> None:
         self._warnings.append(self._page.problem(node, f"warning: {text}"))

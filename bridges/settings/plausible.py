@@ -58,4 +58,5 @@ def _stale_readings(device: DeviceSettings, scan_s: float) -> Remarks:
     stale_s = device.stale_after()
     if stale_s is not None and scan_s >= stale_s:
         text = f"stale_after_s is {stale_s:g}, but its bus is read every {scan_s:g} s (scan_s)"
-        yield ("limits", "stale_after_s"), f"{text}: readings would always be stale; lower scan_s"
+        fix = f"raise stale_after_s above {scan_s:g}, or lower scan_s"
+        yield ("limits", "stale_after_s"), f"{text}: readings would always be stale; {fix}"

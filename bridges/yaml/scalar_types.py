@@ -32,7 +32,8 @@ from bridges.yaml.spelling import either, nearest, short
 from bridges.yaml.typo_hints import has_unit, number_meant
 
 Extra = Mapping[str, str]
-"""A field's `Meta(extra=…)`: its `unit`, its `pattern` in words, its `check`."""
+"""A field's `Meta(extra=…)`: its `unit`, its `pattern` in words, the reason for its `least` value, its
+`check`."""
 
 
 class WrongScalar(Exception):
@@ -143,13 +144,31 @@ def _reason(wanted: Type, node: ScalarNode, extra: Extra, length: bool) -> str:
         meant = f" (did you mean '{near}'?)" if near else ""
         return f"is '{written}': write {wanted_text(wanted)}{meant}"
     if not isinstance(wanted, StrType):
-        return f"is {written}: write {wanted_text(wanted, extra)}"
+        why = _milliseconds(wanted, node, extra) or _too_little(wanted, node, extra)
+        return f"is {written}: write {wanted_text(wanted, extra)}{why}"
     if length:
         least, most = wanted.min_length or 0, wanted.max_length
         span = f"at least {least}" if most is None else f"{least} to {most}"
         return f"has {len(node.value)} characters: {span} are allowed"
     form = extra.get("pattern", "text of another form")
     return f"is '{written}': write {form}"
+
+
+def _too_little(wanted: Type, node: ScalarNode, extra: Extra) -> str:
+    """Return the reason for the least value, if the type has one and the value is below it."""
+    value, least = number(node.value), getattr(wanted, "ge", None)
+    small = value is not None and least is not None and value < least
+    return f"; {extra['least']}" if small and "least" in extra else ""
+
+
+def _milliseconds(wanted: Type, node: ScalarNode, extra: Extra) -> str:
+    """Return how to write, in seconds, a duration given in milliseconds; "" if that does not fit."""
+    if extra.get("unit") != "s" or not isinstance(wanted, FloatType):
+        return ""
+    value, least, most = number(node.value), wanted.ge, wanted.le
+    if value is None or least is None or most is None or not least <= value / 1000 <= most < value:
+        return ""
+    return f"; for {value:g} milliseconds write {value / 1000:g}"
 
 
 def _check_text(node: ScalarNode, extra: Extra) -> None:

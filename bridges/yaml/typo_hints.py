@@ -32,6 +32,9 @@ FIXES |= {
 _OPEN = {"expected ',' or '}'": "{", "expected ',' or ']'": "["}
 _INDENT = re.compile(r"expected <block end>, but found '<block (mapping|sequence) start>'")
 _ODD = re.compile("[\u00a0\u00ad\u1680\u2000-\u200f\u2028-\u202f\u205f\u2060\u3000\ufeff]")
+_GLUED = re.compile(r"\s*(?:- )?([A-Za-z_][\w.-]*):(?=[^\s/:])(.*)")
+_QUOTED = re.compile(r'[:,\[{] *"[^"\n]*"\w+"')
+"""A text in double quotes that goes on with a word and a third double quote."""
 _CURLY = ("\u201c", "\u201d", "\u201e", "\u2018", "\u2019", "\u201a", "\u00ab", "\u00bb")
 
 
@@ -42,10 +45,18 @@ def reason(error: MarkedYAMLError, text: str) -> str:
     since = error.context_mark or where
     if where and since and (odd := _odd_in(lines, since.line, where.line)):
         return odd
+    if where and since and (glued := _glued_in(lines[since.line : where.line + 1], since.line)):
+        return glued
+    if where and "but found '?'" in problem and since:
+        return (
+            f"a key beside the '- ' of line {since.line + 1}: delete that '- ', or indent this line"
+        )
     if where and (_INDENT.search(problem) or _SECOND in problem) and _follows_no_key(lines, where):
         return "the line above has no ': ': a key is followed by a colon and a space"
     if where and _INDENT.search(problem):
         return _indent(lines, where, since or where)
+    if where and since and _QUOTED.search("\n".join(lines[since.line : where.line + 1])):
+        return "double quotes inside double quotes: put the whole text in single quotes"
     for expected, bracket in _OPEN.items():
         if problem.startswith(expected) and since:
             return (
@@ -67,12 +78,24 @@ def _odd_in(lines: list[str], first: int, last: int) -> str:
     return ""
 
 
+def _glued_in(lines: list[str], first: int) -> str:
+    """Describe the first key without a space after its colon; "" if there is none."""
+    for number, line in enumerate(lines, first + 1):
+        if found := _GLUED.match(line.partition(" #")[0].rstrip()):
+            return f"no space after the colon on line {number}: write {found[1]}: {found[2]}"
+    return ""
+
+
 def _indent(lines: list[str], where: Mark, since: Mark) -> str:
-    above = [line for line in lines[since.line : where.line] if line.strip(" ")]
-    indents = sorted({_spaces(line) for line in above if not line.lstrip(" ").startswith("#")})
-    begin = " or ".join(map(str, indents))
-    ours = _spaces(lines[where.line])
-    return f"wrong indent: {ours} before this line, {begin} before those above it (in spaces)"
+    first: dict[int, int] = {}
+    for number, line in enumerate(lines[since.line : where.line], since.line + 1):
+        if line.strip(" ") and not line.lstrip(" ").startswith("#"):
+            first.setdefault(_spaces(line), number)
+    above = " or ".join(f"{spaces} (line {first[spaces]})" for spaces in sorted(first))
+    return (
+        f"wrong indent: {_spaces(lines[where.line])} spaces before this line, {above} before those"
+        " above: keys of one section have the same indent"
+    )
 
 
 def _spaces(line: str) -> int:

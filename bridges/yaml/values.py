@@ -8,8 +8,9 @@ The structs, with their bounds and units, are the only description of a file's c
 from collections.abc import Callable, Hashable, Mapping
 from enum import Enum
 from functools import cache
-from typing import Final, TypeVar, overload
+from typing import Final, NamedTuple, TypeVar, overload
 
+import msgspec
 from msgspec import inspect
 from msgspec.inspect import (
     DictType,
@@ -23,6 +24,7 @@ from msgspec.inspect import (
 )
 from yaml import MappingNode, Node, ScalarNode, SequenceNode
 
+from bridges.yaml.misplaced_keys import bare, glued, is_decimals, misplaced, sections_of
 from bridges.yaml.parsing import YamlFile, is_plain
 from bridges.yaml.positions import MappingEntry, Spot, is_none, locate
 from bridges.yaml.scalar_types import Extra, WrongScalar, leaf, looks, wanted_text
@@ -41,6 +43,11 @@ def described(cls: Hashable) -> Type:
     return inspect.type_info(cls)
 
 
+def field_names(struct: type[msgspec.Struct]) -> set[str]:
+    """Return the keys of a struct, as a YAML has them."""
+    return {field.encode_name for field in msgspec.structs.fields(struct)}
+
+
 class Broken(Enum):
     """The type of BROKEN, the mark for an invalid value."""
 
@@ -53,15 +60,19 @@ _LISTS = (ListType, VarTupleType)
 _MAPPINGS = (DictType, StructType)
 
 
-def _bare(wanted: Type) -> Type:
-    return wanted.type if isinstance(wanted, Metadata) else wanted
-
-
 def _node_of(wanted: Type) -> type[Node]:
-    wanted = _bare(wanted)
+    wanted = bare(wanted)
     if isinstance(wanted, _LISTS):
         return SequenceNode
     return MappingNode if isinstance(wanted, _MAPPINGS) else ScalarNode
+
+
+class _Around(NamedTuple):
+    """A section that is being read: its fields, as `known` takes them, and the column of its keys."""
+
+    spot: Spot
+    fields: Mapping[str, str | None]
+    column: int
 
 
 Check = Callable[[str, Spot], str | None]
@@ -72,12 +83,20 @@ class Values:
     """Converts one file's nodes to values, and notes problems on its page.
 
     `checks`: for texts whose type has `Meta(extra={"check": name})`. Such a text is taken as written,
-    and only its check accepts or refuses it. `structs`: every struct made so far.
+    and only its check accepts or refuses it. `structs`: every struct made so far. `owner(key)`: says
+    where a key of the outermost struct belongs that the struct does not have; "" if nobody knows it.
     """
 
-    def __init__(self, page: YamlFile, checks: Mapping[str, Check] | None = None) -> None:
+    def __init__(
+        self,
+        page: YamlFile,
+        checks: Mapping[str, Check] | None = None,
+        owner: Callable[[str], str] = lambda key: "",
+    ) -> None:
         self._page = page
         self._checks = checks or {}
+        self._owner = owner
+        self._around: list[_Around] = []
         self.structs: list[tuple[tuple[str, ...], object]] = []
 
     @overload
@@ -129,12 +148,29 @@ class Values:
         near = {nearest(name, fields) for name in found if name not in fields}
         for before, entry in zip([None, *entries], entries, strict=False):
             if entry.name not in fields:
-                text = _misplaced(entry, before, elsewhere or {})
+                if before and is_decimals(entry, before):  # the value before it is not meant
+                    found.pop(before.name)
+                text = misplaced(entry, before, elsewhere or {}) or self._too_deep(entry)
+                text = text or (
+                    "" if spot.path or nearest(entry.name, fields) else self._owner(entry.name)
+                )
                 self._page.note(entry.key, text or unknown("key", entry.name, fields))
         for name, wanted in fields.items():
             if isinstance(spot.node, MappingNode) and wanted and name not in {*found, *near}:
-                self._page.note(spot.at, f"{spot.label} needs '{name}': {wanted}")
+                self._page.note(spot.at, _missing(spot, name, wanted))
         return {name: entry for name, entry in found.items() if name in fields}
+
+    def _too_deep(self, entry: MappingEntry) -> str:
+        """Describe a key that belongs to a section around this one; the section then lacks no key."""
+        for around in reversed(self._around):
+            if entry.name in around.fields:
+                missing = _missing(around.spot, entry.name, around.fields[entry.name] or "")
+                self._page.problems[:] = [p for p in self._page.problems if p.text != missing]
+                return (
+                    f"'{short(entry.name)}' is indented too far: it belongs to {around.spot.label},"
+                    f" {around.column} spaces from the left"
+                )
+        return ""
 
     def _value(self, wanted: Type, spot: Spot, extra: Extra | None = None) -> object:
         if isinstance(wanted, Metadata):
@@ -200,6 +236,10 @@ class Values:
         entries = self.entries(spot)
         broken = len(self._page.problems) > before
         for entry in entries:
+            if slip := glued(entry):
+                self._page.note(entry.key, slip)
+                broken = True
+                continue
             key = self._value(wanted.key_type, Spot(entry.key, entry.key, "this key"))
             value = self._value(wanted.value_type, entry.spot(spot.path))
             if key is not BROKEN and key in made:
@@ -216,13 +256,18 @@ class Values:
         known = {n: wanted_text(f.type) if f.required else None for n, f in fields.items()}
         before = len(self._page.problems)
         fitting = {**dict.fromkeys(besides), **known}
-        found = self.known(self.entries(spot), spot, fitting, sections_of(wanted))
+        entries = self.entries(spot)
+        found = self.known(entries, spot, fitting, sections_of(wanted))
         broken = len(self._page.problems) > before
+        self._around.append(
+            _Around(spot, known, entries[0].key.start_mark.column if entries else 0)
+        )
         values = {
             fields[name].name: self._value(fields[name].type, entry.spot(spot.path))
             for name, entry in found.items()
             if name in fields
         }
+        self._around.pop()
         if broken or BROKEN in values.values():
             return BROKEN
         made = wanted.cls(**values)
@@ -259,41 +304,8 @@ class Values:
             self._page.note(where, f"{spot.label} is {looks(spot.node)}: write {wanted}")
 
 
-def sections_of(wanted: StructType) -> dict[str, str]:
-    """Return the keys of a struct's sections: key -> its section; "" for the struct's own keys."""
-    own = {field.encode_name for field in wanted.fields}
-    types = [(f.encode_name, _bare(f.type)) for f in wanted.fields]
-    inner = [
-        (name, part)
-        for name, type_ in types
-        for part in (type_.types if isinstance(type_, UnionType) else (type_,))
-        if isinstance(part, StructType)
-    ]
-    return {f.encode_name: name for name, part in inner for f in part.fields} | dict.fromkeys(
-        own, ""
-    )
-
-
-def _misplaced(
-    entry: MappingEntry, before: MappingEntry | None, elsewhere: Mapping[str, str]
-) -> str:
-    """Describe the typing slip behind an unknown key; "" if none is found."""
-    empty = before is not None and _is_empty(before.value)
-    if before is not None and empty and not _is_empty(entry.value):
-        return (
-            f"'{short(entry.name)}' stands beside '{before.name}', which is empty: indent it below"
-        )
-    if before is not None and entry.name.isdecimal() and _is_empty(entry.value):
-        written = before.value.value
-        if isinstance(before.value, ScalarNode) and written.isdecimal():
-            return f"a comma inside a number: write {written}.{entry.name}"
-    if section := elsewhere.get(entry.name):
-        return f"'{short(entry.name)}' does not belong here: it stands below '{section}'"
-    return ""
-
-
-def _is_empty(node: Node) -> bool:
-    return isinstance(node, ScalarNode) and is_plain(node) and not node.value
+def _missing(spot: Spot, name: str, wanted: str) -> str:
+    return f"{spot.label} needs '{name}': {wanted}"
 
 
 def _of_subject(path: tuple[str, ...], name: str, label: str, text: str) -> str:

@@ -166,14 +166,16 @@ def warnings(settings: HttpChargerSettings) -> Remarks:
     if not _lacks(settings, "receiver_id") and not settings.receivers:
         yield ("fields",), "receiver_id is read, but without receivers nobody is verified"
     off_s = settings.switches_off_after_s
-    if settings.start and off_s is not None and timer_unseen(settings.start, off_s):
-        text = f"start sets no timer of {off_s:g} s that can be seen in it: compare the two"
+    if settings.start and off_s is not None and (text := timer_unseen(settings.start, off_s)):
         yield ("start", "path"), text
     if settings.codes and not settings.codes.error:
         yield ("codes",), "no code means error: each of them will be shown as an unknown state"
 
     known = settings.codes.meanings() if settings.codes else {}
     for word, code in settings.state_words.items():
+        if word in ("true", "false"):
+            text = f'matches the text "{word}" and no JSON {word}: for that write rules:'
+            yield ("state_words", word), text
         if code not in known:
             yield ("state_words", word), f"{code} is not in codes: an unknown state"
 

@@ -121,11 +121,8 @@ def warnings(settings: HttpDoorSettings) -> Remarks:
             "pull the network plug while the door is held, and see that it is released in this time"
         )
         yield ("switches_off_after_s",), text
-        if timer_unseen(settings.hold, settings.switches_off_after_s):
-            text = (
-                f"hold sets no timer of {settings.switches_off_after_s:g} s that can be seen in it"
-            )
-            yield ("hold", "path"), f"{text}: compare the two"
+        if text := timer_unseen(settings.hold, settings.switches_off_after_s):
+            yield ("hold", "path"), text
     yield from needlessly_accepted(_unsafe(settings), settings.accept_unsafe)
     if settings.held is None:
         yield (), "held is not read: that the door was released is not verified"

@@ -11,6 +11,7 @@ from typing import Any, Generic, Literal, NamedTuple, TypeAlias, TypeVar
 
 import msgspec
 
+from bridges.kinds.shared.fields import DeviceSettings
 from bridges.kinds.shared.remarks import Remark, Remarks
 from drivers.hal.points import HalError, Wire
 
@@ -103,6 +104,8 @@ class BusType(msgspec.Struct, Generic[Settings], frozen=True):
     `fake_inside`: the fake must run in the daemon's process, as for pins.
     `unwatched(settings, places)`: remarks on those of `places`, written by the daemon, that keep their
     value when its machine or the network dies.
+    `paced(settings, devices, points)`: remarks on settings that are too slow for these devices on the
+    bus, and for its canonical points in use.
 
     A bus with points also has
     `canonical(point)`: the canonical spelling of a point; the text of its ValueError has the fix;
@@ -120,6 +123,9 @@ class BusType(msgspec.Struct, Generic[Settings], frozen=True):
     warnings: Callable[[Settings], Remarks] = lambda settings: ()
     unwatched: Callable[[Settings, Iterable[str]], UnwatchedOutputs] = lambda settings, places: (
         UnwatchedOutputs()
+    )
+    paced: Callable[[Settings, Sequence[DeviceSettings], Iterable[str]], Remarks] = (
+        lambda settings, devices, points: ()
     )
     fake: str = ""
     fake_inside: bool = False

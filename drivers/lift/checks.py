@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from functools import partial
+from itertools import pairwise
 
 from bridges.kinds.lift.settings import LiftSettings
 from bridges.kinds.lift.signals import Hazard, Side
@@ -53,6 +54,8 @@ def warnings(wiring: LiftWiring) -> Remarks:
         reads_standing = signal == "stopped"
         for _, path, text in _cut(table, signal, not reads_standing, "the car reads standing"):
             yield path, text
+    if not wiring.floor_code.lines:
+        yield from counts_down(wiring, wiring.floor_code.codes, ("floor_code", "codes"))
     confused = floor_warnings(wiring.floor_code, table)
     if confused:
         yield ("floor_code",), f"{confused}: ask for a parity line, or for codes two lines apart"
@@ -161,6 +164,20 @@ def floors(wiring: LiftSettings) -> Remarks:
         seen[stop] = name
 
 
+def counts_down(settings: LiftSettings, codes: Mapping[int, str], path: tuple[str, ...]) -> Remarks:
+    """Yield a warning if the floors' numbers fall from the lowest floor to the highest."""
+    numbers = [
+        min((n for n, at in codes.items() if at == level), default=0) for level in settings.levels()
+    ]
+    if len(numbers) > 2 and all(above < below for below, above in pairwise(numbers)):
+        lowest, highest = settings.levels()[0], settings.levels()[-1]
+        yield (
+            path,
+            f"these numbers count down from {lowest} to {highest}, and floors has {lowest} as the"
+            " lowest: unless the controller counts from the top, one of the two is reversed",
+        )
+
+
 def named(
     what: str, section: tuple[str, ...], given: Collection[str], levels: Collection[str]
 ) -> Remarks:
@@ -229,6 +246,12 @@ def _doors(wiring: LiftWiring) -> Remarks:
             yield ("inputs",), f"no {prefix} contact: {prefix}, or {prefix}_opened and _closed"
         elif not needed and (single or any(two)):
             yield ("inputs",), "a rear door is wired, and no floor has side: rear"
+        travel_s = wiring.limits.door_travel_s
+        if single and wiring.limits.door_timeout_s <= travel_s:
+            text = (
+                f"must be longer than door_travel_s ({travel_s:g} s): no opening would be in time"
+            )
+            yield ("limits", "door_timeout_s"), text
     if rear and outputs.door_open and not outputs.rear_door_open:
         yield ("outputs",), "no rear_door_open, and some floors have side: rear"
 

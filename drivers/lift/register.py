@@ -78,6 +78,7 @@ def warnings(settings: RegisterLiftSettings) -> Remarks:
     asks, holds = bool(commands.agv_mode_request), bool(commands.door_open)
     yield from checks.missing(settings, ("map",), told, asks, fire, holds)
     yield from checks.unseen(settings, found.shows)
+    yield from checks.counts_down(settings, found.floor.codes, ("map", "floor", "codes"))
     if not commands.read_back:
         text = "commands cannot be read back: that they are off is not verified"
         yield ("map", "commands", "read_back"), text

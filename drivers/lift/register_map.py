@@ -228,6 +228,7 @@ class Commands(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
         if self.calls and self.call:
             yield ("calls",), "calls and call are two ways of calling: keep one"
         taken: dict[str, int] = {}
+        owners: dict[str, list[str]] = {}
         values = [(p, c.at, {"ask": c.ask, "release": c.release}) for _, p, c in self.singles()]
         values += [
             (path, at, {"at": bits}) for path, at, bits in self.places() if path == ("call",)
@@ -235,7 +236,10 @@ class Commands(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
         for path, at, words in values:
             for key, bits in words.items():
                 if bits & taken.get(at, 0):
-                    yield (*path, key), f"another command has these bits of {at} already"
+                    others = " and ".join(owners[at])
+                    text = f"{'.'.join(path)} shares bits of {at} with {others}"
+                    yield (*path, key), f"{text}: give each command bits of its own"
+            owners.setdefault(at, []).append(".".join(path))
             taken[at] = functools.reduce(operator.or_, words.values(), taken.get(at, 0))
 
 

@@ -157,7 +157,9 @@ def test_refusals_and_faults_are_reasons_for_a_recording_and_handovers_are_not(
     happens(machine)
     machine.live(40)
 
-    assert [name.split("_")[-2].split("-")[0] for name in machine.files()] == ([why.lower()] if why else [])
+    assert [name.split("_")[-2].split("-")[0] for name in machine.files()] == (
+        [why.lower()] if why else []
+    )
 
 
 def test_the_same_cause_makes_no_second_file_within_ten_minutes(machine: Machine) -> None:

@@ -75,7 +75,7 @@ REFUSED = {
     "a bus that is read too seldom": (
         door(f"{TCP}, scan_s: 2", limits="{stale_after_s: 1.5}"),
         "13:29: stale_after_s is 1.5, but its bus is read every 2 s (scan_s): readings would"
-        " always be stale; lower scan_s",
+        " always be stale; raise stale_after_s above 2, or lower scan_s",
     ),
     "a timeout of nothing": (
         door(limits="{open_timeout_s: 0}"),

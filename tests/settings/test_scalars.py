@@ -107,7 +107,7 @@ NO_SECONDS = {
     "0": f"is 0: {SECONDS}",
     "-1": f"is -1: {SECONDS}",
     "60.01": f"is 60.01: {SECONDS}",
-    "1e3": f"is 1e3: {SECONDS}",
+    "1e3": f"is 1e3: {SECONDS}; for 1000 milliseconds write 1",
     "5 s": f"is written 5 s: write the number alone, {SECONDS[6:]}",
     "0.2s": f"is written 0.2s: write the number alone, {SECONDS[6:]}",
     '"5"': f'is the text "5": {SECONDS}, without quotes',

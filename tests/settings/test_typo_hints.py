@@ -29,11 +29,17 @@ LIMIT = "limits: {open_s: 3, tries: 2}"
 SLIPS = {
     "a line that is too far to the right": (
         changed("      closed:", "       closed:"),
-        ["11:8: wrong indent: 7 before this line, 6 before those above it (in spaces)"],
+        [
+            "11:8: wrong indent: 7 spaces before this line, 6 (line 10) before those above: keys of one"
+            " section have the same indent"
+        ],
     ),
     "a line that is too far to the left": (
         changed("    inputs:", "   inputs:"),
-        ["9:4: wrong indent: 3 before this line, 2 or 4 before those above it (in spaces)"],
+        [
+            "9:4: wrong indent: 3 spaces before this line, 2 (line 7) or 4 (line 8) before those above:"
+            " keys of one section have the same indent"
+        ],
     ),
     "a key without a space after its colon": (
         changed("{transport: dds, domain_id: 7}", "\n  transport:dds\n  domain_id: 7"),

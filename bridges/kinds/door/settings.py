@@ -34,7 +34,7 @@ class DoorDurations(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
         Seconds | None, tells("with estimated feedback, how long the door takes to open.")
     ] = None
     max_hold_s: Annotated[
-        Seconds | None,
+        Patience | None,
         tells("how long RMF may hold it; then a fault is shown, and the hold stays."),
     ] = None
     supervisor_lost_s: Annotated[
@@ -93,3 +93,6 @@ class DoorSettings(DeviceSettings, frozen=True, kw_only=True, forbid_unknown_fie
             )
         if delay_s is not None and delay_s > self.limits.travel_s:
             yield ("limits", "open_delay_s"), "must not be longer than travel_s"
+        if delay_s is not None and delay_s >= self.limits.open_timeout_s:
+            text = f"must be longer than open_delay_s ({delay_s:g} s): no opening would be in time"
+            yield ("limits", "open_timeout_s"), text

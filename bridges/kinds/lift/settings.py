@@ -7,12 +7,24 @@ import msgspec
 from msgspec import Meta
 
 from bridges.kinds.lift.signals import Side, Stop
-from bridges.kinds.shared.fields import DeviceSettings, Name, Period, Seconds, Timeout, tells
+from bridges.kinds.shared.fields import (
+    Brief,
+    DeviceSettings,
+    Name,
+    Patience,
+    Period,
+    Seconds,
+    Timeout,
+    tells,
+)
 from bridges.kinds.shared.kind import FLOOR, Place
+from bridges.kinds.shared.remarks import Remarks
 
 AlarmOn = Annotated[
     list[Literal["fire_alarm", "code_blue", "earthquake", "emergency"]], Meta(min_length=1)
 ]
+
+Pulse = Annotated[float, Meta(ge=0.05, le=60, extra={"unit": "s"})]
 
 
 class Floor(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -47,8 +59,8 @@ class LiftDurations(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
         Timeout, tells("how long the door may take to open; then as with `agv_timeout_s`.")
     ] = 10.0
     request_timeout_s: Annotated[
-        Timeout,
-        tells("""how long RMF may be silent (it repeats requests at 1 Hz). Then a fault is shown,
+        Patience,
+        tells("""how long RMF may be silent. RMF repeats its request each second. Then a fault is shown,
         and the outputs go off unless a robot may be inside."""),
     ] = 30.0
     hazard_clear_s: Annotated[
@@ -58,24 +70,33 @@ class LiftDurations(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
         Seconds, tells("with one door contact, how long the door takes to its other end position.")
     ] = 5.0
     floor_travel_min_s: Annotated[
-        Seconds, tells("the least time from floor to floor. A faster change is not believed.")
+        Brief, tells("the least time from floor to floor. A faster change is not believed.")
     ] = 0.5
     call_pulse_s: Annotated[
-        Seconds | None, tells("how long a call is pulsed; held until arrival when absent.")
+        Pulse | None, tells("how long a call is pulsed; held until arrival when absent.")
     ] = None
     dead_time_s: Annotated[
-        Seconds,
+        Brief,
         tells("""the pause between two calls, between the commands of two doors, and between a call
         and a door command."""),
     ] = 0.3
     min_off_s: Annotated[
-        Seconds, tells("how long a relay stays off at least, to spare it. Off is never delayed.")
+        Brief, tells("how long a relay stays off at least, to spare it. Off is never delayed.")
     ] = 0.5
     max_cycles_per_min: Annotated[
         int,
         Meta(ge=1, le=600),
         tells("how often a relay may switch on in a minute; then it waits."),
     ] = 20
+
+    def problems(self) -> Remarks:
+        """Yield limits that no ride can keep."""
+        least_s = self.floor_travel_min_s
+        if self.floor_timeout_s <= least_s:
+            text = (
+                f"must be longer than floor_travel_min_s ({least_s:g} s): no ride would be in time"
+            )
+            yield ("floor_timeout_s",), text
 
 
 class LiftSettings(DeviceSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):

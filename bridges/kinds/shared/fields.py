@@ -36,9 +36,21 @@ Timeout = Annotated[float, Meta(ge=1, le=86400, extra={"unit": "s"})]
 """A time limit for an attempt. Zero is not allowed: nothing would ever be tried."""
 Period = Annotated[float, Meta(ge=0.01, le=60, extra={"unit": "s"})]
 """A repetition period."""
+Brief = Annotated[float, Meta(ge=0, le=60, extra={"unit": "s"})]
+"""A short duration that may be zero: a pause, a pulse, a bounce."""
 QuietStart = Annotated[float, Meta(ge=3, le=60, extra={"unit": "s"})]
 """The time after its start in which a node without hardware only listens."""
-Patience = Annotated[float, Meta(ge=3, le=86400, extra={"unit": "s"})]
+Patience = Annotated[
+    float,
+    Meta(
+        ge=3,
+        le=86400,
+        extra={
+            "unit": "s",
+            "least": "RMF repeats itself once a second, and two repeats may be lost",
+        },
+    ),
+]
 """The longest silence or state on which the daemon does not act."""
 
 

@@ -1,7 +1,9 @@
 """The `rmf:` section of a YAML: the transport to Open-RMF and its settings."""
 
 import argparse
-from typing import Annotated, Literal
+import re
+from pathlib import Path
+from typing import Annotated, Final, Literal
 
 import msgspec
 from msgspec import Meta
@@ -124,6 +126,21 @@ class Rmf(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
             yield ("zenoh",), f"transport {self.transport} does not read it: write transport: zenoh"
 
 
+def warnings(rmf: Rmf) -> Remarks:
+    """Yield valid settings that are probably mistaken."""
+    if rmf.domain_id is not None and 101 < rmf.domain_id < 215:
+        text = "is in a range whose ports Linux gives to other programs: take 0 to 101"
+        yield ("domain_id",), f"{rmf.domain_id} {text}"
+    release = re.match(r"/opt/ros/([^/]+)/", rmf.ros_setup or "")
+    if release and release[1] not in ROS_RELEASES:
+        yield ("ros_setup",), f"{release[1]} is no release of ROS 2: {', '.join(ROS_RELEASES)}"
+    elif rmf.ros_setup and Path("/opt/ros").is_dir() and not Path(rmf.ros_setup).is_file():
+        text = "does not exist on this machine, which has ROS: install it, or correct the path"
+        yield ("ros_setup",), f"{rmf.ros_setup} {text}"
+
+
+ROS_RELEASES: Final = ("humble", "iron", "jazzy", "kilted", "lyrical", "rolling")
+"""RMF's messages are installed for these releases."""
 TRANSPORTS = ("auto", "ros2", "dds", "zenoh")
 
 

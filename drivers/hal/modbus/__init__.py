@@ -17,6 +17,7 @@ from drivers.hal.modbus.points import canonical, describe, wire_problems
 from drivers.hal.modbus.settings import (
     ModbusSettings,
     needs,
+    paced,
     unreachable,
     unwatched,
     warnings,
@@ -49,4 +50,5 @@ BUS = BusType(
     wire_problems=wire_problems,
     unreachable=unreachable,
     unwatched=unwatched,
+    paced=paced,
 )

@@ -1,11 +1,12 @@
 """`type: modbus` of a device YAML: the place of the units, and the times."""
 
+import math
 from collections.abc import Iterable, Sequence
 from typing import Annotated
 
 import msgspec
 
-from bridges.kinds.shared.fields import Name, Period, tells
+from bridges.kinds.shared.fields import DeviceSettings, Name, Period, tells
 from bridges.kinds.shared.remarks import Remarks
 from drivers.hal import BusSettings, Needs, UnwatchedOutputs, Where, serial_port
 from drivers.hal.modbus.registers import Unit
@@ -76,6 +77,27 @@ def unwatched(settings: ModbusSettings, places: Iterable[str]) -> UnwatchedOutpu
         else:
             idle.append((path, f"nothing is written to unit {unit}: delete this"))
     return UnwatchedOutputs([*warned, *idle], accepted)
+
+
+def paced(
+    settings: ModbusSettings, devices: Sequence[DeviceSettings], points: Iterable[str]
+) -> Remarks:
+    """Yield a warning if one silent unit makes the other units' readings stale, and if a serial line is
+    too slow for its `scan_s`."""
+    units = {int(point.split()[1]) for point in points}
+    units |= {device.unit for device in devices if hasattr(device, "unit")}
+    stale_s = min((s for d in devices if (s := d.stale_after()) is not None), default=math.inf)
+    silent_s = settings.timeout_s * (1 + settings.retries)
+    if len(units) > 1 and silent_s + settings.scan_s > stale_s:
+        yield (
+            ("timeout_s",),
+            f"one silent unit holds up the others for {silent_s:g} s, timeout_s for each try, and their"
+            f" readings are stale after {stale_s:g} s: lower timeout_s or retries",
+        )
+    line = settings.serial
+    if line and (round_s := len(units) * line.least_s) > settings.scan_s:
+        text = f"a reading of every unit takes {round_s:.2g} s at {line.baudrate} baud"
+        yield ("scan_s",), f"{text}: raise scan_s or the baud rate"
 
 
 def _bare(units: Sequence[int]) -> str:

@@ -25,7 +25,8 @@ class Tcp(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     def problems(self) -> Remarks:
         """Yield a problem for an invalid address."""
         if re.fullmatch(r"[^:]*:[0-9]+", self.host):
-            yield ("host",), "write the host alone; its port goes into port"
+            host, _, port = self.host.partition(":")
+            yield ("host",), f"is {self.host!r}: write host: {host}, port: {port}"
         elif not re.fullmatch(r"[A-Za-z0-9_.:-]+", self.host):
             yield ("host",), f"{self.host!r} is not a host: write its address, such as 192.168.1.50"
         elif reason := misspelt_address(self.host):
@@ -63,6 +64,11 @@ class Serial(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
         """Return the time of one character on the wire (s): start, 8 data, parity and stop bits."""
         bits = 9 + (self.parity != "none") + self.stopbits
         return bits / self.baudrate
+
+    @property
+    def least_s(self) -> float:
+        """Return the time (s) of the shortest reading: a request of 8 characters, a reply of 6."""
+        return 14 * self.character_s + 2 * self.gap_s
 
     @property
     def gap_s(self) -> float:

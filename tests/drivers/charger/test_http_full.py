@@ -85,8 +85,8 @@ def test_a_range_may_be_a_number() -> None:
     [
         ({}, "the answer has no 'charger.state', but nothing: is state_path right?"),
         (answer(2), "'charger.state' is 2, and a text is expected"),
-        (answer(None), "'charger.state' is None, and a text is expected"),
-        (answer(receiver=True), "'pad.receiver' is True, and a text or a whole number is expected"),
+        (answer(None), "'charger.state' is null, and a text is expected"),
+        (answer(receiver=True), "'pad.receiver' is true, and a text or a whole number is expected"),
         (answer(receiver=1.5), "'pad.receiver' is 1.5, and a text or a whole number is expected"),
         (answer(aligned=1), "'pad.aligned' is 1, and true or false is expected"),
         (
@@ -103,7 +103,7 @@ def test_a_range_may_be_a_number() -> None:
         ),
         (
             {**answer(), "battery": {"amps": True}},
-            "'battery.amps' is True, and a number is expected",
+            "'battery.amps' is true, and a number is expected",
         ),
         (
             {**answer(), "battery": {"amps": float("inf")}},

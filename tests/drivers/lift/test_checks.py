@@ -243,14 +243,14 @@ UNSAFE: list[tuple[str, dict[str, Any], str, str]] = [
         "door_open",
         {"outputs": {"door_open": pin("J8:36", "low")}},
         "outputs.door_open",
-        "BCM16 = J8:36 is pulled low from power-on until the daemon starts, and its relay is on at"
+        "BCM16 = J8:36 is pulled low from power-on through boot, and its relay is on at"
         " low: use BCM4 to 8, or the other active level",
     ),
     (
         "call_G",
         {"calls": {"B1": coil(2), "G": pin("BCM5", "high"), "1": coil(4)}},
         "calls.G",
-        "BCM5 = J8:29 is pulled high from power-on until the daemon starts, and its relay is on at"
+        "BCM5 = J8:29 is pulled high from power-on through boot, and its relay is on at"
         " high: use BCM9 to 27, or the other active level",
     ),
 ]

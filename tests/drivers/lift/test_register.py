@@ -124,7 +124,8 @@ MODEL = "looks like a number of the data model, which begins at 1"
         (
             "ask: 2, release: 0",
             "ask: 3, release: 0",
-            "44:51: 'ask': another command has these bits of holding register 10 already",
+            "44:51: 'ask': door_open shares bits of holding register 10 with agv_mode_request: give"
+            " each command bits of its own",
         ),
         ("none: 0", "none: 4", "47:43: 'codes': 4 is no call, as none says"),
         (", 4: L4}\n          none", "}\n          none", "47:11: 'codes': no code for L4"),

@@ -60,7 +60,7 @@ def test_a_reset_connection_does_not_count_as_a_reply() -> None:
         ("192.168.1.50", []),
         ("module.ward-3", []),
         ("fe80::1", []),
-        ("192.168.1.50:502", ["write the host alone; its port goes into port"]),
+        ("192.168.1.50:502", ["is '192.168.1.50:502': write host: 192.168.1.50, port: 502"]),
         ("tcp://a", ["'tcp://a' is not a host: write its address, such as 192.168.1.50"]),
         ("a b", ["'a b' is not a host: write its address, such as 192.168.1.50"]),
     ],

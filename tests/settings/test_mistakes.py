@@ -1,0 +1,63 @@
+"""Mistakes that people make in a device YAML, and the first message of `check` (`mistakes.toml`)."""
+
+import tomllib
+from pathlib import Path
+from typing import Any, Final
+
+import pytest
+
+from bridges.settings.load import load
+from bridges.yaml.problems import SettingsError
+
+HERE: Final = Path(__file__).parent
+CONFIG: Final = HERE.parents[1] / "config"
+MISTAKES: Final = tomllib.loads((HERE / "mistakes.toml").read_text())["mistake"]
+OTHERWISE: Final = {
+    "makers addresses": "refused: the text gives both spellings, and 0x2711 is accepted",
+    "timeout too long for line": "refused: no call may take more than 5 s",
+    "right yes": "refused with its spelling: YAML 1.2 reads yes as a text",
+    "host name": "accepted: a module may have a name, and doctor resolves it",
+}
+"""Mistakes that `check` treats otherwise than their author expected -> the reason."""
+
+
+def file_of(mistake: dict[str, Any], folder: Path) -> Path:
+    """Write the example with the mistake in it."""
+    text = (CONFIG / mistake["example"]).read_text()
+    for old, new in mistake.get("changes", ()):
+        assert text.count(old) == 1, old
+        text = text.replace(old, new)
+    if mistake.get("windows"):
+        text = "\ufeff" + text.replace("\n", "\r\n")
+    path = folder / "device.yaml"
+    path.write_bytes(text.encode())
+    return path
+
+
+def said_of(path: Path) -> tuple[str, list[str]]:
+    """Return what `check` does with the file, and its messages, the first one first."""
+    try:
+        warnings = load(path).warnings
+    except SettingsError as error:
+        return "error", [problem.text for problem in error.problems]
+    return "warning" if warnings else "none", [warning.text for warning in warnings]
+
+
+def unlike(mistake: dict[str, Any], folder: Path) -> str:
+    """Say how `check` differs from what the mistake's author expects; "" if it does not."""
+    severity, told = said_of(file_of(mistake, folder))
+    if mistake["severity"] == "none":
+        return "" if severity != "error" else f"refused: {told[0]}"
+    if severity != mistake["severity"]:
+        return f"{severity}, not {mistake['severity']}: {' | '.join(told)}"
+    heard = told[:1] if severity == "error" else told
+    fits = any(
+        all(any(word.lower() in text.lower() for word in words) for words in mistake["words"])
+        for text in heard
+    )
+    return "" if fits else f"says {' | '.join(heard)}"
+
+
+@pytest.mark.parametrize("mistake", MISTAKES, ids=lambda mistake: mistake["name"])
+def test_a_mistake_is_named_in_the_first_message(mistake: dict[str, Any], tmp_path: Path) -> None:
+    assert (unlike(mistake, tmp_path) != "") == (mistake["name"] in OTHERWISE)
