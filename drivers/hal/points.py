@@ -5,7 +5,8 @@ addresses and polarity; the bus (`drivers/hal/`) knows only levels. GPIO pins an
 inputs of a Modbus I/O module are treated alike.
 """
 
-from collections.abc import Mapping, Sequence
+import re
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Annotated, Literal, Protocol, runtime_checkable
 
 import msgspec
@@ -98,6 +99,12 @@ class Wire(msgspec.Struct, frozen=True):
         if self.pull == "none":
             return None
         return self.asserted(self.pull == "up")
+
+
+def is_number(wires: Iterable[Wire]) -> bool:
+    """Are these lines the bits of registers? Then they are a number inside a controller, which has no
+    cable that could be cut."""
+    return all(re.search(r"\bbit\b", wire.point, re.IGNORECASE) for wire in wires)
 
 
 class Lines(Protocol):

@@ -7,7 +7,7 @@ from itertools import pairwise
 from bridges.kinds.lift.settings import LiftSettings
 from bridges.kinds.lift.signals import Hazard, Side
 from bridges.kinds.shared.remarks import Remarks
-from drivers.hal.points import Wire
+from drivers.hal.points import Wire, is_number
 from drivers.lift import codes
 from drivers.lift.broken_lines import floor_warnings, unsafe_codes
 from drivers.lift.table import MOTION, input_rows, wires
@@ -56,7 +56,9 @@ def warnings(wiring: LiftWiring) -> Remarks:
             yield path, text
     if not wiring.floor_code.lines:
         yield from counts_down(wiring, wiring.floor_code.codes, ("floor_code", "codes"))
-    confused = floor_warnings(wiring.floor_code, table)
+    confused = (
+        "" if _in_register(wiring.floor_code, table) else floor_warnings(wiring.floor_code, table)
+    )
     if confused:
         yield ("floor_code",), f"{confused}: ask for a parity line, or for codes two lines apart"
     yield from needlessly_accepted(unsafe(wiring), wiring.accept_unsafe)
@@ -313,8 +315,14 @@ def _in_service(wiring: LiftWiring, state: str) -> bool:
     return service is not None and state in service.codes.values()
 
 
+def _in_register(code: FloorCode, table: Mapping[str, Wire]) -> bool:
+    return is_number(table[signal] for signal, _, _ in code.inputs())
+
+
 def _dead_code(code: FloorCode, table: Mapping[str, Wire]) -> Iterator[Unsafe]:
     """Check that the code reads as no floor with all lines cut at once (the cable, the supply)."""
+    if _in_register(code, table):
+        return
     lines = [signal for signal, _, _ in code.inputs()]
     level, _ = code.read({signal: bool(table[signal].broken_reads()) for signal in lines})
     if level is not None:
