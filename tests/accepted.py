@@ -1,4 +1,6 @@
-"""Passes messages on as the daemon's service does, for stories whose node has none."""
+"""Accept requests as the daemon's service does, for stories in which a core runs without that
+service.
+"""
 
 from typing import Any
 
@@ -12,7 +14,9 @@ from bridges.runtime.device import AnyNode
 def accepted(
     node: AnyNode, kind: AnyDeviceKind, settings: Any, *heard: tuple[Topic[Any], Message]
 ) -> list[Any]:
-    """The events of these requests, each heard on its topic. The node is told of those refused."""
+    """Return the events of these requests, each heard on its topic; tell the node of each refused
+    request.
+    """
     events = []
     for topic, request in heard:
         try:

@@ -16,14 +16,18 @@ from tests.depth import DEEP
 from tests.processes import end_with_us
 
 ON_WIRES = ("commands", "drivers", "hal_fakes", "transports", "runtime", "site", "workbench")
-"""The folders whose tests have threads, processes and sockets. In the others time is virtual."""
+"""Folders whose tests use threads, processes and sockets. Tests in the other folders run in virtual
+time.
+"""
 WIRES_HANG_AFTER_S = 900
-"""No test that passes takes so long, however busy the machine is."""
+"""No passing test takes so long, however busy the machine is."""
 
 if not DEEP and missing_of_ros():
     os.environ.setdefault("TRANSPORT", "zenoh")
-"""The wire between processes, where a story is not about it: zenoh, as on a Raspberry Pi. A daemon
-starts on it with half the CPU. In `make deep`, and beside ROS, these stories run on dds where it is."""
+"""The wire between processes in stories about other things: zenoh, as on a Raspberry Pi. A daemon
+starts on zenoh with half the CPU that dds takes. `make deep`, and a run beside ROS, use dds where dds
+is installed.
+"""
 
 settings.register_profile(
     "here",
@@ -33,15 +37,17 @@ settings.register_profile(
     suppress_health_check=[HealthCheck.too_slow],
 )
 settings.load_profile("here")
-"""The same examples in each run, and no wall-clock limit on drawing or trying them."""
+"""Draw the same examples in each run, without a wall-clock limit on drawing or trying an example."""
 
 signal.signal(
     signal.SIGHUP, signal.SIG_DFL
-)  # or daemons inherit what nohup or a CI's shell has set
+)  # or daemons inherit the setting of nohup or of a CI's shell
 
 gc.disable()
 atexit.register(gc.freeze)
-"""No garbage collection while the tests are collected, which leaves none, nor when a worker ends."""
+"""Collecting the tests leaves no garbage, so the garbage collector is off meanwhile, and at a worker's
+end.
+"""
 
 end_with_us()
 
@@ -50,7 +56,7 @@ _deselected: list[str] = []
 
 @pytest.fixture(autouse=True)
 def _log_as_before() -> Iterator[None]:
-    """A command called in this process sets up its own log; undo that for the next test."""
+    """Undo the log setup of a command called in this process before the next test."""
     root = logging.getLogger()
     handlers, level = list(root.handlers), root.level
     yield
@@ -61,21 +67,23 @@ def _log_as_before() -> Iterator[None]:
 
 @pytest.fixture
 def domain() -> Iterator[int]:
-    """A DDS domain for this test, in which nobody else on this machine is."""
+    """Yield a DDS domain that nobody else on this machine uses."""
     with domain_for_a_while() as free:
         yield free
 
 
 @pytest.fixture(scope="module")
 def module_domain() -> Iterator[int]:
-    """One that the tests of a file share."""
+    """Yield a DDS domain for all tests of a file."""
     with domain_for_a_while() as free:
         yield free
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Order the tests, and end those on wires that hang. Without cyclonedds, as on arm64, the tests of
-    the dds transport are left out."""
+    """Order the tests, and limit the time of tests on wires.
+
+    Without cyclonedds, as on arm64, leave out the tests of the dds transport.
+    """
     if missing_of_dds():
         items[:] = [item for item in items if not item.get_closest_marker("dds")]
     items[:] = _mixed(items)
@@ -84,15 +92,20 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 
 def pytest_collection_finish() -> None:
-    """What was collected stays until the end, so the garbage collector need not scan it."""
+    """Freeze the collected objects: they live until the end, so the garbage collector need not scan
+    them.
+    """
     gc.freeze()
     gc.enable()
 
 
 @pytest.hookimpl(optionalhook=True)  # in a run without xdist
 def pytest_xdist_make_scheduler(config: pytest.Config, log: object) -> object:
-    """With `--dist loadscope` a test with all its parameters has one worker, and so one fixture of a
-    module: an echo process, a schema. Any other test goes to the next free worker."""
+    """With `--dist loadscope`, run a test with all its parameters on one worker.
+
+    A module's fixture (an echo process, a schema) is then made once. Any other test goes to the next
+    free worker.
+    """
     from xdist.scheduler import LoadScopeScheduling  # type: ignore[import-untyped]
 
     class ByTest(LoadScopeScheduling):  # type: ignore[misc]  # which xdist does not type
@@ -103,8 +116,11 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: object) -> object:
 
 
 def _mixed(items: list[pytest.Item]) -> list[pytest.Item]:
-    """Mix tests that wait with tests that compute, to keep all cores busy: file by file, in an order
-    that is always the same. Long tests are in its first quarter, the longest first."""
+    """Mix tests that wait with tests that compute, to keep all cores busy.
+
+    Tests move file by file, always in the same order. The long tests come in the first quarter, the
+    longest first.
+    """
     random = Random(1)
     place = {path: random.random() for path in sorted({item.path for item in items})}
     early = sorted(filter(_seconds, items), key=_seconds, reverse=True)
@@ -113,7 +129,7 @@ def _mixed(items: list[pytest.Item]) -> list[pytest.Item]:
 
 
 def _seconds(item: pytest.Item) -> float:
-    """How long it takes alone, as its mark says; 0 without one."""
+    """Return how long the test takes alone, according to its mark; 0 without a mark."""
     mark = item.get_closest_marker("long")
     return float(mark.args[0]) if mark else 0.0
 
@@ -123,14 +139,14 @@ def _is_on_wires(item: pytest.Item) -> bool:
 
 
 def pytest_deselected(items: Sequence[pytest.Item]) -> None:
-    """Remember which tests were left out because there is no ROS."""
+    """Remember the tests that were left out because ROS is missing."""
     _deselected.extend(item.nodeid for item in items if item.get_closest_marker("ros"))
 
 
 def pytest_terminal_summary(
     terminalreporter: pytest.TerminalReporter, config: pytest.Config
 ) -> None:
-    """Report them: a green run without ROS has not seen the ros2 transport."""
+    """Report the tests left out: a green run without ROS has not tested the ros2 transport."""
     if missing := missing_of_dds():
         terminalreporter.write_line(f"not run: the tests of the dds transport, as {missing}")
     if _deselected and config.getoption("markexpr") == "not ros and not browser":

@@ -1,4 +1,4 @@
-"""Which processes a test has left, and the end of all that a killed run has left."""
+"""Find the processes that a test has left, and end all processes of a run that was killed."""
 
 import os
 from contextlib import suppress
@@ -7,7 +7,7 @@ from secrets import token_hex
 from typing import Final
 
 RUN: Final = "TEST_RUN"
-"""Whatever is started by a run of the tests has its name under this name in its environment."""
+"""The environment variable that names the test run; every process started by the run has it."""
 REAPER: Final = """
 read -r _
 for round in 1 2 3 4 5 6 7 8 9 10; do
@@ -18,18 +18,21 @@ for round in 1 2 3 4 5 6 7 8 9 10; do
     done
 done
 """
-"""Waits for the end of the run, which holds the other end of its pipe. A killed daemon's guard may have
-started another process meanwhile: so it looks again."""
+"""Wait until the run closes its end of the pipe, then kill the run's processes.
+
+The guard of a killed daemon may have started another process meanwhile, so look again.
+"""
 
 
 def end_with_us() -> None:
-    """Whatever this process starts from now on, and what that starts, ends with it, also by SIGKILL.
+    """End all processes started by this process from now on, with their children, when this process
+    ends.
 
-    PR_SET_PDEATHSIG would not do: it is told when the thread that started a child ends, and is not
-    inherited by the child's own children.
+    This holds after SIGKILL too. PR_SET_PDEATHSIG would not do: its signal comes when the starting
+    thread ends, and a child's own children do not inherit it.
     """
     if RUN in os.environ:
-        return  # a worker's processes end with the run that it is of
+        return  # the run that started this worker ends the worker's processes
     os.environ[RUN] = f"{os.getpid()}-{token_hex(8)}"
     waits, _ = os.pipe()
     os.posix_spawn(
@@ -46,10 +49,10 @@ def end_with_us() -> None:
 
 
 def running(directory: Path) -> list[str]:
-    """The command lines of all processes that were told of this directory."""
+    """Return the command lines of all processes that have this directory among their arguments."""
     found = []
     for path in Path("/proc").glob("[0-9]*/cmdline"):
-        with suppress(OSError):  # it has just ended
+        with suppress(OSError):  # the process has just ended
             line = path.read_bytes().decode(errors="replace")
             if str(directory) in line:
                 found.append(line)

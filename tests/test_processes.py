@@ -1,4 +1,4 @@
-"""What a run of the tests has started ends with it, however that ends."""
+"""All processes that a test run started end with the run, however the run ends."""
 
 import os
 import subprocess
@@ -22,13 +22,13 @@ starts.start()
 starts.join()
 sys.stdin.read()
 """
-"""A child of a thread that has ended, in a session of its own, with a child of its own."""
+"""Start a child in its own session from a thread that then ends; that child has a child too."""
 
 
 def test_what_a_killed_run_has_started_is_killed(tmp_path: Path) -> None:
     of_its_own = {name: value for name, value in os.environ.items() if name != RUN}
     words = [sys.executable, "-c", RUNS, str(tmp_path)]
     with subprocess.Popen(words, stdin=subprocess.PIPE, env=of_its_own) as run:
-        wait_until(lambda: len(running(tmp_path)) == 3, "all of them run")
+        wait_until(lambda: len(running(tmp_path)) == 3, "all three processes run")
         run.kill()
-    wait_until(lambda: not running(tmp_path), "none of them runs")
+    wait_until(lambda: not running(tmp_path), "no process runs")

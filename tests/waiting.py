@@ -1,4 +1,4 @@
-"""Waiting for what happens outside this thread: in a real process, on a real socket, on DDS."""
+"""Wait for events outside this thread: in a real process, on a real socket, on DDS."""
 
 import re
 import threading
@@ -11,23 +11,23 @@ from drivers import DriverError
 T = TypeVar("T")
 
 PATIENCE_S = 120.0
-"""Long enough for a very busy machine; a test that passes never waits for it."""
+"""Long enough for a very busy machine; no passing test waits so long."""
 
 TOO_LATE = re.compile(
     r" within [\d.]+ s\b|what came first is not the echo|echo came late|is half a frame"
     r"|is not a frame: a collision"
 )
-"""What a bus says of an answer that is late, or that meets the next one on a serial line."""
+"""A bus's words for an answer that is late, or that collides with the next answer on a serial line."""
 
 LEASE_S = 9.5
-"""Less than DDS takes to miss who has gone without a farewell (10 s)."""
+"""Less than the 10 s after which DDS notices that a node left without a farewell."""
 
 
 def wait_until(condition: Callable[[], object], what: str, patience_s: float = PATIENCE_S) -> None:
-    """Look again and again until the condition holds; fail by name when it never does.
+    """Look again and again until the condition holds; fail with the name `what` if the condition never
+    holds.
 
-    The longer it has taken, the longer the pause before the next look: a look costs CPU, which what is
-    waited for needs.
+    The pauses grow with the time waited, because each look costs CPU that the awaited process needs.
     """
     pause = threading.Event()
     began = time.monotonic()
@@ -38,9 +38,10 @@ def wait_until(condition: Callable[[], object], what: str, patience_s: float = P
 
 
 def at_last(step: Callable[[], T], what: str, between: Callable[[], object] = lambda: None) -> T:
-    """What a step on a wire gives; tried again when an answer comes late, as on a busy machine.
+    """Return the result of a step on a wire; repeat the step if an answer is late, as on a busy
+    machine.
 
-    `between`: done before it is tried again. Every other DriverError is raised.
+    `between` is called before each repetition. Any DriverError other than a late answer is raised.
     """
     done: list[T] = []
 

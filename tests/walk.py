@@ -1,4 +1,4 @@
-"""Every state that something can reach within some steps, and every history of so many moves."""
+"""Walk through all states that can be reached in some steps, and all histories of some moves."""
 
 from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -8,11 +8,11 @@ W = TypeVar("W")
 M = TypeVar("M")
 
 Seen = Callable[[Any], None]
-"""Told of every step on the way."""
+"""A function that is called with every step on the way."""
 
 
 def unseen(step: object) -> None:
-    """For a walk whose steps nobody looks at."""
+    """Ignore the step: for walks that check no steps."""
 
 
 def reached(
@@ -21,9 +21,9 @@ def reached(
     neighbours: Callable[[W], Iterable[W]],
     key: Callable[[W], Hashable] = lambda state: state,
 ) -> list[W]:
-    """Breadth first from the roots: every state within `depth` steps, once.
+    """Return every state within `depth` steps of the roots once, breadth first.
 
-    `key`: equal for states that cannot behave differently.
+    `key` is equal for states that cannot behave differently.
     """
     found = {key(root): root for root in roots}
     edge = list(found.values())
@@ -42,7 +42,9 @@ def reached(
 def histories(
     state: W, moves: Sequence[M], depth: int, after: Callable[[W, M], W]
 ) -> Iterator[tuple[W, tuple[M, ...]]]:
-    """Every history of `depth` moves: where it ends and its moves. `after` changes nothing in place."""
+    """Yield each history of `depth` moves: the last state, and the moves. `after` must not change a
+    state in place.
+    """
     if depth == 0:
         yield state, ()
         return
@@ -53,7 +55,7 @@ def histories(
 
 @dataclass(frozen=True)
 class Walker(Generic[W, M]):
-    """How a world goes on: by a move, in no time, or by waiting (s). Both tell `seen` of each step."""
+    """The steps of a world: moves, which take no time, and waits (s). Each step is given to `seen`."""
 
     moves: Mapping[str, M]
     waits: Sequence[float]
@@ -62,7 +64,7 @@ class Walker(Generic[W, M]):
     key: Callable[[W], Hashable] = lambda state: state
 
     def path(self, world: W, *steps: str | float, seen: Seen = unseen) -> W:
-        """The state that these moves and waits lead to."""
+        """Return the state after these moves and waits."""
         for step in steps:
             if isinstance(step, str):
                 world = self.moved(world, self.moves[step], seen)
@@ -71,11 +73,11 @@ class Walker(Generic[W, M]):
         return world
 
     def neighbours(self, world: W, seen: Seen = unseen) -> Iterator[W]:
-        """Every state one step away."""
+        """Yield every state one step away."""
         steps: list[str | float] = [*self.moves, *self.waits]
         for step in steps:
             yield self.path(world, step, seen=seen)
 
     def walk(self, roots: Iterable[W], depth: int, seen: Seen = unseen) -> list[W]:
-        """Every state within `depth` steps of the roots, once."""
+        """Return every state within `depth` steps of the roots once."""
         return reached(roots, depth, lambda world: self.neighbours(world, seen), self.key)

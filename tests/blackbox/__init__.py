@@ -1,1 +1,1 @@
-"""The black box: what is kept, and how it is read."""
+"""The black box: what it records, and how recordings are read."""

@@ -1,4 +1,6 @@
-"""`python -m tests.blackbox.imported run FILE …`: the command, and at its end what it has imported."""
+"""`python -m tests.blackbox.imported run FILE …` runs the command and finally prints the imported
+modules.
+"""
 
 import sys
 

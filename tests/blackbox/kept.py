@@ -1,4 +1,4 @@
-"""The soak's site with a ring for each daemon: what a day of it leaves to be decided again."""
+"""The soak's site with a ring for each daemon: the recordings of a day, to decide again."""
 
 from collections.abc import Callable
 from functools import partial
@@ -28,7 +28,7 @@ BUSES: dict[str, Any] = {
 
 
 def head(name: str, kind: str, content: dict[str, Any]) -> Head:
-    """The head of a run that serves this YAML."""
+    """Return the head of a run with this YAML."""
     text = yaml.safe_dump({"kind": kind, **content}, sort_keys=False).encode()
     return Head(
         name, 1, __version__, kind, f"/etc/{name}.yaml", text, {}, True, {}, RecordingSettings()
@@ -36,7 +36,7 @@ def head(name: str, kind: str, content: dict[str, Any]) -> Head:
 
 
 def of_device(device: Device) -> Head:
-    """The head of a daemon with this device alone."""
+    """Return the head of a daemon that serves only this device."""
     bus = {0.0: "gpio", 0.05: "modbus", 0.5: "http"}[device.poll_s]
     devices = {device.name: msgspec.to_builtins(device.settings)}
     content = {
@@ -48,12 +48,14 @@ def of_device(device: Device) -> Head:
 
 
 def of_graph(name: str, kind: AnyGraphKind, settings: Any) -> Head:
-    """The head of a supervisor or coordinator."""
+    """Return the head of a supervisor or coordinator."""
     return head(name, kind.name, {kind.devices_key: msgspec.to_builtins(settings)})
 
 
 def keep(site: Site, folder: Path, size: int) -> dict[str, Path]:
-    """Have each daemon of a site keep a ring of this size; gives where, by its name."""
+    """Make each daemon of a site write a ring of this size; return the ring's path by the daemon's
+    name.
+    """
     found = {}
     for daemon in (*site.daemons.values(), *site.nodes):
         if isinstance(daemon, DeviceDaemon):
@@ -71,6 +73,6 @@ def keep(site: Site, folder: Path, size: int) -> dict[str, Path]:
 
 
 def writer(timeline: Timeline, make: Callable[[], Ring], site: Site) -> RingWriter:
-    """A writer in virtual time."""
+    """Return a ring writer in virtual time."""
     clock = Clock(lambda: timeline.now, lambda: EPOCH + timeline.now)
     return RingWriter(make, clock, lambda: site.air.release)

@@ -1,6 +1,6 @@
-"""Recordings and rings that decode and are wrong: other types, times, releases, versions and nesting.
+"""Wrong recordings and rings that still decode: wrong types, times, releases, versions and nesting.
 
-Each is made of a valid one (`corpus`), by some changes of its decoded values.
+Each mutant is a valid recording (`corpus`) with some decoded values changed.
 """
 
 import io
@@ -70,12 +70,12 @@ TREES: Final[tuple[Any, ...]] = (
     [{"": "core.decision.Fault", "code": "X", "detail": 3}],
 )
 KEPT: Final = 70
-"""Entries of each recording that are used: the changes then meet most of them."""
+"""The number of entries used of each recording; with so few, changes hit most entries."""
 
 
 @dataclass(frozen=True)
 class Plain:
-    """A recording as decoded JSON: of its head, and of its entries."""
+    """A recording as decoded JSON: its head and its entries."""
 
     kind: str
     subject: str
@@ -84,7 +84,7 @@ class Plain:
 
 
 def corpus() -> list[Plain]:
-    """The incidents of the soak, each with its messages among its entries."""
+    """Return the soak's incidents, each with the messages among its entries."""
     return [_plain(path) for path in sorted(CORPUS.glob("*.mcap"))]
 
 
@@ -106,14 +106,14 @@ def _spoken(at: float, topic: str, message: Message) -> Spoken:
 
 
 class Mutator:
-    """Makes wrong recordings of valid ones, the same ones for the same seed."""
+    """Makes wrong recordings from valid recordings; the same seed gives the same recordings."""
 
     def __init__(self, seed: int) -> None:
         self._rng = random.Random(seed)
         self._corpus = corpus()
 
     def next(self) -> Plain:
-        """One more, with one to three changes."""
+        """Return the next wrong recording, with one to three changes."""
         valid = self._rng.choice(self._corpus)
         copied: Plain = Plain(
             valid.kind, valid.subject, _copy(valid.head), [_copy(one) for one in valid.entries]
@@ -139,7 +139,7 @@ class Mutator:
                 self._one(self._rng.choice(told.entries))
 
     def _one(self, tree: Any) -> None:
-        """Change one value somewhere below."""
+        """Change one value anywhere in the tree."""
         places = list(_places(tree))
         holder, key = self._rng.choice(places)
         match self._rng.randrange(8):
@@ -169,7 +169,7 @@ class Mutator:
         return _copy(self._rng.choice((*NUMBERS, *TEXTS, *TREES)))
 
     def _version(self, told: Plain) -> None:
-        """Another version's names of types, fields and topics."""
+        """Replace a name of a type, field or topic, as another version would."""
         entry = self._rng.choice(told.entries)
         if is_message(entry):
             entry[self._rng.choice((3, 4, 5))] = self._rng.choice((*TEXTS, *MESSAGES, *RELEASES))
@@ -181,7 +181,7 @@ class Mutator:
             tree[""] = self._rng.choice(others)[""]
 
     def _message(self, told: Plain) -> None:
-        """Another value in one field of a message."""
+        """Change the value of one field of a message."""
         spoken = [one for one in told.entries if is_message(one) and one[5] in (*RELEASES,)]
         if not spoken:
             return
@@ -221,7 +221,7 @@ def _trees(tree: Any) -> Iterator[dict[str, Any]]:
 
 
 def _places(tree: Any) -> Iterator[tuple[Any, Any]]:
-    """Every place below, as what holds it and where."""
+    """Yield every place in the tree: its container and its key."""
     keys = list(tree) if isinstance(tree, dict) else range(len(tree))
     for key in keys:
         yield tree, key
@@ -230,7 +230,7 @@ def _places(tree: Any) -> Iterator[tuple[Any, Any]]:
 
 
 def as_ring(told: Plain) -> bytes:
-    """A ring with these entries in one segment."""
+    """Return a ring with these entries in one segment."""
     head = msgspec.msgpack.encode(told.head)
     content = b"".join(_frame(msgspec.msgpack.encode(one), 1) for one in told.entries)
     size = -(-(MARK.size + len(content) + FRAME.size) // PAGE) * PAGE
@@ -245,7 +245,7 @@ def _frame(content: bytes, number: int) -> bytes:
 
 
 def write_file(told: Plain, path: Path) -> None:
-    """A file as our recorder writes it."""
+    """Write the recording as the recorder writes its files."""
     with path.open("wb") as out:
         writer = Writer(out, compression=CompressionType.ZSTD)
         writer.start("ros2", "rmf-bridges 1")
@@ -267,7 +267,7 @@ def write_file(told: Plain, path: Path) -> None:
 
 
 def is_message(entry: list[Any]) -> bool:
-    """Is it a message whose type we have?"""
+    """Is the entry a message of a known type?"""
     match entry:
         case [1, _, _, str(), str() as kind, _, bytes()]:
             return kind in MESSAGES
@@ -291,7 +291,10 @@ JUDGES: Final[Codes] = READS | {os.EX_UNAVAILABLE}
 
 
 def commands(told: Plain, folder: Path) -> Iterator[tuple[tuple[str, ...], Codes]]:
-    """Each command that reads a recording or a ring, with how it may end. `folder`: for all files."""
+    """Yield each command that reads a recording or a ring, with its permitted exit codes.
+
+    `folder` takes all files.
+    """
     run = folder / "run"
     run.mkdir(parents=True, exist_ok=True)
     for name in ("ring", "ring.died"):
@@ -312,7 +315,7 @@ def commands(told: Plain, folder: Path) -> Iterator[tuple[tuple[str, ...], Codes
 
 
 def ended(words: Sequence[str]) -> tuple[int, str]:
-    """A command's exit code, and what it said on standard error."""
+    """Return a command's exit code and its text on standard error."""
     errors = io.StringIO()
     with redirect_stdout(io.StringIO()), redirect_stderr(errors):
         code = cli.main([*words])
@@ -320,7 +323,9 @@ def ended(words: Sequence[str]) -> tuple[int, str]:
 
 
 def endings(mutator: Mutator, times: int, folder: Path) -> Counter[str]:
-    """How the commands end for so many wrong recordings. Any that ends otherwise raises."""
+    """Count the endings of the commands for so many wrong recordings; raise at any unpermitted
+    ending.
+    """
     found: Counter[str] = Counter()
     for _ in range(times):
         told = mutator.next()

@@ -1,4 +1,4 @@
-"""Every type that a daemon can record, found by walking from what the cores take and give."""
+"""All types that a daemon can record, found from the arguments and results of the cores."""
 
 import enum
 import types
@@ -17,13 +17,15 @@ from bridges.messages.definitions import Message
 PLAIN: dict[Any, Any] = {bool: True, int: 1, float: 1.5, str: "a", None: None, type(None): None}
 BOXES: dict[Any, Any] = {tuple: tuple, frozenset: frozenset, set: frozenset}
 Bound = Mapping[Any, Any]
-"""What the parameters of a generic type stand for."""
+"""The type that each parameter of a generic type stands for."""
 
 
 @cache
 def recordable() -> tuple[Any, ...]:
-    """The types, generic ones with their parameters: all that is inside of a memory, an event, outputs,
-    a report or a message of any kind."""
+    """Return the types inside any memory, event, output, report or message of a kind.
+
+    A generic type comes with its parameters.
+    """
     found: dict[Any, None] = {}
     for start in _starts():
         _walk(start, {}, found)
@@ -53,14 +55,12 @@ def _walk(hint: Any, bound: Bound, found: dict[Any, None]) -> None:
         assert _is_enum(plain) or issubclass(plain, msgspec.Struct | tuple), f"{one} in {found}"
         for part in fields(one).values():
             _walk(part, {}, found)
-        for (
-            below
-        ) in plain.__subclasses__():  # a field of a type also holds those that derive from it
+        for below in plain.__subclasses__():  # a field of a type also takes its subclasses
             _walk(below, {}, found)
 
 
 def fields(one: Any) -> dict[str, Any]:
-    """The fields of a struct, with the parameters of a generic one filled in."""
+    """Return the fields of a struct, with the parameters of a generic struct filled in."""
     plain = typing.get_origin(one) or one
     if _is_enum(plain):
         return {}
@@ -70,7 +70,7 @@ def fields(one: Any) -> dict[str, Any]:
 
 
 def _filled(hint: Any, bound: Bound) -> Any:
-    """A hint with its parameters filled in."""
+    """Return a hint with its parameters filled in."""
     if isinstance(hint, typing.TypeVar):
         return bound.get(hint, None)
     names = getattr(hint, "__parameters__", ())
@@ -78,7 +78,7 @@ def _filled(hint: Any, bound: Bound) -> Any:
 
 
 def _single(hint: Any) -> Iterator[Any]:
-    """The parts of a union, each by itself; what is annotated without its annotation."""
+    """Yield the parts of a union one by one, and an annotated type without its annotation."""
     if typing.get_origin(hint) in (typing.Union, types.UnionType):
         for part in typing.get_args(hint):
             yield from _single(part)
@@ -93,7 +93,7 @@ def _is_enum(one: Any) -> bool:
 
 
 def specimens(one: Any) -> list[Any]:
-    """Every member of an enumeration; of a struct one with every field filled."""
+    """Return every member of an enumeration, or one instance of a struct with every field filled."""
     plain = typing.get_origin(one) or one
     if _is_enum(plain):
         return list(plain)

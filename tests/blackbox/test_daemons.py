@@ -1,4 +1,4 @@
-"""The rings of real daemons: after a kill they are there, and writing them needs no library."""
+"""The rings of real daemons survive a kill; writing a ring imports no other library."""
 
 import os
 import shutil
@@ -20,12 +20,12 @@ def lift(tmp_path: Path) -> Path:
 
 
 def spoken(ring: Path) -> list[str]:
-    """What the ring shows to have been sent."""
+    """Return the topics of the messages that were sent, according to the ring."""
     try:
         return [
             one.topic for one in RingContent(ring).entries() if isinstance(one, Spoken) and one.sent
         ]
-    except Exception:  # noqa: BLE001 - it is not there yet
+    except Exception:  # noqa: BLE001 - the ring is not there yet
         return []
 
 
@@ -72,7 +72,7 @@ def test_a_daemon_serves_on_when_its_ring_is_taken_away_and_makes_another(
 def test_no_daemon_imports_what_only_files_need(lift: Path, tmp_path: Path, domain: int) -> None:
     options = ("--simulate", "--domain-id", str(domain))
     with daemon(lift, tmp_path / "run", *options, program=("tests.blackbox.imported",)) as running:
-        wait_until(lambda: bool(spoken(tmp_path / "run" / "ring")), "it records")
+        wait_until(lambda: bool(spoken(tmp_path / "run" / "ring")), "the daemon records")
         running.end(signal.SIGTERM)
 
     assert "imported []" in running.log.read_text()

@@ -1,4 +1,4 @@
-"""What earlier versions wrote is read for ever, and what this one writes has a name to keep."""
+"""Recordings of earlier versions stay readable; each type of this version has a permanent name."""
 
 import gzip
 import subprocess
@@ -26,11 +26,13 @@ from workbench.replay.replayed import Replay, ReplayedCores, of_head
 from workbench.replay.sources import Notes
 
 ENDED = {"lift.memory.Session.own_stamp", "lift.signals.FromAdapter.stamp"}
-"""Fields (`lift.memory.Session.level`) that a core no longer has: what they held is left out."""
+"""Fields that a core no longer has (`lift.memory.Session.level`); the reader leaves out their
+values.
+"""
 
 
 def files(pattern: str) -> list[Path]:
-    """The files of all days with such names."""
+    """Return the files of all days that match the pattern."""
     return [path for day in DAYS for path in sorted(day.glob(pattern))]
 
 
@@ -41,7 +43,9 @@ def _own_texts() -> Iterator[None]:
 
 
 def test_every_type_that_a_daemon_can_record_has_a_name_and_comes_back() -> None:
-    """If one is missing: a row in `RECORDED` of its kind, or in `bridges/kinds/shared/recorded.py`."""
+    """Remedy for a missing name: a row in `RECORDED` of the kind, or in
+    `bridges/kinds/shared/recorded.py`.
+    """
     nameless = []
     for one in recordable():
         kind = typing.get_origin(one) or one
@@ -69,7 +73,9 @@ def test_a_name_is_given_once_to_a_type_that_a_daemon_records_and_begins_with_it
 
 @pytest.mark.parametrize("day", DAYS, ids=lambda day: day.name)
 def test_no_name_and_no_field_of_an_earlier_version_is_lost(day: Path) -> None:
-    """A renamed type keeps its name in the table, a renamed field by `msgspec.field(name=…)`."""
+    """A renamed type keeps its name in the table; a renamed field keeps its name by
+    `msgspec.field(name=…)`.
+    """
     told = msgspec.json.decode((day / "values.json").read_bytes())
     lost = set()
     for earlier in chain.from_iterable(told.values()):
@@ -78,7 +84,7 @@ def test_no_name_and_no_field_of_an_earlier_version_is_lost(day: Path) -> None:
 
 
 def _lost(was: Any, now: Any) -> set[str]:
-    """The fields that are not read any more."""
+    """Return the fields that are no longer read."""
     if isinstance(was, list) and isinstance(now, list):
         return {lost for one, other in zip(was, now, strict=True) for lost in _lost(one, other)}
     if not isinstance(was, dict) or not isinstance(now, dict):
@@ -106,7 +112,9 @@ def test_a_ring_of_an_earlier_version_is_read_and_replayed(file: Path, tmp_path:
 
 
 def _is_read(file: Path) -> None:
-    """Every value in it is known. Decisions are not compared: by now cores may decide otherwise."""
+    """Check that every value in the file is known. Decisions are not compared, as later cores may
+    differ.
+    """
     notes = Notes()
     head, entries = opened(file, notes)
     everything = list(entries)

@@ -1,4 +1,4 @@
-"""A recording that decodes and is wrong ends each command with a code and a sentence."""
+"""A wrong recording that still decodes ends each command with an exit code and a sentence."""
 
 import math
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""The recorder and the commands beside a real daemon, as a person runs them."""
+"""The recorder and the commands beside a real daemon, as an operator runs them."""
 
 import io
 import json
@@ -29,7 +29,7 @@ def lift(tmp_path: Path) -> Path:
 
 
 class Told(NamedTuple):
-    """What a command has said, and its exit code."""
+    """The output of a command, and its exit code."""
 
     returncode: int
     stdout: str
@@ -37,7 +37,7 @@ class Told(NamedTuple):
 
 
 def bridge(*words: str | Path) -> Told:
-    """A command, to its end, in the folder of its file."""
+    """Run a command to its end, in the folder of its file."""
     out, error = io.StringIO(), io.StringIO()
     with redirect_stdout(out), redirect_stderr(error), chdir(Path(words[1]).parent):
         code = cli.main([str(word) for word in words])
@@ -45,10 +45,10 @@ def bridge(*words: str | Path) -> Told:
 
 
 def states(place: Path) -> int:
-    """How many states the ring shows to have been sent."""
+    """Return how many messages the ring has."""
     try:
         return sum(isinstance(one, Spoken) for one in RingContent(place / "ring").entries())
-    except Exception:  # noqa: BLE001 - it is not there yet
+    except Exception:  # noqa: BLE001 - the ring is not there yet
         return 0
 
 
@@ -86,7 +86,7 @@ def test_a_person_records_an_incident_and_replays_it(
 def test_the_recorder_makes_a_file_of_a_daemon_that_is_killed(
     lift: Path, tmp_path: Path, domain: int
 ) -> None:
-    base = Path(tempfile.mkdtemp(prefix="rec", dir="/tmp"))  # a socket's path must be short
+    base = Path(tempfile.mkdtemp(prefix="rec", dir="/tmp"))  # the path of a socket must be short
     place = base / "rmf-bridge" / lift.stem
     place.parent.mkdir(parents=True)
     out = tmp_path / "out"

@@ -1,4 +1,4 @@
-"""The recorder: when a file is made, what is in it, and how many there may be."""
+"""The recorder: when it makes a file, what the file has, and how many files it keeps."""
 
 import os
 import re
@@ -55,7 +55,7 @@ class Machine:
         self.start()
 
     def start(self) -> None:
-        """A daemon starts."""
+        """Start a daemon."""
         self.runs += 1
         head = Head(
             f"{self.runs:08x}",
@@ -76,19 +76,19 @@ class Machine:
         self.decide(SAMPLE)
 
     def decide(self, event: object, refused: str = "", *faults: Fault) -> None:
-        """One scan of it."""
+        """Record a decision of the daemon in the ring."""
         report = replace(REPORT, faults=faults)
         decision = Decision(None, LiftOutputs(), report, NEVER, refused)
         self.writer.decided("Lift1", None, event, self.now, decision)
         self.writer.flush()
 
     def say(self, topic: str, message: Message, *, sent: bool = False) -> None:
-        """A message goes by."""
+        """Record a message in the ring."""
         self.writer.spoken(topic, message, sent=sent)
         self.writer.flush()
 
     def live(self, seconds: int, each: Callable[[], None] = lambda: None) -> None:
-        """Let time pass, with a reading and a look each second."""
+        """Let time pass; each second the daemon decides on a reading, and the recorder looks."""
         for _ in range(seconds):
             self.now += 1.0
             self.decide(SAMPLE)
@@ -97,11 +97,11 @@ class Machine:
             self.recorder.look()
 
     def files(self) -> list[str]:
-        """What was recorded, by name."""
+        """Return the names of the recordings."""
         return sorted(path.name for path in self.out.glob("*"))
 
     def only(self) -> Path:
-        """The one recording."""
+        """Return the only recording."""
         [path] = self.out.glob("*.mcap")
         return path
 

@@ -1,4 +1,4 @@
-"""The ring: what was written is there after a kill, and a torn end is not taken for an entry."""
+"""The ring: entries survive a kill, and a torn last entry is not read."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""The ring's writer: whatever happens to its ring, no scan notices, and what is kept is the truth."""
+"""The ring's writer: no failure of the ring disturbs a scan, and what the ring has is true."""
 
 import errno
 import os
@@ -37,7 +37,7 @@ HEAD = Head("r", 1, "1", "lift", "/l.yaml", b"", {}, False, {}, RecordingSetting
 
 
 class Daemon:
-    """A daemon's part that is told of what happens, in virtual time."""
+    """The part of a daemon that gives events to the writer, in virtual time."""
 
     def __init__(self, folder: Path, make: Callable[[], Ring] | None = None) -> None:
         self.now, self.step_s = 100.0, 0.0
@@ -50,7 +50,7 @@ class Daemon:
         return Ring(self.folder, HEAD, 100_000)
 
     def scan(self, door: DoorReading = DoorReading.CLOSED, memory: object = None) -> None:
-        """A reading, and what was decided."""
+        """Record a reading and the decision on it."""
         decision = Decision(memory, LiftOutputs(), REPORT, NEVER)
         sample = Sampled(LiftSample("L1", door))
         self.writer.decided("Lift1", self.memory, sample, self.now, decision)
@@ -167,7 +167,7 @@ def test_what_cannot_be_recorded_is_lost_and_no_scan_with_it(
 ) -> None:
     daemon = Daemon(tmp_path)
     for _ in range(3):
-        daemon.memory = object()  # no value of a core: a defect of ours
+        daemon.memory = object()  # no value of a core: a defect of the program
         daemon.scan()
 
     assert [r.getMessage().split(" ")[0] for r in caplog.records] == ["not_written"]
@@ -193,7 +193,7 @@ def test_a_flood_takes_no_more_than_its_bound_and_each_decision_is_kept(tmp_path
     daemon.now += 1.0
     daemon.say(LiftState())
 
-    found = daemon.entries()  # of the last seconds: the flood has filled the ring
+    found = daemon.entries()  # the last seconds only: the flood has filled the ring
     kept = Counter(one.at for one in found if isinstance(one, Spoken))
     assert [kept[at] for at in (104.0, 105.0, 106.0)] == [200, 200, 1]
     assert {one.number for one in found if isinstance(one, EntriesLost)} == {9_800}
@@ -202,7 +202,7 @@ def test_a_flood_takes_no_more_than_its_bound_and_each_decision_is_kept(tmp_path
 
 def test_a_ring_that_failed_is_not_taken_for_a_run_that_died(tmp_path: Path) -> None:
     daemon = Daemon(tmp_path)
-    daemon.memory = object()  # a defect of ours
+    daemon.memory = object()  # a defect of the program
     daemon.scan()
     daemon.now += 11.0
     daemon.writer.look()

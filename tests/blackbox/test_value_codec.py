@@ -1,4 +1,4 @@
-"""Values of cores as trees, and back: the same value, and nothing that could do something."""
+"""Values of cores become trees and the same values again; decoding a tree can run no code."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""A runtime directory as a daemon that serves has it."""
+"""The runtime directory of a daemon in service."""
 
 import json
 from collections.abc import Iterator
@@ -12,8 +12,10 @@ from bridges.runtime.holder import HOLDER, ourselves
 
 @contextmanager
 def served(folder: Path, told: object) -> Iterator[Path]:
-    """A runtime directory that a daemon has; after the block that has died, and another process has
-    its number."""
+    """Yield the runtime directory of a live daemon.
+
+    After the block that daemon has died, and another process has its number.
+    """
     folder.mkdir()
     (folder / "status.json").write_text(json.dumps(told))
     name = ourselves(Path("x"), serves=True)

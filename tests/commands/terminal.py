@@ -1,4 +1,4 @@
-"""A terminal with somebody who types at it, for commands that ask."""
+"""A terminal with a person who types, for commands that ask questions."""
 
 import fcntl
 import os
@@ -15,7 +15,7 @@ from tests.waiting import PATIENCE_S
 
 
 class Terminal:
-    """A terminal with somebody who types at it."""
+    """A terminal with a person who types."""
 
     def __init__(self, *words: str | Path, environ: Mapping[str, str] = os.environ) -> None:
         self.screen = b""
@@ -26,11 +26,13 @@ class Terminal:
         fcntl.ioctl(self._end, termios.TIOCSWINSZ, struct.pack("HHHH", 60, 120, 0, 0))
 
     def wait_for(self, text: str) -> None:
-        """Until the screen has shown this."""
+        """Wait until the screen has shown this text."""
         self.wait_until(lambda: text.encode() in self.screen, text)
 
     def wait_until(self, condition: Callable[[], bool], what: str) -> None:
-        """Until it holds, reading what the program draws: one that nobody reads stops drawing."""
+        """Wait until the condition holds, and read the screen meanwhile: an unread program stops
+        drawing.
+        """
         deadline = time.monotonic() + PATIENCE_S
         while not condition():
             assert time.monotonic() < deadline, (what, self.screen[-2000:])
@@ -40,21 +42,21 @@ class Terminal:
     def _read(self) -> None:
         try:
             chunk = os.read(self._end, 65536)
-        except OSError as error:  # Linux says so when the program has ended
-            raise AssertionError(f"it has ended: {self.screen[-2000:]!r}") from error
+        except OSError as error:  # Linux raises this when the program has ended
+            raise AssertionError(f"the program has ended: {self.screen[-2000:]!r}") from error
         self.screen += chunk
-        if b"\x1b[6n" in chunk:  # it asks where the cursor is
+        if b"\x1b[6n" in chunk:  # the program asks for the position of the cursor
             os.write(self._end, b"\x1b[1;1R")
 
     def type(self, keys: str) -> None:
         os.write(self._end, keys.encode())
 
     def close(self) -> None:
-        """The terminal is closed, as when an ssh connection ends."""
+        """Close the terminal, as when an ssh connection ends."""
         os.close(self._end)
 
     def wait(self) -> int:
-        """The exit code, or minus the signal, without reading the screen any more."""
+        """Return the exit code, or minus the signal, without reading the screen any more."""
         _, status = os.waitpid(self.pid, 0)
         return os.waitstatus_to_exitcode(status)
 

@@ -1,4 +1,4 @@
-"""Completion in a shell, and the manual page: both are made from the commands' own parsers."""
+"""Shell completion and the manual page are both made from the commands' parsers."""
 
 import os
 import subprocess
@@ -26,11 +26,13 @@ for told, line in zip(sys.argv[1::2], sys.argv[2::2]):
         cli.main([])
     assert os.waitpid(child, 0)[1] == 0
 """
-"""A process for each line, as a shell starts them, but forked from one that has imported it all."""
+"""Complete each line in a process of its own, as a shell does, but fork from a process with all imports
+done.
+"""
 
 
 def completed(folder: Path, *lines: str) -> list[list[str]]:
-    """What the shell is offered at the end of each line, by argcomplete's own protocol."""
+    """Return the words offered at the end of each line, by argcomplete's own protocol."""
     told = [folder / str(n) for n in range(len(lines))]
     words = [str(word) for each in zip(told, lines, strict=True) for word in each]
     environ = os.environ | {"_ARGCOMPLETE_IFS": "\n", "_ARGCOMPLETE_SHELL": "bash"}

@@ -1,4 +1,4 @@
-"""`enable` and `disable`: what they do, in which order, and what they refuse."""
+"""`enable` and `disable`: their steps, the order of the steps, and refusals."""
 
 import argparse
 import os
@@ -23,7 +23,7 @@ TARGET = "etc/rmf-bridges/lift_dry_contact.yaml"
 
 @pytest.fixture
 def calls(monkeypatch: pytest.MonkeyPatch) -> list[list[str]]:
-    """The commands that were run; each succeeds."""
+    """Return the commands that were run; each command succeeds."""
     found: list[list[str]] = []
 
     class Done:
@@ -205,7 +205,9 @@ def test_a_step_that_fails_after_the_stop_ends_with_the_service_started_again(
     (tmp_path / "file").touch()
     live = _told(LIFT, Path("/"))
     live.dry_run = False
-    full = WriteFile(tmp_path / "file" / "drop_in", b"")  # no folder: as a full disk, an OSError
+    full = WriteFile(
+        tmp_path / "file" / "drop_in", b""
+    )  # no such folder: OSError, as on a full disk
     assert carry_out([full, Remove(tmp_path / "never")], live, keeps=UNIT) == os.EX_IOERR
     assert calls == [["systemctl", "--quiet", "is-active", UNIT], ["systemctl", "start", UNIT]]
     assert "the steps after that were not taken" in capsys.readouterr().err

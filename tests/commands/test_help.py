@@ -1,4 +1,4 @@
-"""What `--help` says: each command with an example, and each example is a right command line."""
+"""`--help` gives an example for each command, and each example is a valid command line."""
 
 import argparse
 import shlex

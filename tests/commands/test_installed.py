@@ -1,4 +1,4 @@
-"""What a plain `pip install` installs: every file, and commands that need no extra to start."""
+"""A plain `pip install` installs every file, and commands that start without an extra."""
 
 import subprocess
 import sys

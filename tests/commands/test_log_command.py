@@ -1,4 +1,4 @@
-"""`rmf-bridge log`: the command line that it hands to journalctl, and what its pattern finds."""
+"""`rmf-bridge log`: the command line for journalctl, and the lines that the pattern finds."""
 
 import argparse
 import os

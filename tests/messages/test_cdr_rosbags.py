@@ -1,4 +1,4 @@
-"""Our bytes beside those of rosbags: a second implementation of CDR, and of the type hash."""
+"""Our bytes and type hashes against those of rosbags, a second implementation."""
 
 from typing import Any
 
@@ -15,23 +15,23 @@ from tests.messages.test_definitions import FIELDS
 from tests.transports.values import MESSAGE_TYPES, repeatable, values
 
 STORE = get_typestore(Stores.EMPTY)
-for _name, _text in FIELDS.items():  # as in a .msg file: one field to a line
+for _name, _text in FIELDS.items():  # as in a .msg file: one field per line
     _package, _message = _name.split("/")
     STORE.register(get_types_from_msg(_text.replace(",", "\n"), f"{_package}/msg/{_message}"))
 EVERY_TYPE = pytest.mark.parametrize("kind", MESSAGE_TYPES, ids=lambda kind: kind.__name__)
 
 
 def name(kind: type) -> str:
-    """A message type as ROS names it."""
+    """Return the name of a message type in ROS."""
     return f"{d.PACKAGES[kind]}/msg/{kind.__name__}"
 
 
 def theirs(value: Any) -> Any:
-    """A value of ours as rosbags wants it; of numbers in a row it makes arrays."""
+    """Return our value as rosbags expects it, with rows of numbers as arrays."""
     if isinstance(value, Struct):
         made = STORE.types[name(type(value))]
         members = {name: theirs(getattr(value, name)) for name in value.__struct_fields__}
-        if isinstance(value, d.DiagnosticStatus):  # a `byte` is signed there; its bits are the same
+        if isinstance(value, d.DiagnosticStatus):  # rosbags has a signed `byte` with the same bits
             members["level"] = (value.level ^ 128) - 128
         return made(**members)
     if isinstance(value, tuple):

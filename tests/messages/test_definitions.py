@@ -1,12 +1,13 @@
-"""`definitions.py` and `releases.py` against tables typed from the .msg files, release by release.
+"""`definitions.py` and `releases.py` against tables typed from the .msg files of each release.
 
-Read in open-rmf/rmf_internal_msgs at 3d4df023bacaf7a091564e98f4aff0776f72a612 (4.1.0), every line
-of rmf_lift_msgs/msg, rmf_door_msgs/msg, rmf_charger_msgs/msg, rmf_task_msgs/msg/Alert and its
-AlertParameter, and in rmf_fleet_msgs/msg EmergencySignal, FleetState, ChargingAssignments and theirs;
-Time, Duration, Bool and Header from ROS 2 Jazzy's builtin_interfaces and std_msgs, and diagnostic_msgs
-from ros2/common_interfaces c0c0bc57f958eb54a142446f0c2a475754367eee. What Jazzy has otherwise: the same
-files at tag 3.3.1, a351d51602383eb09a8138d302827a76241630a5. Kilted: 4.1.0 and branch kilted (3.5.0) at
-c0f72ce5e2129411d2868414b25f6fab1460fcdb, which have the same files.
+Source: every line of rmf_lift_msgs/msg, rmf_door_msgs/msg, rmf_charger_msgs/msg,
+rmf_task_msgs/msg/Alert and its AlertParameter, and in rmf_fleet_msgs/msg of EmergencySignal,
+FleetState, ChargingAssignments and their parts, in open-rmf/rmf_internal_msgs at
+3d4df023bacaf7a091564e98f4aff0776f72a612 (4.1.0). Time, Duration, Bool and Header are from ROS 2 Jazzy's
+builtin_interfaces and std_msgs, and diagnostic_msgs from ros2/common_interfaces
+c0c0bc57f958eb54a142446f0c2a475754367eee. Jazzy's differences are from the same files at tag 3.3.1,
+a351d51602383eb09a8138d302827a76241630a5. Kilted has the files of 4.1.0, as branch kilted (3.5.0) shows
+at c0f72ce5e2129411d2868414b25f6fab1460fcdb.
 """
 
 import typing
@@ -149,12 +150,12 @@ JAZZY: dict[str, str | None] = {
     "rmf_task_msgs/Alert": None,
     "rmf_task_msgs/AlertParameter": None,
 }
-"""Where Jazzy's files differ from those above; None: there is no such file."""
+"""Differences of Jazzy's files from the table above; None: Jazzy has no such file."""
 NOT_IN_JAZZY = {
     d.RobotModeValue: {"MODE_PERFORMING_ACTION", "MODE_ACTION_COMPLETED"},
     d.AlertTier: {"TIER_INFO", "TIER_WARNING", "TIER_ERROR"},
 }
-"""Every other constant of the table above has the same number in Jazzy's files."""
+"""The constants that Jazzy lacks. All others have the same number in Jazzy's files."""
 GOLDEN = {
     releases.KILTED: FIELDS,
     releases.JAZZY: {name: text for name, text in {**FIELDS, **JAZZY}.items() if text is not None},
@@ -168,7 +169,7 @@ def test_there_are_no_constants_besides_those_of_the_table() -> None:
 
 
 def test_no_constant_that_jazzy_lacks_is_sent() -> None:
-    """Alert's tiers go with the message, which Jazzy lacks too; the modes are RMF's to send."""
+    """Jazzy lacks Alert with its tiers, so neither is sent there; RMF alone sends the missing modes."""
     assert NOT_IN_JAZZY[d.AlertTier] == CONSTANTS[d.AlertTier].keys()
     assert not releases.JAZZY.has(d.Alert)
     ours = set(CONSTANTS[d.RobotModeValue]) - NOT_IN_JAZZY[d.RobotModeValue]

@@ -1,4 +1,6 @@
-"""Nodes of RMF's releases on one graph: who hears whom, what `auto` follows, and what is told of it."""
+"""Nodes of different RMF releases on one graph: who hears whom, what `auto` follows, what is
+reported.
+"""
 
 import logging
 from collections.abc import Callable, Iterator
@@ -29,7 +31,7 @@ Joining = Callable[[str, Release | None], Transport]
 
 @pytest.fixture(params=[DDS, "zenoh", "zenoh_ros2dds"])
 def join_of(request: pytest.FixtureRequest) -> Iterator[Joining]:
-    """Nodes of any release on one graph."""
+    """Yield a function that joins a node of any release to one graph."""
     nodes: list[Transport] = []
 
     def join(name: str, release: Release | None) -> Transport:
@@ -43,7 +45,7 @@ def join_of(request: pytest.FixtureRequest) -> Iterator[Joining]:
 
 @contextmanager
 def fleet(node: Transport) -> Iterator[Callable[[], object]]:
-    """A fleet adapter's states, said again and again."""
+    """Yield a function that publishes a fleet adapter's states, to be called again and again."""
     publisher = node.publisher(topics.FLEET_STATES)
     yield lambda: publisher.publish(FLEET)
     publisher.close()
@@ -93,7 +95,7 @@ def test_a_publisher_of_another_release_is_named_and_counted_while_it_is_there(
             say()
         reason = "a publisher is not heard: its type does not fit ours"
         wait_until(lambda: reason in caplog.text, "the misfit is named")
-    wait_until(lambda: ours.faults() == [], "it has left")
+    wait_until(lambda: ours.faults() == [], "the adapter has left")
     assert caplog.text.count(reason) == 1
     assert received == []
     assert capfd.readouterr().err == ""
@@ -106,12 +108,12 @@ def test_two_releases_on_one_graph_are_a_fault_and_the_first_one_is_spoken(
     with fleet(join_of("new", KILTED)):
         wait_until(lambda: ours.release is KILTED, "the first adapter's release is known")
         with fleet(join_of("old", JAZZY)):
-            wait_until(lambda: len(ours.faults()) == 1, "the other one is seen")
+            wait_until(lambda: len(ours.faults()) == 1, "the other adapter is seen")
             assert ours.faults() == [("TWO_RELEASES", "jazzy and kilted are both on this graph")]
             assert ours.release is KILTED
             what = "each of the three nodes names it"
             wait_until(lambda: caplog.text.count("two_releases") == 3, what)
-        wait_until(lambda: ours.faults() == [], "the other one has left")
+        wait_until(lambda: ours.faults() == [], "the other adapter has left")
     assert caplog.text.count("two_releases") == 3
 
 
@@ -129,7 +131,7 @@ def test_each_of_many_nodes_in_one_process_reads_what_the_others_speak(join_of: 
 
 
 def told(nodes: list[Transport], faults: list[tuple[str, str]]) -> Callable[[], bool]:
-    """Whether each of the nodes reports these faults."""
+    """Return a condition: does each of the nodes report these faults?"""
     return lambda: all(node.faults() == faults for node in nodes)
 
 
@@ -154,11 +156,11 @@ def test_our_own_daemons_are_no_evidence_of_a_release() -> None:
     assert (peers.settle(), peers.release) == (False, JAZZY)
 
 
-# --- what a release lacks ------------------------------------------------------------------------
+# --- messages that a release lacks ----------------------------------------------------------------
 
 
 def site(release: Release) -> tuple[Outlet, MemoryTransport, list[object]]:
-    """A node of this release, and all that is heard of its alarms."""
+    """Return a node of this release, and all that is heard of its alarms."""
     network, heard = MemoryNetwork(), list[object]()
     ears = MemoryTransport(network, "ears")
     for topic in (topics.EMERGENCY_SIGNAL, topics.FIRE_ALARM_TRIGGER, topics.ALERT):
@@ -172,7 +174,7 @@ def site(release: Release) -> tuple[Outlet, MemoryTransport, list[object]]:
 def test_without_emergency_signal_the_alarm_and_its_end_go_out_on_fire_alarm_trigger() -> None:
     outlet, node, heard = site(JAZZY)
     outlet.publish(topics.EMERGENCY_SIGNAL, d.EmergencySignal((), True))
-    node.release = KILTED  # learnt meanwhile: its end takes the way of the alarm
+    node.release = KILTED  # learnt meanwhile: the end goes out as the alarm did
     outlet.publish(topics.EMERGENCY_SIGNAL, d.EmergencySignal((), False))
     assert heard == [d.Bool(True), d.Bool(False)]
     outlet, _, heard = site(KILTED)

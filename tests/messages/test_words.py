@@ -1,4 +1,4 @@
-"""Messages in words, as `watch`, `send` and the demo print them."""
+"""The words for messages that `watch`, `send` and the demo print."""
 
 from bridges.messages import definitions as d
 from bridges.messages import stamps, words

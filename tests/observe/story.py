@@ -1,4 +1,4 @@
-"""Messages in virtual time, and what they change of what is remembered of one device."""
+"""Messages in virtual time, and how each changes the memory of one device."""
 
 from dataclasses import dataclass, field
 
@@ -22,14 +22,14 @@ OPEN, CLOSED = 2, 0
 
 @dataclass
 class Story:
-    """What happens, second by second; `news` is what each message changed, as one line each."""
+    """The course of messages and time; `news` has a line for each change that a message makes."""
 
     graph: PlainGraph = field(default_factory=PlainGraph)
     now: float = 0.0
     news: list[str] = field(default_factory=list)
 
     def hear(self, topic: str, message: d.Message) -> "Story":
-        """A message comes now."""
+        """Let a message arrive now."""
         heard = Heard(self.now, WALL + self.now, topic, message)
         for _, news in self.graph.hear(heard):
             for one in news:
@@ -38,56 +38,56 @@ class Story:
         return self
 
     def passes(self, seconds: float) -> "Story":
-        """Time passes."""
+        """Let time pass."""
         self.now += seconds
         return self
 
     def told(self) -> list[str]:
-        """The news since this was asked last."""
+        """Return the news since the last call."""
         told, self.news = self.news, []
         return told
 
     def device(self, kind: Kind, name: str) -> AnyDevice:
-        """The device of this name."""
+        """Return the device of this name."""
         return self.graph.known[kind, name]
 
     def waits(self, kind: Kind, name: str) -> list[tuple[str, str, float]]:
-        """Who waits now, for what, since when."""
+        """Return each waiting requester with its wish and the start of its wait."""
         now = Moment(self.now, WALL + self.now)
         return [(one.who, one.wants, one.since.at) for one in self.device(kind, name).waits(now)]
 
-    # ---- what is said
+    # ---- messages
 
     def lift(self, session: str = "", floor: str = "L1", door: int = CLOSED) -> "Story":
-        """A LiftState."""
+        """Let a LiftState arrive."""
         said = replace(LIFT, session_id=session, current_floor=floor, door_state=door)
         return self.hear("lift_states", replace(said, lift_time=stamp(WALL + self.now)))
 
     def asks(
         self, who: str, floor: str = "L2", kind: int = AGV, *, passed: bool = False
     ) -> "Story":
-        """A fleet adapter's LiftRequest, or the supervisor's."""
+        """Let a LiftRequest of a fleet adapter arrive, or the supervisor's if it is `passed` on."""
         topic = "lift_requests" if passed else "adapter_lift_requests"
         floor = "" if kind == END else floor
         return self.hear(topic, d.LiftRequest("Lift1", stamp(WALL + self.now), who, kind, floor))
 
     def ends(self, who: str, *, passed: bool = False) -> "Story":
-        """END_SESSION."""
+        """Let an END_SESSION arrive."""
         return self.asks(who, kind=END, passed=passed)
 
     def door(self, mode: int) -> "Story":
-        """A DoorState."""
+        """Let a DoorState arrive."""
         said = replace(DOOR, door_time=stamp(WALL + self.now), current_mode=d.DoorMode(mode))
         return self.hear("door_states", said)
 
     def asks_door(
         self, who: str, mode: int = OPEN, topic: str = "adapter_door_requests"
     ) -> "Story":
-        """A DoorRequest."""
+        """Let a DoorRequest arrive."""
         return self.hear(topic, d.DoorRequest(stamp(WALL), who, "ward", d.DoorMode(mode)))
 
     def lists(self, *holders: str) -> "Story":
-        """The door supervisor's heartbeat."""
+        """Let the door supervisor's heartbeat arrive with these holders."""
         sessions = tuple(d.Session(requester_id=who) for who in holders)
         listed = (d.DoorSessions("ward", sessions),) if sessions else ()
         return self.hear("door_supervisor_heartbeat", d.SupervisorHeartbeat(listed))

@@ -1,4 +1,4 @@
-"""All devices: their bounds, their clock, the age of what they say, and two nodes of one name."""
+"""All devices: the bounds of memory, the clock, the age of messages, and two nodes of one name."""
 
 import pytest
 from msgspec.structs import replace

@@ -1,4 +1,4 @@
-"""What nodes of ours say on `/diagnostics`, remembered in bounds."""
+"""The memory of our nodes' statements on `/diagnostics`, within bounds."""
 
 from bridges.messages import definitions as d
 from bridges.messages.heard import Heard

@@ -1,4 +1,4 @@
-"""What is remembered of a door and a charger: who asks, who holds, who waits."""
+"""The memory of a door and a charger: requesters, holders and waits."""
 
 from msgspec.structs import replace
 

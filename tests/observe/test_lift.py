@@ -1,4 +1,4 @@
-"""What is remembered of a lift: who asks, who has it, who waits, and what RequestLift misses."""
+"""The memory of a lift: requesters, holder, waits, and the unmet conditions of RequestLift."""
 
 import pytest
 

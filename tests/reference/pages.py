@@ -1,6 +1,7 @@
-"""Pages of docs/ that the program makes of itself: `python -m tests.reference.pages` writes them.
+"""Generated pages of docs/: `python -m tests.reference.pages` writes docs/reference/ and the decisions'
+index.
 
-docs/reference/ and the index of decisions. `test_pages.py` compares each with what is there.
+`test_pages.py` compares each page with its file.
 """
 
 import argparse
@@ -26,7 +27,7 @@ DECISIONS: Final = DOCS / "explanation" / "decisions"
 
 
 def commands() -> str:
-    """Each subcommand with its options, from the parsers."""
+    """Return the page of subcommands with their options, from the parsers."""
     whole = next(_subparsers(cli.whole_parser()))
     told = "".join(_command(f"rmf-bridge {name}", whole[name]) for name in cli.COMMANDS)
     rows = (
@@ -86,7 +87,7 @@ def _cell(text: str) -> str:
 
 
 def exit_codes() -> str:
-    """Each subcommand's exit codes."""
+    """Return the page of each subcommand's exit codes."""
     always = "\n".join(f"| {code} | {text} |" for code, text in ALWAYS.items())
     rows = (
         f"| `{name}` | {code} | {text} |"
@@ -101,7 +102,7 @@ def exit_codes() -> str:
 
 
 def laws() -> str:
-    """The laws of `rmf-bridge judge`."""
+    """Return the page of the laws of `rmf-bridge judge`."""
     return LAWS_HEAD + "".join(f"\n## Of a {kind}\n\n{markdown(kind)}\n" for kind in KINDS)
 
 
@@ -121,7 +122,7 @@ the same.
 
 
 def every_topic() -> str:
-    """Topics, with the kinds that publish and hear them."""
+    """Return the page of topics, with the kinds that publish or hear each topic."""
     sent: dict[str, set[str]] = {topics.DIAGNOSTICS.name: {"every daemon"}}
     heard: dict[str, set[str]] = {}
     examples = [load(file) for file in device_yamls()]
@@ -176,7 +177,7 @@ def _names(kinds: Iterable[str]) -> str:
 
 
 def decisions() -> str:
-    """The index of docs/explanation/decisions/."""
+    """Return the index of docs/explanation/decisions/."""
     rows = []
     for file in sorted(DECISIONS.glob("0*.md")):
         title, _, status, *_ = file.read_text().splitlines()

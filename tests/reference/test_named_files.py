@@ -1,4 +1,4 @@
-"""Files named in docs/explanation/architecture.md, CONTRIBUTING.md and the README are there."""
+"""Files named in docs/explanation/architecture.md, CONTRIBUTING.md and the README exist."""
 
 import re
 from pathlib import Path, PurePath
@@ -25,7 +25,7 @@ THERE = [
     if "__pycache__" not in path.parts
 ]
 PATH = re.compile(r"`([\w.-]+(?:/[\w.-]+)*(?:/|\.(?:py|md|yaml|dbc)))`")
-"""A file or a folder in a text; `<kind>` and `*` stand for many, and are not looked for."""
+"""A file or a folder in a text. Paths with `<kind>` or `*` stand for many files and are not checked."""
 WAYS = ("a request", "an edge", "a register", "a frame", "a YAML")
 
 

@@ -1,4 +1,6 @@
-"""A class name means one thing: at most 5 % of the product's classes share theirs with another."""
+"""A class name has one meaning: at most 5 % of the product's classes share a name with another
+class.
+"""
 
 import ast
 from collections import Counter
@@ -12,7 +14,7 @@ MOST: Final = 0.05
 
 
 def classes() -> Iterator[str]:
-    """The name of each class at the top of a module."""
+    """Yield the name of each class at the top of a module."""
     for room in ROOMS:
         for file in sorted((ROOT / room).rglob("*.py")):
             for node in ast.parse(file.read_text()).body:

@@ -1,4 +1,4 @@
-"""What the program makes of itself in docs/ is up to date."""
+"""The generated pages of docs/ are up to date."""
 
 import os
 import re
@@ -16,7 +16,7 @@ ROOT = DOCS.parent
 
 @pytest.mark.parametrize("page", PAGES)
 def test_a_generated_page_is_what_the_program_makes(page: str) -> None:
-    """`make reference` brings it up to date."""
+    """`make reference` brings the page up to date."""
     assert (DOCS / page).read_text() == PAGES[page]()
 
 
@@ -33,7 +33,7 @@ def test_each_exit_code_that_a_command_names_is_told(command: str) -> None:
 
 
 def tracked(pattern: str) -> Iterator[Path]:
-    """Files of the repository, without what is built."""
+    """Yield the files of the repository, without built files."""
     for path in sorted(ROOT.rglob(pattern)):
         if not {".venv", ".venv-ros", "build", "dist"} & set(path.relative_to(ROOT).parts):
             yield path
@@ -58,7 +58,9 @@ LIST = re.compile(r"^(?![ |#-]|\d+\. |<!--|```).*\S\n(?:- |1\. |\| )", re.M)
 
 
 def test_a_list_or_table_begins_after_an_empty_line() -> None:
-    """Without it the site has one paragraph, as Python-Markdown reads it."""
+    """Without the empty line Python-Markdown reads the list or table as part of the paragraph
+    before.
+    """
     texts = {
         page.name: re.sub(r"^ *```.*?^ *```$", "", page.read_text(), flags=re.M | re.S)
         for page in DOCS.rglob("*.md")

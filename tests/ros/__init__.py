@@ -1,1 +1,1 @@
-"""The ROS package beside the pip one."""
+"""The ROS package beside the package for pip."""

@@ -1,7 +1,7 @@
-"""A stand-in for rclpy in a folder of its own: enough of it for a daemon to start and be refused.
+"""A stand-in for rclpy in a folder of its own: enough for a daemon to start and be refused.
 
-At the interpreter's end it says whether the thread of its executor still runs: rclpy's then aborts the
-process (SIGABRT), as its C++ objects go while the thread uses them.
+When the interpreter ends, the stand-in prints whether its executor's thread still runs. The real rclpy
+would then abort the process (SIGABRT), because its C++ objects go while the thread uses them.
 """
 
 from pathlib import Path
@@ -90,7 +90,7 @@ PACKAGES = (
 
 
 def write(folder: Path) -> None:
-    """The stand-in, and message packages that hold nothing."""
+    """Write the stand-in, and message packages without messages."""
     for name, text in MODULES.items():
         (folder / "rclpy").mkdir(exist_ok=True)
         (folder / "rclpy" / f"{name}.py").write_text(text)

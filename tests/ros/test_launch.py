@@ -1,4 +1,4 @@
-"""The launch files with stand-ins for ROS's `launch`, in a Python that has only what ROS brings."""
+"""The launch files, with stand-ins for ROS's `launch`, in a Python with only ROS's packages."""
 
 import subprocess
 import sys
@@ -45,7 +45,9 @@ LIFT = ROOT / "config" / "lift_dry_contact.yaml"
 
 
 def launched(kind: str, file: Path) -> str:
-    """What `ros2 launch rmf_bridges KIND.launch.py config:=FILE simulate:=true` would start."""
+    """Return the command line that `ros2 launch rmf_bridges KIND.launch.py config:=FILE simulate:=true`
+    starts.
+    """
     launch_file = str(ROOT / "ros" / "launch" / f"{kind}.launch.py")
     command = [sys.executable, "-c", LAUNCHED, launch_file, str(file)]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)

@@ -1,4 +1,4 @@
-"""What colcon and `ros2 launch` read agrees with the project, and setup.py takes all of it."""
+"""The files for colcon and `ros2 launch` agree with the project, and setup.py includes all of it."""
 
 import ast
 import subprocess

@@ -1,6 +1,6 @@
-"""A start that is refused on `ros2`, with a stand-in for rclpy: exit code 69, and no thread left over.
+"""A refused start on `ros2`, with a stand-in for rclpy: exit code 69, and the executor's thread joined.
 
-With ROS itself this was seen to end in SIGABRT in 2 of 4 starts; here that cannot be repeated.
+With ROS itself 2 of 4 such starts ended in SIGABRT; that cannot be repeated here.
 """
 
 import os

@@ -1,4 +1,4 @@
-"""A module on the wall, with a door's YAML for it; and RMF's end of the graph."""
+"""An I/O module, with a door's YAML for it, and RMF's end of the graph."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -25,7 +25,7 @@ def graph(module: Module) -> Iterator[Graph]:
 
 @pytest.fixture
 def machine(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A machine with services and users, none of whom is told by systemd where things are."""
+    """Return a machine with services and users; systemd names no directories for them."""
     for name in ("RUNTIME_DIRECTORY", "STATE_DIRECTORY"):
         monkeypatch.delenv(name, raising=False)
     monkeypatch.setattr(directories, "SERVICE_RUN", tmp_path / "run")

@@ -1,4 +1,4 @@
-"""Doors on one bus, in rounds and in virtual time."""
+"""Doors on one bus, scanned in rounds in virtual time."""
 
 from collections.abc import Callable, Sequence
 
@@ -18,7 +18,9 @@ SCAN_S = 0.25
 
 
 class Door:
-    """One door's driver; `during` is called in the middle of each reading. It can be `lost`."""
+    """The driver of a door; each reading calls `during` in its middle. A `lost` door cannot be switched
+    off.
+    """
 
     def __init__(self, name: str, log: Callable[[str], None]) -> None:
         self.during: Callable[[], None] = lambda: None
@@ -49,7 +51,7 @@ class Door:
 
 
 class Wires(Bus):
-    """A bus that tells of edges."""
+    """A bus that reports edges."""
 
     def __init__(self, log: Callable[[str], None]) -> None:
         self._log = log
@@ -66,7 +68,7 @@ class Wires(Bus):
 
 
 class Corridor:
-    """Two doors on one bus, or these. `story`: (s, what)."""
+    """Two doors on one bus, or the given doors. `story` has each event with its time (s)."""
 
     def __init__(
         self, debounce: dict[str, float] | None = None, doors: Sequence[str] = ("ward", "lab")
@@ -93,14 +95,14 @@ class Corridor:
         self.story.append((self.now, what))
 
     def round(self, at: float) -> list[str]:
-        """A round at this time; what happened in it."""
+        """Run a round at this time; return its events."""
         self.now = at
         before = len(self.story)
         self.loop.round()
         return [what for _, what in self.story[before:]]
 
     def falls_silent(self, door: str, timeout_s: float) -> None:
-        """From now on its readings end in a timeout."""
+        """Let each further reading of this door end in a timeout."""
 
         def waits() -> None:
             self.now += timeout_s
@@ -110,5 +112,5 @@ class Corridor:
         self.doors[door].during = waits
 
     def asks(self, door: str) -> None:
-        """RMF wants it open."""
+        """Request the door as RMF does."""
         self.loop.inbox.put(door, OpenRequested("a"))

@@ -1,4 +1,4 @@
-"""What stands in the way of a relay's end: a dead bus, and a user who waits for every lock."""
+"""Obstacles to switching a relay off: a dead bus, and a user who waits for every lock."""
 
 import re
 import subprocess
@@ -26,12 +26,14 @@ for path in sys.argv[1:]:
 print("waits", flush=True)
 sys.stdin.read()
 """
-"""Opens what it may of these files, and waits for the lock of each."""
+"""Opens the readable files among these, and waits for the lock of each."""
 
 
 @contextmanager
 def group_member(folder: Path) -> Iterator[list[str]]:
-    """Another user, in the directory's group, who waits for every lock there; what he could open."""
+    """Let another user of the directory's group wait for every lock there; yield the files he could
+    open.
+    """
     files = sorted(str(path) for path in folder.iterdir() if path.is_file())
     with subprocess.Popen(
         [sys.executable, "-c", WAITS, *files],
@@ -45,12 +47,12 @@ def group_member(folder: Path) -> Iterator[list[str]]:
 
 
 def unit(run: Path, invocation: str) -> dict[str, str]:
-    """What systemd tells one run of a unit."""
+    """Return the environment that systemd gives to one run of a unit."""
     return {"RUNTIME_DIRECTORY": str(run), "INVOCATION_ID": invocation, **SERVICE}
 
 
 def with_a_dead_bus_first(yaml: str, port: int, timeout_s: float = 1.5) -> str:
-    """A door's YAML; before it another door, on a bus at this port, which never answers."""
+    """Return a door's YAML with another door before it, on a bus at this port that never answers."""
     bus = f"{{type: modbus, tcp: {{host: 127.0.0.1, port: {port}}}, timeout_s: {timeout_s}}}"
     door = yaml.partition("doors:\n")[2]
     far = door.replace("ward_door:", "far_door:\n    bus: dead")
@@ -61,6 +63,6 @@ def with_a_dead_bus_first(yaml: str, port: int, timeout_s: float = 1.5) -> str:
 
 
 def live_before_dead(log: str) -> bool:
-    """Whether the live bus was switched off before the dead one had been waited for."""
+    """Was the live bus switched off before the wait for the dead bus ended?"""
     before, _, live = log.partition("outputs_off bus=module verified=yes")
     return bool(live) and "outputs_off bus=dead" not in before

@@ -1,8 +1,8 @@
-"""`rmf-bridge`, with a part inside that fails as soon as a file exists.
+"""`rmf-bridge` with a part that fails as soon as a file exists.
 
-`python -m tests.runtime.hurt PART FILE run …`: `reader` is the transport's, which raises again and
-again; `bus` is Modbus, whose next reading never ends; `loop` is the thread of the bus `dead`, and
-`watch` the daemon's own, which raise.
+`python -m tests.runtime.hurt PART FILE run …`. PART `reader`, the transport's reader, raises again and
+again. `bus` is Modbus: its next reading never ends. `loop`, the thread of the bus `dead`, raises, and
+so does `watch`, the daemon's main thread.
 """
 
 import sys
@@ -34,7 +34,7 @@ def _daemon() -> type:
 
 
 def _raises(*_: Any) -> None:
-    raise MemoryError("none left")
+    raise MemoryError("no memory left")
 
 
 def _raises_for_the_dead(loop: Loop) -> None:
@@ -55,7 +55,7 @@ HURTS: dict[str, tuple[Callable[[], type], str, Callable[..., None]]] = {
 
 
 def main(argv: Sequence[str]) -> int:
-    """Serve until the file exists."""
+    """Run the command; the part fails once the file exists."""
     what, file, *command = argv
     owner, name, fail = HURTS[what]
     whole = getattr(owner(), name)

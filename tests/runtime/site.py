@@ -20,12 +20,13 @@ from tests.waiting import PATIENCE_S, wait_until
 
 ROOT = Path(__file__).parents[2]
 SERVICE = {"RMF_BRIDGE_SERVICE": "1"}
-"""A unit stands behind this daemon, so that it has no guard: that would try for minutes where
-the module is gone."""
+"""As for a systemd unit, so the daemon starts no guard: a guard would try for minutes after the module
+is gone.
+"""
 PATIENT = "stale_after_s: 30"
-"""A busy machine that keeps the daemon from scanning for a while does not take its door away.
-
-For the same reason the module has 1.5 s to answer, and not the usual 0.3."""
+"""A long limit, so a busy machine that delays the scans does not make the door stale. For the same
+reason the module has 1.5 s to answer, in place of the usual 0.3 s.
+"""
 YAML = """
 kind: door
 driver: dry_contact
@@ -44,7 +45,7 @@ doors:
 
 
 class Module:
-    """The I/O module and the door behind it, in this process; it outlives every daemon."""
+    """The I/O module and the door behind it, in this process; the module outlives every daemon."""
 
     def __init__(self, directory: Path, domain: int, transport: str | None = None) -> None:
         transport = transport or wire()
@@ -67,7 +68,7 @@ class Module:
         self._partial = b""
 
     def relay(self) -> list[bool]:
-        """Every edge of the hold relay so far."""
+        """Return every edge of the hold relay so far."""
         try:
             while chunk := self._follow.recv(65536):
                 self._partial += chunk
@@ -78,26 +79,26 @@ class Module:
         return [edge["value"] for edge in self.edges if edge["signal"] == "hold_open"]
 
     def tell(self, *words: str) -> None:
-        """Have the plant do something, as `fail ward_door opened off`."""
+        """Give the plant an order, such as `fail ward_door opened off`."""
         with Caller(self.directory / "plant.sock") as control:
             control.order(" ".join(words))
 
     def hang(self) -> None:
-        """The module answers nobody, and its relay stays as it is."""
+        """Let the module answer nobody, with its relay unchanged."""
         self.tell("fail", "ward_door", "server", "stuck")
 
     def go_on(self) -> None:
-        """It answers again."""
+        """Let the module answer again."""
         self.tell("fail", "ward_door", "server", "ok")
 
     def close(self) -> None:
-        """Take the module off the wall."""
+        """Close the module."""
         self._follow.close()
         self._far_side.close()
 
 
 def shipped(name: str, directory: Path, transport: str) -> Path:
-    """A shipped YAML on this transport, in ROS's surroundings as they are."""
+    """Copy a shipped YAML for this transport, in the environment of ROS as it is; return the copy."""
     text = (ROOT / "config" / name).read_text()
     text = re.sub(r" *ros_setup: .*\n", "", text)
     file = directory / name
@@ -109,12 +110,12 @@ BRIDGE = ("bridges.cli",)
 
 
 def command(*arguments: str | Path, program: Sequence[str] = BRIDGE) -> list[str]:
-    """`rmf-bridge …` in this environment; `program`: the module with what comes before."""
+    """Return `rmf-bridge …` for this environment; `program` replaces the module `bridges.cli`."""
     return [sys.executable, "-m", *program, *map(str, arguments)]
 
 
 def environment(**more: str) -> dict[str, str]:
-    """This process's environment without a service's variables, and with these."""
+    """Return this process's environment without a service's variables, plus the given variables."""
     units = ("RMF_", "NOTIFY", "WATCHDOG", "RUNTIME_DIR", "STATE_DIR", "SERVICE_RESULT")
     own = {name: value for name, value in os.environ.items() if not name.startswith(units)}
     return own | more
@@ -141,18 +142,18 @@ class Daemon:
             )
 
     def wait_for(self, text: str) -> None:
-        """Wait until this text is in the log; fail at once if the daemon ends without it."""
+        """Wait until this text is in the log; fail at once if the daemon ends without the text."""
 
         def said() -> bool:
             ended = self.process.poll() is not None
             log = self.log.read_text()
-            assert text in log or not ended, f"it ended without {text!r}:\n{log}"
+            assert text in log or not ended, f"the daemon ended without {text!r}:\n{log}"
             return text in log
 
         wait_until(said, f"{text!r} in {self.log}")
 
     def end(self, number: int) -> int:
-        """Send a signal and give the exit code."""
+        """Send a signal and return the exit code."""
         self.process.send_signal(number)
         return self.process.wait(PATIENCE_S)
 
@@ -161,7 +162,7 @@ class Daemon:
 def daemon(
     file: Path, runtime_dir: Path, *options: str, program: Sequence[str] = BRIDGE, **env: str
 ) -> Iterator[Daemon]:
-    """A daemon that does not outlive its test."""
+    """Yield a daemon that does not outlive its test."""
     started = Daemon(file, runtime_dir, *options, program=program, **env)
     try:
         yield started
@@ -175,7 +176,7 @@ def daemon(
 
 
 def hold_open(module: Module, graph: "Graph", running: Daemon) -> None:
-    """Ask until the relay holds the door."""
+    """Request OPEN until the relay holds the door."""
     running.wait_for("ready")
 
     def held() -> bool:
@@ -186,7 +187,7 @@ def hold_open(module: Module, graph: "Graph", running: Daemon) -> None:
 
 
 class Graph:
-    """The other end of the graph: asks for the door, and hears its states."""
+    """RMF's end of the graph: requests the door, and hears its states."""
 
     def __init__(self, domain: int) -> None:
         self.states: list[DoorState] = []
@@ -200,12 +201,12 @@ class Graph:
         self.request(mode)
 
     def request(self, mode: DoorModeValue) -> None:
-        """Send a request, whoever listens."""
+        """Send a request without waiting for a listener."""
         request = DoorRequest(
             door_name="ward_door", requester_id="r", requested_mode=DoorMode(int(mode))
         )
         self._requests.publish(request)
 
     def last(self) -> DoorModeValue | None:
-        """The mode that the door showed last."""
+        """Return the mode in the door's last state."""
         return DoorModeValue(self.states[-1].current_mode.value) if self.states else None

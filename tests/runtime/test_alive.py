@@ -1,4 +1,4 @@
-"""A daemon that is suspended, deaf or hung: what RMF is shown, and what systemd hears."""
+"""A daemon that is suspended, deaf or hung: what RMF sees, and what systemd hears."""
 
 import argparse
 import os
@@ -21,7 +21,7 @@ HURT = "tests.runtime.hurt"
 
 
 class Systemd:
-    """What the daemon tells its manager."""
+    """The messages of a daemon to systemd."""
 
     def __init__(self, path: Path) -> None:
         self.socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
@@ -29,7 +29,7 @@ class Systemd:
         self.socket.setblocking(False)
 
     def heard(self) -> list[bytes]:
-        """Everything since the last time."""
+        """Return all messages since the last call."""
         found: list[bytes] = []
         try:
             while True:
@@ -40,7 +40,7 @@ class Systemd:
 
 @contextmanager
 def systemd(directory: Path) -> Iterator[Systemd]:
-    """Its socket at `notify`."""
+    """Yield a listener on the socket `notify`."""
     listening = Systemd(directory / "notify")
     yield listening
     listening.socket.close()
@@ -60,16 +60,21 @@ def test_after_sigstop_no_earlier_state_is_shown_as_new(
         pid = running.process.pid
 
         def suspended() -> bool:
-            """The door leaves OPEN while the daemon is stopped. False if that met it at a scan."""
+            """Suspend the daemon while the door leaves OPEN. Return False if that interrupted a
+            scan.
+            """
             module.tell("fail", "ward_door", "opened", "ok")
             wait_until(lambda: graph.last() is DoorModeValue.MODE_OPEN, "the door shows OPEN")
             shown = len(graph.states)
-            wait_until(lambda: len(graph.states) > shown, "another state")
+            wait_until(lambda: len(graph.states) > shown, "another state comes")
             os.kill(pid, signal.SIGSTOP)
             wait_until(lambda: _state(pid) == "T", "the daemon is suspended")
             module.tell("fail", "ward_door", "opened", "off")
             stopped = time.monotonic()
-            wait_until(lambda: time.monotonic() > stopped + scan_s + 2 * SUSPENDED_S, "a while")
+            wait_until(
+                lambda: time.monotonic() > stopped + scan_s + 2 * SUSPENDED_S,
+                "time passes",
+            )
             resumed = time.time()
             os.kill(pid, signal.SIGCONT)
             wait_until(lambda: len(_since(graph, resumed)) > 2, "states go on")
@@ -80,11 +85,11 @@ def test_after_sigstop_no_earlier_state_is_shown_as_new(
             assert modes[0] is DoorModeValue.MODE_UNKNOWN
             return True
 
-        wait_until(suspended, "it is stopped between two scans")
+        wait_until(suspended, "the daemon is stopped between two scans")
 
 
 def _since(graph: Graph, resumed: float) -> list[DoorModeValue]:
-    """The modes with a stamp of after that."""
+    """Return the modes in states with a stamp after `resumed`."""
     return [
         DoorModeValue(state.current_mode.value)
         for state in tuple(graph.states)
@@ -112,7 +117,7 @@ def test_a_transport_that_cannot_be_restarted_ends_the_daemon_with_the_relay_off
 
         def ended() -> bool:
             heard.extend(manager.heard())
-            graph.request(DoorModeValue.MODE_OPEN)  # what comes wakes the reader, which fails
+            graph.request(DoorModeValue.MODE_OPEN)  # the message wakes the reader, which fails
             return running.process.poll() is not None
 
         wait_until(ended, "the daemon has ended")
@@ -153,7 +158,9 @@ def test_the_watchdog_is_not_fed_while_a_call_of_the_bus_hangs(
 
 
 def _status_written(run: Path, times: int) -> None:
-    """The daemon's main thread goes round, and looks whether to feed the watchdog, so many times."""
+    """Wait for so many rounds of the daemon's main thread; each round checks whether to feed the
+    watchdog.
+    """
     for _ in range(times):
         before = (run / "status.json").stat().st_ino
         wait_until(lambda: _inode(run) not in (None, before), "the status is written")  # noqa: B023
@@ -169,7 +176,9 @@ def _inode(run: Path) -> int | None:
 def test_a_reset_during_the_start_does_no_harm(
     module: Module, graph: Graph, tmp_path: Path
 ) -> None:
-    """`rmf-bridge reset` again and again, from before the process begins until it is in service."""
+    """`rmf-bridge reset` runs again and again, from before the process begins until it is in
+    service.
+    """
     run = tmp_path / "run"
     asked = argparse.Namespace(file=module.file, runtime_dir=str(run))
     codes: list[tuple[bool, int]] = []
@@ -181,7 +190,7 @@ def test_a_reset_during_the_start_does_no_harm(
             return "ready " in running.log.read_text()
 
         wait_until(ready, "the daemon is in service")
-        assert (False, 0) in codes, "one reached it before it served"
+        assert (False, 0) in codes, "a reset came before the daemon served"
         assert {code for _, code in codes} <= {0, 1}
         hold_open(module, graph, running)
         assert running.end(signal.SIGTERM) == 0

@@ -1,4 +1,4 @@
-"""`outputs-off --all-records`: after a power cut relays go off before a daemon starts."""
+"""`outputs-off --all-records` switches relays off after a power cut, before a daemon starts."""
 
 import socket
 import subprocess
@@ -22,7 +22,10 @@ COIL_ON = bytes.fromhex("0001 0000 0006 01 05 0000 ff00")
 
 
 def died(state: Path, file: Path, later: bytes = b"") -> Path:
-    """What the daemon of this file left when the power was cut. `later`: what it had in the YAML."""
+    """Write the record that this file's daemon left at the power cut; return its path.
+
+    `later` is an addition of a later version to the YAML.
+    """
     left = record.of(load(file))
     if later:
         left = msgspec.structs.replace(left, yaml=left.yaml + later, claim=None)
@@ -35,11 +38,11 @@ def died(state: Path, file: Path, later: bytes = b"") -> Path:
 
 @pytest.fixture
 def module(tmp_path: Path, domain: int) -> Iterator[Module]:
-    """A module whose relay is on."""
+    """Yield a module whose relay is on."""
     made = Module(tmp_path, domain)
     with socket.create_connection(("127.0.0.1", port(made.file))) as wire:
 
-        def is_on() -> bool:  # again and again: who follows the relay may have missed the first
+        def is_on() -> bool:  # again and again: the follower may have missed the first edge
             for frame in (COIL_OFF, COIL_ON):
                 wire.sendall(frame)
                 assert wire.recv(64)
@@ -51,14 +54,14 @@ def module(tmp_path: Path, domain: int) -> Iterator[Module]:
 
 
 def port(file: Path) -> int:
-    """The TCP port of a file's module."""
+    """Return the TCP port of a file's module."""
     found = int(load(file).buses["module"].tcp.port)
     texts.give({})
     return found
 
 
 def booted(state: Path) -> subprocess.CompletedProcess[str]:
-    """What the unit runs, with the state directories of this user's daemons."""
+    """Run the unit's command with the state directories of this user's daemons."""
     code = (
         "import pathlib, sys; from bridges.runtime.all_records import switch_off_all;"
         f"sys.exit(switch_off_all(pathlib.Path({str(state / 'rmf-bridge')!r}), 20, 20))"

@@ -1,4 +1,4 @@
-"""What a lift's daemon makes of requests that cannot be right: a real process, on each wire."""
+"""Impossible requests to a lift's daemon: a real process, on each wire."""
 
 import json
 from collections.abc import Iterator
@@ -30,7 +30,7 @@ WRONG = {
 
 
 class Lift:
-    """A simulated lift's daemon, and an RMF that sends it anything."""
+    """The daemon of a simulated lift, and an RMF that can send any request."""
 
     def __init__(self, running: Daemon, status: Path, domain: int) -> None:
         self.running = running
@@ -75,27 +75,29 @@ def test_every_wrong_request_is_refused_by_name_counted_logged_once_and_moves_no
             lift.send(request)
     lift.send(replace(RIGHT, lift_name="Lift2"))
     counted = dict.fromkeys(WRONG, 3)
-    wait_until(lambda: lift.refused() == counted, "all are counted")
+    wait_until(lambda: lift.refused() == counted, "all refusals are counted")
     log = lift.running.log.read_text()
     assert [log.count(f'refused device=Lift1 kind="{kind}"') for kind in WRONG] == [1, 1, 1, 1]
     assert "outputs device=Lift1" not in log
     assert {state.session_id for state in lift.states} == {""}
-    wait_until(lambda: lift.status()["requests_for_others"] == 1, "the other lift's is counted")
+    wait_until(
+        lambda: lift.status()["requests_for_others"] == 1, "the other lift's request is counted"
+    )
 
 
 def test_a_flood_ends_with_the_last_valid_request_and_states_go_on(lift: Lift) -> None:
     for n in range(5000):
         lift.send(replace(RIGHT, session_id=f"fleet/{n % 7}", destination_floor=f"L{n % 12}"))
-    wait_until(lambda: any(s.session_id for s in lift.states), "one was granted")
+    wait_until(lambda: any(s.session_id for s in lift.states), "a session was granted")
     holder = next(s.session_id for s in lift.states if s.session_id)
     lift.send(replace(RIGHT, session_id=holder, request_type=0, destination_floor=""))
-    wait_until(lambda: lift.states[-1].session_id == "", "its END has ended it")
+    wait_until(lambda: lift.states[-1].session_id == "", "its END has ended the session")
     before = len(lift.states)
     wait_until(lambda: len(lift.states) > before + 1, "states go on")
     edges = [
         line for line in lift.running.log.read_text().splitlines() if " outputs device" in line
     ]
-    # By the daemon's own time: its pace of states, and the pace at which a lift's relays may switch.
+    # Counted by the daemon's own time: the pace of its states, and the pace of its relays' switching.
     read_at = [stamps.in_seconds(state.lift_time) for state in lift.states if state.lift_time.sec]
     took_s = read_at[-1] - read_at[0]
     assert len(read_at) <= 2 + (took_s + 1) / TELL_GAP_S
@@ -109,7 +111,7 @@ def test_samples_that_are_not_requests_are_dropped_and_good_ones_are_obeyed(
         wait_until(lambda: lift.status()["samples_dropped"], "hostile samples are counted")
     lift.send(replace(RIGHT, request_type=0))
 
-    def held() -> bool:  # what of the flood is still on its way may push a single request out
+    def held() -> bool:  # a late message of the flood may displace a single request
         lift.send(RIGHT)
         return lift.states[-1].session_id == "fleet/robot"
 

@@ -1,4 +1,4 @@
-"""Who switches off takes the settings from the record, and the YAML only where these do not decode."""
+"""Switching off uses the settings in the record; only if these do not decode, it uses the YAML."""
 
 import subprocess
 import sys
@@ -23,7 +23,7 @@ BUILD = "r1.gabcdef0"
 
 @pytest.fixture(autouse=True)
 def _built(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    """As in a package: this checkout's build is not known."""
+    """Hide the build of this checkout, as a package has another."""
     monkeypatch.setattr(record, "BUILD", BUILD)
     texts.give({})
     yield
@@ -31,7 +31,7 @@ def _built(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 
 
 def claimed(config: Config) -> tuple[object, ...]:
-    """All of a Config that matters to switching off."""
+    """Return the parts of a Config that matter for switching off."""
     return (
         config.text,
         config.kind,
@@ -56,7 +56,7 @@ def of_file(file: Path) -> tuple[Config, ClaimRecord, ClaimedSettings]:
 @pytest.mark.parametrize("file", DEVICES, ids=lambda file: file.stem)
 def test_the_settings_in_a_record_are_those_of_its_yaml(file: Path) -> None:
     config, written, _ = of_file(file)
-    # the YAML must not be needed: it is spoiled here
+    # without the YAML, which is spoiled here
     assert claimed(msgspec.structs.replace(written, yaml=config.text).config()) == claimed(config)
     spoiled = msgspec.structs.replace(written, yaml=b"kind: [").config()
     assert claimed(spoiled)[1:] == claimed(config)[1:]

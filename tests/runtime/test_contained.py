@@ -1,4 +1,4 @@
-"""A driver with a defect: its device is offline and off, and the others serve on."""
+"""A defect in a driver: its device goes offline and off; the other devices stay in service."""
 
 import pytest
 
@@ -13,7 +13,7 @@ def breaks(error: Exception) -> None:
 
 
 def held() -> Corridor:
-    """RMF holds the ward's door."""
+    """Return a corridor in which RMF holds the ward's door."""
     corridor = Corridor()
     corridor.round(0.0)
     corridor.asks("ward")

@@ -1,4 +1,4 @@
-"""Off after every death: a door's daemon on a real Modbus module, with its relay on."""
+"""Outputs go off after every death: a door's daemon on a real Modbus module, with its relay on."""
 
 import os
 import pty
@@ -40,7 +40,7 @@ from tests.waiting import PATIENCE_S, wait_until
 def wall(
     module_domain: int, tmp_path_factory: pytest.TempPathFactory
 ) -> Iterator[tuple[Module, Graph]]:
-    """A module and an RMF that see many daemons come and go."""
+    """Yield a module and an RMF for all tests; daemons come and go."""
     standing = Module(tmp_path_factory.mktemp("wall"), module_domain)
     joined = Graph(standing.domain)
     yield standing, joined
@@ -55,7 +55,7 @@ def graph(wall: tuple[Module, Graph]) -> Graph:
 
 @pytest.fixture
 def module(wall: tuple[Module, Graph]) -> Module:
-    """As it was put on the wall, its relay off and its history forgotten."""
+    """Return the module in its first state: relay off, history forgotten."""
     standing, joined = wall
     standing.go_on()
     standing.file.write_text(standing.yaml)
@@ -106,9 +106,9 @@ def test_the_rule_leaves_out_crashes_and_signals_that_end_nothing_by_default() -
 
 
 USUAL = [signal.SIGHUP, signal.SIGQUIT, signal.SIGTSTP, signal.SIGRTMAX]
-"""SIGINT and SIGTERM are in test_process.py."""
+"""Signals of `make test`; test_process.py has SIGINT and SIGTERM."""
 EVERY = [n for n in ENDING if n < signal.SIGRTMIN or n in (signal.SIGRTMIN, signal.SIGRTMAX)]
-"""Of the realtime signals the first and the last."""
+"""Signals of `make deep`, with the first and the last realtime signal only."""
 
 
 @pytest.mark.parametrize(
@@ -400,7 +400,7 @@ def test_where_a_live_daemon_cannot_be_ruled_out_only_execstoppost_switches_off(
 
 
 def _runs_for_others() -> bool:
-    """Whether another user may run the Python that runs these tests (not below root's home)."""
+    """May another user run this Python? Not if it is below root's home."""
     try:
         return subprocess.run([sys.executable, "-c", ""], user=65534).returncode == 0
     except PermissionError:
@@ -486,7 +486,7 @@ def test_missing_lgpio_or_permission_is_reported_in_one_line(tmp_path: Path) -> 
 def test_a_bus_that_cannot_be_opened_leaves_nothing_to_switch_off(
     domain: int, tmp_path: Path
 ) -> None:
-    """Nothing was claimed, so no record stays that only this hardware could answer."""
+    """Nothing was claimed, so no record stays; only this hardware could settle such a record."""
     file = shipped("lift_dry_contact.yaml", tmp_path, wire())
     text = file.read_text()
     text = text.replace("domain_id: 0", f"domain_id: {domain}\n  network: localhost")

@@ -1,4 +1,4 @@
-"""What a daemon says on `/diagnostics`: the message, and that a real daemon sends it each second."""
+"""The message on `/diagnostics`, which a real daemon sends each second."""
 
 from pathlib import Path
 

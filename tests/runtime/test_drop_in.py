@@ -1,4 +1,4 @@
-"""What a service's drop-in permits, for each way to reach a device, and a graph."""
+"""The permissions in a service's drop-in, for each way to reach a device and a graph."""
 
 from pathlib import Path
 
@@ -53,7 +53,7 @@ SHIPPED = {
 
 
 def permits(config: Config, groups: tuple[str, ...] = GROUPS) -> list[str]:
-    """The lines, without head, sections and the fingerprint of the needs that it fits."""
+    """Return the permissions: no head, no section names, no fingerprint of the needs."""
     lines = text(config, groups).splitlines()
     return [line for line in lines if line[:1] not in ("#", "[") and FITS not in line]
 
@@ -131,7 +131,7 @@ ROUTERS = "zenoh: {connect: [tcp/10.0.0.5:7447, 'tls/[fd00::5]:7447']}"
         ("transport: auto", None),
         ("transport: auto\n  network: localhost", LOCAL),
         ("transport: zenoh\n  network: localhost", LOCAL),
-        ("transport: zenoh", None),  # a peer: others may tell it of peers anywhere
+        ("transport: zenoh", None),  # a zenoh peer may learn of peers at any address
         (f"transport: zenoh\n  {ROUTERS}", f"{LOCAL} 10.0.0.5 fd00::5"),
         ("transport: zenoh\n  zenoh: {mode: client}", LOCAL),
         ("transport: zenoh\n  zenoh: {connect: [tcp/router.local:7447]}", None),
@@ -162,7 +162,7 @@ def test_the_watchdogs_time_follows_from_the_slowest_call(
     )
     assert watchdog_s(config) == expected_s
     assert too_slow(config, watchdog_s(config)) == ""
-    fed_every_s = watchdog_s(config) / 6 + 1 + timeout_s  # as `_watch` looks, a scan and a call
+    fed_every_s = watchdog_s(config) / 6 + 1 + timeout_s  # as `_watch` looks: a scan and a call
     assert fed_every_s < watchdog_s(config)
 
 

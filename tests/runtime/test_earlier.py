@@ -1,6 +1,6 @@
-"""What an earlier version has left is read for ever; what a later one has, is read or refused by name.
+"""Files of earlier versions stay readable; files of later versions are read, or refused with a reason.
 
-`earlier/<date>` is what the program of that day wrote. Rings and recordings: tests/blackbox/earlier.
+`earlier/<date>` has the files of that day's program; tests/blackbox/earlier has rings and recordings.
 """
 
 import logging
@@ -32,7 +32,9 @@ def _forgotten() -> Iterator[None]:
 
 
 def left(folder: Path, **later: object) -> tuple[Path, Records, str]:
-    """A record in a daemon's directory, as a later version may have written it; its YAML's path."""
+    """Put a record into a daemon's directory, with fields of a later version; return its place and its
+    YAML's path.
+    """
     (source,) = EARLIER[-1].glob(PATTERN)
     content = msgspec.json.decode(source.read_bytes()) | later
     path = folder / source.name

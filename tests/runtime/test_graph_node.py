@@ -1,4 +1,4 @@
-"""A kind without hardware in service: what the node around the core does, on real transports."""
+"""A kind without hardware in service: the node around the core, on real transports."""
 
 import time
 from collections.abc import Callable, Iterator
@@ -27,7 +27,7 @@ WALL = 1_800_000_000.0
 
 
 class Site:
-    """Our node on a memory network, with a fleet adapter and a lift's node as tests play them."""
+    """Our node on a memory network; the tests play a fleet adapter and a lift's node."""
 
     def __init__(self, settings: LiftSupervisorSettings | None = None, **more: Any) -> None:
         self.now = 0.0
@@ -46,21 +46,21 @@ class Site:
         self.node.round()
 
     def until(self, at: float) -> None:
-        """Rounds as the thread would make them."""
+        """Run the rounds that the thread would run until then."""
         while self.node.wake_at <= at:
             self.now = max(self.now, self.node.wake_at)
             self.node.round()
         self.now = at
 
     def asks(self, session: str = "fleet/a", lift: str = "Lift1") -> LiftRequest:
-        """An adapter asks."""
+        """Publish an adapter's request; return it."""
         request = LiftRequest(lift, stamp(WALL + self.now), session, 1, "L3", 2)
         self.adapter.publish(request)
         self.node.round()
         return request
 
     def ends(self, session: str = "fleet/a", lift: str = "Lift1") -> None:
-        """An adapter ends a session."""
+        """Publish an adapter's END of a session."""
         self.adapter.publish(LiftRequest(lift, stamp(WALL + self.now), session, 0, "L3", 2))
         self.node.round()
 
@@ -339,7 +339,7 @@ def test_a_lost_transport_is_logged_and_does_not_end_the_daemon(
     assert site.node.devices()["Lift1"]["holder"] == "fleet/a (1 s)"
 
 
-# --- with its thread, and on the wire ----------------------------------------------------------
+# --- in its thread, and on the wire --------------------------------------------------------------
 
 
 @pytest.fixture(params=["memory", "wire"])
@@ -361,7 +361,9 @@ def join(request: pytest.FixtureRequest) -> Iterator[Callable[[str], Transport]]
 def test_a_served_graph_kind_runs_in_its_thread_until_it_is_stopped(
     join: Callable[[str], Transport],
 ) -> None:
-    """A node that is passive because of a rival publishes when it has gone; others see one of them."""
+    """A node that was passive beside a rival publishes once the rival has gone; others see one
+    publisher.
+    """
     others, ours, rival = join("others"), join("supervisor"), join("rival")
     rival.publisher(LIFT_REQUESTS)
     heard: list[LiftRequest] = []
@@ -377,8 +379,10 @@ def test_a_served_graph_kind_runs_in_its_thread_until_it_is_stopped(
     thread.start()
     wait_until(lambda: thread.ready and presence.rivals == 1, "the rival is seen")
     rival.close()
-    wait_until(lambda: presence.may_speak, "it speaks")
-    wait_until(lambda: ear.matched() == 1 and presence.rivals == 0, "its own is no rival")
+    wait_until(lambda: presence.may_speak, "the node may publish")
+    wait_until(
+        lambda: ear.matched() == 1 and presence.rivals == 0, "the node is no rival of itself"
+    )
     request = LiftRequest("Lift1", stamp(time.time()), "fleet/a", 1, "L3", 2)
     adapter.publish(request)
     wait_until(lambda: heard, "the request is passed on")

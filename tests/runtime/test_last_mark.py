@@ -1,4 +1,4 @@
-"""A last mark spares `outputs-off` its work, and only after the clean stop that it is about."""
+"""A last mark spares `outputs-off` its work, but only after the clean stop that the mark names."""
 
 import signal
 import subprocess

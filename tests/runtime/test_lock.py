@@ -1,4 +1,6 @@
-"""Nobody who looks, or waits for the lock, keeps a relay on; and nobody switches off for another."""
+"""A reader, or a process that waits for the lock, keeps no relay on; no run switches another run
+off.
+"""
 
 import fcntl
 import os
@@ -23,7 +25,7 @@ from tests.waiting import wait_until
 
 @pytest.fixture
 def public() -> Iterator[Path]:
-    """A directory that other users can reach, which pytest's are not."""
+    """Yield a directory that other users can reach, unlike pytest's directories."""
     with tempfile.TemporaryDirectory(dir="/tmp") as folder:
         yield Path(folder)
 
@@ -43,7 +45,7 @@ def test_a_member_of_the_group_who_waits_for_every_lock_keeps_no_relay_on(
     run.mkdir()
     os.chown(run, 0, NOBODY)
     run.chmod(0o2750)
-    (run / "lock").write_text('{"pid":1,"file":"x","serves":true}')  # of an older version
+    (run / "lock").write_text('{"pid":1,"file":"x","serves":true}')  # from an older version
     (run / "lock").chmod(0o640)
     with daemon(module.file, run, **unit(run, "a")) as running:
         hold_open(module, graph, running)
@@ -71,7 +73,7 @@ def test_a_run_whose_claim_is_unreleased_is_switched_off_even_if_the_lock_is_hel
     for stranger in (unit(run, "b") | ended, unit(run, "a")):
         refused = told("outputs-off", module.file, **stranger)
         assert (refused.returncode, module.relay()) == (os.EX_UNAVAILABLE, [True])
-        assert str(running.process.pid) not in refused.stderr, "a dead process is no reason"
+        assert str(running.process.pid) not in refused.stderr, "the refusal names a dead process"
     off = told("outputs-off", module.file, **unit(run, "a"), **ended)
     assert (off.returncode, module.relay()) == (0, [True, False]), off.stderr
     os.close(lock)

@@ -1,4 +1,4 @@
-"""Every string of every message that a kind hears: ten megabytes of it are not kept."""
+"""Each string of each message that a kind hears may have ten megabytes, which are not kept."""
 
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -20,7 +20,7 @@ from bridges.settings.load import load
 CONFIG = Path(__file__).parents[2] / "config"
 HUGE = "x" * 10_000_000
 KEPT_MOST = 20_000
-"""Characters of all that is kept of one message."""
+"""The limit of characters kept of one message."""
 
 ROBOT = d.RobotState(
     name="AMR01", task_id="t", mode=d.RobotMode(int(d.RobotModeValue.MODE_CHARGING))
@@ -63,7 +63,9 @@ HEARD: dict[str, dict[Topic[Any], Message]] = {
 
 
 def taker(name: str, topic: Topic[Any]) -> Callable[[Message], object]:
-    """What makes an event of such a message, with this shipped YAML."""
+    """Return a function that makes an event of such a message, with the settings of this shipped
+    YAML.
+    """
     config = load(CONFIG / f"{name}.yaml")
     kind = kind_called(config.kind)
     if isinstance(kind, GraphKind):
@@ -74,7 +76,7 @@ def taker(name: str, topic: Topic[Any]) -> Callable[[Message], object]:
 
 
 def with_huge(value: Any) -> Iterator[Any]:
-    """The value once for each string in it, with that one huge."""
+    """Yield copies of the value, each with another one of its strings huge."""
     if isinstance(value, str):
         yield HUGE
     elif isinstance(value, tuple):

@@ -1,4 +1,4 @@
-"""A bus and its devices in rounds, in virtual time: who is scanned when, and what the end does."""
+"""A bus and its devices in rounds, in virtual time: the order of scans, and the end."""
 
 import pytest
 
@@ -35,7 +35,7 @@ def test_an_edge_during_a_round_is_seen_in_the_next_one() -> None:
     corridor.doors["lab"].during = corridor.bus.edge
     corridor.round(0.0)
     corridor.doors["lab"].during = lambda: None
-    assert corridor.loop.inbox.wait(0.0), "the bell rings"
+    assert corridor.loop.inbox.wait(0.0), "the edge wakes the loop"
     assert corridor.round(0.01) == ["ward read", "lab read"]
 
 
@@ -60,7 +60,7 @@ def test_one_device_that_cannot_be_switched_off_keeps_no_other_on_and_is_reporte
 
 
 def test_after_a_suspension_nothing_is_shown_that_was_only_true_before_it() -> None:
-    """SIGSTOP, or a laptop's sleep, is shorter than the door's readings may be old."""
+    """The suspension (SIGSTOP, or a laptop's sleep) is shorter than the permitted age of a reading."""
     corridor = Corridor(debounce={"opened": 0.1, "closed": 0.1})
     for i in range(7):
         corridor.round(SCAN_S * i)
@@ -97,7 +97,7 @@ def test_a_slow_bus_does_not_count_as_a_suspension(caplog: pytest.LogCaptureFixt
 
 
 def test_each_device_that_is_scanned_and_each_call_of_the_bus_shows_that_the_loop_lives() -> None:
-    """Thirty silent units make a round of thirty timeouts, and no hang."""
+    """Thirty silent units make one long round of thirty timeouts, which must not look like a hang."""
     corridor = Corridor()
     counts: list[int] = []
     corridor.doors["ward"].during = lambda: counts.append(corridor.loop.finished)

@@ -1,4 +1,4 @@
-"""Directories that somebody else has made, or put in a daemon's way: none is read or written."""
+"""Directories that somebody else made, or put in a daemon's way, are neither read nor written."""
 
 import json
 import os
@@ -62,7 +62,7 @@ def a_directory(to: Path, place: Path) -> None:
 
 
 def a_link_within(to: Path, place: Path) -> None:
-    """Somebody's directory, in which one of ours seems to be."""
+    """Make somebody's own directory, with a link to one of our directories inside."""
     a_directory(to, place)
     (place / "rmf-bridge").unlink()
     (place / "rmf-bridge").mkdir()
@@ -74,7 +74,7 @@ PLANTED = [a_link, a_directory, a_link_within]
 
 @pytest.fixture
 def victim(machine: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """What an attacker would have overwritten: a directory of root's with files of a daemon's names."""
+    """Return an attacker's target: a directory of root with files that have a daemon's file names."""
     for name in ("XDG_RUNTIME_DIR", "XDG_STATE_HOME"):
         monkeypatch.delenv(name)
     monkeypatch.setenv("HOME", "none")
@@ -97,7 +97,7 @@ def files(folder: Path) -> dict[str, str]:
 def test_what_anybody_plants_below_tmp_is_neither_read_nor_written(
     victim: Path, machine: Path, plant: Callable[[Path, Path], None], where: str
 ) -> None:
-    """The runtime directory of a daemon that root starts by hand, and its state directory."""
+    """`where` is the runtime directory of a daemon that root starts by hand, or its state directory."""
     before = files(victim)
     plant(victim.parents[1], machine / "tmp" / where)
     with pytest.raises(Distrusted):

@@ -1,4 +1,4 @@
-"""The daemon as a process: how it starts, how it ends, and what it leaves behind."""
+"""The daemon as a process: its start, its end, and what it leaves behind."""
 
 import json
 import os
@@ -40,7 +40,7 @@ def test_a_signal_releases_the_relay_and_leaves_the_graph_at_once(
     with daemon(module.file, tmp_path / "run") as running:
         hold_open(module, graph, running)
         assert running.end(number) == 0
-        wait_until(lambda: graph.heard.matched() == 0, "it has left the graph", LEASE_S)
+        wait_until(lambda: graph.heard.matched() == 0, "the node has left the graph", LEASE_S)
     wait_until(lambda: module.relay() == [True, False], "the relay is off")
     assert sorted(path.name for path in (tmp_path / "run").iterdir()) == [
         *("holder.json", "holder.lock", "ring")
@@ -111,7 +111,7 @@ def test_systemd_hears_ready_then_finished_scans_then_stopping(
             heard.append(systemd.recv(64))
     ready = heard.index(b"READY=1")
     assert heard.count(b"READY=1") == 1
-    assert set(heard[:ready]) <= {STARTING.encode()}  # of a slow start
+    assert set(heard[:ready]) <= {STARTING.encode()}  # sent by a slow start
     assert set(heard[ready:]) == {b"READY=1", b"WATCHDOG=1", b"STOPPING=1"}
 
 

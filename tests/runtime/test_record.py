@@ -1,4 +1,4 @@
-"""A record holds all that is needed to switch off, whatever the disk has later."""
+"""A record has all data for switching off, whatever happens to the disk later."""
 
 from collections.abc import Iterator
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""`ros_setup:`: the daemon sources ROS's setup file by itself, and goes on as if a shell had."""
+"""`ros_setup:`: the daemon sources ROS's setup file and goes on as if started from a prepared shell."""
 
 import logging
 import os

@@ -1,4 +1,4 @@
-"""What a daemon has in its directories, and which directories those are."""
+"""The files in a daemon's directories, and the rule that finds these directories."""
 
 import json
 import os
@@ -27,7 +27,7 @@ from tests.depth import depth
 FILE = Path("/etc/rmf-bridges/lift.yaml")
 OURS = ourselves(FILE, serves=True)
 DEAD = replace(OURS, started=1)
-"""Somebody else has its number by now."""
+"""The name of a dead process, whose number another process has by now."""
 CLAIMED = ClaimRecord(str(FILE), b"kind: lift\n", {"make.yaml": b"for: door_register\n"})
 
 
@@ -79,7 +79,9 @@ def test_where_the_state_keeps_an_old_name_the_runtime_directory_says_who_it_is(
 ) -> None:
     both = Directories(tmp_path / "run", tmp_path / "state")
     serving = RuntimeDirectory(both, FILE, serves=False)
-    named(tmp_path / "state", DEAD)  # of the daemon before the root became read-only
+    named(
+        tmp_path / "state", DEAD
+    )  # written by an earlier daemon, before the disk became read-only
     assert look(both) == replace(OURS, serves=False)
     with pytest.raises(AlreadyRunning, match=f"in use by process {os.getpid()}"):
         RuntimeDirectory(both, FILE, serves=True, wait_s=0.0)
@@ -295,7 +297,7 @@ def test_a_daemon_whose_version_has_another_lock_is_known_by_its_fresh_status(
         assert look(in_one(tmp_path)) == LockHolder(other.pid, str(FILE), True)
         with pytest.raises(AlreadyRunning, match=f"already running: process {other.pid}"):
             held(tmp_path)
-        assert told.exists(), "what is another's stays"
+        assert told.exists(), "another daemon's status file was removed"
         written_at = told.stat().st_mtime
         os.utime(told, (written_at - 6, written_at - 6))
         assert look(in_one(tmp_path)) is None
@@ -363,13 +365,13 @@ def test_a_record_that_the_state_directory_cannot_take_goes_to_the_runtime_direc
     kept = MemoryFile(state, runtime)
     kept.write(b"one")
     state.unlink()
-    state.mkdir()  # nothing can be put in its place
+    state.mkdir()  # a folder, so no file can take its place
     kept.write(b"two")
     kept.write(b"three")
     assert (kept.read(), runtime.read_bytes()) == (b"three", b"three")
     assert [r.getMessage().split(" ")[0] for r in caplog.records] == ["not_written"]
     state.rmdir()
-    state.write_bytes(b"one")  # as a disk that has come back has it
+    state.write_bytes(b"one")  # as a disk has it that has come back
     assert MemoryFile(state, runtime).read() == b"three"
     kept.write(b"four")
     assert (MemoryFile(state, runtime).read(), runtime.exists()) == (b"four", False)

@@ -1,4 +1,4 @@
-"""The thread of a service, with rounds as a test writes them down."""
+"""The thread of a service, with rounds written by the test."""
 
 import threading
 import time
@@ -14,7 +14,9 @@ CLOCK = Clock(time.monotonic, time.time)
 
 
 class Rounds:
-    """`works`: until when rounds do not fail. `safe`: what the end says. `after`: what it waits for."""
+    """Rounds that fail once `works` is False; `safe` is the result of the end, which waits for
+    `after`.
+    """
 
     name = "rounds"
 
@@ -70,7 +72,7 @@ def test_a_thread_that_dies_of_a_defect_switches_off_first(
     thread = Serving(rounds, CLOCK)
     thread.start()
     rounds.inbox.wake()
-    wait_until(lambda: not thread.alive, "it has died")
+    wait_until(lambda: not thread.alive, "the thread has died")
     died = 'died thread=rounds reason="a defect of ours"'
     assert [r.getMessage() for r in caplog.records] == [died]
     assert (rounds.ended, thread.finished) == (1, 0)
@@ -92,7 +94,7 @@ def test_a_thread_that_has_a_defect_serves_no_more_though_it_still_switches_off(
     thread = Serving(rounds, CLOCK)
     thread.start()
     rounds.inbox.wake()
-    wait_until(lambda: rounds.ended, "it switches off")
+    wait_until(lambda: rounds.ended, "the thread switches off")
     assert (thread.alive, rounds.off.is_set()) == (False, False)
     rest.set()
     assert stop([thread], PATIENCE_S)
@@ -101,5 +103,5 @@ def test_a_thread_that_has_a_defect_serves_no_more_though_it_still_switches_off(
 def test_where_one_thread_cannot_be_started_the_others_are_stopped() -> None:
     threads = [Serving(Rounds(), CLOCK), Serving(Rounds(), CLOCK)]
     threads[0].start()
-    assert not stop(threads, PATIENCE_S), "the second has verified nothing"
+    assert not stop(threads, PATIENCE_S), "the thread that never started verified its outputs"
     assert not threads[0].alive

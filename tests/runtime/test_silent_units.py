@@ -1,4 +1,4 @@
-"""Devices that do not answer cost those that do at most one timeout, from the first round on."""
+"""Silent devices delay live devices by one timeout at most, from the first round on."""
 
 from collections.abc import Iterator
 from itertools import groupby, pairwise
@@ -21,7 +21,7 @@ SILENT = [f"silent{i}" for i in range(30)]
 
 
 def corridor(*names: str) -> Corridor:
-    """The doors of `SILENT` on one bus with these, which stand among them."""
+    """Return a corridor with these doors in the middle of the doors of `SILENT`."""
     made = Corridor(doors=[*SILENT[:15], *names, *SILENT[15:]])
     for name in SILENT:
         made.falls_silent(name, TIMEOUT_S)
@@ -29,7 +29,7 @@ def corridor(*names: str) -> Corridor:
 
 
 def served(corridor: Corridor, until: float) -> None:
-    """Rounds as its thread makes them."""
+    """Run the rounds that the thread would run until then."""
     while corridor.now < until:
         corridor.round(max(corridor.now, corridor.loop.wake_at))
 
@@ -64,7 +64,7 @@ def test_a_request_to_a_silent_door_waits_for_its_turn_and_is_not_lost() -> None
 
 
 def test_doors_that_fall_silent_together_are_found_one_in_a_round() -> None:
-    """What stands before them is read between any two of them."""
+    """The ward's door is read between any two silent doors."""
     falling = Corridor(doors=["ward", *SILENT])
     served(falling, 1.0)
     for name in SILENT:
@@ -109,7 +109,7 @@ DOOR = """
     params=[(Module, depth(8, 30)), (SerialModule, depth(8, 16))], ids=["on tcp", "on rtu"]
 )
 def line(request: pytest.FixtureRequest) -> Iterator[tuple[Module, int]]:
-    """A module with one live unit, and how many silent units are there beside it."""
+    """Yield a module with one live unit, and the number of silent units beside it."""
     make, silent = request.param
     module: Module = make()
     module.units.clear()
@@ -135,7 +135,7 @@ def test_on_a_real_bus_a_live_unit_is_asked_between_any_two_silent_ones(
     wait_until(lambda: len({*module.units_asked()}) > silent, "each unit has been asked")
     wait_until(lambda: loop.ready, "each door has published a state")
     asked = module.units_asked()
-    assert not stop([loop], 30.0), "silent units cannot be verified off"
+    assert not stop([loop], 30.0), "silent units were verified off"
     since_it_answered = [unit for unit, _ in groupby(asked[asked.index(live) :])]
     assert since_it_answered[::2] == [live] * len(since_it_answered[::2])
     assert [unit for unit, _ in groupby(asked) if unit != live][:silent] == [

@@ -1,4 +1,4 @@
-"""What the log and the status say of a subject, and what is counted of it."""
+"""The log lines, the status and the counts of a subject."""
 
 import logging
 
@@ -14,7 +14,7 @@ from bridges.runtime.subject import Subject, SubjectCore
 
 
 class Seen(msgspec.Struct, frozen=True):
-    """A report of a number; its news is whether that is even."""
+    """A report of a number; the news is whether the number is even."""
 
     number: int
     faults: tuple[Fault, ...] = ()

@@ -1,4 +1,4 @@
-"""Switching off from a fresh process: silent devices keep no other's relay on."""
+"""Switching off from a new process: silent devices keep no relay of another device on."""
 
 import threading
 from collections.abc import Iterator
@@ -18,9 +18,10 @@ SILENT = 30
 
 @pytest.fixture
 def module() -> Iterator[Module]:
-    """The last of many units answers, and its relay is on.
+    """Yield a module on which only the last of many units answers, with its relay on.
 
-    Who still asks silent ones when the time is up ends once the module is closed, and is waited for.
+    Threads that still ask silent units when the time is up end once the module is closed; wait for
+    them.
     """
     before = set(threading.enumerate())
     standing = Module()

@@ -1,4 +1,4 @@
-"""No single call of a bus may be taken for a hang by systemd's watchdog."""
+"""systemd's watchdog must not take a single call of a bus for a hang."""
 
 import re
 from pathlib import Path

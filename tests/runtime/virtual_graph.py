@@ -1,8 +1,8 @@
 """RMF's graph in virtual time: parties, the network between them, and kinds as the daemon serves them.
 
-Every message takes its way over a network that may lose, delay, repeat and reorder it. A kind
-without hardware runs on the product's own runtime (`GraphNode`), whose rounds are called when they
-are due. Nothing has a thread.
+Each message crosses a network that may lose, delay, repeat and reorder messages. A kind without
+hardware runs on the product's own runtime (`GraphNode`); its rounds are called when they are due. There
+are no threads.
 """
 
 import heapq
@@ -26,39 +26,40 @@ EPOCH = 2.0**30
 NEVER = float("inf")
 
 Route = Callable[[str, str], Sequence[float]]
-"""How long a message takes from one party to another (s), for each copy that arrives."""
+"""The delays of a message from one party to another (s): one for each copy that arrives."""
 
 
 class Party(Protocol):
-    """Somebody who takes part: a node, a robot, a fleet adapter."""
+    """A participant: a node, a robot, a fleet adapter."""
 
     name: str
 
     def hear(self, topic: Topic[Any], message: Any) -> None:
-        """A message has arrived."""
+        """Take a message that has arrived."""
 
     def wake_at(self) -> float:
-        """When to call `wake`."""
+        """Return the time of the next call of `wake`."""
 
     def wake(self) -> None:
-        """The time has come."""
+        """Act: the time has come."""
 
 
 def at_once(sender: str, receiver: str) -> Sequence[float]:
-    """A network without loss or delay worth mentioning, in order."""
+    """Deliver in order, after a negligible delay and without loss."""
     return (0.01,)
 
 
 def in_order(sender: str, receiver: str) -> Sequence[float]:
-    """A network that takes no time."""
+    """Deliver in order and in no time."""
     return (0.0,)
 
 
 class World:
-    """`sent`: (s, who, topic, message) of everything said; `watch` is told of each before it goes out.
+    """All parties and the messages between them.
 
-    `publishers`: topic -> who has declared that they publish it. `hears_others`: topic, and who does
-    not hear itself on it.
+    `sent` has every message as (s, sender, topic, message); `watch` is called before each message goes
+    out. `publishers` has by topic the parties that declared a publisher. `hears_others` has (topic,
+    party) of each party that does not hear its own messages there.
     """
 
     def __init__(self, route: Route = at_once) -> None:
@@ -75,19 +76,19 @@ class World:
         self._numbers = 0
 
     def add(self, party: Party, *topics: Topic[Any]) -> None:
-        """Let it take part, in the place of one of the same name; it hears these topics."""
+        """Let a party that hears these topics join, in place of any party with its name."""
         self.parties[party.name] = party
         for topic in topics:
             self.hearers[topic.name].add(party.name)
 
     def remove(self, name: str) -> None:
-        """Somebody is gone, with its publishers."""
+        """Remove a party with its publishers."""
         del self.parties[name]
         for names in (*self.hearers.values(), *self.publishers.values()):
             names.discard(name)
 
     def send(self, sender: str, topic: Topic[Any], message: Message) -> None:
-        """Publish."""
+        """Publish a message."""
         self.watch(sender, topic, message)
         self.sent.append((round(self.now, 3), sender, topic, message))
         if topic.subscribe.durability == "transient_local":
@@ -100,14 +101,14 @@ class World:
                 self._arrives_after(delay, receiver, topic, message)
 
     def replay(self, receiver: str) -> None:
-        """What every sender has retained, as it comes to one who subscribes now."""
+        """Deliver all retained messages, as a new subscriber gets them."""
         for sender in sorted(self.retained):
             for topic, message in self.retained[sender]:
                 if receiver in self.hearers[topic.name]:
                     self._arrives_after(0.05, receiver, topic, message)
 
     def run(self, until: float, done: Callable[[], bool] = lambda: False) -> None:
-        """Let everything happen until this time, or until it is done."""
+        """Run all events until this time, or until `done` is true."""
         wakes = {name: party.wake_at() for name, party in self.parties.items()}
         while not done():
             at = min(wakes.values(), default=NEVER)
@@ -125,14 +126,14 @@ class World:
                 break
             self.now = max(self.now, at)
             next(party for name, party in self.parties.items() if wakes[name] == at).wake()
-            # Who wakes may be the hand that restarts, adds or removes others.
+            # The woken party may restart, add or remove others.
             wakes = {name: party.wake_at() for name, party in self.parties.items()}
         else:
             return
         self.now = until
 
     def said_on(self, topic: Topic[Any]) -> list[tuple[float, str, Any]]:
-        """Every message on this topic: (s, who, message)."""
+        """Return every message on this topic: (s, sender, message)."""
         return [(at, who, message) for at, who, on, message in self.sent if on == topic]
 
     def _arrives_after(
@@ -169,7 +170,7 @@ class WorldTransport:
         return _End(self, topic)
 
     def hear(self, topic: Topic[Any], message: Any) -> None:
-        """A message has arrived."""
+        """Take a message that has arrived."""
         for received in self.received[topic.name]:
             received(message)
 
@@ -192,15 +193,15 @@ class _End:
         self._topic = topic
 
     def publish(self, message: Any) -> None:
-        assert self._node.name in self._node.world.publishers[self._topic.name], "it has no end"
+        assert self._node.name in self._node.world.publishers[self._topic.name], "no publisher"
         self._node.world.send(self._node.name, self._topic, message)
 
     def matched(self) -> int:
-        """How many publishers other nodes have on the topic."""
+        """Return how many publishers other nodes have on the topic."""
         return len(self.senders())
 
     def senders(self) -> list[str]:
-        """Those nodes."""
+        """Return the nodes with these publishers."""
         others = self._node.world.publishers[self._topic.name] - {self._node.name}
         return sorted(f"/{name}" for name in others)
 
@@ -210,7 +211,9 @@ class _End:
 
 @dataclass
 class Disk:
-    """The state directory, which outlives the daemon; `written` counts. `full`: nothing more fits."""
+    """The state directory, which outlives the daemon. `written` counts writes; if `full`, a write
+    fails.
+    """
 
     kept: bytes | None = None
     written: int = 0
@@ -226,7 +229,7 @@ class Disk:
 
 
 class Served:
-    """A kind without hardware, as the daemon serves it."""
+    """A kind without hardware, served as by the daemon."""
 
     def __init__(
         self,
@@ -246,7 +249,9 @@ class Served:
         self.restart()
 
     def restart(self) -> None:
-        """A new daemon: only what was kept is remembered, and everything retained heard again."""
+        """Start a new daemon: it remembers only its memory on disk, and hears all retained messages
+        again.
+        """
         self.transport.close()
         self.world.add(self)
         self.transport = WorldTransport(self.world, self.name)
@@ -258,11 +263,11 @@ class Served:
         self.node.round()
 
     def leave(self) -> None:
-        """It is stopped and leaves the graph."""
+        """Stop, and leave the graph."""
         self.world.remove(self.name)
 
     def reset(self) -> None:
-        """An operator says that latched faults may clear."""
+        """Reset the node as an operator does, so that latched faults may clear."""
         self.node.reset()
         self.node.round()
 
@@ -278,11 +283,11 @@ class Served:
 
     @property
     def subjects(self) -> list[str]:
-        """The lifts or doors that it knows."""
+        """Return the known lifts or doors."""
         return list(self.node.devices())
 
     def faults(self) -> dict[str, list[str]]:
-        """What its status shows, by lift or door, where anything is wrong."""
+        """Return the faults in its status by lift or door, without those that have none."""
         shown = {name: status["faults"] for name, status in self.node.devices().items()}
         return {
             name: [f"{fault['code']}: {fault['detail']}" for fault in faults]
@@ -292,7 +297,7 @@ class Served:
 
 
 class Ticking:
-    """A node with subscriptions, whose timer calls `tick` every so often."""
+    """A node with subscriptions, and with a timer that calls `tick` each `every_s`."""
 
     def __init__(self, world: World, name: str, every_s: float, tick: Callable[[], None]) -> None:
         self.name = name
@@ -313,7 +318,7 @@ class Ticking:
 
 
 class StandIn:
-    """One of RMF's parties, played by its rules; `new` makes it."""
+    """One of RMF's parties, played by its rules; `new` makes the party."""
 
     def __init__(
         self, world: World, new: Callable[[], RmfParty], name: str, publishes: Topic[Any]
@@ -325,14 +330,14 @@ class StandIn:
         self.restart()
 
     def restart(self) -> None:
-        """A new one, which remembers nothing and hears everything retained again."""
+        """Start a new party, which remembers nothing and hears all retained messages again."""
         self.party = self._new()
         self.world.add(self, *self.party.subscribes)
         self.world.publishers[self._publishes.name].add(self.name)
         self.world.replay(self.name)
 
     def leave(self) -> None:
-        """It is stopped and leaves the graph."""
+        """Stop, and leave the graph."""
         self.world.remove(self.name)
 
     def hear(self, topic: Topic[Any], message: Any) -> None:
@@ -346,6 +351,6 @@ class StandIn:
 
 
 def say(world: World, who: str, said: Iterable[Said]) -> None:
-    """Publish what one of RMF's parties sends."""
+    """Publish messages of one of RMF's parties."""
     for topic, message in said:
         world.send(who, topic, message)

@@ -1,1 +1,3 @@
-"""Tests of the YAML loader, on a kind, drivers and buses of their own (`site/`) and the real ones."""
+"""Tests of the YAML loader, with a kind, drivers and buses made for the tests (`site/`) beside the real
+ones.
+"""

@@ -1,4 +1,4 @@
-"""The kinds, drivers and buses of `site/` beside the real ones, and where the tests' files stand."""
+"""The kinds, drivers and buses of `site/` beside the real ones, and the place of the tests' files."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -14,7 +14,7 @@ SITE = Path(__file__).parent / "site"
 
 @pytest.fixture(scope="package", autouse=True)
 def site() -> Iterator[None]:
-    """Their folders, where files are looked for by name."""
+    """Add the folders of `site/` to the packages in which names are looked up."""
     with pytest.MonkeyPatch.context() as patch:
         for package, folder in (
             (bridges.kinds, "kinds"),
@@ -27,5 +27,5 @@ def site() -> Iterator[None]:
 
 @pytest.fixture(scope="package")
 def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A file to write and load, again and again."""
+    """Return the path of a file to write and load repeatedly."""
     return tmp_path_factory.mktemp("settings") / "gate.yaml"

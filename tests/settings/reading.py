@@ -1,4 +1,4 @@
-"""How the loader's tests read a file: from text to a Config, or to its problems as they print."""
+"""Read a file as the loader's tests need it: from text to a Config, or to the printed problems."""
 
 from pathlib import Path
 
@@ -24,7 +24,7 @@ gates:
 
 
 def problems_of(path: Path, text: str | bytes) -> list[str]:
-    """The problems of a file with this text, as `line:column: text`."""
+    """Return the problems of a file with this text, as `line:column: text`."""
     path.write_bytes(text if isinstance(text, bytes) else text.encode())
     try:
         load(path)
@@ -34,17 +34,17 @@ def problems_of(path: Path, text: str | bytes) -> list[str]:
 
 
 def texts_of(path: Path, text: str) -> list[str]:
-    """The same without line and column."""
+    """Return the problems of a file with this text, without line and column."""
     return [problem.partition(": ")[2] for problem in problems_of(path, text)]
 
 
 def config_of(path: Path, text: str) -> Config:
-    """The Config of a file with this text."""
+    """Return the Config of a file with this text."""
     path.write_bytes(text.encode())
     return load(path)
 
 
 def changed(old: str, new: str, text: str = RIGHT) -> str:
-    """The right file with one place changed."""
+    """Return the correct file with one place changed."""
     assert text.count(old) == 1, old
     return text.replace(old, new)

@@ -1,4 +1,4 @@
-"""Whatever stands in a file, the loader makes a Config of it or raises SettingsError."""
+"""For any content of a file the loader makes a Config or raises SettingsError."""
 
 from pathlib import Path
 

@@ -98,7 +98,7 @@ coordinator:
 
 @pytest.fixture(autouse=True)
 def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """File names as the user gives them, in the folder where they stand."""
+    """Work in a folder with maps, so file names are given as a user gives them."""
     monkeypatch.chdir(tmp_path)
     Path("building.yaml").write_text(BUILDING)
     Path("graph.yaml").write_text(GRAPH)
@@ -107,7 +107,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 def complaints(
     capsys: pytest.CaptureFixture[str], text: str, building: str = "building.yaml"
 ) -> list[str]:
-    """What `check` has to say about the names of a device YAML."""
+    """Return the complaints of `check` about the names in a device YAML."""
     Path("device.yaml").write_text(text)
     code = main(["check", "-q", "device.yaml", "--building-map", building])
     said = capsys.readouterr().err.splitlines()
@@ -116,7 +116,7 @@ def complaints(
 
 
 def problems_of(text: str | bytes) -> list[str]:
-    """Why a map is not read."""
+    """Return the reasons why a map cannot be read."""
     Path("map.yaml").write_bytes(text if isinstance(text, bytes) else text.encode())
     with pytest.raises(SettingsError) as caught:
         load_map("map.yaml")

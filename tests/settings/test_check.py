@@ -1,4 +1,4 @@
-"""`rmf-bridge check`: problems or the wiring table, as a person sees them."""
+"""`rmf-bridge check` prints problems or the wiring table, as a person sees them."""
 
 import os
 import subprocess
@@ -39,7 +39,7 @@ OK
 
 @pytest.fixture(autouse=True)
 def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """File names as the user gives them, in the folder where they stand."""
+    """Work in an empty folder, so file names are given as a user gives them."""
     monkeypatch.chdir(tmp_path)
 
 

@@ -1,4 +1,4 @@
-"""What the daemon gets of a file that is right."""
+"""The Config that the daemon gets from a correct file."""
 
 from pathlib import Path
 from typing import Any
@@ -109,7 +109,7 @@ LIMITS = st.fixed_dictionaries(
 
 @st.composite
 def gates(draw: st.DrawFn) -> dict[str, Any]:
-    """A gate's raw values, right in every respect."""
+    """Return the raw values of a correct gate."""
     names = draw(st.lists(NAMES, unique=True, max_size=9))
     lanes = draw(st.one_of(LANES, st.lists(NAMES, min_size=1)))
     lane = st.sampled_from(list(lanes))
@@ -122,7 +122,7 @@ def gates(draw: st.DrawFn) -> dict[str, Any]:
 
 
 class Quoting(yaml.SafeDumper):
-    """Writes every text in quotes, keys too; everything else as PyYAML does."""
+    """A YAML writer that quotes every text, keys too, and is otherwise PyYAML's."""
 
 
 Quoting.add_representer(

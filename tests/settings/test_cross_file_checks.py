@@ -1,4 +1,4 @@
-"""Files that are checked together: what none of them shows alone."""
+"""Files that are checked together, for problems that no single file shows."""
 
 import os
 from pathlib import Path
@@ -51,7 +51,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 def said(
     capsys: pytest.CaptureFixture[str], first: str, second: str, *options: str
 ) -> tuple[int, list[str]]:
-    """The exit code of `check a.yaml b.yaml`, and what it complains of."""
+    """Return the exit code and the complaints of `check a.yaml b.yaml`."""
     Path("a.yaml").write_text(first)
     Path("b.yaml").write_text(second)
     code = main(["check", "a.yaml", "b.yaml", *options])
@@ -150,7 +150,7 @@ def test_a_coordinators_station_that_no_charger_has_is_an_error(
 
 
 def shipped(name: str, *changes: tuple[str, str]) -> str:
-    """A file of config/ with these changes."""
+    """Return a file of config/ with these changes."""
     text = (CONFIG / name).read_text()
     for old, new in changes:
         text = text.replace(old, new)

@@ -1,4 +1,4 @@
-"""Files that are no device YAML at all: one clear problem each, at the place."""
+"""Files that are no device YAML give one clear problem each, with its place."""
 
 import os
 import socket

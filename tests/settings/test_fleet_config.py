@@ -1,4 +1,4 @@
-"""`check COORDINATOR --fleet-config CONFIG`: each mismatch with file, line and what to write."""
+"""`check COORDINATOR --fleet-config CONFIG` prints each mismatch with file, line and remedy."""
 
 import cmath
 import math
@@ -54,7 +54,7 @@ levels:
 
 
 class Site:
-    """The two files, and RMF's navigation graph if it is given."""
+    """The two files, and RMF's navigation graph if a test gives one."""
 
     def __init__(self, folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
         self._folder, self._capsys = folder, capsys
@@ -62,7 +62,7 @@ class Site:
     def check(
         self, ours: str = OURS, theirs: str = THEIRS, graph: str = "", *more: str
     ) -> tuple[int, list[str]]:
-        """The exit code, and each problem and warning without the folder."""
+        """Return the exit code, and each problem and warning without the folder."""
         for name, text in (("ours.yaml", ours), ("config.yaml", theirs), ("graph.yaml", graph)):
             (self._folder / name).write_text(text)
         options = ["--building-map", str(self._folder / "graph.yaml")] if graph else []
@@ -292,8 +292,9 @@ def test_the_shipped_fleet_agrees_with_the_shipped_coordinator(
 
 
 def test_the_transform_of_the_adapter_templates_example_and_its_mean_squared_error() -> None:
-    """open-rmf/fleet_adapter_template, config.yaml; the values were checked with nudged 0.3.1's
-    formulas, term by term."""
+    """Source: open-rmf/fleet_adapter_template, config.yaml; the values were checked term by term with
+    the formulas of nudged 0.3.1.
+    """
     rmf = [(20.33, -3.156), (8.908, -2.57), (13.02, -3.601), (21.93, -4.124)]
     robot = [(59.0, 399.0), (57.0, 172.0), (68.0, 251.0), (75.0, 429.0)]
     found = estimate(rmf, robot)
@@ -305,7 +306,7 @@ def test_the_transform_of_the_adapter_templates_example_and_its_mean_squared_err
 
 
 def _nudged(x: list[tuple[float, float]], y: list[tuple[float, float]]) -> tuple[float, ...]:
-    """Scale-rotation (s, r) and translation, by the sums of the least-squares normal equations."""
+    """Return scale and rotation (s, r) and the translation, by the least-squares normal equations."""
     n = len(x)
     a1, b1 = sum(p[0] for p in x), sum(p[1] for p in x)
     c1, d1 = sum(p[0] for p in y), sum(p[1] for p in y)

@@ -1,4 +1,4 @@
-"""Values that the types allow but nobody means are refused, or warned of, by name."""
+"""Values that the types allow but no integrator intends give an error or a warning."""
 
 from pathlib import Path
 
@@ -25,13 +25,13 @@ TCP = "tcp: {host: 192.168.1.50}"
 
 
 def door(bus: str = TCP, rmf: str = "{}", limits: str = "{}") -> str:
-    """The door with these changes."""
+    """Return the YAML of the door with these changes."""
     text = DOOR.replace(TCP, bus).replace("buses:", f"rmf: {rmf}\nbuses:")
     return f"{text}    limits: {limits}\n"
 
 
 def warnings_of(file: Path, text: str) -> list[str]:
-    """What is warned of, as `line:column: text`."""
+    """Return the warnings as `line:column: text`."""
     file.write_text(text)
     return [str(w).removeprefix(f"{file}:") for w in load(file).warnings]
 

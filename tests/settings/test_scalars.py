@@ -1,4 +1,4 @@
-"""Texts, numbers and choices: what YAML could take for something else, and what is out of bounds."""
+"""Texts, numbers and choices that YAML could misread, or that are out of bounds."""
 
 from pathlib import Path
 

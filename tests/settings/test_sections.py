@@ -1,4 +1,4 @@
-"""What concerns several sections of a file: kinds, drivers, buses, devices and their wires."""
+"""Problems across the sections of a file: kinds, drivers, buses, devices and their wires."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""`check --json` and `check --sheet`: the same as the text, for a program and for a signature."""
+"""`check --json`, for programs, and `check --sheet`, for signatures, agree with the printed text."""
 
 import json
 import os
@@ -17,7 +17,7 @@ EVIL = '"<script>alert(1)</script>&"'
 
 
 class Page(HTMLParser):
-    """The text of a page, its tags, and whatever it would load or run."""
+    """The text of a page, the tags, and all that the page would load or run."""
 
     def __init__(self, text: str) -> None:
         super().__init__()
@@ -47,13 +47,13 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def sheet_of(*files: str) -> Page:
-    """The sheet of files that are right."""
+    """Return the sheet of correct files."""
     assert main(["check", "-q", "--sheet", "sheet.html", *files]) == 0
     return Page(Path("sheet.html").read_text("utf-8"))
 
 
 def json_of(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, Any]:
-    """The exit code, and what was printed; nothing stands beside it."""
+    """Return the exit code and the printed JSON, and check that nothing else was printed."""
     code = main(["check", "--json", *arguments])
     out, err = capsys.readouterr()
     assert err == ""

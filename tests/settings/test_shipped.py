@@ -1,4 +1,6 @@
-"""Every shipped YAML is right; with any one thing in it wrong, the loader points at that thing."""
+"""Every shipped YAML is correct; after any one change that spoils the file, the loader names the
+place.
+"""
 
 import re
 from collections.abc import Iterator, Sequence
@@ -42,15 +44,15 @@ T = TypeVar("T")
 
 CONFIG = Path(__file__).parents[2] / "config"
 FILES = device_yamls()
-NAMES = ['"17"', "x", ""]  # where a name may stand, these are wrong elsewhere or not at all
+NAMES = ['"17"', "x", ""]  # as a name these may be right, or wrong in another place
 SORTS = {"accept_unsafe": "signal", "setpoints": "setpoint", "values": "value", "when": "value"}
-"""What the keys of a section are, where they are not keys."""
+"""Words for the keys of sections whose keys are called something else than `key`."""
 TRAPS = ["017", "1:30", "no", "1e3", "~", "1.0", "17", "[]", *NAMES]
 
 
 @dataclass(frozen=True)
 class Place:
-    """A mapping's entry in a file's text; `parent` is the key of the mapping that it is in."""
+    """A mapping's entry in a file's text; `parent` is the key of the mapping around the entry."""
 
     key: ScalarNode
     value: Node
@@ -59,7 +61,9 @@ class Place:
 
     @property
     def end(self) -> int:
-        """Where the entry's text ends: block values end at the next token, which is too far."""
+        """Return the end of the entry's text. YAML ends a block value at the next token, which is too
+        late.
+        """
         node = self.value
         while isinstance(node, CollectionNode) and not node.flow_style and node.value:
             last = node.value[-1]
@@ -68,14 +72,14 @@ class Place:
 
 
 def composed(text: str) -> MappingNode:
-    """A file's own mapping, with its marks."""
+    """Return the top mapping of a file, with its marks."""
     root = yaml.compose(text)
     assert isinstance(root, MappingNode)
     return root
 
 
 def places(node: Node, parent: Node) -> Iterator[Place]:
-    """Every entry of every mapping."""
+    """Yield every entry of every mapping."""
     if isinstance(node, SequenceNode):
         for item in node.value:
             yield from places(item, item)
@@ -87,7 +91,9 @@ def places(node: Node, parent: Node) -> Iterator[Place]:
 
 @dataclass(frozen=True)
 class Leaf:
-    """A scalar value; `key`: of its entry, `parent`: the key of the mapping around that."""
+    """A scalar value; `key` is the key of its entry, `parent` the key of the mapping around the
+    entry.
+    """
 
     node: ScalarNode
     key: Node
@@ -95,7 +101,7 @@ class Leaf:
 
 
 def scalars(node: Node, key: Node, parent: Node) -> Iterator[Leaf]:
-    """Every scalar value, keys left out."""
+    """Yield every scalar value, but no keys."""
     if isinstance(node, ScalarNode):
         yield Leaf(node, key, parent)
     elif isinstance(node, SequenceNode):
@@ -115,13 +121,13 @@ def spots(problems: list[str]) -> list[str]:
 
 
 def own_names(config: Path) -> set[str]:
-    """The names of a file's buses and devices, and those in a section, which may be anything."""
+    """Return the freely chosen names of a file: of buses, of devices, and in the kind's section."""
     loaded = load(config)
     return {*loaded.buses, *loaded.devices, *names_in(loaded.section)}
 
 
 def names_in(value: object) -> set[str]:
-    """The keys of every mapping below a struct."""
+    """Return the keys of every mapping below a struct."""
     if isinstance(value, dict):
         return {*value, *(name for inner in value.values() for name in names_in(inner))}
     if not isinstance(value, msgspec.Struct):
@@ -130,12 +136,12 @@ def names_in(value: object) -> set[str]:
 
 
 def some(of: Sequence[T], config: Path, turn: int) -> Sequence[T]:
-    """One in twelve of these, others in each file and in each turn."""
+    """Return every twelfth item, with another start for each file and each turn."""
     return part(of, 12, (FILES.index(config) + 4 * turn) % 12)
 
 
 def is_own(name: str, names: set[str]) -> bool:
-    """Whether a key is the site's own; floors and codes are `L1` and `1` in these files."""
+    """Is the key chosen by the site? Floors and codes are `L1` and `1` in these files."""
     return name in names or name[0].isupper() or name[0].isdigit()
 
 
@@ -162,7 +168,7 @@ def test_a_shipped_files_devices_are_what_msgspec_makes_of_them(config: Path) ->
 
 
 def leaves(wanted: Type) -> Iterator[Type]:
-    """Every type that a struct is made of, down to texts and numbers."""
+    """Yield every type in a struct, down to texts and numbers."""
     if isinstance(wanted, Metadata):
         yield from leaves(wanted.type)
     elif isinstance(wanted, StructType):
@@ -191,7 +197,7 @@ def test_every_field_of_every_driver_and_bus_is_of_a_sort_that_is_read() -> None
 
 
 NAMED_FREELY = ("temperatures",)
-"""Below these, a key is a name of the site's."""
+"""Sections whose keys are freely chosen names."""
 
 
 def test_every_misspelt_key_is_found_where_it_stands(config: Path, file: Path) -> None:
@@ -252,10 +258,10 @@ def test_every_key_that_is_taken_out_leaves_a_right_file_or_is_missed(
 
 
 def is_blamed(leaf: Leaf, trap: str, found: list[str]) -> bool:
-    """Whether one of these problems leads to this value.
+    """Does one of these problems lead to this value?
 
-    Where nothing is written, or another number, the value itself can be right, and what needs it is
-    wrong: the mapping that it is in is pointed at, or another key's problem names its key.
+    A missing or changed number can be valid by itself, and then conflicts with another value. The
+    problem then points at the mapping around the value, or names the value's key.
     """
     if at(leaf.node) in spots(found):
         return True
@@ -280,7 +286,9 @@ def test_every_value_that_is_a_trap_is_found_where_it_stands(config: Path, file:
                 file, f"{text[: node.start_mark.index]}{trap}{text[node.end_mark.index :]}"
             )
             accepted += not found
-            if found and trap == "[]":  # at the key, or at the key of what lacks it
+            if (
+                found and trap == "[]"
+            ):  # at the key, or at the key of the mapping that lacks an item
                 assert at(node).partition(":")[0] in {s.partition(":")[0] for s in spots(found)}
             elif found and trap not in NAMES:
                 assert is_blamed(leaf, trap, found), (trap, found)

@@ -1,4 +1,4 @@
-"""Slips of the keyboard are named as what they are: no parser's words, no pattern, always a subject."""
+"""Slips of the keyboard are named in plain words: no parser's words, no pattern, always a subject."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -164,7 +164,7 @@ doors:
 
 
 def patterns(wanted: Type, words: str = "") -> Iterator[tuple[str, str]]:
-    """Every pattern of a type, and how it is said in words."""
+    """Yield every pattern in a type, with the words that describe the pattern."""
     match wanted:
         case Metadata(type=inner, extra=extra):
             yield from patterns(inner, (extra or {}).get("pattern", words))

@@ -1,4 +1,4 @@
-"""One file with every sort of mistake: all are reported at once, in the order of the file."""
+"""One file with every type of mistake: all mistakes are reported at once, in the order of the file."""
 
 from pathlib import Path
 

@@ -1,17 +1,18 @@
-"""A whole site for a day: 2 lifts, 5 doors, 3 chargers, 5 robots, and all that goes wrong.
+"""A whole site for a day: 2 lifts, 5 doors, 3 chargers, 5 robots, and everything that can go wrong.
 
-In virtual time. Drivers, cores, nodes and supervisors are the daemons' own, on the `memory` transport;
-behind the drivers stand the plants of `hal_fakes`, and RMF is its stand-in. One seed makes one day:
-`make soak SEED=7 HOURS=24` plays it, and a failure prints the command that plays it again.
+The day runs in virtual time. Drivers, cores, nodes and supervisors are those of the daemons, on the
+`memory` transport. Behind the drivers are the plants of `hal_fakes`, and stand-ins play RMF. One seed
+makes one day: `make soak SEED=7 HOURS=24` plays it, and a failure prints the command that plays the day
+again.
 
     timeline.py  virtual time
-    network.py   the graph: delay, loss, repeats and cuts, within what DDS may do
+    network.py   the graph: delay, loss, repeats and cuts, within the limits of DDS
     building.py  the devices: settings, plants, drivers
-    daemons.py   what serves them, and the supervisors: each can be killed and started
+    daemons.py   the daemons of the devices, and the supervisors: each can be killed and started
     robots.py    fleet adapters and their robots, each with an endless day
-    trouble.py   what goes wrong, and its repair
-    laws.py      what must hold, judged from messages, relays and where things really are
+    trouble.py   faults and their repair
+    laws.py      rules for messages, relays and the true places of things
     growth.py    threads, file descriptors, objects and memory, by the hour
-    day.py       all of it together
+    day.py       all parts together
     on_dds.py    the same robots in real time, on DDS, with daemons that are processes
 """

@@ -1,6 +1,6 @@
 """`python -m tests.site --seed 7 --hours 24`: play one day.
 
-Exit code 1, and what to type to play it again, when a law is broken or something grows.
+If a law is broken or something grows, print the command that plays the day again; the exit code is 1.
 """
 
 import argparse
@@ -15,18 +15,20 @@ from tests.site.laws import Broken
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Play one day."""
+    """Play one day; return the exit code."""
     parser = argparse.ArgumentParser(prog="python -m tests.site", description=__doc__)
-    parser.add_argument("--seed", type=int, help="of the day; one is drawn and printed if left out")
-    parser.add_argument("--hours", type=float, default=24.0, help="simulated, 0.5 at the least")
-    parser.add_argument("--rmf", choices=SUPERVISORS, help="whose supervisors; else by the seed")
+    parser.add_argument("--seed", type=int, help="seed of the day; by default random")
+    parser.add_argument("--hours", type=float, default=24.0, help="simulated hours, at least 0.5")
+    parser.add_argument(
+        "--rmf", choices=SUPERVISORS, help="whose supervisors; by default by the seed"
+    )
     parser.add_argument(
         "--kill-every",
         type=float,
         metavar="S",
-        help="RMF's lift supervisor dies so often, nothing else",
+        help="the only trouble: RMF's lift supervisor dies each S seconds",
     )
-    parser.add_argument("--log", type=int, default=60, help="so many last lines of a failed day")
+    parser.add_argument("--log", type=int, default=60, help="log lines printed after a failure")
     options = parser.parse_args(argv)
     seed = secrets.randbelow(10**6) if options.seed is None else options.seed
     if options.hours < 0.3:

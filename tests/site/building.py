@@ -1,9 +1,9 @@
-"""The site's devices: how each is wired, with which driver, and the plant behind it.
+"""The site's devices: the wiring, the driver and the plant of each.
 
-Two lifts (one on the GPIO header with one door contact, no motion line and a binary floor code with
-parity; one at a Modbus module with two door contacts, a motion line, a one-hot code, pulsed calls and a
-fire that an operator must reset), five doors (header, module, module in pulses, two maps of registers)
-and three charging stations.
+Lift1 is on the GPIO header, with one door contact, no motion line and a binary floor code with parity.
+Lift2 is on a Modbus module, with two door contacts, a motion line, a one-hot code, pulsed calls, and a
+fire alarm that an operator must reset. Of five doors one is on the header, two on the module (one by
+pulses), two have register maps. There are three charging stations.
 """
 
 from collections.abc import Callable, Mapping
@@ -38,13 +38,15 @@ LIFTS = ("Lift1", "Lift2")
 DOORS = ("ward", "lab", "store", "gate", "icu")
 CHARGERS = ("bay1", "bay2", "bay3")
 POLL_S = {"gpio": 0.0, "modbus": 0.05, "http": 0.5}
-"""How long after it has happened a change is seen: an edge at once, a poll when it is due."""
+"""Delay until a change is seen (s): an edge is seen at once, a polled change at the next poll."""
 
 
 @dataclass(frozen=True)
 class Device:
-    """One device from its settings to its plant. `driver()`: a new one, as a new daemon has it;
-    `driver_name`: as a YAML has it."""
+    """One device from settings to plant.
+
+    `driver()` makes a new driver, as a new daemon does; `driver_name` is the driver's name in a YAML.
+    """
 
     name: str
     kind: AnyDeviceKind
@@ -58,7 +60,7 @@ class Device:
 
 
 def devices(timeline: Timeline) -> dict[str, Device]:
-    """Every lift, door and charger of the site, by name."""
+    """Return every lift, door and charger of the site by name."""
     found = [_lift(timeline, "Lift1", _shipped("lift_dry_contact", "Lift1"), "gpio")]
     found += [_lift(timeline, "Lift2", _convert(lift_dry_contact, _lift2()), "modbus")]
     for name, content, bus in _dry_doors():
@@ -79,7 +81,7 @@ def _wired(
     settings: Any,
     bus: str,
 ) -> Device:
-    """A device on contacts."""
+    """Return a device on contacts."""
     far = PointsFar(timeline, plant, driver.wires(settings))
     return Device(
         name,

@@ -1,7 +1,7 @@
-"""Charging as RMF knows it: what a fleet adapter tells of its robot, and the places of a coordinator.
+"""Charging as RMF does it: a fleet adapter's reports on its robot, and a coordinator's places.
 
 ChargeBattery drives to the robot's dedicated place and waits there in the mode CHARGING until the
-battery is full (rmf_ros2 9dedd0f, ChargeBattery.cpp). `charging_assignments` says which place that is.
+battery is full (rmf_ros2 9dedd0f, ChargeBattery.cpp). `charging_assignments` names the dedicated place.
 """
 
 from bridges.kinds.charger_coordinator.settings import (
@@ -18,7 +18,7 @@ LOW, FULL = 30.0, 100.0
 
 
 def settings(chargers: tuple[str, ...], robots: tuple[str, ...]) -> CoordinatorSettings:
-    """The coordinator's: every robot may use every charger, and waits at a place of its own."""
+    """Return a coordinator's settings: each robot may use every charger, and waits at its own place."""
     places = [*chargers, *map(waits_at, robots)]
     waypoints = {name: Waypoint(level="L1", x=10.0 * n, y=0.0) for n, name in enumerate(places)}
     known = {
@@ -31,12 +31,12 @@ def settings(chargers: tuple[str, ...], robots: tuple[str, ...]) -> CoordinatorS
 
 
 def waits_at(robot: str) -> str:
-    """A robot's own place."""
+    """Return the name of a robot's own waiting place."""
     return f"wait_{robot}"
 
 
 class Charge:
-    """What a fleet adapter tells of its robot. `place`: the waypoint where it is, "" on the road."""
+    """A fleet adapter's reports on its robot. `place` is the robot's waypoint, "" on the road."""
 
     def __init__(self, robot: str, known: CoordinatorSettings) -> None:
         self.robot = robot
@@ -48,22 +48,22 @@ class Charge:
         self._tasks = 0
 
     def begins(self) -> None:
-        """RMF finds its battery low."""
+        """Begin a charging task: the battery is low."""
         self._tasks += 1
         self.task_id, self.battery = f"charge-{self._tasks}", LOW
 
     def ends(self) -> None:
-        """It is full, or called away."""
+        """End the charging task: the battery is full, or the robot was called away."""
         self.task_id, self.battery, self.place = "", FULL, ""
 
     def hear(self, message: d.ChargingAssignments) -> None:
-        """Its dedicated place may change."""
+        """Take a new dedicated place."""
         for assignment in message.assignments:
             if assignment.robot_name == self.robot:
                 self.dedicated = assignment.waypoint_name
 
     def state(self) -> d.FleetState:
-        """The state of its fleet, as far as this adapter knows it."""
+        """Return the state of the fleet, as far as this adapter knows the fleet."""
         modes = d.RobotModeValue
         at = self._waypoints.get(self.place)
         away = d.Location(x=-1000.0, y=-1000.0, level_name="L1")

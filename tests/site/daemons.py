@@ -1,9 +1,9 @@
 """The daemons of the site: a node for each device, and the supervisors. Each can die and come back.
 
 A device is scanned at each request, at its core's `wake_at`, when a contact of its plant changes (on a
-polled bus one poll later), and every SCAN_S. Between those instants no input changes and no time runs
-out, so a scan there would decide what the last one did: that is why the day need not be scanned at the
-20 Hz of the real loop. (The cores' own tests prove that nothing changes before `wake_at`.)
+polled bus one poll later), and every SCAN_S. Between these instants no input changes and no time runs
+out, so a scan would only repeat the last decision. Therefore the day needs no scans at the 20 Hz of the
+real loop. (The tests of the cores prove that nothing changes before `wake_at`.)
 """
 
 from collections import Counter
@@ -30,16 +30,16 @@ from tests.site.timeline import EPOCH, NEVER, Alarm, Timeline
 from workbench.rmf_model.supervisors import DoorSupervisor, LiftSupervisor
 
 SCAN_S = 0.9
-"""Less than a state may be old (1 s); states go out at 1 Hz, which `wake_at` sees to."""
+"""Less than the permitted age of a state (1 s). `wake_at` makes the states go out at 1 Hz."""
 LEAST_GAP_S = 0.001
 
 
 class DeviceDaemon:
-    """Serves one device. `wall_step_s`: of its wall clock.
+    """Serves one device. `wall_step_s` is the step of its wall clock.
 
-    `looks` is called with each time until which the plant was as it is, `scanned` after each scan,
-    `relayed` with each edge of a relay, `started` as it starts, `hears` with each message that gets
-    to it.
+    `looks` is called with each time at which the plant is about to change or be scanned, `scanned`
+    after each scan, `relayed` with each edge of a relay, `started` at the start, `hears` with each
+    message that arrives.
     """
 
     def __init__(self, timeline: Timeline, air: Air, device: Device) -> None:
@@ -67,7 +67,7 @@ class DeviceDaemon:
         self._place: Place
 
     def start(self) -> None:
-        """A new one: nothing remembered."""
+        """Start a new daemon, which remembers nothing."""
         self.started(self)
         device, kind = self.device, self.device.kind
         self._place = Place(self._air, self.name, lambda: None)
@@ -94,7 +94,7 @@ class DeviceDaemon:
         self.scan()
 
     def kill(self) -> None:
-        """It dies; its outputs are switched off, by itself or by `rmf-bridge outputs-off`."""
+        """Kill the daemon; its outputs are switched off, by itself or by `rmf-bridge outputs-off`."""
         self.alive = False
         self._alarm.set(NEVER)
         self._node.make_safe()
@@ -102,12 +102,12 @@ class DeviceDaemon:
         self.refused.update(self._node.refused)
 
     def reset(self) -> None:
-        """`rmf-bridge reset`."""
+        """Reset the daemon as `rmf-bridge reset` does."""
         if self.alive:
             self.scan(OperatorReset())
 
     def scan(self, *events: Any) -> None:
-        """One scan, with these events."""
+        """Scan once, with these events."""
         if not self.alive:
             return
         now = self._timeline.now
@@ -132,19 +132,19 @@ class DeviceDaemon:
         self.looks(self, now)
 
     def look(self) -> None:
-        """Something has happened to the plant: see it, at once or at the next poll."""
+        """Scan after a change of the plant: at once, or at the next poll."""
         self._timeline.after(self.device.poll_s, self.scan)
 
     def status(self) -> Status:
-        """As the status file has it."""
+        """Return the status as in the status file."""
         return self._node.status()
 
     def faults(self) -> list[str]:
-        """What it says is wrong."""
+        """Return the codes of the faults in the status."""
         return [fault["code"] for fault in self.status()["faults"]] if self.alive else []
 
     def _edge(self, edge: Edge) -> None:
-        """Of the plant, whose own record is not needed."""
+        """Handle an edge of the plant; the plant's own record is not needed."""
         self.device.plant.edges.clear()
         if edge.what == "relay":
             self.relayed(edge)
@@ -172,7 +172,9 @@ RIVAL = "rmf_lift_supervisor"
 
 
 class RmfsSupervisor:
-    """The stand-in for a supervisor of RMF's own: in the place of ours, or beside it by mistake."""
+    """The stand-in for a supervisor of RMF's own: in place of our supervisor, or beside it by
+    mistake.
+    """
 
     def __init__(
         self,
@@ -192,7 +194,7 @@ class RmfsSupervisor:
         air.best_effort.add(name)
 
     def start(self) -> None:
-        """It knows nothing, and hears all that is retained."""
+        """Start a new supervisor, which remembers nothing and hears all retained messages."""
         self._place = Place(self._air, self.name, lambda: None)
         self._party = self._made()
         self._mouths = {topic.name: self._place.publisher(topic) for topic in self._says}
@@ -201,12 +203,12 @@ class RmfsSupervisor:
             self._place.subscribe(topic, self._hear)
 
     def kill(self) -> None:
-        """It is stopped and leaves the graph."""
+        """Stop, and leave the graph."""
         self.alive = False
         self._place.close()
 
     def summary(self) -> Mapping[str, Status]:
-        """It tells nobody what it knows."""
+        """Return nothing: RMF's supervisors show no status."""
         return {}
 
     def _hear(self, message: Any) -> None:
@@ -215,18 +217,18 @@ class RmfsSupervisor:
 
 
 def rmfs_lift_supervisor(timeline: Timeline, air: Air, *, jazzy: bool = False) -> RmfsSupervisor:
-    """rmf_lift_supervisor."""
+    """Return a stand-in for rmf_lift_supervisor."""
     return RmfsSupervisor(timeline, air, RIVAL, lambda: LiftSupervisor(jazzy), [LIFT_REQUESTS])
 
 
 def rmfs_door_supervisor(timeline: Timeline, air: Air) -> RmfsSupervisor:
-    """rmf_door_supervisor."""
+    """Return a stand-in for rmf_door_supervisor."""
     says: list[Topic[Any]] = [DOOR_REQUESTS, DOOR_SUPERVISOR_HEARTBEAT]
     return RmfsSupervisor(timeline, air, "rmf_door_supervisor", DoorSupervisor, says)
 
 
 class GraphDaemon:
-    """Serves a kind that lives on the graph alone. `wall_skew`: its clock is ahead (s)."""
+    """Serves a kind without hardware. `wall_skew`: how far its clock is ahead (s)."""
 
     def __init__(
         self,
@@ -251,7 +253,7 @@ class GraphDaemon:
         self.node: AnyGraphNode
 
     def start(self) -> None:
-        """A new one, which knows what it has kept."""
+        """Start a new daemon, which remembers only its memory on disk."""
         self._place = Place(self._air, self.name, self._round)
         kept = self._disk if self.kind.persist else None
         self.node = GraphNode(
@@ -262,18 +264,18 @@ class GraphDaemon:
         self._round()
 
     def kill(self) -> None:
-        """It dies."""
+        """Kill the daemon."""
         self.alive = False
         self._alarm.set(NEVER)
         self._place.close()
 
     def reset(self) -> None:
-        """`rmf-bridge reset`."""
+        """Reset the daemon as `rmf-bridge reset` does."""
         self.node.reset()
         self._round()
 
     def summary(self) -> Mapping[str, Status]:
-        """Each subject's status, as the status file has it."""
+        """Return each subject's status as in the status file."""
         return self.node.devices()
 
     def _round(self) -> None:

@@ -1,4 +1,4 @@
-"""A day at the site: everybody, everything that goes wrong, and the laws."""
+"""A day at the site: all parties, all troubles, and the laws."""
 
 import logging
 import random as the_random
@@ -32,26 +32,29 @@ from tests.site.trouble import BY_RESET_S, Ill, Ills, Mortal, Trouble, breakable
 
 ROBOTS = ("red", "green", "blue", "white", "black")
 WIND_DOWN_S = BOUND_S + 90.0
-"""Before the end: nothing goes wrong any more, and every robot ends its tour."""
+"""Before the end (s). From then on nothing more goes wrong, and every robot ends its tour."""
 ADOPTS_S = 5.0
-"""After its restart RMF's supervisor ends the session that it is shown, and takes up who asks next. If
-that is not the robot in the car, another is let in beside it, which only RMF can mend."""
+"""RMF's restarted supervisor ends the shown session and then takes the next requester.
+
+If another robot than the one in the car asks first, RMF lets it in beside the first; only RMF can mend
+that.
+"""
 SWEEP_S = 45.0
-"""Before the end: by then every robot is at home."""
+"""Before the end (s). By then every robot is at home."""
 LOOK_EVERY_S = 5.0
 HOUR_S = 3600.0
 
 
 SUPERVISORS = ("ours", "kilted", "jazzy")
-"""Whose supervisors a day has: ours, or RMF's own by the rules of a release."""
+"""The supervisors of a day: ours, or RMF's own by the rules of a release."""
 
 
 class Site:
-    """One seed's day. `run` raises `laws.Broken` when a law is broken.
+    """The day of one seed. `run` raises `laws.Broken` when a law is broken.
 
-    `rmf`: one of SUPERVISORS; the seed decides when it is not given. The fleet adapters of a day with
-    ours are of either release. `kill_every_s`: nothing goes wrong but that RMF's lift supervisor dies
-    so often (s), and is up again within seconds.
+    `rmf` is one of SUPERVISORS; without it the seed decides. On a day with our supervisors the seed
+    decides the release of the fleet adapters. With `kill_every_s` the only trouble is the death of
+    RMF's lift supervisor: it dies so often (s), and is restarted within seconds.
     """
 
     def __init__(
@@ -99,9 +102,9 @@ class Site:
         return [lifts, rmfs_door_supervisor(self.timeline, self.air)]
 
     def run(self, hours: float, told: Callable[[Look], None] = lambda look: None) -> None:
-        """All of it. `told`: each hour's look."""
+        """Run the whole day; `told` is called with each hour's look."""
         end = hours * HOUR_S
-        the_random.seed(self.seed)  # supervisors that meet a rival draw how long they hold back
+        the_random.seed(self.seed)  # supervisors that meet a rival wait for a random time
         self._open()
         if self.kill_every_s is None:
             self.trouble.begin(until=end - WIND_DOWN_S)
@@ -120,7 +123,7 @@ class Site:
         self._close()
 
     def counts(self) -> dict[str, int]:
-        """What was done, for the summary."""
+        """Return the counts of events for the summary."""
         done: dict[str, int] = {}
         for robot in self.robots:
             for what, count in robot.done.items():
@@ -129,7 +132,7 @@ class Site:
         kills = self.kills if self.kill_every_s else {}
         return {**done, **kills, "checks": self.laws.checks, **self.air.counts}
 
-    # ---- its hours
+    # ---- the hours
 
     def _open(self) -> None:
         for name, daemon in self.daemons.items():
@@ -148,7 +151,7 @@ class Site:
         told(self.looks[-1])
 
     def _watch(self) -> None:
-        """Does anybody wait for too long?"""
+        """Check that no robot waits for too long."""
         for robot in self.robots:
             if robot.alive and robot.waits_for:
                 self.laws.waits(robot.name, robot.waits_for, robot.since)
@@ -156,7 +159,7 @@ class Site:
         self.timeline.after(LOOK_EVERY_S, self._watch)
 
     def _mend_queue(self) -> None:
-        """A technician who has seen to robots and stations that failed tells the coordinator so."""
+        """Reset the coordinator, as a technician does who has mended the failed robots and stations."""
         if not (self.coordinated and self.coordinator.alive):
             return
         calm = self.ills.calm_since() + BY_RESET_S < self.timeline.now
@@ -164,7 +167,7 @@ class Site:
             self.coordinator.reset()
 
     def _live(self) -> None:
-        """People use lifts and doors as well; that is no trouble."""
+        """Let people use lifts and doors as well, which is no trouble."""
         people = self._people
         name = people.choice([*LIFTS, *DOORS])
         signal = f"hall_{people.choice(FLOORS)}" if name in LIFTS else "push"
@@ -180,7 +183,9 @@ class Site:
             robot.homing = True
 
     def _sweep(self) -> None:
-        """RMF's supervisors still hold what robots held whose adapters died: somebody restarts them."""
+        """Restart RMF's supervisors, which still hold lifts and doors for robots whose adapters
+        died.
+        """
         for supervisor in self.supervisors:
             if isinstance(supervisor, RmfsSupervisor):
                 supervisor.kill()
@@ -197,13 +202,13 @@ class Site:
                 self.laws.require(empty, f"{supervisor.name}: {name} {waiting} at the end")
 
     def _speakers(self, topic: str) -> int:
-        """How many supervisors speak. Ours and a rival that has just come count as one."""
+        """Return how many supervisors publish. Ours and a rival that has just come count as one."""
         speaking = [end.node.name for end in self.air.memory.publishers[topic]]
         if RIVAL in speaking and self.rmf == "ours":
             return 1
         return len(speaking)
 
-    # ---- where the robots are (`robots.Ground`)
+    # ---- the places of the robots (`robots.Ground`)
 
     def may_enter_lift(self, robot: Resident, lift: str, floor: str) -> bool:
         return self.laws.lift_is_open(lift, floor)
@@ -218,7 +223,7 @@ class Site:
         self.laws.crossed(robot.name)
         for door in DOORS:
             if self.devices[door].plant.contact("obstruction") and self._people.random() < 0.2:
-                self._follows(door)  # somebody walks in behind it
+                self._follows(door)  # somebody walks in behind the robot
             self._obstruct(door)
 
     def _follows(self, door: str) -> None:
@@ -250,7 +255,7 @@ class Site:
         return plant.battery >= 1.0
 
     def _obstruct(self, door: str) -> None:
-        """The light curtain sees robots, and whatever else is in the way."""
+        """Set the light curtain: it sees robots, people and obstructions in the doorway."""
         there = any(robot.doorway == door for robot in self.robots)
         there = there or self.ills.has(door, "press obstruction")
         there = there or self.timeline.now < self._people_at.get(door, 0.0)
@@ -264,7 +269,7 @@ class Site:
         self.devices[device].plant.press(signal, on, self.timeline.now)
         self.daemons[device].look()
 
-    # ---- what may go wrong
+    # ---- possible troubles
 
     def _robot(self, name: str) -> Resident:
         self.air.best_effort.add(name)
@@ -294,7 +299,7 @@ class Site:
         return self.devices[random.choice(random.choice((LIFTS, DOORS, CHARGERS)))]
 
     def _rival(self, random: Random) -> Ill:
-        """RMF's own lift supervisor is started as well, and stopped again."""
+        """Return a trouble: RMF's own lift supervisor is started beside ours, and stopped again."""
         rival = rmfs_lift_supervisor(self.timeline, self.air, jazzy=self.jazzy)
 
         def begin() -> None:
@@ -308,11 +313,13 @@ class Site:
         return Ill("rival", rival.name, "rival", begin, end, most_s=40.0)
 
     def _restart_rmfs(self, random: Random) -> Ill:
-        """One of RMF's supervisors forgets everything, and may then speak for other robots."""
+        """Return a trouble: one of RMF's supervisors forgets everything, and may then speak for other
+        robots.
+        """
         supervisor = random.choice([s for s in self.supervisors if isinstance(s, RmfsSupervisor)])
         devices = LIFTS if supervisor.name == RIVAL else DOORS
 
-        why = f"supervisor {random.random()}"  # two restarts may follow one another closely
+        why = f"supervisor {random.random()}"  # unique, as two restarts may be close together
 
         def begin() -> None:
             supervisor.kill()
@@ -330,7 +337,7 @@ class Site:
         return Ill("supervisor", supervisor.name, "daemon", begin, end, least_s=0.2, most_s=20.0)
 
     def _kill(self) -> None:
-        """RMF's lift supervisor dies, and a new one starts, while everybody goes on."""
+        """Kill RMF's lift supervisor and start a new one, while everybody goes on."""
         if self.timeline.now > self.trouble.over_at:
             return
         supervisor = next(s for s in self.supervisors if s.name == RIVAL)
@@ -343,7 +350,7 @@ class Site:
         self.timeline.after(self.kill_every_s or NEVER, self._kill)
 
     def _distrust(self, devices: Sequence[str], why: str) -> None:
-        """What is said for a robot now is not its own wish."""
+        """Note that requests in a robot's name may now not be the robot's own wish."""
         for name in devices:
             self.ills.begin(name, why)
         for robot in self.robots:
@@ -415,10 +422,11 @@ class Site:
         self.daemons[device.name].look()
 
     def _restart(self, random: Random) -> Ill:
-        """A party dies and comes back, its clock stepped.
+        """Return a trouble: a party dies and comes back with a step of its clock.
 
-        Under RMF's own door supervisor no adapter's clock steps back: that supervisor would ignore its
-        CLOSE as too old and send a heartbeat, which it answers with a CLOSE, as fast as the wire is.
+        Beside RMF's own door supervisor no adapter's clock steps back. The supervisor would ignore the
+        adapter's CLOSE as too old and send a heartbeat; the adapter would answer each heartbeat with
+        another CLOSE, as fast as the wire is.
         """
         ours = [node for node in self.nodes if isinstance(node, GraphDaemon)]
         sorts: list[list[Mortal]] = [[*self.daemons.values()], [*self.robots], [*ours]]
@@ -453,7 +461,7 @@ class Site:
 
 @contextmanager
 def _silent() -> Iterator[None]:
-    """The nodes' logs of a day would fill the memory of whoever captures them."""
+    """Log nothing: a day's log would fill the memory of the process that captures it."""
     before = logging.root.manager.disable
     logging.disable(logging.CRITICAL)
     try:

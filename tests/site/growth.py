@@ -1,4 +1,4 @@
-"""What a day must not cost: threads, file descriptors, objects and memory, looked at by the hour."""
+"""Growth that a day must not cause: threads, file descriptors, objects and memory, each hour."""
 
 import gc
 import os
@@ -9,14 +9,14 @@ from pathlib import Path
 
 PAGE = os.sysconf("SC_PAGE_SIZE")
 WARM_UP = 2
-"""Looks to skip, while caches, queues and laws' logs grow to their size."""
+"""Looks to skip: caches, queues and the laws' logs grow to their full size first."""
 MOST_OBJECTS = 1.05
 MOST_MB = 4.0
 
 
 @dataclass(frozen=True)
 class Look:
-    """Of this test's process at one simulated hour."""
+    """The resources of this test's process at one simulated hour."""
 
     hour: float
     threads: int
@@ -32,7 +32,7 @@ class Look:
 
 
 def look(hour: float) -> Look:
-    """Now, after everything that can be freed has been."""
+    """Free all unused objects; return the resources in use."""
     gc.collect()
     rss_mb = int(Path("/proc/self/statm").read_text().split()[1]) * PAGE / 1e6
     descriptors = len(os.listdir("/proc/self/fd"))
@@ -40,7 +40,7 @@ def look(hour: float) -> Look:
 
 
 def growth(looks: Sequence[Look]) -> list[str]:
-    """What has grown since the warm-up, in words; empty for a day that costs nothing."""
+    """Return in words what has grown since the warm-up; an empty list for a day without growth."""
     if len(looks) <= WARM_UP:
         return []
     first, found = looks[WARM_UP - 1], []

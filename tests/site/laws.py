@@ -1,10 +1,10 @@
-"""What must hold at every moment of the day. Nothing here asks a core's memory or a report.
+"""Laws that hold at every moment of the day. No law here asks a core's memory or a report.
 
-What can be judged from the graph is judged by the laws of `rmf-bridge judge` (`workbench/judge/`), with
-the node's own ears. Here are those that need more: the relays as they are driven at the terminal block,
-and where car, doors, robots and current really are. What a sensor lies about (a stuck or noisy
-wire) nobody can know: while it does, and a moment longer, the states that rest on it are not held
-against the node. A cut wire is no excuse.
+Whatever the graph shows is judged by the laws of `rmf-bridge judge` (`workbench/judge/`), from the
+messages that reach the node. The laws here need more: the relays as driven at the terminal block, and
+the true places of car, doors, robots and current. A node cannot know that a sensor lies (a stuck or
+noisy wire). While a sensor lies, and a moment longer, the states that depend on that sensor are not
+judged. A cut wire is no excuse.
 """
 
 from collections import deque
@@ -35,36 +35,40 @@ SETTLES_S = 2.0
 STALE_S = 1.0 + AT_ONCE_S
 DEAD_TIME_S = 0.29
 GRACE_S = 3.0 + AT_ONCE_S
-"""Lift outputs may stay on for so long after the session is gone from the states."""
+"""Lift outputs may stay on for so long after the session has disappeared from the states."""
 BOUND_S = 300.0
-"""Once everything is repaired, nobody waits longer for anything."""
+"""The longest wait of any robot once everything is repaired."""
 LATEST_S = 2.1
 LATE_S = 5.0
-"""More than the network ever takes for a message when nobody is cut off."""
+"""More than the longest delay of a message, unless a node is cut off."""
 
 ARRIVED_S = 3.5
-"""RMF lets a robot through on a state that is older than its request: that may be on its way still,
-for as long as a late message takes and our supervisor needs to repeat it, while an earlier CLOSE ends.
+"""The longest time in which a door may still be let go after RMF has let a robot through.
+
+RMF does so on a state that may be older than its request. The request may still be on its way while an
+earlier CLOSE ends: a late message, plus the repetition by our supervisor.
 """
 
 STATED = (d.LiftState, d.DoorState, d.ChargerState)
 NO_DWELL = "D2.people"
-"""The plants' doors fall shut as soon as nobody pushes, as no operator does and as this law forbids."""
+"""A law that is left out: it forbids a door that closes as soon as nobody pushes. The plants' doors do
+that, unlike real operators.
+"""
 SHOWN = ("floor", "door", "motion")
-"""The groups of a lift's lines that an open door rests on."""
+"""The groups of a lift's lines on which an open door depends."""
 
 
 class Broken(AssertionError):
-    """A law is broken; the text says which, and when."""
+    """A broken law; the text names the law and the time."""
 
 
 @dataclass
 class LiftTruth:
-    """Of one lift: when its door was last truly open at each floor, and what was last published.
+    """The truth about one lift: when its door was last open at each floor, and what was last published.
 
-    `last`: who had it before; within the grace its session is resumed as it was. `offered`: it has been
-    shown OPEN at its destination. `crossing`, `inside`: the robots there, since when. `ended`: when
-    each session was last told to end.
+    `last` is the session before; within the grace it resumes unchanged. `offered`: the lift has shown
+    OPEN at the session's destination. `crossing` and `inside` are the robots there, with the time of
+    their arrival. `ended` has the time of each session's last END.
     """
 
     open_at: dict[str, float] = field(default_factory=dict)
@@ -78,8 +82,9 @@ class LiftTruth:
 
 
 class Judges:
-    """Of one daemon, since it started: the laws of the graph, and those that rest on its sensors, which
-    are judged while nothing ails it."""
+    """The judges of one daemon since its start. Laws on sensors are judged only while the device is
+    well.
+    """
 
     def __init__(self, daemon: DeviceDaemon) -> None:
         kind = cast(Kind, daemon.device.kind.name)
@@ -89,7 +94,7 @@ class Judges:
         self._sensed: Judge | None = None
 
     def hear(self, heard: Heard, well: bool) -> str:
-        """The laws that are broken now, with what shows it."""
+        """Return the laws that the message breaks, with the evidence."""
         self._always.hear(heard)
         if not well:
             self._sensed = None
@@ -108,7 +113,7 @@ class Judges:
 
 
 class Laws:
-    """`log`: the latest of what was said and done, for the report of a failure."""
+    """All laws of the site. `log` has the latest events, for the report of a failure."""
 
     def __init__(self, timeline: Timeline, ills: Ills) -> None:
         self.log: deque[tuple[float, str]] = deque(maxlen=600)
@@ -146,29 +151,29 @@ class Laws:
         daemon.started, daemon.hears = self._started, self._hears
 
     def note(self, what: str) -> None:
-        """One line for the report of a failure."""
+        """Add a line to the report of a failure."""
         self.log.append((self._timeline.now, what))
 
     def require(self, holds: bool, law: str) -> None:
-        """Fail, with what went before, unless the law holds."""
+        """Fail with the law's text unless the law holds."""
         self.checks += 1
         if not holds:
             raise Broken(f"at {self._timeline.now:.3f} s: {law}")
 
-    # ---- what is said
+    # ---- messages
 
     def _started(self, daemon: DeviceDaemon) -> None:
         self._judges[daemon.name] = Judges(daemon)
 
     def _hears(self, daemon: DeviceDaemon, topic: topics.Topic[Any], message: Any) -> None:
-        """What gets to a node, as it is judged by it."""
+        """Let the node's judges hear a message that reaches the node."""
         now = self._timeline.now
         well = self._ills.well_since(daemon.name) + LATE_S < now
         broken = self._judges[daemon.name].hear(Heard(now, EPOCH + now, topic.name, message), well)
         self.require(not broken, broken)
 
     def heard(self, speaker: str, topic: topics.Topic[Any], message: Any) -> None:
-        """Check a message that somebody publishes."""
+        """Check a message that a party publishes."""
         if speaker in self._daemons and isinstance(message, STATED):
             self._hears(self._daemons[speaker], topic, message)
         match message:
@@ -215,14 +220,16 @@ class Laws:
             truth.last = before or truth.last
             truth.session, truth.since = state.session_id, now
             others = sorted(set(truth.inside) - {state.session_id}) if state.session_id else []
-            self.require(not others, f"{name} is given to {state.session_id}, {others} in the car")
+            self.require(
+                not others, f"{name} is given to {state.session_id}, with {others} in the car"
+            )
         if state.door_state != d.LiftDoor.DOOR_OPEN:
             return
         self._open_is_true(name, state)
         sick = self._hazard_since(name)
         admits = state.session_id and not truth.offered
         self.require(
-            not (admits and sick + AT_ONCE_S < now), f"{name} lets a robot in under hazard"
+            not (admits and sick + AT_ONCE_S < now), f"{name} lets a robot in under a hazard"
         )
         if state.session_id and state.current_floor == state.destination_floor:
             truth.offered = True
@@ -230,16 +237,16 @@ class Laws:
     def _open_is_true(self, name: str, state: d.LiftState) -> None:
         truth, now = self._lifts[name], self._timeline.now
         stale = self._ills.since(name, "bus") + STALE_S < now
-        self.require(not stale, f"{name} is OPEN though nobody can see it")
+        self.require(not stale, f"{name} shows OPEN without a fresh reading")
         lied = any(group(wire) in SHOWN for wire in self._ills.lying(name, SETTLES_S))
         true_at = truth.open_at.get(state.current_floor, -NEVER)
         self.require(
             lied or now - true_at <= self._sensed_s(name),
-            f"{name} is OPEN at {state.current_floor}, which it is not",
+            f"{name} shows OPEN at {state.current_floor} but is not open there",
         )
 
     def _sensed_s(self, name: str) -> float:
-        """How long ago (s) a shown state may have been true: a reading counts until it is stale."""
+        """Return the greatest age of a shown state (s): a reading counts until it is stale."""
         return STALE_S if self._ills.since(name, "bus") <= self._timeline.now else SENSED_S
 
     def _door_state(self, name: str, state: d.DoorState) -> None:
@@ -250,10 +257,10 @@ class Laws:
             return
         now = self._timeline.now
         stale = self._ills.since(name, "bus") + STALE_S < now
-        self.require(not stale, f"{name} is OPEN though nobody can see it")
+        self.require(not stale, f"{name} shows OPEN without a fresh reading")
         lied = {"opened", "closed"} & set(self._ills.lying(name, SETTLES_S))
         true = bool(lied) or now - self._doors[name] <= self._sensed_s(name)
-        self.require(true, f"{name} is OPEN, which it is not")
+        self.require(true, f"{name} shows OPEN but is not open")
 
     def _charger_state(self, name: str, state: d.ChargerState) -> None:
         word = d.ChargerStateValue(state.state).name[8:]
@@ -266,10 +273,10 @@ class Laws:
         true = bool(lied) or self._timeline.now - self._currents[name] <= unsure_s
         self.require(true, f"{name} is CHARGING without current")
 
-    # ---- what is driven, and where things are
+    # ---- outputs, and the places of things
 
     def scanned(self, daemon: DeviceDaemon) -> None:
-        """After each scan of a device."""
+        """Check the laws after a scan of a device."""
         name = daemon.name
         self._see(daemon, self._timeline.now)
         if name in self._lifts:
@@ -280,7 +287,7 @@ class Laws:
             self._doorway(name)
 
     def _see(self, daemon: DeviceDaemon, at: float) -> None:
-        """Note where lift or door really are, up to this time."""
+        """Note the true state of a lift or door up to this time."""
         name, plant = daemon.name, daemon.device.plant
         if isinstance(plant, LiftPlant):
             if plant.car.standing and plant.doors[Side.FRONT].opened:
@@ -293,7 +300,7 @@ class Laws:
             self._currents[name] = at
 
     def _relay(self, edge: Edge) -> None:
-        """A relay is driven. (A charger's clearing is a pulse, and no relay.)"""
+        """Check an edge of a relay. (A charger's clearing of errors is a pulse, and no relay.)"""
         name, now = edge.device, self._timeline.now
         plant = self._daemons[name].device.plant
         if isinstance(plant, ChargerPlant):
@@ -314,10 +321,14 @@ class Laws:
         on, calls = self._relays[name], edge.signal.startswith("call_")
         called = [signal for signal in on if signal.startswith("call_")]
         self.require(len(called) <= 1, f"{name} is called to two floors")
-        self.require(not (called and "door_open" in on), f"{name} is called while held open")
+        self.require(
+            not (called and "door_open" in on), f"{name} is called while its door is held open"
+        )
         if calls and edge.value:
             rested_s = self._timeline.now - self._off_at.get((name, "door_open"), -NEVER)
-            self.require(rested_s > DEAD_TIME_S, f"{name} is called as soon as it is let go")
+            self.require(
+                rested_s > DEAD_TIME_S, f"{name} is called too soon after its door is let go"
+            )
         if edge.signal == "door_open" and not edge.value:
             self._lets_nobody_go(name, {r: at for r, (_, at) in self._lifts[name].crossing.items()})
 
@@ -328,7 +339,7 @@ class Laws:
             self._not_onto_an_obstruction(name, plant)
 
     def _lets_nobody_go(self, name: str, crossing: dict[str, float]) -> None:
-        """A door that is well is not let go while a robot is told that it is held."""
+        """Require a healthy door to stay held while a robot in it is told that the door is held."""
         for robot, since in crossing.items():
             well = self._ills.well_since(name) + LATE_S <= since
             just = self._timeline.now - since < ARRIVED_S
@@ -341,10 +352,10 @@ class Laws:
         since = max(self._ills.well_since(name), self._ills.obstructed_since(name))
         if seen and not plant.contact("closed"):
             early = since + AT_ONCE_S > self._timeline.now
-            self.require(early, f"{name} lets go onto an obstruction")
+            self.require(early, f"{name} lets its door go onto an obstruction")
 
     def _hazard_since(self, name: str) -> float:
-        """Since when a hazard has been there for the node to see; inf: none."""
+        """Return since when the node can see a hazard; inf: there is none."""
         return max(self._ills.hazard_since(name), self._ills.since_over(name, "bus", "daemon"))
 
     def _lift_outputs(self, name: str) -> None:
@@ -354,17 +365,18 @@ class Laws:
         sighted = not self._ills.has(name, "bus")
         sick = self._hazard_since(name) + AT_ONCE_S < now
         self.require(not (sighted and sick), f"{name} drives {sorted(on)} under a hazard")
-        # A session may be too short to be shown, and its END be late.
+        # A session may be too short to be shown, and its END may be late.
         ends = [truth.since, *(at + LATEST_S for at in truth.ended.values())]
         since = max(*ends, self._ills.since_over(name, "bus", "cut off"))
         over = max(since + GRACE_S, self._on_since[name] + AT_ONCE_S) < now
         self.require(
-            not (sighted and over and not truth.session), f"{name} drives {sorted(on)} for nobody"
+            not (sighted and over and not truth.session),
+            f"{name} drives {sorted(on)} unrequested",
         )
         self.require(on == {"agv_mode_request"} or "agv_mode_request" in on, f"{name}: {on}")
 
     def _door_outputs(self, name: str) -> None:
-        """A fire that releases the door takes the hold away, whoever wants it."""
+        """Require that a fire that releases the door also ends the hold, whoever requests the door."""
         releases = self._daemons[name].device.settings.on_fire == "release"
         sick = self._hazard_since(name) + AT_ONCE_S < self._timeline.now
         held = releases and sick and self._relays[name] and not self._ills.has(name, "bus")
@@ -373,7 +385,7 @@ class Laws:
     # ---- robots
 
     def boards(self, robot: str, lift: str, floor: str) -> None:
-        """A robot crosses the threshold inwards, told by RMF that it may."""
+        """Let a robot cross the threshold inwards, with RMF's permission."""
         truth = self._lifts[lift]
         others = sorted(set(truth.inside) - {robot})
         self.require(not others, f"{robot} is let into {lift}, where {others} is")
@@ -382,34 +394,36 @@ class Laws:
         truth.crossing[robot] = (floor, self._timeline.now)
 
     def leaves(self, robot: str, lift: str, floor: str) -> None:
-        """A robot crosses the threshold outwards."""
+        """Let a robot cross the threshold outwards."""
         self.note(f"{robot} goes out of {lift} at {floor}")
         self._lifts[lift].crossing[robot] = (floor, self._timeline.now)
 
     def in_doorway(self, robot: str, door: str) -> None:
-        """A robot stands in the doorway."""
+        """Let a robot stand in the doorway."""
         self.note(f"{robot} is in the doorway of {door}")
         self._doorways[door][robot] = self._timeline.now
 
     def crossed(self, robot: str) -> None:
-        """It is across whatever it was crossing, or nobody can tell any more."""
+        """Forget the robot's crossing: the robot is across, or nobody knows any more."""
         for truth in self._lifts.values():
             truth.crossing.pop(robot, None)
         for doorway in self._doorways.values():
             doorway.pop(robot, None)
 
     def is_out(self, robot: str, lift: str) -> None:
-        """It is out of the car."""
+        """Note that the robot is out of the car."""
         self._lifts[lift].inside.pop(robot, None)
 
     def abandoned(self, robot: str) -> None:
-        """Its adapter has died, or RMF's own supervisor speaks: what is said for it is not its wish."""
+        """Forget the robot: its adapter has died, or RMF's supervisor sends requests that it does not
+        wish.
+        """
         self.crossed(robot)
         for truth in self._lifts.values():
             truth.inside.pop(robot, None)
 
     def _thresholds(self, name: str) -> None:
-        """The car stands open for a robot on its threshold, while the lift is well."""
+        """Require the car of a healthy lift to stand open for a robot on its threshold."""
         truth = self._lifts[name]
         for robot, (floor, since) in truth.crossing.items():
             if self._ills.well_since(name) + LATE_S > since:
@@ -425,33 +439,33 @@ class Laws:
             self.require(open_now, f"{name} is not open for {robot} in its doorway")
 
     def lift_is_open(self, lift: str, floor: str) -> bool:
-        """Is it really open now?"""
+        """Is the lift truly open now?"""
         self._daemons[lift].advance()
         self._see(self._daemons[lift], self._timeline.now)
         return self._lifts[lift].open_at.get(floor) == self._timeline.now
 
     def door_is_open(self, door: str) -> bool:
-        """Is it really open now?"""
+        """Is the door truly open now?"""
         self._daemons[door].advance()
         self._see(self._daemons[door], self._timeline.now)
         return self._doors[door] == self._timeline.now
 
     def on_pad(self, robot: str, charger: str) -> None:
-        """A robot has arrived on a pad."""
+        """Note a robot's arrival on a pad."""
         before = self._pads.get(charger)
         self.require(before is None, f"{robot} drives onto {charger}, where {before} is")
         self._pads[charger] = robot
         self.note(f"{robot} is on the pad of {charger}")
 
     def off_pad(self, robot: str, charger: str) -> None:
-        """It has left."""
+        """Note that the robot has left the pad."""
         del self._pads[charger]
         self.note(f"{robot} has left the pad of {charger}")
 
-    # ---- nobody waits for ever, and the end
+    # ---- the longest wait, and the end
 
     def waits(self, robot: str, what: str, since: float) -> None:
-        """A robot still waits for this."""
+        """Require a robot's wait to be short enough."""
         calm_since = self._ills.calm_since()
         waited = self._timeline.now - max(since, calm_since)
         self.require(
@@ -461,7 +475,7 @@ class Laws:
         )
 
     def at_rest(self) -> None:
-        """The day is over: nothing is driven, shown or held."""
+        """Require, at the end of the day, that nothing is driven, shown or held."""
         for name, on in self._relays.items():
             self.require(not on, f"{name} drives {sorted(on)} at the end of the day")
         for name, truth in self._lifts.items():

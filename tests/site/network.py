@@ -1,10 +1,11 @@
 """The site's graph: the `memory` transport, with a network between its ends.
 
-Within what RELIABLE and KEEP_LAST promise: of one writer a reader gets each sample in order, late
-where the network had to repeat it. A reader that is best effort in the field (RMF's own, for states, on
-Fast DDS) loses some; to be harsher than DDS so does everybody, seldom, and a few come twice. A node
-that is cut off for less than a lease gets everything afterwards, in one burst; one that is cut off for
-longer has lost it, and what others retain for it comes once more.
+It stays within the promises of RELIABLE and KEEP_LAST: a reader gets each sample of one writer in
+order, late if the network had to repeat the sample. A reader that is best effort in the field (RMF's
+own readers of states, on Fast DDS) loses some samples. To be harsher than DDS, all other readers lose a
+few too, and a few samples come twice. A node that is cut off for less than a lease gets everything
+afterwards in one burst. A node that is cut off for longer loses everything meanwhile, and then gets the
+messages that others retain for it.
 """
 
 from collections.abc import Callable, Sequence
@@ -22,14 +23,16 @@ from tests.transports.memory import MemoryNetwork, MemoryTransport
 LEASE_S = 10.0
 STATES = (LIFT_STATES.name, DOOR_STATES.name)
 RETAINED = "retained"
-"""Who speaks when a late joiner is given what was kept for it."""
+"""The speaker's name while a late joiner gets retained messages."""
 
 Watch = Callable[[str, Topic[Any], Message], None]
 
 
 @dataclass(frozen=True)
 class Weather:
-    """Probabilities: a sample is lost, a state is lost to RMF, it comes late, it comes twice."""
+    """Probabilities: any sample is lost, a state to RMF is lost, a sample is late, a sample comes
+    twice.
+    """
 
     lost: float = 0.005
     states_lost: float = 0.02
@@ -42,7 +45,9 @@ CLEAR = Weather(0.0, 0.0, 0.0, 0.0)
 
 
 class Air:
-    """Between all nodes. `best_effort`: who hears states as RMF does. `watch` hears all."""
+    """The air between all nodes. `best_effort` has the nodes that hear states as RMF does. `watch` gets
+    every message.
+    """
 
     def __init__(self, timeline: Timeline, random: Random) -> None:
         self.timeline = timeline
@@ -58,13 +63,13 @@ class Air:
         self._arrived: dict[tuple[str, str, str], float] = {}
 
     def cut_off(self, name: str, until: float) -> None:
-        """Nothing gets to it or from it until then."""
+        """Let nothing reach or leave this node until then."""
         self._cut[name] = until
         lost = until - self.timeline.now > LEASE_S
         self.timeline.at(until, partial(self._found_again, name, lost))
 
     def delays(self, speaker: str, hearer: str, topic: Topic[Any]) -> Sequence[float]:
-        """When a sample arrives (s from now), for each copy of it that does."""
+        """Return the delays of a sample's copies (s); no delay if the sample is lost."""
         weather, random, now = self.weather, self._random.random, self.timeline.now
         until = max(self._cut.get(speaker, 0.0), self._cut.get(hearer, 0.0))
         delay = 0.002 + 0.02 * random()
@@ -89,7 +94,7 @@ class Air:
     def carry(
         self, hearer: "Place", topic: Topic[Any], received: Callable[[Any], None], message: Any
     ) -> None:
-        """Take one sample to one subscription."""
+        """Carry one sample to one subscription."""
         self.counts["sent"] += 1
         delays = self.delays(self.speaker, hearer.name, topic)
         link = (self.speaker, hearer.name, topic.name)
@@ -110,7 +115,7 @@ class Air:
                 self._give_again(name, end)
 
     def _give_again(self, name: str, end: Any) -> None:
-        """What the one who is back has retained for this subscription."""
+        """Give the subscription the messages that the returned node has retained."""
         for publisher in self.memory.publishers[end.topic.name]:
             if publisher.node.name == name and _wants_retained(end, publisher):
                 for message in list(publisher.retained):
@@ -118,7 +123,7 @@ class Air:
 
 
 class Place(MemoryTransport):
-    """One node's place on the graph. `heard` is called after each sample that it got."""
+    """One node's place on the graph. `heard` is called after each sample that the node gets."""
 
     def __init__(self, air: Air, name: str, heard: Callable[[], None]) -> None:
         super().__init__(air.memory, name, air.release)

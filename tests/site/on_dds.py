@@ -1,7 +1,7 @@
-"""The same robots in real time, on DDS: each fleet adapter is a node of its own, and so is each daemon.
+"""The same robots in real time, on DDS: each fleet adapter and each daemon is a node of its own.
 
-Whoever is killed here is killed as a process is; what the robots are promised by RMF is held against
-the edges of the plants, which their control sockets tell.
+Killed daemons are killed as processes. RMF's promises to the robots are compared with the edges of the
+plants, read from the plants' control sockets.
 """
 
 import signal
@@ -34,11 +34,11 @@ LIFT, DOOR = "Lift1", "ward_door"
 PLACES = Places(["L1", "L2"], [LIFT], [DOOR])
 PACE = 0.05
 PATIENCE_S = 240.0
-"""Nobody waits longer, whoever was killed meanwhile and however busy the machine is."""
+"""The longest wait, even with a party killed meanwhile and a busy machine."""
 
 
 class RealTime(Timeline):
-    """A timeline that follows the clock, and takes what other threads post."""
+    """A timeline that follows the clock, and takes events from other threads."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -46,11 +46,13 @@ class RealTime(Timeline):
         self._posted: SimpleQueue[Callable[[], None]] = SimpleQueue()
 
     def post(self, what: Callable[[], None]) -> None:
-        """From any thread: let this happen now."""
+        """Let this happen now; may be called from any thread."""
         self._posted.put(what)
 
     def until(self, done: Callable[[], bool], check: Callable[[], None]) -> None:
-        """Live until it is done; `check` raises when there is no point in going on."""
+        """Let time pass until `done` is true; `check` raises when the condition can no longer come
+        true.
+        """
         while not done():
             self.run(time.monotonic() - self._began)
             check()
@@ -63,7 +65,7 @@ class RealTime(Timeline):
 
 
 class DdsPlace:
-    """One node on DDS, whose messages come at the timeline's own time."""
+    """A node on DDS whose messages arrive at the timeline's own time."""
 
     speaks = "dds"
 
@@ -128,7 +130,7 @@ class RealSite:
         self.robots = [self._robot(f"fleet/{name}") for name in names]
 
     def start(self, party: str) -> None:
-        """A daemon, in the place of the one that was killed."""
+        """Start a daemon, in place of a killed one."""
         self._started += 1
         directory = self._directory / str(self._started)
         directory.mkdir()
@@ -137,7 +139,9 @@ class RealSite:
             daemon.follow(lambda edge: self.timeline.post(partial(self._edge, edge)))
 
     def restart(self, party: str, how: signal.Signals) -> None:
-        """Kill it, as a process is killed: with SIGKILL nothing is said any more. Start another."""
+        """Kill a daemon as a process is killed, and start another; after SIGKILL the old daemon says
+        nothing more.
+        """
         daemon = self.daemons.pop(party)
         if party in ("lift", "door"):
             device = LIFT if party == "lift" else DOOR
@@ -149,14 +153,16 @@ class RealSite:
         self.start(party)
 
     def restart_adapter(self, robot: Resident) -> None:
-        """A new fleet adapter for this robot, which stays where it is."""
+        """Start a new fleet adapter for this robot, which stays where it is."""
         robot.kill()
         self._across.pop(robot.name, None)
         self._inside.discard(robot.name)
         robot.start()
 
     def check(self) -> None:
-        """All daemons live, and nobody waits for ever. Raises Wrong or AssertionError."""
+        """Check that all daemons live and no robot waits for too long; raise Wrong or
+        AssertionError.
+        """
         for daemon in self.daemons.values():
             daemon.check()
         for robot in self.robots:
@@ -164,19 +170,19 @@ class RealSite:
             assert not robot.waits_for or waited_s < PATIENCE_S, f"{robot.name}: {robot.waits_for}"
 
     def until(self, done: Callable[[], bool]) -> None:
-        """Let everybody go on until this is so."""
+        """Let everybody go on until the condition holds."""
         self.timeline.until(done, self.check)
 
     def done(self, what: str) -> int:
-        """How often the robots have done this, together."""
+        """Return how often all robots together have done this."""
         return sum(robot.done[what] for robot in self.robots)
 
     def driven(self) -> list[tuple[str, str]]:
-        """What is on at the terminal blocks: (device, relay)."""
+        """Return the outputs that are on at the terminal blocks: (device, relay)."""
         return [key for key, on in self._edges.items() if on and key[1] in RELAYS]
 
     def close(self) -> None:
-        """Everybody goes home, whatever has happened."""
+        """Stop all robots and daemons, whatever has happened."""
         for robot in self.robots:
             if robot.alive:
                 robot.kill()
@@ -206,7 +212,7 @@ class RealSite:
         across = [robot for robot, where in self._across.items() if where == edge.device]
         assert not (lets_go and across), f"{edge.device} lets its door go with {across} in it"
 
-    # ---- where the robots are
+    # ---- the places of the robots
 
     def may_enter_lift(self, robot: Resident, lift: str, floor: str) -> bool:
         return self._edges.get((lift, "door"), False)
@@ -232,10 +238,10 @@ class RealSite:
         self._across[robot.name] = door
 
     def on_pad(self, robot: Resident, charger: str) -> None:
-        """Does not happen: this site has no charger."""
+        """Never called: this site has no charger."""
 
     def off_pad(self, robot: Resident, charger: str) -> None:
-        """Does not happen: this site has no charger."""
+        """Never called: this site has no charger."""
 
     def charged(self, charger: str) -> bool:
         return True

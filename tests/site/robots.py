@@ -1,8 +1,8 @@
 """The robots: each with its fleet adapter (RMF's rules, `workbench.rmf_model`) and a day without end.
 
-Again and again: through a door, to another floor by lift, through another door, sometimes to a charger,
-sometimes a rest. Now and then a task is cancelled while it waits. An adapter that dies forgets all but
-where its robot stands; then the robot is led out of there first.
+Again and again a robot goes through a door, by lift to another floor, through another door, sometimes
+to a charger; sometimes it rests. Now and then a task is cancelled while the robot waits. After its
+death an adapter knows only where its robot stands, so the robot first leaves that place.
 """
 
 from collections.abc import Callable, Generator
@@ -20,15 +20,15 @@ from workbench.rmf_model.phases import DoorClose, DoorOpen, EndLiftSession, Requ
 from workbench.rmf_model.robot import Phase, RobotContext
 
 FRESH_S = 2.5
-"""A charger's state as old as this is not driven by."""
+"""The age (s) from which a charger's state does not permit driving onto the pad."""
 PAD_S = 2.0
-"""From the pad's edge onto it, and off it again."""
+"""The time (s) from the pad's edge onto the pad, and off again."""
 CHARGER_PATIENCE_S = 8.0
 
 
 @dataclass(frozen=True)
 class Places:
-    """Where robots go, by RMF's names."""
+    """The robots' destinations, by RMF's names."""
 
     floors: list[str]
     lifts: list[str]
@@ -38,7 +38,7 @@ class Places:
 
 @dataclass(frozen=True)
 class Within:
-    """A phase that is cancelled when it has taken so long (s)."""
+    """A phase that is cancelled after its patience (s)."""
 
     phase: Phase
     patience_s: float = NEVER
@@ -46,49 +46,51 @@ class Within:
 
 Want = Within | float
 Day = Generator[Want, bool, None]
-"""What a day waits for next, a phase or seconds; it is told whether the phase was done."""
+"""A day yields what the robot waits for next, a phase or seconds, and receives whether the phase is
+done.
+"""
 
 
 class Ground(Protocol):
-    """Where the robots really are: what the building has to do with them."""
+    """The true places of the robots, and what the building makes of them."""
 
     def may_enter_lift(self, robot: "Resident", lift: str, floor: str) -> bool:
-        """Does it see an open car there?"""
+        """Does the robot see an open car there?"""
 
     def boards(self, robot: "Resident", lift: str, floor: str) -> None:
-        """It crosses the threshold of the car, inwards."""
+        """Let the robot cross the threshold of the car inwards."""
 
     def leaves(self, robot: "Resident", lift: str, floor: str) -> None:
-        """It crosses the threshold outwards."""
+        """Let the robot cross the threshold of the car outwards."""
 
     def crossed(self, robot: "Resident") -> None:
-        """It is across: the car's threshold or the doorway."""
+        """Note that the robot has crossed the car's threshold or the doorway."""
 
     def is_out(self, robot: "Resident", lift: str) -> None:
-        """It is out of the car."""
+        """Note that the robot is out of the car."""
 
     def may_enter_door(self, robot: "Resident", door: str) -> bool:
-        """Does it see an open door?"""
+        """Does the robot see an open door?"""
 
     def in_doorway(self, robot: "Resident", door: str) -> None:
-        """It stands in the doorway."""
+        """Let the robot stand in the doorway."""
 
     def on_pad(self, robot: "Resident", charger: str) -> None:
-        """It has arrived on the pad."""
+        """Note the robot's arrival on the pad."""
 
     def off_pad(self, robot: "Resident", charger: str) -> None:
-        """It has left the pad."""
+        """Note that the robot has left the pad."""
 
     def charged(self, charger: str) -> bool:
-        """Its battery is full."""
+        """Is the battery on this charger full?"""
 
 
 class Resident:
-    """One robot. `waits_for`, since `since`: what it is told by RMF to wait for.
+    """One robot. `waits_for` is what RMF lets it wait for, since `since`.
 
-    `join(name)`: a place on the graph for its adapter. `pace`: its pauses, against those of a robot.
-
-    `disturbed_at`: when its adapter last died: what RMF then says in its name is not its wish.
+    `join(name)` gives its adapter a place on the graph. `pace` is the factor of its pauses, compared
+    with a real robot. `disturbed_at` is the time of its adapter's last death: after that, requests in
+    its name may not be its own wish.
     """
 
     def __init__(
@@ -137,7 +139,7 @@ class Resident:
     # ---- the adapter
 
     def start(self) -> None:
-        """A new fleet adapter: it knows where its robot is, and nothing else."""
+        """Start a new fleet adapter, which knows only where its robot is."""
         self.alive = True
         self.robot = RobotContext(self.name, self._jazzy)
         self.robot.in_car = self.in_car is not None
@@ -158,7 +160,7 @@ class Resident:
         self._go_on(True, first=True)
 
     def kill(self) -> None:
-        """The adapter dies. Its robot stays where it is."""
+        """Kill the adapter; the robot stays where it is."""
         self.alive = False
         self.disturbed_at = self._timeline.now
         self._alarm.set(NEVER)
@@ -169,7 +171,7 @@ class Resident:
 
     @property
     def at_rest(self) -> bool:
-        """It has nothing to do any more."""
+        """Has the robot nothing more to do?"""
         return self.homing and not (self.waits_for or self.in_car or self.doorway or self.pad)
 
     @property
@@ -188,7 +190,7 @@ class Resident:
         self._look()
 
     def _tell(self) -> None:
-        """The fleet's state, each second."""
+        """Publish the fleet's state, each second."""
         if self._task and self.alive:
             self._say([(topics.FLEET_STATES, self._task.state())])
             self._beat.set(self._timeline.now + 1.0)
@@ -199,7 +201,7 @@ class Resident:
         self._look()
 
     def _look(self) -> None:
-        """Go on with the day if what it waits for has come."""
+        """Go on with the day if the awaited event has come."""
         if self._awaits is not None and self._awaits.done:
             self._go_on(True)
         elif self._timeline.now >= self._until:
@@ -248,16 +250,16 @@ class Resident:
             yield 60.0
 
     def _pause(self, least_s: float, most_s: float) -> float:
-        """The robot drives, or rests: nothing is waited for."""
+        """Return the duration of a drive or rest, during which the robot waits for nothing."""
         self.waits_for = ""
         return self._pace * self._random.uniform(least_s, most_s)
 
     def _patience(self) -> float:
-        """Seldom a task is cancelled."""
+        """Return the robot's patience (s), which is seldom short: then the task is cancelled."""
         return self._random.uniform(0.5, 20.0) if self._random.random() < 0.04 else NEVER
 
     def _get_clear(self) -> Day:
-        """After its adapter's death: out of wherever it stands."""
+        """Leave the place where the adapter's death has left the robot."""
         if self.doorway:
             yield self._pause(1.0, 5.0)
             self.doorway = ""
@@ -268,7 +270,7 @@ class Resident:
             self._task.ends()
         if self.in_car:
             lift, _, target = self.in_car
-            if self._random.random() < 0.5:  # RMF sees our session meanwhile, and ends it
+            if self._random.random() < 0.5:  # RMF sees our session meanwhile and ends it
                 yield self._pause(1.0, 4.0)
             yield from self._ride_on(lift, target)
         yield self._pause(0.1, 3.0)
@@ -292,7 +294,7 @@ class Resident:
         target = self._random.choice([f for f in self._places.floors if f != self.floor])
         came = yield Within(RequestLift(lift, self.floor, inside=False), self._patience())
         if not came:
-            return  # another task; the context lets the lift go when nothing has wanted it for 30 s
+            return  # another task; the context ends the session after 30 s without a request
         while not self._ground.may_enter_lift(self, lift, self.floor):
             yield 0.5
         self.in_car = (lift, self.floor, target)
@@ -316,10 +318,10 @@ class Resident:
         self.done["rides"] += 1
         yield self._pause(2.0, 10.0)
 
-    # ---- charging by RMF's own task, under our coordinator
+    # ---- charging by RMF's own task, with our coordinator
 
     def _charge_as_told(self) -> Day:
-        """Stand where it is told to, until it has charged."""
+        """Go to each dedicated place until the robot has charged."""
         assert self._task is not None
         self.waits_for, self.since = "a charger", self._timeline.now
         self._task.begins()
@@ -337,13 +339,15 @@ class Resident:
         self._task.ends()
 
     def _is_kept(self, charger: str) -> bool:
-        """Does the station say that it is kept for this robot?"""
+        """Is the station assigned to this robot?"""
         state = self._station(charger)
         assigned = state is not None and state.state == d.ChargerStateValue.CHARGER_ASSIGNED
         return assigned and state is not None and f"fleet/{state.robot_name}" == self.name
 
     def _charge_on(self, charger: str) -> Generator[Want, bool, bool]:
-        """True if current has flowed; then it is full."""
+        """Charge on the pad until the battery is full or a time is over; return True if current has
+        flowed.
+        """
         assert self._task is not None
         yield PAD_S
         if not self._is_kept(charger):
@@ -363,10 +367,10 @@ class Resident:
         self.done["charges"] += flowed
         return flowed
 
-    # ---- charging without a coordinator: nothing in RMF asks for it; our own words
+    # ---- charging without a coordinator: RMF sends no such requests, so the robot sends its own
 
     def _charge(self) -> Day:
-        """Try the stations until one is ours; drive there; charge; leave."""
+        """Try the stations until one is granted; drive there, charge, leave."""
         self.waits_for, self.since = "a charger", self._timeline.now
         while not self.homing:
             for charger in self._random.sample(self._places.chargers, len(self._places.chargers)):
@@ -396,7 +400,7 @@ class Resident:
         return False
 
     def _charge_at(self, charger: str, request_id: str) -> Generator[Want, bool, bool]:
-        """True if current has flowed. It goes onto the pad only while that is said to be ours."""
+        """Charge on the pad while the station is ours; return True if current has flowed."""
         if not self._is_ours(charger, request_id):
             return False
         yield PAD_S
@@ -418,7 +422,7 @@ class Resident:
         self._ground.off_pad(self, charger)
 
     def _cancel(self, charger: str, request_id: str) -> Day:
-        """Until the station does not show the request any more."""
+        """Send the cancellation until the station no longer shows the request."""
         for _ in range(5):
             self._say([(topics.CHARGER_CANCELS, d.ChargerCancel(charger, request_id))])
             yield 1.0
@@ -432,7 +436,7 @@ class Resident:
         return assigned and state is not None and state.request_id == request_id
 
     def _station(self, charger: str) -> d.ChargerState | None:
-        """Its latest state, if that is fresh."""
+        """Return the station's latest state if it is fresh."""
         at, state = self._stations.get(charger, (-NEVER, None))
         return state if self._timeline.now - at <= FRESH_S else None
 
@@ -442,7 +446,7 @@ class Resident:
 
 
 def _words(phase: Phase) -> str:
-    """What a phase waits for, as a person says it."""
+    """Return what a phase waits for, in words."""
     match phase:
         case RequestLift():
             inside = " from inside" if phase.wanted.inside else ""

@@ -1,7 +1,7 @@
-"""No line is logged for ever: ten minutes in virtual time under each fault, with robots that wait.
+"""No line is logged for ever: ten minutes in virtual time under each fault, with waiting robots.
 
-Lifts, doors and chargers are the daemons' own, and so are the supervisors and the coordinator. Lines
-are equal if they differ only in numbers.
+Lifts, doors, chargers, supervisors and the coordinator are those of the daemons. Lines count as equal
+if only their numbers differ.
 """
 
 import re
@@ -20,11 +20,13 @@ from tests.workbench.explain.story import Scene
 
 SERVED = ("Lift1", "Lift2", "ward", "gate", "bay1")
 MOST = 3
-"""In the last five minutes: fewer than one in a minute."""
+"""The limit for equal lines in the last five minutes: fewer than one per minute."""
 
 
 class Hospital(Scene):
-    """Its devices, supervisors and coordinator; one robot has asked for a lift, another for a door."""
+    """A scene with devices, supervisors and a coordinator; one robot has requested a lift, another a
+    door.
+    """
 
     def __init__(self) -> None:
         super().__init__(*SERVED, diagnoses=False)
@@ -36,7 +38,7 @@ class Hospital(Scene):
 
     @property
     def nodes(self) -> list[GraphDaemon]:
-        """Those without hardware."""
+        """Return the nodes without hardware."""
         return [one for one in self.supervisors.values() if isinstance(one, GraphDaemon)]
 
 
@@ -44,7 +46,7 @@ Trouble = Callable[[Hospital, pytest.MonkeyPatch], None]
 
 
 def each(scene: Hospital, seconds: float, do: Callable[[], None]) -> None:
-    """Do this now, and again and again."""
+    """Do this now and again and again."""
 
     def again() -> None:
         do()
@@ -132,7 +134,7 @@ TROUBLES: dict[str, Trouble] = {
 
 
 CHANGES = ("hardware_that_comes_and_goes", "two_nodes_for_each_device")
-"""Where something really changes all the time: what keeps being said is held back on the way out."""
+"""Faults under which the facts really change all the time; the log's output then holds repeats back."""
 
 
 @pytest.mark.parametrize("trouble", TROUBLES)

@@ -1,4 +1,4 @@
-"""Robots compete for one lift and one door on DDS, and every daemon and an adapter is killed once."""
+"""Robots compete for one lift and one door on DDS; every daemon and one adapter is killed once."""
 
 import signal
 from collections.abc import Iterator
@@ -14,7 +14,7 @@ from tests.site.on_dds import RealSite
 def site(
     domain: int, tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch
 ) -> Iterator[RealSite]:
-    directory: Path = tmp_path_factory.mktemp("s")  # a socket's name has 107 characters at the most
+    directory: Path = tmp_path_factory.mktemp("s")  # a socket's name has at most 107 characters
     monkeypatch.setenv("XDG_STATE_HOME", str(directory))
     monkeypatch.setenv("TRANSPORT", runs_here())
     site = RealSite(directory, domain, ("red", "green", "blue"))
@@ -45,6 +45,6 @@ def test_three_robots_share_a_lift_and_a_door_while_everybody_is_killed_once(
 
 
 def _wait_for_a_ride_and_two_passages(site: RealSite) -> None:
-    """Somebody has ridden, and two have gone through the door."""
+    """Wait for one more ride in the lift and two more passages through the door."""
     rides, doors = site.done("rides"), site.done("doors")
     site.until(lambda: site.done("rides") > rides and site.done("doors") > doors + 1)

@@ -9,17 +9,17 @@ from tests.site.growth import Look, growth
 from tests.site.laws import Broken
 
 SEEDS = depth([2], [1, 2, 3])
-"""tests/workbench/replay/test_replay.py has days of 1 and 3: each is that of another supervisor."""
+"""Days of other supervisors; tests/workbench/replay/test_replay.py plays seeds 1 and 3 as well."""
 MINUTES = depth(8, 20)
-"""Robots go home in the last minutes of a day (`WIND_DOWN_S`): a shorter one has nothing else."""
+"""The day is long enough for more than the last minutes, in which robots go home (`WIND_DOWN_S`)."""
 
 
 @pytest.mark.long(5)
 @pytest.mark.parametrize("seed", SEEDS)
 def test_a_site_lives_through_its_troubles(seed: int) -> None:
-    """If this fails: `make soak SEED=… HOURS=0.3333` plays it again, and prints what went before.
+    """On a failure `make soak SEED=… HOURS=0.3333` plays the day again and prints the events before.
 
-    The seed decides whose supervisors there are: RMF's of either release, or ours.
+    The seed chooses the supervisors: RMF's of either release, or ours.
     """
     site = Site(seed)
     site.run(MINUTES / 60)
@@ -33,9 +33,9 @@ def test_a_site_lives_through_its_troubles(seed: int) -> None:
 def test_without_our_remedy_a_robot_that_rmfs_supervisor_forgets_stops_a_lift_for_good(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """The day finds the deadlock that `bridges/kinds/lift/forgotten.py` ends."""
+    """This day has the deadlock that `bridges/kinds/lift/forgotten.py` ends."""
     monkeypatch.setattr(forgotten, "heard", lambda session, asked, now: (session, False))
-    site = Site(23, "kilted")  # a day on which it comes early
+    site = Site(23, "kilted")  # a day with an early deadlock
     site.trouble._draw = site._restart_rmfs
     with pytest.raises(Broken, match=r"waits for Lift\d"):
         site.run(0.5)
@@ -46,7 +46,7 @@ def test_without_our_remedy_a_robot_that_rmfs_supervisor_forgets_stops_a_lift_fo
 def test_no_occupied_car_is_given_to_another_robot_while_rmfs_supervisor_dies_each_27_s(
     rmf: str,
 ) -> None:
-    """`make soak RMF=jazzy KILL_EVERY=27 HOURS=1.65 SEED=3` has two hundred kills."""
+    """`make soak RMF=jazzy KILL_EVERY=27 HOURS=1.65 SEED=3` plays two hundred kills."""
     site = Site(3, rmf, kill_every_s=27.0)
     site.run(depth(12, 60) / 60)
     assert site.kills["of them with a robot in a car"] > depth(4, 60)

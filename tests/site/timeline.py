@@ -1,4 +1,4 @@
-"""Virtual time: what is to happen, in order."""
+"""Virtual time: future events, in order."""
 
 import heapq
 from collections.abc import Callable
@@ -10,7 +10,10 @@ EPOCH = 1_800_000_000.0
 
 
 class Timeline:
-    """`now` in seconds since the day began. Of two things at the same time the older is first."""
+    """The clock of the day and its events; `now` is seconds since the day began.
+
+    Two events at the same time happen in the order in which they were added.
+    """
 
     def __init__(self) -> None:
         self.now = 0.0
@@ -18,18 +21,18 @@ class Timeline:
         self._count = 0
 
     def at(self, when: float, what: Callable[[], None]) -> None:
-        """Let this happen then; never, if that is inf."""
+        """Let this happen at this time; never, if the time is inf."""
         if when == NEVER:
             return
         self._count += 1
         heapq.heappush(self._due, (max(when, self.now), self._count, what))
 
     def after(self, seconds: float, what: Callable[[], None]) -> None:
-        """Have this happen so many seconds from now."""
+        """Let this happen so many seconds from now."""
         self.at(self.now + seconds, what)
 
     def run(self, until: float) -> None:
-        """Everything that happens until then."""
+        """Run all events until this time."""
         due = self._due
         while due and due[0][0] <= until:
             self.now, _, what = heapq.heappop(due)
@@ -38,7 +41,7 @@ class Timeline:
 
 
 class Alarm:
-    """One party's clock: the last time that was set is when it rings."""
+    """The alarm clock of one party: it rings at the time that was set last."""
 
     def __init__(self, timeline: Timeline, ring: Callable[[], None]) -> None:
         self._timeline = timeline

@@ -1,9 +1,9 @@
-"""What goes wrong, and when it is mended: from the seed alone.
+"""Troubles and their repair, from the seed alone.
 
-Trouble comes in bouts: a few things break within a minute, each is mended after a while, and then there
-is calm, sometimes long enough that everybody must have got what they wait for. Who mends a wire, a part
-or a fire latch also resets the device (`rmf-bridge reset`), as a technician does; after restarts, cuts,
-lost buses and hazards that clear by themselves nobody resets anything.
+Trouble comes in bouts: a few things break within a minute, and each is mended after a while. Then comes
+a calm, sometimes so long that no robot may still be waiting. After mending a wire, a part or a fire
+latch, the technician also resets the device (`rmf-bridge reset`). Nobody resets after restarts, cuts,
+lost buses or hazards that clear by themselves.
 """
 
 from collections.abc import Callable, Iterator
@@ -23,12 +23,15 @@ WIRE_MODES: tuple[FailureMode, ...] = ("off", "stuck", "slow", "garbage", "wrong
 LIES: tuple[FailureMode, ...] = ("stuck", "slow", "garbage", "wrong")
 RESET = ", to be reset"
 BY_RESET_S = 4.0
-"""After the repair: hazards have cleared, the technician resets, the device is itself again."""
+"""The time from the repair to a healthy device (s): hazards clear, and the technician resets."""
 LIFT_HAZARDS = ("fire_alarm", "code_blue", "manual_mode", "earthquake")
 
 
 class Ills:
-    """What ails whom, since when; and what has, until when. `device` may be any party."""
+    """The ills of each party, with the start of present ills and the end of past ills.
+
+    A `device` may be any party.
+    """
 
     def __init__(self, timeline: Timeline) -> None:
         self._timeline = timeline
@@ -39,42 +42,42 @@ class Ills:
         self._calm_at = 0.0
 
     def begin(self, device: str, what: str, mode: FailureMode | None = None) -> None:
-        """It breaks."""
+        """Note the start of an ill."""
         self._now.setdefault(device, {})[what] = self._timeline.now
         if mode is not None:
             self._modes[device, what] = mode
 
     def end(self, device: str, what: str) -> None:
-        """It is well again."""
+        """Note the end of an ill."""
         del self._now[device][what]
         self._over.setdefault(device, {})[what] = self._timeline.now
         self._calm_at = self._timeline.now
 
     def has(self, device: str, what: str) -> bool:
-        """Is it broken?"""
+        """Has the device this ill?"""
         return what in self._now.get(device, {})
 
     def any(self, device: str) -> bool:
-        """Is anything wrong with it?"""
+        """Has the device any ill?"""
         return bool(self._now.get(device))
 
     def since(self, device: str, what: str) -> float:
-        """Since when it is broken; inf: it is not."""
+        """Return the start of this ill; inf if the device has no such ill."""
         return self._now.get(device, {}).get(what, NEVER)
 
     def since_over(self, device: str, *what: str) -> float:
-        """Since when all of these have been well again."""
+        """Return the end of the last of these ills."""
         over = self._over.get(device, {})
         return max(over.get(one, -NEVER) for one in what)
 
     def well_since(self, device: str) -> float:
-        """Since when nothing has been wrong with it; inf: something is."""
+        """Return since when the device has had no ill; inf if it has an ill."""
         if self.any(device):
             return NEVER
         return max(self._over.get(device, {}).values(), default=-NEVER)
 
     def lying(self, device: str, settles_s: float) -> Iterator[str]:
-        """The wires and parts that say what is not so, or did a moment ago."""
+        """Yield the wires and parts that lie, or did so a moment ago."""
         for (name, what), mode in self._modes.items():
             if name != device or mode not in LIES:
                 continue
@@ -83,7 +86,7 @@ class Ills:
                 yield what
 
     def hazard_since(self, device: str) -> float:
-        """Since when a hazard is there whose wire is sound; inf: none is."""
+        """Return since when there is a hazard on a sound wire; inf if there is none."""
         now, over = self._now.get(device, {}), self._over.get(device, {})
         return min(
             (
@@ -97,19 +100,19 @@ class Ills:
         )
 
     def obstruct(self, device: str) -> None:
-        """Somebody stands in the doorway from now on."""
+        """Note that somebody stands in the doorway from now on."""
         self._obstructed[device] = self._timeline.now
 
     def obstructed_since(self, device: str) -> float:
-        """Since when somebody stands in its doorway; NEVER if nobody does."""
+        """Return since when somebody stands in the doorway; NEVER if nobody does."""
         return self._obstructed.get(device, NEVER)
 
     def calm_since(self) -> float:
-        """Since when nothing at all has been wrong; inf: something is."""
+        """Return since when no party has had an ill; inf if one has."""
         return NEVER if any(self._now.values()) else self._calm_at
 
     def all(self) -> list[str]:
-        """What is wrong now."""
+        """Return all present ills."""
         return [f"{device}: {what}" for device, ills in self._now.items() for what in ills]
 
 
@@ -126,10 +129,10 @@ class Mortal(Protocol):
 
 @dataclass(frozen=True)
 class Ill:
-    """One thing that can go wrong: with whom, what, how it begins and ends, how long it lasts (s).
+    """One possible trouble: the party, the ill, its begin and end, and its duration (s).
 
-    `sort`: to count it by. `reset`: what whoever mends it does afterwards, if it was broken for longer
-    than `heals_s` (s): until then it comes right by itself.
+    `sort` is the heading for counting. `reset` is the technician's action after the repair. It is left
+    out if the ill lasted no longer than `heals_s` (s), because the device then recovers by itself.
     """
 
     sort: str
@@ -145,7 +148,7 @@ class Ill:
 
 
 class Trouble:
-    """Bouts of it. `draw`: something that may go wrong now."""
+    """Bouts of trouble. `draw` returns a trouble that may begin now."""
 
     def __init__(
         self,
@@ -164,7 +167,7 @@ class Trouble:
         self._note = note
 
     def begin(self, until: float) -> None:
-        """The first bout, and others after it, all over by then."""
+        """Begin the first bout, and more bouts after it; all end by then."""
         self.over_at = until
         self._timeline.after(self._random.uniform(20.0, 60.0), self._bout)
 
@@ -180,7 +183,7 @@ class Trouble:
             self._timeline.at(last + calm_s, self._bout)
 
     def _strike(self, at: float) -> float:
-        """One thing breaks then; when it is mended."""
+        """Draw a trouble that begins at this time; return the time of its repair."""
         ill = self._draw(self._random)
         lasts_s = self._random.uniform(ill.least_s, ill.most_s)
         if self._random.random() < 0.1:
@@ -212,7 +215,9 @@ class Trouble:
             self._timeline.after(BY_RESET_S, lambda: self._reset(ill))
 
     def _reset(self, ill: Ill) -> None:
-        """By a technician, who waits until the device answers: nobody resets what cannot be seen."""
+        """Reset as a technician, who waits until the device answers: a silent device cannot be
+        reset.
+        """
         assert ill.reset is not None
         if self._ills.has(ill.device, "bus") or self._ills.has(ill.device, "daemon"):
             self._timeline.after(BY_RESET_S, lambda: self._reset(ill))
@@ -225,7 +230,7 @@ Breakable = list[tuple[str, tuple[FailureMode, ...]]]
 
 
 def breakable(device: Device) -> tuple[Breakable, Breakable]:
-    """The wires and the parts of a device, and how each can fail."""
+    """Return the wires and the parts of a device, with the ways in which each can fail."""
     plant = device.plant
     wires = [(signal, WIRE_MODES) for signal in (*plant._sensors, *plant._relays)]
     if isinstance(plant, LiftPlant):
@@ -237,7 +242,7 @@ def breakable(device: Device) -> tuple[Breakable, Breakable]:
 
 
 def pressable(device: Device) -> list[str]:
-    """What the building does to a device that counts as an ill."""
+    """Return the building's actions on a device that count as ills."""
     plant = device.plant
     if isinstance(plant, LiftPlant):
         return [h for h in LIFT_HAZARDS if Hazard(h) in plant.pressed]

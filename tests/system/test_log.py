@@ -1,4 +1,4 @@
-"""What log lines say: words of the field, and no Python."""
+"""Log lines have the words of the field, and nothing of Python."""
 
 import json
 import logging

@@ -1,4 +1,4 @@
-"""The unit with the drop-in of each shipped file, as systemd itself judges it."""
+"""The unit with the drop-in of each shipped file, judged by systemd itself."""
 
 import configparser
 import re
@@ -23,8 +23,8 @@ OTHERS = (RECORDER, PAGE, EARLY)
 CONFIG = device_yamls()
 VERIFY = ("systemd-analyze", "verify", "--man=no")
 MOST = 2.0
-"""On systemd 252 a file on the network has 1.5, one with GPIO or a serial port 1.7, one with CAN's own
-sockets 1.7: AF_CAN counts as an exotic family, 0.2.
+"""The limit of exposure. On systemd 252 a file on the network has 1.5, with GPIO or a serial port 1.7,
+with CAN's own sockets 1.7: AF_CAN counts as an exotic family (0.2).
 """
 
 needs_systemd = pytest.mark.skipif(
@@ -33,7 +33,7 @@ needs_systemd = pytest.mark.skipif(
 
 
 def system(folder: Path, file: Path) -> str:
-    """A root directory with the service of this file; returns its name."""
+    """Make a root directory with the service of this file; return the service's name."""
     units = folder / "etc/systemd/system"
     name = f"rmf-bridge@{file.stem}.service"
     (units / f"{name}.d").mkdir(parents=True)
@@ -44,7 +44,7 @@ def system(folder: Path, file: Path) -> str:
 
 
 def exposure(folder: Path, name: str) -> float:
-    """The score of `systemd-analyze security`: 0 exposes nothing, 10 everything."""
+    """Return the score of `systemd-analyze security`: 0 exposes nothing, 10 everything."""
     done = subprocess.run(
         ["systemd-analyze", "security", "--offline=true", f"--root={folder}", name],
         capture_output=True,
@@ -53,7 +53,7 @@ def exposure(folder: Path, name: str) -> float:
     )
     found = re.search(r"Overall exposure level for .*: ([0-9.]+) ", done.stdout)
     assert found, done.stdout
-    assert not done.stderr  # "Unknown key name", say
+    assert not done.stderr  # such as "Unknown key name"
     return float(found[1])
 
 

@@ -1,8 +1,8 @@
-"""What earlier versions wrote to disk, a folder for each day on which it was kept. It is never renewed.
+"""Files that earlier versions wrote, a folder for each day. A folder is never renewed.
 
-`values.json`: name -> trees, a specimen of each type that a daemon could record. `*.ring.gz`, `*.mcap`:
-what a daemon's ring and the recorder held. `*.kept`: the memory of a kind without hardware.
-`claimed-*.json`: records of what a daemon claimed.
+`values.json` has a specimen of each recordable type, as trees by name. `*.ring.gz` are daemons' rings,
+`*.mcap` the recorder's files, `*.kept` the memory of kinds without hardware. `claimed-*.json` are
+records of claimed outputs.
 """
 
 from pathlib import Path

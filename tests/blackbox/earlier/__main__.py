@@ -1,6 +1,6 @@
-"""`python -m tests.blackbox.earlier DAY` keeps what this version writes, in a new folder.
+"""`python -m tests.blackbox.earlier DAY` writes the files of this version to a new folder.
 
-Worth it before a version that moves or renames what is recorded; the older folders stay as they are.
+Run it before a version that moves or renames recorded types; the older folders stay unchanged.
 """
 
 import gzip
@@ -29,7 +29,7 @@ CONFIG = Path(__file__).parents[3] / "config"
 CLAIMED = ("lift_dry_contact", "door_register", "charger_http", "charger_wiferion")
 SEED, HOURS = 6, 0.6
 CHOSEN = ("Lift1", "store", "bay1", "coordinator", "door_supervisor", "lift_supervisor")
-"""A daemon of each kind, on a day that has them all."""
+"""The parties whose files are saved: a daemon of each kind, on a day that has every kind."""
 LOOK_S = 5.0
 RING = 8 * 8192
 LAST_S = 10.0
@@ -55,7 +55,7 @@ def _records(folder: Path) -> None:
 
 
 def _day(folder: Path) -> None:
-    """The rings of a day, what the recorder makes of them, and the most that was kept on disk."""
+    """Write a day's rings, the recorder's files of them, and each node's largest memory on disk."""
     with tempfile.TemporaryDirectory(dir="/dev/shm") as scratch:
         site = Site(SEED)
         rings = keep(site, Path(scratch), RING)
@@ -86,7 +86,7 @@ def _ring(path: Path, ring: Path) -> None:
 
 
 def main(day: str) -> int:
-    """Write the folder."""
+    """Write the folder of this day."""
     folder = HERE / day
     folder.mkdir()
     (folder / "values.json").write_bytes(_values())

@@ -1,1 +1,1 @@
-"""Not a bus: something that a bus's file needs."""
+"""A helper module of a bus's file, and no bus itself."""

@@ -1,4 +1,4 @@
-"""Contacts with names in words, without a spelling of their own in a table."""
+"""A bus whose points have names in words; a table shows them as written."""
 
 from typing import Annotated
 
@@ -9,21 +9,21 @@ from drivers.hal import Bus, BusType
 
 
 class Settings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The module."""
+    """The settings of the module."""
 
     host: str
     port: Annotated[int, Meta(ge=1, le=65535)] = 502
 
 
 def canonical(point: str) -> str:
-    """One spelling."""
+    """Return the only spelling of the point."""
     if not point.startswith("coil "):
         raise ValueError(f"{point!r}: write coil and its number")
     return point
 
 
 def open_bus(settings: Settings) -> Bus:
-    """No test opens it."""
+    """Open nothing: no test opens this bus."""
     raise NotImplementedError
 
 

@@ -1,4 +1,4 @@
-"""Pins A0 to A9, which may be called 0A to 9A as well; A9 has no pull, A8 is an input."""
+"""Pins A0 to A9, also called 0A to 9A; A9 has no pull, A8 is an input."""
 
 import re
 from collections.abc import Iterable
@@ -12,13 +12,13 @@ from drivers.hal.points import Wire
 class Settings(
     msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, tag_field="type"
 ):
-    """The pins."""
+    """The settings of the pins."""
 
     chip: int | None = None
 
 
 def canonical(point: str) -> str:
-    """One spelling."""
+    """Return the canonical spelling of the point."""
     found = re.fullmatch(r"A(\d)|(\d)A", point)
     if not found:
         raise ValueError(f"{point!r} is not a pin: write A{point[:1] or 0}")
@@ -26,13 +26,13 @@ def canonical(point: str) -> str:
 
 
 def describe(point: str) -> str:
-    """Both spellings."""
+    """Return both spellings of the point."""
     name = canonical(point)
     return f"{name} = {name[1]}A"
 
 
 def wire_problems(wire: Wire) -> Iterable[str]:
-    """Wires that cannot be."""
+    """Yield the reasons why the wire is impossible."""
     if wire.direction == "in" and wire.pull is None:
         yield "pull is missing"
     if wire.direction == "in" and wire.pull == "up" and "9" in wire.point:
@@ -42,7 +42,7 @@ def wire_problems(wire: Wire) -> Iterable[str]:
 
 
 def open_bus(settings: Settings) -> Bus:
-    """No test opens it."""
+    """Open nothing: no test opens this bus."""
     raise NotImplementedError
 
 

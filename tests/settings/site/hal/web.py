@@ -6,13 +6,13 @@ from drivers.hal import Bus, BusType
 
 
 class Settings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The server."""
+    """The settings of the server."""
 
     host: str
 
 
 def open_bus(settings: Settings) -> Bus:
-    """No test opens it."""
+    """Open nothing: no test opens this bus."""
     raise NotImplementedError
 
 

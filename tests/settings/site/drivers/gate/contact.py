@@ -1,4 +1,4 @@
-"""A driver with wires, and with a field of every sort that a struct may have."""
+"""A driver with wires, and with every type of field that a struct may have."""
 
 from enum import Enum
 from typing import Annotated, Literal
@@ -16,21 +16,21 @@ Code = Annotated[int, Meta(ge=0, le=15)]
 
 
 class Side(Enum):
-    """A choice."""
+    """A choice of two sides."""
 
     LEFT = "left"
     RIGHT = "right"
 
 
 class Lane(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """One lane, where it needs more than a name."""
+    """One lane that needs more than a name."""
 
     side: Side = Side.LEFT
     heights: tuple[Annotated[float, Meta(gt=0, lt=5, extra={"unit": "m"})], ...] = ()
 
 
 class Limits(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Numbers of every sort."""
+    """Every type of number."""
 
     open_s: Annotated[float, Meta(ge=0.1, le=60, extra={"unit": "s"})] = 5.0
     close_s: Seconds | None = None
@@ -42,13 +42,13 @@ class Limits(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     label: Annotated[str, Meta(pattern="^[a-z]+$", extra={"pattern": "a small word"})] | int = 0
 
     def problems(self) -> Remarks:
-        """What the fields cannot say one by one."""
+        """Yield problems that concern several fields together."""
         if self.close_s is not None and self.close_s > self.open_s:
             yield ("close_s",), "'close_s' may not be longer than 'open_s'"
 
 
 class Settings(DeviceSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A gate."""
+    """The settings of a gate on contacts."""
 
     lanes: list[Name] | dict[Name, Lane]
     inputs: dict[Name, Input]
@@ -58,14 +58,14 @@ class Settings(DeviceSettings, frozen=True, kw_only=True, forbid_unknown_fields=
     limits: Limits = Limits()
 
     def problems(self) -> Remarks:
-        """Codes name lanes."""
+        """Yield the codes that name an unknown lane."""
         for code, lane in self.codes.items():
             if lane not in self.lanes:
                 yield ("codes", str(code)), f"code {code} is no lane: '{lane}'"
 
 
 def wires(settings: Settings) -> list[Wire]:
-    """The table."""
+    """Return the wiring table."""
     return [
         *(_input(name, i, ("inputs", name)) for name, i in settings.inputs.items()),
         *(_input(f"bit_{n}", i, ("bits", str(n))) for n, i in enumerate(settings.bits)),
@@ -81,13 +81,13 @@ def _input(name: str, i: Input, path: tuple[str, ...]) -> Wire:
 
 
 def warnings(settings: Settings) -> Remarks:
-    """Legal, but worth a look."""
+    """Yield settings that are legal but unusual."""
     if settings.limits.loud:
         yield ("limits", "loud"), "it will be loud"
 
 
 def create(name: str, settings: Settings, bus: object) -> Driver[None, None]:
-    """No test runs it."""
+    """Create nothing: no test runs this driver."""
     raise NotImplementedError
 
 

@@ -7,18 +7,18 @@ from tests.settings.site.hal import web
 
 
 class Settings(DeviceSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A gate behind a web server."""
+    """The settings of a gate behind a web server."""
 
     page: Name = "gate"
 
 
 def describe(settings: Settings, bus: web.Settings) -> list[tuple[str, str]]:
-    """What it talks to."""
+    """Return the addresses that the driver uses."""
     return [("polls", f"http://{bus.host}/{settings.page}"), ("identity", "not verified")]
 
 
 def create(name: str, settings: Settings, bus: object) -> Driver[None, None]:
-    """No test runs it."""
+    """Create nothing: no test runs this driver."""
     raise NotImplementedError
 
 
