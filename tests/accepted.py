@@ -1,6 +1,4 @@
-"""Accept requests as the daemon's service does, for stories in which a core runs without that
-service.
-"""
+"""Accept requests as the daemon's service does, for stories in which a core runs without it."""
 
 from typing import Any
 
@@ -14,9 +12,7 @@ from bridges.runtime.device import AnyNode
 def accepted(
     node: AnyNode, kind: AnyDeviceKind, settings: Any, *heard: tuple[Topic[Any], Message]
 ) -> list[Any]:
-    """Return the events of these requests, each heard on its topic; tell the node of each refused
-    request.
-    """
+    """Return the events of requests, each heard on its topic; tell the node of refused requests."""
     events = []
     for topic, request in heard:
         try:

@@ -16,9 +16,7 @@ from tests.depth import DEEP
 from tests.processes import end_with_us
 
 ON_WIRES = ("commands", "drivers", "hal_fakes", "transports", "runtime", "site", "workbench")
-"""Folders whose tests use threads, processes and sockets. Tests in the other folders run in virtual
-time.
-"""
+"""Folders whose tests use threads, processes and sockets. Other tests run in virtual time."""
 WIRES_HANG_AFTER_S = 900
 """No passing test takes so long, however busy the machine is."""
 
@@ -45,9 +43,7 @@ signal.signal(
 
 gc.disable()
 atexit.register(gc.freeze)
-"""Collecting the tests leaves no garbage, so the garbage collector is off meanwhile, and at a worker's
-end.
-"""
+"""The collection of tests leaves no garbage, so no garbage is collected then, nor at a worker's end."""
 
 end_with_us()
 
@@ -92,9 +88,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 
 def pytest_collection_finish() -> None:
-    """Freeze the collected objects: they live until the end, so the garbage collector need not scan
-    them.
-    """
+    """Freeze the collected objects: they live until the end, so no scan for garbage is needed."""
     gc.freeze()
     gc.enable()
 

@@ -10,16 +10,12 @@ T = TypeVar("T")
 
 
 def depth(default: T, deep: T) -> T:
-    """Return `default` in `make test` and `deep` in `make deep`: a walk's depth, or how much a walk
-    must find.
-    """
+    """Return `default` in `make test` and `deep` in `make deep`: a depth, or a number to be found."""
     return deep if DEEP else default
 
 
 def part(of: Sequence[T], one_in: int, first: int = 0) -> Sequence[T]:
-    """Return, in `make test`, every `one_in`-th item from number `first` on; in `make deep`, all
-    items.
-    """
+    """Return all items in `make deep`, else every `one_in`-th item from number `first` on."""
     return of if DEEP else of[first::one_in]
 
 

@@ -42,9 +42,7 @@ def reached(
 def histories(
     state: W, moves: Sequence[M], depth: int, after: Callable[[W, M], W]
 ) -> Iterator[tuple[W, tuple[M, ...]]]:
-    """Yield each history of `depth` moves: the last state, and the moves. `after` must not change a
-    state in place.
-    """
+    """Yield each history of `depth` moves: last state and moves. `after` returns a new state."""
     if depth == 0:
         yield state, ()
         return

@@ -1,6 +1,4 @@
-"""`python -m tests.blackbox.imported run FILE …` runs the command and finally prints the imported
-modules.
-"""
+"""`python -m tests.blackbox.imported run FILE …` runs the command, then prints the imported modules."""
 
 import sys
 

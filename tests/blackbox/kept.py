@@ -53,9 +53,7 @@ def of_graph(name: str, kind: AnyGraphKind, settings: Any) -> Head:
 
 
 def keep(site: Site, folder: Path, size: int) -> dict[str, Path]:
-    """Make each daemon of a site write a ring of this size; return the ring's path by the daemon's
-    name.
-    """
+    """Make each daemon of a site write a ring of this size; return the ring's path by daemon."""
     found = {}
     for daemon in (*site.daemons.values(), *site.nodes):
         if isinstance(daemon, DeviceDaemon):

@@ -323,9 +323,7 @@ def ended(words: Sequence[str]) -> tuple[int, str]:
 
 
 def endings(mutator: Mutator, times: int, folder: Path) -> Counter[str]:
-    """Count the endings of the commands for so many wrong recordings; raise at any unpermitted
-    ending.
-    """
+    """Count the endings of the commands for so many wrong recordings; raise at a wrong ending."""
     found: Counter[str] = Counter()
     for _ in range(times):
         told = mutator.next()

@@ -26,9 +26,7 @@ from workbench.replay.replayed import Replay, ReplayedCores, of_head
 from workbench.replay.sources import Notes
 
 ENDED = {"lift.memory.Session.own_stamp", "lift.signals.FromAdapter.stamp"}
-"""Fields that a core no longer has (`lift.memory.Session.level`); the reader leaves out their
-values.
-"""
+"""Fields that a core no longer has (`lift.memory.Session.level`); their values are left out."""
 
 
 def files(pattern: str) -> list[Path]:
@@ -43,9 +41,7 @@ def _own_texts() -> Iterator[None]:
 
 
 def test_every_type_that_a_daemon_can_record_has_a_name_and_comes_back() -> None:
-    """Remedy for a missing name: a row in `RECORDED` of the kind, or in
-    `bridges/kinds/shared/recorded.py`.
-    """
+    """Missing names are added to `RECORDED` of the kind, or of `bridges/kinds/shared/recorded.py`."""
     nameless = []
     for one in recordable():
         kind = typing.get_origin(one) or one
@@ -73,9 +69,7 @@ def test_a_name_is_given_once_to_a_type_that_a_daemon_records_and_begins_with_it
 
 @pytest.mark.parametrize("day", DAYS, ids=lambda day: day.name)
 def test_no_name_and_no_field_of_an_earlier_version_is_lost(day: Path) -> None:
-    """A renamed type keeps its name in the table; a renamed field keeps its name by
-    `msgspec.field(name=…)`.
-    """
+    """A renamed type keeps its name in the table, a renamed field by `msgspec.field(name=…)`."""
     told = msgspec.json.decode((day / "values.json").read_bytes())
     lost = set()
     for earlier in chain.from_iterable(told.values()):
@@ -112,9 +106,7 @@ def test_a_ring_of_an_earlier_version_is_read_and_replayed(file: Path, tmp_path:
 
 
 def _is_read(file: Path) -> None:
-    """Check that every value in the file is known. Decisions are not compared, as later cores may
-    differ.
-    """
+    """Check that every value is known. Decisions are not compared, as later cores may differ."""
     notes = Notes()
     head, entries = opened(file, notes)
     everything = list(entries)

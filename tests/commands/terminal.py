@@ -30,9 +30,7 @@ class Terminal:
         self.wait_until(lambda: text.encode() in self.screen, text)
 
     def wait_until(self, condition: Callable[[], bool], what: str) -> None:
-        """Wait until the condition holds, and read the screen meanwhile: an unread program stops
-        drawing.
-        """
+        """Wait until the condition holds, and read meanwhile: an unread program stops drawing."""
         deadline = time.monotonic() + PATIENCE_S
         while not condition():
             assert time.monotonic() < deadline, (what, self.screen[-2000:])

@@ -26,9 +26,7 @@ for told, line in zip(sys.argv[1::2], sys.argv[2::2]):
         cli.main([])
     assert os.waitpid(child, 0)[1] == 0
 """
-"""Complete each line in a process of its own, as a shell does, but fork from a process with all imports
-done.
-"""
+"""Completes each line in its own process, as a shell does, but forked after all imports."""
 
 
 def completed(folder: Path, *lines: str) -> list[list[str]]:

@@ -1,6 +1,4 @@
-"""Nodes of different RMF releases on one graph: who hears whom, what `auto` follows, what is
-reported.
-"""
+"""Nodes of different RMF releases on one graph: who hears whom, what `auto` follows, which faults."""
 
 import logging
 from collections.abc import Callable, Iterator

@@ -1,6 +1,4 @@
-"""A class name has one meaning: at most 5 % of the product's classes share a name with another
-class.
-"""
+"""A class name has one meaning: at most 5 % of the product's classes share their name."""
 
 import ast
 from collections import Counter

@@ -58,9 +58,7 @@ LIST = re.compile(r"^(?![ |#-]|\d+\. |<!--|```).*\S\n(?:- |1\. |\| )", re.M)
 
 
 def test_a_list_or_table_begins_after_an_empty_line() -> None:
-    """Without the empty line Python-Markdown reads the list or table as part of the paragraph
-    before.
-    """
+    """Without the empty line Python-Markdown adds the list or table to the paragraph before."""
     texts = {
         page.name: re.sub(r"^ *```.*?^ *```$", "", page.read_text(), flags=re.M | re.S)
         for page in DOCS.rglob("*.md")

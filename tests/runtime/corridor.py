@@ -18,9 +18,7 @@ SCAN_S = 0.25
 
 
 class Door:
-    """The driver of a door; each reading calls `during` in its middle. A `lost` door cannot be switched
-    off.
-    """
+    """A door's driver; each reading calls `during`. A `lost` door cannot be switched off."""
 
     def __init__(self, name: str, log: Callable[[str], None]) -> None:
         self.during: Callable[[], None] = lambda: None

@@ -31,9 +31,7 @@ sys.stdin.read()
 
 @contextmanager
 def group_member(folder: Path) -> Iterator[list[str]]:
-    """Let another user of the directory's group wait for every lock there; yield the files he could
-    open.
-    """
+    """Let a user of the directory's group wait for all locks there; yield the files he opened."""
     files = sorted(str(path) for path in folder.iterdir() if path.is_file())
     with subprocess.Popen(
         [sys.executable, "-c", WAITS, *files],

@@ -20,9 +20,7 @@ from tests.waiting import PATIENCE_S, wait_until
 
 ROOT = Path(__file__).parents[2]
 SERVICE = {"RMF_BRIDGE_SERVICE": "1"}
-"""As for a systemd unit, so the daemon starts no guard: a guard would try for minutes after the module
-is gone.
-"""
+"""Makes the daemon a service, without a guard: that would try for minutes after the module is gone."""
 PATIENT = "stale_after_s: 30"
 """A long limit, so a busy machine that delays the scans does not make the door stale. For the same
 reason the module has 1.5 s to answer, in place of the usual 0.3 s.

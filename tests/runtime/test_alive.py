@@ -60,9 +60,7 @@ def test_after_sigstop_no_earlier_state_is_shown_as_new(
         pid = running.process.pid
 
         def suspended() -> bool:
-            """Suspend the daemon while the door leaves OPEN. Return False if that interrupted a
-            scan.
-            """
+            """Suspend the daemon while the door leaves OPEN; return False if that met a scan."""
             module.tell("fail", "ward_door", "opened", "ok")
             wait_until(lambda: graph.last() is DoorModeValue.MODE_OPEN, "the door shows OPEN")
             shown = len(graph.states)
@@ -158,9 +156,7 @@ def test_the_watchdog_is_not_fed_while_a_call_of_the_bus_hangs(
 
 
 def _status_written(run: Path, times: int) -> None:
-    """Wait for so many rounds of the daemon's main thread; each round checks whether to feed the
-    watchdog.
-    """
+    """Wait for so many rounds of the daemon's main thread, which feeds the watchdog."""
     for _ in range(times):
         before = (run / "status.json").stat().st_ino
         wait_until(lambda: _inode(run) not in (None, before), "the status is written")  # noqa: B023
@@ -176,9 +172,7 @@ def _inode(run: Path) -> int | None:
 def test_a_reset_during_the_start_does_no_harm(
     module: Module, graph: Graph, tmp_path: Path
 ) -> None:
-    """`rmf-bridge reset` runs again and again, from before the process begins until it is in
-    service.
-    """
+    """`rmf-bridge reset` runs again and again, from before the process begins to its service."""
     run = tmp_path / "run"
     asked = argparse.Namespace(file=module.file, runtime_dir=str(run))
     codes: list[tuple[bool, int]] = []

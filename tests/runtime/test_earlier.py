@@ -32,9 +32,7 @@ def _forgotten() -> Iterator[None]:
 
 
 def left(folder: Path, **later: object) -> tuple[Path, Records, str]:
-    """Put a record into a daemon's directory, with fields of a later version; return its place and its
-    YAML's path.
-    """
+    """Write a record with fields of a later version; return its path, its place and its YAML's path."""
     (source,) = EARLIER[-1].glob(PATTERN)
     content = msgspec.json.decode(source.read_bytes()) | later
     path = folder / source.name

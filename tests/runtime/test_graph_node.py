@@ -361,9 +361,7 @@ def join(request: pytest.FixtureRequest) -> Iterator[Callable[[str], Transport]]
 def test_a_served_graph_kind_runs_in_its_thread_until_it_is_stopped(
     join: Callable[[str], Transport],
 ) -> None:
-    """A node that was passive beside a rival publishes once the rival has gone; others see one
-    publisher.
-    """
+    """A passive node publishes once its rival has gone; others then see one publisher."""
     others, ours, rival = join("others"), join("supervisor"), join("rival")
     rival.publisher(LIFT_REQUESTS)
     heard: list[LiftRequest] = []

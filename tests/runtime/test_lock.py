@@ -1,6 +1,4 @@
-"""A reader, or a process that waits for the lock, keeps no relay on; no run switches another run
-off.
-"""
+"""Readers, and processes that wait for the lock, keep no relay on; no run switches another off."""
 
 import fcntl
 import os

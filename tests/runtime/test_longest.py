@@ -63,9 +63,7 @@ HEARD: dict[str, dict[Topic[Any], Message]] = {
 
 
 def taker(name: str, topic: Topic[Any]) -> Callable[[Message], object]:
-    """Return a function that makes an event of such a message, with the settings of this shipped
-    YAML.
-    """
+    """Return a function that makes an event of such a message, with this shipped YAML's settings."""
     config = load(CONFIG / f"{name}.yaml")
     kind = kind_called(config.kind)
     if isinstance(kind, GraphKind):

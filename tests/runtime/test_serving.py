@@ -14,9 +14,7 @@ CLOCK = Clock(time.monotonic, time.time)
 
 
 class Rounds:
-    """Rounds that fail once `works` is False; `safe` is the result of the end, which waits for
-    `after`.
-    """
+    """Rounds that fail once `works` is False. Their end returns `safe`, and waits for `after`."""
 
     name = "rounds"
 

@@ -85,9 +85,7 @@ def test_after_a_kill_the_live_bus_is_switched_off_while_the_dead_one_is_still_t
 def test_what_several_dead_daemons_left_on_shares_the_time_of_one(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """systemd kills ExecStopPost after TimeoutStopSec; the last record must have its turn before
-    that.
-    """
+    """systemd kills ExecStopPost after TimeoutStopSec; the last record must have its turn before."""
     file, given = tmp_path / "lift.yaml", list[float]()
     claims = Records(Directories(tmp_path, tmp_path), file)
     for name in ("lift_dry_contact", "lift_relay_board", "lift_one_hot"):

@@ -211,9 +211,7 @@ class _End:
 
 @dataclass
 class Disk:
-    """The state directory, which outlives the daemon. `written` counts writes; if `full`, a write
-    fails.
-    """
+    """The state directory, which outlives the daemon. `written` counts writes; `full` refuses them."""
 
     kept: bytes | None = None
     written: int = 0
@@ -249,9 +247,7 @@ class Served:
         self.restart()
 
     def restart(self) -> None:
-        """Start a new daemon: it remembers only its memory on disk, and hears all retained messages
-        again.
-        """
+        """Start a new daemon, which knows only its memory on disk and all retained messages."""
         self.transport.close()
         self.world.add(self)
         self.transport = WorldTransport(self.world, self.name)

@@ -1,3 +1,1 @@
-"""Tests of the YAML loader, with a kind, drivers and buses made for the tests (`site/`) beside the real
-ones.
-"""
+"""Tests of the YAML loader, with a kind, drivers and buses of the tests (`site/`) and the real ones."""

@@ -292,9 +292,7 @@ def test_the_shipped_fleet_agrees_with_the_shipped_coordinator(
 
 
 def test_the_transform_of_the_adapter_templates_example_and_its_mean_squared_error() -> None:
-    """Source: open-rmf/fleet_adapter_template, config.yaml; the values were checked term by term with
-    the formulas of nudged 0.3.1.
-    """
+    """open-rmf/fleet_adapter_template, config.yaml; values checked term by term with nudged 0.3.1."""
     rmf = [(20.33, -3.156), (8.908, -2.57), (13.02, -3.601), (21.93, -4.124)]
     robot = [(59.0, 399.0), (57.0, 172.0), (68.0, 251.0), (75.0, 429.0)]
     found = estimate(rmf, robot)

@@ -1,6 +1,4 @@
-"""Every shipped YAML is correct; after any one change that spoils the file, the loader names the
-place.
-"""
+"""Every shipped YAML is correct; after any one change that spoils it, the loader names the place."""
 
 import re
 from collections.abc import Iterator, Sequence
@@ -61,9 +59,7 @@ class Place:
 
     @property
     def end(self) -> int:
-        """Return the end of the entry's text. YAML ends a block value at the next token, which is too
-        late.
-        """
+        """Return the end of the entry's text; YAML's own end of a block value is too late."""
         node = self.value
         while isinstance(node, CollectionNode) and not node.flow_style and node.value:
             last = node.value[-1]
@@ -91,9 +87,7 @@ def places(node: Node, parent: Node) -> Iterator[Place]:
 
 @dataclass(frozen=True)
 class Leaf:
-    """A scalar value; `key` is the key of its entry, `parent` the key of the mapping around the
-    entry.
-    """
+    """A scalar value, with the key of its entry and the key of the mapping around (`parent`)."""
 
     node: ScalarNode
     key: Node

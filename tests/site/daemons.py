@@ -172,9 +172,7 @@ RIVAL = "rmf_lift_supervisor"
 
 
 class RmfsSupervisor:
-    """The stand-in for a supervisor of RMF's own: in place of our supervisor, or beside it by
-    mistake.
-    """
+    """The stand-in for a supervisor of RMF's own: in place of ours, or beside ours by mistake."""
 
     def __init__(
         self,

@@ -183,9 +183,7 @@ class Site:
             robot.homing = True
 
     def _sweep(self) -> None:
-        """Restart RMF's supervisors, which still hold lifts and doors for robots whose adapters
-        died.
-        """
+        """Restart RMF's supervisors, which still hold devices for robots whose adapters died."""
         for supervisor in self.supervisors:
             if isinstance(supervisor, RmfsSupervisor):
                 supervisor.kill()
@@ -313,9 +311,7 @@ class Site:
         return Ill("rival", rival.name, "rival", begin, end, most_s=40.0)
 
     def _restart_rmfs(self, random: Random) -> Ill:
-        """Return a trouble: one of RMF's supervisors forgets everything, and may then speak for other
-        robots.
-        """
+        """Return a trouble: a supervisor of RMF forgets all, and may then speak for other robots."""
         supervisor = random.choice([s for s in self.supervisors if isinstance(s, RmfsSupervisor)])
         devices = LIFTS if supervisor.name == RIVAL else DOORS
 

@@ -51,9 +51,7 @@ earlier CLOSE ends: a late message, plus the repetition by our supervisor.
 
 STATED = (d.LiftState, d.DoorState, d.ChargerState)
 NO_DWELL = "D2.people"
-"""A law that is left out: it forbids a door that closes as soon as nobody pushes. The plants' doors do
-that, unlike real operators.
-"""
+"""This law is left out: unlike real doors, the plants' doors close as soon as nobody pushes."""
 SHOWN = ("floor", "door", "motion")
 """The groups of a lift's lines on which an open door depends."""
 
@@ -82,9 +80,7 @@ class LiftTruth:
 
 
 class Judges:
-    """The judges of one daemon since its start. Laws on sensors are judged only while the device is
-    well.
-    """
+    """The judges of one daemon. Laws on sensors are judged only while the device is well."""
 
     def __init__(self, daemon: DeviceDaemon) -> None:
         kind = cast(Kind, daemon.device.kind.name)
@@ -415,9 +411,7 @@ class Laws:
         self._lifts[lift].inside.pop(robot, None)
 
     def abandoned(self, robot: str) -> None:
-        """Forget the robot: its adapter has died, or RMF's supervisor sends requests that it does not
-        wish.
-        """
+        """Forget the robot: its adapter has died, or a supervisor asks in its name unwished."""
         self.crossed(robot)
         for truth in self._lifts.values():
             truth.inside.pop(robot, None)

@@ -30,9 +30,7 @@ Watch = Callable[[str, Topic[Any], Message], None]
 
 @dataclass(frozen=True)
 class Weather:
-    """Probabilities: any sample is lost, a state to RMF is lost, a sample is late, a sample comes
-    twice.
-    """
+    """Probabilities: a sample is lost, a state to RMF is lost, a sample is late or comes twice."""
 
     lost: float = 0.005
     states_lost: float = 0.02
@@ -45,9 +43,7 @@ CLEAR = Weather(0.0, 0.0, 0.0, 0.0)
 
 
 class Air:
-    """The air between all nodes. `best_effort` has the nodes that hear states as RMF does. `watch` gets
-    every message.
-    """
+    """The air between nodes. `best_effort` nodes hear states as RMF does; `watch` hears all."""
 
     def __init__(self, timeline: Timeline, random: Random) -> None:
         self.timeline = timeline

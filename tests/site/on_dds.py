@@ -50,9 +50,7 @@ class RealTime(Timeline):
         self._posted.put(what)
 
     def until(self, done: Callable[[], bool], check: Callable[[], None]) -> None:
-        """Let time pass until `done` is true; `check` raises when the condition can no longer come
-        true.
-        """
+        """Let time pass until `done` is true; `check` raises when waiting has become useless."""
         while not done():
             self.run(time.monotonic() - self._began)
             check()
@@ -139,9 +137,7 @@ class RealSite:
             daemon.follow(lambda edge: self.timeline.post(partial(self._edge, edge)))
 
     def restart(self, party: str, how: signal.Signals) -> None:
-        """Kill a daemon as a process is killed, and start another; after SIGKILL the old daemon says
-        nothing more.
-        """
+        """Kill a daemon as a process is killed (SIGKILL leaves it no last word); start another."""
         daemon = self.daemons.pop(party)
         if party in ("lift", "door"):
             device = LIFT if party == "lift" else DOOR
@@ -160,9 +156,7 @@ class RealSite:
         robot.start()
 
     def check(self) -> None:
-        """Check that all daemons live and no robot waits for too long; raise Wrong or
-        AssertionError.
-        """
+        """Check that all daemons live and no robot waits for too long; raise if not."""
         for daemon in self.daemons.values():
             daemon.check()
         for robot in self.robots:

@@ -46,9 +46,7 @@ class Within:
 
 Want = Within | float
 Day = Generator[Want, bool, None]
-"""A day yields what the robot waits for next, a phase or seconds, and receives whether the phase is
-done.
-"""
+"""A day yields what the robot waits for, a phase or seconds, and receives: is the phase done?"""
 
 
 class Ground(Protocol):
@@ -345,9 +343,7 @@ class Resident:
         return assigned and state is not None and f"fleet/{state.robot_name}" == self.name
 
     def _charge_on(self, charger: str) -> Generator[Want, bool, bool]:
-        """Charge on the pad until the battery is full or a time is over; return True if current has
-        flowed.
-        """
+        """Charge until the battery is full or the time is over; return True if current has flowed."""
         assert self._task is not None
         yield PAD_S
         if not self._is_kept(charger):

@@ -24,9 +24,7 @@ MOST = 3
 
 
 class Hospital(Scene):
-    """A scene with devices, supervisors and a coordinator; one robot has requested a lift, another a
-    door.
-    """
+    """A scene with all devices and nodes; one robot has requested a lift, another a door."""
 
     def __init__(self) -> None:
         super().__init__(*SERVED, diagnoses=False)

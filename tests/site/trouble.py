@@ -215,9 +215,7 @@ class Trouble:
             self._timeline.after(BY_RESET_S, lambda: self._reset(ill))
 
     def _reset(self, ill: Ill) -> None:
-        """Reset as a technician, who waits until the device answers: a silent device cannot be
-        reset.
-        """
+        """Reset as a technician, who waits for the device: a silent device cannot be reset."""
         assert ill.reset is not None
         if self._ills.has(ill.device, "bus") or self._ills.has(ill.device, "daemon"):
             self._timeline.after(BY_RESET_S, lambda: self._reset(ill))

@@ -1,7 +1,7 @@
-"""What must be true of every decision of the charger's core, whatever happened before it.
+"""Rules for every decision of the charger's core, whatever happened before.
 
-Judged from the event, the readings, the outputs and the walk's ledger; the core's memory is asked only
-whether a request still holds the station.
+The rules judge the event, the readings, the outputs and the walk's ledger. They ask the core's memory
+only whether a request still holds the station.
 """
 
 from bridges.kinds.charger.signals import Activity
@@ -14,7 +14,7 @@ BAD = (Activity.ERROR, Activity.UNKNOWN)
 
 
 def check(step: Step) -> None:
-    """Check every rule; AssertionError says which is broken."""
+    """Check every rule; the AssertionError shows the broken rule."""
     the_message_is_whole(step)
     the_state_is_what_was_read(step)
     power_has_a_reason(step)
@@ -28,7 +28,7 @@ def check(step: Step) -> None:
 
 
 def the_message_is_whole(step: Step) -> None:
-    """A text in ERROR and in no other state; a robot with each request, and its request kept."""
+    """Require a text in ERROR and in no other state, and with each request the request's own robot."""
     shown = step.decision.report
     assert shown.state in set(State)
     assert (shown.error_message != "") == (shown.state is State.CHARGER_ERROR)
@@ -47,7 +47,7 @@ def the_message_is_whole(step: Step) -> None:
 
 
 def the_state_is_what_was_read(step: Step) -> None:
-    """CHARGING exactly while current flows; ERROR if lost, at fault or served by two nodes."""
+    """Require CHARGING exactly while current flows, and ERROR if lost, faulty or served twice."""
     state = step.decision.report.state
     sighted = _sighted(step)
     flows = step.seen is not None and step.seen.activity in FLOWS
@@ -63,7 +63,7 @@ def the_state_is_what_was_read(step: Step) -> None:
 
 
 def power_has_a_reason(step: Step) -> None:
-    """Power only for a valid request at a station that answers and is well."""
+    """Require a valid request, and a healthy station that answers, for power."""
     power, shown = step.decision.outputs.power, step.decision.report
     if power:
         assert step.ledger.granted is not None
@@ -87,7 +87,7 @@ def power_has_a_reason(step: Step) -> None:
 
 
 def nobody_else_is_energised(step: Step) -> None:
-    """Of verified robots only the one that asked, and a new one only in range."""
+    """Require power only for the requesting robot where robots are verified; at first only in range."""
     power, sample, limits = step.decision.outputs.power, step.seen, step.limits
     if not limits.receivers or sample is None or not _sighted(step):
         return
@@ -106,7 +106,7 @@ def nobody_else_is_energised(step: Step) -> None:
 
 
 def protection_lasts(step: Step) -> None:
-    """Out of service until a clearing and, within its time, a good reading."""
+    """Require, for an end of "out of service", a clearing and in time after it a good reading."""
     before, after = step.before.ledger, step.ledger
     if before.out and not after.out:
         assert isinstance(step.event, Sampled)
@@ -116,7 +116,7 @@ def protection_lasts(step: Step) -> None:
 
 
 def requests_end_on_good_readings(step: Step) -> None:
-    """Nothing else makes a station free, but an operator at one that has been silent for long."""
+    """Require a good reading for a request's end, or an operator's reset at a long silent station."""
     before = step.before.ledger
     if before.granted is None or step.ledger.granted == before.granted:
         return
@@ -135,7 +135,7 @@ def requests_end_on_good_readings(step: Step) -> None:
 
 
 def commands_are_counted(step: Step) -> None:
-    """A decision adds at most one command of each; none clears while two nodes serve the station."""
+    """Require at most one new command of each type, and no clearing beside a second node."""
     before, outputs = step.before.memory, step.decision.outputs
     assert outputs.clear_errors - before.clear_errors in (0, 1)
     assert outputs.range_checks - before.range_checks in (0, 1)
@@ -144,8 +144,11 @@ def commands_are_counted(step: Step) -> None:
 
 
 def a_request_that_waits_has_a_reason(step: Step) -> None:
-    """A request waits while it has the station, and the station neither charges with leave to do so,
-    nor shows that the request is over (RELEASED)."""
+    """Require a reason for each waiting request.
+
+    A request waits while it has the station, the station does not charge with permission, and the
+    station does not show that the request is over (RELEASED).
+    """
     shown, seen = step.decision.report, step.seen
     may_not = step.decision.outputs.power is False and seen and seen.activity is Activity.CHARGING
     waits = step.decision.memory.holder is not None and (
@@ -167,6 +170,6 @@ def _rivalled(step: Step) -> bool:
 
 
 def _going_on(step: Step) -> bool:
-    """Current has flowed for this request, or flows now."""
+    """Has current flowed for this request?"""
     holder = step.decision.memory.holder
     return holder is not None and holder.started

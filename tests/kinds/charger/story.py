@@ -28,11 +28,11 @@ RECEIVERS = {"rx-1": robot("tiny/AMR01"), "rx-2": robot("tiny/AMR02")}
 
 
 FULL = ChargerLimits(DURATIONS, RECEIVERS)
-"""A station that sees who stands on its pad, and can be stopped."""
+"""A station that sees the robot on its pad, and can be stopped."""
 
 
 def observed(**durations: Any) -> ChargerLimits:
-    """Such a station with these durations, and the defaults."""
+    """Return a station that can only be observed, with these durations and otherwise the defaults."""
     return ChargerLimits(ChargerDurations(**durations), can_stop=False)
 
 
@@ -65,9 +65,10 @@ CANCEL_1 = Cancelled("req-1")
 
 @dataclass
 class Story:
-    """A core with its memory. `told`: (time, state, request id or error) whenever the news differ.
+    """A core with its memory.
 
-    `powered`: what each poll by `sees` decided about the power.
+    `told` has (time, state, request id or error) for each change of the news. `powered` has the
+    decision about power after each poll by `sees`.
     """
 
     limits: ChargerLimits = LIMITS
@@ -81,7 +82,7 @@ class Story:
     powered: list[bool | None] = field(default_factory=list)
 
     def event(self, event: Event) -> "Story":
-        """Something happens now."""
+        """Let an event happen now."""
         decision = core.decide(self.memory, event, self.now, self.limits)
         self.memory, self.outputs, self.report = decision.memory, decision.outputs, decision.report
         shown = decision.report
@@ -97,7 +98,7 @@ class Story:
         return self
 
     def polls(self, script: str) -> "Story":
-        """`idle 3, charging 2`: so many polls that read this, a second after one another."""
+        """Poll once a second; `idle 3, charging 2`: three polls read idle, then two read charging."""
         for part in script.split(","):
             word, count = part.split()
             for _ in range(int(count)):
@@ -106,7 +107,7 @@ class Story:
         return self
 
     def sees(self, *readings: tuple[Activity, str, int], **known: Any) -> "Story":
-        """`(activity, receiver, polls)` of a station that knows who is on its pad."""
+        """Poll a station that knows the robot on its pad: `(activity, receiver, number of polls)`."""
         for activity, receiver, count in readings:
             sample = ChargerSample(activity, 0, measured=Measured(receiver_id=receiver, **known))
             for _ in range(count):
@@ -116,12 +117,12 @@ class Story:
         return self
 
     def all(self, events: Iterable[Event]) -> "Story":
-        """Several events at once."""
+        """Let several events happen at once."""
         for event in events:
             self.event(event)
         return self
 
 
 def measured(sample: ChargerSample, **known: float) -> Sampled[ChargerSample]:
-    """A reading of a station that measures."""
+    """Return a reading of a station that measures."""
     return Sampled(replace(sample, measured=Measured(**known)))  # type: ignore[arg-type]

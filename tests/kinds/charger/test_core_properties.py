@@ -1,4 +1,4 @@
-"""What holds of the charger's core over long histories, and how often it clears errors."""
+"""Properties of the charger's core over long histories, and the pace of clearing errors."""
 
 import itertools
 

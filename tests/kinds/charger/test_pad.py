@@ -1,4 +1,4 @@
-"""Who stands on a pad survives ChargerState's error_message, whatever the names are."""
+"""The robot on a pad can be read back from ChargerState's error_message, whatever the names are."""
 
 import pytest
 from hypothesis import given, settings

@@ -1,4 +1,4 @@
-"""A ChargerRequest that is refused is answered: on a topic, in the status and in diagnostics."""
+"""A refused ChargerRequest is answered: on a topic, in the status and in diagnostics."""
 
 from dataclasses import dataclass, field
 from typing import Any
@@ -55,7 +55,7 @@ class Idle:
 
 @dataclass
 class Station:
-    """A charger's node, scanned once a second, and what it says."""
+    """A charger's node that is scanned once a second; `said` has its messages."""
 
     now: float = 0.0
     said: list[tuple[str, Any]] = field(default_factory=list)

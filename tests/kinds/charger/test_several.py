@@ -1,4 +1,4 @@
-"""Several stations in one daemon: a fault of one does not touch the others."""
+"""Several stations in one daemon: a fault of one station does not disturb the others."""
 
 import json
 from collections.abc import Callable, Iterator
@@ -17,7 +17,7 @@ from tests.transports.memory import MemoryNetwork, MemoryTransport
 from tests.waiting import wait_until
 
 TIMEOUT_S = 0.5
-"""Of the bad one; the sound ones have time, on a busy machine too."""
+"""The timeout of the bad station. The sound stations have more time, for a busy machine."""
 
 
 def silent(caller: Caller) -> None:
@@ -32,7 +32,7 @@ def trickles(caller: Caller) -> None:
 
 @contextmanager
 def daemon(file: Path, **stations: Conversation) -> Iterator[list[ChargerState]]:
-    """A daemon for these stations, `b` a bad one, each on its own bus; the states that it tells."""
+    """Yield the states of these stations, each on its own bus; `b` is a bad station."""
     buses, chargers = {}, {}
     with ExitStack() as open_:
         for name, talk in stations.items():

@@ -1,5 +1,7 @@
-"""A station that sees who stands on its pad and obeys: the five situations of a shared charger, its own
-side of each, in virtual time, one poll a second."""
+"""A station that sees the robot on its pad and obeys, in the five situations of a shared charger.
+
+The stories show the station's part of each situation, in virtual time, with one poll a second.
+"""
 
 import pytest
 from msgspec.structs import replace
@@ -45,7 +47,7 @@ def story(limits: ChargerLimits = FULL) -> Story:
 
 
 def docked() -> Story:
-    """AMR01 asked at 1 s, came, and charges since 4 s; it is 5 s now."""
+    """Return a story at 5 s: AMR01 asked at 1 s, docked, and has charged since 4 s."""
     return (
         story().event(AMR1).sees((A.IDLE, NOBODY, 2), (A.HANDSHAKE, ONE, 1), (A.CHARGING, ONE, 1))
     )
@@ -125,7 +127,7 @@ def test_a_receiver_that_is_lost_from_sight_while_current_flows_keeps_its_power(
 def test_nothing_is_energised_before_a_check_of_the_range_that_was_asked_for_says_yes() -> None:
     it = story().event(AMR1).sees((A.IDLE, NOBODY, 1), in_range=True)
     assert it.outputs == ChargerOutputs(power=False)
-    it.sees((A.IDLE, ONE, 1), in_range=True)  # an old answer: not asked for by us
+    it.sees((A.IDLE, ONE, 1), in_range=True)  # an old result: the core has not ordered that check
     assert it.outputs == ChargerOutputs(power=False, range_checks=1)
     it.sees((A.IDLE, ONE, 1), in_range=False)
     assert it.outputs == ChargerOutputs(power=False, range_checks=1)
@@ -371,7 +373,7 @@ def test_each_refusal_has_its_own_fault() -> None:
     ]
 
 
-# ---- CHARGER-6: failure: the station's side, the robot's side
+# ---- CHARGER-6: failures of the station or of the robot
 
 
 def at_fault(text: str, side: str = "", receiver: str = ONE) -> Sampled[ChargerSample]:

@@ -1,4 +1,4 @@
-"""Every state within some steps of the start, and of each stage of a charge: what is true in all."""
+"""All states within some steps of the start and of each stage of a charge, checked by the rules."""
 
 import pytest
 from msgspec.structs import replace
@@ -27,12 +27,12 @@ STAGES: dict[str, tuple[str | float, ...]] = {
 
 
 def path(limits: ChargerLimits, *steps: str | float) -> World:
-    """The state that these moves and waits lead to."""
+    """Return the state after these moves and waits."""
     return walker(limits).path(World(), *steps, seen=check)
 
 
 def shown(world: World, limits: ChargerLimits) -> tuple[str, str, bool | None]:
-    """What one more scan says: state, request, power."""
+    """Return the state, request and power of one more scan."""
     steps: list[Step] = []
     walker(limits).path(world, 0.5, seen=steps.append)
     decision = steps[-1].decision
@@ -91,7 +91,7 @@ def test_from_every_state_a_sound_station_comes_back_and_charges_the_robot_that_
 
 
 def _mended(world: World, limits: ChargerLimits) -> World:
-    """The pad is clear, all answers, nothing is wrong, and an operator resets what is latched."""
+    """Return the world mended: pad clear, everything answers and is well, latched faults reset."""
     world = replace(world, readable=True, writable=True)
     steps = ("idle", "the pad is clear", "in range", "gap right", "pad at height")
     then = ("A cancels", "B cancels", 32.0, "reset", 4.0)
@@ -99,7 +99,7 @@ def _mended(world: World, limits: ChargerLimits) -> World:
 
 
 def _charged(world: World, limits: ChargerLimits) -> World:
-    """The first robot asks, comes and is charged."""
+    """Return the world after the first robot has asked, come and begun to charge."""
     asked = ChargeRequested("req-new", "tiny", "A")
     world = moved(world, lambda before: (before, [asked]), limits, check)
     world = walker(limits).path(world, "A docks", 2.0, seen=check)

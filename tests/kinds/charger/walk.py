@@ -1,8 +1,8 @@
-"""Every state that the charger's core can reach within some steps, and what must be true in each.
+"""All states that the charger's core can reach within some steps.
 
-A state is the core's memory with every time relative to now, the station with its pad, and a ledger
-that tells what has happened in other words. Ages beyond every limit are made equal, and counts are left
-out, so that states that cannot behave differently are one.
+A state has the core's memory with every time relative to now, the station with its pad, and a ledger
+that notes the events in the rules' own words. Ages beyond every limit are made equal, and counts are
+left out, so that states that cannot behave differently count as one state.
 """
 
 from collections.abc import Callable
@@ -53,12 +53,12 @@ SITES = {
 
 
 class Ledger(msgspec.Struct, frozen=True):
-    """What has happened, without the core's conclusions. Times are relative to the state's.
+    """Events without the core's conclusions. Times are relative to the state's time.
 
-    `granted`: the request that was accepted last and has not been seen to end; `robot`: whose.
-    `spoiled`: since then it was cancelled, or an error was read. `read_at`: of the last good reading,
-    `misses` since. `out`: the station's own fault was read, and no clearing was seen to help since;
-    `cleared_at`: the last clearing.
+    `granted` is the last accepted request, until its end is seen; `robot` is the robot of that request.
+    `spoiled`: since the grant the request was cancelled or an error was read. `read_at` is the time of
+    the last good reading, `misses` counts failed readings since. `out`: the station's own fault was
+    read, and no clearing has helped since. `cleared_at` is the time of the last clearing.
     """
 
     granted: str | None = None
@@ -84,7 +84,7 @@ class World(msgspec.Struct, frozen=True):
 
 
 class Step(msgspec.Struct, frozen=True):
-    """One decision and all around it. `ledger`: after it."""
+    """One decision with the facts around it; `ledger` is the ledger after the decision."""
 
     before: World
     event: Event
@@ -99,11 +99,11 @@ Seen = Callable[[Step], None]
 Move = Callable[[World], tuple[World, list[Event]]]
 
 
-# ---- what can happen
+# ---- possible events
 
 
 def reading(world: World) -> list[Event]:
-    """The event that a scan brings."""
+    """Return the events of a scan."""
     if not world.readable:
         return [IoFailed("timeout")]
     return [Sampled(world.sample), *([] if world.writable else [WriteFailed("status 500")])]
@@ -164,7 +164,7 @@ WAITS = (1.0, 5.0, 32.0)
 
 
 def moved(world: World, move: Move, limits: ChargerLimits, seen: Seen) -> World:
-    """The world after this move."""
+    """Return the world after this move."""
     world, events = move(world)
     for event in events:
         world = decided(world, event, 0.0, limits, seen)
@@ -172,7 +172,7 @@ def moved(world: World, move: Move, limits: ChargerLimits, seen: Seen) -> World:
 
 
 def waited(world: World, seconds: float, limits: ChargerLimits, seen: Seen) -> World:
-    """After so long, with a scan at least each four seconds."""
+    """Return the world after this time, with a scan at least every four seconds."""
     while seconds > 0:
         after_s = min(seconds, 4.0)
         for n, event in enumerate(reading(world)):
@@ -182,7 +182,7 @@ def waited(world: World, seconds: float, limits: ChargerLimits, seen: Seen) -> W
 
 
 def decided(world: World, event: Event, now: float, limits: ChargerLimits, seen: Seen) -> World:
-    """The core decides at `now`; the result is at time 0 again."""
+    """Let the core decide at `now`; return the world with the time set to 0 again."""
     decision = decide(world.memory, event, now, limits)
     ledger = noted(world, event, now, limits, decision)
     sample = event.sample if isinstance(event, Sampled) else world.seen
@@ -199,7 +199,7 @@ def decided(world: World, event: Event, now: float, limits: ChargerLimits, seen:
 
 
 def noted(world: World, event: Event, now: float, limits: ChargerLimits, decision: Any) -> Ledger:
-    """The ledger after an event."""
+    """Return the ledger after an event."""
     ledger = world.ledger
     cleared = decision.outputs.clear_errors > world.memory.clear_errors
     if isinstance(event, Sampled):
@@ -246,13 +246,13 @@ def _read(ledger: Ledger, sample: ChargerSample, now: float, limits: ChargerLimi
 
 
 def _held(ledger: Ledger, decision: Any) -> Ledger:
-    """Requests end in ways that the rules judge elsewhere; here only that none is shown any more."""
+    """Note that no request is shown any more. Other rules judge the way in which the request ended."""
     shown = decision.report
     if decision.memory.holder is None:
         return replace(ledger, granted=None, robot=None, spoiled=False)
     who = RobotName(shown.fleet, shown.robot)
     if not shown.request_id and (ledger.granted != "" or who != ledger.robot):
-        # served without a request
+        # charging without a request
         return replace(ledger, granted="", robot=who, spoiled=False, adopted=False)
     return ledger
 
@@ -261,7 +261,7 @@ def _held(ledger: Ledger, decision: Any) -> Ledger:
 
 
 def alike(memory: ChargerMemory, now: float, limits: ChargerLimits) -> ChargerMemory:
-    """The same memory at time 0, equal for those that cannot behave differently."""
+    """Return the memory at time 0, equal for memories that cannot behave differently."""
     holder = memory.holder
     if holder:
         holder = replace(
@@ -296,12 +296,12 @@ def _shifted(ledger: Ledger, now: float) -> Ledger:
 
 
 def _at(at: Any, now: float, oldest_s: float = OLDEST_S) -> Any:
-    """A time, relative to now, and no further back than makes a difference; None stays."""
+    """Return a time relative to now, cut off where more age makes no difference; None stays None."""
     return None if at is None else max(at - now, -oldest_s)
 
 
 def walker(limits: ChargerLimits) -> Walker[World, Move]:
-    """The charger's, with these limits."""
+    """Return the charger's walker with these limits."""
     return Walker(
         MOVES,
         WAITS,

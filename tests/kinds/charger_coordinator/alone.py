@@ -1,4 +1,4 @@
-"""The coordinator's core alone, with two stations, in virtual time: told by hand, its words noted."""
+"""The coordinator's core alone with two stations, in virtual time, with its messages noted."""
 
 from typing import Any
 
@@ -27,7 +27,7 @@ A, B = "charger_a", "charger_b"
 
 
 class Alone(alone.Alone[SiteMemory, Event, SiteLimits, SiteReport]):
-    """`shows`: what each station does, told once a second; `seen`: the robots that a fleet shows."""
+    """The core alone, with each station's state (`shows`) and the robots that fleets show (`seen`)."""
 
     def __init__(self) -> None:
         self.shows = {name: ChargerStateHeard(name, IDLE) for name in (A, B)}
@@ -35,7 +35,7 @@ class Alone(alone.Alone[SiteMemory, Event, SiteLimits, SiteReport]):
         super().__init__(core.initial("site", 0.0), core.decide, SiteLimits.of(SETTINGS), True)
 
     def words(self, message: d.Message) -> str:
-        """Words to the stations are noted."""
+        """Return messages to stations in words, and "" for other messages."""
         match message:
             case d.ChargerRequest():
                 return f"{message.charger_name}: {message.robot_name}"
@@ -48,7 +48,7 @@ class Alone(alone.Alone[SiteMemory, Event, SiteLimits, SiteReport]):
         return [str(fault) for fault in self.report.faults]
 
     def run(self, seconds: int) -> list[tuple[float, str]]:
-        """Let time pass, a second at a time; what was said meanwhile."""
+        """Let time pass, second by second; return the messages of that time."""
         said = len(self.sent)
         for _ in range(seconds):
             self.now += 1.0
@@ -60,12 +60,12 @@ class Alone(alone.Alone[SiteMemory, Event, SiteLimits, SiteReport]):
         return self.sent[said:]
 
     def wants(self, who: RobotName, place: str | None = None, percent: float = 40.0) -> None:
-        """Its fleet shows it so from now on."""
+        """Let the fleet show, from now on, that this robot wants to charge."""
         place = f"wait_{who.name[-1]}" if place is None else place
         self.seen[who] = Sighting(who, True, place, percent, f"task of {who.name}")
 
     def does(self, station: str, state: Any, error: str = "") -> None:
-        """The station goes on so with the request that it was sent last."""
+        """Let the station show this state with the request that it got last."""
         grant = self.memory.grants[station]
         self.shows[station] = ChargerStateHeard(
             station, state, grant.request_id, grant.robot, error
@@ -73,5 +73,5 @@ class Alone(alone.Alone[SiteMemory, Event, SiteLimits, SiteReport]):
 
 
 def busy(station: str) -> ChargerStateHeard:
-    """A station that serves somebody who is none of ours."""
+    """Return the state of a station that serves a robot of another site."""
     return ChargerStateHeard(station, CHARGING, "somebody-1", RobotName("other", "robot"))

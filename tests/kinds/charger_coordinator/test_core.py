@@ -1,4 +1,4 @@
-"""The coordinator's rules one by one: its core alone, told by hand, in virtual time."""
+"""The coordinator's rules one by one: the core alone, given events by hand, in virtual time."""
 
 import dataclasses
 
@@ -95,7 +95,7 @@ def test_a_full_robot_that_an_operator_asked_for_makes_room() -> None:
 
 
 def answer(site_: Alone, event: Event) -> str:
-    """Why the event is refused; "" if it counts."""
+    """Return why the event is refused, or "" if the event is accepted."""
     before = len(site_.refused)
     site_.hears(event)
     return "".join(why for _, why in site_.refused[before:])
@@ -205,7 +205,7 @@ def test_requests_are_numbered_one_after_the_other() -> None:
     ]
 
 
-# ---- COORDINATOR-STATIONS-2, COORDINATOR-STATIONS-3: whose fault
+# ---- COORDINATOR-STATIONS-2, COORDINATOR-STATIONS-3: the side at fault
 
 
 def test_an_error_of_an_unknown_side_counts_until_another_station_charges_the_robot() -> None:
@@ -237,7 +237,7 @@ def test_a_robot_that_fails_at_both_stations_a_moment_after_the_charge_begins_is
     ]
 
 
-# ---- COORDINATOR-5, COORDINATOR-WRONG-PAD-3: robots astray
+# ---- COORDINATOR-5, COORDINATOR-WRONG-PAD-3: robots on wrong pads
 
 
 def test_a_strayed_robot_in_a_task_cannot_be_told_so_a_person_is_at_once() -> None:
@@ -270,7 +270,7 @@ def test_a_robot_on_its_way_from_a_station_where_it_failed_is_not_astray() -> No
     assert [(nudge.count, nudge.at) for nudge in site_.memory.nudges.values()] == [(1, 32.0)]
 
 
-# ---- COORDINATOR-WISHES-4: on its way
+# ---- COORDINATOR-WISHES-4: a robot on its way
 
 
 def test_an_idle_robot_that_is_called_and_begins_a_task_is_on_its_way() -> None:

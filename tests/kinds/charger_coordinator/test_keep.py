@@ -1,4 +1,4 @@
-"""What the coordinator keeps across a restart, and what it does not believe of it."""
+"""The coordinator's memory across a restart, and the parts that are not believed afterwards."""
 
 import pytest
 from msgspec.structs import replace

@@ -1,4 +1,4 @@
-"""What comes in and what a file may say: ours or refused, by name."""
+"""Messages and settings of the coordinator: accepted, or refused with a reason."""
 
 from pathlib import Path
 from typing import Any
@@ -21,7 +21,7 @@ ONE = RobotName("tiny", "AMR01")
 
 
 def robot(x: float, y: float, level: str = "L1", mode: int = 1) -> Sighting:
-    """AMR01 as it is seen there."""
+    """Return AMR01 as its fleet shows it at this place."""
     at = d.Location(x=x, y=y, level_name=level)
     state = d.RobotState("AMR01", "", "task", 0, d.RobotMode(mode), 40.0, at)
     (seen,) = messages.accept_fleet(d.FleetState("tiny", (state,)), SETTINGS, 0.0).robots

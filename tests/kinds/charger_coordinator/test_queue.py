@@ -1,4 +1,4 @@
-"""COORDINATOR-2: who gets which station, first come, first served; and who may have one."""
+"""COORDINATOR-2: the queue gives stations first come, first served, to permitted robots only."""
 
 from msgspec.structs import replace
 

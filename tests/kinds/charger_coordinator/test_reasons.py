@@ -1,4 +1,4 @@
-"""What the queue says of each robot that waits: whole texts, on memories made by hand."""
+"""The queue's reasons for each waiting robot: whole texts, on memories made by hand."""
 
 from msgspec.structs import replace
 
@@ -26,7 +26,7 @@ X, Y = RobotName("big", "X"), RobotName("big", "Y")
 
 
 def site(stations: int) -> SiteLimits:
-    """So many stations, and each suits everybody."""
+    """Return a site with so many stations that suit every robot."""
     names = tuple(f"s{i + 1}" for i in range(stations))
     robots = dict.fromkeys((ONE, TWO, THREE), names)
     places: dict[str, dict[str, str]] = {name: {} for name in names}
@@ -94,7 +94,7 @@ def test_while_it_may_not_publish_no_station_is_what_they_wait_for() -> None:
 
 
 def said(now: float, seen: StationSeen, *robots: RobotName) -> str:
-    """What AMR01 hears of its only station, at which these robots stand."""
+    """Return the reason shown for AMR01, whose only station has these robots on its pad."""
     one = SiteLimits({ONE: ("s1",)}, {}, {"s1": {"tiny": "p1"}}, {}, 60.0, 100.0, 90.0, 60.0)
     there = {who: Standing(Sighting(who, False, "p1", 50.0, ""), 10.0) for who in robots}
     memory = replace(BUSY, wishes=BUSY.wishes[:1], grants={}, stations={"s1": seen}, robots=there)
@@ -123,7 +123,7 @@ def test_a_robot_without_any_station_waits_for_the_schedule() -> None:
     ]
 
 
-# ---- what is remembered
+# ---- the memory of stations and of requests
 
 
 def test_a_station_is_silent_five_seconds_after_its_last_state() -> None:

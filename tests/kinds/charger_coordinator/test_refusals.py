@@ -1,4 +1,4 @@
-"""A wish that the coordinator refuses is answered, as a charger's refusal is."""
+"""A wish that the coordinator refuses is answered, like a charger's refusal."""
 
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -35,7 +35,7 @@ class Office:
         operator.subscribe(topics.CHARGER_REFUSALS, lambda status: self.heard.append(read(status)))
 
     def rounds(self, until: float) -> None:
-        """A round each quarter of a second."""
+        """Run a round each quarter of a second."""
         while self.now < until:
             self.node.round()
             self.now += 0.25

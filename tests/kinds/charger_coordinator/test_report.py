@@ -1,4 +1,4 @@
-"""What the coordinator shows and tells, and when it wakes."""
+"""The coordinator's report and texts, and the times at which it wakes."""
 
 import pytest
 
@@ -20,7 +20,7 @@ from tests.kinds.charger_coordinator.alone import ONE, SETTINGS, A, Alone, B
 SITE = SiteLimits.of(SETTINGS)
 
 
-# ---- COORDINATOR-REPORT-2, COORDINATOR-REPORT-3: what is shown and told
+# ---- COORDINATOR-REPORT-2, COORDINATOR-REPORT-3: the report
 
 
 def test_the_report_names_each_station_with_its_state_and_robot() -> None:
@@ -97,7 +97,7 @@ def wakes(site_: Alone) -> float:
     return core.decide(site_.memory, Woken(), site_.now, SITE).wake_at
 
 
-# ---- COORDINATOR-REPORT-1, COORDINATOR-3: when it wakes
+# ---- COORDINATOR-REPORT-1, COORDINATOR-3: the times of waking
 
 
 def test_the_core_wakes_when_a_station_falls_silent_and_when_a_request_is_due_again() -> None:

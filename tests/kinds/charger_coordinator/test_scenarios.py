@@ -1,7 +1,7 @@
-"""The charging scenarios by their numbers, under every `finishing_request` and with RMF's retreat.
+"""The numbered charging scenarios, with every `finishing_request` and with RMF's retreat.
 
-The fleet shows of its robots what RMF's adapter shows (`workbench/rmf_model/fleet.py`): IDLE and
-no task while a robot charges as its finishing request, CHARGING in every task after its first charge.
+The fleet shows its robots as RMF's adapter does (`workbench/rmf_model/fleet.py`): IDLE without a task
+while a robot charges as its finishing request, CHARGING in every task after its first charge.
 """
 
 from typing import Final
@@ -20,14 +20,14 @@ History = list[tuple[float, str]]
 
 
 def yard(finishing: Finishing, **changes: object) -> Yard:
-    """Everybody is up, at its waiting place and full."""
+    """Return a yard with each robot at its waiting place and full."""
     site = Yard(finishing=finishing, **changes)  # type: ignore[arg-type]
     site.run(5.0)
     return site
 
 
 def home_from_work(finishing: Finishing, percent: float, jazzy: bool = False) -> Yard:
-    """AMR01 has ended its task in the ward, with so much left."""
+    """Return a yard in which AMR01 has ended its task in the ward, with this battery level."""
     site = yard(finishing, jazzy=jazzy)
     site.fleet.works("AMR01", "ward", site.now)
     site.run(10.0)
@@ -37,7 +37,7 @@ def home_from_work(finishing: Finishing, percent: float, jazzy: bool = False) ->
 
 
 def charged_at_a(told_at: float, full_at: float, drives_s: float = 6.0) -> History:
-    """AMR01 is called to charger_a from its place, and charged there."""
+    """Return the history of AMR01's call to charger_a and its charge there."""
     return [
         (told_at, "charger_a <- charge AMR01"),
         (told_at, "charger_a: ASSIGNED AMR01"),
@@ -58,7 +58,7 @@ CALLED_IN_VAIN: Final = [
     (77.25, "charger_a: IDLE"),
 ]
 
-# ---- 0: who wants to charge
+# ---- 0: which robots want to charge
 
 
 @pytest.mark.parametrize(
@@ -155,7 +155,7 @@ def test_0_a_full_robot_that_waits_for_traffic_on_its_pad_is_not_served_again(
     robot.battery_percent = 99.0
     assert site.run(120.0) == []
     robot.battery_percent = 89.0
-    assert site.run(125.0) == [], "the dispatcher gave it a patrol: that is no charge"
+    assert site.run(125.0) == [], "a patrol counts as a wish to charge"
     robot.task_id = "somebody's task"
     assert site.run(130.0)[0] == (127.25, "charger_a <- charge AMR01")
 
@@ -245,7 +245,7 @@ def test_1_the_schedule_calls_the_robots_that_it_names_and_is_shown(finishing: F
             (27.5, "charger_a: RELEASED AMR01"),
             (28.5, "charger_a: IDLE"),
         ]
-    else:  # RMF moves nobody for it
+    else:  # no task makes RMF move the robot
         assert told == [(at + 4.0, what) for at, what in CALLED_IN_VAIN[3:]]
 
 
@@ -269,7 +269,7 @@ def test_2_a_robots_own_wish_and_an_operators_are_shown_apart(finishing: Finishi
 
 
 def three_at_two(finishing: Finishing) -> Yard:
-    """Both stations charge, and AMR02 waits for either."""
+    """Return a yard in which both stations charge, and AMR02 waits for either."""
     site = yard(finishing)
     for who in ("AMR03", "AMR01", "AMR02"):
         site.fleet.charge(who, site.now)
@@ -403,7 +403,7 @@ def test_4_where_nobody_reads_receivers_the_fleets_position_tells_who_stands_the
     ]
 
 
-# ---- 5a: the station is faulty; 5b: the robot is
+# ---- 5a: a faulty station; 5b: a faulty robot
 
 
 @EACH

@@ -1,4 +1,4 @@
-"""The coordinator's own schedule: when it is in force, for whom, and what a file may say."""
+"""The coordinator's own schedule: when and for which robots it applies, and its settings."""
 
 from pathlib import Path
 

@@ -1,5 +1,7 @@
-"""What a station's state says of a request and of who is at fault, rule by rule: memories made by
-hand, and whole memories afterwards."""
+"""The meaning of a station's state for a request, and the side at fault, rule by rule.
+
+Memories before are made by hand; memories after are compared as a whole.
+"""
 
 import pytest
 from msgspec.structs import replace
@@ -33,12 +35,12 @@ LOST, MISPLACED = "Charger unreachable", "wrong docking: tiny/AMR02 is not assig
 
 
 def at(who: RobotName, place: str | None, since: float = AGES_AGO) -> Standing:
-    """A robot without a task, as its fleet showed it last."""
+    """Return a robot without a task, as its fleet showed it last."""
     return Standing(Sighting(who, False, place, 50.0, ""), 20.0, since, since)
 
 
 def site(**changes: object) -> SiteMemory:
-    """AMR01 has charger_a, and AMR02 waits; both stand at their places."""
+    """Return a memory in which AMR01 has charger_a and AMR02 waits, both at their waiting places."""
     robots = {ONE: at(ONE, "wait_1"), TWO: at(TWO, "wait_2")}
     known = {"may_speak": True, "wishes": WISHES, "grants": {A: GRANT}, "robots": robots}
     return SiteMemory(**{**known, **changes})  # type: ignore[arg-type]
@@ -49,7 +51,7 @@ def shows(state: int, error: str = "", since: float = 10.0, heard: float = 20.0)
 
 
 def after(memory: SiteMemory, state: int, error: str = "", request_id: str = "r1") -> SiteMemory:
-    """The memory once charger_a has shown this at 30 s, but for the state itself."""
+    """Return the memory after charger_a has shown this at 30 s, without the shown state itself."""
     heard = ChargerStateHeard(A, state, request_id, ONE, error)  # type: ignore[arg-type]
     return replace(stations.heard(memory, heard, 30.0, SITE), stations=memory.stations)
 
@@ -153,7 +155,7 @@ def test_an_unnamed_charge_is_that_of_a_robot_that_waits_there_without_a_station
     assert stations.adopted(memory, 30.0, SITE).grants == {B: GRANT, A: granted}
 
 
-# ---- COORDINATOR-3, COORDINATOR-STATIONS-4: time
+# ---- COORDINATOR-3, COORDINATOR-STATIONS-4: time limits
 
 
 @pytest.mark.parametrize(
@@ -231,7 +233,7 @@ def test_a_charge_under_way_or_over_is_left_alone_and_the_next_request_is_not() 
         assert stations.in_time(memory, 99.0, SITE).grants == {A: first}
 
 
-# ---- COORDINATOR-STATIONS-2, COORDINATOR-STATIONS-3: whose fault
+# ---- COORDINATOR-STATIONS-2, COORDINATOR-STATIONS-3: the side at fault
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""The situations that shared chargers meet, whole: fleet adapter, chargers' own cores, coordinator."""
+"""Whole situations of shared chargers: a fleet adapter, the chargers' own cores, the coordinator."""
 
 from typing import Any
 
@@ -14,7 +14,7 @@ from tests.kinds.charger_coordinator.virtual_site import Yard
 
 
 def yard(**changes: object) -> Yard:
-    """Everybody is up, and nobody wants anything yet."""
+    """Return a yard in which all is up and no robot has a wish yet."""
     found = Yard(**changes)  # type: ignore[arg-type]
     assert found.run(5.0) == [
         (0.25, "charger_a: IDLE"),
@@ -40,7 +40,7 @@ def test_a_scheduled_robot_is_called_from_its_place_charged_and_sent_on() -> Non
     site.fleet.works("AMR01", "ward", site.now)
     assert site.run(40.0) == [(30.25, "charger_a: IDLE")]
     assert site.faults == []
-    assert site.assignments == 3, "each change once: every message restarts tasks, and is logged"
+    assert site.assignments == 3, "a repeated assignment would restart tasks"
 
 
 def test_an_operator_has_the_robot_on_the_pad_charged_ad_hoc() -> None:
@@ -232,7 +232,10 @@ def test_a_restart_keeps_the_queue_and_touches_no_charge_under_way() -> None:
 
 
 def charges_at_a(*, by_operator: bool, knows: bool) -> Yard:
-    """AMR01 charges at charger_a; at 14 s it has 60 %, or by an operator 65 %."""
+    """Return a yard in which AMR01 charges at charger_a.
+
+    At 14 s the battery has 60 %, or 65 % if an operator made the request.
+    """
     site = yard(fills=1.0, knows=knows)
     if by_operator:
         site.wants("AMR01")
@@ -246,7 +249,7 @@ def charges_at_a(*, by_operator: bool, knows: bool) -> Yard:
 
 
 AGAIN: Any = [(16.25, "charger_a: ASSIGNED AMR01"), (18.25, "charger_a: CHARGING AMR01")]
-"""What follows when the station is read again, and is asked."""
+"""The history once the station is readable again and gets a request."""
 REFUSED = (16.25, "charger_a: ERROR AMR01 (wrong docking: tiny/AMR01 is not assigned here)")
 
 
@@ -335,7 +338,7 @@ def test_a_coordinator_that_has_lost_its_memory_takes_over_what_the_stations_sho
 
 
 def dedicate(site: Yard, **places: str) -> Publisher[Any]:
-    """RMF's charging schedule begins, and dedicates: a robot that it sends to wait has a wait_… ."""
+    """Begin RMF's charging schedule: each robot is sent to its place, to wait if that is a wait_… ."""
     schedule: Publisher[Any] = site.rmf.publisher(topics.CHARGING_ASSIGNMENTS)
     modes = {who: int(place.startswith("wait")) for who, place in places.items()}
     told = tuple(d.ChargingAssignment(who, place, modes[who]) for who, place in places.items())
@@ -400,7 +403,7 @@ def test_of_two_coordinators_one_serves_and_the_other_only_listens() -> None:
     assert (site.node.status()["passive"], other.status()["passive"]) == (False, True)
 
 
-# ---- COORDINATOR-3, COORDINATOR-STATIONS-4: what is not reached
+# ---- COORDINATOR-3, COORDINATOR-STATIONS-4: unreachable stations
 
 
 def test_a_charge_goes_on_while_its_station_is_not_reached() -> None:

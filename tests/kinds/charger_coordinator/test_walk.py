@@ -1,8 +1,8 @@
-"""Every history to a depth, and drawn ones: what must hold whatever fleets, stations and time do.
+"""All histories to a depth, and drawn ones: rules that hold whatever fleets, stations and time do.
 
-The walk: all histories of three moves (in `make deep` of four: 10^4), a second and more
-apart, of two robots and two stations that do as RMF's charger messages say. Whoever speaks then is
-heard to the end.
+The walk takes all histories of three moves (in `make deep` of four: 10^4), each a second or more apart.
+Two robots and two stations behave as RMF's charger messages say. After the last move everything is mended, and every
+robot that wants to be charged must be.
 """
 
 from copy import copy
@@ -48,8 +48,11 @@ STEP_S = 1.25
 
 
 class Node:
-    """A charger's daemon by the book. `holder`: the request id and robot; `ends`: it was cancelled.
-    `on_pad`: whom it was charging when it was restarted."""
+    """A charger's daemon that obeys the rules.
+
+    `holder` is the request id and robot; `ends`: the request was cancelled. `on_pad` is the robot that
+    was charging when the daemon was restarted.
+    """
 
     def __init__(self) -> None:
         self.state = IDLE
@@ -60,11 +63,11 @@ class Node:
         self.known: set[str] = set()
 
     def takes(self, who: RobotName) -> bool:
-        """May this robot have it?"""
+        """May this robot have the station?"""
         return self.state is IDLE or (self.holder is None and self.on_pad == who)
 
     def restarts(self) -> None:
-        """It was killed, and has forgotten its request; current flows for one more state."""
+        """Restart the daemon: the request is forgotten, and current flows for one more state."""
         self.on_pad = self.holder[1] if self.holder and self.state is CHARGING else None
         self.state = CHARGING if self.on_pad else IDLE
         self.holder, self.error, self.known = None, "", set()
@@ -82,7 +85,7 @@ class Node:
                 self.state = RELEASED
 
     def goes_on(self) -> None:
-        """The next thing that happens when all is well."""
+        """Take the next step of an undisturbed charge."""
         if self.on_pad and self.state is CHARGING:
             self.fails(f"wrong docking: {self.on_pad} is not assigned here")
             return
@@ -106,7 +109,7 @@ class Node:
 
 
 class Ledger:
-    """The coordinator's core, two stations and two robots, and what must hold at each word."""
+    """The coordinator's core, two stations and two robots, with the rules for each message."""
 
     def __init__(self) -> None:
         self.now = 0.0
@@ -120,7 +123,7 @@ class Ledger:
         self.passes()
 
     def copy(self) -> "Ledger":
-        """A copy that has the same history, to continue in another way."""
+        """Return a copy with the same history, to continue in another way."""
         made = copy(self)
         made.nodes = {name: copy(node) for name, node in self.nodes.items()}
         for node in made.nodes.values():
@@ -140,7 +143,7 @@ class Ledger:
             self._check(message)
 
     def passes(self) -> None:
-        """Time, the stations' states and the fleet's."""
+        """Let time pass, and let the states of stations and fleet arrive."""
         self.now += STEP_S
         for name, node in self.nodes.items():
             self.hears(node.shown(name))
@@ -150,7 +153,7 @@ class Ledger:
         self.hears(Woken())
 
     def check_all_are_charged_in_the_end(self) -> None:
-        """Everything is mended and goes on; fail unless every robot that wants to be charged is."""
+        """Mend everything and go on; fail unless every robot that wants to charge is charged."""
         if not self.speaks:
             self.hears(MaySpeak(True))
         before = dict(self.charged)
@@ -182,10 +185,10 @@ class Ledger:
                 assert len(set(places)) == len(places)
                 assert set(places) <= WAYPOINTS
         live = self._live()
-        assert len(set(live)) == len(live), "one robot, two stations"
+        assert len(set(live)) == len(live), "one robot has two stations"
 
     def _live(self) -> list[RobotName]:
-        """The robots that have a station, and are not to leave it."""
+        """Return the robots that have a station and need not leave it."""
         return [
             node.holder[1]
             for node in self.nodes.values()
@@ -193,7 +196,7 @@ class Ledger:
         ]
 
     def restarts(self) -> None:
-        """Killed and back, after the quiet time."""
+        """Restart the coordinator, and let its quiet time pass."""
         memory = self.memory
         kept = keep.persist({"site": memory})
         self.memory = keep.restore(kept, SETTINGS, self.now)["site"]
@@ -232,7 +235,7 @@ MOVES: list[Any] = [
 
 
 def after(ledger: Ledger, move: Any) -> Ledger:
-    """A copy one move later."""
+    """Return a copy one move later."""
     ledger = ledger.copy()
     move(ledger)
     ledger.passes()
@@ -348,4 +351,4 @@ def test_a_damaged_memory_of_the_coordinator_is_refused_as_a_whole(kept: bytes) 
         keep.restore(kept, SETTINGS, 0.0)
     except ValueError:
         return
-    raise AssertionError("that was no memory of ours")
+    raise AssertionError("a damaged memory was accepted")

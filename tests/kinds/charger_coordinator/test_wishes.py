@@ -1,4 +1,4 @@
-"""Who wants to be charged, rule by rule: memories made by hand, and what one FleetState changes."""
+"""Wishes to be charged, rule by rule: memories made by hand, and the changes by one FleetState."""
 
 import pytest
 from msgspec.structs import replace
@@ -30,14 +30,14 @@ AT_NIGHT, AT_NOON = LocalTime(0, 23 * 60), LocalTime(0, 12 * 60)
 def seen(
     place: str | None = "wait_1", percent: float = 50.0, task: str = "", charges: bool = False
 ) -> Sighting:
-    """AMR01, as its fleet shows it."""
+    """Return AMR01 as its fleet shows it."""
     return Sighting(ONE, charges, place, percent, task)
 
 
 def after(
     memory: SiteMemory, sighting: Sighting, now: float, site: SiteLimits = SITE
 ) -> SiteMemory:
-    """The memory once a fleet has shown it, but for what is remembered of the sighting itself."""
+    """Return the memory after a fleet has shown a robot, without the memory of the sighting itself."""
     return replace(wishes.sighted(memory, sighting, now, site), robots=memory.robots)
 
 
@@ -82,7 +82,7 @@ def test_a_withdrawal_is_by_the_operators_id_or_by_the_one_that_the_station_show
     assert wishes.unwanted(left, "r1") == (left, "no such request")
 
 
-# ---- COORDINATOR-WISHES-5: it came when it was called, or not
+# ---- COORDINATOR-WISHES-5: whether a called robot came
 
 
 @pytest.mark.parametrize(
@@ -128,11 +128,14 @@ def test_a_robot_that_did_not_come_loses_station_and_wish_and_is_not_called_for_
     )
 
 
-# ---- COORDINATOR-WISHES-2, COORDINATOR-WISHES-3: it was charged
+# ---- COORDINATOR-WISHES-2, COORDINATOR-WISHES-3: a charged robot
 
 
 def charged(by: By = "fleet", **changes: object) -> SiteMemory:
-    """AMR01 charges at charger_a; it failed before, and waits at a pad in the task "t1"."""
+    """Return a memory in which AMR01 charges at charger_a.
+
+    It failed before at charger_b, and stands at the pad of charger_a in the task "t1".
+    """
     return SiteMemory(
         wishes=(Wish(ONE, by, "t1"), Wish(TWO, "fleet")),
         grants={A: Grant(ONE, "r1", 10.0, shown=True, started=True, sent_at=10.0)},
@@ -228,7 +231,7 @@ def test_a_robot_that_has_left_in_another_task_was_served_long_ago(
     assert after(memory, sighting, 30.0).served == served
 
 
-# ---- COORDINATOR-WISHES-4: it begins a task
+# ---- COORDINATOR-WISHES-4: a robot that begins a task
 
 IDLE_WISH = Wish(ONE, "fleet")
 ON_ITS_WAY = Wish(ONE, "fleet", "t2", called=True)
@@ -254,7 +257,7 @@ def test_a_task_that_begins_soon_after_the_call_is_the_drive_to_the_station(
     assert found == (two, then) if then else found == (two,)
 
 
-# ---- COORDINATOR-WISHES-1, COORDINATOR-WISHES-2, COORDINATOR-WISHES-3: it wants to be charged
+# ---- COORDINATOR-WISHES-1, COORDINATOR-WISHES-2, COORDINATOR-WISHES-3: how a wish begins
 
 
 def test_a_wish_begins_once_the_robot_has_stood_there_for_two_seconds() -> None:
@@ -335,7 +338,7 @@ def test_a_served_robots_mode_is_believed_after_five_minutes_in_another_task(
     assert after(memory, sighting, now).wishes == found
 
 
-# ---- COORDINATOR-WISHES-4: it still wants to be charged
+# ---- COORDINATOR-WISHES-4: a robot that still wants to be charged
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""Robots on the wrong pad, rule by rule: memories made by hand, and whole answers."""
+"""Robots on the wrong pad, rule by rule: memories made by hand, and whole results."""
 
 from collections.abc import Mapping
 
@@ -30,24 +30,24 @@ SITE = SiteLimits.of(settings())
 ONE, TWO, THREE = (RobotName("tiny", f"AMR0{i}") for i in (1, 2, 3))
 A, B = "charger_a", "charger_b"
 AT = {A: "charger_a", B: "dock_b"}
-"""Station -> its waypoint."""
+"""The waypoint of each station."""
 PAD = "wrong docking: tiny/AMR01 is not assigned here"
 
 
 def at(
     who: RobotName, place: str | None, since: float, task: str = "", heard: float = 85.0
 ) -> Standing:
-    """A robot at one of our waypoints since then, as its fleet showed it last at `heard`."""
+    """Return a robot at this waypoint since `since`, as its fleet last showed it at `heard`."""
     return Standing(Sighting(who, False, place, 50.0, task), heard, since, since)
 
 
 def shows(state: ChargerStateValue = IDLE, since: float = 0.0, error: str = "") -> StationSeen:
-    """A station's state since then."""
+    """Return a station with this state since `since`."""
     return StationSeen(state, "", None, error, 85.0, since)
 
 
 def site(*robots: Standing, **changes: object) -> SiteMemory:
-    """Both stations are idle, and we assign."""
+    """Return a memory in which both stations are idle and the coordinator may publish."""
     found: Mapping[str, object] = {
         "may_speak": True,
         "robots": {standing.sighting.who: standing for standing in robots},
@@ -57,11 +57,11 @@ def site(*robots: Standing, **changes: object) -> SiteMemory:
 
 
 def found(memory: SiteMemory, *times: float) -> list[list[OnWrongPad]]:
-    """Who is astray at each of these times."""
+    """Return the robots on wrong pads at each of these times."""
     return [list(wrong_pad.found(memory, now, SITE).values()) for now in times]
 
 
-# ---- COORDINATOR-WRONG-PAD-1: who has a station, and stands at another
+# ---- COORDINATOR-WRONG-PAD-1: a robot with a station, on the pad of another station
 
 EXPECTED = {A: Grant(ONE, "r1", 10.0, shown=True)}
 
@@ -100,7 +100,7 @@ def test_the_stations_own_word_for_who_is_on_its_pad_counts_at_once_and_only_in_
 def history(
     memory: SiteMemory, *times: float
 ) -> list[tuple[float, dict[RobotName, Nudge], bool, bool]]:
-    """(s, who was told so far, whether ONE is told now, whether a person must come), as time passes."""
+    """Return for each time (s, nudges so far, is ONE nudged now?, is an alarm raised?)."""
     lines = []
     for now in times:
         memory = wrong_pad.nudged(memory, now, SITE)
@@ -111,7 +111,7 @@ def history(
     return lines
 
 
-# ---- COORDINATOR-WRONG-PAD-1, COORDINATOR-WRONG-PAD-4: what it is told
+# ---- COORDINATOR-WRONG-PAD-1, COORDINATOR-WRONG-PAD-4: the nudges of a robot
 
 
 def test_a_stray_is_told_twice_for_one_request_and_then_a_person_is() -> None:
@@ -139,7 +139,7 @@ def test_a_stray_is_told_again_for_a_new_request_and_the_count_lasts_on_its_way(
     assert wrong_pad.nudged(left, 60.0, SITE).nudges == {ONE: Nudge("r1", 1, 22.0)}
 
 
-# ---- COORDINATOR-WRONG-PAD-3, COORDINATOR-WRONG-PAD-4: who cannot be told
+# ---- COORDINATOR-WRONG-PAD-3, COORDINATOR-WRONG-PAD-4: robots that cannot be nudged
 
 
 @pytest.mark.parametrize("why", ["it works", "another node assigns", "we may not speak"])
@@ -162,19 +162,19 @@ def test_the_core_wakes_for_every_step_with_a_robot_astray() -> None:
     assert dues == [[22.0, 22.0, NEVER], [22.0, 23.0, 37.0, NEVER], [22.0, 38.0, 52.0, NEVER]]
 
 
-# ---- COORDINATOR-WRONG-PAD-2: who has no station, and stands on a pad that another waits for
+# ---- COORDINATOR-WRONG-PAD-2: a robot without a station, on a pad for which another robot waits
 
 WAITS = (Wish(ONE, "fleet"),)
 BLOCKS = OnWrongPad(TWO, A, 90.0, A, 1, waiter=ONE)
 
 
 def blocks(station: str) -> OnWrongPad:
-    """TWO blocks this one."""
+    """Return the finding that TWO blocks this station."""
     return BLOCKS._replace(station=station, why=station)
 
 
 def blocked(came_at: float = 30.0, **changes: object) -> SiteMemory:
-    """TWO stands at charger_a, where nobody charges it, and ONE waits."""
+    """Return a memory in which TWO stands at charger_a without charging, and ONE waits."""
     return site(at(TWO, AT[A], came_at), **{"wishes": WAITS, **changes})
 
 
@@ -192,7 +192,7 @@ def test_nobody_blocks_where_nobody_waits_or_the_waiting_robot_itself_stands() -
 
 
 def test_waiting_robots_are_looked_for_among_all_wishes_and_their_pads_in_order() -> None:
-    """THREE, which is first in the queue, has its station; ONE and TWO wait, and TWO stands on one."""
+    """THREE, first in the queue, has its station already. ONE and TWO wait, and TWO stands on a pad."""
     memory = blocked(
         wishes=(Wish(THREE, "fleet"), Wish(TWO, "fleet"), Wish(ONE, "fleet")),
         grants={B: Grant(THREE, "r3", 10.0, shown=True)},

@@ -1,5 +1,8 @@
-"""A charging yard in virtual time: our coordinator as the daemon runs it, charger daemons' own cores
-with a plant under each, and a fleet adapter whose robots obey. The network is the memory transport."""
+"""A charging yard in virtual time: our coordinator as in its daemon, chargers, and an obedient fleet.
+
+Each charger is its daemon's own core with a plant. A fleet adapter moves the robots as it is told. The
+network is the memory transport.
+"""
 
 from typing import Any
 
@@ -39,7 +42,7 @@ BIG_GRAPH = {
     "bay_1": ("L1", 0.0, 10.0),
     "ward": ("L1", 50.0, 0.0),
 }
-"""The other brand's, in which the same places have other names."""
+"""The waypoints of the other brand, which has other names for the same places."""
 PLACES = {
     "charger_a": {"tiny": "charger_a", "big": "station_1"},
     "charger_b": {"tiny": "dock_b", "big": "station_2"},
@@ -50,7 +53,7 @@ BIG = {"RX-9": RobotName("big", "B01")}
 
 
 def settings(**changes: Any) -> CoordinatorSettings:
-    """Two stations, three robots that may use both; `AMR03` charger_b only."""
+    """Return the settings of two stations and three robots; `AMR03` may use charger_b only."""
     robots = {
         who.name: RobotSettings(
             stations=["charger_a", "charger_b"][who.name == "AMR03" :],
@@ -76,7 +79,7 @@ def settings(**changes: Any) -> CoordinatorSettings:
 
 
 def two_brands() -> CoordinatorSettings:
-    """The same two stations, and a fleet of another brand beside the first."""
+    """Return the settings of the same two stations, with a fleet of another brand beside the first."""
     tiny = settings().fleets["tiny"]
     waypoints = {
         n: Waypoint(level=a, x=x, y=y) for n, (a, x, y) in BIG_GRAPH.items() if n != "ward"
@@ -93,10 +96,11 @@ def two_brands() -> CoordinatorSettings:
 
 
 class Charger:
-    """A charger's daemon: its own core, and a station under it.
+    """A charger's daemon: its own core, and a station.
 
-    To break: `broken` (an error once it energises, of the side `fails`), `refuses` (receivers whose
-    handshake fails), `unplugged` (it does not answer its daemon), `dead` (the daemon itself).
+    Possible faults: `broken` gives an error on the side `fails` as soon as power flows; `refuses` has
+    receivers whose handshake fails; an `unplugged` station does not answer its daemon; `dead` is a dead
+    daemon.
     """
 
     def __init__(self, name: str, knows: bool = True) -> None:
@@ -119,17 +123,17 @@ class Charger:
         self._told_at = -1.0
 
     def restarts(self, now: float, switched_off: bool = True) -> None:
-        """Its daemon was killed and is up again. `switched_off`: `outputs-off` reached the station."""
+        """Restart a killed daemon. `switched_off`: `outputs-off` reached the station meanwhile."""
         self.memory = charger.initial(self.limits, now)
         self._power = self._power and not switched_off
         self._clears, self._told, self.dead = 0, None, False
 
     def stops(self) -> None:
-        """Its power ends, whatever its daemon says."""
+        """End the power, whatever the daemon orders."""
         self._power = False
 
     def scan(self, now: float) -> d.ChargerState | None:
-        """Read, decide, drive; the state when it is due."""
+        """Read, decide and drive; return the state when it is due."""
         self._run(now)
         if self.unplugged:
             return self.decide(IoFailed("no route to host"), now)
@@ -141,7 +145,7 @@ class Charger:
         return self.decide(Sampled(ChargerSample(self.activity, 0, text, measured, side)), now)
 
     def decide(self, event: Any, now: float) -> d.ChargerState | None:
-        """One decision of the daemon's core."""
+        """Make one decision of the daemon's core."""
         decision = charger.decide(self.memory, event, now, self.limits)
         self.memory, outputs = decision.memory, decision.outputs
         if not self.unplugged:
@@ -177,7 +181,7 @@ class Charger:
 
 
 class Yard:
-    """All of them. `story`: (s, what) of everything worth telling, in order; `fills`: % per second."""
+    """The whole yard. `story` has (s, event) in order; `fills` is the charging speed (%/s)."""
 
     def __init__(
         self,
@@ -215,21 +219,21 @@ class Yard:
         self.coordinator = self.serves("ours", self.disk)
 
     def serves(self, name: str, disk: Disk | None = None) -> Served:
-        """A coordinator's daemon. Its wall clock shows 13:46:40 at 0 s."""
+        """Start a coordinator's daemon. Its wall clock shows 13:46:40 at 0 s."""
         return Served(self.world, KIND, self.settings, name, 1e6 - EPOCH, disk)
 
     @property
     def node(self) -> GraphNode[Any, Any, Any, Any, Any]:
-        """The coordinator."""
+        """Return the coordinator's node."""
         return self.coordinator.node
 
     @property
     def now(self) -> float:
-        """Monotonic s."""
+        """Return the monotonic time (s)."""
         return self.world.now
 
     def run(self, until: float) -> list[tuple[float, str]]:
-        """Let time pass; what was told meanwhile."""
+        """Let time pass; return the events of that time."""
         told = len(self.story)
         self.world.run(until)
         return self.story[told:]
@@ -242,22 +246,22 @@ class Yard:
             self._scan(charger_)
 
     def tell(self, what: str) -> None:
-        """One line of the story."""
+        """Add an event to the story."""
         self.story.append((round(self.now, 3), what))
 
     def wants(self, who: str, station: str = "", request_id: str = "op-1") -> None:
-        """An operator's wish."""
+        """Publish an operator's wish."""
         timeout = duration(0.0)
         request = d.ChargerRequest(station, "tiny", who, timeout, request_id)
         self.wishes.publish(request)
 
     def mode(self, station: str) -> str:
-        """What its last state said."""
+        """Return the mode in the station's last state."""
         return self._shown[station].split()[0]
 
     @property
     def faults(self) -> list[str]:
-        """What the coordinator's status shows."""
+        """Return the faults in the coordinator's status."""
         return [
             f"{f['code']}: {f['detail']}" for s in self.node.devices().values() for f in s["faults"]
         ]

@@ -1,6 +1,6 @@
-"""What must be true of every decision of the door's core, whatever happened before it.
+"""Rules for every decision of the door's core, whatever happened before.
 
-Judged from the event, the inputs, the outputs and the walk's ledger; the core's memory is not asked.
+The rules judge the event, the inputs, the outputs and the walk's ledger, but never the core's memory.
 """
 
 from typing import Any
@@ -14,7 +14,7 @@ from tests.kinds.door.walk import UNLIKE, Step, World, burns, fresh, reading, si
 
 
 def check(step: Step) -> None:
-    """Check every rule; AssertionError says which is broken."""
+    """Check every rule; the AssertionError shows the broken rule."""
     the_hold_has_a_reason(step)
     the_relay_follows_the_hold(step)
     open_is_the_truth(step)
@@ -25,7 +25,7 @@ def check(step: Step) -> None:
 
 
 def the_hold_has_a_reason(step: Step) -> None:
-    """RMF wants it, or fire does, or somebody stands there after we let go; else it is off."""
+    """Require a reason for a hold: RMF's request, a fire, or an obstruction after such a hold."""
     held, ledger = step.decision.report.hold, step.ledger
     if not _sighted(step):
         assert not held
@@ -47,14 +47,14 @@ def the_hold_has_a_reason(step: Step) -> None:
 
 
 def the_relay_follows_the_hold(step: Step) -> None:
-    """Steadily, or in pulses from when the hold began."""
+    """Require the relay to follow the hold: steadily, or in pulses from the begin of the hold."""
     on, pulse = step.decision.outputs.hold_open, step.limits.pulse
     in_pulse = pulse is None or (step.now - step.ledger.held_since) % pulse.every_s < pulse.on_s
     assert on == (step.ledger.held and in_pulse)
 
 
 def open_is_the_truth(step: Step) -> None:
-    """OPEN only by a fresh reading of the contact at the open end, or by time where permitted."""
+    """Require, for OPEN, a fresh reading of the open contact, or, if permitted, the opening time."""
     shown, sample = step.decision.report, step.world.sample
     if not _sighted(step):
         assert shown.mode is DoorModeValue.MODE_OFFLINE
@@ -77,8 +77,11 @@ def open_is_the_truth(step: Step) -> None:
 
 
 def a_request_that_waits_has_a_reason(step: Step) -> None:
-    """An OPEN waits while RMF wants the door open, and is not shown that it is. Without the hold there
-    is a fault too, except before the first reading."""
+    """Require a reason for each waiting OPEN.
+
+    An OPEN waits while RMF wants the door open and the door is not shown OPEN. If the hold is missing
+    too, there must be a fault, except before the first reading.
+    """
     shown = step.decision.report
     assert bool(shown.waits) == (step.ledger.wanted and shown.mode is not DoorModeValue.MODE_OPEN)
     stands = shown.waits and not shown.hold and step.ledger.read_at is not None
@@ -86,7 +89,7 @@ def a_request_that_waits_has_a_reason(step: Step) -> None:
 
 
 def hazards_are_as_read(step: Step) -> None:
-    """A fire counts as soon as it lasts and ends when it has been away; only it refuses OPEN."""
+    """Require hazards as read: a fire begins at once, ends with a delay, and alone refuses OPEN."""
     clear_s = step.limits.t.hazard_clear_s
     if fresh(step.ledger, step.now, step.limits):
         assert not (burns(step.decision) and _told_otherwise(step, "fire", clear_s))
@@ -99,7 +102,7 @@ def hazards_are_as_read(step: Step) -> None:
 
 
 def nothing_changes_before_wake_at(world: World, limits: DoorLimits) -> None:
-    """Scans of the same inputs between now and `wake_at` decide nothing else."""
+    """Require scans of unchanged inputs between now and `wake_at` to decide nothing new."""
     now = _scan(world, world.memory, 0.0, limits)
     until = min(now.wake_at, 1e4)
     later = _scan(world, now.memory, until * (1.0 - 1e-6), limits)
@@ -132,6 +135,6 @@ def _signal(step: Step, name: str) -> bool:
 
 
 def _told_otherwise(step: Step, name: str, for_s: float) -> bool:
-    """Have the readings shown for so long, without a gap, that it is not asserted?"""
+    """Have the readings shown for so long, without a gap, that the contact is not asserted?"""
     since = step.ledger.unlike[UNLIKE.index(name)]
     return since is not None and step.now >= since + for_s

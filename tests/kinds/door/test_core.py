@@ -54,7 +54,7 @@ def test_an_open_before_the_first_reading_is_kept_and_held_with_it() -> None:
     assert core.told == [(0.0, "OFFLINE", False), (1.0, "UNKNOWN", True), (1.0625, "CLOSED", True)]
 
 
-# ---- DOOR-6: its contacts
+# ---- DOOR-6: the contacts
 
 
 def test_a_doors_position_is_unknown_before_its_contacts_have_settled() -> None:
@@ -183,7 +183,7 @@ def test_an_obstruction_at_a_door_that_is_not_held_is_not_a_fault() -> None:
     assert core.faults() == ()
 
 
-# ---- DOOR-6, DOOR-SENSING-4: what is told of its position
+# ---- DOOR-6, DOOR-SENSING-4: the reported position
 
 
 def test_open_and_closed_at_once_is_unknown_and_a_fault_while_it_lasts() -> None:

@@ -1,4 +1,4 @@
-"""RMF's door messages at the edge."""
+"""RMF's door messages, where they enter and leave the daemon."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""What holds for a door in long histories: of requests, readings, gaps, rivals and alarms."""
+"""Properties of a door in long histories of requests, readings, gaps, rivals and alarms."""
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -28,7 +28,7 @@ LIMITS = st.builds(
 
 
 def checked(step: Step) -> None:
-    """The rules hold, and a decision that is repeated is the same decision."""
+    """Check that the rules hold, and that a repeated decision gives the same result."""
     check(step)
     once = step.decision
     assert decide(step.before, step.event, step.now, step.limits) == once

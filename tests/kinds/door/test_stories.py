@@ -1,4 +1,4 @@
-"""Whole stories of a door, its driver, its operator and RMF's supervisor, in virtual time."""
+"""Whole stories of a door, with its driver, its operator and RMF's supervisor, in virtual time."""
 
 from typing import Any
 
@@ -12,7 +12,7 @@ from workbench.rmf_model.supervisors import DoorSupervisor
 
 
 class Corridor:
-    """A door, RMF's door supervisor, and robots that ask it. States go out at 1 Hz and on change."""
+    """A door, RMF's door supervisor, and robots. States go out at 1 Hz and on change."""
 
     def __init__(self, **changes: Any) -> None:
         self.door = Door(**changes)
@@ -20,7 +20,7 @@ class Corridor:
         self._told: tuple[int, int] | None = None
 
     def robot(self, name: str, mode: DoorModeValue) -> None:
-        """A robot's fleet adapter asks the supervisor, which may ask the door."""
+        """Let a robot's fleet adapter ask the supervisor, which may ask the door."""
         self._deliver(door_request("door", name, mode, self.door.now))
 
     def run(self, until: float) -> None:
@@ -197,7 +197,7 @@ def test_a_cut_wire_of_each_contact_never_reads_as_open() -> None:
         assert "OPEN" not in [mode for _, mode in door.told], signal
 
 
-# ---- DOOR-5: what is lost and comes back
+# ---- DOOR-5: lost and restored connections
 
 
 def test_a_door_whose_module_is_lost_is_offline_and_is_held_again_when_it_is_back() -> None:

@@ -1,4 +1,4 @@
-"""DOOR-1: the grace of a CLOSE is a door's limit on switching: it lengthens a hold and refuses none."""
+"""DOOR-1: the grace after CLOSE limits switching; it may lengthen a hold, but refuses none."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""Every state within some steps of the start, and of each stage of a passage: what is true in all."""
+"""All states within some steps of the start and of each stage of a passage, checked by the rules."""
 
 import pytest
 from msgspec.structs import replace
@@ -37,12 +37,12 @@ STAGES: dict[str, tuple[str | float, ...]] = {
 
 
 def path(*steps: str | float, limits: DoorLimits = PLAIN) -> World:
-    """The state that these moves and waits lead to."""
+    """Return the state after these moves and waits."""
     return walker(limits).path(start(limits), *steps)
 
 
 class Scan:
-    """One more scan of a state, checked; what it decided."""
+    """One more scan of a state, checked, with its decision."""
 
     def __init__(self, world: World, limits: DoorLimits) -> None:
         self._steps: list[Step] = []
@@ -105,18 +105,18 @@ def test_the_rules_hold_within_some_steps_of_all_stages_at_each_kind_of_site(sit
 
 
 def mended(world: World, limits: DoorLimits) -> World:
-    """The building mends itself: the door is shut, nobody is in it, nothing burns, all answer."""
+    """Return the world mended: the door shut, the doorway empty, no fire, everything answers."""
     world = replace(world, sample=start(limits).sample, readable=True, writable=True)
     return path_checked(world, limits, 6.0)
 
 
 def path_checked(world: World, limits: DoorLimits, *steps: str | float) -> World:
-    """After these moves and waits, each step of them checked."""
+    """Return the world after these moves and waits, with each step checked."""
     return walker(limits).path(world, *steps, seen=check)
 
 
 def states_around_all_stages(limits: DoorLimits) -> list[World]:
-    """Every state within a step of them."""
+    """Return every state within a step of the stages."""
     roots = [path(*steps, limits=limits) for steps in STAGES.values()]
     return walker(limits).walk(roots, 1, check)
 

@@ -34,7 +34,7 @@ def word(mode: DoorModeValue) -> str:
 
 
 class CoreAlone:
-    """The core, fed by hand. `told`: (s, mode, hold relay) whenever mode or relay differ."""
+    """The core, fed by hand. `told` has (s, mode, hold relay) for each change of mode or relay."""
 
     def __init__(self, limits: DoorLimits | None = None) -> None:
         self.limits = limits or DoorLimits(debounce=DEBOUNCED)
@@ -44,7 +44,7 @@ class CoreAlone:
         self.last: Decided | None = None
 
     def hears(self, event: Event) -> Decided:
-        """One decision, now."""
+        """Make one decision, now."""
         decided = decide(self.memory, event, self.now, self.limits)
         self.memory, self.last = decided.memory, decided
         told = (word(decided.report.mode), decided.outputs.hold_open)
@@ -53,7 +53,7 @@ class CoreAlone:
         return decided
 
     def sees(self, sample: DoorSample | IoFailed, until: float) -> Decided:
-        """Scans with these inputs, from now until then."""
+        """Scan with these inputs, from now until then."""
         event: Event = sample if isinstance(sample, IoFailed) else Sampled(sample)
         decided = self.hears(event)
         while self.now < until:
@@ -62,13 +62,13 @@ class CoreAlone:
         return decided
 
     def faults(self) -> tuple[str, ...]:
-        """What is wrong now."""
+        """Return the present faults."""
         assert self.last is not None
         return tuple(str(fault) for fault in self.last.report.faults)
 
 
 def settings(**changes: Any) -> DryContactDoorSettings:
-    """A door on a Modbus module, as its YAML would have it, with these keys changed."""
+    """Return the settings of a door on a Modbus module, as from a YAML, with these keys changed."""
     inputs = changes.pop("inputs", {})
     plain = {
         "inputs": {
@@ -93,7 +93,7 @@ FIRE = _input(3, "low")
 
 
 class Door:
-    """The whole door: `told` is (s, mode) as RMF would hear it; `relay` and `faults` likewise."""
+    """The whole door. `told` has (s, mode) as RMF hears it; `relay` and `faults` have their changes."""
 
     def __init__(self, **changes: Any) -> None:
         self.settings = settings(**changes)
@@ -107,14 +107,14 @@ class Door:
         self.restart()
 
     def restart(self) -> None:
-        """A new daemon on the same door: outputs off, nothing remembered."""
+        """Start a new daemon on the same door: outputs off, nothing remembered."""
         self.driver: DryContactDoor = create("door", self.settings, self.bus)
         self.memory = initial(self.limits, self.now)
         self.driver.open()
         self.scan()
 
     def run(self, until: float) -> None:
-        """Scans from now until then."""
+        """Scan from now until then."""
         while self.now < until:
             self.now = min(until, self.now + SCAN_S, self.wake_at)
             self.scan()
@@ -135,16 +135,16 @@ class Door:
         _note(self.faults, self.now, tuple(fault.code for fault in decided.report.faults))
 
     def opens(self, requester: str = "door_supervisor") -> None:
-        """An OPEN arrives."""
+        """Let an OPEN arrive."""
         self.scan(OpenRequested(requester))
 
     def closes(self, requester: str = "door_supervisor") -> None:
-        """A CLOSE arrives."""
+        """Let a CLOSE arrive."""
         self.scan(CloseRequested(requester))
 
     @property
     def relay(self) -> list[tuple[float, bool]]:
-        """Every edge of the hold relay."""
+        """Return every edge of the hold relay."""
         return [
             (round(e.at, 4), bool(e.value)) for e in self.plant.edges if e.signal == "hold_open"
         ]

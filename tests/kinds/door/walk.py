@@ -1,8 +1,8 @@
-"""Every state that the door's core can reach within some steps, and what must be true in each.
+"""All states that the door's core can reach within some steps.
 
-A state is the core's memory with every time relative to now, the building around it, and a ledger
-that tells the rules in other words. Ages that are beyond every limit are made equal, so that states
-that cannot behave differently are one. All durations are sums of powers of two: no time is rounded.
+A state has the core's memory with every time relative to now, the building around it, and a ledger that
+follows the rules in its own words. Ages beyond every limit are made equal, so that states that cannot
+behave differently count as one state. All durations are sums of powers of two, so no time is rounded.
 """
 
 from collections.abc import Callable
@@ -22,24 +22,24 @@ from tests.kinds.door.virtual import Decided
 from tests.walk import Walker
 
 LONG_S = 32.0
-"""Without a wake_at, a scan each so many seconds is enough here; below `stale_after_s`."""
+"""The longest time between scans (s) while the core wants no wake; it is below `stale_after_s`."""
 
 DURATIONS: dict[str, float] = {"stale_after_s": 60.0, "max_hold_s": 30.0}
-"""Not the defaults: the age of readings, which costs scans; and the alarm for a door left open."""
+"""Changed defaults: longer `stale_after_s` saves scans; `max_hold_s` gives the open door's alarm."""
 
 
 def limits_of(durations: dict[str, float] | None = None, **facts: Any) -> DoorLimits:
-    """The default durations, except these."""
+    """Return the limits with these durations, and DURATIONS and the defaults for the rest."""
     return DoorLimits(t=DoorDurations(**{**DURATIONS, **(durations or {})}), **facts)
 
 
 class Ledger(msgspec.Struct, frozen=True):
-    """What has happened, without the core's conclusions. Times are relative to the state's.
+    """Events without the core's conclusions. Times are relative to the state's time.
 
-    `wanted`: RMF has asked for it open; `ends_at`: when its CLOSE comes true. `let_go`: what held it
-    has ended, and no reading since then has said closed. `shut`: the last reading says so.
-    `sure_since`: since when the hold is as it is and nothing has failed. `unlike`: by contact, since
-    when readings have said otherwise than asserted.
+    `wanted`: RMF has asked for the door open; `ends_at` is when RMF's CLOSE takes effect. `let_go`: the
+    reason for the hold has ended, and no reading since has said closed. `shut`: the last reading says
+    closed. `sure_since` is when the hold last changed or a failure ended. `unlike` has, for each
+    contact, since when the readings have said that the contact is not asserted.
     """
 
     held: bool = False
@@ -58,7 +58,7 @@ UNLIKE = ("opened", "obstruction", "fire")
 
 
 class World(msgspec.Struct, frozen=True):
-    """Memory and ledger at time 0, and the building: whether it can be read, and written to."""
+    """Memory and ledger at time 0, and the building: can it be read, and written to?"""
 
     memory: DoorMemory
     sample: DoorSample
@@ -68,12 +68,12 @@ class World(msgspec.Struct, frozen=True):
 
 
 def start(limits: DoorLimits) -> World:
-    """A daemon that has just started on a closed door; without contacts where they are estimated."""
+    """Return a daemon just started on a closed door; an estimated door has no contacts."""
     opened, closed = (None, None) if limits.estimated else (False, True)
     return World(initial(limits, 0.0), DoorSample(opened, closed, obstruction=False, fire=False))
 
 
-# ---- what can happen
+# ---- possible events
 
 Move = Callable[[World], tuple[World, Event]]
 
@@ -119,7 +119,7 @@ def _relay(world: World) -> tuple[World, Event]:
 
 
 def reading(world: World) -> Event:
-    """What a scan reads."""
+    """Return the reading of a scan."""
     return Sampled(world.sample) if world.readable else IoFailed("timeout")
 
 
@@ -141,7 +141,7 @@ MOVES: dict[str, Move] = {
     "reset": _event(OperatorReset()),
 }
 TIMES = (0.0625, 1.0, 4.0, 16.0, 64.0)
-"""Below and beyond the debounce, the hazards' end, the grace, the travel and opening, the age."""
+"""Times on both sides of debounce, hazards' end, grace, travel, opening and age."""
 
 
 # ---- one step
@@ -150,7 +150,7 @@ Seen = Callable[["Step"], None]
 
 
 class Step(msgspec.Struct, frozen=True):
-    """One decision, at time `now` after the state began. `ledger`: with this step in it."""
+    """One decision at time `now` after the state began; `ledger` includes this step."""
 
     before: DoorMemory
     event: Event
@@ -162,13 +162,13 @@ class Step(msgspec.Struct, frozen=True):
 
 
 def moved(world: World, move: Move, limits: DoorLimits, seen: Seen) -> World:
-    """The state after a move, at the same instant."""
+    """Return the state after a move, at the same instant."""
     around, event = move(world)
     return _scanned(around, event, 0.0, limits, seen)[0]
 
 
 def waited(world: World, seconds: float, limits: DoorLimits, seen: Seen) -> World:
-    """The state after some time, with a scan whenever the core wants one."""
+    """Return the state after some time, with a scan whenever the core wants a scan."""
     now = 0.0
     world, wake_at = _scanned(world, reading(world), now, limits, seen)
     while now < seconds:
@@ -184,7 +184,7 @@ def waited(world: World, seconds: float, limits: DoorLimits, seen: Seen) -> Worl
 def _scanned(
     world: World, event: Event, now: float, limits: DoorLimits, seen: Seen
 ) -> tuple[World, float]:
-    """One scan: decide and write. Also when to scan again."""
+    """Scan once: decide and write. Return the world, and the time of the next scan."""
     step = _step(world, event, now, limits, seen)
     world = replace(world, memory=step.decision.memory, ledger=step.ledger)
     if not world.writable:
@@ -204,7 +204,7 @@ def _step(world: World, event: Event, now: float, limits: DoorLimits, seen: Seen
 def noted(
     ledger: Ledger, event: Event, now: float, decision: Decided, limits: DoorLimits
 ) -> Ledger:
-    """The ledger after one decision. It takes over only the hold, and whether a fire ended it."""
+    """Return the ledger after a decision, of which it uses only the hold, the refusal and the fire."""
     wanted, ends_at = _asked(ledger, event, now, bool(decision.refused), limits)
     if limits.on_fire == "release" and burns(decision):
         wanted, ends_at = False, None
@@ -234,26 +234,26 @@ def noted(
 
 
 def fresh(ledger: Ledger, now: float, limits: DoorLimits) -> bool:
-    """Is the last reading young enough?"""
+    """Is the last reading fresh?"""
     return ledger.read_at is not None and now < ledger.read_at + limits.t.stale_after_s
 
 
 def sighted(ledger: Ledger, now: float, limits: DoorLimits) -> bool:
-    """A fresh reading, and nobody else under this name."""
+    """Is there a fresh reading, and no other node of this name?"""
     rival_at = ledger.rival_at
     alone = rival_at is None or now >= rival_at + RIVAL_QUIET_S
     return alone and fresh(ledger, now, limits)
 
 
 def burns(decision: Decided) -> bool:
-    """Does the core say that there is a fire?"""
+    """Does the core report a fire?"""
     return any(fault.code == "FIRE_ALARM" for fault in decision.report.faults)
 
 
 def _asked(
     ledger: Ledger, event: Event, now: float, refused: bool, limits: DoorLimits
 ) -> tuple[bool, float | None]:
-    """Does RMF want the door open? A CLOSE counts after its grace."""
+    """Return whether RMF wants the door open, and when a CLOSE takes effect after its grace."""
     wanted, ends_at = ledger.wanted, ledger.ends_at
     if ends_at is not None and now >= ends_at and not isinstance(event, OpenRequested):
         wanted, ends_at = False, None
@@ -268,7 +268,7 @@ def _asked(
 def _unlike(
     ledger: Ledger, event: Event, now: float, limits: DoorLimits
 ) -> tuple[float | None, ...]:
-    """A failed reading ends what was seen; a failed write is no reading."""
+    """Return since when each contact reads as not asserted; only a failed reading ends that time."""
     if isinstance(event, Sampled):
         gap = not fresh(ledger, now, limits)
         said = [getattr(event.sample, signal) for signal in UNLIKE]
@@ -285,7 +285,7 @@ def _unlike(
 
 
 def shifted(memory: DoorMemory, by: float, limits: DoorLimits) -> DoorMemory:
-    """The same memory with every time moved by so much, and old ones cut off."""
+    """Return the same memory with every time moved by so much, and old times cut off."""
     t, senses = limits.t, memory.senses
     return replace(
         memory,
@@ -320,12 +320,12 @@ def _shifted(ledger: Ledger, by: float, limits: DoorLimits) -> Ledger:
 
 
 def _at(at: Any, by: float, oldest_s: float = float("inf")) -> Any:
-    """A time, moved, and no further back than makes a difference; None stays."""
+    """Return a moved time, cut off where more age makes no difference; None stays None."""
     return None if at is None else max(at + by, -oldest_s)
 
 
 def _held_since(at: float, by: float, limits: DoorLimits) -> float:
-    """The age of the hold, cut off beyond every limit; its place among the pulses stays."""
+    """Return the begin of the hold, cut off beyond every limit but at the same place between pulses."""
     age_s, oldest_s = -(at + by), max(limits.t.travel_s, limits.t.open_timeout_s)
     if age_s <= oldest_s:
         return -age_s
@@ -333,7 +333,7 @@ def _held_since(at: float, by: float, limits: DoorLimits) -> float:
 
 
 def _settled(seen: Settled[Any] | None, by: float) -> Any:
-    """A settled contact without its time; a half-seen one with it."""
+    """Return a settled contact without its time, and an unsettled contact with its time."""
     if seen is None:
         return None
     return Settled(
@@ -346,7 +346,7 @@ def _settled(seen: Settled[Any] | None, by: float) -> Any:
 
 
 def alike(world: World, limits: DoorLimits) -> World:
-    """Equal for states that cannot behave differently."""
+    """Return the world in a form that is equal for states that cannot behave differently."""
     return replace(
         world,
         memory=shifted(world.memory, 0.0, limits),
@@ -355,7 +355,7 @@ def alike(world: World, limits: DoorLimits) -> World:
 
 
 def walker(limits: DoorLimits) -> Walker[World, Move]:
-    """The door's, with these limits."""
+    """Return the door's walker with these limits."""
     return Walker(
         MOVES,
         TIMES,

@@ -1,4 +1,4 @@
-"""The supervisor's core alone, for one door, in virtual time: told by hand, its words written down."""
+"""The supervisor's core alone, for one door, in virtual time: tests give events and note messages."""
 
 from bridges.kinds.door_supervisor import core
 from bridges.kinds.door_supervisor.memory import DoorSupervisorLimits, SupervisedDoor
@@ -16,7 +16,7 @@ SECOND_NS = 10**9
 
 
 class Alone(alone.Alone[SupervisedDoor, Event, DoorSupervisorLimits, DoorHoldReport]):
-    """With one door. `faults`: (s, texts), each time that they differ."""
+    """The core for one door. `faults` has (s, texts) for each change."""
 
     def __init__(self, limits: DoorSupervisorLimits | None = None, *, speaks: bool = True) -> None:
         self.faults: list[tuple[float, tuple[str, ...]]] = []
@@ -36,18 +36,18 @@ class Alone(alone.Alone[SupervisedDoor, Event, DoorSupervisorLimits, DoorHoldRep
             self.faults.append((round(self.now, 3), faults))
 
     def opens(self, who: str = "a", *, aged: float = 0.0) -> None:
-        """A requester's OPEN, sent `aged` s ago by its own clock."""
+        """Let a requester's OPEN arrive, sent `aged` s ago by the requester's clock."""
         self.hears(RequesterOpens(who, self.stamp(aged)))
 
     def closes(self, who: str = "a", *, aged: float = 0.0) -> None:
-        """A requester's CLOSE."""
+        """Let a requester's CLOSE arrive, sent `aged` s ago by the requester's clock."""
         self.hears(RequesterCloses(who, self.stamp(aged)))
 
     def stamp(self, aged: float) -> int:
         return round(self.stamped(aged) * SECOND_NS)
 
     def shows(self, mode: str, until: float | None = None) -> None:
-        """A DoorState; with `until`, one each second from now until then."""
+        """Let a DoorState arrive; with `until`, one each second from now until then."""
         self.hears(DoorStateHeard(DoorModeValue[f"MODE_{mode}"]))
         while until is not None and self.now + 1.0 <= until:
             self.until(self.now + 1.0)

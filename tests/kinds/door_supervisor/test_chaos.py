@@ -1,7 +1,7 @@
-"""Robots at a door while messages are lost, late, doubled and reordered, and everybody dies at times.
+"""Robots at a door while messages are lost, late, doubled and reordered, and every party dies at times.
 
-Whatever happens: no CLOSE while a robot is let in, no flood; and once the network is well again
-everybody gets through, and the door is closed behind the last one.
+There must be no CLOSE while a robot is let in, and no flood of messages. Once the network is well again
+every robot must get through, and the door must close behind the last.
 """
 
 from collections.abc import Callable, Sequence
@@ -33,7 +33,7 @@ def late(random: Random) -> Sequence[float]:
 
 
 class Storm:
-    """The site, and the watch over what our supervisor says."""
+    """The site, with a watch over our supervisor's messages."""
 
     def __init__(self, seed: int, fate: Fate, disk: Disk | None = None) -> None:
         self.random = Random(seed)
@@ -53,7 +53,7 @@ class Storm:
         self.wrong: list[tuple[float, tuple[str, ...]]] = []
 
     def rages(self) -> None:
-        """Every few seconds somebody dies, and is back after a while."""
+        """Kill a party every few seconds, and start it again after a while."""
         while self.world.now < STORM_S:
             self.run(self.world.now + self.random.uniform(2.0, 15.0))
             match self.random.choice(("supervisor", "supervisor", "door", *ROBOTS)):
@@ -72,7 +72,7 @@ class Storm:
         self.run(self.world.now + CALM_S)
 
     def run(self, until: float) -> None:
-        """In small steps, to see who is let in and who leaves."""
+        """Run in small steps, to see which robots are let in and which leave."""
         while self.world.now < until:
             self.world.run(min(until, self.world.now + 0.0625))
 
@@ -88,7 +88,7 @@ class Storm:
             self.wrong.append((self.world.now, tuple(self.let_in)))
 
     def _look(self) -> None:
-        """A robot that is let in holds the door, unless a heartbeat of its earlier visit let it in."""
+        """Note the robots that are let in; a robot without a hold was misled by an earlier heartbeat."""
         for who, walker in self.walkers.items():
             if not walker.passing:
                 self.let_in.discard(who)
@@ -101,7 +101,7 @@ class Storm:
 
 
 def rates(storm: Storm, topic: Any) -> list[float]:
-    """The gaps (s) between our supervisor's messages on this topic, across its restarts too."""
+    """Return the gaps (s) between our supervisor's messages on this topic, across its restarts too."""
     at = [when for when, who, said, _ in storm.world.sent if (who, said) == ("supervisor", topic)]
     return [b - a for a, b in pairwise(at)]
 
@@ -129,14 +129,14 @@ def test_no_door_closes_on_a_robot_and_no_robot_waits_for_ever(seed: int, fate: 
 
 
 class Forgetful(Disk):
-    """A table that does not outlive its supervisor, as with RMF's own."""
+    """A table on no disk: it is lost at a restart, as with RMF's own supervisor."""
 
     def read(self) -> bytes | None:
         return None
 
 
 def test_the_test_notices_a_close_on_a_robot() -> None:
-    """Without the table, a restart closes the door on robots in the doorway."""
+    """Without the table on disk a restart closes the door on robots, and the watch notices."""
     wrong = 0
     for seed in range(4):
         storm = Storm(seed, lossy, Forgetful())

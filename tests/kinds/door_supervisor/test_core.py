@@ -1,4 +1,4 @@
-"""The door supervisor's rules, one sentence each; what it sends to the door's node, whole."""
+"""The door supervisor's rules, a sentence each, with all messages to the door's node."""
 
 from itertools import pairwise
 
@@ -308,7 +308,7 @@ def test_a_repeat_belongs_to_the_same_visit_unless_it_comes_late() -> None:
     assert holder.repeats(8, late + 0.1) == replace(holder, asked_at=late + 0.1, stamp=8, visit=8)
 
 
-# ---- DOOR-SUPERVISOR-4: when it may speak
+# ---- DOOR-SUPERVISOR-4: permission to publish
 
 
 def test_after_its_quiet_start_it_first_sends_open_for_each_holder() -> None:
@@ -348,7 +348,7 @@ def test_beside_another_supervisor_it_sends_nothing_and_keeps_its_table() -> Non
     assert (desk.sent, desk.holders) == ([(0.0, "OPEN"), (20.0, "OPEN")], ["b"])
 
 
-# ---- DOOR-SUPERVISOR-3: what is told
+# ---- DOOR-SUPERVISOR-3: the report
 
 
 def test_a_door_that_one_requester_has_held_for_too_long_is_a_fault_and_nothing_else() -> None:

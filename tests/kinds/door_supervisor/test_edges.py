@@ -1,4 +1,4 @@
-"""What comes in from RMF's graph and from the state directory: taken, or refused by name."""
+"""Messages from RMF's graph and memory from the state directory: accepted, or refused with a reason."""
 
 import pytest
 
@@ -115,7 +115,7 @@ def test_the_daemon_uses_the_names_and_topics_of_rmfs_own_supervisor() -> None:
     assert KIND.sole == (topics.DOOR_REQUESTS,)
 
 
-# --- the table ---------------------------------------------------------------------------------
+# --- the table on disk ------------------------------------------------------------------------
 
 
 def held(door: str, **stamps: int) -> SupervisedDoor:

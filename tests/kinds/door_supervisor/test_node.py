@@ -20,7 +20,7 @@ HEARTBEAT = topics.DOOR_SUPERVISOR_HEARTBEAT
 
 
 class Graph:
-    """One network, our node on it, and everything that is heard of it: (s, words)."""
+    """One network with our node; `heard` has (s, words) of all its messages."""
 
     def __init__(self) -> None:
         self.now = 0.0

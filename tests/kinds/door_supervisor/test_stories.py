@@ -18,7 +18,7 @@ A, B = "fleet/a", "fleet/b"
 
 
 class Site:
-    """One door, robots with these plans, and a supervisor from the start: ours, with its disk."""
+    """One door, robots with these plans, and a supervisor: ours with its disk, or RMF's."""
 
     def __init__(
         self, *plans: list[tuple[float, float]], theirs: bool = False, **changes: object
@@ -35,7 +35,7 @@ class Site:
         ]
 
     def restarts(self, after_s: float = 0.0) -> None:
-        """Our supervisor dies, and is back after a while."""
+        """Kill our supervisor and start it again after a while."""
         self.ours.leave()
         self.world.run(self.world.now + after_s)
         self.ours.restart()
@@ -246,7 +246,7 @@ def test_the_heartbeat_goes_out_each_second_and_when_the_table_changes() -> None
         (6.25, listed),
         (6.35, listed),  # the robot has asked again
         (7.25, listed),
-        (8.25, listed),  # it is inside
+        (8.25, listed),  # the robot is inside
     ]
 
 
@@ -277,7 +277,7 @@ def test_a_door_that_falls_silent_is_forgotten() -> None:
 
 
 def doorway(*, rival: bool = False, quiet_s: float = 3.0) -> Site:
-    """A robot stands in the doorway, silent, when the door's node and our supervisor die together."""
+    """Let the door's node and our supervisor die while a silent robot stands in the doorway."""
     site = Site([(10.0, 60.0)], quiet_start_s=quiet_s)
     site.world.run(25.0)
     assert site.walkers[0].passing
@@ -294,7 +294,7 @@ def doorway(*, rival: bool = False, quiet_s: float = 3.0) -> Site:
     return site
 
 
-# ---- DOOR-SUPERVISOR-4: holders that are restored
+# ---- DOOR-SUPERVISOR-4: restored holders
 
 
 def test_a_robot_in_the_doorway_keeps_its_door_when_the_door_and_our_supervisor_die_together() -> (

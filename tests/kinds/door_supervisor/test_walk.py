@@ -1,8 +1,8 @@
-"""Every history to a depth, and drawn ones: the rules once more, in other words.
+"""All histories to a depth, and drawn ones, checked by the rules in other words.
 
-The walk: all 4^7 = 16384 histories of seven steps, 0.75 s apart, of two requesters who open and
-close (stamps in order); then all 6^5 = 7776 of late requests, states and leave to speak. But for
-`make deep` they are two steps and one step shorter.
+The first walk has all 4^7 = 16384 histories of seven steps, 0.75 s apart: two requesters open and
+close, with stamps in order. The second walk has all 6^5 = 7776 histories of late requests, states and
+permissions to publish. Except in `make deep` the first walk is two steps shorter, the second one step.
 """
 
 from collections.abc import Callable
@@ -29,7 +29,7 @@ STEP_S = 0.75
 
 
 class Ledger:
-    """The table by RMF's rules, as if requests came in order; and what must hold at each message."""
+    """The table by RMF's rules for requests in order, with the rules for each message."""
 
     def __init__(self, *, speaks: bool) -> None:
         self.memory: SupervisedDoor = core.initial("ward", 0.0)
@@ -43,7 +43,7 @@ class Ledger:
         self.hears(MaySpeak(speaks))
 
     def copy(self) -> "Ledger":
-        """A copy that has the same history, to continue in another way."""
+        """Return a copy with the same history, to continue in another way."""
         made = copy(self)
         made.holders, made.newest, made.sent = set(self.holders), dict(self.newest), [*self.sent]
         return made
@@ -61,7 +61,7 @@ class Ledger:
         codes = [fault.code for fault in decided.report.faults]
         assert ("DOOR_HELD_OPEN" in codes) == bool(late)
         assert bool(decided.report.waits) == (bool(self.holders) and not self.speaks)
-        # A new holder reaches the node soon: a message is due, or the last one was right.
+        # A new holder's OPEN reaches the node soon: a message is due, or the last message was OPEN.
         if self.speaks and self.holders:
             assert self.memory.sent == OPEN or self.wake_at <= self.now + GAP_S
 
@@ -98,7 +98,7 @@ def stamp(now: float, aged: float = 0.0) -> int:
 
 
 def after(ledger: Ledger, event: Callable[[float], Any]) -> Ledger:
-    """A copy that hears this event now, a step's time later."""
+    """Return a copy that hears this event now, a step's time later."""
     ledger = ledger.copy()
     ledger.hears(event(ledger.now))
     ledger.until(ledger.now + STEP_S)
@@ -106,7 +106,7 @@ def after(ledger: Ledger, event: Callable[[float], Any]) -> Ledger:
 
 
 def asked(ledger: Ledger, move: tuple[Any, str]) -> Ledger:
-    """A copy that hears this requester open or close."""
+    """Return a copy that hears this requester open or close."""
     word, who = move
     return after(ledger, lambda now: word(who, stamp(now)))
 
@@ -163,8 +163,11 @@ def told(history: list[tuple[float, Any]]) -> Ledger:
 
 
 def _would_be_believed(ledger: Ledger, event: Any) -> bool:
-    """Would this old request count? Long after the last one it means that a clock was set back, or that
-    its requester was forgotten; test_core has stories of both."""
+    """Would this old request be accepted?
+
+    An old stamp long after the last request means that a clock was set back or the requester was
+    forgotten; test_core has stories of both.
+    """
     if not isinstance(event, RequesterOpens | RequesterCloses) or event.stamp >= ledger.newest.get(
         event.requester, 0
     ):

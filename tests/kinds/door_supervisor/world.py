@@ -1,6 +1,6 @@
 """A corridor in virtual time: a door with its daemon's core, robots of RMF, and a door supervisor.
 
-The supervisor is ours as it is served, or the stand-in for RMF's.
+The supervisor is ours as it is served, or the stand-in for RMF's supervisor.
 """
 
 from collections.abc import Iterable
@@ -28,7 +28,7 @@ def holds(disk: Disk, who: str) -> bool:
 
 
 class OurSupervisor(Served):
-    """The supervisor of this repository. `disk`: its state directory."""
+    """The supervisor of this repository, with its state directory `disk`."""
 
     disk: Disk
 
@@ -39,14 +39,14 @@ class OurSupervisor(Served):
 
 
 class RmfsSupervisor(StandIn):
-    """RMF's own supervisor, by its rules."""
+    """A stand-in for RMF's own supervisor."""
 
     def __init__(self, world: World) -> None:
         super().__init__(world, DoorSupervisor, "rmf_supervisor", topics.DOOR_REQUESTS)
 
 
 def to_door(world: World) -> list[tuple[float, str, str]]:
-    """Every word on door_requests: (s, who said it, OPEN or CLOSED)."""
+    """Return every message on door_requests: (s, sender, OPEN or CLOSED)."""
     return [
         (at, who, d.DoorModeValue(request.requested_mode.value).name[5:])
         for at, who, request in world.said_on(topics.DOOR_REQUESTS)
@@ -54,7 +54,7 @@ def to_door(world: World) -> list[tuple[float, str, str]]:
 
 
 class DoorDaemon:
-    """A door's daemon: scans, obeys door_requests, tells its state at 1 Hz and on change."""
+    """A door's daemon: it scans, obeys door_requests, and publishes its state at 1 Hz and on change."""
 
     def __init__(self, world: World, name: str = WARD, **changes: Any) -> None:
         self.name = name
@@ -66,24 +66,24 @@ class DoorDaemon:
         world.add(self, topics.DOOR_REQUESTS)
 
     def hear(self, topic: topics.Topic[Any], message: Any) -> None:
-        """A request for this door, or another's."""
+        """Take a request for this door or for another door."""
         if message.door_name == self.name:
             self.door.now = self.world.now
             self.door.scan(door_messages.accept(message, self.door.settings))
             self._tell()
 
     def wake(self) -> None:
-        """One scan."""
+        """Scan once."""
         self.door.now = self.world.now
         self.door.scan()
         self._tell()
 
     def wake_at(self) -> float:
-        """The next scan."""
+        """Return the time of the next scan."""
         return min(self.door.now + SCAN_S, self.door.wake_at)
 
     def restart(self) -> None:
-        """The daemon dies and is back: outputs off, nothing remembered."""
+        """Restart the daemon: outputs off, nothing remembered."""
         self.door.now = self.world.now
         self.door.restart()
 
@@ -99,7 +99,8 @@ class DoorDaemon:
 class Walker:
     """A fleet adapter and its robot, which goes through the door again and again.
 
-    `log`: (s, what). `passing`: it has been let in and has not asked to close. `skew`: of its clock.
+    `log` has (s, event). `passing`: the robot has been let in and has not sent CLOSE yet. `skew`: how
+    far the adapter's clock is ahead (s).
     """
 
     def __init__(
@@ -119,22 +120,22 @@ class Walker:
         world.add(self, *RobotContext.subscribes)
 
     def hear(self, topic: topics.Topic[Any], message: Any) -> None:
-        """The robot's own rules, then what comes next in its day."""
+        """Apply the robot's own rules, then begin the next step of its day if it is due."""
         say(self.world, self.name, self.robot.hear(message, self.world.now + self.skew))
         self._go_on()
 
     def wake(self) -> None:
-        """Its timers are due, or the robot's next step."""
+        """Run the robot's timers, and the next step of its day if it is due."""
         if self.world.now >= self.robot.wake_at() - self.skew:
             say(self.world, self.name, self.robot.tick(self.world.now + self.skew))
         self._go_on()
 
     def wake_at(self) -> float:
-        """When its next repeat is due, or the robot's next step."""
+        """Return the time of the next repeat or of the robot's next step."""
         return min(self.robot.wake_at() - self.skew, self._next_at)
 
     def restart(self) -> None:
-        """The fleet adapter dies and is back: it knows of no door."""
+        """Restart the fleet adapter, which then knows of no door."""
         self.robot, self.passing = RobotContext(self.name), False
         self._note("restarted")
         self._plan_next()

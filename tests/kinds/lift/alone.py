@@ -1,4 +1,4 @@
-"""The lift's core alone: told one event after the other, at times given by hand."""
+"""The lift's core alone: tests give one event after the other, at chosen times."""
 
 from typing import Any
 
@@ -33,7 +33,7 @@ ASKED = LiftRequested("A", True, "L1")
 
 
 class Alone:
-    """A core alone, told one event after the other; `decision`: the last."""
+    """A core alone, which gets one event after the other; `decision` is the last decision."""
 
     def __init__(
         self, debounce: dict[str, float] | None = None, by_call: bool = False, **limits: Any

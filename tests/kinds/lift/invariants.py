@@ -1,6 +1,6 @@
-"""What must be true of every decision of the lift's core, whatever happened before it.
+"""Rules for every decision of the lift's core, whatever happened before.
 
-Judged from the event, the inputs and the outputs; the core's own conclusions are not asked.
+The rules compare the event, the inputs and the outputs with the core's memory.
 """
 
 import math
@@ -29,7 +29,7 @@ HINDER_NOBODY = {"FORGOTTEN_BY_SUPERVISOR", "RELAY_RESTS"}
 
 
 def check(step: Step) -> None:
-    """Check every rule; AssertionError says which is broken."""
+    """Check every rule; the AssertionError shows the broken rule."""
     outputs_make_sense(step)
     nothing_is_driven_when_forbidden(step)
     sessions_end_by_end_alone(step)
@@ -39,9 +39,10 @@ def check(step: Step) -> None:
 
 
 def outputs_make_sense(step: Step) -> None:
-    """Calls and door commands exclude each other, need AGV mode, a session, and the right place.
+    """Require sensible outputs: calls and door commands exclude each other.
 
-    A call that is to bring AGV mode needs none, and may be for where the car stands.
+    Both need AGV mode, a session and the right place. A call that is to bring AGV mode needs no AGV
+    mode, and may be for the car's own landing.
     """
     driven, memory, sample = step.decision.outputs, step.decision.memory, step.world.sample
     session, grace = memory.session, memory.grace
@@ -69,7 +70,7 @@ def outputs_make_sense(step: Step) -> None:
 
 
 def nothing_is_driven_when_forbidden(step: Step) -> None:
-    """Hazards, another node, blindness and HUMAN mode switch everything off, at once."""
+    """Require all outputs off, at once, under a hazard, another node, blindness or HUMAN mode."""
     memory, now = step.decision.memory, step.now
     session = memory.session
     forbidden = (
@@ -85,8 +86,12 @@ def nothing_is_driven_when_forbidden(step: Step) -> None:
 
 
 def sessions_end_by_end_alone(step: Step) -> None:
-    """Granted by a request while free, ended by the holder's END or by the silence of a robot whose END
-    has come, and untouched by all else. Who may be in the car gets the lift back, and nobody else."""
+    """Require sessions to begin and end only as permitted.
+
+    A request begins a session of a free lift. The holder's END ends it, and so does the silence of a
+    robot after its supervisor's END; nothing else does. In the grace a robot that may be in the car
+    gets the lift back, and no other session gets it.
+    """
     before, after, event = _id(step.before), _id(step.decision.memory), step.event
     if before and _fell_silent(step):
         assert after is None or (after == before and _is_asked_for(event, before))
@@ -119,7 +124,7 @@ def _is_asked_for(event: object, session: str) -> bool:
 
 
 def _fell_silent(step: Step) -> bool:
-    """The supervisor has ended the session, and its robot has not asked for five seconds."""
+    """Has the robot been silent for five seconds after the supervisor ended its session?"""
     session = step.before.session
     assert session is not None
     disowned = session.forgotten is not None and session.forgotten.disowned
@@ -127,8 +132,11 @@ def _fell_silent(step: Step) -> bool:
 
 
 def _is_its_end(step: Step, event: object) -> bool:
-    """An END of its supervisor while its robot does not go on asking, a person's, or its robot's own
-    where that counts."""
+    """Is the event an END that counts?
+
+    Such an END comes from a person, from the robot's own adapter where that is permitted, or from the
+    supervisor unless the robot goes on asking.
+    """
     session = step.before.session
     assert session is not None
     forgotten, robot, ends = session.forgotten, session.robot, session.ends
@@ -147,7 +155,7 @@ def _is_its_end(step: Step, event: object) -> bool:
 
 
 def open_is_the_truth(step: Step) -> None:
-    """OPEN only of an open door of a standing car at a known floor; for boarding, of a sound lift."""
+    """Require, for OPEN, an open door of a standing car at a known floor; to board, a healthy lift."""
     shown: LiftReport = step.decision.report
     if shown.door is not LiftDoor.DOOR_OPEN:
         return
@@ -171,8 +179,11 @@ def open_is_the_truth(step: Step) -> None:
 
 
 def a_request_that_waits_has_a_reason(step: Step) -> None:
-    """A request waits while the lift has its session, and does not show the last floor that was asked
-    for with the door OPEN. A wait for a worn relay is a fault as well."""
+    """Require a reason for each waiting request.
+
+    A request waits while it has the session and the lift does not show OPEN at the floor that was
+    requested last. A wait for a worn relay is a fault as well.
+    """
     shown, session = step.decision.report, step.decision.memory.session
     event = step.event
     waits = session is not None and (
@@ -204,7 +215,7 @@ def _worn(channel: Any, step: Step) -> bool:
 
 
 def nothing_changes_before_wake_at(world: World, limits: LiftLimits) -> None:
-    """Scans of the same inputs between now and `wake_at` decide nothing else."""
+    """Require scans of unchanged inputs between now and `wake_at` to decide nothing new."""
     now = _scan(world, world.memory, 0.0, limits)
     until = min(now.wake_at, 1e4)
     later = _scan(world, now.memory, until * (1.0 - 1e-6), limits)

@@ -14,14 +14,15 @@ from workbench.rmf_model.supervisors import LiftSupervisor
 STEP_S = 0.25
 
 REPLAYED = 100
-"""How many old requests a transient-local topic gives to a new subscriber, of each publisher."""
+"""The number of old requests that a transient-local publisher gives to a new subscriber."""
 
 
 class World:
-    """`fate` gives the delays (s) after which a LiftRequest reaches the node: none loses it, two double
-    it. `hears` says whether RMF gets a LiftState. By default all arrives at once and in order.
+    """The lift's node and RMF's parties.
 
-    The robots hear each state before the supervisor when `adapters_first`.
+    `fate` gives the delays (s) of a LiftRequest to the node: an empty list loses the request, two
+    delays double it. `hears`: does RMF get this LiftState? By default all messages arrive at once and
+    in order. With `adapters_first` the robots hear each state before the supervisor.
     """
 
     def __init__(self, story: Story, *robots: RobotContext, adapters_first: bool = False) -> None:
@@ -37,7 +38,7 @@ class World:
         story.hear = self._hear
 
     def run(self, until: float) -> None:
-        """Time passes, and late requests arrive."""
+        """Let time pass, and deliver late requests."""
         while self.story.now < until:
             self.story.run(min(until, self.story.now + STEP_S))
             arrived = [r for at, r in self._flying if at <= self.story.now]
@@ -46,15 +47,15 @@ class World:
                 self.story.request(*arrived)
 
     def asks(self, robot: RobotContext, floor: str, *, inside: bool = False) -> None:
-        """A robot's task comes to RequestLift."""
+        """Let a robot's task begin RequestLift."""
         self._say(robot.begin(RequestLift("Lift1", floor, inside=inside), self._now))
 
     def releases(self, robot: RobotContext) -> None:
-        """A robot has left the car: EndLiftSession."""
+        """Let a robot that has left the car begin EndLiftSession."""
         self._say(robot.begin(EndLiftSession("Lift1"), self._now))
 
     def rides(self, robot: RobotContext, start: str, end: str) -> None:
-        """A whole ride of one robot, from request to release."""
+        """Play a whole ride of one robot, from request to release."""
         self.asks(robot, start)
         self.until_done(robot)
         robot.in_car = True
@@ -67,15 +68,17 @@ class World:
         self.until_done(robot)
 
     def until_done(self, robot: RobotContext, within: float = 60.0) -> None:
-        """Until the robot's phase is complete."""
+        """Run until the robot's phase is complete."""
         end = self.story.now + within
         while not robot.done:
             assert self.story.now < end, f"not within {within} s: {self.story.state}"
             self.run(self.story.now + STEP_S)
 
     def restart_supervisor(self, first: RobotContext | None = None) -> None:
-        """A new one, which the fleet adapters' retained requests reach first, those of `first` before
-        the others'."""
+        """Start a new supervisor, which gets the adapters' retained requests.
+
+        The requests of `first` come before those of the other adapters.
+        """
         self.supervisor = LiftSupervisor()
         who = first.requester_id if first else ""
         for _, history in sorted(self._history.items(), key=lambda item: item[0] != who):
@@ -84,18 +87,18 @@ class World:
         self._arrive()
 
     def finds_again(self, robot: RobotContext, apart_s: float = 0.02) -> None:
-        """The supervisor finds an adapter again that was cut off, and hears what it has retained."""
+        """Let the supervisor find a cut-off adapter again, and hear its retained requests."""
         for request in self.asked_by(robot):
             self._deliver(self.supervisor.hear(request, self._now))
             self._arrive()
             self.run(self.story.now + apart_s)
 
     def asked_by(self, robot: RobotContext) -> list[LiftRequest]:
-        """What its adapter has retained."""
+        """Return the requests that the robot's adapter has retained."""
         return self._history[robot.requester_id][-REPLAYED:]
 
     def restart_adapter(self, robot: RobotContext) -> RobotContext:
-        """A new fleet adapter for the same robot, which has no task and holds no lift."""
+        """Start a new fleet adapter for the same robot, without a task and without a lift."""
         fresh = RobotContext(robot.requester_id)
         fresh.on_task = False
         self.robots[self.robots.index(robot)] = fresh

@@ -1,7 +1,7 @@
-"""A lift in virtual time: the real node and core, with a building behind the driver that tests drive.
+"""A lift in virtual time: the real node and core, and behind the driver a building that tests control.
 
-Scans come each `scan_s`, at every `wake_at` and with every request, as the loop makes them. Histories
-are lists of (s, what), so that a test can assert all that happened with ==.
+Scans come each `scan_s`, at every `wake_at` and with every request, as in the daemon's loop. Histories
+are lists of (s, event), so a test can compare a whole history with ==.
 """
 
 import math
@@ -48,13 +48,15 @@ AGV, HUMAN, END = (
 OUTPUTS = ("agv_request", "call", "hold_door")
 
 STANDING = LiftSample("L1", DoorReading.CLOSED, motion=Motion.STOPPED, agv=False)
-"""At L1, closed, in nobody's service."""
+"""The car at L1, closed, without a session."""
 
 
 class Building:
-    """The lift as a test sets it (`drivers.Driver[LiftSample, LiftOutputs]`); it does nothing itself.
+    """The lift as the test sets it (`drivers.Driver[LiftSample, LiftOutputs]`); it does nothing by
+    itself.
 
-    `edges`: (s, output, value). `unreadable`, `unwritable`: why reading or writing fails.
+    `edges` has (s, output, value). `unreadable` and `unwritable` are the reasons why reading or writing
+    fails.
     """
 
     def __init__(self, sample: LiftSample = STANDING) -> None:
@@ -68,15 +70,15 @@ class Building:
         self.opened = 0
 
     def set(self, **inputs: Any) -> None:
-        """Some inputs change."""
+        """Change some inputs."""
         self.sample = replace(self.sample, **inputs)
 
     def hazard(self, *hazards: Hazard) -> None:
-        """These hazards are there, and no others."""
+        """Set the present hazards."""
         self.set(hazards=frozenset(hazards))
 
     def advance(self, now: float) -> None:
-        """Time passes."""
+        """Let time pass."""
         self.now = now
 
     def open(self) -> None:
@@ -113,9 +115,9 @@ def _of(outputs: LiftOutputs, name: str) -> Any:
 
 
 class Controller(Building):
-    """A lift that works: grants AGV mode, goes where it is called, opens while the door is held.
+    """A lift that works: it grants AGV mode, goes to called floors, and opens while its door is held.
 
-    A floor takes `FLOOR_S`, in the middle of which no floor is shown; the door takes `DOOR_S`.
+    A floor takes `FLOOR_S`, with no floor shown in the middle; the door takes `DOOR_S`.
     """
 
     AGV_S, FLOOR_S, DOOR_S = 0.5, 2.0, 1.0
@@ -176,7 +178,7 @@ class Controller(Building):
 
 
 def words(state: LiftState) -> str:
-    """A state as a person says it."""
+    """Return a state in words."""
     door = LiftDoor(state.door_state).name.removeprefix("DOOR_").lower()
     mode = LiftMode(state.current_mode).name.removeprefix("MODE_")
     session = f", {state.session_id} to {state.destination_floor}" if state.session_id else ""
@@ -184,9 +186,9 @@ def words(state: LiftState) -> str:
 
 
 class Story:
-    """One lift in service. `told`: what RMF heard, (s, LiftState), whether it changed or not.
+    """One lift in service. `told` has every LiftState that RMF heard, as (s, LiftState).
 
-    `hear` is called with each state; what is then put into `incoming` arrives at once.
+    `hear` is called with each state; messages that it puts into `incoming` arrive at once.
     """
 
     def __init__(
@@ -215,7 +217,7 @@ class Story:
         self.limits = LiftLimits.of(self.settings, DEBOUNCE if debounce is None else debounce)
         self.now = 0.0
         self.wall_step_s = 0.0
-        self.deaf = False  # nothing can be sent
+        self.deaf = False  # if True, nothing can be sent
         self.told: list[tuple[float, LiftState]] = []
         self.alarms: list[tuple[float, Message]] = []
         self.hear: Callable[[LiftState], None] = lambda state: None
@@ -225,10 +227,10 @@ class Story:
         self._scans = 0
         self.restart()
 
-    # ---- what happens
+    # ---- events
 
     def restart(self) -> None:
-        """A new daemon, which remembers nothing, starts on the same lift."""
+        """Start a new daemon on the same lift; it remembers nothing."""
         clock = Clock(lambda: self.now, lambda: WALL + self.now + self.wall_step_s)
         self.node = Node(
             "Lift1", self._kind, self.settings, self.limits, self.building, self._publish, clock
@@ -236,7 +238,7 @@ class Story:
         self._scan()
 
     def run(self, until: float) -> None:
-        """Scans from now until then."""
+        """Scan from now until then."""
         while self.now < until:
             due = min(self._scans * self._scan_s, max(self.node.wake_at, self.now + LEAST_GAP_S))
             while due == self._scans * self._scan_s:
@@ -246,7 +248,7 @@ class Story:
                 self._scan()
 
     def until(self, what: Callable[[], object], within: float = 60.0) -> float:
-        """Scans until this is so; when that was (s)."""
+        """Scan until the condition holds; return that time (s)."""
         end = self.now + within
         while not what():
             assert self.now < end, f"not within {within} s: {self.state}"
@@ -254,50 +256,50 @@ class Story:
         return round(self.now, 2)
 
     def asks(self, session: str, floor: str, mode: LiftRequestType = AGV) -> None:
-        """A request of the kind that fleet adapters and rmf-web send."""
+        """Let a request arrive as fleet adapters and rmf-web send it."""
         self.request(LiftRequest("Lift1", session_id=session, request_type=int(mode),
                                  destination_floor=floor, door_state=2))  # fmt: skip
 
     def ends(self, session: str) -> None:
-        """END_SESSION as fleet adapters send it: no floor, door 0."""
+        """Let END_SESSION arrive as fleet adapters send it: no floor, door 0."""
         self.request(LiftRequest("Lift1", session_id=session, request_type=int(END)))
 
     def request(self, *requests: LiftRequest) -> None:
-        """These requests arrive from the supervisor in one scan."""
+        """Let these requests of the supervisor arrive in one scan."""
         self.receive(*((LIFT_REQUESTS, request) for request in requests))
 
     def receive(self, *said: tuple[Topic[Any], LiftRequest]) -> None:
-        """These arrive in one scan, each on its topic."""
+        """Let these messages arrive in one scan, each on its topic."""
         self._scan(*accepted(self.node, self._kind, self.settings, *said))
 
     def rival(self) -> None:
-        """Somebody else publishes a state of this lift."""
+        """Let another node publish a state of this lift."""
         self._scan(RivalSeen())
 
     def resets(self) -> None:
-        """An operator's `rmf-bridge reset`."""
+        """Reset, as an operator does with `rmf-bridge reset`."""
         self._scan(OperatorReset())
 
-    # ---- what is known of it
+    # ---- results
 
     @property
     def edges(self) -> list[tuple[float, str, Any]]:
-        """Each change of an output."""
+        """Return each change of an output."""
         return self.building.edges
 
     @property
     def outputs(self) -> LiftOutputs:
-        """What is driven."""
+        """Return the driven outputs."""
         return self.building.driven
 
     @property
     def state(self) -> str:
-        """What RMF was told last."""
+        """Return the last state for RMF, in words."""
         return words(self.told[-1][1])
 
     @property
     def states(self) -> list[tuple[float, str]]:
-        """What RMF was told, without the repeats."""
+        """Return the states for RMF, in words and without repeats."""
         changes: list[tuple[float, str]] = []
         for at, state in self.told:
             if not changes or words(state) != changes[-1][1]:
@@ -306,13 +308,13 @@ class Story:
 
     @property
     def motions(self) -> list[LiftMotion]:
-        """The motion that RMF was told, without the repeats."""
+        """Return the motions in the states for RMF, without repeats."""
         told = [LiftMotion(state.motion_state) for _, state in self.told]
         return [m for m, before in zip(told, [None, *told], strict=False) if m != before]
 
     @property
     def faults(self) -> list[str]:
-        """What the status file shows as wrong."""
+        """Return the faults in the status file."""
         return [fault["code"] for fault in self.node.status()["faults"]]
 
     # ---- inside

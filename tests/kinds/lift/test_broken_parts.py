@@ -1,7 +1,7 @@
-"""Each wire, and each part of the lift, broken in turn, under RMF: node, driver, wires and plant.
+"""Each wire and each part of the lift, broken in turn, under RMF: node, driver, wires and plant.
 
-While it is broken a robot may wait for ever, but an open door is offered only where there is one.
-When it is mended and the robot gives up, the next ride completes.
+While a part is broken a robot may wait for ever, but OPEN is shown only of a truly open door. After the
+repair, and after the robot has given up, the next ride completes.
 """
 
 from dataclasses import dataclass
@@ -19,12 +19,12 @@ from tests.kinds.lift.wired import WiredStory, shipped
 from workbench.rmf_model.robot import RobotContext
 
 LATE_S = 0.3
-"""Debounce, a scan, and states that may not follow each other faster: how old a truth may be."""
+"""The permitted age of a shown truth: debounce, a scan, and the least gap between states."""
 
 WIRES = [w.signal for w in wires(shipped())]
 WIRE_FAILURES: list[FailureMode] = ["off", "stuck", "wrong"]
 LIES = {("door", "wrong")}
-"""A contact that says open when the door is closed, and has no second one beside it."""
+"""A contact that says open while the door is closed; no second contact contradicts it."""
 
 BREAKS = [(w, mode) for w in WIRES for mode in WIRE_FAILURES if (w, mode) not in LIES]
 BREAKS += [(p, m) for p, modes in FAILS.items() for m in modes if p != "rear_door_operator"]
@@ -32,7 +32,7 @@ BREAKS += [(p, m) for p, modes in FAILS.items() for m in modes if p != "rear_doo
 
 @dataclass
 class Witness:
-    """Looks at the real car at each state, and remembers where it stood open."""
+    """Looks at the real car at each state, and remembers where the car stood open."""
 
     story: WiredStory
     open_at: str | None = None
@@ -46,12 +46,12 @@ class Witness:
     def hears(self, state: LiftState) -> None:
         self.looks()
         if state.door_state == 2:
-            assert self.story.now <= self.until, "open is shown, and it is not"
+            assert self.story.now <= self.until, "OPEN is shown of a closed door"
             assert state.current_floor == self.open_at
 
 
 def ride(broken: str, mode: FailureMode, broken_at: float) -> WiredStory:
-    """A robot's ride to L3 on a lift that breaks; it is mended, the robot gives up, another rides."""
+    """Play a ride on a lift that breaks; after the repair the robot gives up and another rides."""
     story = WiredStory(scan_s=0.1, agv_timeout_s=5, floor_timeout_s=10, door_timeout_s=5)
     robot, other = RobotContext("fleet/a"), RobotContext("fleet/b")
     rmf = World(story, robot, other)

@@ -1,4 +1,4 @@
-"""A robot's ride on every lift of `config/`: what is driven, and what RMF is told on the way."""
+"""A robot's ride on every lift of `config/`: the driven outputs, and the states that RMF hears."""
 
 from pathlib import Path
 from typing import Any
@@ -17,7 +17,7 @@ A = "fleet/a"
 
 
 def in_service(name: str) -> Story:
-    """The lift of an example."""
+    """Return the lift of an example, in service."""
     settings: Any = load(CONFIG / name).devices["Lift1"]
     if isinstance(settings, dry_contact.DryContactLiftSettings):
         return WiredStory(settings)
@@ -32,12 +32,12 @@ def in_service(name: str) -> Story:
 
 
 def told(story: Story) -> list[str]:
-    """What RMF was told, without the states between floors."""
+    """Return the states that RMF heard, without those between floors."""
     return [words for _, words in story.states if "moving" not in words and "at ?" not in words]
 
 
 def asked_until_open(story: Story, floor: str) -> None:
-    """RMF repeats its request until the door is open there."""
+    """Repeat RMF's request until the door is open at the floor."""
 
     def there() -> bool:
         story.asks(A, floor)
@@ -67,7 +67,7 @@ def test_a_robot_rides_from_l1_to_l3_and_lets_go(name: str) -> None:
 
 
 def driven(story: Story) -> dict[str, bool]:
-    """What each relay was switched to last, as the lift has it."""
+    """Return the last value of each relay, as the lift has it."""
     plant = story.building.plant  # type: ignore[attr-defined]
     return {edge.signal: bool(edge.value) for edge in plant.edges if edge.what == "relay"}
 

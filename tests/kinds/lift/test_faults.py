@@ -1,4 +1,4 @@
-"""LIFT-4, LIFT-DRIVE-5, LIFT-SENSING-3: the words of each fault."""
+"""LIFT-4, LIFT-DRIVE-5, LIFT-SENSING-3: the text of each fault."""
 
 from typing import Any
 

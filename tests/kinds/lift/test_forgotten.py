@@ -1,7 +1,7 @@
 """LIFT-2: a supervisor that has forgotten the robot in the car: by RMF's own rules, and rule by rule.
 
-rmf_ros2, lift_supervisor/Node.cpp: one slot for each lift, adopted from whoever is heard first; what
-any other session asks, its END among it, is dropped.
+rmf_ros2, lift_supervisor/Node.cpp: there is one slot for each lift. The first session that is heard
+takes the slot; requests of any other session, END too, are dropped.
 """
 
 from collections.abc import Sequence
@@ -83,7 +83,7 @@ def test_an_end_that_was_lost_while_another_robot_waits_is_heard_from_its_adapte
 
 
 class Overheard:
-    """A lift that `A` holds, open at L2. `adapter`: what is said in its name, without a supervisor."""
+    """A lift that `A` holds, open at L2. `adapter` sends requests in A's name past the supervisor."""
 
     def __init__(self, building: Building | None = None) -> None:
         self.story = Story(building or Controller())
@@ -143,7 +143,7 @@ def test_an_end_counts_when_it_is_heard_twice_with_no_newer_request_between() ->
 
 
 def test_an_old_request_does_not_count_and_an_end_without_a_stamp_does() -> None:
-    """Jazzy's fleet adapter does not stamp its END (RobotContext.cpp, _check_lift_state)."""
+    """Jazzy's fleet adapter sends END without a stamp (RobotContext.cpp, _check_lift_state)."""
     lift = Overheard()
     lift.story.asks(B, "L1")
     lift.adapter(AGV, "L2")

@@ -1,4 +1,4 @@
-"""What takes the lift away from RMF, and how it comes back."""
+"""Hazards and rivals that take the lift away from RMF, and how RMF gets the lift back."""
 
 import pytest
 from msgspec.structs import replace
@@ -37,7 +37,7 @@ MODES = [
 
 
 def waiting(**options: object) -> Story:
-    """A waits outside at L1, where the car stands closed with its door held."""
+    """Return a story in which A waits outside at L1, where the car stands closed with its door held."""
     story = Story(Building(CLOSED_AT_L1), door_timeout_s=600, **options)  # type: ignore[arg-type]
     story.run(1.0)
     story.asks("A", "L1")
@@ -47,7 +47,7 @@ def waiting(**options: object) -> Story:
 
 
 def inside(**options: object) -> Story:
-    """A may be inside at L1: the open door has been published."""
+    """Return a story in which A may be inside at L1: the open door has been published."""
     story = Story(Building(OPEN_AT_L1), **options)  # type: ignore[arg-type]
     story.run(1.0)
     story.asks("A", "L1")
@@ -308,7 +308,7 @@ def test_agv_mode_that_is_never_confirmed_is_waited_for_through_an_overload() ->
     assert story.outputs == LiftOutputs(agv_request=True)
 
 
-# ---- LIFT-4: latches, and what the fleets are told
+# ---- LIFT-4: latches, and the alarm for the fleets
 
 
 def test_with_automatic_reset_rmf_gets_the_lift_back_when_the_fire_is_over() -> None:
@@ -376,7 +376,7 @@ def test_the_fire_alarm_topic_hears_true_once_and_false_only_after_an_operators_
     story.run(8.0)
     building.hazard(Hazard.FIRE)
     story.run(10.0)
-    story.resets()  # it still burns
+    story.resets()  # the fire still burns
     building.hazard()
     story.run(100.0)
     assert story.alarms == [(2.1, on)]
@@ -396,12 +396,12 @@ def test_a_code_blue_is_told_to_the_fleets_where_the_settings_say_so_until_an_op
     on, off = EmergencySignal((), True), EmergencySignal((), False)
     story.building.hazard(Hazard.CODE_BLUE)
     story.run(5.0)
-    story.building.hazard(Hazard.CODE_BLUE, Hazard.FIRE)  # one alarm, told once
+    story.building.hazard(Hazard.CODE_BLUE, Hazard.FIRE)  # one alarm, sent once
     story.run(8.0)
     story.building.hazard()
     story.run(20.0)
     assert story.alarms == [(2.1, on)]
-    assert story.state.startswith("AGV")  # the lift itself is back; the fleets wait for a person
+    assert story.state.startswith("AGV")  # the lift is back, but the fleets wait for a person
     story.resets()
     story.run(21.0)
     assert story.alarms == [(2.1, on), (20.0, off)]
@@ -476,7 +476,7 @@ def test_a_latched_fire_stays_latched_while_nobody_can_see_whether_it_is_over(ov
     assert story.faults == ["FIRE_LATCHED", "INPUTS_NOT_FRESH"]
     story.building.unreadable = ""
     story.run(11.05)
-    story.resets()  # read, but not settled yet
+    story.resets()  # the inputs are read, but not settled yet
     story.run(20.0)
     assert story.faults == ["FIRE_LATCHED" if over else "FIRE"]
     assert story.alarms == [(2.1, Bool(True))]

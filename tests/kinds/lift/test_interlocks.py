@@ -1,4 +1,4 @@
-"""Relays: what may never be on together, what rests between what, and that off never waits."""
+"""Relays that may never be on together, the rest between changes, and switching off without delay."""
 
 import pytest
 from msgspec.structs import replace
@@ -18,7 +18,7 @@ def limits(**changes: float) -> LiftDurations:
 def driven(
     relays: Relays, wishes: list[tuple[float, LiftOutputs]], rules: LiftDurations
 ) -> list[str]:
-    """What is on after each wish: `A` for AGV mode, the called floor, the held door."""
+    """Return the outputs after each wish: `A` for AGV mode, the called floor, the held door."""
     shown = []
     for now, wish in wishes:
         relays = relays.step(wish, now, rules)
@@ -103,7 +103,7 @@ def test_the_core_wakes_when_relays_have_rested() -> None:
     assert worn.changes_at(call("L1"), 6.0, rules) == 7.0
 
 
-# ---- LIFT-DRIVE-2, LIFT-DRIVE-3: which goes first
+# ---- LIFT-DRIVE-2, LIFT-DRIVE-3: which output comes first
 
 
 def test_a_call_goes_before_a_door_command_when_both_are_wanted() -> None:

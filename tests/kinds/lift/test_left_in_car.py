@@ -1,8 +1,8 @@
-"""LIFT-2: a session that RMF's supervisor ends while its robot is in the car; a robot left there.
+"""LIFT-2: RMF's supervisor ends a session while its robot is in the car, or a robot is left there.
 
-By RMF's own rules first: a supervisor that starts sends END for whatever session the lift shows, and
-takes up whoever is heard first (rmf_ros2, lift_supervisor/Node.cpp). A fleet adapter that starts sends
-END for its robot's session (RobotContext.cpp, _check_lift_state).
+The first stories follow RMF's own rules. A starting supervisor sends END for the session that the lift
+shows, and takes the first session that it hears (rmf_ros2, lift_supervisor/Node.cpp). A starting fleet
+adapter sends END for its robot's session (RobotContext.cpp, _check_lift_state).
 """
 
 import pytest
@@ -24,7 +24,7 @@ LEFT_S = 60.0
 def riding(
     jazzy: bool = False, adapters_first: bool = False
 ) -> tuple[World, RobotContext, RobotContext]:
-    """A is between L2 and L4, B waits at L1."""
+    """Return RMF's world with A between L2 and L4 and B waiting at L1, and both robots."""
     a, b = RobotContext(A, jazzy), RobotContext(B, jazzy)
     rmf = world(a, b, adapters_first=adapters_first)
     rmf.supervisor = LiftSupervisor(jazzy)
@@ -44,7 +44,7 @@ def riding(
 def test_a_supervisor_that_restarts_and_ends_the_session_takes_no_lift_from_a_robot_in_the_car(
     jazzy: bool, adapters_first: bool, after_s: float
 ) -> None:
-    """Whoever it takes up then, at whatever moment of the ride."""
+    """This holds for any session that the supervisor takes then, and at any moment of the ride."""
     rmf, a, b = riding(jazzy, adapters_first)
     rmf.run(rmf.story.now + after_s)
     edges = list(rmf.story.edges)
@@ -65,14 +65,14 @@ def test_a_supervisor_that_restarts_and_ends_the_session_takes_no_lift_from_a_ro
     rmf.until_done(b)
     assert sessions(rmf.story) == ["", A, "", B]
     granted_at = next(at for at, state in rmf.story.told if state.session_id == B)
-    assert granted_at - released_at < 6.0  # the grace of 3 s, and RMF's next words
+    assert granted_at - released_at < 6.0  # the grace of 3 s, and RMF's next request
 
 
 CALLED_AND_HELD = [("call", None), ("hold_door", "front")]
 
 
 class InMidRide(Overheard):
-    """A has been let in at L2 and rides to L4; its adapter has just said so."""
+    """A has been let in at L2 and rides to L4; A's adapter has just repeated the request."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -87,7 +87,7 @@ class InMidRide(Overheard):
         self.story.run(self.story.now + 0.2)
 
     def asks_for(self, seconds: float) -> None:
-        """Its adapter goes on asking, once a second."""
+        """Let A's adapter go on asking, once a second."""
         for _ in range(int(seconds)):
             self.adapter(AGV, "L4")
             self.story.run(self.story.now + 0.8)

@@ -1,4 +1,4 @@
-"""The node around the core: when it publishes, what it logs, and that its driver may fail."""
+"""The node around the core: its publishing, its log, and failures of its driver."""
 
 import logging
 
@@ -81,7 +81,7 @@ def test_a_lift_that_was_never_read_is_offline_with_stamp_zero_and_nothing_is_wr
         )
     }
     assert story.node.ready
-    assert building.writes == 1  # the claim, with everything off
+    assert building.writes == 1  # the claim writes all outputs off
     assert story.faults == ["INPUTS_NOT_FRESH"]
 
 
@@ -106,7 +106,7 @@ def test_the_log_has_one_line_when_a_device_is_lost_and_one_when_it_is_back(
         lines = [r.getMessage().split()[0] for r in caplog.records]
         assert (lines.count("device_lost"), lines.count("device_back")) == (1, 1)
         assert (lines.count("fault"), lines.count("fault_over")) == (1, 1)
-        assert len(lines) == 6  # and the state, there and back
+        assert len(lines) == 6  # the other two lines give the state, lost and restored
 
 
 def test_a_new_daemon_finds_the_lift_in_agv_mode_and_waits_to_be_asked() -> None:

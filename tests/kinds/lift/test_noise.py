@@ -1,4 +1,4 @@
-"""What belongs to every start, every handover and every idle second of Jazzy's RMF is no warning."""
+"""Jazzy's RMF repeats some messages at every start, handover and idle second: they give no warning."""
 
 import logging
 

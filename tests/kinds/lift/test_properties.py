@@ -1,4 +1,4 @@
-"""Whatever happens, in whichever order: the invariants on a debounced lift, and RMF in a storm."""
+"""Any events in any order: the rules hold on a debounced lift, and RMF survives a storm."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -25,7 +25,7 @@ STORMS = settings(max_examples=examples(40))
 
 @dataclass
 class Judge:
-    """Looks at every decision of a story; `open_seen_at`: when the contact last said open (s)."""
+    """Checks every decision of a story; `open_seen_at` is when the contact last said open (s)."""
 
     building: Building
     open_seen_at: float = -1.0
@@ -45,7 +45,7 @@ class Judge:
 
 
 def judged(building: Building, **options: Any) -> tuple[Story, Judge]:
-    """A story whose every decision is looked at."""
+    """Return a story, and the judge that checks its decisions."""
     judge = Judge(building)
     return Story(building, kind=replace(KIND, decide=judge.decide), **options), judge
 
@@ -133,7 +133,7 @@ FATES = st.lists(
 
 
 def trouble(rmf: Rmf, robot: RobotContext, what: str) -> RobotContext:
-    """One party restarts, or the building acts up for half a second."""
+    """Restart one party, or let the building misbehave for half a second."""
     story = rmf.story
     if what == "supervisor":
         rmf.restart_supervisor()

@@ -17,7 +17,7 @@ OPEN_FOR_A = "AGV, open at L2, fleet/a to L2"
 
 
 def on_its_threshold(rides_before: int) -> tuple[World, RobotContext]:
-    """A robot goes into the car at L3, and has had so many rides just before."""
+    """Return a world whose robot enters the car at L3, after so many rides just before."""
     robot = RobotContext(A)
     rmf = world(robot)
     for _ in range(rides_before):
@@ -35,7 +35,7 @@ def on_its_threshold(rides_before: int) -> tuple[World, RobotContext]:
 def test_an_earlier_ride_that_rmf_hears_again_lets_no_door_go_while_a_robot_goes_in(
     rides_before: int,
 ) -> None:
-    """As `make soak SEED=7 RMF=kilted` found it: an adapter that was cut off for more than a lease."""
+    """`make soak SEED=7 RMF=kilted` found this: an adapter was cut off for longer than a lease."""
     rmf, robot = on_its_threshold(rides_before)
     before = list(rmf.story.edges)
     rmf.finds_again(robot)
@@ -60,7 +60,7 @@ def test_a_supervisor_that_restarts_and_hears_an_earlier_ride_lets_no_door_go_ei
 def test_a_robot_that_is_cut_off_before_it_gets_the_lift_is_as_safe_when_it_is_found_again() -> (
     None
 ):
-    """It was cut off at 12.6 h of that day, and had the lift only afterwards."""
+    """On that day (12.6 h) the robot got the lift only after it had been cut off."""
     first, robot = RobotContext(B), RobotContext(A)
     rmf = world(first, robot)
     rmf.rides(robot, "L2", "L1")
@@ -82,8 +82,10 @@ def test_a_robot_that_is_cut_off_before_it_gets_the_lift_is_as_safe_when_it_is_f
 def test_an_earlier_ride_that_rmf_hears_again_shows_a_robot_no_door_that_was_let_go(
     after_s: float,
 ) -> None:
-    """As a robot's next ride began where the last one had ended, while RMF's real supervisor was dead:
-    it went in on the earlier ride's state, and the door closed."""
+    """On that day a robot's next ride began where the last had ended, while RMF's supervisor was dead.
+
+    The robot entered on the earlier ride's state, and the door closed.
+    """
     lift = Overheard(Building(LiftSample("L2", DoorReading.OPEN, motion=Motion.STOPPED, agv=True)))
     assert lift.story.state == OPEN_FOR_A
     lift.story.ends(A)

@@ -1,4 +1,4 @@
-"""One robot rides: what its lift does and says, from the request to the end of the session."""
+"""One robot's ride: the lift's actions and states, from the request to the end of the session."""
 
 import pytest
 from msgspec.structs import replace
@@ -18,7 +18,7 @@ IDLE_AT_L1 = [(0.0, "OFFLINE, moving at ?"), (0.1, "HUMAN, closed at L1")]
 def at(
     level: str | None, door: DoorReading = DoorReading.CLOSED, *, agv: bool = True
 ) -> LiftSample:
-    """A standing car."""
+    """Return a reading of a standing car."""
     return LiftSample(level, door, motion=Motion.STOPPED, agv=agv)
 
 
@@ -380,7 +380,7 @@ def test_without_a_session_either_open_door_is_shown() -> None:
     assert story.state == "AGV, moving at L2"
 
 
-# ---- what is refused, and what a person reads
+# ---- refusals, and the texts for people
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""What is believed of the inputs: broken, contradictory, glitching, stale, restless, moving."""
+"""The trust in inputs: broken, contradictory, glitching, stale, restless and moving inputs."""
 
 import pytest
 from msgspec.structs import replace
@@ -30,7 +30,7 @@ OPEN_AT_L1 = LiftSample("L1", DoorReading.OPEN, motion=Motion.STOPPED, agv=True)
 
 
 def boarding(**inputs: object) -> Story:
-    """A waits at L1, where the lift stands open. `inputs` replace parts of what it reads."""
+    """Return a story in which A waits at L1 and the lift stands open; `inputs` change the reading."""
     story = Story(Building(replace(OPEN_AT_L1, **inputs)))
     story.run(1.0)
     story.asks("A", "L1")
@@ -38,7 +38,7 @@ def boarding(**inputs: object) -> Story:
     return story
 
 
-# ---- LIFT-5: the open door, and what contradicts it
+# ---- LIFT-5: the open door, and inputs that contradict it
 
 
 def test_an_open_door_is_offered_when_every_input_confirms_it() -> None:
@@ -572,7 +572,7 @@ def test_an_estimated_door_that_starts_to_move_is_no_longer_at_its_end() -> None
     assert story.node.status()["door"] == "moving"
 
 
-# ---- LIFT-SENSING-1, LIFT-SENSING-5: when it wakes
+# ---- LIFT-SENSING-1, LIFT-SENSING-5: the times of waking
 
 
 def test_the_core_wakes_when_an_input_seen_for_the_first_time_has_settled() -> None:
@@ -632,7 +632,7 @@ def test_a_new_fault_is_news_but_a_change_of_its_words_is_not() -> None:
 
 
 class FloorsInAgvMode(Controller):
-    """Its floor code means something only in AGV mode (`valid_when`); its motion lines always do."""
+    """A lift whose floor code is valid only in AGV mode (`valid_when`), its motion lines always."""
 
     def read(self) -> LiftSample:
         sample = super().read()

@@ -1,4 +1,4 @@
-"""Who holds the lift: grant, refresh, refuse, END and the grace after it."""
+"""The holder of the lift: grant, refresh, refusal, END and the grace after END."""
 
 from typing import Any
 
@@ -30,7 +30,7 @@ OPEN_AT_L1 = LiftSample("L1", DoorReading.OPEN, motion=Motion.STOPPED, agv=True)
 
 
 def boarded() -> Story:
-    """A robot may be inside: the open door at its floor has been published, three seconds ago."""
+    """Return a story in which a robot may be inside: its open door was published 3 s ago."""
     story = Story(Building(OPEN_AT_L1))
     story.run(1.0)
     story.asks("A", "L1")
@@ -161,7 +161,7 @@ def test_nothing_that_was_off_is_energised_during_the_grace() -> None:
     story.run(1.0)
     story.asks("A", "L1")
     story.run(1.3)
-    story.ends("A")  # AGV mode is granted and the car stands open to be held, but nobody asks
+    story.ends("A")  # the car stands open in AGV mode, ready to be held, but no session asks
     story.run(10.0)
     assert story.edges == [(1.0, "agv_request", True), (4.3, "agv_request", False)]
 
@@ -266,7 +266,7 @@ def test_a_session_that_never_had_agv_mode_leaves_no_grace() -> None:
     assert story.state == "HUMAN, closed at L1, B to L2"
 
 
-# ---- LIFT-1, LIFT-4: when nobody gets it
+# ---- LIFT-1, LIFT-4: when no session gets the lift
 
 
 @pytest.mark.parametrize(

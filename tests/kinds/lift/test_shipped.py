@@ -1,4 +1,4 @@
-"""The shipped wiring has no motion lines: its debounce alone must tell a glitch from a door."""
+"""The shipped wiring has no motion lines: debounce alone tells a glitch from a door's motion."""
 
 from pathlib import Path
 

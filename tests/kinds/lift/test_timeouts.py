@@ -1,4 +1,4 @@
-"""What does not happen in time: AGV mode, the floor, the open door, RMF's next request, an I/O."""
+"""Events that do not come in time: AGV mode, the floor, the open door, RMF's next request, an I/O."""
 
 from itertools import pairwise
 
@@ -25,7 +25,7 @@ OFF = LiftOutputs()
 
 
 def lift(level: str, door: DoorReading, *, agv: bool, **limits: object) -> Story:
-    """A standing car, scanned twice a second, and a request for L1 at 1 s."""
+    """Return a story with a standing car, scanned twice a second, and a request for L1 at 1 s."""
     building = Building(LiftSample(level, door, motion=Motion.STOPPED, agv=agv))
     story = Story(building, scan_s=0.5, **limits)  # type: ignore[arg-type]
     story.run(1.0)
@@ -34,14 +34,14 @@ def lift(level: str, door: DoorReading, *, agv: bool, **limits: object) -> Story
 
 
 def keep_asking(story: Story, until: float) -> None:
-    """RMF repeats its request each second until then."""
+    """Repeat RMF's request until then."""
     while story.now < until:
         story.asks("A", "L1")
         story.run(min(until, story.now + 5.0))
 
 
 def tries(story: Story, output: str) -> list[float]:
-    """When an output was switched on."""
+    """Return the times at which an output was switched on."""
     return [at for at, name, value in story.edges if name == output and value]
 
 
@@ -88,7 +88,7 @@ def test_a_failed_step_is_tried_three_times_more_and_then_latched(
 
 
 def latched() -> Story:
-    """The door at L1 has not opened in four tries."""
+    """Return a story in which the door at L1 has not opened in four tries."""
     story = lift("L1", DoorReading.CLOSED, agv=True, door_timeout_s=4.0)
     keep_asking(story, 200.0)
     assert (story.faults, story.outputs) == (["DOOR_OPENING_FAULT"], OFF)
@@ -104,7 +104,7 @@ def test_a_latched_fault_ends_with_the_session() -> None:
 
 
 def test_a_latched_fault_ends_with_an_end_though_the_same_session_is_back_at_once() -> None:
-    """An operator ends the session, and the fleet adapter asks again within a second."""
+    """An operator ends the session, and the fleet adapter repeats its request within a second."""
     story = lift("L1", DoorReading.OPEN, agv=True, door_timeout_s=4.0)
     story.run(3.0)
     story.building.set(door=DoorReading.CLOSED)
@@ -114,7 +114,7 @@ def test_a_latched_fault_ends_with_an_end_though_the_same_session_is_back_at_onc
     story.run(200.5)
     story.asks("A", "L1")
     assert (story.faults, story.outputs) == ([], HELD)
-    story.building.set(agv=False, door=DoorReading.OPEN)  # and it is still known to be inside
+    story.building.set(agv=False, door=DoorReading.OPEN)  # the robot is still known to be inside
     story.run(202.0)
     assert story.state == "HUMAN, open at L1, A to L1"
 
@@ -135,7 +135,7 @@ def test_a_latched_fault_ends_with_an_operators_reset() -> None:
 
 def test_a_reset_during_a_retry_lets_the_request_wait_for_agv_mode_again() -> None:
     def history(reset_at: float) -> list[tuple[float, bool, list[str]]]:
-        """(s, AGV request, faults) at each change, scanned twice a second."""
+        """Return (s, AGV request, faults) at each change, scanned twice a second."""
         alone = Alone(agv_timeout_s=5.0)
         alone(0.0, replace(CLOSED, agv=False), ASKED)
         shown: list[tuple[float, bool, list[str]]] = []
@@ -211,7 +211,7 @@ def test_agv_mode_lost_with_the_robot_at_the_open_door_shows_the_true_door() -> 
 
 
 def test_the_call_stays_on_while_people_take_the_car_first() -> None:
-    """Without an AGV status line nothing keeps people from stealing the car."""
+    """Without an AGV status line nothing keeps people from taking the car first."""
     building = Building(LiftSample("L2", DoorReading.CLOSED, motion=Motion.STOPPED, agv=None))
     story = Story(building)
     story.run(1.0)
@@ -227,7 +227,9 @@ def test_the_call_stays_on_while_people_take_the_car_first() -> None:
     building.set(level="L1", motion=Motion.STOPPED)
     story.run(10.0)
     assert story.outputs == HELD
-    building.set(level=None, motion=Motion.UP)  # stolen with the robot still outside
+    building.set(
+        level=None, motion=Motion.UP
+    )  # people take the car while the robot is still outside
     story.run(12.0)
     assert story.outputs == LiftOutputs(agv_request=True)
     building.set(level="L2", motion=Motion.STOPPED)
@@ -317,7 +319,7 @@ def test_inputs_are_believed_though_outputs_cannot_be_written() -> None:
     story.asks("A", "L1")
     story.until(lambda: story.state == "AGV, open at L1, A to L1")
     story.building.unwritable = "timeout"
-    story.building.driven = OFF  # the module's own watchdog has let go
+    story.building.driven = OFF  # the module's own watchdog has switched off
     story.run(story.now + 5.0)
     assert story.state == "OFFLINE, closed at L1, A to L1"
 

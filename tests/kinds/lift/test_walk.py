@@ -1,4 +1,4 @@
-"""Every state within some steps of the start, and of each stage of a ride: what is true in all."""
+"""All states within some steps of the start and of each stage of a ride, checked by the rules."""
 
 from math import inf
 
@@ -78,7 +78,7 @@ def test_the_rules_hold_within_some_steps_of_each_stage_of_a_ride(root: str) -> 
 
 
 def mended_and_idle(world: World) -> World:
-    """The building mends itself and stands idle at L1; RMF ends every session; an operator resets."""
+    """Return the world mended and idle at L1, with all sessions ended and all latches reset."""
     world = replace(world, sample=IDLE, readable=True, writable=True)
     world = WALKER.path(world, 6.0, "A ends", "B ends", "reset", 9.0, seen=check)
     assert world.memory.session is None
@@ -86,7 +86,7 @@ def mended_and_idle(world: World) -> World:
 
 
 def serves(world: World) -> bool:
-    """Somebody new asks, AGV mode comes, the car comes, the door opens."""
+    """Does a new request get AGV mode, the car and the open door?"""
     world = WALKER.path(world, "B asks L1", seen=check)
     wanted = WALKER.path(world, 1.0, seen=check).memory.relays.outputs()
     sample = replace(IDLE, agv=True, door=DoorReading.OPEN, motion=Motion.STOPPED)

@@ -18,12 +18,12 @@ def world(*robots: RobotContext, adapters_first: bool = False) -> World:
 
 
 def ons(story: Story, output: str) -> int:
-    """How often an output was switched on."""
+    """Return how often an output was switched on."""
     return sum(1 for _, name, value in story.edges if name == output and value)
 
 
 def sessions(story: Story) -> list[str]:
-    """Who held the lift, one after the other; "" for nobody."""
+    """Return the sessions that the lift has shown, one after the other; "" for none."""
     shown = [state.session_id for _, state in story.told]
     return [s for s, before in zip(shown, [None, *shown], strict=False) if s != before]
 
@@ -134,7 +134,7 @@ def test_a_supervisor_that_restarts_with_a_robot_in_the_car_does_not_end_its_ses
     robot.in_car = True
     rmf.run(rmf.story.now + 3.0)
     edges = list(rmf.story.edges)
-    rmf.supervisor.slots.clear()  # it has started, and the first it hears is a state of ours
+    rmf.supervisor.slots.clear()  # the supervisor has restarted, and first hears a state of ours
     rmf.run(rmf.story.now + 20.0)
     ends = [request for request in rmf.requested if request.request_type == END]
     assert len(ends) == 1
@@ -175,7 +175,7 @@ def test_a_supervisor_that_restarts_in_a_fire_does_not_lock_the_robot_in() -> No
 
 
 def test_the_replay_of_a_hundred_old_requests_switches_agv_mode_once() -> None:
-    """As RMF's transient-local adapter topic gives it to a supervisor that starts."""
+    """RMF's transient-local adapter topic gives a starting supervisor so many old requests."""
     story = Story(Controller())
     story.run(1.0)
     old = [

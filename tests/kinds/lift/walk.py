@@ -1,7 +1,7 @@
-"""Every state that the decision core can reach within some steps, and what must be true in each.
+"""All states that the lift's core can reach within some steps.
 
-A state is the core's memory, with every time relative to now, and the building around it. Ages that
-are beyond every limit are made equal, so that states that cannot behave differently are one.
+A state has the core's memory, with every time relative to now, and the building around it. Ages beyond
+every limit are made equal, so that states that cannot behave differently count as one state.
 """
 
 from collections.abc import Callable
@@ -32,13 +32,13 @@ from bridges.kinds.shared.freshness import Requester
 from tests.walk import Walker
 
 LONG_S = 55.0
-"""Without a wake_at, a scan each so many seconds is enough here; below `stale_after_s`."""
+"""The longest time between scans (s) while the core wants no wake; it is below `stale_after_s`."""
 
 
 def limits_of(
     debounce: dict[str, float] | None = None, agv_mode: Any = "requested", **changes: Any
 ) -> LiftLimits:
-    """The default durations, but readings stay fresh for a minute: the walk then needs fewer scans."""
+    """Return the default limits with readings fresh for a minute, which saves scans of the walk."""
     settings = LiftSettings(
         floors=["L1", "L2", "L3"],
         limits=LiftDurations(**{"stale_after_s": 60.0, **changes}),
@@ -50,7 +50,7 @@ def limits_of(
 
 
 class World(msgspec.Struct, frozen=True):
-    """Memory at time 0, and the building: its inputs; whether it can be read, and written to."""
+    """Memory at time 0, and the building: its inputs, and can it be read, and written to?"""
 
     memory: LiftMemory
     sample: LiftSample
@@ -62,11 +62,11 @@ IDLE = LiftSample("L1", DoorReading.CLOSED, motion=Motion.STOPPED, agv=False)
 
 
 def start(limits: LiftLimits) -> World:
-    """A daemon that has just started on an idle lift."""
+    """Return a daemon that has just started on an idle lift."""
     return World(initial(limits, 0.0), IDLE)
 
 
-# ---- what can happen
+# ---- possible events
 
 Move = Callable[[World], tuple[World, Event]]
 
@@ -104,7 +104,7 @@ def _relays(world: World) -> tuple[World, Event]:
 
 
 def reading(world: World) -> Event:
-    """What a scan reads."""
+    """Return the reading of a scan."""
     return Sampled(world.sample) if world.readable else IoFailed("timeout")
 
 
@@ -145,7 +145,7 @@ Seen = Callable[["Step"], None]
 
 
 class Step(msgspec.Struct, frozen=True):
-    """One decision, at time `now` after the state began. `exact`: no input is debounced."""
+    """One decision at time `now` after the state began. `exact`: no input is debounced."""
 
     before: LiftMemory
     event: Event
@@ -157,13 +157,13 @@ class Step(msgspec.Struct, frozen=True):
 
 
 def moved(world: World, move: Move, limits: LiftLimits, seen: Seen) -> World:
-    """The state after a move, at the same instant."""
+    """Return the state after a move, at the same instant."""
     around, event = move(world)
     return _decided(around, event, 0.0, limits, seen)
 
 
 def waited(world: World, seconds: float, limits: LiftLimits, seen: Seen) -> World:
-    """The state after some time, with a scan whenever the core wants one."""
+    """Return the state after some time, with a scan whenever the core wants a scan."""
     now, wake_at = 0.0, 0.0
     while now < seconds:
         now = min(seconds, max(now + 0.001, min(wake_at, now + LONG_S)))
@@ -178,7 +178,7 @@ def waited(world: World, seconds: float, limits: LiftLimits, seen: Seen) -> Worl
 
 
 def _decided(world: World, event: Event, now: float, limits: LiftLimits, seen: Seen) -> World:
-    """One scan: decide, write, and publish what was decided."""
+    """Scan once: decide, write and publish."""
     step = _step(world, world.memory, event, now, limits, seen)
     if not world.writable:
         step = _step(world, step.decision.memory, WriteFailed("timeout"), now, limits, seen)
@@ -207,11 +207,11 @@ AGES = {
     "unwritten_since": 61.0,
     "since": 700.0,
 }
-"""Beyond this age (s) a time's distance makes no difference any more."""
+"""The ages (s) beyond which more age makes no difference."""
 
 
 def shifted(memory: LiftMemory, by: float) -> LiftMemory:
-    """The same memory with every time moved by so much, and old ones cut off."""
+    """Return the same memory with every time moved by so much, and old times cut off."""
     senses, session, grace = memory.senses, memory.session, memory.grace
     return replace(
         memory,
@@ -249,7 +249,7 @@ def shifted(memory: LiftMemory, by: float) -> LiftMemory:
 
 
 def _at(at: Any, by: float, kind: str = "") -> Any:
-    """A time, moved; None stays. A time that is not named has no age that is too old."""
+    """Return a moved time, cut off at the greatest age of its `kind`, if any; None stays None."""
     if at is None:
         return None
     return max(round(at + by, 6), -AGES.get(kind, 1e9))
@@ -283,7 +283,7 @@ def _forgotten(forgotten: ForgottenSession, by: float) -> ForgottenSession:
 
 
 def _robot(robot: OwnWords, by: float) -> OwnWords:
-    """Whether it was ever heard makes a difference."""
+    """Return the robot's words with times moved; a robot that was never heard stays so."""
     heard = robot.asked_at > AGES_AGO
     asked_at = max(_at(robot.asked_at, by), -7.0) if heard else AGES_AGO
     ended_at = round(robot.ended_at + by, 6)
@@ -311,7 +311,7 @@ def _channel(channel: Channel[Any], by: float) -> Any:
 
 
 def key(world: World) -> tuple[Any, ...]:
-    """Equal for states that cannot behave differently."""
+    """Return a key that is equal for states that cannot behave differently."""
     memory, senses = world.memory, world.memory.senses
     hazards = tuple(senses.hazards.get(h) for h in Hazard)
     return (
@@ -324,7 +324,7 @@ def key(world: World) -> tuple[Any, ...]:
 
 
 def walker(limits: LiftLimits) -> Walker[World, Move]:
-    """The lift's, with these limits."""
+    """Return the lift's walker with these limits."""
     return Walker(
         MOVES,
         TIMES,

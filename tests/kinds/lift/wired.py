@@ -1,4 +1,4 @@
-"""The whole lift without its pins: node, driver, wires and plant, in virtual time."""
+"""The whole lift except its pins: node, driver, wires and plant, in virtual time."""
 
 from pathlib import Path
 from typing import Any, cast
@@ -21,14 +21,14 @@ SHIPPED = Path(__file__).parents[3] / "config" / "lift_dry_contact.yaml"
 
 
 def shipped() -> DryContactLiftSettings:
-    """The shipped example of `config/`."""
+    """Return the settings of the example in `config/`."""
     settings = load(SHIPPED).devices["Lift1"]
     assert isinstance(settings, DryContactLiftSettings)
     return settings
 
 
 class Driven(Building):
-    """Behind a driver and its bus."""
+    """A building behind a driver and its bus."""
 
     plant: LiftPlant
     _driver: Driver[LiftSample, LiftOutputs]
@@ -46,7 +46,7 @@ class Driven(Building):
 
 
 class WiredBuilding(Driven):
-    """The plant at the far ends of the wires."""
+    """A building that is the plant at the far ends of the wires."""
 
     def __init__(self, settings: DryContactLiftSettings) -> None:
         super().__init__()
@@ -55,13 +55,13 @@ class WiredBuilding(Driven):
 
     @property
     def standing_open_at(self) -> str | None:
-        """The landing where the car really stands with its door really open."""
+        """Return the landing where the car truly stands with its door truly open."""
         car, (door,) = self.plant.car, self.plant.doors.values()
         return f"L{car.floor + 1}" if car.standing and door.opened else None
 
 
 class GatewayBuilding(Driven):
-    """The plant behind a gateway's registers."""
+    """A building that is the plant behind a gateway's registers."""
 
     def __init__(self, settings: register.RegisterLiftSettings) -> None:
         super().__init__()
@@ -71,7 +71,7 @@ class GatewayBuilding(Driven):
 
 
 class WiredStory(Story):
-    """A lift in service; the shipped one if it is not said which."""
+    """A lift in service, by default the shipped lift."""
 
     building: WiredBuilding
 
@@ -86,10 +86,10 @@ class WiredStory(Story):
         )
 
     def fail(self, part: str, mode: FailureMode | None) -> None:
-        """A wire or part breaks (None: is mended)."""
+        """Break a wire or part in this mode, or mend it (None)."""
         self.building.plant.advance(self.now)
         self.building.plant.fail(part, mode)
 
     def press(self, what: str, asserted: bool) -> None:
-        """Somebody in the building does something."""
+        """Let somebody in the building press a signal or let it go."""
         self.building.plant.press(what, asserted, self.now)

@@ -1,4 +1,4 @@
-"""The supervisor's core alone, for one lift, in virtual time: told by hand, its words written down."""
+"""The supervisor's core alone, for one lift, in virtual time: tests give events and note messages."""
 
 from bridges.kinds.lift_supervisor import core
 from bridges.kinds.lift_supervisor.memory import LiftSupervisorLimits, SupervisedLift
@@ -18,13 +18,13 @@ TYPES = {0: "END", 1: "AGV", 2: "HUMAN"}
 
 
 def words(message: LiftRequest) -> str:
-    """`AGV a L3`, `END a L1`."""
+    """Return a request in words: `AGV a L3`, `END a L1`."""
     name = TYPES[message.request_type]
     return f"{name} {message.session_id} {message.destination_floor}".rstrip()
 
 
 class Alone(alone.Alone[SupervisedLift, Event, LiftSupervisorLimits, SupervisorReport]):
-    """With one lift."""
+    """The core for one lift."""
 
     def __init__(self, limits: LiftSupervisorLimits | None = None, *, speaks: bool = True) -> None:
         super().__init__(
@@ -37,13 +37,13 @@ class Alone(alone.Alone[SupervisedLift, Event, LiftSupervisorLimits, SupervisorR
         return words(message)
 
     def asks(self, session: str, floor: str = "L3", *, kind: int = 1, aged: float = 0.0) -> None:
-        """An adapter's request, sent `aged` s ago by its own clock."""
+        """Let an adapter's request arrive, sent `aged` s ago by the adapter's clock."""
         stamp = self.stamped(aged)
         door = 2 if kind == 1 else 0
         self.hears(RideRequested(session, Target(kind, floor, door), stamp, self.now - stamp))
 
     def ends(self, session: str, *, aged: float = 0.0) -> None:
-        """An adapter's END."""
+        """Let an adapter's END arrive, sent `aged` s ago by the adapter's clock."""
         stamp = self.stamped(aged)
         self.hears(RideEnded(session, stamp, self.now - stamp))
 
@@ -57,12 +57,12 @@ class Alone(alone.Alone[SupervisedLift, Event, LiftSupervisorLimits, SupervisorR
         mode: str = "AGV",
         floors: tuple[str, ...] = (),
     ) -> None:
-        """A LiftState."""
+        """Let a LiftState arrive."""
         door = 2 if open else 0
         self.hears(LiftStateHeard(session, floor, to, door, MODES[mode], floors))
 
     def ride(self, session: str = "a") -> None:
-        """The lift is there, for this session: nothing is left to ask for."""
+        """Show the lift open at L3 for this session, so that nothing is left to ask for."""
         self.shows(session, "L3", to="L3", open=True)
 
     @property

@@ -1,4 +1,4 @@
-"""The lift supervisor's rules, one sentence each; what it sends to the lift's node, whole."""
+"""The lift supervisor's rules, a sentence each, with all messages to the lift's node."""
 
 import math
 
@@ -184,7 +184,7 @@ def test_nobody_else_is_served_before_a_state_after_the_end_shows_that_it_was_ob
     desk = Alone()
     desk.asks("a")
     desk.asks("b", "L1")
-    desk.shows("", "L2")  # from before the grant
+    desk.shows("", "L2")  # a state from before the grant
     desk.ends("a")
     desk.until(0.1)
     for second in range(1, 4):
@@ -207,7 +207,7 @@ def test_a_state_from_before_the_end_was_sent_confirms_nothing() -> None:
     desk = Alone()
     desk.asks("a")
     desk.until(0.05)
-    desk.ends("a")  # waits for its turn on the wire
+    desk.ends("a")  # the END waits for its turn on the wire
     desk.shows("", "L1")
     desk.asks("b")
     assert desk.report.holder == "a"
@@ -234,7 +234,7 @@ def test_an_end_from_a_robot_that_neither_has_nor_wants_the_lift_is_ignored() ->
 
 
 def test_an_end_of_the_session_that_the_lift_shows_is_passed_on_whoever_waits() -> None:
-    """The lift was taken without us; its robot, or an operator, gives it back."""
+    """A session was granted without this supervisor; its robot or an operator ends it."""
     desk = Alone()
     desk.asks("b")
     desk.shows("a", "L2")
@@ -326,7 +326,7 @@ def test_a_robot_that_waits_in_silence_for_10_s_leaves_the_queue_and_comes_back_
 
 
 def test_requesters_may_be_silent_while_the_lift_is_silent() -> None:
-    """Fleet adapters repeat themselves at its states, and at nothing else."""
+    """Fleet adapters repeat their requests at a lift's states, and at nothing else."""
     desk = Alone(LiftSupervisorLimits(holder_ttl_s=70.0))
     desk.asks("a")
     desk.asks("b")
@@ -442,7 +442,7 @@ def test_a_robot_that_waits_is_known_however_many_names_are_heard_after_it() -> 
     assert {"a", "b"} < set(desk.memory.requesters)
 
 
-# ---- LIFT-SUPERVISOR-2: who really has the lift
+# ---- LIFT-SUPERVISOR-2: the true holder of the lift
 
 
 def test_a_session_that_the_lift_shows_goes_before_the_queue_if_its_robot_asks() -> None:
@@ -526,7 +526,7 @@ def test_a_holder_whose_session_the_node_has_lost_in_a_restart_is_asked_for_agai
     assert desk.sent == [(0.0, "AGV a L3"), (5.0, "AGV a L3")]
 
 
-# ---- LIFT-SUPERVISOR-4: who has gone
+# ---- LIFT-SUPERVISOR-4: requesters that have gone
 
 
 def test_a_holder_that_the_lift_never_took_and_that_is_silent_for_10_s_is_ended() -> None:
@@ -588,7 +588,7 @@ def test_a_lift_that_does_not_take_the_holder_or_does_not_release_it_raises_an_a
 
 
 def shown_each_second(desk: Alone, session: str, until: int) -> tuple[Fault, ...]:
-    """The faults after states that show this session from now until then."""
+    """Let states show this session each second until then; return the last faults."""
     for second in range(int(desk.now), until + 1):
         desk.until(float(second))
         desk.shows(session, "L1", to="L3")

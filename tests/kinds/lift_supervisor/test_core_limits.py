@@ -1,4 +1,4 @@
-"""What holds the supervisor back: hazards, a quiet start, another supervisor, stale requests."""
+"""Limits of the supervisor: hazards, a quiet start, another supervisor, stale requests."""
 
 import pytest
 from msgspec.structs import replace
@@ -69,7 +69,7 @@ def test_a_holders_human_mode_is_passed_on_in_a_hazard() -> None:
     assert desk.sent == [(0.0, "AGV a L3"), (1.0, "HUMAN a L1")]
 
 
-# ---- LIFT-SUPERVISOR-6: while it may not speak
+# ---- LIFT-SUPERVISOR-6: without permission to publish
 
 
 def test_after_its_quiet_start_it_continues_the_ride_that_it_finds() -> None:
@@ -174,7 +174,7 @@ def test_a_request_may_be_as_old_as_our_uptime_or_as_the_yaml_says_if_clocks_agr
 
 
 def test_a_request_from_the_future_is_not_believed_in_the_quiet_time() -> None:
-    """Our clock is not set yet: all that is replayed looks new."""
+    """Our clock is not set yet, so all replayed requests look new."""
     desk = Alone(speaks=False)
     desk.skew = 3600.0
     desk.asks("a")

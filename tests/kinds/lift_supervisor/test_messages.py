@@ -1,4 +1,4 @@
-"""What adapters send, as events, or refused by name; and what the status file says."""
+"""Adapters' messages become events or are refused with a reason; the content of the status file."""
 
 import pytest
 from msgspec.structs import replace

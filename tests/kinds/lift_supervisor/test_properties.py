@@ -1,4 +1,4 @@
-"""What always holds: under losses, delays, copies and restarts, and for every order of events."""
+"""Properties that hold under losses, delays, copies and restarts, and in every order of events."""
 
 import random
 from collections.abc import Iterator, Sequence
@@ -30,7 +30,7 @@ NAMES = ["fleet/a", "fleet/b", "fleet/c"]
 
 
 def bad_network(rng: random.Random, loss: float) -> Any:
-    """Messages are lost, doubled, and overtake each other by up to half a second."""
+    """Return a route that loses, doubles and reorders messages, with delays of up to half a second."""
 
     def route(sender: str, receiver: str) -> Sequence[float]:
         copies = 0 if rng.random() < loss else 2 if rng.random() < 0.1 else 1
@@ -40,7 +40,7 @@ def bad_network(rng: random.Random, loss: float) -> Any:
 
 
 def check_rates(requests: list[tuple[float, str]]) -> None:
-    """No two messages within 0.1 s, none unchanged within 1 s, and few in all."""
+    """Require 0.1 s between any two messages, 1 s between equal messages, and few messages in all."""
     for (at, text), (later, again) in pairwise(requests):
         assert later - at >= (0.999 if text == again else 0.099), (at, text, again)
     for at, _ in requests:
@@ -57,7 +57,7 @@ Restart = st.tuples(st.floats(0, 150), st.sampled_from(["supervisor", "Lift1", *
     our_skew=st.sampled_from([0.0, -3600.0, 3600.0]),
     restarts=st.lists(Restart, max_size=6),
 )
-@example(seed=1, loss=0.0, our_skew=0.0, restarts=[])  # a late state began the same END again
+@example(seed=1, loss=0.0, our_skew=0.0, restarts=[])  # once, a late state began the same END again
 def test_every_live_robot_is_served_whatever_is_lost_and_whoever_restarts(
     seed: int, loss: float, our_skew: float, restarts: list[tuple[float, str]]
 ) -> None:
@@ -119,7 +119,7 @@ LIMITS = LiftSupervisorLimits(holder_alarm_s=15.0, holder_ttl_s=20.0)
 
 
 class Watched:
-    """The core, with what must hold after each of its decisions."""
+    """The core, with the rules for each of its decisions."""
 
     def __init__(
         self, memory: SupervisedLift, now: float, limits: LiftSupervisorLimits = LIMITS
@@ -130,7 +130,7 @@ class Watched:
         self.wake_at = float("inf")
 
     def hears(self, event: Any) -> str:
-        """One decision; what was sent, or ""."""
+        """Make one decision; return the message that was sent, or ""."""
         before = self.memory
         decided = core.decide(before, event, self.now, self.limits)
         self.memory = memory = decided.memory
@@ -139,7 +139,7 @@ class Watched:
         assert len(decided.publish) <= 1
         assert len({claim.session for claim in memory.claims}) == len(memory.claims)
         since = [claim.since for claim in memory.claims]
-        assert since == sorted(since), "first come, first served"
+        assert since == sorted(since), "the queue is out of order"
         self._check_turn(before, memory, event)
         if not decided.publish:
             return ""
@@ -158,7 +158,7 @@ class Watched:
         return text
 
     def _check_turn(self, before: SupervisedLift, after: SupervisedLift, event: Any) -> None:
-        """A turn that has reached the lift ends by END, and an END by a state that came after it."""
+        """Require END and a later state, or another session at the lift, for the end of a turn."""
         if not after.may_speak:
             assert after.turn is None
             return
@@ -171,11 +171,13 @@ class Watched:
         else:
             shown = after.session_shown
             assert after.turn
-            assert after.turn.session == shown != before.turn.session, "the lift has another"
+            assert after.turn.session == shown != before.turn.session, (
+                "another session has the lift"
+            )
 
 
 def events_at(now: float) -> list[Any]:
-    """The events that may happen next."""
+    """Return the events that may happen next."""
     agv, fire = LiftMode.MODE_AGV, LiftMode.MODE_FIRE
     return [
         RideRequested("a", Target(1, "L3", 2), now, 0.0),
@@ -199,7 +201,7 @@ def events_at(now: float) -> list[Any]:
 def test_every_order_of_events_to_this_depth_keeps_the_rules(
     may_speak: bool, steps: int, steps_s: tuple[float, ...], at_least: int
 ) -> None:
-    """A memory met twice at the same time is walked once."""
+    """A memory that comes twice at the same time is walked once."""
     memory = core.initial("Lift1", 0.0)
     memory = core.decide(memory, MaySpeak(may_speak), 0.0, LIMITS).memory
 
@@ -216,7 +218,7 @@ def test_every_order_of_events_to_this_depth_keeps_the_rules(
 
 @st.composite
 def histories(draw: st.DrawFn) -> list[tuple[float, int]]:
-    """A history of events, each as (seconds before it, number of the event)."""
+    """Draw a history of events, each as (seconds before it, number of the event)."""
     gap = st.sampled_from([0.0, 0.05, 0.1, 0.5, 1.0, 2.5, 4.0, 11.0])
     return draw(st.lists(st.tuples(gap, st.integers(0, 9)), max_size=60))
 
@@ -255,7 +257,7 @@ def test_from_every_state_a_lift_that_obeys_is_granted_to_a_robot_that_asks(
 
 
 def obeys(session: str, text: str) -> str:
-    """Which session has the lift after this request, if `session` had it before."""
+    """Return the session that has the lift after this request, if `session` had it before."""
     kind, who = (*text.split(" "), "", "")[:2]
     if kind == "AGV" and not session:
         return who

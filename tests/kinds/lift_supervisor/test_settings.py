@@ -1,4 +1,4 @@
-"""The YAML's section, and what of it reaches the core."""
+"""The YAML's section, and the part of it that reaches the core."""
 
 import math
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Two supervisors that begin at the same moment, as after a power cut: one of them serves."""
+"""Two supervisors start at the same moment, as after a power cut, and one of them serves in the end."""
 
 from collections import deque
 from collections.abc import Callable
@@ -17,7 +17,7 @@ STEP_S = 0.05
 
 
 class Late:
-    """A subscription that sees a publisher DISCOVERY_S after it has come or gone, as on a network."""
+    """A subscription that sees a publisher come or go DISCOVERY_S late, as on a network."""
 
     def __init__(self, end: Subscription) -> None:
         self._end = end
@@ -66,5 +66,5 @@ def test_of_two_supervisors_that_start_at_once_exactly_one_serves_in_the_end() -
             node.round()
         speaking.append(sum(node.presence.may_speak for node in nodes))
         now += STEP_S
-    assert 2 in speaking, "they did begin at once"
+    assert 2 in speaking, "the two did not begin at once"
     assert set(speaking[round(30.0 / STEP_S) :]) == {1}

@@ -1,8 +1,8 @@
-"""Every history to a depth: whoever asks for a lift is passed on to it, or the report says why not.
+"""All histories to a depth: a request for a lift is passed on, or the report gives the reason.
 
-Nine moves: two robots ask, one ends, states of the lift, leave to speak, silence. All 9^5 = 59,049
-histories of five; but for `make deep` all 9^4 = 6,561 of four. Judged from what was sent and what is
-reported.
+There are nine moves: two robots ask, one ends, states of the lift, permission to publish, silence.
+`make deep` has all 9^5 = 59,049 histories of five moves, `make test` all 9^4 = 6,561 of four. The test
+judges the sent messages and the report.
 """
 
 from collections.abc import Callable
@@ -27,7 +27,7 @@ MOVES: list[Move] = [
     lambda one: one.until(one.now + 12.0),
 ]
 PACE_S = 0.2
-"""Longer than the least time between two messages."""
+"""More than the least time between two messages."""
 
 
 def after(one: Alone, move: Move) -> Alone:
@@ -40,7 +40,7 @@ def after(one: Alone, move: Move) -> Alone:
 
 
 def check(one: Alone) -> None:
-    """A request is served while it was the last that went out; it waits while it was not."""
+    """Require a reason in the report while a robot's request is not the last message sent."""
     last = one.sent[-1][1] if one.sent else ""
     unserved = [c for c in one.memory.claims if last != f"AGV {c.session} {c.target.floor}"]
     assert bool(one.report.waits) >= bool(unserved), one.report

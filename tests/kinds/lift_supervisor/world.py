@@ -1,7 +1,7 @@
-"""A lift's part of the graph in virtual time: its node on a lift that works, riders, supervisors.
+"""A lift's part of the graph in virtual time: the node of a lift that works, riders, supervisors.
 
-The supervisor is ours as it is served, or the stand-in for RMF's. The lift node is ours as it is
-served (Node). The fleet adapters are RMF's rules.
+The supervisor is ours as it is served, or the stand-in for RMF's supervisor. The lift's node is ours as
+it is served (Node). The fleet adapters follow RMF's rules.
 """
 
 from typing import Any
@@ -26,12 +26,12 @@ FLOORS = ["L1", "L2", "L3"]
 
 
 def requests(world: World) -> list[tuple[float, str]]:
-    """What was sent to the lift's node: (s, words)."""
+    """Return the messages to the lift's node: (s, words)."""
     return [(at, words(message)) for at, _, message in world.said_on(LIFT_REQUESTS)]
 
 
 def sessions(world: World) -> list[tuple[float, str]]:
-    """Whom the lift has shown: (s, session), each time that it differs."""
+    """Return the sessions that the lift has shown: (s, session) for each change."""
     shown = [(0.0, "")]
     for at, _, state in world.said_on(LIFT_STATES):
         if state.session_id != shown[-1][1]:
@@ -53,14 +53,14 @@ class OurSupervisor(Served):
 
 
 class RmfsSupervisor(StandIn):
-    """RMF's own supervisor, by its rules."""
+    """A stand-in for RMF's own supervisor."""
 
     def __init__(self, world: World) -> None:
         super().__init__(world, LiftSupervisor, "rmf_supervisor", LIFT_REQUESTS)
 
 
 class LiftNode:
-    """Our lift node, scanning a lift that works."""
+    """Our lift's node, which scans a lift that works."""
 
     SCAN_S = 0.25
 
@@ -73,7 +73,7 @@ class LiftNode:
         self.restart()
 
     def restart(self) -> None:
-        """A new daemon: outputs off, nothing remembered."""
+        """Start a new daemon: outputs off, nothing remembered."""
         clock = Clock(lambda: self.world.now, lambda: EPOCH + self.world.now)
         limits = LIFT.limits(self.settings, {})
         self.lift.advance(self.world.now)
@@ -105,7 +105,7 @@ class LiftNode:
 class Rider:
     """A robot with its fleet adapter: it rides each of its trips, then is done.
 
-    `skew`: its clock is ahead of ours (s). `rode`: (s, trip) of each ride that has ended.
+    `skew`: how far its clock is ahead of ours (s). `rode` has (s, trip) of each completed ride.
     """
 
     ENTER_S = 3.0
@@ -134,14 +134,14 @@ class Rider:
         return not self.trips
 
     def restart(self) -> None:
-        """A new fleet adapter, which sends its robot on the same trip once more, from the start."""
+        """Start a new fleet adapter, which begins the same trip again."""
         self.world.retained.pop(self.name, None)
         self.robot = RobotContext(self.name)
         self._step = 0
         self._next_at = NEVER if self.done else self.world.now + 2.0
 
     def die(self) -> None:
-        """It sends nothing any more, and what it retained is gone."""
+        """Let the adapter die: it sends nothing more, and its retained messages are gone."""
         self.world.retained.pop(self.name, None)
         self.world.hearers[LIFT_STATES.name].discard(self.name)
         self._next_at = NEVER

@@ -1,4 +1,4 @@
-"""The core of a kind without hardware, alone in virtual time: told by hand, its words written down."""
+"""The core of a kind without hardware, alone in virtual time: tests give events and note messages."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
@@ -15,7 +15,10 @@ E = TypeVar("E")
 
 
 class Alone(ABC, Generic[M, E, L, R]):
-    """`sent`: (s, words) of each message; `refused`: (s, why). Requesters' clocks: ours plus `skew`."""
+    """A core alone. `sent` has (s, words) of each message, `refused` (s, reason).
+
+    Requesters' clocks are `skew` ahead of ours.
+    """
 
     def __init__(
         self,
@@ -37,10 +40,10 @@ class Alone(ABC, Generic[M, E, L, R]):
 
     @abstractmethod
     def words(self, message: Message) -> str:
-        """A message in short; "" for one that is not noted."""
+        """Return a message in short words, or "" for a message that is not noted."""
 
     def hears(self, event: E | MaySpeak | Woken) -> None:
-        """One decision, now."""
+        """Make one decision, now."""
         decided = self._decide(self.memory, event, self.now, self.limits)
         self.memory, self.report, self.wake_at = decided.memory, decided.report, decided.wake_at
         at = round(self.now, 3)
@@ -50,13 +53,13 @@ class Alone(ABC, Generic[M, E, L, R]):
             self.refused.append((at, decided.refused))
 
     def until(self, at: float) -> None:
-        """Time passes; the core is woken when it wants to be."""
+        """Let time pass, and wake the core at its own times."""
         while self.wake_at <= at:
             self.now = self.wake_at
             self.hears(Woken())
-            assert self.wake_at > self.now, "it wants to be woken at once, for ever"
+            assert self.wake_at > self.now, "the core wants to be woken at once, for ever"
         self.now = at
 
     def stamped(self, aged: float) -> float:
-        """When a requester sent what is `aged` s old, by its own clock (s)."""
+        """Return a stamp (s) that is `aged` s old by the requester's clock."""
         return self.now + self.skew - aged

@@ -1,4 +1,4 @@
-"""Which of an adapter's requests count, by its own stamps and by our clock."""
+"""Which of an adapter's requests count, by the adapter's stamps and by our clock."""
 
 import math
 
@@ -10,7 +10,7 @@ from bridges.messages.definitions import Time
 
 STAMP = 1_800_000_000.0
 STARTED = Rules(most_s=5.0)
-"""We started 5 s ago."""
+"""Rules for a daemon that started 5 s ago."""
 
 
 class Clocked:
@@ -22,7 +22,7 @@ class Clocked:
         self.requester = Requester()
 
     def at(self, now: float, *, sent: float | None = None, ends: bool = False) -> bool:
-        """A message arrives `now`; it was `sent` at that time of ours (s), or just now."""
+        """Does this message count? It arrives `now`; it was `sent` then by our clock (s), or now."""
         sent = now if sent is None else sent
         stamp = STAMP + sent + self.skew
         age_s = now - sent - self.skew
@@ -79,7 +79,7 @@ def test_a_request_from_the_future_counts_unless_a_limit_is_set() -> None:
 
 
 def test_an_end_is_compared_with_earlier_ends_only() -> None:
-    """An operator ends a robot's session by another clock than the robot's."""
+    """An operator's clock, which ends a robot's session, may differ from the robot's clock."""
     requester = Clocked()
     assert requester.at(100.0)
     assert requester.at(100.0, sent=95.0, ends=True)

@@ -1,4 +1,4 @@
-"""pyproject.toml's lists: import rules name whole folders, a new kind among them; mutation, files."""
+"""Lists in pyproject.toml: the purity contract includes every kind, and files for mutation exist."""
 
 import tomllib
 from pathlib import Path
