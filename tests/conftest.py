@@ -43,7 +43,7 @@ signal.signal(
 
 gc.disable()
 atexit.register(gc.freeze)
-"""The collection of tests leaves no garbage, so no garbage is collected then, nor at a worker's end."""
+"""The garbage collector is off while pytest collects tests (no garbage) and at a worker's end."""
 
 end_with_us()
 
@@ -52,7 +52,7 @@ _deselected: list[str] = []
 
 @pytest.fixture(autouse=True)
 def _log_as_before() -> Iterator[None]:
-    """Undo the log setup of a command called in this process before the next test."""
+    """Before the next test, undo the log setup of a command that was called in this process."""
     root = logging.getLogger()
     handlers, level = list(root.handlers), root.level
     yield
@@ -112,7 +112,7 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: object) -> object:
 def _mixed(items: list[pytest.Item]) -> list[pytest.Item]:
     """Mix tests that wait with tests that compute, to keep all cores busy.
 
-    Tests move file by file, always in the same order. The long tests come in the first quarter, the
+    Whole files are mixed, always in the same order. The long tests come in the first quarter, the
     longest first.
     """
     random = Random(1)

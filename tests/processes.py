@@ -25,8 +25,7 @@ The guard of a killed daemon may have started another process meanwhile, so look
 
 
 def end_with_us() -> None:
-    """End all processes started by this process from now on, with their children, when this process
-    ends.
+    """End all later children of this process, and their children, when this process ends.
 
     This holds after SIGKILL too. PR_SET_PDEATHSIG would not do: its signal comes when the starting
     thread ends, and a child's own children do not inherit it.

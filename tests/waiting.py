@@ -24,8 +24,7 @@ LEASE_S = 9.5
 
 
 def wait_until(condition: Callable[[], object], what: str, patience_s: float = PATIENCE_S) -> None:
-    """Look again and again until the condition holds; fail with the name `what` if the condition never
-    holds.
+    """Look repeatedly until the condition holds; fail with the name `what` if it never holds.
 
     The pauses grow with the time waited, because each look costs CPU that the awaited process needs.
     """
@@ -38,8 +37,7 @@ def wait_until(condition: Callable[[], object], what: str, patience_s: float = P
 
 
 def at_last(step: Callable[[], T], what: str, between: Callable[[], object] = lambda: None) -> T:
-    """Return the result of a step on a wire; repeat the step if an answer is late, as on a busy
-    machine.
+    """Return the result of a step on a wire, repeated while answers are late, as on a busy machine.
 
     `between` is called before each repetition. Any DriverError other than a late answer is raised.
     """

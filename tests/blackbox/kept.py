@@ -1,4 +1,4 @@
-"""The soak's site with a ring for each daemon: the recordings of a day, to decide again."""
+"""The soak's site with a ring for each daemon: a day of recordings for replays."""
 
 from collections.abc import Callable
 from functools import partial

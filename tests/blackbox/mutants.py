@@ -293,7 +293,7 @@ JUDGES: Final[Codes] = READS | {os.EX_UNAVAILABLE}
 def commands(told: Plain, folder: Path) -> Iterator[tuple[tuple[str, ...], Codes]]:
     """Yield each command that reads a recording or a ring, with its permitted exit codes.
 
-    `folder` takes all files.
+    All files go into `folder`.
     """
     run = folder / "run"
     run.mkdir(parents=True, exist_ok=True)

@@ -1,4 +1,4 @@
-"""The rings of real daemons survive a kill; writing a ring imports no other library."""
+"""The rings of real daemons survive a kill; writing a ring needs no library."""
 
 import os
 import shutil

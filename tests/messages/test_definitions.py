@@ -169,7 +169,7 @@ def test_there_are_no_constants_besides_those_of_the_table() -> None:
 
 
 def test_no_constant_that_jazzy_lacks_is_sent() -> None:
-    """Jazzy lacks Alert with its tiers, so neither is sent there; RMF alone sends the missing modes."""
+    """Alert's tiers go out only with Alert, which Jazzy lacks too; only RMF sends the missing modes."""
     assert NOT_IN_JAZZY[d.AlertTier] == CONSTANTS[d.AlertTier].keys()
     assert not releases.JAZZY.has(d.Alert)
     ours = set(CONSTANTS[d.RobotModeValue]) - NOT_IN_JAZZY[d.RobotModeValue]

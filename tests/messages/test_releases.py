@@ -1,4 +1,4 @@
-"""Nodes of different RMF releases on one graph: who hears whom, what `auto` follows, which faults."""
+"""Nodes of different RMF releases on one graph: who hears whom, what `auto` follows, and the faults."""
 
 import logging
 from collections.abc import Callable, Iterator

@@ -53,8 +53,7 @@ JAZZYS: dict[Any, str | None] = {
     d.Alert: None,
     d.AlertParameter: None,
 }
-"""Jazzy's differences, from the .msg files at tag 3.3.1 (a351d51), by rosbags 0.11; None: no such
-message.
+"""Jazzy's differences, by rosbags 0.11 from the .msg files at tag 3.3.1 (a351d51); None: no message.
 
 For 3.5.0 (kilted, c0f72ce) rosbags computes the same hashes as for 4.1.0.
 """

@@ -66,7 +66,7 @@ class Story:
     def asks(
         self, who: str, floor: str = "L2", kind: int = AGV, *, passed: bool = False
     ) -> "Story":
-        """Let a LiftRequest of a fleet adapter arrive, or the supervisor's if it is `passed` on."""
+        """Let a fleet adapter's LiftRequest arrive or, if `passed`, the supervisor's LiftRequest."""
         topic = "lift_requests" if passed else "adapter_lift_requests"
         floor = "" if kind == END else floor
         return self.hear(topic, d.LiftRequest("Lift1", stamp(WALL + self.now), who, kind, floor))

@@ -1,7 +1,6 @@
-"""Generated pages of docs/: `python -m tests.reference.pages` writes docs/reference/ and the decisions'
-index.
+"""`python -m tests.reference.pages` writes the generated pages of docs/.
 
-`test_pages.py` compares each page with its file.
+These are docs/reference/ and the index of decisions; `test_pages.py` compares each page with its file.
 """
 
 import argparse

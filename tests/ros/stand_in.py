@@ -1,7 +1,7 @@
 """A stand-in for rclpy in a folder of its own: enough for a daemon to start and be refused.
 
-When the interpreter ends, the stand-in prints whether its executor's thread still runs. The real rclpy
-would then abort the process (SIGABRT), because its C++ objects go while the thread uses them.
+When the interpreter ends, the stand-in prints whether its executor's thread still runs. With such a
+thread the real rclpy aborts the process (SIGABRT): its C++ objects go while the thread uses them.
 """
 
 from pathlib import Path

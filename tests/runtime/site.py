@@ -20,7 +20,7 @@ from tests.waiting import PATIENCE_S, wait_until
 
 ROOT = Path(__file__).parents[2]
 SERVICE = {"RMF_BRIDGE_SERVICE": "1"}
-"""Makes the daemon a service, without a guard: that would try for minutes after the module is gone."""
+"""A service starts no guard; a guard would try for minutes after the module is gone."""
 PATIENT = "stale_after_s: 30"
 """A long limit, so a busy machine that delays the scans does not make the door stale. For the same
 reason the module has 1.5 s to answer, in place of the usual 0.3 s.
@@ -96,7 +96,7 @@ class Module:
 
 
 def shipped(name: str, directory: Path, transport: str) -> Path:
-    """Copy a shipped YAML for this transport, in the environment of ROS as it is; return the copy."""
+    """Copy a shipped YAML for this transport, without its `ros_setup`; return the copy."""
     text = (ROOT / "config" / name).read_text()
     text = re.sub(r" *ros_setup: .*\n", "", text)
     file = directory / name
@@ -108,7 +108,7 @@ BRIDGE = ("bridges.cli",)
 
 
 def command(*arguments: str | Path, program: Sequence[str] = BRIDGE) -> list[str]:
-    """Return `rmf-bridge …` for this environment; `program` replaces the module `bridges.cli`."""
+    """Return the command line of `rmf-bridge …`; `program` is the module and its first arguments."""
     return [sys.executable, "-m", *program, *map(str, arguments)]
 
 

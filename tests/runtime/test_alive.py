@@ -60,7 +60,7 @@ def test_after_sigstop_no_earlier_state_is_shown_as_new(
         pid = running.process.pid
 
         def suspended() -> bool:
-            """Suspend the daemon while the door leaves OPEN; return False if that met a scan."""
+            """Suspend the daemon while the door leaves OPEN; return False if the stop met a scan."""
             module.tell("fail", "ward_door", "opened", "ok")
             wait_until(lambda: graph.last() is DoorModeValue.MODE_OPEN, "the door shows OPEN")
             shown = len(graph.states)

@@ -23,7 +23,7 @@ BUILD = "r1.gabcdef0"
 
 @pytest.fixture(autouse=True)
 def _built(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    """Hide the build of this checkout, as a package has another."""
+    """Set the build of a package; a checkout has no known build."""
     monkeypatch.setattr(record, "BUILD", BUILD)
     texts.give({})
     yield

@@ -486,7 +486,7 @@ def test_missing_lgpio_or_permission_is_reported_in_one_line(tmp_path: Path) -> 
 def test_a_bus_that_cannot_be_opened_leaves_nothing_to_switch_off(
     domain: int, tmp_path: Path
 ) -> None:
-    """Nothing was claimed, so no record stays; only this hardware could settle such a record."""
+    """Nothing was claimed, so no record may stay: without this hardware nobody could clear it."""
     file = shipped("lift_dry_contact.yaml", tmp_path, wire())
     text = file.read_text()
     text = text.replace("domain_id: 0", f"domain_id: {domain}\n  network: localhost")

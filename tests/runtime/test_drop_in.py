@@ -33,7 +33,7 @@ SHIPPED = {
     "charger_modbus": SERIAL,
     "charger_register": SERIAL,
     "charger_relay": NET,
-    "charger_wiferion": SERIAL,  # slcan
+    "charger_wiferion": SERIAL,  # on slcan
     "door_http": NET,
     "door_line": SERIAL,
     "door_modbus": NET,

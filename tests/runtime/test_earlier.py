@@ -32,7 +32,7 @@ def _forgotten() -> Iterator[None]:
 
 
 def left(folder: Path, **later: object) -> tuple[Path, Records, str]:
-    """Write a record with fields of a later version; return its path, its place and its YAML's path."""
+    """Write a record with a later version's fields; return its path, the records and the YAML."""
     (source,) = EARLIER[-1].glob(PATTERN)
     content = msgspec.json.decode(source.read_bytes()) | later
     path = folder / source.name

@@ -1,4 +1,4 @@
-"""Each string of each message that a kind hears may have ten megabytes, which are not kept."""
+"""Ten megabytes in any string of any message that a kind hears are not kept."""
 
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -74,7 +74,7 @@ def taker(name: str, topic: Topic[Any]) -> Callable[[Message], object]:
 
 
 def with_huge(value: Any) -> Iterator[Any]:
-    """Yield copies of the value, each with another one of its strings huge."""
+    """Yield a copy of the value for each string in it, with that string huge."""
     if isinstance(value, str):
         yield HUGE
     elif isinstance(value, tuple):

@@ -371,7 +371,7 @@ def test_a_record_that_the_state_directory_cannot_take_goes_to_the_runtime_direc
     assert (kept.read(), runtime.read_bytes()) == (b"three", b"three")
     assert [r.getMessage().split(" ")[0] for r in caplog.records] == ["not_written"]
     state.rmdir()
-    state.write_bytes(b"one")  # as a disk has it that has come back
+    state.write_bytes(b"one")  # an old record, as on a disk that has come back
     assert MemoryFile(state, runtime).read() == b"three"
     kept.write(b"four")
     assert (MemoryFile(state, runtime).read(), runtime.exists()) == (b"four", False)

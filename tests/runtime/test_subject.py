@@ -33,7 +33,7 @@ def subject(by_code: bool) -> tuple[Subject[int, Seen, None, Seen], Refusals]:
         return fault.code if by_code else fault
 
     def publish(topic: Topic[Message], message: Message) -> None:
-        raise AssertionError("nothing is said")
+        raise AssertionError("nothing may be published")
 
     core = SubjectCore(
         "device", decide, lambda report, now: {"number": str(report.number)}, identity

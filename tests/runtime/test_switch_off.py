@@ -20,8 +20,8 @@ SILENT = 30
 def module() -> Iterator[Module]:
     """Yield a module on which only the last of many units answers, with its relay on.
 
-    Threads that still ask silent units when the time is up end once the module is closed; wait for
-    them.
+    Some threads still ask silent units when the time is up. They end once the module is closed, so wait
+    for them.
     """
     before = set(threading.enumerate())
     standing = Module()

@@ -211,7 +211,7 @@ class _End:
 
 @dataclass
 class Disk:
-    """The state directory, which outlives the daemon. `written` counts writes; `full` refuses them."""
+    """The state directory, which outlives the daemon. `written` counts writes; if `full`, they fail."""
 
     kept: bytes | None = None
     written: int = 0
@@ -283,7 +283,7 @@ class Served:
         return list(self.node.devices())
 
     def faults(self) -> dict[str, list[str]]:
-        """Return the faults in its status by lift or door, without those that have none."""
+        """Return, by lift or door, the faults in the status, if there are any."""
         shown = {name: status["faults"] for name, status in self.node.devices().items()}
         return {
             name: [f"{fault['code']}: {fault['detail']}" for fault in faults]
@@ -293,7 +293,7 @@ class Served:
 
 
 class Ticking:
-    """A node with subscriptions, and with a timer that calls `tick` each `every_s`."""
+    """A node with subscriptions and a timer, which calls `tick` every `every_s` seconds."""
 
     def __init__(self, world: World, name: str, every_s: float, tick: Callable[[], None]) -> None:
         self.name = name

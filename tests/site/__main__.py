@@ -20,7 +20,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("--seed", type=int, help="seed of the day; by default random")
     parser.add_argument("--hours", type=float, default=24.0, help="simulated hours, at least 0.5")
     parser.add_argument(
-        "--rmf", choices=SUPERVISORS, help="whose supervisors; by default by the seed"
+        "--rmf", choices=SUPERVISORS, help="whose supervisors; the seed decides by default"
     )
     parser.add_argument(
         "--kill-every",

@@ -45,8 +45,8 @@ LATE_S = 5.0
 ARRIVED_S = 3.5
 """The longest time in which a door may still be let go after RMF has let a robot through.
 
-RMF does so on a state that may be older than its request. The request may still be on its way while an
-earlier CLOSE ends: a late message, plus the repetition by our supervisor.
+RMF lets robots through on a state that may be older than the request. The request may still be on its
+way while an earlier CLOSE ends: a late message, plus the repetition by our supervisor.
 """
 
 STATED = (d.LiftState, d.DoorState, d.ChargerState)
@@ -411,7 +411,7 @@ class Laws:
         self._lifts[lift].inside.pop(robot, None)
 
     def abandoned(self, robot: str) -> None:
-        """Forget the robot: its adapter has died, or a supervisor asks in its name unwished."""
+        """Forget the robot: requests in its name may no longer be its own wish."""
         self.crossed(robot)
         for truth in self._lifts.values():
             truth.inside.pop(robot, None)

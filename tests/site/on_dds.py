@@ -1,7 +1,7 @@
 """The same robots in real time, on DDS: each fleet adapter and each daemon is a node of its own.
 
-Killed daemons are killed as processes. RMF's promises to the robots are compared with the edges of the
-plants, read from the plants' control sockets.
+Each daemon is a process, and is killed as a process. The edges of the plants, read from their control
+sockets, must keep RMF's promises to the robots.
 """
 
 import signal
@@ -137,7 +137,7 @@ class RealSite:
             daemon.follow(lambda edge: self.timeline.post(partial(self._edge, edge)))
 
     def restart(self, party: str, how: signal.Signals) -> None:
-        """Kill a daemon as a process is killed (SIGKILL leaves it no last word); start another."""
+        """Kill a daemon by this signal (SIGKILL permits no last word), and start another."""
         daemon = self.daemons.pop(party)
         if party in ("lift", "door"):
             device = LIFT if party == "lift" else DOOR

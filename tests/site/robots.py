@@ -46,11 +46,11 @@ class Within:
 
 Want = Within | float
 Day = Generator[Want, bool, None]
-"""A day yields what the robot waits for, a phase or seconds, and receives: is the phase done?"""
+"""A day yields its next wait (a phase or seconds) and receives whether the phase was done."""
 
 
 class Ground(Protocol):
-    """The true places of the robots, and what the building makes of them."""
+    """The true places of the robots, and the building's part in their passages."""
 
     def may_enter_lift(self, robot: "Resident", lift: str, floor: str) -> bool:
         """Does the robot see an open car there?"""
@@ -84,7 +84,7 @@ class Ground(Protocol):
 
 
 class Resident:
-    """One robot. `waits_for` is what RMF lets it wait for, since `since`.
+    """One robot. `waits_for` names the thing that the robot waits for, `since` the start of the wait.
 
     `join(name)` gives its adapter a place on the graph. `pace` is the factor of its pauses, compared
     with a real robot. `disturbed_at` is the time of its adapter's last death: after that, requests in
@@ -319,7 +319,7 @@ class Resident:
     # ---- charging by RMF's own task, with our coordinator
 
     def _charge_as_told(self) -> Day:
-        """Go to each dedicated place until the robot has charged."""
+        """Go to the dedicated place, which may change, until the robot has charged."""
         assert self._task is not None
         self.waits_for, self.since = "a charger", self._timeline.now
         self._task.begins()

@@ -132,7 +132,7 @@ TROUBLES: dict[str, Trouble] = {
 
 
 CHANGES = ("hardware_that_comes_and_goes", "two_nodes_for_each_device")
-"""Faults under which the facts really change all the time; the log's output then holds repeats back."""
+"""Faults under which facts change all the time; the log's filter then holds back repeats."""
 
 
 @pytest.mark.parametrize("trouble", TROUBLES)

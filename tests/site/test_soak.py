@@ -9,7 +9,7 @@ from tests.site.growth import Look, growth
 from tests.site.laws import Broken
 
 SEEDS = depth([2], [1, 2, 3])
-"""Days of other supervisors; tests/workbench/replay/test_replay.py plays seeds 1 and 3 as well."""
+"""Each seed has other supervisors; tests/workbench/replay/test_replay.py plays 1 and 3 anyway."""
 MINUTES = depth(8, 20)
 """The day is long enough for more than the last minutes, in which robots go home (`WIND_DOWN_S`)."""
 

@@ -108,7 +108,7 @@ class Ills:
         return self._obstructed.get(device, NEVER)
 
     def calm_since(self) -> float:
-        """Return since when no party has had an ill; inf if one has."""
+        """Return since when no party has had an ill; inf if any party has an ill."""
         return NEVER if any(self._now.values()) else self._calm_at
 
     def all(self) -> list[str]:

@@ -28,7 +28,7 @@ def check(step: Step) -> None:
 
 
 def the_message_is_whole(step: Step) -> None:
-    """Require a text in ERROR and in no other state, and with each request the request's own robot."""
+    """Require a text in ERROR only, and beside each request the robot of that request."""
     shown = step.decision.report
     assert shown.state in set(State)
     assert (shown.error_message != "") == (shown.state is State.CHARGER_ERROR)
@@ -63,7 +63,7 @@ def the_state_is_what_was_read(step: Step) -> None:
 
 
 def power_has_a_reason(step: Step) -> None:
-    """Require a valid request, and a healthy station that answers, for power."""
+    """Require, for power, a valid request and a healthy station that answers."""
     power, shown = step.decision.outputs.power, step.decision.report
     if power:
         assert step.ledger.granted is not None
@@ -87,7 +87,7 @@ def power_has_a_reason(step: Step) -> None:
 
 
 def nobody_else_is_energised(step: Step) -> None:
-    """Require power only for the requesting robot where robots are verified; at first only in range."""
+    """Where robots are verified, require power for the requesting robot only, at first in range."""
     power, sample, limits = step.decision.outputs.power, step.seen, step.limits
     if not limits.receivers or sample is None or not _sighted(step):
         return
@@ -106,7 +106,7 @@ def nobody_else_is_energised(step: Step) -> None:
 
 
 def protection_lasts(step: Step) -> None:
-    """Require, for an end of "out of service", a clearing and in time after it a good reading."""
+    """Require, before "out of service" ends, a clearing and soon after it a good reading."""
     before, after = step.before.ledger, step.ledger
     if before.out and not after.out:
         assert isinstance(step.event, Sampled)
@@ -146,8 +146,8 @@ def commands_are_counted(step: Step) -> None:
 def a_request_that_waits_has_a_reason(step: Step) -> None:
     """Require a reason for each waiting request.
 
-    A request waits while it has the station, the station does not charge with permission, and the
-    station does not show that the request is over (RELEASED).
+    A request waits while it has the station, unless the station charges with permission or shows that
+    the request is over (RELEASED).
     """
     shown, seen = step.decision.report, step.seen
     may_not = step.decision.outputs.power is False and seen and seen.activity is Activity.CHARGING

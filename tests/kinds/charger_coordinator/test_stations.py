@@ -1,6 +1,6 @@
 """The meaning of a station's state for a request, and the side at fault, rule by rule.
 
-Memories before are made by hand; memories after are compared as a whole.
+Each test makes a memory by hand, and compares the whole memory after the state.
 """
 
 import pytest
@@ -51,7 +51,7 @@ def shows(state: int, error: str = "", since: float = 10.0, heard: float = 20.0)
 
 
 def after(memory: SiteMemory, state: int, error: str = "", request_id: str = "r1") -> SiteMemory:
-    """Return the memory after charger_a has shown this at 30 s, without the shown state itself."""
+    """Return the memory after charger_a has shown this at 30 s, but with the shown states as before."""
     heard = ChargerStateHeard(A, state, request_id, ONE, error)  # type: ignore[arg-type]
     return replace(stations.heard(memory, heard, 30.0, SITE), stations=memory.stations)
 

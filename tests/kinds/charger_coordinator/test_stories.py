@@ -338,7 +338,7 @@ def test_a_coordinator_that_has_lost_its_memory_takes_over_what_the_stations_sho
 
 
 def dedicate(site: Yard, **places: str) -> Publisher[Any]:
-    """Begin RMF's charging schedule: each robot is sent to its place, to wait if that is a wait_… ."""
+    """Begin RMF's charging schedule, which sends each robot to its place, to wait at a `wait_…`."""
     schedule: Publisher[Any] = site.rmf.publisher(topics.CHARGING_ASSIGNMENTS)
     modes = {who: int(place.startswith("wait")) for who, place in places.items()}
     told = tuple(d.ChargingAssignment(who, place, modes[who]) for who, place in places.items())

@@ -1,8 +1,8 @@
 """All histories to a depth, and drawn ones: rules that hold whatever fleets, stations and time do.
 
 The walk takes all histories of three moves (in `make deep` of four: 10^4), each a second or more apart.
-Two robots and two stations behave as RMF's charger messages say. After the last move everything is mended, and every
-robot that wants to be charged must be.
+Two robots and two stations behave as RMF's charger messages say. After the last move everything is
+mended, and every robot that wants to charge must be charged.
 """
 
 from copy import copy

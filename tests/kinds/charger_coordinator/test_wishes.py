@@ -37,7 +37,7 @@ def seen(
 def after(
     memory: SiteMemory, sighting: Sighting, now: float, site: SiteLimits = SITE
 ) -> SiteMemory:
-    """Return the memory after a fleet has shown a robot, without the memory of the sighting itself."""
+    """Return the memory after this sighting, but with the remembered sightings as before."""
     return replace(wishes.sighted(memory, sighting, now, site), robots=memory.robots)
 
 

@@ -37,7 +37,7 @@ PAD = "wrong docking: tiny/AMR01 is not assigned here"
 def at(
     who: RobotName, place: str | None, since: float, task: str = "", heard: float = 85.0
 ) -> Standing:
-    """Return a robot at this waypoint since `since`, as its fleet last showed it at `heard`."""
+    """Return a robot at this waypoint since `since`, last shown by its fleet at `heard`."""
     return Standing(Sighting(who, False, place, 50.0, task), heard, since, since)
 
 

@@ -47,7 +47,7 @@ def the_hold_has_a_reason(step: Step) -> None:
 
 
 def the_relay_follows_the_hold(step: Step) -> None:
-    """Require the relay to follow the hold: steadily, or in pulses from the begin of the hold."""
+    """Require the relay to follow the hold: steadily, or in pulses from the start of the hold."""
     on, pulse = step.decision.outputs.hold_open, step.limits.pulse
     in_pulse = pulse is None or (step.now - step.ledger.held_since) % pulse.every_s < pulse.on_s
     assert on == (step.ledger.held and in_pulse)
@@ -135,6 +135,6 @@ def _signal(step: Step, name: str) -> bool:
 
 
 def _told_otherwise(step: Step, name: str, for_s: float) -> bool:
-    """Have the readings shown for so long, without a gap, that the contact is not asserted?"""
+    """Have the readings shown, for `for_s` and without a gap, that the contact is not asserted?"""
     since = step.ledger.unlike[UNLIKE.index(name)]
     return since is not None and step.now >= since + for_s

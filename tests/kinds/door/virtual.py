@@ -93,7 +93,7 @@ FIRE = _input(3, "low")
 
 
 class Door:
-    """The whole door. `told` has (s, mode) as RMF hears it; `relay` and `faults` have their changes."""
+    """The whole door. `told` has (s, mode) as RMF hears it; `faults` has each change of faults."""
 
     def __init__(self, **changes: Any) -> None:
         self.settings = settings(**changes)

@@ -22,14 +22,14 @@ from tests.kinds.door.virtual import Decided
 from tests.walk import Walker
 
 LONG_S = 32.0
-"""The longest time between scans (s) while the core wants no wake; it is below `stale_after_s`."""
+"""The longest gap between scans (s) if the core asks for no earlier scan; below `stale_after_s`."""
 
 DURATIONS: dict[str, float] = {"stale_after_s": 60.0, "max_hold_s": 30.0}
 """Changed defaults: longer `stale_after_s` saves scans; `max_hold_s` gives the open door's alarm."""
 
 
 def limits_of(durations: dict[str, float] | None = None, **facts: Any) -> DoorLimits:
-    """Return the limits with these durations, and DURATIONS and the defaults for the rest."""
+    """Return the limits: these durations, then DURATIONS, then the defaults."""
     return DoorLimits(t=DoorDurations(**{**DURATIONS, **(durations or {})}), **facts)
 
 
@@ -268,7 +268,7 @@ def _asked(
 def _unlike(
     ledger: Ledger, event: Event, now: float, limits: DoorLimits
 ) -> tuple[float | None, ...]:
-    """Return since when each contact reads as not asserted; only a failed reading ends that time."""
+    """Return since when each contact has read as not asserted, without a gap."""
     if isinstance(event, Sampled):
         gap = not fresh(ledger, now, limits)
         said = [getattr(event.sample, signal) for signal in UNLIKE]
@@ -325,7 +325,7 @@ def _at(at: Any, by: float, oldest_s: float = float("inf")) -> Any:
 
 
 def _held_since(at: float, by: float, limits: DoorLimits) -> float:
-    """Return the begin of the hold, cut off beyond every limit but at the same place between pulses."""
+    """Return the start of the hold, cut off beyond every limit, at the same place between pulses."""
     age_s, oldest_s = -(at + by), max(limits.t.travel_s, limits.t.open_timeout_s)
     if age_s <= oldest_s:
         return -age_s

@@ -88,7 +88,7 @@ class Storm:
             self.wrong.append((self.world.now, tuple(self.let_in)))
 
     def _look(self) -> None:
-        """Note the robots that are let in; a robot without a hold was misled by an earlier heartbeat."""
+        """Note the robots that are let in, or that an earlier heartbeat has misled."""
         for who, walker in self.walkers.items():
             if not walker.passing:
                 self.let_in.discard(who)

@@ -2,7 +2,8 @@
 
 The first walk has all 4^7 = 16384 histories of seven steps, 0.75 s apart: two requesters open and
 close, with stamps in order. The second walk has all 6^5 = 7776 histories of late requests, states and
-permissions to publish. Except in `make deep` the first walk is two steps shorter, the second one step.
+permissions to publish. `make test` leaves out the last two steps of the first walk and the last step of
+the second.
 """
 
 from collections.abc import Callable
@@ -98,7 +99,7 @@ def stamp(now: float, aged: float = 0.0) -> int:
 
 
 def after(ledger: Ledger, event: Callable[[float], Any]) -> Ledger:
-    """Return a copy that hears this event now, a step's time later."""
+    """Return a copy that has heard this event and let a step's time pass."""
     ledger = ledger.copy()
     ledger.hears(event(ledger.now))
     ledger.until(ledger.now + STEP_S)
@@ -106,7 +107,7 @@ def after(ledger: Ledger, event: Callable[[float], Any]) -> Ledger:
 
 
 def asked(ledger: Ledger, move: tuple[Any, str]) -> Ledger:
-    """Return a copy that hears this requester open or close."""
+    """Return a copy that has heard this requester open or close."""
     word, who = move
     return after(ledger, lambda now: word(who, stamp(now)))
 

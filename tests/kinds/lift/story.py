@@ -52,8 +52,7 @@ STANDING = LiftSample("L1", DoorReading.CLOSED, motion=Motion.STOPPED, agv=False
 
 
 class Building:
-    """The lift as the test sets it (`drivers.Driver[LiftSample, LiftOutputs]`); it does nothing by
-    itself.
+    """A passive lift, set by the test (`drivers.Driver[LiftSample, LiftOutputs]`).
 
     `edges` has (s, output, value). `unreadable` and `unwritable` are the reasons why reading or writing
     fails.

@@ -19,7 +19,7 @@ from tests.kinds.lift.wired import WiredStory, shipped
 from workbench.rmf_model.robot import RobotContext
 
 LATE_S = 0.3
-"""The permitted age of a shown truth: debounce, a scan, and the least gap between states."""
+"""The permitted age of a state: debounce, a scan, and the least gap between states."""
 
 WIRES = [w.signal for w in wires(shipped())]
 WIRE_FAILURES: list[FailureMode] = ["off", "stuck", "wrong"]

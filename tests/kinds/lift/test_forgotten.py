@@ -1,4 +1,4 @@
-"""LIFT-2: a supervisor that has forgotten the robot in the car: by RMF's own rules, and rule by rule.
+"""LIFT-2: a supervisor that has forgotten the robot in the car, by RMF's rules and rule by rule.
 
 rmf_ros2, lift_supervisor/Node.cpp: there is one slot for each lift. The first session that is heard
 takes the slot; requests of any other session, END too, are dropped.

@@ -1,4 +1,4 @@
-"""Relays that may never be on together, the rest between changes, and switching off without delay."""
+"""Relays that may never be on together, pauses between changes, and switching off without delay."""
 
 import pytest
 from msgspec.structs import replace

@@ -24,7 +24,7 @@ LEFT_S = 60.0
 def riding(
     jazzy: bool = False, adapters_first: bool = False
 ) -> tuple[World, RobotContext, RobotContext]:
-    """Return RMF's world with A between L2 and L4 and B waiting at L1, and both robots."""
+    """Return the world, A between L2 and L4, and B, which waits at L1."""
     a, b = RobotContext(A, jazzy), RobotContext(B, jazzy)
     rmf = world(a, b, adapters_first=adapters_first)
     rmf.supervisor = LiftSupervisor(jazzy)

@@ -1,4 +1,4 @@
-"""Requests of earlier rides that RMF's supervisor hears again: by RMF's own rules, and rule by rule."""
+"""Requests of earlier rides that RMF's supervisor hears again, by RMF's rules and rule by rule."""
 
 from collections.abc import Mapping
 
@@ -60,7 +60,7 @@ def test_a_supervisor_that_restarts_and_hears_an_earlier_ride_lets_no_door_go_ei
 def test_a_robot_that_is_cut_off_before_it_gets_the_lift_is_as_safe_when_it_is_found_again() -> (
     None
 ):
-    """On that day (12.6 h) the robot got the lift only after it had been cut off."""
+    """In `make soak SEED=7 RMF=kilted`, at 12.6 h, the robot was cut off before it got the lift."""
     first, robot = RobotContext(B), RobotContext(A)
     rmf = world(first, robot)
     rmf.rides(robot, "L2", "L1")
@@ -82,7 +82,7 @@ def test_a_robot_that_is_cut_off_before_it_gets_the_lift_is_as_safe_when_it_is_f
 def test_an_earlier_ride_that_rmf_hears_again_shows_a_robot_no_door_that_was_let_go(
     after_s: float,
 ) -> None:
-    """On that day a robot's next ride began where the last had ended, while RMF's supervisor was dead.
+    """A robot's next ride began where the last had ended, while RMF's real supervisor was dead.
 
     The robot entered on the earlier ride's state, and the door closed.
     """

@@ -1,4 +1,4 @@
-"""The trust in inputs: broken, contradictory, glitching, stale, restless and moving inputs."""
+"""Trust in inputs that are broken, contradictory, glitching, stale, restless or moving."""
 
 import pytest
 from msgspec.structs import replace

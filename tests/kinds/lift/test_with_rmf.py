@@ -175,7 +175,7 @@ def test_a_supervisor_that_restarts_in_a_fire_does_not_lock_the_robot_in() -> No
 
 
 def test_the_replay_of_a_hundred_old_requests_switches_agv_mode_once() -> None:
-    """RMF's transient-local adapter topic gives a starting supervisor so many old requests."""
+    """RMF's transient-local adapter topic gives a starting supervisor a hundred old requests."""
     story = Story(Controller())
     story.run(1.0)
     old = [

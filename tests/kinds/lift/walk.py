@@ -32,7 +32,7 @@ from bridges.kinds.shared.freshness import Requester
 from tests.walk import Walker
 
 LONG_S = 55.0
-"""The longest time between scans (s) while the core wants no wake; it is below `stale_after_s`."""
+"""The longest gap between scans (s) if the core asks for no earlier scan; below `stale_after_s`."""
 
 
 def limits_of(

@@ -22,7 +22,7 @@ class Clocked:
         self.requester = Requester()
 
     def at(self, now: float, *, sent: float | None = None, ends: bool = False) -> bool:
-        """Does this message count? It arrives `now`; it was `sent` then by our clock (s), or now."""
+        """Does a message count that was `sent` (s, our clock; default: now) and arrives `now`?"""
         sent = now if sent is None else sent
         stamp = STAMP + sent + self.skew
         age_s = now - sent - self.skew
@@ -79,7 +79,7 @@ def test_a_request_from_the_future_counts_unless_a_limit_is_set() -> None:
 
 
 def test_an_end_is_compared_with_earlier_ends_only() -> None:
-    """An operator's clock, which ends a robot's session, may differ from the robot's clock."""
+    """An operator who ends a robot's session may have another clock than the robot."""
     requester = Clocked()
     assert requester.at(100.0)
     assert requester.at(100.0, sent=95.0, ends=True)
