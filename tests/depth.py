@@ -10,7 +10,7 @@ T = TypeVar("T")
 
 
 def depth(default: T, deep: T) -> T:
-    """Return `default` in `make test` and `deep` in `make deep`: a depth, or a number to be found."""
+    """Return `default` in `make test` and `deep` in `make deep`: a walk's depth or least number."""
     return deep if DEEP else default
 
 

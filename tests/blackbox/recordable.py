@@ -38,7 +38,7 @@ def _starts() -> Iterator[Any]:
     for kind in map(kind_called, kind_names()):
         hints = typing.get_type_hints(kind.decide)
         memory, event, _now, _limits, decision = hints.values()
-        assert typing.get_origin(decision) is Decision, f"{kind.name}: walk from {hints}"
+        assert typing.get_origin(decision) is Decision, f"{kind.name}: decide returns {decision}"
         yield from (memory, event, *typing.get_args(decision))
 
 
@@ -52,7 +52,9 @@ def _walk(hint: Any, bound: Bound, found: dict[Any, None]) -> None:
                 _walk(part, bound, found) if part is not ... else None
             continue
         found[one] = None
-        assert _is_enum(plain) or issubclass(plain, msgspec.Struct | tuple), f"{one} in {found}"
+        assert _is_enum(plain) or issubclass(plain, msgspec.Struct | tuple), (
+            f"{one} is no struct, tuple or enumeration"
+        )
         for part in fields(one).values():
             _walk(part, {}, found)
         for below in plain.__subclasses__():  # a field of a type also takes its subclasses

@@ -91,7 +91,7 @@ def test_a_flood_ends_with_the_last_valid_request_and_states_go_on(lift: Lift) -
     wait_until(lambda: any(s.session_id for s in lift.states), "a session was granted")
     holder = next(s.session_id for s in lift.states if s.session_id)
     lift.send(replace(RIGHT, session_id=holder, request_type=0, destination_floor=""))
-    wait_until(lambda: lift.states[-1].session_id == "", "its END has ended the session")
+    wait_until(lambda: lift.states[-1].session_id == "", "the holder's END has ended the session")
     before = len(lift.states)
     wait_until(lambda: len(lift.states) > before + 1, "states go on")
     edges = [

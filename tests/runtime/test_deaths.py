@@ -253,7 +253,7 @@ def test_a_planted_name_makes_reset_signal_nobody(tmp_path: Path, name: str) -> 
     assert "Traceback" not in told.stderr
 
 
-@pytest.mark.skipif(os.geteuid() != 0, reason="only root has others' directories to be careful of")
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root must distrust other users")
 def test_root_acts_as_the_owner_of_a_directory_and_so_signals_no_one_elses_process(
     tmp_path: Path,
 ) -> None:
@@ -379,7 +379,7 @@ def test_running_out_of_file_descriptors_ends_no_daemon(
     assert module.relay() == [True, False]
 
 
-@pytest.mark.skipif(os.geteuid() != 0, reason="only root has others' directories to be careful of")
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root must distrust other users")
 def test_where_a_live_daemon_cannot_be_ruled_out_only_execstoppost_switches_off(
     module: Module, graph: Graph, tmp_path: Path
 ) -> None:

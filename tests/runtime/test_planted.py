@@ -19,7 +19,7 @@ from bridges.system.directories import Directories, Distrusted, opened
 NOBODY = 65534
 FILE = Path("/etc/rmf-bridges/lift.yaml")
 CLAIMED = ClaimRecord(str(FILE), b"kind: lift\n", {})
-ROOT = pytest.mark.skipif(os.geteuid() != 0, reason="only root can make what others would")
+ROOT = pytest.mark.skipif(os.geteuid() != 0, reason="only root can make files of other users")
 
 
 def test_a_directory_that_somebody_else_could_have_made_is_not_believed(tmp_path: Path) -> None:

@@ -18,7 +18,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Play one day; return the exit code."""
     parser = argparse.ArgumentParser(prog="python -m tests.site", description=__doc__)
     parser.add_argument("--seed", type=int, help="seed of the day; by default random")
-    parser.add_argument("--hours", type=float, default=24.0, help="simulated hours, at least 0.5")
+    parser.add_argument("--hours", type=float, default=24.0, help="simulated hours, at least 0.3")
     parser.add_argument(
         "--rmf", choices=SUPERVISORS, help="whose supervisors; the seed decides by default"
     )
@@ -47,7 +47,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     _print(f"{took_s:.1f} s")
     grown = growth(site.looks)
     if grown:
-        return _failed(site, "it grows: " + ", ".join(grown), options)
+        return _failed(site, "growth: " + ", ".join(grown), options)
     _print("every law held, nobody waited for ever, nothing grew")
     return 0
 
@@ -55,10 +55,12 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _failed(site: Site, why: str, options: argparse.Namespace) -> int:
     for at, line in list(site.laws.log)[-options.log :]:
         _print(f"{at:12.3f}  {line}")
-    _print(f"wrong now: {', '.join(site.ills.all()) or 'nothing'}")
+    _print(f"present troubles: {', '.join(site.ills.all()) or 'nothing'}")
     _print(f"BROKEN {why}")
     kills = f" KILL_EVERY={options.kill_every:g}" if options.kill_every else ""
-    _print(f"again: make soak SEED={site.seed} HOURS={options.hours:g} RMF={site.rmf}{kills}")
+    _print(
+        f"to play the day again: make soak SEED={site.seed} HOURS={options.hours:g} RMF={site.rmf}{kills}"
+    )
     return 1
 
 

@@ -57,7 +57,7 @@ class Charge:
         self.task_id, self.battery, self.place = "", FULL, ""
 
     def hear(self, message: d.ChargingAssignments) -> None:
-        """Take a new dedicated place."""
+        """Note the dedicated place of the robot, which may be new."""
         for assignment in message.assignments:
             if assignment.robot_name == self.robot:
                 self.dedicated = assignment.waypoint_name

@@ -351,7 +351,7 @@ class Laws:
             self.require(early, f"{name} lets its door go onto an obstruction")
 
     def _hazard_since(self, name: str) -> float:
-        """Return since when the node can see a hazard; inf: there is none."""
+        """Return the time since which the node can see a hazard; inf if there is none."""
         return max(self._ills.hazard_since(name), self._ills.since_over(name, "bus", "daemon"))
 
     def _lift_outputs(self, name: str) -> None:

@@ -65,7 +65,7 @@ class Air:
         self.timeline.at(until, partial(self._found_again, name, lost))
 
     def delays(self, speaker: str, hearer: str, topic: Topic[Any]) -> Sequence[float]:
-        """Return the delays of a sample's copies (s); no delay if the sample is lost."""
+        """Return the delays of a sample's copies (s), an empty sequence for a lost sample."""
         weather, random, now = self.weather, self._random.random, self.timeline.now
         until = max(self._cut.get(speaker, 0.0), self._cut.get(hearer, 0.0))
         delay = 0.002 + 0.02 * random()

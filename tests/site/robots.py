@@ -253,7 +253,7 @@ class Resident:
         return self._pace * self._random.uniform(least_s, most_s)
 
     def _patience(self) -> float:
-        """Return the robot's patience (s), which is seldom short: then the task is cancelled."""
+        """Return the patience (s) with a phase: seldom short, so that the task is cancelled."""
         return self._random.uniform(0.5, 20.0) if self._random.random() < 0.04 else NEVER
 
     def _get_clear(self) -> Day:

@@ -71,7 +71,7 @@ class Ills:
         return max(over.get(one, -NEVER) for one in what)
 
     def well_since(self, device: str) -> float:
-        """Return since when the device has had no ill; inf if it has an ill."""
+        """Return the time since which the device has had no ill; inf if it has an ill."""
         if self.any(device):
             return NEVER
         return max(self._over.get(device, {}).values(), default=-NEVER)
@@ -86,7 +86,7 @@ class Ills:
                 yield what
 
     def hazard_since(self, device: str) -> float:
-        """Return since when there is a hazard on a sound wire; inf if there is none."""
+        """Return the time since which a hazard is on a sound wire; inf if there is none."""
         now, over = self._now.get(device, {}), self._over.get(device, {})
         return min(
             (
@@ -104,11 +104,11 @@ class Ills:
         self._obstructed[device] = self._timeline.now
 
     def obstructed_since(self, device: str) -> float:
-        """Return since when somebody stands in the doorway; NEVER if nobody does."""
+        """Return the time since which somebody stands in the doorway; NEVER if nobody does."""
         return self._obstructed.get(device, NEVER)
 
     def calm_since(self) -> float:
-        """Return since when no party has had an ill; inf if any party has an ill."""
+        """Return the time since which no party has had an ill; inf if any has."""
         return NEVER if any(self._now.values()) else self._calm_at
 
     def all(self) -> list[str]:

@@ -268,7 +268,7 @@ def _asked(
 def _unlike(
     ledger: Ledger, event: Event, now: float, limits: DoorLimits
 ) -> tuple[float | None, ...]:
-    """Return since when each contact has read as not asserted, without a gap."""
+    """Return when each contact began to read as not asserted, without a gap since then."""
     if isinstance(event, Sampled):
         gap = not fresh(ledger, now, limits)
         said = [getattr(event.sample, signal) for signal in UNLIKE]

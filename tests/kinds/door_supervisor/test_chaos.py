@@ -129,7 +129,7 @@ def test_no_door_closes_on_a_robot_and_no_robot_waits_for_ever(seed: int, fate: 
 
 
 class Forgetful(Disk):
-    """A table on no disk: it is lost at a restart, as with RMF's own supervisor."""
+    """A table that is not on disk, so a restart loses it, as with RMF's own supervisor."""
 
     def read(self) -> bytes | None:
         return None

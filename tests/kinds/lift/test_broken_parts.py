@@ -46,7 +46,7 @@ class Witness:
     def hears(self, state: LiftState) -> None:
         self.looks()
         if state.door_state == 2:
-            assert self.story.now <= self.until, "OPEN is shown of a closed door"
+            assert self.story.now <= self.until, "OPEN is shown for a closed door"
             assert state.current_floor == self.open_at
 
 
