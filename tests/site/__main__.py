@@ -58,9 +58,7 @@ def _failed(site: Site, why: str, options: argparse.Namespace) -> int:
     _print(f"present troubles: {', '.join(site.ills.all()) or 'nothing'}")
     _print(f"BROKEN {why}")
     kills = f" KILL_EVERY={options.kill_every:g}" if options.kill_every else ""
-    _print(
-        f"to play the day again: make soak SEED={site.seed} HOURS={options.hours:g} RMF={site.rmf}{kills}"
-    )
+    _print(f"to repeat: make soak SEED={site.seed} HOURS={options.hours:g} RMF={site.rmf}{kills}")
     return 1
 
 

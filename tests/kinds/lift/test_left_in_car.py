@@ -24,7 +24,7 @@ LEFT_S = 60.0
 def riding(
     jazzy: bool = False, adapters_first: bool = False
 ) -> tuple[World, RobotContext, RobotContext]:
-    """Return the world, A between L2 and L4, and B, which waits at L1."""
+    """Return the world and its two robots: A rides from L2 to L4, B waits at L1."""
     a, b = RobotContext(A, jazzy), RobotContext(B, jazzy)
     rmf = world(a, b, adapters_first=adapters_first)
     rmf.supervisor = LiftSupervisor(jazzy)
