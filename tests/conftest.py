@@ -52,7 +52,7 @@ _deselected: list[str] = []
 
 @pytest.fixture(autouse=True)
 def _log_as_before() -> Iterator[None]:
-    """Before the next test, undo the log setup of a command that was called in this process."""
+    """Undo, before the next test, the log setup of a command that was called in this process."""
     root = logging.getLogger()
     handlers, level = list(root.handlers), root.level
     yield
@@ -95,7 +95,7 @@ def pytest_collection_finish() -> None:
 
 @pytest.hookimpl(optionalhook=True)  # in a run without xdist
 def pytest_xdist_make_scheduler(config: pytest.Config, log: object) -> object:
-    """With `--dist loadscope`, run a test with all its parameters on one worker.
+    """Run a test with all its parameters on one worker, if `--dist loadscope` is given.
 
     A module's fixture (an echo process, a schema) is then made once. Any other test goes to the next
     free worker.

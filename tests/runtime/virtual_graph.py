@@ -41,7 +41,7 @@ class Party(Protocol):
         """Return the time of the next call of `wake`."""
 
     def wake(self) -> None:
-        """Act: the time has come."""
+        """Act at the time of `wake_at`."""
 
 
 def at_once(sender: str, receiver: str) -> Sequence[float]:

@@ -232,10 +232,10 @@ class RealSite:
         self._across[robot.name] = door
 
     def on_pad(self, robot: Resident, charger: str) -> None:
-        """Never called: this site has no charger."""
+        """Do nothing: this site has no charger."""
 
     def off_pad(self, robot: Resident, charger: str) -> None:
-        """Never called: this site has no charger."""
+        """Do nothing: this site has no charger."""
 
     def charged(self, charger: str) -> bool:
         return True

@@ -87,7 +87,7 @@ def power_has_a_reason(step: Step) -> None:
 
 
 def nobody_else_is_energised(step: Step) -> None:
-    """Where robots are verified, require power for the requesting robot only, at first in range."""
+    """Require, where robots are verified, power for the requesting robot only, at first in range."""
     power, sample, limits = step.decision.outputs.power, step.seen, step.limits
     if not limits.receivers or sample is None or not _sighted(step):
         return

@@ -325,7 +325,7 @@ def _at(at: Any, by: float, oldest_s: float = float("inf")) -> Any:
 
 
 def _held_since(at: float, by: float, limits: DoorLimits) -> float:
-    """Return the start of the hold, cut off beyond every limit, at the same place between pulses."""
+    """Return the start of the hold; an old start is cut off by whole pulses."""
     age_s, oldest_s = -(at + by), max(limits.t.travel_s, limits.t.open_timeout_s)
     if age_s <= oldest_s:
         return -age_s
