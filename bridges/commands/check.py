@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from bridges.settings.building_map import BuildingMap
 
 COORDINATOR = "charger_coordinator"
-NO_COORDINATOR = "no FILE is a charger coordinator's YAML, to compare this with"
+NOTHING_BESIDE = "no FILE is a charger coordinator's or a lift's YAML, to compare this with"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -41,8 +41,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="CONFIG",
         action="append",
         default=[],
-        help="compare a charger coordinator with a fleet adapter's config.yaml; with a navigation"
-        " graph as --building-map the positions too. Once for each fleet",
+        help="compare a charger coordinator and lifts with a fleet adapter's config.yaml; with a"
+        " navigation graph as --building-map the positions too. Once for each fleet",
     )
     parser.add_argument(
         "--several-machines",
@@ -117,11 +117,11 @@ def _beside_fleet(
     found: Mapping[str, Findings],
     building: "BuildingMap | None",
 ) -> dict[str, Findings]:
-    """Return each coordinator's findings, extended by the comparison with this fleet's config."""
+    """Return the findings on coordinators and lifts, extended by the comparison with this fleet."""
     from bridges.settings.fleet_config import load_fleet
-    from bridges.settings.fleet_names import compared
+    from bridges.settings.fleet_names import compared, emergency_levels
 
-    ours = {f: config for f, (config, _) in right.items() if config.kind == COORDINATOR}
+    ours = {f: config for f, (config, _) in right.items() if config.kind in (COORDINATOR, "lift")}
     try:
         fleet = load_fleet(file)
     except SettingsError as error:
@@ -129,10 +129,11 @@ def _beside_fleet(
         return {first: _more(found[first], errors=error.problems)}
     if not ours:
         first = next(iter(found))
-        return {first: _more(found[first], errors=[fleet.problem((), NO_COORDINATOR)])}
+        return {first: _more(found[first], errors=[fleet.problem((), NOTHING_BESIDE)])}
     told_of = {}
     for name, config in ours.items():
-        beside = compared(config, fleet, building)
+        of_lift = config.kind == "lift"
+        beside = emergency_levels(config, fleet) if of_lift else compared(config, fleet, building)
         told_of[name] = _more(found[name], beside.errors, beside.warnings, beside.notes)
     return told_of
 

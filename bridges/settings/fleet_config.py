@@ -5,6 +5,9 @@
       recharge_threshold: 0.2           # below it RMF gives a robot no task
       recharge_soc: 1.0                 # RMF's ChargeBattery ends there
       finishing_request: charge         # charge, park or nothing
+      publish_fleet_state: 10.0         # Hz
+      account_for_battery_drain: true
+      lift_emergency_levels: {Lift1: L1}   # since Iron; where a robot in the car gets out in an alarm
       robots: {AMR01: {charger: charger_a}}
     reference_coordinates: {L1: {rmf: [[x, y], ...], robot: [[x, y], ...]}}
 
@@ -67,6 +70,9 @@ class RmfFleet(msgspec.Struct, frozen=True):
     recharge_threshold: Soc | None = None
     recharge_soc: Soc | None = None
     finishing_request: str | None = None
+    publish_fleet_state: float | None = None
+    account_for_battery_drain: bool | None = None
+    lift_emergency_levels: dict[str, str] = msgspec.field(default_factory=dict)
     robots: dict[str, RobotConfig | None] = msgspec.field(default_factory=dict)
 
 

@@ -13,6 +13,7 @@ from msgspec import Struct, field
 from yaml import MappingNode
 
 from bridges.kinds.charger_coordinator.settings import CoordinatorSettings, FleetSettings, Waypoint
+from bridges.kinds.lift.settings import LiftSettings
 from bridges.settings.building_map import BuildingMap
 from bridges.settings.config import Config
 from bridges.settings.fleet_config import EVERY_LEVEL, FleetFile
@@ -23,6 +24,7 @@ from bridges.yaml.spelling import unknown
 
 Transforms = Mapping[str, Similarity]
 """Level -> transform from RMF's map to the robot's; EVERY_LEVEL for all."""
+LEAST_HZ = 1.0
 FINISHING = ("charge", "park", "nothing")
 
 
@@ -40,8 +42,30 @@ def compared(config: Config, fleet: FleetFile, building: BuildingMap | None) -> 
     found.names()
     found.percentages()
     found.finishing()
+    found.needed()
     found.positions(building)
     return found.all
+
+
+def emergency_levels(lifts: Config, fleet: FleetFile) -> Compared:
+    """Compare the fleet's recall floors with the lifts that raise an alarm."""
+    found, path = Compared(), ("rmf_fleet", "lift_emergency_levels")
+    theirs = fleet.fleet.lift_emergency_levels
+    for name, lift in lifts.devices.items():
+        assert isinstance(lift, LiftSettings)
+        floors = [floor for _, _, floor in lift.on_map()]
+        level = theirs.get(name)
+        if level is not None and level not in floors:
+            text = f"'{name}' has an {unknown('floor', level, floors)}"
+            found.errors.append(fleet.problem((*path, name), text))
+        elif level is None and lift.alarm != "none":
+            text = (
+                f"'{name}' raises an alarm ({lift.alarm}) and has no recall floor here: a robot in its"
+                f" car would wait for its old floor. Write lift_emergency_levels: {{{name}: FLOOR}}; in"
+                " Humble the adapter calls set_lift_emergency_level"
+            )
+            found.warnings.append(fleet.problem(path, f"warning: {text}"))
+    return found
 
 
 class _Comparing:
@@ -131,6 +155,16 @@ class _Comparing:
                 " the next robot waits: write charge"
             )
             self._theirs("warnings", path if request else ("rmf_fleet",), text)
+
+    def needed(self) -> None:
+        """Check the keys without which the coordinator sees no robot, or RMF charges none."""
+        hz = self._fleet.fleet.publish_fleet_state
+        if hz is not None and hz < LEAST_HZ:
+            text = f"{hz:g} Hz is too seldom for the coordinator to see the robots: write 1 or more"
+            self._theirs("errors", ("rmf_fleet", "publish_fleet_state"), text)
+        if self._fleet.fleet.account_for_battery_drain is False:
+            text = "without it RMF never sends a robot to charge: write true"
+            self._theirs("errors", ("rmf_fleet", "account_for_battery_drain"), text)
 
     def positions(self, building: BuildingMap | None) -> None:
         """Check the maps' transforms, and compare each waypoint with the navigation graph."""

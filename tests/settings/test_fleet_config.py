@@ -158,6 +158,53 @@ def test_settings_that_cannot_be_right_are_named_where_they_stand(
     assert (code, problem in found) == (os.EX_CONFIG, True), found
 
 
+@pytest.mark.parametrize(
+    ("key", "problem"),
+    [
+        (
+            "publish_fleet_state: 0.2",
+            "config.yaml:3:3: 0.2 Hz is too seldom for the coordinator to see the robots: write 1 or"
+            " more",
+        ),
+        (
+            "account_for_battery_drain: False",
+            "config.yaml:3:3: without it RMF never sends a robot to charge: write true",
+        ),
+    ],
+)
+def test_a_key_without_which_no_robot_is_charged_is_an_error(
+    site: Site, key: str, problem: str
+) -> None:
+    theirs = THEIRS.replace("  name: tiny\n", f"  name: tiny\n  {key}\n")
+    assert site.check(theirs=theirs) == (os.EX_CONFIG, [problem])
+
+
+@pytest.mark.parametrize(
+    ("levels", "code", "begins"),
+    [
+        ("{Lift1: L1}", 0, []),
+        (
+            "{Lift2: L1}",
+            0,
+            ["warning: 'Lift1' raises an alarm (emergency_signal) and has no recall"],
+        ),
+        ("{Lift1: L9}", os.EX_CONFIG, ["'Lift1' has an unknown floor 'L9'"]),
+    ],
+)
+def test_each_lift_with_an_alarm_has_a_recall_floor_in_the_fleets_configuration(
+    site: Site, levels: str, code: int, begins: list[str]
+) -> None:
+    lift = (Path(__file__).parents[2] / "config" / "lift_io_module.yaml").read_text()
+    lift += "    alarm: emergency_signal\n"
+    theirs = THEIRS.replace("  name: tiny\n", f"  name: tiny\n  lift_emergency_levels: {levels}\n")
+    found, told = site.check(lift, theirs)
+    told = [line.partition("config.yaml:3:")[2].partition(": ")[2] for line in told]
+    assert found == code
+    assert [
+        line[: len(text)] for line, text in zip(filter(None, told), begins, strict=True)
+    ] == begins
+
+
 def test_a_station_that_releases_a_robot_before_rmfs_recharge_soc_is_a_mismatch(site: Site) -> None:
     code, found = site.check(ours=OURS + "  full_percent: 95\n")
     assert (code, found) == (
@@ -274,10 +321,10 @@ def test_a_fleet_configuration_without_a_coordinator_is_compared_with_nothing(
     theirs = tmp_path / "config.yaml"
     theirs.write_text(THEIRS)
     assert (
-        main(["check", "-q", "config/lift_one_hot.yaml", "--fleet-config", str(theirs)])
+        main(["check", "-q", "config/door_modbus.yaml", "--fleet-config", str(theirs)])
         == os.EX_CONFIG
     )
-    assert "no FILE is a charger coordinator's YAML" in capsys.readouterr().err
+    assert "no FILE is a charger coordinator's or a lift's YAML" in capsys.readouterr().err
 
 
 def test_the_shipped_fleet_agrees_with_the_shipped_coordinator(
