@@ -6,6 +6,7 @@ findings about a file (`bridges/settings/sheets/findings.py`) are printed as tex
 
 import argparse
 import os
+import shutil
 import sys
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
@@ -184,8 +185,13 @@ def _print(file: Findings, quiet: bool) -> None:
     if not quiet:
         _complain(map(str, file.warnings))
         if file.kind:
-            sys.stdout.write("\n".join(text.lines(file)) + "\n")
+            sys.stdout.write("\n".join(text.lines(file, _columns())) + "\n")
     _complain(map(str, file.errors))
+
+
+def _columns() -> int:
+    """Return the terminal's width; for a pipe or file COLUMNS, or 200."""
+    return shutil.get_terminal_size((200, 24)).columns
 
 
 def _verdict(files: Sequence[Findings], quiet: bool) -> None:

@@ -13,6 +13,7 @@ import msgspec
 
 from bridges.kinds.shared.fields import DeviceSettings
 from bridges.kinds.shared.remarks import Remark, Remarks
+from bridges.kinds.shared.table import Table
 from drivers.hal.points import HalError, Wire
 
 __all__ = [
@@ -104,6 +105,7 @@ class BusType(msgspec.Struct, Generic[Settings], frozen=True):
     `fake_inside`: the fake must run in the daemon's process, as for pins.
     `unwatched(settings, places)`: remarks on those of `places`, written by the daemon, that keep their
     value when its machine or the network dies.
+    `tables(settings)`: further facts for `check`, such as the values that are written to a watchdog.
     `paced(settings, devices, points)`: remarks on settings that are too slow for these devices on the
     bus, and for its canonical points in use.
 
@@ -124,6 +126,7 @@ class BusType(msgspec.Struct, Generic[Settings], frozen=True):
     unwatched: Callable[[Settings, Iterable[str]], UnwatchedOutputs] = lambda settings, places: (
         UnwatchedOutputs()
     )
+    tables: Callable[[Settings], Iterable[Table]] = lambda settings: ()
     paced: Callable[[Settings, Sequence[DeviceSettings], Iterable[str]], Remarks] = (
         lambda settings, devices, points: ()
     )

@@ -13,6 +13,7 @@ from tests.settings.test_sections import WEB
 
 TABLE = """\
 gate.yaml: gate, driver contact
+RMF: domain 7; transport dds; network subnet; release auto; publishes door_states; hears -
 
 bus header (pins)
   device  signal  point    direction  active  pull  debounce  at rest  wire broken
@@ -39,8 +40,9 @@ OK
 
 @pytest.fixture(autouse=True)
 def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Work in an empty folder, so file names are given as a user gives them."""
+    """Work in an empty folder, so file names are given as a user gives them, with a wide terminal."""
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "130")
 
 
 def check(*arguments: str) -> int:
@@ -79,6 +81,8 @@ def test_a_driver_without_wires_says_what_it_talks_to(capsys: pytest.CaptureFixt
     assert check("gate.yaml") == 0
     assert capsys.readouterr() == (
         "gate.yaml: gate, driver web\n"
+        "RMF: domain ROS_DOMAIN_ID or 0; transport auto; network subnet; release auto; publishes"
+        " door_states; hears -\n"
         "\n"
         "bus server (web): host 192.168.1.7\n"
         "  device  what      meaning\n"

@@ -78,7 +78,10 @@ class Site:
 
 
 @pytest.fixture
-def site(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Site:
+def site(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> Site:
+    monkeypatch.setenv("COLUMNS", "200")
     return Site(tmp_path, capsys)
 
 

@@ -24,7 +24,10 @@ def _file(findings: Findings) -> dict[str, object]:
         {"device": part.device, "bus": part.bus, "tables": [*map(_table, part.tables)]}
         for part in findings.parts
     ]
-    return {**msgspec.structs.asdict(findings), "parts": parts}
+    buses = [
+        {**msgspec.structs.asdict(b), "tables": [*map(_table, b.tables)]} for b in findings.buses
+    ]
+    return {**msgspec.structs.asdict(findings), "parts": parts, "buses": buses}
 
 
 def _table(table: Table) -> dict[str, object]:

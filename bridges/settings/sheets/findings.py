@@ -9,6 +9,8 @@ from bridges.kinds import kind_called
 from bridges.kinds.shared.graph_kind import GraphKind
 from bridges.kinds.shared.table import Table
 from bridges.messages import fallbacks
+from bridges.messages.definitions import Message
+from bridges.messages.topics import Topic
 from bridges.settings.load import Config
 from bridges.settings.shown import choices_of, plain
 from bridges.yaml.parsing import Problem
@@ -34,17 +36,19 @@ class Part(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class BusShown(msgspec.Struct, frozen=True, kw_only=True):
-    """One bus and its settings."""
+    """One bus, its settings, and its own tables, such as the values written to a module's watchdog."""
 
     name: str
     type: str
     settings: dict[str, str]
+    tables: list[Table] = []
 
 
 class Findings(msgspec.Struct, frozen=True, kw_only=True):
     """One file: its contents if it is valid, and its errors and warnings.
 
-    `sha256`: of its bytes, so that a signed sheet identifies the file. `notes`: further facts for the
+    `sha256`: of its bytes, so that a signed sheet identifies the file. `rmf`: the domain, transport and
+    release, and the names of its topics. `notes`: further facts for the
     user.
     """
 
@@ -52,6 +56,7 @@ class Findings(msgspec.Struct, frozen=True, kw_only=True):
     kind: str = ""
     driver: str = ""
     sha256: str = ""
+    rmf: dict[str, str] = {}
     buses: list[BusShown] = []
     parts: list[Part] = []
     notes: list[str] = []
@@ -71,6 +76,7 @@ def findings(config: Config, errors: Sequence[Problem] = (), notes: Sequence[str
         kind=config.kind,
         driver=config.driver,
         sha256=hashlib.sha256(config.text).hexdigest(),
+        rmf=_rmf(config),
         buses=[_bus(config, bus) for bus in config.buses],
         parts=[_graph(config)] if config.section is not None else _devices(config),
         notes=[*notes, *map(str, config.notes), *_lacking(config)],
@@ -79,20 +85,41 @@ def findings(config: Config, errors: Sequence[Problem] = (), notes: Sequence[str
     )
 
 
-def _lacking(config: Config) -> list[str]:
-    """List the messages that RMF's release lacks, and their substitutes."""
+def _rmf(config: Config) -> dict[str, str]:
+    """Return the settings to compare with RMF's, and the topics by their names on this site."""
+    rmf, kind = config.rmf, kind_called(config.kind)
+    spoken = [*([] if isinstance(kind, GraphKind) else [kind.states]), *_published(config)]
+    names = {
+        topic.name: rmf.topics.get(topic.name, topic.name) for topic in (*spoken, *kind.requests)
+    }
+    return {
+        "domain": "ROS_DOMAIN_ID or 0" if rmf.domain_id is None else str(rmf.domain_id),
+        "transport": rmf.transport,
+        "network": rmf.network,
+        "release": rmf.release,
+        "publishes": ", ".join(dict.fromkeys(names[topic.name] for topic in spoken)),
+        "hears": ", ".join(names[topic.name] for topic in kind.requests) or "-",
+    }
+
+
+def _published(config: Config) -> list[Topic[Message]]:
+    """List the topics beside the states on which the file's devices publish."""
     kind = kind_called(config.kind)
     if isinstance(kind, GraphKind):
-        topics = [*kind.publishes]
-    else:
-        topics = [t for device in config.devices.values() for t in kind.publishes(device)]
-    lines = [line for topic in topics for line in fallbacks.remarks(topic, config.rmf.release)]
-    return list(dict.fromkeys(lines))
+        return [*kind.publishes]
+    return [topic for device in config.devices.values() for topic in kind.publishes(device)]
+
+
+def _lacking(config: Config) -> list[str]:
+    """List the messages that RMF's release lacks, and their substitutes."""
+    lines = (fallbacks.remarks(topic, config.rmf.release) for topic in _published(config))
+    return list(dict.fromkeys(line for topic in lines for line in topic))
 
 
 def _bus(config: Config, name: str) -> BusShown:
     settings = {key: text for key, text, _ in plain(config.buses[name]) if text != "-"}
-    return BusShown(name=name, type=config.bus_types[name], settings=settings)
+    tables = [*config.bus_type(name).tables(config.buses[name])]
+    return BusShown(name=name, type=config.bus_types[name], settings=settings, tables=tables)
 
 
 def _graph(config: Config) -> Part:

@@ -3,7 +3,7 @@
 It needs no other file. Texts from a YAML are escaped, never markup.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from html import escape
 
 from bridges.kinds.shared.table import Table
@@ -18,6 +18,7 @@ h2 { break-after: avoid; }
 p { margin: .2em 0; } .file { font-family: monospace; font-size: 7pt; word-break: break-all; }
 table { border-collapse: collapse; width: calc(100% - 1px); } tr { break-inside: avoid; }
 th, td { border: 1px solid #888; padding: 0 .3em; text-align: left; vertical-align: top; }
+td { overflow-wrap: anywhere; }
 th { background: #eee; } .box { width: 2.2em; text-align: center; } .seen { min-width: 6em; }
 .short { white-space: nowrap; } .warning { border-left: 4px solid #000; padding-left: .6em; }
 .narrow { columns: 2; column-gap: 1.2em; margin-top: .7em; padding-right: 1px; }
@@ -27,7 +28,7 @@ th { background: #eee; } .box { width: 2.2em; text-align: center; } .seen { min-
 @page { size: A4; margin: 9mm; } @media print { body { margin: 0; } }
 """
 BOX = '<td class="box">&#9744;</td>'
-SHORT = 24
+SHORT = 12
 """Cells with up to this many letters are not broken into lines."""
 NARROW = 60
 """Tables with up to this many letters in a row fit in half the page's width."""
@@ -50,7 +51,8 @@ def page(files: Sequence[Findings]) -> str:
 
 def _section(findings: Findings, part: Part) -> str:
     bus = next((bus for bus in findings.buses if bus.name == part.bus), None)
-    tables = [*part.tables[:-1], *([_bus(bus)] if bus else ()), *part.tables[-1:]]
+    of_bus = [_bus(bus), *bus.tables] if bus else []
+    tables = [*part.tables[:-1], *of_bus, _settings("RMF", findings.rmf), *part.tables[-1:]]
     lines = [
         *_head(findings, part),
         *_remarks(findings),
@@ -72,8 +74,11 @@ def _head(findings: Findings, part: Part) -> Iterator[str]:
 
 
 def _bus(bus: BusShown) -> Table:
-    title, rows = f"bus {bus.name} ({bus.type})", tuple(bus.settings.items())
-    return Table(title, ("setting", "value"), rows)
+    return _settings(f"bus {bus.name} ({bus.type})", bus.settings)
+
+
+def _settings(title: str, settings: Mapping[str, str]) -> Table:
+    return Table(title, ("setting", "value"), tuple(settings.items()))
 
 
 def _is_wide(table: Table) -> bool:

@@ -1,41 +1,57 @@
 """The findings about a file, as lines for a terminal."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 from bridges.kinds.shared.table import Table
-from bridges.settings.sheets.findings import MEANINGS, WIRES, BusShown, Findings, Part
-from bridges.system.columns import aligned
+from bridges.settings.sheets.findings import MEANINGS, WIRES, Findings, Part
+from bridges.system.columns import aligned, wrapped
 
 
-def lines(findings: Findings) -> list[str]:
-    """Return a valid file's kind and driver, its wiring or messages, and a blank line at the end."""
+def lines(findings: Findings, columns: int) -> list[str]:
+    """Return a valid file's kind and driver, its wiring or messages, and a blank line at the end, in
+    lines of at most `columns` characters."""
     driver = f", driver {findings.driver}" if findings.driver else ""
-    return [f"{findings.file}: {findings.kind}{driver}", "", *_body(findings), *_notes(findings)]
+    return [
+        f"{findings.file}: {findings.kind}{driver}",
+        *_sentence(f"RMF: {_pairs(findings.rmf, '; ')}", columns),
+        "",
+        *_body(findings, columns),
+        *_notes(findings, columns),
+    ]
 
 
-def _body(findings: Findings) -> Iterator[str]:
+def _body(findings: Findings, columns: int) -> Iterator[str]:
     for bus in findings.buses:
-        yield _bus(bus)
-        yield from _wiring([part for part in findings.parts if part.bus == bus.name])
+        settings = f": {_pairs(bus.settings)}" if bus.settings else ""
+        yield from _sentence(f"bus {bus.name} ({bus.type}){settings}", columns)
+        yield from _wiring([part for part in findings.parts if part.bus == bus.name], columns)
         yield ""
-    yield from _tables(findings.parts)
+        for table in bus.tables:
+            yield f"bus {bus.name}: {table.title}"
+            yield from [*_table(table, columns), ""]
+    yield from _tables(findings.parts, columns)
 
 
-def _bus(bus: BusShown) -> str:
-    settings = ", ".join(f"{key} {text}" for key, text in bus.settings.items())
-    return f"bus {bus.name} ({bus.type}){f': {settings}' if settings else ''}"
+def _pairs(settings: Mapping[str, str], between: str = ", ") -> str:
+    return between.join(f"{key} {text}" for key, text in settings.items())
 
 
-def _wiring(parts: Sequence[Part]) -> Iterator[str]:
+def _sentence(text: str, columns: int) -> list[str]:
+    """Return the text in lines, the later ones indented."""
+    first, *more = wrapped(text, columns)
+    return [first, *(f"  {line}" for line in wrapped(" ".join(more), columns - 2) if line)]
+
+
+def _wiring(parts: Sequence[Part], columns: int) -> Iterator[str]:
     """Yield the wires of all devices of a bus in one table; then the meanings for other devices."""
     for title in (WIRES, MEANINGS):
         found = [(p.device, table) for p in parts for table in p.tables if table.title == title]
         headings = [("device", *table.headings) for _, table in found[:1]]
         rows = [(device, *row) for device, table in found for row in table.rows]
-        yield from _indented([*headings, *rows]) if rows else []
+        yield from _indented([*headings, *rows], columns) if rows else []
 
 
-def _tables(parts: Sequence[Part]) -> Iterator[str]:
+def _tables(parts: Sequence[Part], columns: int) -> Iterator[str]:
     """Yield the other tables. Equal tables of several devices are printed once."""
     alike: dict[Table, list[str]] = {}
     for part in parts:
@@ -43,20 +59,21 @@ def _tables(parts: Sequence[Part]) -> Iterator[str]:
             if table.title not in (WIRES, MEANINGS):
                 alike.setdefault(table, []).append(part.device)
     for table, devices in alike.items():
-        yield f"{', '.join(devices)}: {table.title}"
-        yield from _table(table)
+        yield from _sentence(f"{', '.join(devices)}: {table.title}", columns)
+        yield from _table(table, columns)
         yield ""
 
 
-def _table(table: Table) -> list[str]:
+def _table(table: Table, columns: int) -> list[str]:
     """Return the lines of a table, without columns that are empty in every row."""
     filled = table.filled()
-    return _indented([filled.headings, *filled.rows])
+    return _indented([filled.headings, *filled.rows], columns)
 
 
-def _indented(rows: Sequence[Sequence[str]]) -> list[str]:
-    return [f"  {line}" for line in aligned(rows)]
+def _indented(rows: Sequence[Sequence[str]], columns: int) -> list[str]:
+    return [f"  {line}" for line in aligned(rows, columns - 2)]
 
 
-def _notes(findings: Findings) -> list[str]:
-    return [*findings.notes, ""] if findings.notes else []
+def _notes(findings: Findings, columns: int) -> list[str]:
+    found = [line for note in findings.notes for line in _sentence(note, columns)]
+    return [*found, ""] if found else []

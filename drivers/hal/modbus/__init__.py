@@ -18,6 +18,7 @@ from drivers.hal.modbus.settings import (
     ModbusSettings,
     needs,
     paced,
+    tables,
     unreachable,
     unwatched,
     warnings,
@@ -51,4 +52,5 @@ BUS = BusType(
     unreachable=unreachable,
     unwatched=unwatched,
     paced=paced,
+    tables=tables,
 )

@@ -8,6 +8,7 @@ import msgspec
 
 from bridges.kinds.shared.fields import DeviceSettings, Name, Period, tells
 from bridges.kinds.shared.remarks import Remarks
+from bridges.kinds.shared.table import Table
 from drivers.hal import BusSettings, Needs, UnwatchedOutputs, Where, serial_port
 from drivers.hal.modbus.registers import Unit
 from drivers.hal.modbus.tcp_or_serial import Serial, Tcp
@@ -98,6 +99,17 @@ def paced(
     if line and (round_s := len(units) * line.least_s) > settings.scan_s:
         text = f"a reading of every unit takes {round_s:.2g} s at {line.baudrate} baud"
         yield ("scan_s",), f"{text}: raise scan_s or the baud rate"
+
+
+def tables(settings: ModbusSettings) -> Iterable[Table]:
+    """Yield the writes and readings of the modules' watchdog."""
+    if settings.module_watchdog:
+        units = ", ".join(map(str, settings.module_watchdog.units))
+        yield Table(
+            f"watchdog of unit {units}",
+            ("when", "place", "value"),
+            tuple(settings.module_watchdog.rows()),
+        )
 
 
 def _bare(units: Sequence[int]) -> str:

@@ -4,6 +4,7 @@ Without timely writes the module drops its outputs by itself. Each make has its 
 arming, refreshing and showing this, so they are in the YAML or a profile. `dead_man.py` uses them.
 """
 
+from collections.abc import Iterator
 from typing import Annotated, Final
 
 import msgspec
@@ -77,6 +78,22 @@ class Watchdog(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     def chosen(self) -> Habits:
         """Return the habits in the YAML, or else the profile's."""
         return PROFILE.chosen(self.profile, self.habits)
+
+    def rows(self) -> Iterator[tuple[str, str, str]]:
+        """Yield each write, and each reading that is looked at: (when, place, value)."""
+        chosen = self.chosen()
+        for write in chosen.arm:
+            yield f"starts it, for {chosen.time_s:g} s", write.at, str(write.value)
+        refresh = " and ".join(map(str, chosen.refresh.values))
+        yield f"every {chosen.refresh_s:g} s", chosen.refresh.at, f"{refresh}, in turn"
+        for write in chosen.rearm:
+            yield "after a trip, first", write.at, str(write.value)
+        for when, shown in (
+            ("reads while it runs", chosen.armed),
+            ("reads after a trip", chosen.tripped),
+        ):
+            for place in shown:
+                yield when, place.at, " or ".join(map(str, place.values))
 
     def warnings(self) -> Remarks:
         """Yield a warning for a profile that nobody has tried."""
