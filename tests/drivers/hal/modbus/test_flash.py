@@ -331,5 +331,5 @@ def test_no_board_times_the_pulses_of_a_pin() -> None:
 
 
 def test_check_says_where_a_pulse_is_asked_for_and_how_long_it_lasts() -> None:
-    rows = lines(findings(load(SHIPPED)))
+    rows = lines(findings(load(SHIPPED)), 200)
     assert "unit 1 coil 0 (00001), 0.7 s by the module at unit 1 coil 0x200" in "\n".join(rows)
