@@ -22,17 +22,28 @@ MOST_PARTS: Final = 500
 """The most elements of a sequence; a legal FleetState has 200 robots."""
 
 
+class Sender(Struct, eq=False):
+    """One publisher on the graph, the same object for all its messages.
+
+    `node`: the publisher's node, `/namespace/name`, which can be forged; "" until discovery tells.
+    """
+
+    node: str = ""
+
+
 class Heard(Struct, frozen=True):
     """A message, its topic's ROS name, and the time of its arrival.
 
     `at`: s on a clock that never steps, from any zero. `wall`: s since the epoch, by the clock of the
-    listening machine, for comparison with stamps.
+    listening machine, for comparison with stamps. `sender`: None where the wire or the recording does
+    not tell.
     """
 
     at: float
     wall: float
     topic: str
     message: Message
+    sender: Sender | None = None
 
 
 class Own(Struct, frozen=True):

@@ -54,6 +54,9 @@ class ObservedGraph(Generic[D]):
         if isinstance(message, d.DiagnosticArray):
             return [*self._diagnosed(message, moment)]
         found = [*self._about(message, moment)]
+        if isinstance(message, words.Stated):
+            for device in found:
+                device.published_by(heard.sender, moment)
         return [(device, device.hear(moment, topic, message)) for device in found]
 
     def moment(self, heard: Heard | Own) -> Moment:

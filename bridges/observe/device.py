@@ -7,9 +7,11 @@ from typing import ClassVar, Generic, NamedTuple, TypeVar
 
 from bridges.messages import definitions as d
 from bridges.messages import words
+from bridges.messages.heard import Sender
 from bridges.observe.diagnosis import Diagnosis, report
 from bridges.observe.limits import MOST_NODES, OLD_S, SILENT_S
 from bridges.observe.news import News
+from bridges.observe.publishers import StatePublishers
 from bridges.observe.requesters import DeviceRequester, DeviceRequesters, Fact, Moment
 
 T = TypeVar("T", d.LiftState, d.DoorState, d.ChargerState)
@@ -64,7 +66,17 @@ class ObservedDevice(ABC, Generic[T]):
         self.reading = Fact("", began)
         self.changed: dict[str, str] = {}
         self.diagnoses: dict[str, Diagnosis] = {}
+        self._publishers = StatePublishers()
         self._back: deque[tuple[float, float]] = deque(maxlen=8)
+
+    def published_by(self, sender: Sender | None, now: Moment) -> None:
+        """Take the publisher of a state."""
+        self._publishers.hear(sender, now.at)
+
+    def publishers(self, now: Moment) -> tuple[Sender, ...]:
+        """Return the publishers of its states in the last 5 s; several only if they take turns, as two
+        nodes under one name do. Empty if unknown, as in recordings and on `ros2`: then `steps_back`."""
+        return self._publishers.at(now.at)
 
     def hear(self, moment: Moment, topic: str, message: d.Message) -> list[News]:
         """Take a message about the device. `topic`: the last part of its name."""

@@ -33,6 +33,8 @@ MOST_REQUESTERS: Final = 100
 """Bound for one device; a site has some dozens of robots."""
 MOST_HOLDERS: Final = 64
 """Bound for one door."""
+MOST_SENDERS: Final = 8
+"""Bound for the publishers of one device's states."""
 MOST_NODES: Final = 8
 """Bound for our nodes that report on one device."""
 MOST_DAEMONS: Final = 500

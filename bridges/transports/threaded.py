@@ -8,10 +8,12 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import ClassVar, Final
 
+from bridges.messages.heard import Sender
 from bridges.messages.releases import Release
 from bridges.system.log import pairs
 from bridges.transports import addresses
 from bridges.transports.peers import Peers
+from bridges.transports.senders import Senders
 from bridges.transports.transport import TransportError
 
 log = logging.getLogger(__name__)
@@ -68,6 +70,7 @@ class Threaded:
         self.name = node_name
         self.domain_id = domain_id
         self._peers = Peers(release)
+        self._senders = Senders()
         self.dropped: dict[str, int] = {}
         self._lock = threading.Lock()
         self._closed = False
@@ -87,6 +90,11 @@ class Threaded:
         """Return (code, detail) of each fault that now keeps nodes from hearing each other; from any
         thread."""
         return self._peers.faults()
+
+    def sender(self) -> Sender | None:
+        """Return the publisher of the message that a callback takes now; None if the wire does not
+        tell, as rclpy (Jazzy) does not."""
+        return self._senders.now()
 
     @property
     def lives(self) -> bool:

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from typing import Protocol, TypeVar, cast
 
 from bridges.messages.definitions import Message
+from bridges.messages.heard import Sender
 from bridges.messages.releases import Release
 from bridges.messages.topics import Topic
 
@@ -86,6 +87,10 @@ class Transport(Protocol):
 
         `others_only`: messages of this transport's own publishers are not delivered.
         """
+
+    def sender(self) -> Sender | None:
+        """Return the publisher of the message that `received` takes now; None if the wire hides it.
+        Only in that callback."""
 
     @property
     def lives(self) -> bool:

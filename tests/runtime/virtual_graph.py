@@ -176,6 +176,9 @@ class WorldTransport:
 
     lives = True
 
+    def sender(self) -> None:
+        """None: in the world no daemon asks."""
+
     def faults(self) -> list[tuple[str, str]]:
         return []
 

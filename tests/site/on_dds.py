@@ -87,6 +87,9 @@ class DdsPlace:
 
         return self._inner.subscribe(topic, post, others_only=others_only)
 
+    def sender(self) -> None:
+        """None: messages come later than their publishers are known."""
+
     @property
     def lives(self) -> bool:
         return self._inner.lives

@@ -12,6 +12,7 @@ from collections.abc import Callable
 
 from bridges.messages import cdr
 from bridges.messages.definitions import Message
+from bridges.messages.heard import Sender
 from bridges.messages.releases import NEWEST, Release
 from bridges.messages.topics import AnyTopic, Topic
 from bridges.transports import notices
@@ -36,6 +37,7 @@ class MemoryTransport:
         self.name = node_name
         self.dropped: dict[str, int] = {}
         self.release = release
+        self.heard_from: Sender | None = None
         self._network = network
         self._closed = False
 
@@ -55,6 +57,10 @@ class MemoryTransport:
         self._network.subscriptions[topic.name].append(subscription)
         subscription.catch_up()
         return subscription
+
+    def sender(self) -> Sender | None:
+        """The publisher of the message that is being delivered."""
+        return self.heard_from
 
     @property
     def lives(self) -> bool:
@@ -86,6 +92,7 @@ class _Publisher:
     def __init__(self, node: MemoryTransport, network: MemoryNetwork, topic: AnyTopic) -> None:
         self.node = node
         self.topic = topic
+        self.sender = Sender(f"/{node.name}")
         self.retained: deque[Message] = deque(maxlen=topic.publish.depth)
         self._ends = network.publishers[topic.name]
         self._heard_by = network.subscriptions[topic.name]
@@ -99,7 +106,7 @@ class _Publisher:
             self.retained.append(message)
         for subscription in list(self._heard_by):
             if subscription.hears(self):
-                subscription.hand_on(message)
+                subscription.hand_on(message, self.sender)
 
     def matched(self) -> int:
         """How many subscriptions are reached; 0 after close."""
@@ -137,8 +144,9 @@ class _Subscription:
             and not (self._others_only and publisher.node is self.node)
         )
 
-    def hand_on(self, message: Message) -> None:
+    def hand_on(self, message: Message, sender: Sender) -> None:
         """Deliver a message. As on a wire, a subscriber's exception does not reach the publisher."""
+        self.node.heard_from = sender
         notices.hand_on(self.node.dropped, self.topic, self.received, message)
 
     def catch_up(self) -> None:
@@ -148,7 +156,7 @@ class _Subscription:
         for publisher in self._hears:
             if self.hears(publisher):
                 for message in list(publisher.retained)[-self.topic.subscribe.depth :]:
-                    self.hand_on(message)
+                    self.hand_on(message, publisher.sender)
 
     def matched(self) -> int:
         """How many publishers are heard; 0 after close."""

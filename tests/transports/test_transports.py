@@ -7,6 +7,7 @@ from hypothesis import given
 from msgspec.structs import replace
 
 from bridges.messages import definitions as d
+from bridges.messages.heard import Sender
 from bridges.messages.topics import RETAINED, VOLATILE, Topic
 from bridges.transports.transport import Publisher, Subscription, TransportError
 from tests.transports.joining import RELEASE, Join
@@ -144,6 +145,31 @@ def test_a_subscription_knows_the_nodes_that_send_to_it_and_leaves_itself_out(jo
     wait_until(lambda: heard.senders() == [f"/{other.name}"], "the sender has a name")
     voice.close()
     wait_until(lambda: heard.senders() == [], "it has gone")
+
+
+def test_a_listener_may_ask_who_published_a_message_of_two_that_say_the_same(join: Join) -> None:
+    ours, one, two = join("ours"), join("one"), join("two")
+    heard: list[Sender | None] = []
+    subscription = ours.subscribe(HEARD, lambda _: heard.append(ours.sender()))
+    voices = one.publisher(HEARD), two.publisher(HEARD)
+    wait_until(lambda: subscription.matched() == 2, "both are heard")
+    for voice in voices:
+        wait_for_match(voice, subscription)
+
+    def named() -> bool:
+        heard.clear()
+        for voice in voices * 2:
+            count = len(heard)
+            voice.publish(numbered(1))
+            wait_until(lambda count=count: len(heard) > count, "it arrives")  # type: ignore[misc]
+        return ours.speaks == "ros2" or all(sender and sender.node for sender in heard)
+
+    wait_until(named, "discovery has told the nodes")
+    if ours.speaks == "ros2":
+        assert heard == [None] * 4  # rclpy (Jazzy) does not tell
+    else:
+        assert [sender and sender.node for sender in heard] == [f"/{one.name}", f"/{two.name}"] * 2
+        assert len(set(heard)) == 2
 
 
 def test_matches_are_counted_up_and_down(join: Join) -> None:

@@ -78,6 +78,7 @@ class Renamed:
         self.name, self.speaks, self.dropped = transport.name, transport.speaks, transport.dropped
         self.domain_id = transport.domain_id
         self.wall, self.close = transport.wall, transport.close
+        self.sender = transport.sender
         self._transport = transport
         self._names = names
 

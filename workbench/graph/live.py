@@ -42,6 +42,7 @@ class Ear:
         *,
         others_only: bool = False,
     ) -> None:
+        self._sender = transport.sender
         self._waiting: SimpleQueue[Heard] = SimpleQueue()
         self.ends: dict[str, Subscription] = {
             topic.name: transport.subscribe(
@@ -51,7 +52,8 @@ class Ear:
         }
 
     def _received(self, topic: str, message: Message) -> None:
-        self._waiting.put(Heard(time.monotonic(), time.time(), topic, bounded(message)))
+        at, wall = time.monotonic(), time.time()
+        self._waiting.put(Heard(at, wall, topic, bounded(message), self._sender()))
 
     def listen(self, timeout_s: float) -> list[Heard]:
         """Yield all messages that have arrived, in order; wait up to `timeout_s` for the first."""

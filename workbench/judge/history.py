@@ -77,6 +77,7 @@ class History(ABC, Generic[T]):
             earlier = self.heard_at
             self.seen.hear(Moment(heard.at, heard.wall), heard.topic, message)
             if isinstance(message, words.Stated):
+                self.seen.published_by(heard.sender, Moment(heard.at, heard.wall))
                 return self._take_state(message, earlier)  # type: ignore[arg-type]
         elif isinstance(message, words.Stated):
             if words.kind(message) == self.seen.kind and len(self.others) < REMEMBERED:

@@ -9,7 +9,7 @@ from queue import Empty, Full, Queue
 from typing import Final
 
 from bridges.messages.definitions import Message
-from bridges.messages.heard import Heard, bounded
+from bridges.messages.heard import Heard, Sender, bounded
 from bridges.messages.topics import AnyTopic
 from bridges.system.log import pairs
 from bridges.transports.transport import Transport, TransportError
@@ -71,7 +71,7 @@ class Listener:
             try:
                 with closing(self._join()) as transport:
                     for topic in HEARD:
-                        transport.subscribe(topic, self._receive(topic))
+                        transport.subscribe(topic, self._receive(topic, transport.sender))
                     self.trouble = ""
                     self._stay(transport)
             except TransportError as error:
@@ -89,10 +89,12 @@ class Listener:
             else:
                 self.trouble = ""
 
-    def _receive(self, topic: AnyTopic) -> Callable[[Message], None]:
+    def _receive(
+        self, topic: AnyTopic, sender: Callable[[], Sender | None]
+    ) -> Callable[[Message], None]:
         def receive(message: Message) -> None:
             kept = bounded(message)
             self.cut += kept is not message
-            self.hear(Heard(time.monotonic(), time.time(), topic.name, kept))
+            self.hear(Heard(time.monotonic(), time.time(), topic.name, kept, sender()))
 
         return receive

@@ -5,7 +5,7 @@ An end outlives its writer or reader: it gets a new one when the transport joins
 
 import threading
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from typing import Final, Protocol
 
 from cyclonedds.core import DDSException, DDSStatus
@@ -24,6 +24,7 @@ from bridges.messages.topics import AnyTopic
 from bridges.transports import notices
 from bridges.transports.dds.idl import IdlSample, sample_type
 from bridges.transports.peers import Peers
+from bridges.transports.senders import Senders
 from bridges.transports.transport import Receive, TransportError
 
 WRITE_BLOCKS_NS: Final = 20_000_000
@@ -117,11 +118,13 @@ class DdsSubscription:
         received: Receive,
         dropped: dict[str, int],
         owners: Callable[[list[bytes]], list[str]],
+        senders: Senders,
         *,
         others_only: bool,
     ) -> None:
         self.topic = topic
         self._owners = owners
+        self._senders = senders
         self._others_only = others_only
         self._reader: DataReader = None
         self._received = received
@@ -154,15 +157,28 @@ class DdsSubscription:
         reader = self._reader
         try:
             handles = reader.get_matched_publications() if reader else []
-            found = [reader.get_matched_publication_data(handle) for handle in handles]
+        except DDSException:
+            return []
+        return self._nodes(handles)
+
+    def _nodes(self, handles: list[int]) -> list[str]:
+        """Return the nodes of these matched publishers, as far as known."""
+        reader = self._reader
+        try:
+            found = [reader.get_matched_publication_data(handle) for handle in handles if reader]
         except DDSException:
             return []
         return self._owners([writer.key.bytes for writer in found if writer])
+
+    def _node_of(self, handle: Hashable) -> str:
+        return next(iter(self._nodes([handle])), "")  # type: ignore[list-item]
 
     def take(self) -> bool:
         """Deliver the arrived samples; return False if there were none."""
         if self._reader is None:
             return False
+        senders = self._senders
+        senders.node_of = self._node_of
         for taken in range(AT_ONCE):
             try:
                 samples = self._reader.take(1)
@@ -172,6 +188,7 @@ class DdsSubscription:
             if not samples:
                 return taken > 0
             if samples[0].sample_info.valid_data:
+                senders.key = samples[0].sample_info.publication_handle
                 notices.hand_on(self._dropped, self.topic, self._received, samples[0].message)
         return True
 

@@ -103,7 +103,12 @@ class DdsTransport(Threaded):
     ) -> DdsSubscription:
         """Declare a subscription with `topic.subscribe` QoS; `received` runs on our thread."""
         subscription = DdsSubscription(
-            topic, any_type(received), self.dropped, self._owners, others_only=others_only
+            topic,
+            any_type(received),
+            self.dropped,
+            self._owners,
+            self._senders,
+            others_only=others_only,
         )
         with self._lock, self._reporting(f"topic {topic.name} cannot be subscribed"):
             if self._joined:

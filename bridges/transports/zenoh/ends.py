@@ -12,7 +12,7 @@ Callbacks on zenoh's threads only queue work for the transport's thread.
 import time
 from abc import ABC, abstractmethod
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from functools import partial
 from typing import Final, Protocol
 
@@ -26,6 +26,7 @@ from bridges.messages.definitions import Message
 from bridges.messages.releases import NEWEST
 from bridges.messages.topics import AnyTopic
 from bridges.transports import notices
+from bridges.transports.senders import Senders
 from bridges.transports.transport import Receive, TransportError
 from bridges.transports.zenoh import keys as zenoh_keys
 from bridges.transports.zenoh.keys import Keys, Kind
@@ -194,6 +195,7 @@ class ZenohSubscription(ZenohEnd):
         received: Receive,
         do: Callable[[Order], None],
         dropped: dict[str, int],
+        senders: Senders,
         *,
         others_only: bool,
         attached: bool,
@@ -201,6 +203,7 @@ class ZenohSubscription(ZenohEnd):
     ) -> None:
         super().__init__(topic, notices.NOT_HEARD, do, tell)
         self.others_only = others_only
+        self._senders = senders
         self._ring = Merged(do, self.take)
         self._own_session = ""
         self._received = received
@@ -241,8 +244,13 @@ class ZenohSubscription(ZenohEnd):
         ours = self._own_session if self.others_only else ""
         return [peer.node for peer in peers if peer.session != ours]
 
+    def _node_of(self, gid: Hashable) -> str:
+        peers = list(self.place.peers.items()) if self.place else []
+        return next((peer.node for token, peer in peers if zenoh_keys.gid(token) == gid), "")
+
     def take(self) -> None:
         """Deliver the arrived samples, at most AT_ONCE; the rest waits for the next turn."""
+        self._senders.node_of = self._node_of
         for _ in range(min(AT_ONCE, len(self._waiting))):
             try:
                 message = self._message(self._waiting.popleft())
@@ -276,4 +284,5 @@ class ZenohSubscription(ZenohEnd):
             raise CdrError("without the attachment of a ROS node")
         if sender in place.unheard:
             return None
+        self._senders.key = sender
         return cdr.decode(self.topic.type, bytes(sample.payload), self._release)

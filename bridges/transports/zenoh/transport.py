@@ -126,6 +126,7 @@ class ZenohTransport(Threaded):
             any_type(received),
             self._orders.put,
             self.dropped,
+            self._senders,
             others_only=others_only,
             attached=self._settings.keys == "rmw_zenoh",
             tell=self._watcher.tell,

@@ -1,0 +1,50 @@
+"""Two publishers of one device's states, and all that only looks like two."""
+
+from bridges.messages.heard import Heard, Sender
+from bridges.observe.all_devices import PlainGraph
+from bridges.observe.limits import MOST_SENDERS, SLOWEST_S
+from bridges.observe.requesters import Moment
+from tests.observe.story import LIFT, WALL
+
+A, B, C = (Sender(f"/{name}") for name in "abc")
+
+
+def publishers(
+    *told: Sender | None, step_s: float = 0.5, after_s: float = 0.0
+) -> tuple[Sender, ...]:
+    """The publishers `after_s` after these published the same state in turn."""
+    graph, at = PlainGraph(), 0.0
+    for at, sender in enumerate(told):
+        graph.hear(Heard(at * step_s, WALL, "lift_states", LIFT, sender))
+    now = at * step_s + after_s
+    return graph.known["lift", "Lift1"].publishers(Moment(now, WALL))
+
+
+def test_two_that_publish_in_turn_are_two_though_they_say_the_same() -> None:
+    assert publishers(A, B, A) == (B, A)
+    assert publishers(*[A, B] * 40) == (A, B)
+    assert publishers(*[A, A, A, A, B] * 8) == (A, B)
+    assert publishers(*[A, B, C] * 8) == (A, B, C)
+
+
+def test_a_node_that_restarts_or_a_listener_that_joins_again_is_no_second_publisher() -> None:
+    assert publishers(A, A, A) == (A,)
+    assert publishers(A, A, B) == (B,)
+    assert publishers(A, B, C) == (C,)
+    assert publishers(A, B, A, step_s=SLOWEST_S) == (A,)  # it came back after the other had gone
+
+
+def test_two_are_one_again_once_the_other_has_gone() -> None:
+    assert publishers(A, B, A, B, *[A] * 11) == (A,)
+    assert publishers(A, B, A, after_s=SLOWEST_S + 1) == ()
+
+
+def test_unknown_publishers_are_none() -> None:
+    assert publishers(None, None) == ()
+
+
+def test_made_up_publishers_are_bounded_and_do_not_hide_that_there_are_several() -> None:
+    made_up = [Sender() for _ in range(100)]
+    shown = publishers(A, *made_up, A, *made_up, step_s=0.01)
+    assert A in shown
+    assert len(shown) == MOST_SENDERS
