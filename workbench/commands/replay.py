@@ -49,6 +49,11 @@ def run(args: argparse.Namespace) -> int:
         replay = Replay(entries, ReplayedCores(config))
         found = replay.changes() if args.config else replay.differences()
         differences = list(islice(found, MOST))
+        course = replay.course
+        if args.config and not course.subjects and course.others:
+            there = ", ".join(sorted(config.devices))
+            recorded = ", ".join(sorted(course.others))
+            raise NotReplayable(f"{args.config} describes {there}, {args.file} records {recorded}")
     except SettingsError as error:
         for problem in error.problems:
             print(problem, file=sys.stderr)
@@ -58,7 +63,7 @@ def run(args: argparse.Namespace) -> int:
         return EX_DATAERR
     except BagError as error:
         return unreadable("replay", error)
-    return _told(args, head, replay.course, differences, notes)
+    return _told(args, head, course, differences, notes)
 
 
 def _told(
@@ -107,8 +112,11 @@ def _lines(
     )
     if course.unusable:
         yield f"{course.unusable} entries are left out: their memory is not in the recording"
-    for one in differences:
-        yield from _what_if(one) if args.config else _difference(one)
+    if args.config:
+        yield from _changes(differences)
+    else:
+        for one in differences:
+            yield from _difference(one)
     if len(differences) == MOST:
         yield f"… and no more than {MOST} are shown"
     if not differences:
@@ -116,13 +124,23 @@ def _lines(
         yield same
 
 
-def _what_if(one: Difference) -> Iterator[str]:
-    """Describe in one line the changed decision, or the return to the recorded one."""
-    where = f"{_time(one.wall)} {one.subject}: {_part(one)}"
-    if one.today is None:
-        yield f"{where}: as recorded again"
-    else:
-        yield f"{where}: {_plain(one.today)}, where {_plain(one.recorded)} was recorded"
+def _changes(differences: list[Difference]) -> Iterator[str]:
+    """Yield a line for each change: when it began, when it was over, and how often it came."""
+    times: dict[str, list[str]] = {}
+    lasts: dict[tuple[str, str], list[str]] = {}
+    for one in differences:
+        if before := lasts.pop((one.subject, one.what), None):
+            before[-1] += f" to {_time(one.wall)}"
+        if one.today is not None:
+            today, recorded = _plain(one.today), _plain(one.recorded)
+            text = f"{one.subject}: {_part(one)}: {today}, where {recorded} was recorded"
+            came = times.setdefault(text, [])
+            came.append(_time(one.wall))
+            if one.what != "refused":
+                lasts[one.subject, one.what] = came
+    for text, came in times.items():
+        more = f"; {len(came)} times, the last {came[-1]}" if len(came) > 1 else ""
+        yield f"{came[0]} {text}{more}"
 
 
 def _difference(one: Difference) -> Iterator[str]:
@@ -139,9 +157,11 @@ def _part(one: Difference) -> str:
 
 
 def _plain(told: Tree) -> str:
-    """Format a part of a decision for people."""
+    """Format a part of a decision for people; `-` for an empty text."""
+    if isinstance(told, list):
+        return ", ".join(map(_plain, told)) or "-"
     try:
-        return plain(value(told))
+        return plain(value(told)) or "-"
     except UnknownValue:
         return str(told)
 

@@ -39,6 +39,8 @@ CONTEXT: Final = 6
 """The number of events reported before a difference."""
 PARTS: Final = ("outputs", "news", "refused")
 """The parts visible from outside; only these are compared when other limits are tried."""
+LASTING: Final = ("outputs", "news", "faults")
+"""The parts that stay until a decision changes them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,11 +70,13 @@ class Difference:
 @dataclass(slots=True)
 class Course:
     """Progress of a replay. `decisions`: number compared. `unusable`: entries of subjects that cannot
-    be replayed. `subjects`: replayable ones. `began`, `ended`: s since the epoch."""
+    be replayed. `subjects`: replayable ones; `others`: those that the settings lack. `began`, `ended`:
+    s since the epoch."""
 
     decisions: int = 0
     unusable: int = 0
     subjects: set[str] = field(default_factory=set)
+    others: set[str] = field(default_factory=set)
     began: float = 0.0
     ended: float = 0.0
     offset_s: float = 0.0
@@ -134,6 +138,7 @@ class _Subject:
         self._outputs: object = typed(known.outputs, core.types["outputs"])
         self._news = self._report.news() if self._report else None
         self._recorded = _trees(self._outputs, self._report)
+        self._standing: list[Parts] = []
         self.last: deque[tuple[float, object]] = deque(maxlen=CONTEXT)
 
     @property
@@ -160,7 +165,7 @@ class _Subject:
         told = {"refused": step.refused, "publish": step.publish, "wake_at": step.wake_at}
         decision = self._decide(event, step.at)
         self._outputs, self._news = decision.outputs, decision.report.news()
-        return _differing(self._recorded | told, decision)
+        return self._compared(told, decision)
 
     def again(self, at: float) -> list[Parts]:
         """Repeat the last reading, which changed nothing when recorded."""
@@ -173,9 +178,14 @@ class _Subject:
             and not decision.refused
             and not decision.publish
         ):
-            return []
+            return self._standing
         self._outputs, self._news = decision.outputs, decision.report.news()
-        return _differing(self._recorded | {"refused": "", "publish": []}, decision)
+        return self._compared({"refused": "", "publish": []}, decision)
+
+    def _compared(self, told: dict[str, Tree], decision: AnyDecision) -> list[Parts]:
+        found = _differing(self._recorded | told, decision)
+        self._standing = [parts for parts in found if parts[0] in LASTING]
+        return found
 
     def _decide(self, event: object, at: float) -> AnyDecision:
         self.last.append((at, event))
@@ -230,18 +240,18 @@ class Replay:
 
     def changes(self) -> Iterator[Difference]:
         """Yield the effects of other limits: each time that outputs, state or refusal begin to
-        differ, differ in another way, or match the recording again."""
-        shown: dict[tuple[str, str], Tree] = {}
+        differ, differ in another way, or (None today) match the recording again."""
+        shown: dict[tuple[str, str], tuple[Tree, Tree]] = {}
         for entry in self._entries:
             self.course.reach(entry)
             for at, found in self._played(entry, strict=False):
                 differing = {part: (was, now) for part, was, now in found}
                 for part in PARTS:
-                    was, now = differing.get(part, (None, None))
+                    both = apart(*differing.get(part, (None, None)))
                     key = (_name(entry), part)
-                    if shown.get(key) != now:
-                        shown[key] = now
-                        yield self._difference(entry, at, (part, was, now))
+                    if shown.get(key, (None, None)) != both:
+                        shown[key] = both
+                        yield self._difference(entry, at, (part, *both))
 
     def _difference(self, entry: AnyEntry, at: float, found: Parts) -> Difference:
         subject, offset_s = self._subjects[_name(entry)], self.course.offset_s
@@ -281,12 +291,20 @@ class Replay:
         if entry.anew or name not in self._subjects:
             core = self._cores.of(name)
             self._subjects[name] = _Subject(core, entry) if core else None
-            self.course.subjects |= {name} if core else set()
+            (self.course.subjects if core else self.course.others).add(name)
             return
         subject = self._subjects[name]
         if strict and subject and (found := first_difference(entry.memory, subject.memory())):
             place, was, now = found
             yield entry.at, [(f"memory {place}".strip(), was, now)]
+
+
+def apart(was: Tree, now: Tree) -> tuple[Tree, Tree]:
+    """Return the elements that differ of two lists of the same length; other values whole."""
+    if not (isinstance(was, list) and isinstance(now, list) and len(was) == len(now)):
+        return was, now
+    pairs = [pair for pair in zip(was, now, strict=True) if pair[0] != pair[1]]
+    return [one for one, _ in pairs], [other for _, other in pairs]
 
 
 def _name(entry: AnyEntry) -> str:

@@ -1,5 +1,6 @@
 """What the soak's daemons kept is decided again, each decision and each memory the same."""
 
+import os
 from pathlib import Path
 
 import pytest
@@ -9,6 +10,7 @@ from msgspec.structs import replace
 from bridges.blackbox.entries import Decided, Known
 from bridges.blackbox.ring import RingContent
 from bridges.blackbox.value_codec import value
+from bridges.cli import main
 from bridges.kinds.lift import core as lift_core
 from bridges.kinds.shared.decision import Fault
 from tests.blackbox.kept import keep
@@ -97,6 +99,45 @@ def test_other_limits_show_what_they_would_have_changed_and_the_same_ones_nothin
 
     assert found.pop(3.0) >= {"outputs"}
     assert list(found.values()) == [set()]
+
+
+def test_a_change_is_shown_once_with_its_end_and_how_often_it_came(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    head, _ = opened(HERE / "Lift1_1.mcap", Notes())
+    longer = head.yaml.replace(b"release_grace_s: 3.0", b"release_grace_s: 6.0")
+    (tmp_path / "other.yaml").write_bytes(longer)
+    assert (
+        main(["replay", str(HERE / "Lift1_1.mcap"), "--config", str(tmp_path / "other.yaml")]) == 1
+    )
+    lines = [line.split(" Lift1: ") for line in capsys.readouterr().out.splitlines()[1:]]
+    assert [(when.count(" to "), what) for when, what in lines] == [
+        (1, "outputs: agv_request yes, hold_door front, where agv_request yes was recorded"),
+        (1, "outputs: agv_request yes, hold_door front, where - was recorded"),
+        (1, "outputs: agv_request yes, where - was recorded"),
+        (1, "state: -, -, where L4, fleet/green was recorded"),
+        (0, lines[4][1]),
+        (1, "outputs: agv_request yes, where agv_request yes, hold_door front was recorded"),
+        (1, "outputs: -, where agv_request yes, hold_door front was recorded"),
+    ]
+    refused = (
+        "refused: released a moment ago: by fleet/red, where - was recorded; 7 times, the last "
+    )
+    assert lines[4][1].startswith(refused)
+
+
+@pytest.mark.parametrize(("other", "lacks"), [("Lift2_1", "Lift2"), ("bay1_1", "charger")])
+def test_the_yaml_of_another_device_is_refused_with_both_names(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], other: str, lacks: str
+) -> None:
+    head, _ = opened(HERE / f"{other}.mcap", Notes())
+    (tmp_path / "other.yaml").write_bytes(head.yaml)
+    file = str(HERE / "Lift1_1.mcap")
+    assert main(["replay", file, "--config", str(tmp_path / "other.yaml")]) == os.EX_DATAERR
+    said = capsys.readouterr()
+    assert said.out == ""
+    assert f"other.yaml describes {lacks}" in said.err.replace(" a ", " ")
+    assert f"{file} records" in said.err
 
 
 def test_what_cannot_be_replayed_is_counted(tmp_path: Path) -> None:
