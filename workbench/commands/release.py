@@ -3,7 +3,8 @@
 This is `send lift LIFT --end` under an operator's word: it sends the holder's END_SESSION to the lift
 supervisor until the lift shows the session's end. If the supervisor is missing or does not obey within
 seconds, the request goes directly to the lift's own daemon; if a robot may be in the car, only with
-`--car-empty`. A robot that keeps requesting the lift goes to the end of the queue.
+`--car-empty`. After the end, `release` watches for 5 s, and tells who has the lift and whether
+it moves. A robot that keeps requesting the lift goes to the end of the queue.
 """
 
 import argparse

@@ -32,7 +32,7 @@ from workbench.graph.live import Ear
 from workbench.graph.requests import Failed, Fulfilled, Request, RequestProgress
 from workbench.graph.requests.charger import ChargeCancel, QueuedCancel, QueuedCharge, RobotCharge
 from workbench.graph.requests.door import DoorMove
-from workbench.graph.requests.lift import LiftEnd, LiftRide
+from workbench.graph.requests.lift import LiftEnd, LiftRide, aftermath
 
 NODE_NAME = "rmf_bridge_send"
 LOOK_EVERY_S = 0.1
@@ -238,12 +238,16 @@ class _Exchange:
         self.seen = RequestProgress(began_at=time.monotonic(), timeout_s=timeout_s, graph=graph)
         self.asked: set[str] = set()
         self.described = ""
+        self.watches_until: float | None = None
+        self._last_before = 0
 
     def look(self) -> int | None:
         """Take the messages heard and do the next step; return an exit code at the end."""
         for heard in self.ear.listen(LOOK_EVERY_S):
             self._take(heard)
         now = time.monotonic()
+        if self.watches_until is not None:
+            return self._watch(now)
         self.seen = replace(self.seen, listeners=self._listeners())
         todo = step(self.request, self.seen, now)
         if todo.outcome is not None:
@@ -289,12 +293,25 @@ class _Exchange:
         self.seen = self.seen.sends(now)
         self._publisher(topic).publish(message)
 
-    def _finish(self, outcome: Fulfilled | Failed) -> int:
-        if isinstance(outcome, Fulfilled):
-            self._line(time.monotonic(), "done", outcome.text)
+    def _finish(self, outcome: Fulfilled | Failed) -> int | None:
+        """Tell the outcome; return an exit code, or None to watch the effect of what was sent."""
+        if isinstance(outcome, Failed):
+            complain(self.command, outcome.text)
+            return 1
+        now = time.monotonic()
+        self._line(now, "done", outcome.text)
+        if not self.request.watched_s or self.seen.first_sent_at is None:
             return 0
-        complain(self.command, outcome.text)
-        return 1
+        self.watches_until = now + self.request.watched_s
+        self._last_before = len(self.seen.states) - 1
+        return None
+
+    def _watch(self, now: float) -> int | None:
+        """Tell at the end of the watch what the lift did; the outcome stands."""
+        if self.watches_until is None or now < self.watches_until:
+            return None
+        self._line(now, "after", aftermath(self.seen.states_of(d.LiftState)[self._last_before :]))
+        return 0
 
     def _line(self, at: float, what: str, text: str) -> None:
         elapsed_s = max(0.0, at - self.seen.began_at)

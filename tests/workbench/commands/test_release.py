@@ -17,7 +17,7 @@ from workbench.commands import send
 from workbench.graph.exchange import step
 from workbench.graph.join import CommandLine
 from workbench.graph.requests import Failed, Fulfilled, RequestProgress
-from workbench.graph.requests.lift import LiftEnd
+from workbench.graph.requests.lift import LiftEnd, aftermath
 
 LINE = CommandLine(("release", "Lift1"))
 RELEASE = LiftEnd("Lift1", "", True, line=LINE)
@@ -106,6 +106,47 @@ def test_whether_a_robot_is_inside_is_read_from_the_lifts_own_diagnostics() -> N
     lift.publisher(topics.LIFT_STATES).publish(GRANTED)
     exchange.look()
     assert [(r.session_id, r.request_type) for r in asked] == [(ME, 0)]
+
+
+def test_after_the_end_release_watches_who_has_the_lift_and_what_moves() -> None:
+    network, out = MemoryNetwork(), io.StringIO()
+    lift = MemoryTransport(network, "lift")
+    lift.subscribe(topics.ADAPTER_LIFT_REQUESTS.live(), print)
+    lift.publisher(topics.LIFT_REQUESTS)
+    states = lift.publisher(topics.LIFT_STATES)
+    exchange = send._Exchange(MemoryTransport(network, "me"), RELEASE, 10.0, out)
+    blue = replace(LIFT, session_id="fleet/blue")
+    for state in (GRANTED, LIFT, blue, replace(blue, current_floor="L3", motion_state=1)):
+        states.publish(state)
+        assert exchange.look() is None
+    exchange.watches_until = time.monotonic()
+    assert exchange.look() == 0
+    lines = [line.split(maxsplit=2)[2] for line in out.getvalue().splitlines()]
+    done = lines.index(f"done     Lift1  Lift1 is no longer held by {ME}")
+    assert lines[done + 1 :][0].endswith("held by fleet/blue")
+    assert lines[-1] == (
+        "after    Lift1  fleet/blue has it now; in these 5 s: the car goes up; floor L1 to L3"
+    )
+
+
+@pytest.mark.parametrize(
+    ("states", "text"),
+    [
+        ([LIFT, LIFT], "nobody has it now; in these 5 s: neither the car nor its door moved"),
+        (
+            [LIFT, replace(LIFT, door_state=1), replace(LIFT, door_state=0)],
+            "nobody has it now; in these 5 s: door closed to moving to closed",
+        ),
+        (
+            [LIFT],
+            "nobody has it now; no state came in 5 s: it is not known whether anything moves",
+        ),
+    ],
+)
+def test_the_watch_tells_also_that_nothing_moved_or_was_heard(
+    states: list[d.LiftState], text: str
+) -> None:
+    assert aftermath(states) == text
 
 
 def test_without_a_supervisor_a_person_must_look_into_a_car_that_may_hold_a_robot() -> None:

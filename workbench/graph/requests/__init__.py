@@ -143,6 +143,11 @@ class Request(ABC):
         """The daemon's own topic, or the fleet adapters'."""
         return self.own if self.direct or self.adapter is None else self.adapter
 
+    @property
+    def watched_s(self) -> float:
+        """Return how long the device is watched after the outcome (s)."""
+        return 0.0
+
     @abstractmethod
     def message(self, seen: RequestProgress) -> words.Requested | None:
         """The message to send, without its stamp; None while it cannot be made yet."""

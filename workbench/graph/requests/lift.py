@@ -1,7 +1,8 @@
 """Request a lift, as RequestLift.cpp does, and end a session, as EndLiftSession.cpp does."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from itertools import groupby
 from typing import Final
 
 from bridges.messages import definitions as d
@@ -12,6 +13,8 @@ from workbench.graph.requests import Failed, Fulfilled, Obstacle, Request, Reque
 
 OBEYS_WITHIN_S: Final = 5.0
 """Time limit (s) for a supervisor's end of a session; it needs a few states."""
+MOVES_WITHIN_S: Final = 5.0
+"""After an operator's release the lift is watched for this long (s): a person may stand at the car."""
 
 
 class _Lift(Request):
@@ -144,6 +147,11 @@ class LiftEnd(_Lift):
         instead = f"; {holder} has it" if holder else ""
         return Fulfilled(f"{self.name} is not held by {session}: nothing to end{instead}")
 
+    @property
+    def watched_s(self) -> float:
+        """Return how long the lift is watched after the session's end (s)."""
+        return MOVES_WITHIN_S if self.falls_back else 0.0
+
     def goes_direct(self, seen: RequestProgress, now: float) -> bool:
         """Has the supervisor, if any, had its time, and is the car empty?"""
         asked_at = seen.began_at if seen.first_sent_at is None else seen.first_sent_at
@@ -174,3 +182,23 @@ class LiftEnd(_Lift):
         text = f"{self.name} still shows the session: the supervisor may have dropped the request"
         there = self.line.again_with("--direct")
         return (Obstacle(True, text, f"to ask the lift's own daemon: {there}"),)
+
+
+def aftermath(states: Sequence[d.LiftState]) -> str:
+    """Tell who has the lift now, and whether anything moves. `states`: the one that showed the end of
+    the session, and those heard since then."""
+    last = states[-1]
+    who = f"{last.session_id} has it now" if last.session_id else "nobody has it now"
+    if len(states) == 1:
+        return (
+            f"{who}; no state came in {MOVES_WITHIN_S:g} s: it is not known whether anything moves"
+        )
+    stands = d.LiftMotion.MOTION_STOPPED, d.LiftMotion.MOTION_UNKNOWN
+    going = {one.motion_state for one in states if one.motion_state not in stands}
+    moved = [f"the car goes {words.plain(d.LiftMotion, motion)}" for motion in sorted(going)]
+    floors = [floor or "-" for floor, _ in groupby(one.current_floor for one in states)]
+    doors = [words.plain(d.LiftDoor, door) for door, _ in groupby(one.door_state for one in states)]
+    for part, course in (("floor", floors), ("door", doors)):
+        moved += [f"{part} {' to '.join(course)}"] if len(course) > 1 else []
+    what = "; ".join(moved) or "neither the car nor its door moved"
+    return words.printable(f"{who}; in these {MOVES_WITHIN_S:g} s: {what}")
