@@ -1,6 +1,6 @@
 """All devices heard, in bounds even if names are invented."""
 
-from collections import deque
+from collections import OrderedDict, deque
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any, ClassVar, Generic, TypeVar
 
@@ -12,7 +12,14 @@ from bridges.observe.device import ObservedDevice
 from bridges.observe.diagnosis import Diagnosis, about, of_node, report
 from bridges.observe.door import ObservedDoor
 from bridges.observe.lift import ObservedLift
-from bridges.observe.limits import FORGOTTEN_S, MOST_DAEMONS, MOST_DEVICES, SILENT_S, STEP_S
+from bridges.observe.limits import (
+    FORGOTTEN_S,
+    MOST_DAEMONS,
+    MOST_DEVICES,
+    MOST_SPEAKERS,
+    SILENT_S,
+    STEP_S,
+)
 from bridges.observe.news import News
 from bridges.observe.requesters import Moment
 
@@ -29,6 +36,7 @@ class ObservedGraph(Generic[D]):
     stopped FORGOTTEN_S ago by a new one; otherwise the devices heard first stay. `crowded`: kinds with
     devices left out. `steps`: the times of steps of the listener's clock, and their size (s).
     `nodes`: reports of our daemons and coordinators on themselves, by `<node>: <device>`.
+    `spoke`: the last word of each fleet adapter for a robot, `FLEET/ROBOT`, or for its fleet, `FLEET/`.
     """
 
     makes: ClassVar[Mapping[words.Kind, Callable[[str, Moment], Any]]]
@@ -40,6 +48,7 @@ class ObservedGraph(Generic[D]):
         self.steps: list[tuple[Moment, float]] = []
         self.crowded: set[words.Kind] = set()
         self.nodes: dict[str, Diagnosis] = {}
+        self.spoke: OrderedDict[str, Moment] = OrderedDict()
         self._most = most
         self._offset: float | None = None
         self._heartbeat: Heard | None = None
@@ -53,6 +62,11 @@ class ObservedGraph(Generic[D]):
             self._heartbeat = heard
         if isinstance(message, d.DiagnosticArray):
             return [*self._diagnosed(message, moment)]
+        if who := _speaks(topic, message):
+            self.spoke[who] = moment
+            self.spoke.move_to_end(who)
+            if len(self.spoke) > MOST_SPEAKERS:
+                self.spoke.popitem(last=False)
         found = [*self._about(message, moment)]
         if isinstance(message, words.Stated):
             for device in found:
@@ -135,6 +149,18 @@ class ObservedGraph(Generic[D]):
             return False
         del self.known[oldest.kind, oldest.id]
         return True
+
+
+def _speaks(topic: str, message: d.Message) -> str:
+    """Return the robot or fleet for which a fleet adapter speaks here; "" for other messages."""
+    match message:
+        case d.FleetState():
+            return f"{message.name}/"
+        case d.LiftRequest() if topic == "adapter_lift_requests":
+            return message.session_id
+        case d.DoorRequest() if topic == "adapter_door_requests":
+            return message.requester_id
+    return ""
 
 
 def _heard_at(device: AnyDevice) -> float:

@@ -9,7 +9,7 @@ from bridges.messages import definitions as d
 from bridges.messages import words
 from bridges.messages.heard import Sender
 from bridges.observe.diagnosis import Diagnosis, report
-from bridges.observe.limits import MOST_NODES, OLD_S, SILENT_S
+from bridges.observe.limits import FLAPS_WITHIN_S, MOST_NODES, OLD_S, SILENT_S
 from bridges.observe.news import News
 from bridges.observe.publishers import StatePublishers
 from bridges.observe.requesters import DeviceRequester, DeviceRequesters, Fact, Moment
@@ -68,6 +68,7 @@ class ObservedDevice(ABC, Generic[T]):
         self.diagnoses: dict[str, Diagnosis] = {}
         self._publishers = StatePublishers()
         self._back: deque[tuple[float, float]] = deque(maxlen=8)
+        self._flips: deque[float] = deque(maxlen=100)
 
     def published_by(self, sender: Sender | None, now: Moment) -> None:
         """Take the publisher of a state."""
@@ -108,6 +109,10 @@ class ObservedDevice(ABC, Generic[T]):
     def steps_back(self, now: float, by_s: float, within_s: float) -> int:
         """Count recent steps back of the stamps by more than `by_s`, as with two nodes."""
         return sum(by > by_s and now - at < within_s for at, by in self._back)
+
+    def flaps(self, now: Moment) -> int:
+        """Count the recent changes to OFFLINE and back."""
+        return sum(now.at - at < FLAPS_WITHIN_S for at in self._flips)
 
     def checks(self, one: DeviceRequester) -> tuple[Check, ...]:
         """List the conditions of RMF's phase of this requester; empty if RMF has no such phase."""
@@ -156,4 +161,6 @@ class ObservedDevice(ABC, Generic[T]):
             before = fact.value
             if fact.say(value, moment):
                 self.changed[name] = before
+                if name == "mode" and before and "OFFLINE" in (before.upper(), value.upper()):
+                    self._flips.append(moment.at)
         yield from self._settle(moment)

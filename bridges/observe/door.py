@@ -73,6 +73,10 @@ class ObservedDoor(ObservedDevice[d.DoorState]):
         asks = [one for one in self.requesters if one.asks(now) and not self.matches(one)]
         return sorted(asks, key=lambda one: one.since.at)
 
+    def asks_now(self, now: Moment) -> bool:
+        """Does somebody still ask on `door_requests`?"""
+        return self.asked is not None and now.at - self.asked_last.at <= REQUESTER_SILENT_S
+
     def waits(self, now: Moment) -> Iterator[Wait]:
         """Yield each wait for OPEN, even the supervisor's. Without a heartbeat only the door's state
         counts."""
@@ -81,12 +85,7 @@ class ObservedDoor(ObservedDevice[d.DoorState]):
             if one.wants == OPEN and not (opened and self.last_heartbeat is None):
                 yield Wait(one.who, "OPEN", one.since)
         asked = self.asked is not None and self.asked.value == OPEN
-        if (
-            self.asked
-            and asked
-            and not opened
-            and now.at - self.asked_last.at <= REQUESTER_SILENT_S
-        ):
+        if self.asked and asked and not opened and self.asks_now(now):
             yield Wait(self.sender, "OPEN", self.asked.since)
 
     def _hear_other(self, moment: Moment, topic: str, message: d.Message) -> Iterator[News]:

@@ -7,7 +7,7 @@ from typing import Final
 from bridges.messages import definitions as d
 from bridges.messages import words
 from bridges.observe.device import Check, ObservedDevice, Wait
-from bridges.observe.limits import REQUESTER_SILENT_S
+from bridges.observe.limits import REQUESTER_SILENT_S, SILENT_S
 from bridges.observe.news import News
 from bridges.observe.requesters import DeviceRequester, Fact, Moment
 
@@ -28,7 +28,9 @@ def request_lift(session: str, floor: str, door: str, who: str, wants: str) -> t
 
 class ObservedLift(ObservedDevice[d.LiftState]):
     """`adapters_heard`: a fleet adapter was heard. `supervisor`: the session in the supervisor's last
-    request on `lift_requests` ("" after an END), heard last at `supervisor_last`."""
+    request on `lift_requests` ("" after an END), heard last at `supervisor_last`. `idle_ends`: the number
+    of ENDs in a row, and their sender, whose session the lift did not show. `taken_from`: the session that the lift last gave to
+    another one without END."""
 
     kind = "lift"
 
@@ -43,6 +45,8 @@ class ObservedLift(ObservedDevice[d.LiftState]):
         self.adapters_heard = False
         self.supervisor: Fact | None = None
         self.supervisor_last: Moment | None = None
+        self.taken_from = ""
+        self.idle_ends: tuple[int, str, Moment] = (0, "", began)
 
     def facts(self, state: d.LiftState) -> dict[str, str]:
         """Return session, mode, floor, motion, destination and door."""
@@ -76,6 +80,25 @@ class ObservedLift(ObservedDevice[d.LiftState]):
         for one in self.asking(now):
             if self.is_silent(now) or not self.matches(one):
                 yield Wait(one.who, one.wants, one.lacks)
+
+    def not_passed_on(self, now: Moment) -> DeviceRequester | None:
+        """Return a robot whose repeated request or END a living supervisor would pass on, if nothing has
+        come on `lift_requests` meanwhile. Only the holder's count, or any robot's while the lift is free:
+        RMF's supervisor drops the others (lift_supervisor/Node.cpp). A grant in a recording without
+        `lift_requests` shows that they were not recorded.
+        """
+        silent_at, holder = now.at - REQUESTER_SILENT_S, self.session.value
+        last = self.supervisor_last
+        unrecorded = last is None and holder != NOBODY and self.session.since.seen
+        if unrecorded or (last is not None and last.at > silent_at):
+            return None
+        asks = (
+            one
+            for one in self.requesters
+            if one.own and holder in (NOBODY, one.who) and (one.asks(now) or one.ends(now))
+            if (one.ended or one.first).at <= silent_at
+        )
+        return min(asks, key=lambda one: one.since.at, default=None)
 
     # ---- requests
 
@@ -115,15 +138,19 @@ class ObservedLift(ObservedDevice[d.LiftState]):
 
     def _end(self, moment: Moment, who: str, passed_on: bool) -> Iterator[News]:
         one, holds = self.requesters.get(who), who == self.session.value
-        if one is None and who and holds:  # a holder whose request was not heard
+        if not holds and not passed_on and self.state is not None:
+            count = self.idle_ends[0] if self.idle_ends[1] == who else 0
+            self.idle_ends = count + 1, who, moment
+        if one is None and who and (holds or self.state is None):  # its request was not heard
             one, _ = self.requesters.ask(who, "", moment)
             one.granted, one.ended, one.own = self.session.since, moment, not passed_on
-            one.end_passed_on = passed_on
+            one.end_last, one.end_passed_on = None if passed_on else moment, passed_on
             yield News("ends", moment, who, passed_on=passed_on)
             return
         if one is None:
             return
         one.end_passed_on = one.end_passed_on or passed_on
+        one.end_last = one.end_last if passed_on else moment
         if one.ended is not None:
             return
         yield News("ends", moment, who, requester=one, passed_on=passed_on)
@@ -147,6 +174,8 @@ class ObservedLift(ObservedDevice[d.LiftState]):
                 one.lacks = moment
                 if one.met is None:
                     one.met = moment
+                    if one.boarded is None:
+                        one.boarded, one.boarded_at = moment, one.wants
                     yield News("met", moment, one.who, requester=one)
             elif one.ended is None:
                 one.met = None
@@ -161,6 +190,9 @@ class ObservedLift(ObservedDevice[d.LiftState]):
         first, holder = self.before is None, self.session.value
         before = self.changed.get("session", NOBODY)
         old, new = self.requesters.get(before), self.requesters.get(holder)
+        if NOBODY not in (before, holder) and not first and self.gap_s <= SILENT_S:
+            unended = old is not None and old.ended is None and not old.end_passed_on
+            self.taken_from = before if unended else ""
         if before != NOBODY and not first:
             yield News("lost", moment, before, requester=old)
             if old is not None:

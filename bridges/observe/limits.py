@@ -24,6 +24,9 @@ OLD_S: Final = 3.0
 """A reading of this age is old: three polls were missed. This far ahead, it is by another clock."""
 CLOCKS_DIFFER_S: Final = 5.0
 """A request with a stamp this far off comes from another clock."""
+FLAPS: Final = 3
+FLAPS_WITHIN_S: Final = 30.0
+"""A device that goes OFFLINE or comes back this often in this time has readings that come and go."""
 QUIET_S: Final = 60.0
 """A repeated refusal within this time is no news."""
 STEP_S: Final = 2.0
@@ -40,6 +43,8 @@ MOST_NODES: Final = 8
 MOST_DAEMONS: Final = 500
 MOST_VALUES: Final = 100
 """Bound for one diagnosis; ours have a third of this number."""
+MOST_SPEAKERS: Final = 500
+"""Bound for robots and fleets with a last word."""
 MOST_CODES: Final = 20
 """Bounds for the faults and for the reasons of refusals in one diagnosis."""
 MOST_DEVICES: Final = 300

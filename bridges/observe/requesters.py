@@ -40,9 +40,10 @@ class DeviceRequester:
     """One requester and its wish. `wants`: a floor, a door's mode, and the like. Times: `first`, the
     start of its visit; `since`, its first request for this wish; `lacks`, the start of its wait;
     `last`, its last request; `passed_on`, the supervisor's last request for it; `met`, the wish seen
-    fulfilled by RMF; `granted`, its hold of the device; `ended`, its END. `end_passed_on`: the
-    supervisor has passed on that END. `gone`: it has stopped without END. `times`: the number of its
-    requests. `own`: it was heard itself, not only through the supervisor.
+    fulfilled by RMF; `boarded`, the first such time in this visit; `granted`, its hold of the device;
+    `ended`, its first END, and `end_last`, its latest. `end_passed_on`: the supervisor has passed on that
+    END. `gone`: it has stopped without END. `times`: the number of its requests. `own`: it was heard
+    itself, not only through the supervisor. `given_up`: its wish before this one, if that was not met.
     `stamp_age_s`: the age by our clock of its last request, if that was `stamped`.
     """
 
@@ -57,7 +58,11 @@ class DeviceRequester:
     passed_on: Moment | None = None
     granted: Moment | None = None
     met: Moment | None = None
+    boarded: Moment | None = None
+    boarded_at: str = ""
+    given_up: str = ""
     ended: Moment | None = None
+    end_last: Moment | None = None
     end_passed_on: bool = False
     gone: bool = False
     stamped: bool = False
@@ -66,6 +71,10 @@ class DeviceRequester:
     def asks(self, now: Moment) -> bool:
         """Does the requester still ask?"""
         return self.ended is None and now.at - self.last.at <= REQUESTER_SILENT_S
+
+    def ends(self, now: Moment) -> bool:
+        """Does the requester still repeat END?"""
+        return self.end_last is not None and now.at - self.end_last.at <= REQUESTER_SILENT_S
 
     def stamp(self, moment: Moment, stamp: Time) -> None:
         """Note the age of its request, by our clock."""
@@ -106,6 +115,7 @@ class DeviceRequesters:
             since = Moment(moment.at, moment.wall, seen=moment.seen and not early)
             found = self._all[who] = DeviceRequester(who, wants, since, since, since, moment)
         elif new := found.wants != wants:
+            found.given_up = found.wants if found.met is None else ""
             found.wants, found.since, found.lacks, found.met = wants, moment, moment, None
         found.last, found.gone = moment, False
         found.times += 1

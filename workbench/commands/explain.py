@@ -13,6 +13,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Final
 
+from bridges.messages import topics
 from bridges.messages.words import KINDS, Kind
 from bridges.runtime import faults
 from bridges.transports.transport import TransportError
@@ -28,7 +29,7 @@ from workbench.graph.join import (
     open_graph,
     seconds,
 )
-from workbench.graph.live import Ear
+from workbench.graph.live import OF_DEVICES, Ear
 from workbench.replay.recordings import RecordingSpan, add_span_arguments, told_between, unreadable
 from workbench.replay.sources import BagError
 
@@ -95,6 +96,8 @@ def _recorded(args: argparse.Namespace) -> int:
     for heard in told_between(args.file, span, "explain", args.device or ""):
         site.take(heard)
     site.story_from(span.begins_at)
+    if args.from_ or args.to:
+        site.at_its_end()
     if not site.messages:
         complain(
             "explain", f"{args.file} has nothing about RMF's lifts, doors and chargers in that time"
@@ -145,11 +148,14 @@ def _tell(found: Explanation, *, as_json: bool) -> None:
 
 def _live(args: argparse.Namespace) -> int:
     with interruptible(), closing(open_graph(args, "rmf_bridge_explain")) as transport:
-        ear = Ear(transport)
+        ear = Ear(transport, (*OF_DEVICES, topics.FLEET_STATES))
+        past = Ear(transport, (topics.ADAPTER_LIFT_REQUESTS,))
         site = HeardDevices(args.live, args.session, graph=command_line(args).options)
         if args.follow:
             _follow(ear, site, args)
         _listen(ear, site, args.for_s)
+        for one in past.listen(0.0):
+            site.retained(one)
         return _one(site, args)
 
 
@@ -161,6 +167,7 @@ def _listen(ear: Ear, site: HeardDevices, for_s: float) -> None:
         for heard in ear.listen(left_s):
             site.take(heard)
     site.pass_time(time.monotonic(), time.time())
+    site.senders = {topic: end.senders() for topic, end in ear.ends.items()}
 
 
 def _follow(ear: Ear, site: HeardDevices, args: argparse.Namespace) -> None:

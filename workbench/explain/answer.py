@@ -1,27 +1,32 @@
 """The parts of an answer, and the common part of all kinds' answers."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from difflib import get_close_matches
 from typing import Final
 
+from bridges.blackbox.triggers import DIED, FAULT, REFUSED, WAITING
 from bridges.messages.words import Kind
 from bridges.observe.limits import CLOCKS_DIFFER_S
-from bridges.observe.requesters import DeviceRequester
+from bridges.observe.requesters import DeviceRequester, Moment
 from workbench.explain.device import Device
 from workbench.explain.explanation import CheckedField, FaultTold, NextStep
 from workbench.explain.phrases import TimePhrases, lasted, listed
+from workbench.explain.rows import label
 
 Remedies = Mapping[str, tuple[str, str]]
 """A fault's code -> its likely cause, and what to do."""
+SILENCES: Final = ("LIFT_SILENT", "DOOR_SILENT", "STATION_SILENT")
 MOST_NAMES: Final = 8
+RELAYS_OFF: Final = "; its daemon has every relay off"
 LISTENS_S: Final = 2.5
 """Least listening time (s) for calling something missing."""
 
 
 @dataclass(slots=True)
 class Answer:
-    """Sentences, RMF's view, and the next step."""
+    """Sentences, RMF's view, and the next step. `because`: the codes of the faults on which the verdict
+    rests; only they keep their remedies, because others may contradict it. None: all keep them."""
 
     now: list[str] = field(default_factory=list)
     next: list[NextStep] = field(default_factory=list)
@@ -29,6 +34,7 @@ class Answer:
     fields: tuple[CheckedField, ...] = ()
     notes: tuple[str, ...] = ()
     since: float = float("-inf")
+    because: tuple[str, ...] | None = None
 
     def say(self, text: str, *steps: NextStep) -> "Answer":
         """Add a sentence, and the next step that follows from it."""
@@ -38,34 +44,78 @@ class Answer:
 
 
 @dataclass(frozen=True, slots=True)
+class FileReason:
+    """The reason for which our recorder kept a file: a fixed name, a text, and the time."""
+
+    code: str
+    text: str
+    at: Moment
+
+    @property
+    def fault(self) -> str:
+        """The code of the fault for which the file was kept; "" for other reasons."""
+        return self.text.partition(":")[0] if self.code == FAULT else ""
+
+    def told(self, clock: TimePhrases) -> str:
+        """Say why the file was kept, and of which time the rest speaks."""
+        why = {
+            FAULT: f"for the fault {self.text}",
+            REFUSED: f"because a request was refused: {self.text}",
+            WAITING: f"because {self.text}",
+            DIED: f"because the daemon died: {self.text}",
+        }.get(self.code, f"by a person: {self.text or 'no text'}")
+        return f"This file was kept {why}. What follows is of {clock.time(clock.now.wall)}."
+
+
+@dataclass(frozen=True, slots=True)
 class OthersHeard:
-    """Other things heard: the names of each kind, and the number of messages."""
+    """Everything heard besides the device: the names of each kind, the number of messages, the last word
+    of each robot's or fleet's adapter (`ObservedGraph.spoke`), the faults' remedies, and the reason for
+    the file. `senders`: the nodes that publish each topic, as discovered on a live graph; None for a
+    recording, which does not name them."""
 
     names: Mapping[Kind, tuple[str, ...]]
     messages: int
+    spoke: Mapping[str, Moment] = field(default_factory=dict)
+    remedies: Remedies = field(default_factory=dict)
+    reason: FileReason | None = None
+    senders: Mapping[str, Sequence[str]] | None = None
+
+    def nobody_publishes(self, topic: str) -> bool:
+        """Is it known that no node publishes this topic?"""
+        return self.senders is not None and not self.senders.get(topic)
+
+    def publishers(self, topic: str) -> str:
+        """Name the nodes that publish this topic; "" if none is known."""
+        nodes = [label(node) for node in (self.senders or {}).get(topic, ())]
+        return listed(nodes[:MOST_NAMES]) if nodes else ""
 
 
-def unheard(device: Device, around: OthersHeard, clock: TimePhrases) -> Answer:
+def unheard(device: Device, around: OthersHeard) -> Answer:
     """Answer for a device without any state."""
-    answer = Answer(since=device.began.at)
+    answer = Answer(since=device.began.at, because=SILENCES)
     others = around.names.get(device.kind, ())
     if not around.messages:
-        answer.say(
-            "Nothing at all was heard.",
+        nodes = sorted(
+            {label(one) for senders in (around.senders or {}).values() for one in senders}
+        )
+        seen = f", but these nodes are on the graph: {', '.join(nodes[:MOST_NAMES])}"
+        return answer.say(
+            f"Nothing at all was heard{seen if nodes else ''}.",
             NextStep(
                 "a person",
                 "look at the domain, the network and the transport: `rmf-bridge doctor FILE`",
             ),
         )
-        return answer
-    answer.say(f"Nobody publishes a state of {device.name}; {_others(around)}.")
     near = get_close_matches(device.name.lower(), {n.lower(): n for n in others}, 1)
     mean = next((f" (did you mean {name}?)" for name in others if [name.lower()] == near), "")
-    what = f"start the daemon of {device.name}, or correct the spelling of its name{mean}"
     return answer.say(
-        "RMF waits for ever for a device that is silent: its fleet adapters ask again only when a"
-        " state comes.",
-        NextStep("a person", what),
+        f"Nobody publishes a state of {device.name}: its daemon is not running or is cut off, or the"
+        f" name is misspelt; {_others(around)}.",
+        NextStep(
+            "a person",
+            f"start the daemon of {device.name}, or correct the spelling of its name{mean}",
+        ),
     )
 
 
@@ -77,20 +127,24 @@ def _others(around: OthersHeard) -> str:
     return f"these were heard: {'; '.join(parts)}" if parts else "no state of any device was heard"
 
 
-def silent(device: Device, clock: TimePhrases) -> Answer | None:
-    """Answer for a device whose states have stopped."""
+def stopped(device: Device, around: OthersHeard, clock: TimePhrases) -> Answer | None:
+    """Answer for a device whose daemon died, by the file's reason, or whose states have stopped."""
     last = device.last_state
+    if last is not None and around.reason is not None and around.reason.code == DIED:
+        return Answer(since=last.at - 60.0, because=()).say(
+            f"The daemon of {device.name} died then. The file ends there, so nothing after it is known.",
+            NextStep(
+                "a person",
+                f"see whether the daemon of {device.name} runs again and its relays are off"
+                " (`rmf-bridge status`), and why it died (`rmf-bridge log`, the journal)",
+            ),
+        )
     if last is None or not device.is_silent(clock.now):
         return None
     for_s = lasted(clock.now.at - last.at)
-    answer = Answer(since=last.at - 60.0)
-    answer.say(
-        f"The last state of {device.name} came at {clock.time(last.wall)}: for {for_s} nobody has"
-        " said what it does."
-    )
-    return answer.say(
-        "RMF is stuck too: fleet adapters and supervisor repeat their requests only when a state"
-        " comes.",
+    return Answer(since=last.at - 60.0, because=SILENCES).say(
+        f"The last state of {device.name} came at {clock.time(last.wall)}, {for_s} ago: its daemon is"
+        " not running, or is cut off.",
         NextStep(
             "a person",
             f"look at the daemon of {device.name} and its network: `rmf-bridge status` and"
@@ -128,10 +182,6 @@ def notes(device: Device, clock: TimePhrases) -> tuple[str, ...]:
         found.append(
             f"The states' stamps are {ahead} ahead of this clock: the two machines' clocks differ."
         )
-    if device.two_nodes(clock.now):
-        found.append(
-            f"The stamps of {device.name}'s states go back and forth: two nodes seem to publish them."
-        )
     listened = clock.now.at - device.began.at > LISTENS_S
     speaks = device.last_state is not None and not device.is_silent(clock.now)
     if speaks and device.own(clock.now) is None and listened:
@@ -142,20 +192,26 @@ def notes(device: Device, clock: TimePhrases) -> tuple[str, ...]:
     return tuple(found)
 
 
+def clock_off(claim: DeviceRequester) -> bool:
+    """Does the clock that stamps this requester's requests differ from ours?"""
+    return claim.stamped and abs(claim.stamp_age_s) >= CLOCKS_DIFFER_S
+
+
 def clock_of(claim: DeviceRequester) -> tuple[str, ...]:
     """Note that a requester's clock differs, which makes its requests look old or new."""
-    age_s = claim.stamp_age_s
-    if abs(age_s) < CLOCKS_DIFFER_S or not claim.stamped:
+    if not clock_off(claim):
         return ()
-    side = "behind" if age_s > 0 else "ahead of"
+    side = "behind" if claim.stamp_age_s > 0 else "ahead of"
+    off = lasted(abs(claim.stamp_age_s))
     return (
-        f"The requests of {claim.who} are stamped {lasted(abs(age_s))} {side} this clock. One that"
-        " looks old is taken for a replay until it has been repeated for a while.",
+        f"The requests of {claim.who} are stamped {off} {side} this clock. RMF's own supervisors do not"
+        " compare stamps. Ours take a request with such a stamp for a replay until it has been repeated"
+        " for a while.",
     )
 
 
 def faults(device: Device, clock: TimePhrases, remedies: Remedies) -> tuple[FaultTold, ...]:
-    """Add the present faults, with their remedies."""
+    """Return the present faults, with their remedies."""
     return tuple(
         FaultTold(code, detail, clock.since(moment), *remedies.get(code, ()))
         for code, (detail, moment) in device.faults(clock.now).items()
@@ -164,15 +220,8 @@ def faults(device: Device, clock: TimePhrases, remedies: Remedies) -> tuple[Faul
 
 def relays(device: Device, clock: TimePhrases) -> str:
     """`; its daemon has these on: agv_request, call L3`, or "" if that is not known."""
-    own = device.own(clock.now)
-    told = own.values.get("outputs") if own else None
-    if told is None:
-        return ""
-    if told == "-":
-        return "; its daemon has every relay off"
+    told = device.told("outputs", clock.now)
     shown = [part.removesuffix(" yes") for part in told.split(", ") if not part.endswith(" 0")]
-    return (
-        f"; its daemon has these on: {listed(shown)}"
-        if shown
-        else "; its daemon has every relay off"
-    )
+    if not told:
+        return ""
+    return f"; its daemon has these on: {listed(shown)}" if shown != ["-"] and shown else RELAYS_OFF

@@ -11,6 +11,7 @@ from bridges.kinds.charger.pad import misplaced_in
 from bridges.kinds.charger.report import FaultCause, diagnosis
 from bridges.observe.charger import NOBODY
 from workbench.explain import answer as common
+from workbench.explain import first_causes
 from workbench.explain.answer import Answer
 from workbench.explain.charger_facts import ChargerFacts
 from workbench.explain.explanation import NextStep
@@ -28,17 +29,21 @@ def answer(
 ) -> Answer:
     """Explain the charger at the last message. `coordinator`: its diagnostics now, {} without."""
     if charger.last_state is None:
-        found = common.unheard(charger, around, clock)
+        found = common.unheard(charger, around)
         _refusal(found, charger, clock)
         return found
-    stopped = common.silent(charger, clock)
+    stopped = common.stopped(charger, around, clock)
     if stopped is not None:
         return stopped
     found = Answer(since=min([one.first.at for one in charger.requesters], default=float("-inf")))
     _state(found, charger, clock)
     if old := common.old_reading(charger, clock):
         found.say(old)
-    _next(found, charger, clock)
+    if not (
+        first_causes.two_nodes(found, charger, clock, "charger_states")
+        or first_causes.own_fault(found, charger, clock, around)
+    ):
+        _next(found, charger, clock)
     _refusal(found, charger, clock)
     _coordinated(found, charger, coordinator)
     return found

@@ -26,7 +26,8 @@ BACK_WITHIN_S: Final = 15.0
 
 class Device(ObservedDevice[Any]):
     """One device, from its messages, and its story. `name`: in a printable form. `focus`: the session
-    whose last ride's story is kept whole, even if others ride later."""
+    whose last ride's story is kept whole, even if others ride later. `bus_error`: the last one that its
+    daemon noted."""
 
     def __init__(self, name: str, began: Moment) -> None:
         super().__init__(name, began)
@@ -35,6 +36,7 @@ class Device(ObservedDevice[Any]):
         self.lines: deque[StoryLine] = deque(maxlen=MOST_LINES)
         self.noted: Diagnosis | None = None
         self.notes_faults = False
+        self.bus_error = ""
 
     def hear(self, moment: Moment, topic: str, message: d.Message) -> list[News]:
         """Take a message about the device; add its changes to the story."""
@@ -93,6 +95,11 @@ class Device(ObservedDevice[Any]):
         """Do the stamps go back and forth, as from two nodes?"""
         return self.steps_back(now.at, BACK_S, BACK_WITHIN_S) >= BACK_TIMES
 
+    def nodes(self, now: Moment) -> list[str]:
+        """Name the nodes that publish its states now, as far as they are known."""
+        every = (one for one in self.diagnoses.values() if one.is_current(now.at))
+        return sorted({one.name.partition(": ")[0] for one in every if one.kind == self.kind})
+
     def note(self, moment: Moment, note: Noted) -> None:
         """Take a note of its own daemon. Notes are of changes: each holds until the next."""
         if self.noted is None:
@@ -106,6 +113,7 @@ class Device(ObservedDevice[Any]):
             told = ((label(c), "" if text == c else label(text)) for c, text in note.faults.items())
             self._tell_all(known.has(moment, dict(told)))
             self.notes_faults = True
+        self.bus_error = label(note.bus_error, 200) or self.bus_error
         if note.refused:
             self._tell_all(known.refuses(moment, label(note.refused.partition(": ")[0])))
 
@@ -122,6 +130,11 @@ class Device(ObservedDevice[Any]):
     def own(self, now: Moment) -> Diagnosis | None:
         """Return the present diagnostics of the device's own daemon; None if foreign or silent."""
         return next((one for one in self.heard_from(now) if one.kind == self.kind), None)
+
+    def told(self, key: str, now: Moment) -> str:
+        """Return its own daemon's present value of this key; "" if it is not known."""
+        own = (one for one in self.heard_from(now) if one.kind == self.kind)
+        return next((one.values[key] for one in own if key in one.values), "")
 
     def faults(self, now: Moment) -> dict[str, tuple[str, Moment]]:
         """Return code -> detail and beginning; the device's own first."""

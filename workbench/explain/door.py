@@ -9,8 +9,10 @@ from shlex import quote
 from typing import Final
 
 from bridges.observe.door import CLOSED, OPEN
+from bridges.observe.limits import REQUESTER_SILENT_S
 from bridges.observe.requesters import DeviceRequester, Moment
 from workbench.explain import answer as common
+from workbench.explain import first_causes
 from workbench.explain.answer import Answer
 from workbench.explain.door_facts import DoorFacts
 from workbench.explain.explanation import CheckedField, NextStep
@@ -19,6 +21,8 @@ from workbench.explain.phrases import TimePhrases
 SETTLES_S: Final = 2.0
 LONG_S: Final = 60.0
 """The longest time (s) of a robot's drive through a doorway."""
+OPENS_S, MOVES_S = 5.0, 15.0
+"""A door that nobody holds begins to close, and is closed, within these times (s)."""
 AWAY: Final = ("offline", "unknown")
 
 
@@ -28,9 +32,10 @@ def answer(
     """Explain the door at the last message. `focus`: the requester in question; "" for the
     waiting one."""
     if door.last_state is None:
-        return _with_askers(common.unheard(door, around, clock), door, clock)
-    stopped = common.silent(door, clock)
+        return _with_askers(common.unheard(door, around), door, clock)
+    stopped = common.stopped(door, around, clock)
     if stopped is not None:
+        stopped.say(f"Then it was {door.mode.value}.")
         return _with_askers(stopped, door, clock)
     claim = _in_question(door, clock, focus)
     found = Answer(since=_begins(door, claim))
@@ -39,20 +44,26 @@ def answer(
         found.say(
             f"{claim.who} has waited for {door.name} to be {wants} {clock.since(claim.since)}."
         )
+        found.asks, found.fields = claim.who, _fields(door, claim, clock)
+        found.notes += common.clock_of(claim)
     holders = [f"{who} {clock.since(since)}" for who, since in [*door.holders.items()][:4]]
     held = f"It has been held by {', '.join(holders)}." if holders else "Nobody holds it."
     if door.last_heartbeat is None:
-        held = "Who holds it is not known."
+        held = "No heartbeat of its supervisor was heard."
     found.say(f"{door.name} has been {door.mode.value} {clock.since(door.mode.since)}. {held}")
     if old := common.old_reading(door, clock):
         found.say(old)
-    if claim is None:
-        _nobody_asks(found, door, clock)
+    held_open = bool(door.holders or claim or (door.asked and door.asked.value == OPEN))
+    if (
+        first_causes.two_nodes(found, door, clock, "door_states")
+        or first_causes.readings_come_and_go(found, door, clock)
+        or first_causes.own_fault(found, door, clock, around, end="open" if held_open else "shut")
+    ):
         return found
-    found.asks, found.fields = claim.who, _fields(door, claim, clock)
-    found.notes += common.clock_of(claim)
     if door.mode.value in AWAY:
         _away(found, door, clock)
+    elif claim is None:
+        _nobody_asks(found, door, clock, around)
     elif claim.wants == OPEN:
         _opens(found, door, claim, clock)
     else:
@@ -158,22 +169,74 @@ def _not_let_go(found: Answer, door: DoorFacts, claim: DeviceRequester, clock: T
 # ---- nobody waits
 
 
-def _nobody_asks(found: Answer, door: DoorFacts, clock: TimePhrases) -> None:
+def _nobody_asks(
+    found: Answer, door: DoorFacts, clock: TimePhrases, around: common.OthersHeard
+) -> None:
     asked = door.asked.value if door.asked else ""
+    for_s = clock.now.at - door.mode.since.at
     if door.holders:
         _held_open(found, door, clock)
-    elif door.last_heartbeat is None and asked == OPEN and door.mode.value not in AWAY:
+    elif door.last_heartbeat is None and asked == OPEN:
         _asked_open(found, door, clock)
     elif door.mode.value == CLOSED:
         found.say("Nobody waits for it.", NextStep("nobody", "there is nothing to do"))
-    elif door.mode.value in AWAY:
-        _away(found, door, clock)
+    elif door.last_heartbeat is None and not door.asks_now(clock.now):
+        _nobody_tells(found, door, clock, around)
+    elif for_s <= (OPENS_S if door.mode.value == OPEN else MOVES_S):
+        found.say(
+            "No robot holds it, so it closes or is about to.",
+            NextStep("nobody", f"wait until {door.name} is closed"),
+        )
     else:
         found.say(
-            "No robot keeps it open: a person or the door's own controller does. RMF's supervisor sends"
-            " CLOSE at each of its states meanwhile; that releases a hold and shuts nothing.",
+            "No robot holds it: something else keeps it from closing, as a push button, somebody in the"
+            " doorway, or its own controller. CLOSE from RMF's supervisor only releases a hold, and shuts"
+            " nothing.",
             NextStep("the controller", f"close {door.name} when nobody is in the doorway"),
         )
+
+
+def _nobody_tells(
+    found: Answer, door: DoorFacts, clock: TimePhrases, around: common.OthersHeard
+) -> None:
+    """Explain an open door without a request or a heartbeat. RMF's supervisor sends a heartbeat only
+    after requests, and CLOSE at each state of an open door that nobody holds (door_supervisor/Node.cpp)."""
+    if clock.now.at - door.began.at < REQUESTER_SILENT_S:
+        found.say(
+            "Whether a robot holds it is not known yet.", NextStep("nobody", "listen for longer")
+        )
+        return
+    doorway = f"look into the doorway of {door.name}"
+    if around.nobody_publishes("door_requests"):
+        found.say(
+            "No node publishes `door_requests`, so the door supervisor is not running. Whether a robot"
+            " holds the door is not known: it may stand in the doorway, where it says nothing.",
+            NextStep(
+                "a person",
+                f"{doorway}; when no robot stands in it, start the door supervisor, which lets go of every"
+                " door whose holder is silent",
+            ),
+        )
+        return
+    holds = "a robot holds the door, and most likely stands in the doorway, where it says nothing"
+    if nodes := around.publishers("door_requests"):
+        found.say(
+            f"{nodes} publishes `door_requests` and sends no CLOSE, as RMF's supervisor does at each"
+            f" state of an open door that nobody holds. So {holds}.",
+            NextStep(
+                "the robot",
+                f"drive through and send CLOSE; if {door.name} stays open for more than a minute, a person"
+                " has to look into the doorway",
+            ),
+        )
+        return
+    found.say(
+        f"Nothing asks for CLOSE: either {holds}, or no door supervisor is running.",
+        NextStep(
+            "a person",
+            f"{doorway}; when no robot stands in it, see whether the door supervisor is running",
+        ),
+    )
 
 
 def _asked_open(found: Answer, door: DoorFacts, clock: TimePhrases) -> None:
@@ -199,7 +262,9 @@ def _held_open(found: Answer, door: DoorFacts, clock: TimePhrases) -> None:
         found.say(
             f"{said} A robot in the doorway says nothing until it is through.",
             NextStep(
-                "the robot", f"{who} has to drive through; then its fleet adapter sends CLOSE"
+                "the robot",
+                f"{who} has to drive through; then its fleet adapter sends CLOSE. If {door.name} stays open"
+                " for more than a minute, a person has to look into the doorway",
             ),
         )
         return
@@ -208,7 +273,7 @@ def _held_open(found: Answer, door: DoorFacts, clock: TimePhrases) -> None:
         " left, keeps the door open for ever.",
         NextStep(
             "a person",
-            f"look into the doorway; if nobody is there: `rmf-bridge send door {quote(door.name)}"
-            f" close --requester {quote(who)}`",
+            f"look into the doorway; only when the doorway is clear: `rmf-bridge send door"
+            f" {quote(door.name)} close --requester {quote(who)}`",
         ),
     )

@@ -6,12 +6,15 @@ no more memory than a minute's.
 
 from collections import deque
 from collections.abc import Mapping, Sequence
+from copy import deepcopy
 from dataclasses import replace
 from datetime import tzinfo
 from typing import ClassVar, Final
 
 from bridges.kinds.charger import refusals
+from bridges.blackbox.triggers import DIED, REFUSED
 from bridges.messages import definitions as d
+from bridges.messages import words
 from bridges.messages.heard import Heard, Own
 from bridges.messages.words import KINDS, Kind
 from bridges.observe.all_devices import Key, ObservedGraph
@@ -19,8 +22,8 @@ from bridges.observe.diagnosis import COORDINATOR
 from bridges.observe.limits import MOST_DEVICES
 from bridges.observe.requesters import Moment
 from workbench.explain import answer as common
-from workbench.explain import charger, door, lift
-from workbench.explain.answer import Answer, Remedies
+from workbench.explain import charger, door, known_defects, lift
+from workbench.explain.answer import Answer, FileReason, Remedies
 from workbench.explain.charger_facts import ChargerFacts
 from workbench.explain.device import MOST_LINES, Device
 from workbench.explain.door_facts import DoorFacts
@@ -31,12 +34,15 @@ from workbench.explain.phrases import TimePhrases, lasted, on_graph
 from workbench.explain.rows import label
 
 STORY_LINES: Final = 40
+SHOWS_S: Final = 1.5
+"""So long after the reason for a file its effect is in the device's states, which come at 1 Hz."""
 
 
 class HeardDevices(ObservedGraph[Device]):
     """All devices heard, or only those of this `name`.
 
-    `session`: the one whose last ride's story is kept, even if others ride later.
+    `session`: the one whose last ride's story is kept, even if others ride later. `senders`: the nodes
+    that publish each topic, of a live graph on which FLEET_STATES are heard too; None if not known.
     """
 
     makes: ClassVar = {"lift": LiftFacts, "door": DoorFacts, "charger": ChargerFacts}
@@ -58,9 +64,15 @@ class HeardDevices(ObservedGraph[Device]):
         self._name = name
         self._session = session
         self._others: dict[Kind, dict[str, None]] = {kind: {} for kind in KINDS}
+        self._reason: dict[str, FileReason] = {}
+        self._then: dict[Key, tuple[Moment, Device]] = {}
+        self.senders: Mapping[str, Sequence[str]] | None = None
 
     def take(self, heard: Heard | Own) -> None:
         """Take the next message, or the next text of our recorder."""
+        for name, reason in self._reason.items():
+            if heard.at > reason.at.at + SHOWS_S and reason.code != DIED:
+                self._keep(name)
         if isinstance(heard, Own):
             self._note(self.moment(heard), heard)
             return
@@ -68,6 +80,20 @@ class HeardDevices(ObservedGraph[Device]):
         self.hear(heard)
         if isinstance(heard.message, d.DiagnosticStatus):
             self._refusal(self.now, heard.message)
+
+    def retained(self, heard: Heard) -> None:
+        """Take a request that a fleet adapter has retained. It counts for a lift without states, where
+        no adapter repeats itself."""
+        if isinstance(heard.message, d.LiftRequest):
+            found = self.device("lift", heard.message.lift_name, self.now)
+            if isinstance(found, LiftFacts) and found.state is None:
+                self.messages += 1
+                found.retain(heard.message, self.now)
+
+    def at_its_end(self) -> None:
+        """Explain the recording's end, not the moment for which our recorder kept it."""
+        self._reason.clear()
+        self._then.clear()
 
     def story_from(self, at: float) -> None:
         """Leave everything before this time (s) out of the stories."""
@@ -80,17 +106,27 @@ class HeardDevices(ObservedGraph[Device]):
     def kinds(self, name: str) -> list[Kind]:
         """Return the kinds of a device of this name: by its states, else by the requests for it."""
         found = [kind for kind in KINDS if (kind, name) in self.known]
-        return [kind for kind in found if self.known[kind, name].state is not None] or found
+        stated = [kind for kind in found if self.known[kind, name].state is not None]
+        return stated or found or (["charger"] if name in self._coordinates() else [])
 
     def explain(
         self, kind: Kind, name: str, zone: tzinfo | None, remedies: Remedies | None = None
     ) -> Explanation:
         """Explain the device at the last message. `zone`: of the times; None: this machine's."""
-        clock = TimePhrases(self.now, zone)
         began = self.began or self.now
-        device = self.known.get((kind, name)) or self.make(kind, name)
-        answer = self._answer(device, clock)
-        common.say_waits(answer, device, clock)
+        last = self.known.get((kind, name)) or self.make(kind, name)
+        now, device = self._then.get((kind, name), (self.now, last))
+        clock = TimePhrases(now, zone)
+        reason = self._reason.get(name) or self._reason.get("")
+        answer = self._answer(device, clock, reason, remedies or {})
+        if reason is not None:
+            answer.now.insert(0, reason.told(clock))
+            _act_on(answer, reason, remedies or {})
+        if answer.because is None:
+            common.say_waits(answer, device, clock)
+        if device is not last and last.state is not None:
+            later = f"{words.condition(last.state)}; held by {words.holder(last.state) or 'nobody'}"
+            answer.say(f"At the end of the file, at {clock.time(self.now.wall)}: {label(later)}.")
         story = self._story(device, answer)
         for_s = lasted(self.now.at - began.at)
         return Explanation(
@@ -106,20 +142,29 @@ class HeardDevices(ObservedGraph[Device]):
             fields=answer.fields,
             faults=tuple(
                 replace(fault, do=on_graph(fault.do, self._graph))
-                for fault in common.faults(device, clock, remedies or {})
+                for fault in common.faults(device, clock, _kept(answer, remedies or {}))
             ),
-            notes=(*answer.notes, *common.notes(device, clock), *self._stepped(clock)),
+            notes=(
+                *answer.notes,
+                *known_defects.notes(device, clock.now),
+                *common.notes(device, clock),
+                *self._stepped(clock),
+            ),
             story=story[-STORY_LINES:],
             left_out=max(0, len(story) - STORY_LINES),
             before=_before(device, clock),
         )
 
-    def _answer(self, device: Device, clock: TimePhrases) -> Answer:
+    def _answer(
+        self, device: Device, clock: TimePhrases, reason: FileReason | None, remedies: Remedies
+    ) -> Answer:
         names = {
             kind: (*self._others[kind], *(label(one.id) for one in self.stated(kind)))
             for kind in KINDS
         }
-        around = common.OthersHeard(names, self.messages)
+        around = common.OthersHeard(
+            names, self.messages, self.spoke, remedies, reason, self.senders
+        )
         match device:
             case LiftFacts():
                 return lift.answer(device, clock, around, self._session)
@@ -162,9 +207,19 @@ class HeardDevices(ObservedGraph[Device]):
 
     def _note(self, moment: Moment, own: Own) -> None:
         note = noted(own.topic.rpartition("/")[2], own.text)
+        if note is None:
+            return
+        if note.kept_for is not None:
+            self._reason.setdefault(note.subject, FileReason(*note.kept_for, moment))
         for kind in KINDS:
-            if note is not None and (kind, note.subject) in self.known:
+            if (kind, note.subject) in self.known:
                 self.known[kind, note.subject].note(moment, note)
+
+    def _keep(self, name: str) -> None:
+        """Keep the devices of this name ("": all) as they are now."""
+        for key, device in self.known.items():
+            if name in ("", device.id) and key not in self._then:
+                self._then[key] = self.now, deepcopy(device)
 
     def _coordinates(self) -> Mapping[str, str]:
         found = [one for one in self.nodes.values() if one.kind == COORDINATOR]
@@ -177,6 +232,23 @@ class HeardDevices(ObservedGraph[Device]):
             f"At {clock.time(moment.wall)} the listener's clock was stepped by {by_s:+.0f} s."
             for moment, by_s in self.steps
         )
+
+
+def _kept(answer: Answer, remedies: Remedies) -> Remedies:
+    """Return the remedies that do not contradict the answer."""
+    because = remedies if answer.because is None else answer.because
+    return {code: remedy for code, remedy in remedies.items() if code in because}
+
+
+def _act_on(answer: Answer, reason: FileReason, remedies: Remedies) -> None:
+    """Propose a step for the file's reason where the device's state alone shows nothing to do."""
+    if any(step.who != "nobody" for step in answer.next):
+        return
+    do = remedies[reason.fault][1] if reason.fault in remedies else ""
+    if reason.code == REFUSED:
+        do = "compare the refused request with the device's settings; the reason above says what differs"
+    if do:
+        answer.next = [NextStep("a person", do)]
 
 
 def _before(device: Device, clock: TimePhrases) -> str:

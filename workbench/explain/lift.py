@@ -5,26 +5,22 @@ its floor and its door (rmf_ros2, RequestLift.cpp:322-326). The answer names the
 the reason, and the party that has to act next.
 """
 
-from shlex import quote
 from typing import Final
 
 from bridges.observe.lift import NO_FLOOR, NOBODY
 from bridges.observe.requesters import DeviceRequester
 from workbench.explain import answer as common
+from workbench.explain import first_causes, lift_holder
 from workbench.explain.answer import Answer
-from workbench.explain.explanation import CheckedField, NextStep, Who
-from workbench.explain.lift_facts import DIRECT, LiftFacts
-from workbench.explain.lift_ungranted import SETTLES_S, not_granted
-from workbench.explain.phrases import TimePhrases, lasted
+from workbench.explain.explanation import CheckedField, NextStep
+from workbench.explain.lift_facts import LiftFacts
+from workbench.explain.lift_ungranted import not_granted, not_passed_on
+from workbench.explain.phrases import TimePhrases
 from workbench.explain.rows import label
 
-LONG_S: Final = 60.0
-"""A robot drives within this time (s) of getting all it waits for."""
-HAZARDS: Final = {
-    "FIRE": "the fire alarm has to end, and be reset where its settings ask for that",
-    "EMERGENCY": "the emergency (stop, code blue, earthquake) has to end",
-    "OFFLINE": "find out why it is out of service, or cannot be read",
-}
+STANDS_S: Final = 5.0
+"""A fleet adapter that knows the recall floor asks for it within this time (s)."""
+ALARMS: Final = {"FIRE": "fire alarm", "EMERGENCY": "emergency (stop, code blue, earthquake)"}
 
 
 def answer(
@@ -32,8 +28,8 @@ def answer(
 ) -> Answer:
     """Explain the lift at the last message. `focus`: the session in question; "" for a waiting one."""
     if lift.last_state is None:
-        return _with_askers(common.unheard(lift, around, clock), lift, clock)
-    stopped = common.silent(lift, clock)
+        return _with_askers(common.unheard(lift, around), lift, clock)
+    stopped = common.stopped(lift, around, clock)
     if stopped is not None:
         _hold(stopped, lift, clock, then=True)
         return _with_askers(stopped, lift, clock)
@@ -48,16 +44,41 @@ def answer(
     _hold(found, lift, clock)
     if old := common.old_reading(lift, clock):
         found.say(old)
-    if claim is None:
-        _nobody_asks(found, lift, clock)
-    elif claim.ended is not None:
-        _end_not_obeyed(found, lift, claim, clock)
-    else:
+    if claim is not None and claim.ended is None:
         found.asks, found.fields = claim.who, _fields(lift, claim, clock)
         found.notes += common.clock_of(claim)
-        _why(found, lift, claim, clock)
+    _why(found, lift, claim, clock, around)
     _others_wait(found, lift, claim, clock)
     return found
+
+
+def _why(
+    found: Answer,
+    lift: LiftFacts,
+    claim: DeviceRequester | None,
+    clock: TimePhrases,
+    around: common.OthersHeard,
+) -> None:
+    """Find the cause: the lift itself first, then the way of the requests, then the holder."""
+    silent = lift.not_passed_on(clock.now)
+    if first_causes.two_nodes(found, lift, clock, "lift_states"):
+        return
+    if lift.mode.value in ALARMS:
+        _alarm(found, lift, clock)
+    elif first_causes.readings_come_and_go(found, lift, clock):
+        return
+    elif first_causes.own_fault(found, lift, clock, around):
+        return
+    elif lift.mode.value == "OFFLINE":
+        _out_of_service(found, lift, clock)
+    elif silent is not None:
+        not_passed_on(found, lift, silent, clock, around)
+    elif lift.session.value != NOBODY:
+        _held(found, lift, clock, around)
+    elif claim is not None and claim.ended is None:
+        not_granted(found, lift, claim, clock)
+    else:
+        found.say("Nobody asks for it.", NextStep("nobody", "there is nothing to do"))
 
 
 def _in_question(lift: LiftFacts, clock: TimePhrases, focus: str) -> DeviceRequester | None:
@@ -118,14 +139,6 @@ def _fields(
     )
 
 
-def _nobody_asks(found: Answer, lift: LiftFacts, clock: TimePhrases) -> None:
-    holder = lift.session.value
-    if holder == NOBODY:
-        found.say("Nobody asks for it.", NextStep("nobody", "there is nothing to do"))
-    else:
-        _without_word(found, lift, holder, clock)
-
-
 def _others_wait(
     found: Answer, lift: LiftFacts, claim: DeviceRequester | None, clock: TimePhrases
 ) -> None:
@@ -143,163 +156,75 @@ def _others_wait(
 # ---- why it waits
 
 
-def _why(found: Answer, lift: LiftFacts, claim: DeviceRequester, clock: TimePhrases) -> None:
-    """Explain why this claim is not met; if it is, name the party to act next."""
-    holder = lift.session.value
-    if lift.matches(claim) and claim.asks(clock.now):
-        _drives(found, lift, claim, clock)
-    elif lift.matches(claim):
-        _without_word(found, lift, holder, clock)
-    elif lift.mode.value in HAZARDS:
-        _hazard(found, lift, clock)
-    elif holder == claim.who:
-        _missing(found, lift, claim, clock)
-    elif holder == NOBODY:
-        not_granted(found, lift, claim, clock)
-    else:
-        _held(found, lift, claim, holder, clock)
-
-
-def _hazard(found: Answer, lift: LiftFacts, clock: TimePhrases) -> None:
-    mode = lift.mode.value
-    who: Who = "a person" if mode == "OFFLINE" else "the controller"
+def _alarm(found: Answer, lift: LiftFacts, clock: TimePhrases) -> None:
+    mode, holder = lift.mode.value, lift.session.value
+    found.because = (mode,)
     found.say(
         f"The lift has been in {mode} mode {clock.since(lift.mode.since)}: it takes no robot until that"
-        " ends. RMF does not look at the mode, and only sees that the lift does not come.",
-        NextStep(who, HAZARDS[mode]),
+        " ends. RMF does not look at the mode, and only sees that the lift does not come."
     )
-    holder = lift.session.value
+    ends = f"the {ALARMS[mode]} has to end, and be reset where the lift's settings ask for that"
     if holder == NOBODY:
+        found.next.append(NextStep("the controller", ends))
         return
-    own = lift.own(clock.now)
-    inside = own.values.get("boarded") if own else None
-    door = {
-        "yes": " Its robot may be in the car, so it is shown the true door and can leave.",
-        "no": " Its robot was not let into the car, so it is shown no open door.",
-    }.get(inside or "", "")
-    found.say(f"{holder} keeps the session meanwhile: only its END ends one.{door}")
+    theirs = lift.requesters.get(holder)
+    found.say(
+        f"{holder} keeps the session meanwhile: only its END ends one. {lift.in_car(holder, clock.now)}"
+    )
+    stands = lift.door.value == "open" and clock.now.at - lift.door.since.at > STANDS_S
+    if mode == "FIRE" and stands and theirs is not None and theirs.asks(clock.now):
+        if theirs.wants != lift.floor.value:
+            found.say(
+                f"The car stands at {lift.floor.value} with its door open, as after a recall, and"
+                f" {holder} still asks for {theirs.wants}: its fleet adapter does not know the recall"
+                " floor, or has not heard the alarm.",
+                NextStep(
+                    "a person",
+                    f"leave the lift alone until the alarm is over; after the alarm, name {lift.floor.value}"
+                    " as the recall floor in the fleet's YAML (`lift_emergency_levels`)",
+                ),
+            )
+            return
+        found.say(f"The door is open at {theirs.wants}, where {holder} wants to leave.")
+        found.next.append(NextStep("the robot", f"{holder} has to drive out"))
+        return
+    recall = "bring the car to the recall floor and open its door there"
+    found.next.append(NextStep("the controller", f"{recall}; then {ends}"))
 
 
-def _held(
-    found: Answer, lift: LiftFacts, claim: DeviceRequester, holder: str, clock: TimePhrases
-) -> None:
-    """Explain a lift held by another session."""
+def _out_of_service(found: Answer, lift: LiftFacts, clock: TimePhrases) -> None:
+    found.say(
+        f"The lift has been in OFFLINE mode {clock.since(lift.mode.since)}: it is out of service or"
+        " cannot be read, and takes no robot.",
+        NextStep("a person", "find out why it is out of service, or cannot be read"),
+    )
+    if lift.session.value != NOBODY:
+        found.say(f"{lift.session.value} keeps the session meanwhile: only its END ends one.")
+        found.say(lift.in_car(lift.session.value, clock.now))
+
+
+def _held(found: Answer, lift: LiftFacts, clock: TimePhrases, around: common.OthersHeard) -> None:
+    """Explain what the holder waits for, or why it keeps the lift."""
+    holder = lift.session.value
     theirs = lift.requesters.get(holder)
     if theirs is not None and theirs.ended is not None:
-        _end_not_obeyed(found, lift, theirs, clock)
+        lift_holder.end_not_obeyed(found, lift, theirs, clock)
     elif theirs is None or not theirs.asks(clock.now):
-        _without_word(found, lift, holder, clock)
+        lift_holder.without_word(found, lift, clock, around)
     elif lift.matches(theirs):
-        _drives(found, lift, theirs, clock)
+        lift_holder.drives(found, theirs, clock)
     else:
-        where = theirs.wants or "no floor"
-        found.say(f"{holder} itself has waited for it at {where} {clock.since(theirs.since)}.")
+        if found.asks != holder:
+            where = theirs.wants or "no floor"
+            found.say(f"{holder} itself has waited for it at {where} {clock.since(theirs.since)}.")
         _missing(found, lift, theirs, clock)
-    _forgotten(found, lift, holder, clock)
-
-
-def _forgotten(found: Answer, lift: LiftFacts, holder: str, clock: TimePhrases) -> None:
-    """Explain that the supervisor requests for another session than the holder's."""
-    asks = lift.supervisor
-    if asks is None or asks.value in ("", holder, NOBODY):
-        return
-    if clock.now.at - asks.since.at < SETTLES_S and asks.since.seen:
-        return
-    sender = lift.sender(asks.value)
-    it = "a supervisor that does so" if sender == DIRECT else "it"
-    found.say(
-        f"{sender.capitalize()} has asked for {asks.value} {clock.since(asks.since)}, though {holder}"
-        f" has the lift: {it} has forgotten {holder}, by a restart or a lost END, and passes none of"
-        " its requests on. Our node then hears that robot's own requests and its END; other nodes do"
-        " not."
-    )
-
-
-def _without_word(found: Answer, lift: LiftFacts, holder: str, clock: TimePhrases) -> None:
-    """Explain a silent holder of the lift."""
-    theirs = lift.requesters.get(holder)
-    heard_s = clock.now.at - max(lift.began.at, lift.session.since.at)
-    if theirs is None and heard_s < common.LISTENS_S:
-        found.say(
-            f"{holder} has not been heard yet; that takes a few seconds.",
-            NextStep("nobody", "listen for longer"),
-        )
-        return
-    since = f" since {clock.time(theirs.last.wall)}" if theirs else f" for {lasted(heard_s)}"
-    once = " It asked once only, as a person at a dashboard does." if _once(theirs) else ""
-    found.say(
-        f"{holder} has said nothing{since}, and has not sent END. A robot that waits or rides asks at"
-        f" each state: its fleet adapter is gone.{once}",
-        NextStep(
-            "a person",
-            f"check the car; if it is empty, {_release(lift)} ends the session",
-        ),
-    )
-    own = lift.own(clock.now)
-    if own is not None and own.values.get("boarded") in ("yes", "no"):
-        inside = own.values["boarded"] == "yes"
-        found.say("A robot may be in the car." if inside else "No robot has been let into the car.")
-
-
-def _release(lift: LiftFacts) -> str:
-    return f"`rmf-bridge release {quote(lift.name)}`"
-
-
-def _once(claim: DeviceRequester | None) -> bool:
-    return claim is not None and claim.times == 1
-
-
-def _end_not_obeyed(
-    found: Answer, lift: LiftFacts, claim: DeviceRequester, clock: TimePhrases
-) -> None:
-    assert claim.ended is not None
-    if clock.now.at - claim.ended.at < SETTLES_S:
-        found.say(
-            f"{claim.who} has just sent END.",
-            NextStep("the device's node", "show no session in its next state"),
-        )
-        return
-    if claim.own and not claim.end_passed_on and lift.supervisor_last is not None:
-        found.say(
-            f"{claim.who} sent END at {clock.time(claim.ended.wall)}, and the supervisor has not passed"
-            " it on.",
-            NextStep(
-                "the supervisor",
-                f"pass on END; until then: {_release(lift)}",
-            ),
-        )
-        return
-    found.say(
-        f"{claim.who} sent END at {clock.time(claim.ended.wall)}, and the lift still shows its"
-        " session.",
-        NextStep(
-            "the device's node",
-            f"end the session; until then: {_release(lift)}",
-        ),
-    )
-
-
-def _drives(found: Answer, lift: LiftFacts, claim: DeviceRequester, clock: TimePhrases) -> None:
-    """Explain a robot that has all it waited for."""
-    met = claim.met or claim.since
-    found.say(
-        f"{claim.who} has seen its lift at {claim.wants} with the door open {clock.since(met)}.",
-        NextStep(
-            "the robot",
-            f"{claim.who} has to drive in or out; then its fleet adapter asks for the next floor, or"
-            " sends END",
-        ),
-    )
-    if clock.now.at - met.at > LONG_S:
-        found.say("That is long: the robot may be blocked or lost, or its adapter hangs.")
+    lift_holder.forgotten(found, lift, holder, clock)
 
 
 def _missing(found: Answer, lift: LiftFacts, claim: DeviceRequester, clock: TimePhrases) -> None:
     """Explain a granted session whose mode, floor or door is still missing."""
     on = common.relays(lift, clock)
-    if lift.mode.value in HAZARDS:
-        _hazard(found, lift, clock)
-    elif lift.floor.value == NO_FLOOR and lift.door.value == "open":
+    if lift.floor.value == NO_FLOOR and lift.door.value == "open":
         found.say(
             f"The door has been open {clock.since(lift.door.since)}, but the car is at no known floor,"
             f" so RMF does not let the robot drive{on}.",
@@ -308,14 +233,7 @@ def _missing(found: Answer, lift: LiftFacts, claim: DeviceRequester, clock: Time
             ),
         )
     elif lift.mode.value == "HUMAN":
-        found.say(
-            "It has the session, but the lift has been in HUMAN mode"
-            f" {clock.since(lift.mode.since)}{on}.",
-            NextStep(
-                "the controller",
-                "confirm AGV mode: a key switch, people's calls that it serves first, or the contact",
-            ),
-        )
+        _human(found, lift, clock, on)
     elif lift.floor.value == NO_FLOOR and lift.motion.value == "stopped":
         found.say(
             f"The car has stood at no known floor {clock.since(lift.floor.since)}{on}.",
@@ -335,3 +253,31 @@ def _missing(found: Answer, lift: LiftFacts, claim: DeviceRequester, clock: Time
             f" {clock.since(lift.door.since)}{on}.",
             NextStep("the controller", f"open the door at {claim.wants}"),
         )
+
+
+def _human(found: Answer, lift: LiftFacts, clock: TimePhrases, on: str) -> None:
+    """Explain a session in HUMAN mode: is the controller asked for AGV mode at all?"""
+    human = (
+        f"{lift.session.value} has the session, but the lift has been in HUMAN mode"
+        f" {clock.since(lift.mode.since)}"
+    )
+    refused = {"AGV_MODE_NOT_GRANTED", "AGV_MODE_LOST"} & lift.faults(clock.now).keys()
+    if on and "agv_request" not in on and not refused:
+        found.because = ()
+        found.say(
+            f"{human}{on}: the controller is not asked for AGV mode. A relay that was switched too often"
+            " has to rest, as with an unsteady input.",
+            NextStep(
+                "a person",
+                "see in `rmf-bridge log` why the daemon does not ask; look for an input that flickers",
+            ),
+        )
+        return
+    unknown = "" if on else ". Whether its node asks the controller for AGV mode is not known"
+    found.say(
+        f"{human}{on}{unknown}.",
+        NextStep(
+            "the controller",
+            "confirm AGV mode: a key switch, people's calls that it serves first, or the contact",
+        ),
+    )

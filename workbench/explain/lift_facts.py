@@ -3,7 +3,9 @@
 from dataclasses import dataclass
 from typing import Final
 
-from bridges.observe.lift import NO_FLOOR, NOBODY, ObservedLift
+from bridges.messages import definitions as d
+from bridges.messages.stamps import in_seconds
+from bridges.observe.lift import END, NO_FLOOR, NOBODY, ObservedLift
 from bridges.observe.news import News
 from bridges.observe.requesters import DeviceRequester, Moment
 from workbench.explain.device import Device
@@ -44,6 +46,26 @@ class LiftFacts(Device, ObservedLift):
         """Name the sender for this session on `lift_requests`, as far as known."""
         one = self.requesters.get(who)
         return "the supervisor" if one is not None and one.own else DIRECT
+
+    def in_car(self, who: str, now: Moment) -> str:
+        """Say whether this robot may be in the car."""
+        told, one = self.told("boarded", now), self.requesters.get(who)
+        if told == "no":
+            return f"{who} has not been let into the car."
+        if told == "yes" or (one is not None and one.boarded is not None):
+            return f"{who} may be in the car."
+        return f"Whether {who} is in the car is not known."
+
+    def retain(self, request: d.LiftRequest, now: Moment) -> None:
+        """Take a request that its fleet adapter sent before we listened. Its stamp tells when."""
+        wall, who = in_seconds(request.request_time), self.text(request.session_id)
+        if request.request_type == END:
+            self.requesters.drop(who)
+            return
+        asked = Moment(now.at - max(0.0, now.wall - wall), min(wall, now.wall), seen=False)
+        wants = self.text(request.destination_floor)
+        one, _ = self.requesters.ask(who, wants, asked, stands=True)
+        one.own = True
 
     def says(self, one: News) -> str:
         """Return a line of the story; "" for none."""

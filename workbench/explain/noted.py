@@ -1,4 +1,5 @@
-"""The notes of our daemons about their own devices: inputs, outputs, faults and refusals.
+"""The notes of our daemons about their own devices: inputs, outputs, faults, bus errors and refusals;
+and our recorder's notes of the reason for a file.
 
 In an incident file the texts are JSON under `/rmf_bridge/` (`bridges/blackbox/incident.py`,
 `readable`). A file may come from anywhere, so a text of another shape is ignored.
@@ -12,7 +13,7 @@ import msgspec
 
 from workbench.explain.timeline import Level
 
-TOPICS: Final = ("samples", "outputs", "faults", "decisions")
+TOPICS: Final = ("samples", "outputs", "faults", "decisions", "bus_errors", "notes")
 MOST: Final = 40
 """At most this many inputs, outputs or faults of one device are read."""
 
@@ -20,7 +21,8 @@ MOST: Final = 40
 @dataclass(frozen=True, slots=True)
 class Noted:
     """One note about `subject`. `inputs`, `outputs`, `faults`: all of them, as name -> value ("": off),
-    or None if the note is about something else. `refused`: why a request was refused.
+    or None if the note is about something else. `refused`: why a request was refused. `bus_error`: why a
+    reading or writing failed. `kept_for`: the reason for the file, a fixed name and a text.
     """
 
     subject: str
@@ -28,6 +30,8 @@ class Noted:
     outputs: Mapping[str, str] | None = None
     faults: Mapping[str, str] | None = None
     refused: str = ""
+    bus_error: str = ""
+    kept_for: tuple[str, str] | None = None
 
 
 def noted(topic: str, text: str) -> Noted | None:
@@ -47,6 +51,12 @@ def noted(topic: str, text: str) -> Noted | None:
             return Noted(subject, faults=dict(_faults(told.get("faults"))))
         case "decisions" if isinstance(refused := told.get("refused"), str) and refused:
             return Noted(subject, refused=refused)
+        case "bus_errors" if isinstance(reason := told.get("reason"), str):
+            return Noted(subject, bus_error=reason or "it failed")
+        case "notes":
+            match told:
+                case {"code": str() as code, "text": str() as text}:
+                    return Noted(subject, kept_for=(code, text))
     return None
 
 

@@ -1,0 +1,163 @@
+"""Explain what the holder of a lift does: it is silent, has sent END, or has all that it waits for."""
+
+from shlex import quote
+from typing import Final
+
+from bridges.observe.lift import NOBODY
+from bridges.observe.limits import REQUESTER_SILENT_S
+from bridges.observe.requesters import DeviceRequester
+from workbench.explain import answer as common
+from workbench.explain.answer import Answer, OthersHeard
+from workbench.explain.explanation import NextStep
+from workbench.explain.lift_facts import DIRECT, LiftFacts
+from workbench.explain.lift_ungranted import SETTLES_S
+from workbench.explain.phrases import TimePhrases, lasted, listed
+from workbench.explain.rows import label
+
+LONG_S: Final = 60.0
+"""A robot drives within this time (s) of getting all it waits for."""
+
+
+def release(lift: LiftFacts) -> str:
+    """Return the command that ends the lift's session."""
+    return f"`rmf-bridge release {quote(lift.name)}`"
+
+
+def without_word(found: Answer, lift: LiftFacts, clock: TimePhrases, around: OthersHeard) -> None:
+    """Explain a holder that neither asks nor sends END."""
+    holder, theirs = lift.session.value, lift.requesters.get(lift.session.value)
+    heard_s = clock.now.at - max(lift.began.at, lift.session.since.at)
+    if theirs is None and heard_s < common.LISTENS_S:
+        found.say(
+            f"{holder} has not been heard yet; that takes a few seconds.",
+            NextStep("nobody", "listen for longer"),
+        )
+        return
+    since = f"since {clock.time(theirs.last.wall)}" if theirs else f"for at least {lasted(heard_s)}"
+    found.say(
+        f"{holder} has sent no request and no END {since}, though a robot that waits or rides asks at"
+        " each state."
+    )
+    found.because = ()
+    look = f"look into the car; only when the car is empty: {release(lift)}"
+    fleet = holder.rpartition("/")[0]
+    speaks, together = _of_fleet(fleet, holder, theirs, clock, around)
+    if not fleet:
+        found.say(
+            f"{holder} is no robot's name (FLEET/ROBOT): another node has taken the lift, as a dashboard"
+            " does.",
+            NextStep("a person", look),
+        )
+    elif speaks:
+        found.say(
+            f"The fleet adapter lives, as it speaks for {listed(speaks)}: either {holder} is dead, or"
+            " the adapter has dropped it.",
+            NextStep("a person", look),
+        )
+    elif together or around.senders is not None:
+        found.say(
+            f"{holder} and {listed(together)} fell silent together: their fleet adapter is gone or cut off."
+            if together
+            else f"Nothing from any robot of {fleet} was heard either: its fleet adapter is gone or cut off."
+        )
+        found.next.append(NextStep("a person", _restart(fleet, holder)))
+    else:
+        found.say(
+            "Either its fleet adapter is gone or cut off, or the adapter has dropped the robot: nothing"
+            " here tells which.",
+            NextStep("a person", look),
+        )
+    found.say(lift.in_car(holder, clock.now))
+
+
+def _restart(fleet: str, holder: str) -> str:
+    return (
+        f"look into the car, then restart the fleet adapter of {fleet}: it sends END for {holder} when it"
+        f" starts, so give {holder} a task within a minute if it stands in the car, or take it out"
+    )
+
+
+def _of_fleet(
+    fleet: str,
+    holder: str,
+    theirs: DeviceRequester | None,
+    clock: TimePhrases,
+    around: OthersHeard,
+) -> tuple[list[str], list[str]]:
+    """Return the robots for which the holder's fleet adapter speaks now, and those that fell silent when
+    the holder did."""
+    said = {label(who): at for who, at in around.spoke.items()}
+    others = {who: at for who, at in said.items() if who.startswith(f"{fleet}/") and who != holder}
+    named = {who: who if who != f"{fleet}/" else f"the states of {fleet}" for who in others}
+    speaks = [who for who, at in others.items() if clock.now.at - at.at <= REQUESTER_SILENT_S]
+    ended = theirs.last.at if theirs else float("-inf")
+    together = [who for who, at in others.items() if abs(at.at - ended) <= REQUESTER_SILENT_S]
+    return [named[who] for who in sorted(speaks)][-4:], [named[who] for who in sorted(together)][
+        -4:
+    ]
+
+
+def end_not_obeyed(
+    found: Answer, lift: LiftFacts, claim: DeviceRequester, clock: TimePhrases
+) -> None:
+    """Explain an END after which the lift still shows the session."""
+    assert claim.ended is not None
+    at = clock.time(claim.ended.wall)
+    if clock.now.at - claim.ended.at < SETTLES_S:
+        found.say(
+            f"{claim.who} has just sent END.",
+            NextStep("the device's node", "show no session in its next state"),
+        )
+    elif claim.own and not claim.end_passed_on and lift.supervisor_last is not None:
+        found.say(
+            f"{claim.who} sent END at {at}, and the supervisor has not passed it on.",
+            NextStep("the supervisor", f"pass on END of {claim.who}; its log says why it does not"),
+        )
+    else:
+        found.say(
+            f"{claim.who} sent END at {at}, and the lift still shows its session.",
+            NextStep(
+                "the device's node",
+                f"end the session; until then, when the car is empty: {release(lift)}",
+            ),
+        )
+
+
+def drives(found: Answer, claim: DeviceRequester, clock: TimePhrases) -> None:
+    """Explain a robot that has all it waited for."""
+    met = claim.met or claim.since
+    found.say(
+        f"{claim.who} has all that it waits for: its lift at {claim.wants} with the door open"
+        f" {clock.since(met)}."
+    )
+    if clock.now.at - met.at > LONG_S:
+        found.say(
+            "That is long, and lift and supervisor have done their part: the robot is dead or blocked, or"
+            " its fleet adapter hangs.",
+            NextStep("a person", f"look at {claim.who}, and at its fleet adapter's log"),
+        )
+        return
+    found.next.append(
+        NextStep(
+            "the robot",
+            f"{claim.who} has to drive in or out; then its fleet adapter asks for the next floor, or"
+            " sends END. If it stays for more than a minute, a person has to look at it",
+        )
+    )
+
+
+def forgotten(found: Answer, lift: LiftFacts, holder: str, clock: TimePhrases) -> None:
+    """Explain that the supervisor requests for another session than the holder's."""
+    asks = lift.supervisor
+    if asks is None or asks.value in ("", holder, NOBODY):
+        return
+    if clock.now.at - asks.since.at < SETTLES_S and asks.since.seen:
+        return
+    sender = lift.sender(asks.value)
+    it = "a supervisor that does so" if sender == DIRECT else "it"
+    found.say(
+        f"{sender.capitalize()} has asked for {asks.value} {clock.since(asks.since)}, though {holder}"
+        f" has the lift: {it} has forgotten {holder} after a restart or a lost END, and passes none of"
+        f" the requests of {holder} on. Our node then hears the robot's own requests and END; other"
+        " nodes do not."
+    )
