@@ -68,7 +68,7 @@ class ObservedDevice(ABC, Generic[T]):
         self.diagnoses: dict[str, Diagnosis] = {}
         self._publishers = StatePublishers()
         self._back: deque[tuple[float, float]] = deque(maxlen=8)
-        self._flips: deque[float] = deque(maxlen=100)
+        self._flips: deque[tuple[float, float]] = deque(maxlen=100)
 
     def published_by(self, sender: Sender | None, now: Moment) -> None:
         """Take the publisher of a state."""
@@ -110,9 +110,9 @@ class ObservedDevice(ABC, Generic[T]):
         """Count recent steps back of the stamps by more than `by_s`, as with two nodes."""
         return sum(by > by_s and now - at < within_s for at, by in self._back)
 
-    def flaps(self, now: Moment) -> int:
-        """Count the recent changes to OFFLINE and back."""
-        return sum(now.at - at < FLAPS_WITHIN_S for at in self._flips)
+    def flaps(self, now: Moment) -> list[float]:
+        """Return the age of the reading (s) at each recent change to OFFLINE or back."""
+        return [age_s for at, age_s in self._flips if now.at - at < FLAPS_WITHIN_S]
 
     def checks(self, one: DeviceRequester) -> tuple[Check, ...]:
         """List the conditions of RMF's phase of this requester; empty if RMF has no such phase."""
@@ -162,5 +162,5 @@ class ObservedDevice(ABC, Generic[T]):
             if fact.say(value, moment):
                 self.changed[name] = before
                 if name == "mode" and before and "OFFLINE" in (before.upper(), value.upper()):
-                    self._flips.append(moment.at)
+                    self._flips.append((moment.at, self.stamp_age_s))
         yield from self._settle(moment)

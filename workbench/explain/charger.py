@@ -18,6 +18,8 @@ from workbench.explain.explanation import NextStep
 from workbench.explain.phrases import TimePhrases, lasted
 from workbench.explain.rows import label
 
+LONG_S: Final = 120.0
+"""A robot comes to its charger within this time (s), or somebody should look why it does not."""
 REFUSED_LATELY_S: Final = 60.0
 
 Coordinator = Mapping[str, str]
@@ -66,10 +68,11 @@ def _next(found: Answer, charger: ChargerFacts, clock: TimePhrases) -> None:
         case "idle":
             _idle(found, charger, clock)
         case "assigned":
-            found.say(
-                f"It does not see {who} on its pad yet, or cannot charge it yet.",
-                NextStep("the robot", f"{who} has to come to {charger.name} and park exactly"),
-            )
+            found.say(f"{who} has not come to its pad, or cannot be charged there yet.")
+            long = clock.now.at - charger.condition.since.at > LONG_S
+            comes = NextStep("the robot", f"{who} has to come to {charger.name} and park exactly")
+            look = f"find {who}: see what task its fleet adapter has for it, and why it does not come"
+            found.next.append(NextStep("a person", look) if long else comes)
         case "charging":
             left = f"in {lasted(charger.full_in_s)}" if charger.full_in_s > 0 else "when it is full"
             found.say(

@@ -56,7 +56,7 @@ def answer(
     held_open = bool(door.holders or claim or (door.asked and door.asked.value == OPEN))
     if (
         first_causes.two_nodes(found, door, clock, "door_states")
-        or first_causes.readings_come_and_go(found, door, clock)
+        or first_causes.comes_and_goes(found, door, clock)
         or first_causes.own_fault(found, door, clock, around, end="open" if held_open else "shut")
     ):
         return found

@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from typing import Final
 
 from bridges.observe.limits import FLAPS, FLAPS_WITHIN_S
+from workbench.explain import answer as common
 from workbench.explain.answer import Answer, OthersHeard
 from workbench.explain.device import Device
 from workbench.explain.explanation import NextStep
@@ -14,6 +15,10 @@ TWO_NODES: Final = "TWO_NODES_FOR_ONE_DEVICE"
 BUS: Final = (
     "check the bus: the module at its end, its supply and its cable, and whether a second master is on"
     " the line; `rmf-bridge log` shows each lost reply"
+)
+FLICKERS: Final = (
+    "find what kept changing: an input that flickers (check its wire and contact), or a relay module that"
+    " restarts; `rmf-bridge log` shows which"
 )
 CONTACT: Final = (
     "Either the leaf has stopped on its way, or its {contact} contact or the wire of that contact is"
@@ -30,10 +35,9 @@ OWN: Final[Mapping[str, tuple[str, str]]] = {
         " writes to it",
     ),
     "RELAY_RESTS": (
-        "An input flickers, so a relay was switched too often and now has to rest: meanwhile the daemon"
-        " asks the controller for nothing.",
-        "find the input that flickers, and check its wire and contact: `rmf-bridge log` shows what kept"
-        " changing",
+        "A relay was switched too often and now has to rest: meanwhile the daemon asks the controller for"
+        " nothing.",
+        FLICKERS,
     ),
     "DOOR_CONTACTS_CONTRADICT": ("", ""),
     "DOOR_CODE_ILLEGAL": ("", ""),
@@ -49,6 +53,10 @@ OWN: Final[Mapping[str, tuple[str, str]]] = {
 """A fault of the device itself, the most telling first: an explanation, and where a person looks; ""
 for the words of `bridges/runtime/faults.yaml`."""
 READINGS: Final = ("INPUTS_NOT_FRESH", "COMMUNICATION_LOST")
+OFFLINE: Final = (*READINGS, "OUTPUTS_NOT_WRITTEN", "MANUAL", "OUT_OF_SERVICE")
+"""Faults that show a device as OFFLINE."""
+STALLS_S: Final = 0.5
+"""A reading that has grown older than the others by this time (s) shows that no new one came."""
 
 
 def two_nodes(found: Answer, device: Device, clock: TimePhrases, topic: str) -> bool:
@@ -70,17 +78,28 @@ def two_nodes(found: Answer, device: Device, clock: TimePhrases, topic: str) -> 
     return True
 
 
-def readings_come_and_go(found: Answer, device: Device, clock: TimePhrases) -> bool:
-    """Explain readings that come and go. True if they do."""
-    flips = device.flaps(clock.now)
-    if flips < FLAPS:
+def comes_and_goes(found: Answer, device: Device, clock: TimePhrases) -> bool:
+    """Explain a device that goes OFFLINE and comes back. True if it does. If its readings are old when it
+    is OFFLINE, they do not come; else an input of the device says so."""
+    ages = device.flaps(clock.now)
+    if len(ages) < FLAPS:
         return False
+    heard_s = lasted(min(FLAPS_WITHIN_S, clock.now.at - device.began.at))
+    often = f"{device.name} goes OFFLINE and comes back again and again ({len(ages)} times in {heard_s})"
+    on = common.relays(device, clock)
+    if max(ages) - min(ages) < STALLS_S:
+        found.because = ("RELAY_RESTS",)
+        found.say(
+            f"{often}, though its readings are fresh: an input flickers, such as a contact for manual mode"
+            f" or out of service{on}.",
+            NextStep("a person", FLICKERS),
+        )
+        return True
     found.because = READINGS
     bus = f" The last error on its bus: {device.bus_error}." if device.bus_error else ""
     found.say(
-        f"{device.name} goes OFFLINE and comes back again and again ({flips} changes in the last"
-        f" {lasted(min(FLAPS_WITHIN_S, clock.now.at - device.began.at))}): its module or bus answers late"
-        f" or not at all by turns, and what it shows between is no reason for anything.{bus}",
+        f"{often}: its readings stop and come again, because its module or bus answers late or not at"
+        f" all. What it shows in between proves nothing{on}.{bus}",
         NextStep("a person", BUS),
     )
     return True

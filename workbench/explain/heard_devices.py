@@ -19,10 +19,10 @@ from bridges.messages.heard import Heard, Own
 from bridges.messages.words import KINDS, Kind
 from bridges.observe.all_devices import Key, ObservedGraph
 from bridges.observe.diagnosis import COORDINATOR
-from bridges.observe.limits import MOST_DEVICES
+from bridges.observe.limits import FLAPS, MOST_DEVICES
 from bridges.observe.requesters import Moment
 from workbench.explain import answer as common
-from workbench.explain import charger, door, known_defects, lift
+from workbench.explain import charger, door, first_causes, known_defects, lift
 from workbench.explain.answer import Answer, FileReason, Remedies
 from workbench.explain.charger_facts import ChargerFacts
 from workbench.explain.device import MOST_LINES, Device
@@ -116,8 +116,10 @@ class HeardDevices(ObservedGraph[Device]):
         began = self.began or self.now
         last = self.known.get((kind, name)) or self.make(kind, name)
         now, device = self._then.get((kind, name), (self.now, last))
-        clock = TimePhrases(now, zone)
         reason = self._reason.get(name) or self._reason.get("")
+        if reason and reason.fault in first_causes.OFFLINE and len(last.flaps(self.now)) >= FLAPS:
+            now, device = self.now, last  # only time shows that it comes and goes
+        clock = TimePhrases(now, zone)
         answer = self._answer(device, clock, reason, remedies or {})
         if reason is not None:
             answer.now.insert(0, reason.told(clock))

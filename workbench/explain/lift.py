@@ -20,6 +20,8 @@ from workbench.explain.rows import label
 
 STANDS_S: Final = 5.0
 """A fleet adapter that knows the recall floor asks for it within this time (s)."""
+FLOOR_S: Final = 20.0
+"""A car that moves reaches the next floor within this time (s)."""
 ALARMS: Final = {"FIRE": "fire alarm", "EMERGENCY": "emergency (stop, code blue, earthquake)"}
 
 
@@ -32,6 +34,8 @@ def answer(
     stopped = common.stopped(lift, around, clock)
     if stopped is not None:
         _hold(stopped, lift, clock, then=True)
+        if lift.session.value != NOBODY:
+            stopped.say(lift.in_car(lift.session.value, clock.now))
         return _with_askers(stopped, lift, clock)
     claim = _in_question(lift, clock, focus)
     found = Answer(since=_begins(lift, claim))
@@ -65,7 +69,7 @@ def _why(
         return
     if lift.mode.value in ALARMS:
         _alarm(found, lift, clock)
-    elif first_causes.readings_come_and_go(found, lift, clock):
+    elif first_causes.comes_and_goes(found, lift, clock):
         return
     elif first_causes.own_fault(found, lift, clock, around):
         return
@@ -108,6 +112,8 @@ def _with_askers(found: Answer, lift: LiftFacts, clock: TimePhrases) -> Answer:
     for claim in [one for one in lift.asking(clock.now) if one.met is None][:3]:
         since = clock.since(claim.since)
         found.say(f"{claim.who} has waited for it at {claim.wants or 'no floor'} {since}.")
+        if lift.state is None:
+            found.say(lift.in_car(claim.who, clock.now))
         found.since = min(found.since, claim.first.at)
     return found
 
@@ -241,6 +247,15 @@ def _missing(found: Answer, lift: LiftFacts, claim: DeviceRequester, clock: Time
                 "the controller", "show its floor: a wire of the floor code, or a stop on the way"
             ),
         )
+    elif lift.floor.value != claim.wants and _rides(lift, claim, clock):
+        found.say(
+            f"{claim.who} rides: the car is on its way to {claim.wants}, and has been at"
+            f" {lift.floor.value} {clock.since(lift.floor.since)}{on}.",
+            NextStep(
+                "the robot",
+                f"{claim.who} rides on; it drives out when the car is at {claim.wants} with its door open",
+            ),
+        )
     elif lift.floor.value != claim.wants:
         found.say(
             f"The car has not come to {claim.wants}: it has been at {lift.floor.value}"
@@ -253,6 +268,12 @@ def _missing(found: Answer, lift: LiftFacts, claim: DeviceRequester, clock: Time
             f" {clock.since(lift.door.since)}{on}.",
             NextStep("the controller", f"open the door at {claim.wants}"),
         )
+
+
+def _rides(lift: LiftFacts, claim: DeviceRequester, clock: TimePhrases) -> bool:
+    """Is the robot in a car that has just moved?"""
+    inside = claim.boarded is not None or lift.told("boarded", clock.now) == "yes"
+    return inside and lift.floor.since.seen and clock.now.at - lift.floor.since.at < FLOOR_S
 
 
 def _human(found: Answer, lift: LiftFacts, clock: TimePhrases, on: str) -> None:

@@ -66,6 +66,8 @@ class LiftFacts(Device, ObservedLift):
         wants = self.text(request.destination_floor)
         one, _ = self.requesters.ask(who, wants, asked, stands=True)
         one.own = True
+        if one.times > 1 and one.given_up:
+            one.boarded = asked  # a robot asks for another floor from within the car
 
     def says(self, one: News) -> str:
         """Return a line of the story; "" for none."""
