@@ -11,7 +11,7 @@ from bridges.observe.charger import ObservedCharger
 from bridges.observe.device import ObservedDevice
 from bridges.observe.diagnosis import Diagnosis, about, of_node, report
 from bridges.observe.door import ObservedDoor
-from bridges.observe.lift import ObservedLift
+from bridges.observe.lift import END, ObservedLift
 from bridges.observe.limits import (
     FORGOTTEN_S,
     MOST_DAEMONS,
@@ -36,7 +36,8 @@ class ObservedGraph(Generic[D]):
     stopped FORGOTTEN_S ago by a new one; otherwise the devices heard first stay. `crowded`: kinds with
     devices left out. `steps`: the times of steps of the listener's clock, and their size (s).
     `nodes`: reports of our daemons and coordinators on themselves, by `<node>: <device>`.
-    `spoke`: the last word of each fleet adapter for a robot, `FLEET/ROBOT`, or for its fleet, `FLEET/`.
+    `spoke`: the last words of fleet adapters: for a robot that asks (`FLEET/ROBOT`), for one that ends
+    (`FLEET`), and for the fleet itself (`FLEET/`).
     """
 
     makes: ClassVar[Mapping[words.Kind, Callable[[str, Moment], Any]]]
@@ -62,16 +63,28 @@ class ObservedGraph(Generic[D]):
             self._heartbeat = heard
         if isinstance(message, d.DiagnosticArray):
             return [*self._diagnosed(message, moment)]
-        if who := _speaks(topic, message):
-            self.spoke[who] = moment
-            self.spoke.move_to_end(who)
-            if len(self.spoke) > MOST_SPEAKERS:
-                self.spoke.popitem(last=False)
+        self._speaks(topic, message, moment)
         found = [*self._about(message, moment)]
         if isinstance(message, words.Stated):
             for device in found:
                 device.published_by(heard.sender, moment)
         return [(device, device.hear(moment, topic, message)) for device in found]
+
+    def _speaks(self, topic: str, message: d.Message, moment: Moment) -> None:
+        match message:
+            case d.FleetState():
+                who, ends = f"{message.name}/", False
+            case d.LiftRequest() if topic == "adapter_lift_requests":
+                who, ends = message.session_id, message.request_type == END
+            case d.DoorRequest() if topic == "adapter_door_requests":
+                opens = message.requested_mode.value == d.DoorModeValue.MODE_OPEN
+                who, ends = message.requester_id, not opens
+            case _:
+                return
+        self.spoke.pop(who, None)
+        self.spoke[who.rpartition("/")[0] if ends else who] = moment
+        if len(self.spoke) > MOST_SPEAKERS:
+            self.spoke.popitem(last=False)
 
     def moment(self, heard: Heard | Own) -> Moment:
         """Return the message's time; a message out of order in a recording counts as of now."""
@@ -149,18 +162,6 @@ class ObservedGraph(Generic[D]):
             return False
         del self.known[oldest.kind, oldest.id]
         return True
-
-
-def _speaks(topic: str, message: d.Message) -> str:
-    """Return the robot or fleet for which a fleet adapter speaks here; "" for other messages."""
-    match message:
-        case d.FleetState():
-            return f"{message.name}/"
-        case d.LiftRequest() if topic == "adapter_lift_requests":
-            return message.session_id
-        case d.DoorRequest() if topic == "adapter_door_requests":
-            return message.requester_id
-    return ""
 
 
 def _heard_at(device: AnyDevice) -> float:

@@ -28,9 +28,9 @@ def request_lift(session: str, floor: str, door: str, who: str, wants: str) -> t
 
 class ObservedLift(ObservedDevice[d.LiftState]):
     """`adapters_heard`: a fleet adapter was heard. `supervisor`: the session in the supervisor's last
-    request on `lift_requests` ("" after an END), heard last at `supervisor_last`. `idle_ends`: the number
-    of ENDs in a row, and their sender, whose session the lift did not show. `taken_from`: the session that the lift last gave to
-    another one without END."""
+    request on `lift_requests` ("" after an END), heard last at `supervisor_last`. `idle_ends`: the
+    number of ENDs in a row for a session that the lift did not show, that session, and the last time.
+    `taken_from`: the last session that the lift replaced by another one without END."""
 
     kind = "lift"
 
@@ -82,10 +82,11 @@ class ObservedLift(ObservedDevice[d.LiftState]):
                 yield Wait(one.who, one.wants, one.lacks)
 
     def not_passed_on(self, now: Moment) -> DeviceRequester | None:
-        """Return a robot whose repeated request or END a living supervisor would pass on, if nothing has
-        come on `lift_requests` meanwhile. Only the holder's count, or any robot's while the lift is free:
-        RMF's supervisor drops the others (lift_supervisor/Node.cpp). A grant in a recording without
-        `lift_requests` shows that they were not recorded.
+        """Return a robot that repeats a request or END while nothing comes on `lift_requests`.
+
+        Only the holder counts, or any robot while the lift is free: RMF's supervisor drops the requests
+        of others (lift_supervisor/Node.cpp). If a robot was given the lift although nothing ever came
+        there, that topic was not recorded.
         """
         silent_at, holder = now.at - REQUESTER_SILENT_S, self.session.value
         last = self.supervisor_last
@@ -173,7 +174,7 @@ class ObservedLift(ObservedDevice[d.LiftState]):
             if one.ended is None and self.matches(one):
                 one.lacks = moment
                 if one.met is None:
-                    one.met = moment
+                    one.met, one.reached = moment, one.wants
                     if one.boarded is None:
                         one.boarded, one.boarded_at = moment, one.wants
                     yield News("met", moment, one.who, requester=one)

@@ -40,10 +40,11 @@ class DeviceRequester:
     """One requester and its wish. `wants`: a floor, a door's mode, and the like. Times: `first`, the
     start of its visit; `since`, its first request for this wish; `lacks`, the start of its wait;
     `last`, its last request; `passed_on`, the supervisor's last request for it; `met`, the wish seen
-    fulfilled by RMF; `boarded`, the first such time in this visit; `granted`, its hold of the device;
-    `ended`, its first END, and `end_last`, its latest. `end_passed_on`: the supervisor has passed on that
+    fulfilled by RMF; `boarded`, the first such time in this visit,
+    for the wish `boarded_at`; `reached`, the last wish so fulfilled; `granted`, its hold of the device;
+    `ended`, its first END, and `end_last`, its latest. `end_passed_on`: the supervisor has passed on
     END. `gone`: it has stopped without END. `times`: the number of its requests. `own`: it was heard
-    itself, not only through the supervisor. `given_up`: its wish before this one, if that was not met.
+    itself, not only through the supervisor. `given_up`: the wish before this one, unless it was met.
     `stamp_age_s`: the age by our clock of its last request, if that was `stamped`.
     """
 
@@ -60,6 +61,7 @@ class DeviceRequester:
     met: Moment | None = None
     boarded: Moment | None = None
     boarded_at: str = ""
+    reached: str = ""
     given_up: str = ""
     ended: Moment | None = None
     end_last: Moment | None = None
@@ -115,7 +117,7 @@ class DeviceRequesters:
             since = Moment(moment.at, moment.wall, seen=moment.seen and not early)
             found = self._all[who] = DeviceRequester(who, wants, since, since, since, moment)
         elif new := found.wants != wants:
-            found.given_up = found.wants if found.met is None else ""
+            found.given_up = "" if found.reached == found.wants else found.wants
             found.wants, found.since, found.lacks, found.met = wants, moment, moment, None
         found.last, found.gone = moment, False
         found.times += 1

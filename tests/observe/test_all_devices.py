@@ -8,8 +8,14 @@ from bridges.messages.heard import Heard
 from bridges.messages.stamps import stamp
 from bridges.observe.all_devices import PlainGraph
 from bridges.observe.device import reading_age
-from bridges.observe.limits import FORGOTTEN_S, MOST_DEVICES, OLD_S
-from tests.observe.story import LIFT, RED, WALL, Story
+from bridges.observe.limits import (
+    FLAPS_WITHIN_S,
+    FORGOTTEN_S,
+    MOST_DEVICES,
+    MOST_SPEAKERS,
+    OLD_S,
+)
+from tests.observe.story import BLUE, LIFT, RED, WALL, Story
 
 
 def lift(at: float, name: str) -> Heard:
@@ -86,3 +92,29 @@ def test_stamps_of_two_nodes_go_back_and_forth_and_those_of_one_do_not() -> None
         two.passes(1)
     back = [s.device("lift", "Lift1").steps_back(6.0, 0.2, 15.0) for s in (one, two)]
     assert back == [0, 6]
+
+
+def test_the_last_words_of_fleet_adapters_are_bounded_and_an_end_is_no_robots_word() -> None:
+    story = Story().asks(RED).passes(1).asks_door(BLUE).passes(1).ends(RED).passes(1)
+    story.hear("fleet_states", d.FleetState("fleet"))
+    assert {who: at.at for who, at in story.graph.spoke.items()} == {
+        BLUE: 1,
+        "fleet": 2,
+        "fleet/": 3,
+    }
+    for number in range(2 * MOST_SPEAKERS):
+        story.asks(f"made/up{number}")
+    assert len(story.graph.spoke) == MOST_SPEAKERS
+
+
+@pytest.mark.parametrize("mode", [4, 2])
+def test_a_device_that_goes_offline_and_comes_back_flaps_and_one_that_changes_otherwise_does_not(
+    mode: int,
+) -> None:
+    story = Story()
+    for number in range(8):
+        story.hear("lift_states", replace(LIFT, current_mode=mode if number % 2 else 1)).passes(3)
+    flaps = story.device("lift", "Lift1").flaps(story.graph.now)
+    assert len(flaps) == (7 if mode == 4 else 0)
+    story.passes(FLAPS_WITHIN_S).lift()
+    assert story.device("lift", "Lift1").flaps(story.graph.now) == []

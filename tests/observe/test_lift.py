@@ -4,6 +4,7 @@ import pytest
 
 from bridges.observe.lift import ObservedLift, request_lift
 from bridges.observe.limits import GIVEN_UP_S, MOST_REQUESTERS, REQUESTER_SILENT_S, SILENT_S
+from bridges.observe.requesters import Moment
 from tests.observe.story import BLUE, CLOSED, OPEN, RED, Story
 
 
@@ -93,6 +94,71 @@ def test_the_end_of_a_holder_that_was_not_heard_asking_is_remembered(passed: boo
     assert one is not None
     assert one.ended is not None
     assert (one.ended.at, one.end_passed_on, one.own) == (1, passed, not passed)
+
+
+def test_an_end_before_the_first_state_is_remembered_until_the_state_shows_its_session() -> None:
+    story = Story().ends(RED).passes(1).lift(RED)
+    one = story.device("lift", "Lift1").requesters.get(RED)
+    assert one is not None
+    assert (one.ended is not None, one.own) == (True, True)
+
+
+def test_a_robot_repeats_end_until_its_last_is_old() -> None:
+    story = Story().lift(RED)
+    for _ in range(5):
+        story.passes(1).ends(RED).lift(RED)
+    one = story.device("lift", "Lift1").requesters.get(RED)
+    assert one is not None
+    assert one.ends(story.graph.now)
+    assert not one.ends(Moment(story.now + REQUESTER_SILENT_S + 0.1, 0.0))
+
+
+def not_passed_on(story: Story) -> str:
+    """Who asks in vain."""
+    lift = story.device("lift", "Lift1")
+    assert isinstance(lift, ObservedLift)
+    one = lift.not_passed_on(story.graph.now)
+    return one.who if one else ""
+
+
+@pytest.mark.parametrize("ends", [True, False])
+def test_requests_of_the_holder_that_nothing_follows_are_not_passed_on(ends: bool) -> None:
+    story = Story().lift(RED).asks(RED, passed=True)
+    for _ in range(5):
+        story.passes(1)
+        (story.ends(RED) if ends else story.asks(RED)).lift(RED)
+    assert not_passed_on(story) == RED
+    assert not_passed_on(story.asks(RED, passed=True)) == ""
+
+
+def test_requests_for_a_free_lift_are_passed_on_by_a_living_supervisor() -> None:
+    story = Story()
+    for _ in range(5):
+        story.lift().asks(BLUE).passes(1)
+    assert not_passed_on(story.lift()) == BLUE
+
+
+def test_the_requests_of_others_are_dropped_by_a_living_supervisor_too() -> None:
+    story = Story().lift(RED)
+    for _ in range(9):
+        story.passes(1).asks(BLUE).lift(RED)
+    assert not_passed_on(story) == ""
+
+
+def test_a_grant_without_any_request_of_a_supervisor_shows_that_its_topic_is_not_recorded() -> None:
+    story = Story().lift().passes(1).asks(RED)
+    for _ in range(9):
+        story.lift(RED).passes(1).asks(RED)
+    assert not_passed_on(story) == ""
+
+
+def test_a_wish_that_was_given_up_is_remembered_and_one_that_was_met_is_not() -> None:
+    story = Story().lift(RED).asks(RED, "L2").lift(RED, "L2", OPEN).asks(RED, "L3").lift(RED)
+    one = story.device("lift", "Lift1").requesters.get(RED)
+    assert one is not None
+    assert (one.boarded_at, one.given_up) == ("L2", "")
+    story.asks(RED, "L2")
+    assert (one.boarded_at, one.given_up) == ("L2", "L3")
 
 
 def test_the_supervisor_asks_for_whom_it_asked_last_and_no_stranger_becomes_a_requester() -> None:

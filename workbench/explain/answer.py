@@ -10,7 +10,7 @@ from bridges.messages.words import Kind
 from bridges.observe.limits import CLOCKS_DIFFER_S
 from bridges.observe.requesters import DeviceRequester, Moment
 from workbench.explain.device import Device
-from workbench.explain.explanation import CheckedField, FaultTold, NextStep
+from workbench.explain.explanation import CheckedField, FaultTold, NextStep, Who
 from workbench.explain.phrases import TimePhrases, lasted, listed
 from workbench.explain.rows import label
 
@@ -36,10 +36,14 @@ class Answer:
     since: float = float("-inf")
     because: tuple[str, ...] | None = None
 
-    def say(self, text: str, *steps: NextStep) -> "Answer":
+    def say(self, text: str, who: Who | None = None, do: str = "") -> "Answer":
         """Add a sentence, and the next step that follows from it."""
         self.now.append(text)
-        self.next += steps
+        return self.acts(who, do) if who else self
+
+    def acts(self, who: Who, do: str) -> "Answer":
+        """Add a next step."""
+        self.next.append(NextStep(who, do))
         return self
 
 
@@ -69,10 +73,10 @@ class FileReason:
 
 @dataclass(frozen=True, slots=True)
 class OthersHeard:
-    """Everything heard besides the device: the names of each kind, the number of messages, the last word
-    of each robot's or fleet's adapter (`ObservedGraph.spoke`), the faults' remedies, and the reason for
-    the file. `senders`: the nodes that publish each topic, as discovered on a live graph; None for a
-    recording, which does not name them."""
+    """Everything known besides the device: the names of each kind, the number of messages, the last
+    words of fleet adapters (`ObservedGraph.spoke`), the faults' remedies, and the reason for the file.
+    `senders`: the nodes that publish each topic on a live graph; None for a recording, which does not
+    name them."""
 
     names: Mapping[Kind, tuple[str, ...]]
     messages: int
@@ -102,20 +106,16 @@ def unheard(device: Device, around: OthersHeard) -> Answer:
         seen = f", but these nodes are on the graph: {', '.join(nodes[:MOST_NAMES])}"
         return answer.say(
             f"Nothing at all was heard{seen if nodes else ''}.",
-            NextStep(
-                "a person",
-                "look at the domain, the network and the transport: `rmf-bridge doctor FILE`",
-            ),
+            "a person",
+            "look at the domain, the network and the transport: `rmf-bridge doctor FILE`",
         )
     near = get_close_matches(device.name.lower(), {n.lower(): n for n in others}, 1)
     mean = next((f" (did you mean {name}?)" for name in others if [name.lower()] == near), "")
     return answer.say(
         f"Nobody publishes a state of {device.name}: its daemon is not running or is cut off, or the"
         f" name is misspelt; {_others(around)}.",
-        NextStep(
-            "a person",
-            f"start the daemon of {device.name}, or correct the spelling of its name{mean}",
-        ),
+        "a person",
+        f"start the daemon of {device.name}, or correct the spelling of its name{mean}",
     )
 
 
@@ -132,12 +132,10 @@ def stopped(device: Device, around: OthersHeard, clock: TimePhrases) -> Answer |
     last = device.last_state
     if last is not None and around.reason is not None and around.reason.code == DIED:
         return Answer(since=last.at - 60.0, because=()).say(
-            f"The daemon of {device.name} died then. The file ends there, so nothing after it is known.",
-            NextStep(
-                "a person",
-                f"see whether the daemon of {device.name} runs again and its relays are off"
-                " (`rmf-bridge status`), and why it died (`rmf-bridge log`, the journal)",
-            ),
+            f"The daemon of {device.name} died then. The file ends there: what came after is unknown.",
+            "a person",
+            f"see whether the daemon of {device.name} runs again and its relays are off"
+            " (`rmf-bridge status`), and why it died (`rmf-bridge log`, the journal)",
         )
     if last is None or not device.is_silent(clock.now):
         return None
@@ -145,11 +143,9 @@ def stopped(device: Device, around: OthersHeard, clock: TimePhrases) -> Answer |
     return Answer(since=last.at - 60.0, because=SILENCES).say(
         f"The last state of {device.name} came at {clock.time(last.wall)}, {for_s} ago: its daemon is"
         " not running, or is cut off.",
-        NextStep(
-            "a person",
-            f"look at the daemon of {device.name} and its network: `rmf-bridge status` and"
-            " `rmf-bridge doctor FILE` on its machine",
-        ),
+        "a person",
+        f"look at the daemon of {device.name} and its network: `rmf-bridge status` and"
+        " `rmf-bridge doctor FILE` on its machine",
     )
 
 

@@ -42,7 +42,7 @@ def answer(
     if old := common.old_reading(charger, clock):
         found.say(old)
     if not (
-        first_causes.two_nodes(found, charger, clock, "charger_states")
+        first_causes.two_nodes(found, charger, clock, around, "charger_states")
         or first_causes.own_fault(found, charger, clock, around)
     ):
         _next(found, charger, clock)
@@ -71,27 +71,30 @@ def _next(found: Answer, charger: ChargerFacts, clock: TimePhrases) -> None:
             found.say(f"{who} has not come to its pad, or cannot be charged there yet.")
             long = clock.now.at - charger.condition.since.at > LONG_S
             comes = NextStep("the robot", f"{who} has to come to {charger.name} and park exactly")
-            look = f"find {who}: see what task its fleet adapter has for it, and why it does not come"
+            look = (
+                f"find {who}: see what task its fleet adapter has for it, and why it does not come"
+            )
             found.next.append(NextStep("a person", look) if long else comes)
         case "charging":
             left = f"in {lasted(charger.full_in_s)}" if charger.full_in_s > 0 else "when it is full"
             found.say(
                 f"{who} is being charged.",
-                NextStep("the controller", f"end the charge {left}, or when it is cancelled"),
+                "the controller",
+                f"end the charge {left}, or when it is cancelled",
             )
         case "released":
             found.say(
                 "The charge is over, and the pad is not clear yet.",
-                NextStep(
-                    "the robot", f"{who if who != NOBODY else 'the robot'} has to leave the pad"
-                ),
+                "the robot",
+                f"{who if who != NOBODY else 'the robot'} has to leave the pad",
             )
         case "error":
             _error(found, charger)
         case other:
             found.say(
                 f"RMF defines no charger state {other}.",
-                NextStep("the device's node", "publish RMF's states"),
+                "the device's node",
+                "publish RMF's states",
             )
 
 
@@ -102,15 +105,14 @@ def _idle(found: Answer, charger: ChargerFacts, clock: TimePhrases) -> None:
         if one.ended is None and one.granted is None and one.asks(clock.now)
     ]
     if not asking:
-        found.say("Nobody asks for it.", NextStep("nobody", "there is nothing to do"))
+        found.say("Nobody asks for it.", "nobody", "there is nothing to do")
         return
     first = asking[0]
     found.say(
         f"It has been asked to charge {first.wants} {clock.since(first.first)} (request {first.who}),"
         " and has not taken the request.",
-        NextStep(
-            "the device's node", "take the request; a refusal is explained below, or in its log"
-        ),
+        "the device's node",
+        "take the request; a refusal is explained below, or in its log",
     )
 
 
@@ -126,7 +128,8 @@ def _error(found: Answer, charger: ChargerFacts) -> None:
         )
         found.say(
             f"Wrong station: {who} stands at {charger.name}{instead}.",
-            NextStep("the robot", f"{who} has to leave the pad; then the error ends by itself"),
+            "the robot",
+            f"{who} has to leave the pad; then the error ends by itself",
         )
         return
     says = {
@@ -145,7 +148,7 @@ def _error(found: Answer, charger: ChargerFacts) -> None:
         diagnosis(text),
         ("Its text does not say whether robot or station is at fault", "check both"),
     )
-    found.say(f"{side}: {text or 'no text was given'}.", NextStep("a person", do))
+    found.say(f"{side}: {text or 'no text was given'}.", "a person", do)
 
 
 def _refusal(found: Answer, charger: ChargerFacts, clock: TimePhrases) -> None:

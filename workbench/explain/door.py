@@ -53,11 +53,12 @@ def answer(
     found.say(f"{door.name} has been {door.mode.value} {clock.since(door.mode.since)}. {held}")
     if old := common.old_reading(door, clock):
         found.say(old)
-    held_open = bool(door.holders or claim or (door.asked and door.asked.value == OPEN))
+    held_open = door.holders or claim or (door.asked and door.asked.value == OPEN)
+    end = "open" if held_open else "shut"
     if (
-        first_causes.two_nodes(found, door, clock, "door_states")
+        first_causes.two_nodes(found, door, clock, around, "door_states")
         or first_causes.comes_and_goes(found, door, clock)
-        or first_causes.own_fault(found, door, clock, around, end="open" if held_open else "shut")
+        or first_causes.own_fault(found, door, clock, around, door.mode.value, end)
     ):
         return found
     if door.mode.value in AWAY:
@@ -112,7 +113,8 @@ def _away(found: Answer, door: DoorFacts, clock: TimePhrases) -> None:
     why = "its fault says why" if own and own.faults else "its daemon's log says why"
     found.say(
         f"The door is shown as {door.mode.value}: it cannot be read or believed, so nobody can pass.",
-        NextStep("a person", f"check the door's wires, bus and power: {why}"),
+        "a person",
+        f"check the door's wires, bus and power: {why}",
     )
 
 
@@ -127,14 +129,16 @@ def _opens(found: Answer, door: DoorFacts, claim: DeviceRequester, clock: TimePh
         what = "asks for CLOSE" if asked is not None else "has not asked the door to open"
         found.say(
             f"The supervisor lists {claim.who}, and {what}.",
-            NextStep("the supervisor", f"send OPEN for {door.name}"),
+            "the supervisor",
+            f"send OPEN for {door.name}",
         )
         return
     on = common.relays(door, clock)
     found.say(
         f"The supervisor asks for OPEN, and the door has been {door.mode.value}"
         f" {clock.since(door.mode.since)}{on}.",
-        NextStep("the controller", f"open {door.name} fully, and show it by its contact"),
+        "the controller",
+        f"open {door.name} fully, and show it by its contact",
     )
     if clock.now.at - door.mode.since.at > LONG_S:
         found.say("That is long: an obstacle, a locked door, or a contact that shows nothing.")
@@ -142,19 +146,19 @@ def _opens(found: Answer, door: DoorFacts, claim: DeviceRequester, clock: TimePh
 
 def _not_listed(found: Answer, door: DoorFacts, claim: DeviceRequester, clock: TimePhrases) -> None:
     if clock.now.at - claim.since.at < SETTLES_S and claim.since.seen:
-        found.say("It was asked for a moment ago.", NextStep("the supervisor", f"list {claim.who}"))
+        found.say("It was asked for a moment ago.", "the supervisor", f"list {claim.who}")
     elif door.last_heartbeat is None:
         found.say(
             "Nobody takes the request: no door supervisor was heard on `door_supervisor_heartbeat`.",
-            NextStep("a person", "start rmf_door_supervisor, or a door supervisor of rmf-bridges"),
+            "a person",
+            "start rmf_door_supervisor, or a door supervisor of rmf-bridges",
         )
     else:
         found.say(
             f"The door supervisor does not list {claim.who}: it takes its requests for replays, or"
             " has too many requesters.",
-            NextStep(
-                "the supervisor", f"take the request of {claim.who}; its log says why it does not"
-            ),
+            "the supervisor",
+            f"take the request of {claim.who}; its log says why it does not",
         )
 
 
@@ -162,7 +166,8 @@ def _not_let_go(found: Answer, door: DoorFacts, claim: DeviceRequester, clock: T
     found.say(
         f"It asks for CLOSE, and the supervisor's heartbeat has listed it"
         f" {clock.since(door.holders[claim.who])}.",
-        NextStep("the supervisor", f"remove {claim.who} from its list"),
+        "the supervisor",
+        f"remove {claim.who} from its list",
     )
 
 
@@ -179,43 +184,43 @@ def _nobody_asks(
     elif door.last_heartbeat is None and asked == OPEN:
         _asked_open(found, door, clock)
     elif door.mode.value == CLOSED:
-        found.say("Nobody waits for it.", NextStep("nobody", "there is nothing to do"))
+        found.say("Nobody waits for it.", "nobody", "there is nothing to do")
     elif door.last_heartbeat is None and not door.asks_now(clock.now):
         _nobody_tells(found, door, clock, around)
     elif for_s <= (OPENS_S if door.mode.value == OPEN else MOVES_S):
         found.say(
             "No robot holds it, so it closes or is about to.",
-            NextStep("nobody", f"wait until {door.name} is closed"),
+            "nobody",
+            f"wait until {door.name} is closed",
         )
     else:
         found.say(
-            "No robot holds it: something else keeps it from closing, as a push button, somebody in the"
-            " doorway, or its own controller. CLOSE from RMF's supervisor only releases a hold, and shuts"
-            " nothing.",
-            NextStep("the controller", f"close {door.name} when nobody is in the doorway"),
+            "No robot holds it: a push button, somebody in the doorway or its own controller keeps it"
+            " open. CLOSE from RMF's supervisor only releases a hold, and shuts nothing.",
+            "the controller",
+            f"close {door.name} when nobody is in the doorway",
         )
 
 
 def _nobody_tells(
     found: Answer, door: DoorFacts, clock: TimePhrases, around: common.OthersHeard
 ) -> None:
-    """Explain an open door without a request or a heartbeat. RMF's supervisor sends a heartbeat only
-    after requests, and CLOSE at each state of an open door that nobody holds (door_supervisor/Node.cpp)."""
+    """Explain an open door about which nobody says anything.
+
+    RMF's supervisor sends a heartbeat after requests only, and CLOSE at each state of an open door that
+    nobody holds (door_supervisor/Node.cpp).
+    """
     if clock.now.at - door.began.at < REQUESTER_SILENT_S:
-        found.say(
-            "Whether a robot holds it is not known yet.", NextStep("nobody", "listen for longer")
-        )
+        found.say("Whether a robot holds it is not known yet.", "nobody", "listen for longer")
         return
     doorway = f"look into the doorway of {door.name}"
     if around.nobody_publishes("door_requests"):
         found.say(
             "No node publishes `door_requests`, so the door supervisor is not running. Whether a robot"
             " holds the door is not known: it may stand in the doorway, where it says nothing.",
-            NextStep(
-                "a person",
-                f"{doorway}; when no robot stands in it, start the door supervisor, which lets go of every"
-                " door whose holder is silent",
-            ),
+            "a person",
+            f"{doorway}; when no robot stands in it, start the door supervisor, which lets go of every"
+            " door whose holder is silent",
         )
         return
     holds = "a robot holds the door, and most likely stands in the doorway, where it says nothing"
@@ -223,19 +228,15 @@ def _nobody_tells(
         found.say(
             f"{nodes} publishes `door_requests` and sends no CLOSE, as RMF's supervisor does at each"
             f" state of an open door that nobody holds. So {holds}.",
-            NextStep(
-                "the robot",
-                f"drive through and send CLOSE; if {door.name} stays open for more than a minute, a person"
-                " has to look into the doorway",
-            ),
+            "the robot",
+            f"drive through and send CLOSE; if {door.name} stays open for more than a minute, a person"
+            " has to look into the doorway",
         )
         return
     found.say(
         f"Nothing asks for CLOSE: either {holds}, or no door supervisor is running.",
-        NextStep(
-            "a person",
-            f"{doorway}; when no robot stands in it, see whether the door supervisor is running",
-        ),
+        "a person",
+        f"{doorway}; when no robot stands in it, see whether the door supervisor is running",
     )
 
 
@@ -261,19 +262,15 @@ def _held_open(found: Answer, door: DoorFacts, clock: TimePhrases) -> None:
     if clock.now.at - since.at <= LONG_S:
         found.say(
             f"{said} A robot in the doorway says nothing until it is through.",
-            NextStep(
-                "the robot",
-                f"{who} has to drive through; then its fleet adapter sends CLOSE. If {door.name} stays open"
-                " for more than a minute, a person has to look into the doorway",
-            ),
+            "the robot",
+            f"{who} has to drive through; then its fleet adapter sends CLOSE. If {door.name} stays open"
+            " for more than a minute, a person has to look into the doorway",
         )
         return
     found.say(
         f"{said} RMF has no time limit: a robot that died in the doorway, or a dashboard that somebody"
         " left, keeps the door open for ever.",
-        NextStep(
-            "a person",
-            f"look into the doorway; only when the doorway is clear: `rmf-bridge send door"
-            f" {quote(door.name)} close --requester {quote(who)}`",
-        ),
+        "a person",
+        f"look into the doorway; only when the doorway is clear: `rmf-bridge send door"
+        f" {quote(door.name)} close --requester {quote(who)}`",
     )

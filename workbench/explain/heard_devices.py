@@ -11,8 +11,8 @@ from dataclasses import replace
 from datetime import tzinfo
 from typing import ClassVar, Final
 
-from bridges.kinds.charger import refusals
 from bridges.blackbox.triggers import DIED, REFUSED
+from bridges.kinds.charger import refusals
 from bridges.messages import definitions as d
 from bridges.messages import words
 from bridges.messages.heard import Heard, Own
@@ -248,9 +248,10 @@ def _act_on(answer: Answer, reason: FileReason, remedies: Remedies) -> None:
         return
     do = remedies[reason.fault][1] if reason.fault in remedies else ""
     if reason.code == REFUSED:
-        do = "compare the refused request with the device's settings; the reason above says what differs"
+        do = "compare the refused request with the device's settings: the refusal says what differs"
     if do:
-        answer.next = [NextStep("a person", do)]
+        harmless = do.startswith(("nothing:", "nothing to", "intended"))
+        answer.next = [NextStep("nobody" if harmless else "a person", do)]
 
 
 def _before(device: Device, clock: TimePhrases) -> str:

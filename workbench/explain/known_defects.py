@@ -1,7 +1,7 @@
-"""Known defects of RMF, each with its thread, where what was heard shows one without doubt.
+"""Known defects of RMF, each with its thread, where what was heard leaves no doubt.
 
-Not named, because messages of lifts and doors do not prove them: #389 (a robot enters without a session),
-PR#490 (mutex groups), and Jazzy's RequestLift that takes a match for an arrival when it replans.
+Messages of lifts and doors do not prove #389 (a robot enters without a session), PR#490 (mutex groups)
+and Jazzy's RequestLift that accepts a match without arrival: these are not named.
 """
 
 from collections.abc import Callable, Iterator
@@ -16,37 +16,34 @@ SPAM: Final = 10
 """A fleet adapter ends a session with one END, or with a few while states are late."""
 
 
-def _summons_back(lift: ObservedLift, now: Moment) -> str:
-    """A robot that was let in asked for another floor, and then for the first one again."""
+def _calls_back(lift: ObservedLift, now: Moment) -> str:
     one = lift.requesters.get(lift.session.value)
-    if one is None or not one.asks(now) or one.met is not None or one.boarded is None:
+    if one is None or one.boarded is None or one.met is not None or lift.mode.value != "AGV":
         return ""
     back = one.wants == one.boarded_at and one.given_up not in ("", one.wants)
-    return one.who if back and lift.mode.value == "AGV" else ""
+    return one.who if back and one.asks(now) else ""
 
 
 def _taken_away(lift: ObservedLift, now: Moment) -> str:
-    """The lift gave a robot's session to another one, and the robot still asks."""
     one = lift.requesters.get(lift.taken_from)
     return one.who if one is not None and one.asks(now) and lift.session.value != NOBODY else ""
 
 
 def _ends_for_ever(lift: ObservedLift, now: Moment) -> str:
-    """END comes again and again for a session that the lift does not show."""
     count, who, last = lift.idle_ends
     return who if count >= SPAM and now.at - last.at <= REQUESTER_SILENT_S else ""
 
 
 PATTERNS: Final[tuple[tuple[Callable[[ObservedLift, Moment], str], str], ...]] = (
     (
-        _summons_back,
-        "{who} calls the car back to the floor where it got in: a known defect of fleet adapters when they"
-        " replan during a ride (rmf_ros2#555, mended by PR#556).",
+        _calls_back,
+        "In mid-ride {who} calls the car back to the floor where it got in: a known defect of fleet"
+        " adapters that replan (rmf_ros2#555, mended by PR#556).",
     ),
     (
         _taken_away,
-        "The lift's node gave the session of {who} away without its END: RMF's robots then wait for ever"
-        " (rmf_ros2#314).",
+        "The lift's node has taken the session from {who} without END, and RMF's robots then wait for"
+        " ever (rmf_ros2#314).",
     ),
     (
         _ends_for_ever,
@@ -54,6 +51,7 @@ PATTERNS: Final[tuple[tuple[Callable[[ObservedLift, Moment], str], str], ...]] =
         " fleet adapters (rmf_ros2#382, #415).",
     ),
 )
+"""A pattern, which returns its requester or "", and its sentence."""
 
 
 def notes(device: Device, now: Moment) -> Iterator[str]:
@@ -61,10 +59,9 @@ def notes(device: Device, now: Moment) -> Iterator[str]:
     waits = any(one.ended is None and not one.gone for one in device.requesters)
     if device.kind != "charger" and waits and (device.state is None or device.is_silent(now)):
         yield (
-            "RMF has no timeout: its robots wait for ever for a lift or door that is silent (rmf_ros2#472,"
+            "RMF has no timeout: its robots wait for ever for a silent lift or door (rmf_ros2#472,"
             " #248)."
         )
     if isinstance(device, ObservedLift):
-        for pattern, text in PATTERNS:
-            if who := pattern(device, now):
-                yield text.format(who=who)
+        found = ((pattern(device, now), text) for pattern, text in PATTERNS)
+        yield from (text.format(who=who) for who, text in found if who)

@@ -12,9 +12,9 @@ from bridges.observe.requesters import DeviceRequester
 from workbench.explain import answer as common
 from workbench.explain import first_causes, lift_holder
 from workbench.explain.answer import Answer
-from workbench.explain.explanation import CheckedField, NextStep
+from workbench.explain.explanation import CheckedField
 from workbench.explain.lift_facts import LiftFacts
-from workbench.explain.lift_ungranted import not_granted, not_passed_on
+from workbench.explain.lift_ungranted import SETTLES_S, not_granted, not_passed_on
 from workbench.explain.phrases import TimePhrases
 from workbench.explain.rows import label
 
@@ -65,24 +65,30 @@ def _why(
 ) -> None:
     """Find the cause: the lift itself first, then the way of the requests, then the holder."""
     silent = lift.not_passed_on(clock.now)
-    if first_causes.two_nodes(found, lift, clock, "lift_states"):
+    if first_causes.two_nodes(found, lift, clock, around, "lift_states"):
         return
     if lift.mode.value in ALARMS:
         _alarm(found, lift, clock)
-    elif first_causes.comes_and_goes(found, lift, clock):
-        return
-    elif first_causes.own_fault(found, lift, clock, around):
+    elif first_causes.comes_and_goes(found, lift, clock) or first_causes.own_fault(
+        found, lift, clock, around, lift.door.value
+    ):
         return
     elif lift.mode.value == "OFFLINE":
-        _out_of_service(found, lift, clock)
-    elif silent is not None:
+        kept = lift.session.value != NOBODY
+        found.say(
+            f"The lift has been in OFFLINE mode {clock.since(lift.mode.since)}: it is out of service or"
+            f" cannot be read, and takes no robot.{f' {lift.keeps(clock.now)}' if kept else ''}",
+            "a person",
+            "find out why it is out of service, or cannot be read",
+        )
+    elif silent is not None and (silent.ended or silent.wants in (lift.floors or silent.wants)):
         not_passed_on(found, lift, silent, clock, around)
     elif lift.session.value != NOBODY:
         _held(found, lift, clock, around)
     elif claim is not None and claim.ended is None:
         not_granted(found, lift, claim, clock)
     else:
-        found.say("Nobody asks for it.", NextStep("nobody", "there is nothing to do"))
+        found.say("Nobody asks for it.", "nobody", "there is nothing to do")
 
 
 def _in_question(lift: LiftFacts, clock: TimePhrases, focus: str) -> DeviceRequester | None:
@@ -163,7 +169,7 @@ def _others_wait(
 
 
 def _alarm(found: Answer, lift: LiftFacts, clock: TimePhrases) -> None:
-    mode, holder = lift.mode.value, lift.session.value
+    mode, holder, floor = lift.mode.value, lift.session.value, lift.floor.value
     found.because = (mode,)
     found.say(
         f"The lift has been in {mode} mode {clock.since(lift.mode.since)}: it takes no robot until that"
@@ -171,42 +177,27 @@ def _alarm(found: Answer, lift: LiftFacts, clock: TimePhrases) -> None:
     )
     ends = f"the {ALARMS[mode]} has to end, and be reset where the lift's settings ask for that"
     if holder == NOBODY:
-        found.next.append(NextStep("the controller", ends))
+        found.acts("the controller", ends)
         return
+    found.say(lift.keeps(clock.now))
     theirs = lift.requesters.get(holder)
-    found.say(
-        f"{holder} keeps the session meanwhile: only its END ends one. {lift.in_car(holder, clock.now)}"
-    )
     stands = lift.door.value == "open" and clock.now.at - lift.door.since.at > STANDS_S
-    if mode == "FIRE" and stands and theirs is not None and theirs.asks(clock.now):
-        if theirs.wants != lift.floor.value:
-            found.say(
-                f"The car stands at {lift.floor.value} with its door open, as after a recall, and"
-                f" {holder} still asks for {theirs.wants}: its fleet adapter does not know the recall"
-                " floor, or has not heard the alarm.",
-                NextStep(
-                    "a person",
-                    f"leave the lift alone until the alarm is over; after the alarm, name {lift.floor.value}"
-                    " as the recall floor in the fleet's YAML (`lift_emergency_levels`)",
-                ),
-            )
-            return
-        found.say(f"The door is open at {theirs.wants}, where {holder} wants to leave.")
-        found.next.append(NextStep("the robot", f"{holder} has to drive out"))
-        return
-    recall = "bring the car to the recall floor and open its door there"
-    found.next.append(NextStep("the controller", f"{recall}; then {ends}"))
-
-
-def _out_of_service(found: Answer, lift: LiftFacts, clock: TimePhrases) -> None:
-    found.say(
-        f"The lift has been in OFFLINE mode {clock.since(lift.mode.since)}: it is out of service or"
-        " cannot be read, and takes no robot.",
-        NextStep("a person", "find out why it is out of service, or cannot be read"),
-    )
-    if lift.session.value != NOBODY:
-        found.say(f"{lift.session.value} keeps the session meanwhile: only its END ends one.")
-        found.say(lift.in_car(lift.session.value, clock.now))
+    if mode != "FIRE" or not stands or theirs is None or not theirs.asks(clock.now):
+        found.acts(
+            "the controller",
+            f"bring the car to the recall floor and open its door there; then {ends}",
+        )
+    elif theirs.wants == floor:
+        found.say(f"The door is open at {floor}.", "the robot", f"{holder} has to drive out")
+    else:
+        found.say(
+            f"The car stands at {floor} with its door open, as after a recall, and {holder} still asks"
+            f" for {theirs.wants}: its fleet adapter does not know the recall floor, or has not heard"
+            " the alarm.",
+            "a person",
+            f"leave the lift alone until the alarm is over; then name {floor} as the recall floor in"
+            " the fleet's YAML (`lift_emergency_levels`)",
+        )
 
 
 def _held(found: Answer, lift: LiftFacts, clock: TimePhrases, around: common.OthersHeard) -> None:
@@ -234,39 +225,37 @@ def _missing(found: Answer, lift: LiftFacts, claim: DeviceRequester, clock: Time
         found.say(
             f"The door has been open {clock.since(lift.door.since)}, but the car is at no known floor,"
             f" so RMF does not let the robot drive{on}.",
-            NextStep(
-                "the controller", f"show its floor ({claim.wants}): check the floor code's wires"
-            ),
+            "the controller",
+            f"show its floor ({claim.wants}): check the floor code's wires",
         )
     elif lift.mode.value == "HUMAN":
         _human(found, lift, clock, on)
     elif lift.floor.value == NO_FLOOR and lift.motion.value == "stopped":
         found.say(
             f"The car has stood at no known floor {clock.since(lift.floor.since)}{on}.",
-            NextStep(
-                "the controller", "show its floor: a wire of the floor code, or a stop on the way"
-            ),
+            "the controller",
+            "show its floor: a wire of the floor code, or a stop on the way",
         )
     elif lift.floor.value != claim.wants and _rides(lift, claim, clock):
         found.say(
             f"{claim.who} rides: the car is on its way to {claim.wants}, and has been at"
             f" {lift.floor.value} {clock.since(lift.floor.since)}{on}.",
-            NextStep(
-                "the robot",
-                f"{claim.who} rides on; it drives out when the car is at {claim.wants} with its door open",
-            ),
+            "the robot",
+            f"{claim.who} rides on, and drives out when the door is open at {claim.wants}",
         )
     elif lift.floor.value != claim.wants:
         found.say(
             f"The car has not come to {claim.wants}: it has been at {lift.floor.value}"
             f" {clock.since(lift.floor.since)}{on}.",
-            NextStep("the controller", f"bring the car to {claim.wants}"),
+            "the controller",
+            f"bring the car to {claim.wants}",
         )
     else:
         found.say(
             f"The car is there, but its door has been {lift.door.value}"
             f" {clock.since(lift.door.since)}{on}.",
-            NextStep("the controller", f"open the door at {claim.wants}"),
+            "the controller",
+            f"open the door at {claim.wants}",
         )
 
 
@@ -283,22 +272,18 @@ def _human(found: Answer, lift: LiftFacts, clock: TimePhrases, on: str) -> None:
         f" {clock.since(lift.mode.since)}"
     )
     refused = {"AGV_MODE_NOT_GRANTED", "AGV_MODE_LOST"} & lift.faults(clock.now).keys()
-    if on and "agv_request" not in on and not refused:
+    settled = clock.now.at - lift.session.since.at > SETTLES_S
+    if on and "agv_request" not in on and not refused and settled:
         found.because = ()
         found.say(
-            f"{human}{on}: the controller is not asked for AGV mode. A relay that was switched too often"
-            " has to rest, as with an unsteady input.",
-            NextStep(
-                "a person",
-                "see in `rmf-bridge log` why the daemon does not ask; look for an input that flickers",
-            ),
+            f"{human}{on}, so the controller is not asked for AGV mode.",
+            "a person",
+            "see in `rmf-bridge log` why the daemon does not ask; an input may flicker",
         )
         return
     unknown = "" if on else ". Whether its node asks the controller for AGV mode is not known"
     found.say(
         f"{human}{on}{unknown}.",
-        NextStep(
-            "the controller",
-            "confirm AGV mode: a key switch, people's calls that it serves first, or the contact",
-        ),
+        "the controller",
+        "confirm AGV mode: a key switch, people's calls that it serves first, or the contact",
     )

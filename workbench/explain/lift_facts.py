@@ -56,6 +56,11 @@ class LiftFacts(Device, ObservedLift):
             return f"{who} may be in the car."
         return f"Whether {who} is in the car is not known."
 
+    def keeps(self, now: Moment) -> str:
+        """Say that the holder keeps the session in a hazard, and whether it may be in the car."""
+        who = self.session.value
+        return f"{who} keeps the session meanwhile: only its END ends one. {self.in_car(who, now)}"
+
     def retain(self, request: d.LiftRequest, now: Moment) -> None:
         """Take a request that its fleet adapter sent before we listened. Its stamp tells when."""
         wall, who = in_seconds(request.request_time), self.text(request.session_id)

@@ -8,7 +8,6 @@ from bridges.observe.limits import REQUESTER_SILENT_S
 from bridges.observe.requesters import DeviceRequester
 from workbench.explain import answer as common
 from workbench.explain.answer import Answer, OthersHeard
-from workbench.explain.explanation import NextStep
 from workbench.explain.lift_facts import DIRECT, LiftFacts
 from workbench.explain.lift_ungranted import SETTLES_S
 from workbench.explain.phrases import TimePhrases, lasted, listed
@@ -30,51 +29,43 @@ def without_word(found: Answer, lift: LiftFacts, clock: TimePhrases, around: Oth
     if theirs is None and heard_s < common.LISTENS_S:
         found.say(
             f"{holder} has not been heard yet; that takes a few seconds.",
-            NextStep("nobody", "listen for longer"),
+            "nobody",
+            "listen for longer",
         )
         return
     since = f"since {clock.time(theirs.last.wall)}" if theirs else f"for at least {lasted(heard_s)}"
+    found.because = ()
     found.say(
         f"{holder} has sent no request and no END {since}, though a robot that waits or rides asks at"
         " each state."
     )
-    found.because = ()
-    look = f"look into the car; only when the car is empty: {release(lift)}"
     fleet = holder.rpartition("/")[0]
     speaks, together = _of_fleet(fleet, holder, theirs, clock, around)
+    look = f"look into the car; only when the car is empty: {release(lift)}"
     if not fleet:
         found.say(
-            f"{holder} is no robot's name (FLEET/ROBOT): another node has taken the lift, as a dashboard"
-            " does.",
-            NextStep("a person", look),
+            f"{holder} is no robot's name (FLEET/ROBOT), so a dashboard may have taken the lift."
         )
     elif speaks:
         found.say(
-            f"The fleet adapter lives, as it speaks for {listed(speaks)}: either {holder} is dead, or"
-            " the adapter has dropped it.",
-            NextStep("a person", look),
+            f"The fleet adapter lives, as it speaks for {listed(speaks)}: {holder} is dead, or the"
+            " adapter has dropped it."
         )
     elif together or around.senders is not None:
-        found.say(
-            f"{holder} and {listed(together)} fell silent together: their fleet adapter is gone or cut off."
-            if together
-            else f"Nothing from any robot of {fleet} was heard either: its fleet adapter is gone or cut off."
+        silent = f"Nothing from any robot of {fleet} was heard either"
+        if together:
+            silent = f"{listed([holder, *together])} fell silent together"
+        found.say(f"{silent}: their fleet adapter is gone or cut off.")
+        look = (
+            f"look into the car, then restart the fleet adapter of {fleet}. It then sends END for"
+            f" {holder}: if {holder} stands in the car, give it a task within a minute, or take it"
+            " out"
         )
-        found.next.append(NextStep("a person", _restart(fleet, holder)))
     else:
         found.say(
-            "Either its fleet adapter is gone or cut off, or the adapter has dropped the robot: nothing"
-            " here tells which.",
-            NextStep("a person", look),
+            "Its fleet adapter is gone or cut off, or has dropped the robot: nothing here tells which."
         )
-    found.say(lift.in_car(holder, clock.now))
-
-
-def _restart(fleet: str, holder: str) -> str:
-    return (
-        f"look into the car, then restart the fleet adapter of {fleet}: it sends END for {holder} when it"
-        f" starts, so give {holder} a task within a minute if it stands in the car, or take it out"
-    )
+    found.say(lift.in_car(holder, clock.now), "a person", look)
 
 
 def _of_fleet(
@@ -84,17 +75,19 @@ def _of_fleet(
     clock: TimePhrases,
     around: OthersHeard,
 ) -> tuple[list[str], list[str]]:
-    """Return the robots for which the holder's fleet adapter speaks now, and those that fell silent when
-    the holder did."""
-    said = {label(who): at for who, at in around.spoke.items()}
-    others = {who: at for who, at in said.items() if who.startswith(f"{fleet}/") and who != holder}
-    named = {who: who if who != f"{fleet}/" else f"the states of {fleet}" for who in others}
-    speaks = [who for who, at in others.items() if clock.now.at - at.at <= REQUESTER_SILENT_S]
+    """Return for whom the holder's adapter speaks now, and who fell silent when the holder did."""
     ended = theirs.last.at if theirs else float("-inf")
-    together = [who for who, at in others.items() if abs(at.at - ended) <= REQUESTER_SILENT_S]
-    return [named[who] for who in sorted(speaks)][-4:], [named[who] for who in sorted(together)][
-        -4:
-    ]
+    speaks, together = [], []
+    for raw, at in around.spoke.items():
+        who = label(raw)
+        if who == holder or not f"{who}/".startswith(f"{fleet}/"):
+            continue
+        name = f"the fleet {fleet}" if who in (fleet, f"{fleet}/") else who
+        if clock.now.at - at.at <= REQUESTER_SILENT_S:
+            speaks.append(name)
+        elif who != fleet and abs(at.at - ended) <= REQUESTER_SILENT_S:
+            together.append(name)
+    return sorted({*speaks})[:4], sorted({*together})[:4]
 
 
 def end_not_obeyed(
@@ -106,20 +99,20 @@ def end_not_obeyed(
     if clock.now.at - claim.ended.at < SETTLES_S:
         found.say(
             f"{claim.who} has just sent END.",
-            NextStep("the device's node", "show no session in its next state"),
+            "the device's node",
+            "show no session in its next state",
         )
     elif claim.own and not claim.end_passed_on and lift.supervisor_last is not None:
         found.say(
             f"{claim.who} sent END at {at}, and the supervisor has not passed it on.",
-            NextStep("the supervisor", f"pass on END of {claim.who}; its log says why it does not"),
+            "the supervisor",
+            f"pass on END of {claim.who}; its log says why it does not",
         )
     else:
         found.say(
             f"{claim.who} sent END at {at}, and the lift still shows its session.",
-            NextStep(
-                "the device's node",
-                f"end the session; until then, when the car is empty: {release(lift)}",
-            ),
+            "the device's node",
+            f"end the session; until then, when the car is empty: {release(lift)}",
         )
 
 
@@ -132,17 +125,16 @@ def drives(found: Answer, claim: DeviceRequester, clock: TimePhrases) -> None:
     )
     if clock.now.at - met.at > LONG_S:
         found.say(
-            "That is long, and lift and supervisor have done their part: the robot is dead or blocked, or"
-            " its fleet adapter hangs.",
-            NextStep("a person", f"look at {claim.who}, and at its fleet adapter's log"),
+            "That is long, and the lift has done its part: the robot is dead or blocked, or its fleet"
+            " adapter hangs.",
+            "a person",
+            f"look at {claim.who}, and at its fleet adapter's log",
         )
         return
-    found.next.append(
-        NextStep(
-            "the robot",
-            f"{claim.who} has to drive in or out; then its fleet adapter asks for the next floor, or"
-            " sends END. If it stays for more than a minute, a person has to look at it",
-        )
+    found.acts(
+        "the robot",
+        f"{claim.who} has to drive in or out; then its fleet adapter asks for the next floor, or"
+        " sends END. If it stays for more than a minute, a person has to look at it",
     )
 
 

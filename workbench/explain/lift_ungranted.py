@@ -2,10 +2,10 @@
 
 from typing import Final
 
+from bridges.observe.limits import CLOCKS_DIFFER_S
 from bridges.observe.requesters import DeviceRequester
 from workbench.explain import answer as common
 from workbench.explain.answer import Answer, OthersHeard
-from workbench.explain.explanation import NextStep
 from workbench.explain.lift_facts import LiftFacts
 from workbench.explain.phrases import TimePhrases, lasted
 
@@ -19,15 +19,12 @@ def not_granted(found: Answer, lift: LiftFacts, claim: DeviceRequester, clock: T
         found.say(
             f"{lift.name} serves {', '.join(lift.floors[:12])}, not {claim.wants or 'an empty name'}:"
             " the request is refused.",
-            NextStep(
-                "a person", "give the floor one name, on RMF's map and in the lift's settings"
-            ),
+            "a person",
+            "give the floor one name, on RMF's map and in the lift's settings",
         )
         return
     if clock.now.at - claim.since.at < SETTLES_S and claim.since.seen:
-        found.say(
-            "It was asked for a moment ago.", NextStep("the device's node", "grant the session")
-        )
+        found.say("It was asked for a moment ago.", "the device's node", "grant the session")
         return
     if _asks_for_another(found, lift, claim, clock):
         return
@@ -35,15 +32,15 @@ def not_granted(found: Answer, lift: LiftFacts, claim: DeviceRequester, clock: T
     if reasons:
         found.say(
             f"Its daemon refuses the request: {', '.join(reasons)}.",
-            NextStep(
-                "the device's node", "grant the session once that is over; its log has the details"
-            ),
+            "the device's node",
+            "grant the session once that is over; its log has the details",
         )
     else:
         found.say(
             "The request is passed on to the lift's node, which does not grant it and gives no reason"
             " on the graph.",
-            NextStep("the device's node", "grant the session; its log says why it does not"),
+            "the device's node",
+            "grant the session; its log says why it does not",
         )
 
 
@@ -60,10 +57,8 @@ def _asks_for_another(
         instead = f" {lift.sender(other).capitalize()} asks for {other}."
     found.say(
         f"The supervisor does not pass the request on.{instead}",
-        NextStep(
-            "the supervisor",
-            f"pass on the request of {claim.who}; its log says why it does not",
-        ),
+        "the supervisor",
+        f"pass on the request of {claim.who}; its log says why it does not",
     )
     return True
 
@@ -72,58 +67,49 @@ def not_passed_on(
     found: Answer, lift: LiftFacts, claim: DeviceRequester, clock: TimePhrases, around: OthersHeard
 ) -> None:
     """Explain that nothing comes on `lift_requests` while this robot asks or repeats END."""
-    found.because = ()
     if common.clock_off(claim) and claim.ended is None:
         _clock(found, lift, claim)
         return
-    ends = claim.ended is not None
-    what = "repeats its END" if ends else f"asks for {claim.wants or 'no floor'}"
-    last = lift.supervisor_last
+    what = "repeats its END" if claim.ended else f"asks for {claim.wants or 'no floor'}"
+    last, nodes = lift.supervisor_last, around.publishers("lift_requests")
     since = f" since {clock.time(last.wall)}" if last else ""
     says = f"{claim.who} {what} at each state, and nothing has come on `lift_requests`{since}:"
-    topic = "lift_requests"
-    publishers = around.publishers(topic)
-    if "lift_supervisor" in lift.waits_said(clock.now):
+    restart = "restart the lift supervisor (rmf_lift_supervisor, or that of rmf-bridges)"
+    if any(one.kind == "lift_supervisor" for one in lift.heard_from(clock.now)):
+        reasons = ", ".join(lift.refusals(clock.now, clock.now.at - 30.0))
         found.say(
-            f"{says} its supervisor does not pass that on.",
-            NextStep(
-                "a person", "end what it waits for; `rmf-bridge status` on its machine says how"
-            ),
+            f"{says} its supervisor is running, and does not pass that on"
+            + (f": it refuses the request, {reasons}." if reasons else "."),
+            "a person",
+            "end what the supervisor waits for; `rmf-bridge status` on its machine says how",
         )
         return
-    restart = "restart the lift supervisor (rmf_lift_supervisor, or that of rmf-bridges)"
-    if around.nobody_publishes(topic):
+    found.because = ()
+    if around.nobody_publishes("lift_requests"):
         found.say(f"{says} no node publishes there, so the lift supervisor is not running.")
-    elif publishers:
-        found.say(
-            f"{says} {publishers} publishes there and passes nothing on, because it hangs, is passive or"
-            " is cut off."
-        )
-        restart = f"look at the log of {publishers}, then {restart}"
+    elif nodes:
+        found.say(f"{says} {nodes} publishes there, but hangs, is passive or is cut off.")
+        restart = f"look at the log of {nodes}, then {restart}"
     else:
         found.say(f"{says} the lift supervisor is not running, hangs, or is cut off.")
-    found.next.append(NextStep("a person", restart))
-    if ends:
-        found.say(
-            "Its END does not prove that the car is empty: a fleet adapter that has started anew sends"
-            " END too."
-        )
+    found.acts("a person", restart)
+    if claim.ended:
+        found.say("END does not prove an empty car: a fleet adapter sends it at its start too.")
     elif lift.session.value == claim.who:
         found.say(lift.in_car(claim.who, clock.now))
 
 
 def _clock(found: Answer, lift: LiftFacts, claim: DeviceRequester) -> None:
-    """Explain requests that are dropped, as their stamps are of another clock."""
-    fleet = claim.who.rpartition("/")[0] or claim.who
-    off, side = lasted(abs(claim.stamp_age_s)), "behind" if claim.stamp_age_s > 0 else "ahead"
-    whose = f"the machine of the fleet adapter of {fleet}"
-    if abs(lift.stamp_age_s) >= common.CLOCKS_DIFFER_S:
-        whose = f"{whose}, or of this machine: the states' stamps do not fit either"
+    """Explain requests that are dropped because of their stamps."""
+    whose = f"the machine of the fleet adapter of {claim.who.rpartition('/')[0] or claim.who}"
+    if abs(lift.stamp_age_s) >= CLOCKS_DIFFER_S:
+        whose += ", or of this machine: the states' stamps do not fit either"
+    side = "behind" if claim.stamp_age_s > 0 else "ahead"
+    found.because = ()
     found.say(
-        f"The requests of {claim.who} are not passed on, and the clock that stamps them is {off} {side}:"
-        " a supervisor that compares stamps takes such requests for replays and drops them.",
-        NextStep(
-            "a person",
-            f"set the clock of {whose} (NTP); if nothing changes then, look at the supervisor's log",
-        ),
+        f"Nothing comes on `lift_requests` for {claim.who}, whose requests are stamped by a clock"
+        f" {lasted(abs(claim.stamp_age_s))} {side}: a supervisor that compares stamps takes them for"
+        " replays and drops them.",
+        "a person",
+        f"set the clock of {whose} (NTP); if that does not help, look at the supervisor's log",
     )

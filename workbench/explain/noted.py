@@ -21,8 +21,8 @@ MOST: Final = 40
 @dataclass(frozen=True, slots=True)
 class Noted:
     """One note about `subject`. `inputs`, `outputs`, `faults`: all of them, as name -> value ("": off),
-    or None if the note is about something else. `refused`: why a request was refused. `bus_error`: why a
-    reading or writing failed. `kept_for`: the reason for the file, a fixed name and a text.
+    or None if the note is about something else. `refused`: why a request was refused. `bus_error`: why
+    the bus failed. `kept_for`: the reason for the file, as a fixed name and a text.
     """
 
     subject: str

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from bridges.runtime.faults import remedies
+from bridges.runtime.faults import for_explain
 from tests.workbench.explain.situations import SCENES
 from workbench.explain.heard_devices import HeardDevices
 from workbench.explain.text import SCREEN_LINES, lines
@@ -22,7 +22,7 @@ def told(name: str) -> list[str]:
     site = HeardDevices(device)
     for one in heard:
         site.take(one)
-    known = dict.fromkeys(remedies(), ("its cause", "its remedy"))
+    known = for_explain()
     return lines(site.explain(kind, device, UTC, known), UTC)
 
 
