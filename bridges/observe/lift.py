@@ -150,7 +150,7 @@ class ObservedLift(ObservedDevice[d.LiftState]):
             return
         if one is None:
             return
-        one.end_passed_on = one.end_passed_on or passed_on
+        one.own, one.end_passed_on = one.own or not passed_on, one.end_passed_on or passed_on
         one.end_last = one.end_last if passed_on else moment
         if one.ended is not None:
             return
