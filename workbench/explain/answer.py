@@ -67,7 +67,7 @@ class FileReason:
             REFUSED: f"because a request was refused: {self.text}",
             WAITING: f"because {self.text}",
             DIED: f"because the daemon died: {self.text}",
-        }.get(self.code, f"by a person: {self.text or 'no text'}")
+        }.get(self.code, f'by a person, who wrote "{self.text}"')
         return f"This file was kept {why}. What follows is of {clock.time(clock.now.wall)}."
 
 

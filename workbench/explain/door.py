@@ -9,7 +9,7 @@ from shlex import quote
 from typing import Final
 
 from bridges.observe.door import CLOSED, OPEN
-from bridges.observe.limits import REQUESTER_SILENT_S
+from bridges.observe.limits import FLAPS, REQUESTER_SILENT_S
 from bridges.observe.requesters import DeviceRequester, Moment
 from workbench.explain import answer as common
 from workbench.explain import first_causes
@@ -35,7 +35,7 @@ def answer(
         return _with_askers(common.unheard(door, around), door, clock)
     stopped = common.stopped(door, around, clock)
     if stopped is not None:
-        stopped.say(f"Then it was {door.mode.value}.")
+        stopped.say(f"{door.name} was {door.mode.value} then.")
         return _with_askers(stopped, door, clock)
     claim = _in_question(door, clock, focus)
     found = Answer(since=_begins(door, claim))
@@ -51,7 +51,7 @@ def answer(
     if door.last_heartbeat is None:
         held = "No heartbeat of its supervisor was heard."
     found.say(f"{door.name} has been {door.mode.value} {clock.since(door.mode.since)}. {held}")
-    if old := common.old_reading(door, clock):
+    if len(door.flaps(clock.now)) < FLAPS and (old := common.old_reading(door, clock)):
         found.say(old)
     held_open = door.holders or claim or (door.asked and door.asked.value == OPEN)
     end = "open" if held_open else "shut"

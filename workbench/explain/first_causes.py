@@ -20,8 +20,8 @@ FLICKERS: Final = (
     " that restarts; `rmf-bridge log` shows which"
 )
 CONTACT: Final = (
-    "The leaf has stopped on its way, or the {contact} contact or its wire is bad: both look the same"
-    " from here.",
+    "The leaf has not moved all the way, or the {contact} contact or its wire is bad: both look the"
+    " same from here.",
     "look whether the door really stands {end}; if it does, check the {contact} contact and its wire;"
     " if it does not, check what stops the leaf, and the relay that drives it",
 )
@@ -29,16 +29,20 @@ OWN: Final[Mapping[str, tuple[str, str]]] = {
     "INPUTS_NOT_FRESH": ("", BUS),
     "COMMUNICATION_LOST": ("", BUS),
     "OUTPUTS_NOT_WRITTEN": (
-        "The controller does not get what the daemon asks for, and is not to blame.",
+        "What the daemon asks for does not reach the controller, so the controller is not to blame.",
         "check the relay module that the fault names: its supply, its line, and whether a second master"
         " writes to it",
     ),
     "RELAY_RESTS": (
-        "Until then the controller is asked for nothing, and is not to blame.",
+        "While it rests the daemon asks the controller for nothing, so the controller is not to blame.",
         FLICKERS,
     ),
     "DOOR_OPENING_FAULT": CONTACT,
     "DOOR_TRAVEL_TIMEOUT": CONTACT,
+    "RUNTIME_LIMIT_EXCEEDED": (
+        "The car does not come, or the floor code does not show it there.",
+        "",
+    ),
     **dict.fromkeys(
         (
             "DOOR_CONTACTS_CONTRADICT",
@@ -69,15 +73,13 @@ def two_nodes(
     if TWO_NODES not in device.faults(clock.now) and not device.two_nodes(clock.now):
         return False
     names, nodes = device.nodes(clock.now), around.publishers(topic)
-    named = (
-        f". These nodes publish {topic}: {nodes}"
-        if nodes
-        else ", and the messages do not name them"
-    )
+    named = f"these nodes publish {topic}: {nodes}" if nodes else "the messages do not name them"
+    if len(names) > 1:
+        named = listed(names)
     found.because = (TWO_NODES,)
     found.say(
-        f"Two nodes publish states of {device.name}{f': {listed(names)}' if len(names) > 1 else named}."
-        " Until one of them is stopped, trust none of these states.",
+        f"Two nodes publish states of {device.name} ({named}). Until one of the two is stopped, trust"
+        " none of these states.",
         "a person",
         "find out by the wires which of the two has the device, and stop the other or give it another"
         f" name (`ros2 topic info -v /{topic}` lists the publishers)",
@@ -94,7 +96,7 @@ def comes_and_goes(found: Answer, device: Device, clock: TimePhrases) -> bool:
     heard_s = lasted(min(FLAPS_WITHIN_S, clock.now.at - device.began.at))
     on, often = common.relays(device, clock), f"{len(ages)} changes in {heard_s}"
     flickers = max(ages) - min(ages) < STALLS_S
-    found.because = ("RELAY_RESTS",) if flickers else READINGS
+    found.because = () if flickers else READINGS
     why = (
         "though its readings are fresh: an input flickers, as a contact for manual mode may"
         if flickers

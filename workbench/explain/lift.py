@@ -8,6 +8,7 @@ the reason, and the party that has to act next.
 from typing import Final
 
 from bridges.observe.lift import NO_FLOOR, NOBODY
+from bridges.observe.limits import FLAPS
 from bridges.observe.requesters import DeviceRequester
 from workbench.explain import answer as common
 from workbench.explain import first_causes, lift_holder
@@ -46,7 +47,7 @@ def answer(
         where = claim.wants or "no floor"
         found.say(f"{claim.who} has waited for {lift.name} at {where} {clock.since(claim.since)}.")
     _hold(found, lift, clock)
-    if old := common.old_reading(lift, clock):
+    if len(lift.flaps(clock.now)) < FLAPS and (old := common.old_reading(lift, clock)):
         found.say(old)
     if claim is not None and claim.ended is None:
         found.asks, found.fields = claim.who, _fields(lift, claim, clock)
@@ -70,7 +71,7 @@ def _why(
     if lift.mode.value in ALARMS:
         _alarm(found, lift, clock)
     elif first_causes.comes_and_goes(found, lift, clock) or first_causes.own_fault(
-        found, lift, clock, around, lift.door.value
+        found, lift, clock, around
     ):
         return
     elif lift.mode.value == "OFFLINE":

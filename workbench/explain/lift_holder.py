@@ -55,7 +55,7 @@ def without_word(found: Answer, lift: LiftFacts, clock: TimePhrases, around: Oth
         silent = f"Nothing from any robot of {fleet} was heard either"
         if together:
             silent = f"{listed([holder, *together])} fell silent together"
-        found.say(f"{silent}: their fleet adapter is gone or cut off.")
+        found.say(f"{silent}: the fleet adapter of {fleet} is gone or cut off.")
         look = (
             f"look into the car, then restart the fleet adapter of {fleet}. It then sends END for"
             f" {holder}: if {holder} stands in the car, give it a task within a minute, or take it"
@@ -77,17 +77,23 @@ def _of_fleet(
 ) -> tuple[list[str], list[str]]:
     """Return for whom the holder's adapter speaks now, and who fell silent when the holder did."""
     ended = theirs.last.at if theirs else float("-inf")
-    speaks, together = [], []
+    speaks: list[str] = []
+    together: list[str] = []
     for raw, at in around.spoke.items():
         who = label(raw)
         if who == holder or not f"{who}/".startswith(f"{fleet}/"):
             continue
-        name = f"the fleet {fleet}" if who in (fleet, f"{fleet}/") else who
         if clock.now.at - at.at <= REQUESTER_SILENT_S:
-            speaks.append(name)
+            speaks.append(who)
         elif who != fleet and abs(at.at - ended) <= REQUESTER_SILENT_S:
-            together.append(name)
-    return sorted({*speaks})[:4], sorted({*together})[:4]
+            together.append(who)
+    return _robots(speaks, fleet), _robots(together, fleet)
+
+
+def _robots(found: list[str], fleet: str) -> list[str]:
+    """Name the robots, or the fleet where only the adapter's words for the fleet were heard."""
+    robots = sorted(who for who in found if who not in (fleet, f"{fleet}/"))
+    return robots[:4] or ([f"the rest of {fleet}"] if found else [])
 
 
 def end_not_obeyed(

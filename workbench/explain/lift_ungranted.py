@@ -101,11 +101,11 @@ def not_passed_on(
 
 def _clock(found: Answer, lift: LiftFacts, claim: DeviceRequester) -> None:
     """Explain requests that are dropped because of their stamps."""
-    whose = f"the machine of the fleet adapter of {claim.who.rpartition('/')[0] or claim.who}"
+    whose = f"the machine with the fleet adapter of {claim.who.rpartition('/')[0] or claim.who}"
     if abs(lift.stamp_age_s) >= CLOCKS_DIFFER_S:
-        whose += ", or of this machine: the states' stamps do not fit either"
+        whose += ", or of this machine (the states' stamps do not fit either)"
     side = "behind" if claim.stamp_age_s > 0 else "ahead"
-    found.because = ()
+    found.because, found.notes = (), ()
     found.say(
         f"Nothing comes on `lift_requests` for {claim.who}, whose requests are stamped by a clock"
         f" {lasted(abs(claim.stamp_age_s))} {side}: a supervisor that compares stamps takes them for"

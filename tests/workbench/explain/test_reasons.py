@@ -99,9 +99,9 @@ def test_a_dead_daemons_file_is_about_its_death(kind: Kind) -> None:
     ("code", "text", "why"),
     [
         (WAITING, "fleet/red has waited for L2 for 180 s", "because fleet/red has waited for L2"),
-        ("OPERATOR", "it jerked", "by a person: it jerked"),
-        ("OPERATOR", "", "by a person: no text"),
-        ("LATER", "of a later version", "by a person: of a later version"),
+        ("OPERATOR", "it jerked", 'by a person, who wrote "it jerked".'),
+        ("OPERATOR", "", 'by a person, who wrote "".'),
+        ("LATER", "of a later version", 'by a person, who wrote "of a later version".'),
     ],
 )
 def test_a_wait_and_a_persons_note_are_told_first(code: str, text: str, why: str) -> None:
