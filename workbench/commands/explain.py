@@ -152,28 +152,28 @@ def _live(args: argparse.Namespace) -> int:
         past = Ear(transport, (topics.ADAPTER_LIFT_REQUESTS,))
         site = HeardDevices(args.live, args.session, graph=command_line(args).options)
         if args.follow:
-            _follow(ear, site, args)
-        _listen(ear, site, args.for_s)
-        for one in past.listen(0.0):
-            site.retained(one)
+            _follow(ear, past, site, args)
+        _listen(ear, past, site, args.for_s)
         return _one(site, args)
 
 
-def _listen(ear: Ear, site: HeardDevices, for_s: float) -> None:
-    """Listen for this time (s)."""
+def _listen(ear: Ear, past: Ear, site: HeardDevices, for_s: float) -> None:
+    """Listen for this time (s). `past` hears the requests that fleet adapters have retained too."""
     until = time.monotonic() + for_s
     site.pass_time(time.monotonic(), time.time())
     while (left_s := until - time.monotonic()) > 0:
         for heard in ear.listen(left_s):
             site.take(heard)
     site.pass_time(time.monotonic(), time.time())
+    for one in past.listen(0.0):
+        site.retained(one)
     site.senders = {topic: end.senders() for topic, end in ear.ends.items()}
 
 
-def _follow(ear: Ear, site: HeardDevices, args: argparse.Namespace) -> None:
+def _follow(ear: Ear, past: Ear, site: HeardDevices, args: argparse.Namespace) -> None:
     """Print each change, until Ctrl-C."""
     told: object = None
-    _listen(ear, site, args.for_s)
+    _listen(ear, past, site, args.for_s)
     while True:
         kinds: list[Kind] = [args.kind] if args.kind else site.kinds(args.live) or ["lift"]
         found = site.explain(kinds[0], args.live, None, faults.for_explain())
@@ -181,4 +181,4 @@ def _follow(ear: Ear, site: HeardDevices, args: argparse.Namespace) -> None:
         if news != told:
             _tell(found, as_json=args.json)
         told = news
-        _listen(ear, site, AGAIN_S)
+        _listen(ear, past, site, AGAIN_S)

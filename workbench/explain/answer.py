@@ -206,10 +206,13 @@ def clock_of(claim: DeviceRequester) -> tuple[str, ...]:
     )
 
 
-def faults(device: Device, clock: TimePhrases, remedies: Remedies) -> tuple[FaultTold, ...]:
-    """Return the present faults, with their remedies."""
+def faults(
+    device: Device, clock: TimePhrases, remedies: Remedies, because: tuple[str, ...] | None
+) -> tuple[FaultTold, ...]:
+    """Return the present faults, with their remedies. `because`: as in `Answer`."""
+    kept = {code: one for code, one in remedies.items() if because is None or code in because}
     return tuple(
-        FaultTold(code, detail, clock.since(moment), *remedies.get(code, ()))
+        FaultTold(code, detail, clock.since(moment), *kept.get(code, ()))
         for code, (detail, moment) in device.faults(clock.now).items()
     )
 

@@ -226,8 +226,8 @@ def _nobody_tells(
     holds = "a robot holds the door, and most likely stands in the doorway, where it says nothing"
     if nodes := around.publishers("door_requests"):
         found.say(
-            f"{nodes} publishes `door_requests` and sends no CLOSE, as RMF's supervisor does at each"
-            f" state of an open door that nobody holds. So {holds}.",
+            f"RMF's supervisor sends CLOSE at each state of an open door that nobody holds. {nodes}"
+            f" publishes `door_requests` and sends none: so {holds}.",
             "the robot",
             f"drive through and send CLOSE; if {door.name} stays open for more than a minute, a person"
             " has to look into the doorway",

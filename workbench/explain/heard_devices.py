@@ -65,14 +65,15 @@ class HeardDevices(ObservedGraph[Device]):
         self._session = session
         self._others: dict[Kind, dict[str, None]] = {kind: {} for kind in KINDS}
         self._reason: dict[str, FileReason] = {}
-        self._then: dict[Key, tuple[Moment, Device]] = {}
+        self._due: dict[str, float] = {}
+        self._then: dict[Key, tuple[Moment, Device, Mapping[str, Moment]]] = {}
         self.senders: Mapping[str, Sequence[str]] | None = None
 
     def take(self, heard: Heard | Own) -> None:
         """Take the next message, or the next text of our recorder."""
-        for name, reason in self._reason.items():
-            if heard.at > reason.at.at + SHOWS_S and reason.code != DIED:
-                self._keep(name)
+        for name in [name for name, at in self._due.items() if heard.at > at]:
+            del self._due[name]
+            self._keep(name)
         if isinstance(heard, Own):
             self._note(self.moment(heard), heard)
             return
@@ -115,15 +116,20 @@ class HeardDevices(ObservedGraph[Device]):
         """Explain the device at the last message. `zone`: of the times; None: this machine's."""
         began = self.began or self.now
         last = self.known.get((kind, name)) or self.make(kind, name)
-        now, device = self._then.get((kind, name), (self.now, last))
+        now, device, spoke = self._then.get((kind, name), (self.now, last, self.spoke))
         reason = self._reason.get(name) or self._reason.get("")
         if reason and reason.fault in first_causes.OFFLINE and len(last.flaps(self.now)) >= FLAPS:
-            now, device = self.now, last  # only time shows that it comes and goes
+            now, device, spoke = (
+                self.now,
+                last,
+                self.spoke,
+            )  # only time shows that it comes and goes
         clock = TimePhrases(now, zone)
-        answer = self._answer(device, clock, reason, remedies or {})
+        around = self._around(spoke, reason, remedies or {})
+        answer = self._answer(device, clock, around)
         if reason is not None:
             answer.now.insert(0, reason.told(clock))
-            _act_on(answer, reason, remedies or {})
+            _act_on(answer, reason, around.remedies)
         if answer.because is None:
             common.say_waits(answer, device, clock)
         if device is not last and last.state is not None:
@@ -144,7 +150,7 @@ class HeardDevices(ObservedGraph[Device]):
             fields=answer.fields,
             faults=tuple(
                 replace(fault, do=on_graph(fault.do, self._graph))
-                for fault in common.faults(device, clock, _kept(answer, remedies or {}))
+                for fault in common.faults(device, clock, around.remedies, answer.because)
             ),
             notes=(
                 *answer.notes,
@@ -157,16 +163,16 @@ class HeardDevices(ObservedGraph[Device]):
             before=_before(device, clock),
         )
 
-    def _answer(
-        self, device: Device, clock: TimePhrases, reason: FileReason | None, remedies: Remedies
-    ) -> Answer:
+    def _around(
+        self, spoke: Mapping[str, Moment], reason: FileReason | None, remedies: Remedies
+    ) -> common.OthersHeard:
         names = {
             kind: (*self._others[kind], *(label(one.id) for one in self.stated(kind)))
             for kind in KINDS
         }
-        around = common.OthersHeard(
-            names, self.messages, self.spoke, remedies, reason, self.senders
-        )
+        return common.OthersHeard(names, self.messages, spoke, remedies, reason, self.senders)
+
+    def _answer(self, device: Device, clock: TimePhrases, around: common.OthersHeard) -> Answer:
         match device:
             case LiftFacts():
                 return lift.answer(device, clock, around, self._session)
@@ -211,8 +217,10 @@ class HeardDevices(ObservedGraph[Device]):
         note = noted(own.topic.rpartition("/")[2], own.text)
         if note is None:
             return
-        if note.kept_for is not None:
-            self._reason.setdefault(note.subject, FileReason(*note.kept_for, moment))
+        if note.kept_for is not None and not self._reason:
+            self._reason[note.subject] = reason = FileReason(*note.kept_for, moment)
+            if reason.code != DIED:
+                self._due[note.subject] = moment.at + SHOWS_S
         for kind in KINDS:
             if (kind, note.subject) in self.known:
                 self.known[kind, note.subject].note(moment, note)
@@ -221,7 +229,7 @@ class HeardDevices(ObservedGraph[Device]):
         """Keep the devices of this name ("": all) as they are now."""
         for key, device in self.known.items():
             if name in ("", device.id) and key not in self._then:
-                self._then[key] = self.now, deepcopy(device)
+                self._then[key] = self.now, deepcopy(device), {**self.spoke}
 
     def _coordinates(self) -> Mapping[str, str]:
         found = [one for one in self.nodes.values() if one.kind == COORDINATOR]
@@ -234,12 +242,6 @@ class HeardDevices(ObservedGraph[Device]):
             f"At {clock.time(moment.wall)} the listener's clock was stepped by {by_s:+.0f} s."
             for moment, by_s in self.steps
         )
-
-
-def _kept(answer: Answer, remedies: Remedies) -> Remedies:
-    """Return the remedies that do not contradict the answer."""
-    because = remedies if answer.because is None else answer.because
-    return {code: remedy for code, remedy in remedies.items() if code in because}
 
 
 def _act_on(answer: Answer, reason: FileReason, remedies: Remedies) -> None:
