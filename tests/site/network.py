@@ -15,6 +15,7 @@ from random import Random
 from typing import Any
 
 from bridges.messages.definitions import Message
+from bridges.messages.heard import Sender
 from bridges.messages.releases import NEWEST
 from bridges.messages.topics import DOOR_STATES, LIFT_STATES, Topic
 from tests.site.timeline import NEVER, Timeline
@@ -97,7 +98,7 @@ class Air:
         for delay in delays:
             at = max(self.timeline.now + delay, self._arrived.get(link, 0.0))
             self._arrived[link] = at
-            self.timeline.at(at, partial(hearer.arrive, received, message))
+            self.timeline.at(at, partial(hearer.arrive, received, message, hearer.heard_from))
         if not delays:
             self.counts["lost"] += 1
 
@@ -135,9 +136,10 @@ class Place(MemoryTransport):
         carried = partial(self._air.carry, self, topic, received)
         return super().subscribe(topic, carried, others_only=others_only)
 
-    def arrive(self, received: Callable[[Any], None], message: Any) -> None:
+    def arrive(self, received: Callable[[Any], None], message: Any, sender: Sender | None) -> None:
         """Hand the message over, unless the node has left."""
         if not self._closed:
+            self.heard_from = sender
             self._air.counts["arrived"] += 1
             received(message)
             self._heard()

@@ -92,11 +92,16 @@ class Device(ObservedDevice[Any]):
         return tuple(line for line in self.lines if line.at >= at)
 
     def two_nodes(self, now: Moment) -> bool:
-        """Do the stamps go back and forth, as from two nodes?"""
-        return self.steps_back(now.at, BACK_S, BACK_WITHIN_S) >= BACK_TIMES
+        """Do two publishers take turns, or do the stamps go back and forth, as from two nodes?"""
+        return (
+            len(self.publishers(now)) > 1
+            or self.steps_back(now.at, BACK_S, BACK_WITHIN_S) >= BACK_TIMES
+        )
 
     def nodes(self, now: Moment) -> list[str]:
         """Name the nodes that publish its states now, as far as they are known."""
+        if len(senders := {label(one.node) for one in self.publishers(now) if one.node}) > 1:
+            return sorted(senders)
         every = (one for one in self.diagnoses.values() if one.is_current(now.at))
         return sorted({one.name.partition(": ")[0] for one in every if one.kind == self.kind})
 
