@@ -29,7 +29,7 @@ def table(tmp_path: Path, title: str, *changes: tuple[str, str]) -> list[str]:
         text = text.replace(old, new)
     file = tmp_path / "lift.yaml"
     file.write_text(text)
-    shown = lines(findings(load(file)))
+    shown = lines(findings(load(file)), 200)
     first = shown.index(f"Lift1: {title}")
     return [" ".join(line.split()) for line in shown[first + 2 : shown.index("", first)]]
 
