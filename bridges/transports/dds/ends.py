@@ -125,6 +125,7 @@ class DdsSubscription:
         self.topic = topic
         self._owners = owners
         self._senders = senders
+        self._finds_node = self._node_of  # made once: a daemon takes many messages
         self._others_only = others_only
         self._reader: DataReader = None
         self._received = received
@@ -178,7 +179,7 @@ class DdsSubscription:
         if self._reader is None:
             return False
         senders = self._senders
-        senders.node_of = self._node_of
+        senders.node_of = self._finds_node
         for taken in range(AT_ONCE):
             try:
                 samples = self._reader.take(1)

@@ -204,6 +204,7 @@ class ZenohSubscription(ZenohEnd):
         super().__init__(topic, notices.NOT_HEARD, do, tell)
         self.others_only = others_only
         self._senders = senders
+        self._finds_node = self._node_of  # made once: a daemon takes many messages
         self._ring = Merged(do, self.take)
         self._own_session = ""
         self._received = received
@@ -250,7 +251,7 @@ class ZenohSubscription(ZenohEnd):
 
     def take(self) -> None:
         """Deliver the arrived samples, at most AT_ONCE; the rest waits for the next turn."""
-        self._senders.node_of = self._node_of
+        self._senders.node_of = self._finds_node
         for _ in range(min(AT_ONCE, len(self._waiting))):
             try:
                 message = self._message(self._waiting.popleft())

@@ -196,7 +196,9 @@ def aftermath(states: Sequence[d.LiftState]) -> str:
     stands = d.LiftMotion.MOTION_STOPPED, d.LiftMotion.MOTION_UNKNOWN
     going = {one.motion_state for one in states if one.motion_state not in stands}
     moved = [f"the car goes {words.plain(d.LiftMotion, motion)}" for motion in sorted(going)]
-    floors = [floor or "-" for floor, _ in groupby(one.current_floor for one in states)]
+    floors = [
+        floor or "no known floor" for floor, _ in groupby(one.current_floor for one in states)
+    ]
     doors = [words.plain(d.LiftDoor, door) for door, _ in groupby(one.door_state for one in states)]
     for part, course in (("floor", floors), ("door", doors)):
         moved += [f"{part} {' to '.join(course)}"] if len(course) > 1 else []
