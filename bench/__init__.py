@@ -1,1 +1,1 @@
-"""Benchmarks: the daemons' cost compared with a bare transport node's, as ratios in one run."""
+"""Benchmarks: the daemons' cost as a ratio to a bare transport node's cost, in the same run."""

@@ -1,7 +1,7 @@
 """`make bench`: latency and memory of the daemons compared with a bare transport node, in one run.
 
 Everything runs on loopback, on fake hardware, in processes of its own. The tables go to stdout, the
-figures to bench/results/bench.json. A selection: `python -m bench idle buses`.
+figures to bench/results/bench.json. To run only some parts: `python -m bench idle buses`.
 """
 
 import json
@@ -30,7 +30,9 @@ SECTIONS = {
 
 def main(words: list[str]) -> int:
     """Measure, print, write."""
-    parser = ArgumentParser(prog="python -m bench", description="Measure all, or these parts.")
+    parser = ArgumentParser(
+        prog="python -m bench", description="Parts to measure; without parts, all."
+    )
     parser.add_argument("parts", nargs="*", help=", ".join(SECTIONS), metavar="PART")
     chosen = parser.parse_args(words).parts
     if unknown := set(chosen) - set(SECTIONS):

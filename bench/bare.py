@@ -1,4 +1,4 @@
-"""The baseline: a transport node that only answers (run as its own process)."""
+"""The baseline: a transport node that only answers, run as a separate process."""
 
 import signal
 import sys

@@ -1,5 +1,5 @@
-"""The limits of buses: a serial line of doors, many doors on TCP with a dead one, chargers on HTTP with
-bad ones among them, and a full CAN bus. Each is compared with its theoretical least time.
+"""The limits of buses: a serial line of doors, many doors on TCP with a dead door, HTTP chargers of
+which some are bad, and a full CAN bus. Each bus is compared with its theoretical least time.
 """
 
 import statistics
@@ -43,7 +43,7 @@ def measure(scratch: Path) -> Tables:
     }
 
 
-# ---- a serial line: a whole poll cycle against what the wire alone must take
+# ---- a serial line: a whole poll cycle, compared with the least time on the wire
 
 LINE: Final[Content] = {
     "type": "modbus",
@@ -59,7 +59,7 @@ CYCLES: Final = 60
 WARM_UP: Final = 3
 REQUEST: Final = 8
 REPLY: Final = 6
-"""Characters of a request for bits, and of a reply with up to eight of them, with unit and CRC."""
+"""Characters in a request for bits, and in a reply with up to eight bits, including unit and CRC."""
 READINGS: Final = 2
 """A door's coil and inputs."""
 
@@ -96,7 +96,7 @@ def _cycles(config: Config, scratch: Path) -> list[float]:
     return times[WARM_UP:]
 
 
-# ---- many doors on TCP: ages as a subscriber sees them, and from one state of a door to its next
+# ---- many doors on TCP: the states' ages for a subscriber, and the time between a door's states
 
 WATCHED_S: Final = 20.0
 MANY: Final = 200
@@ -105,7 +105,7 @@ States = dict[str, list[tuple[float, DoorState]]]
 
 
 def _many_doors(scratch: Path) -> Rows:
-    """Poll each door every 0.1 s; its state comes each second."""
+    """Poll each door every 0.1 s; each door's state comes each second."""
     with _doors(scratch, MANY):
         many = _ages(_door_states())
     with _doors(scratch, DEAD_OF) as plant:
@@ -114,7 +114,7 @@ def _many_doors(scratch: Path) -> Rows:
         time.sleep(SETTLE_S)
         states = _door_states()
     states.pop(f"door_{DEAD_OF}")
-    return {f"{MANY}": many, f"{DEAD_OF}": before, f"{DEAD_OF}, one of them dead": _ages(states)}
+    return {f"{MANY}": many, f"{DEAD_OF}": before, f"{DEAD_OF}, one door dead": _ages(states)}
 
 
 @contextmanager
@@ -149,7 +149,7 @@ def _ages(seen: States) -> Row:
     }
 
 
-# ---- HTTP chargers: the age of RMF's knowledge of the sound ones, in poll periods
+# ---- HTTP chargers: the age of RMF's knowledge of the sound chargers, in poll periods
 
 SOUND, DEAD, TRICKLING = 35, 10, 5
 LOOK_S: Final = 0.02
@@ -167,8 +167,9 @@ class Known:
 
 
 def _bad_chargers(scratch: Path) -> Rows:
-    """Measure ours and, on the same servers at the same time, the naive loop: one
-    `requests.get` after the other, each second, with a timeout that applies to each read."""
+    """Measure our daemon and, on the same servers at the same time, a naive loop: `requests.get` for
+    each charger in turn, each second, with a timeout that applies to each read.
+    """
     rmf, plain, done = Known(), Known(), threading.Event()
     with http_chargers(SOUND, DEAD, TRICKLING) as ports, graph() as transport:
         mixed = _mixed(ports)
@@ -186,7 +187,7 @@ def _bad_chargers(scratch: Path) -> Rows:
 
 
 def _mixed(ports: Sequence[int]) -> list[int]:
-    """Spread the bad ones among the sound ones."""
+    """Spread the bad chargers among the sound chargers."""
     bad, sound = list(ports[SOUND:]), list(ports[:SOUND])
     every = len(ports) // len(bad)
     mixed = [
@@ -230,11 +231,11 @@ LASTS_S: Final = 10.0
 BATCH_S: Final = 0.005
 SCAN_S: Final = 0.2
 OURS: Final = (0x58A, 0x70A, 0x123, 0x321)
-"""Ids of every second frame; the others are foreign."""
+"""Ids of every second frame; the other frames are foreign."""
 
 
 def _flooded(read: Callable[[str, threading.Event, list[int]], float]) -> Row:
-    """Send frames at a full bus's pace; count the wanted ones at a reader."""
+    """Send frames at a full bus's pace; count the wanted frames at a reader."""
     channel = f"bench-{read.__name__}"
     ended, heard, seconds = threading.Event(), [0], list[float]()
     reader = threading.Thread(target=lambda: seconds.append(read(channel, ended, heard)))

@@ -1,6 +1,6 @@
-"""HTTP chargers for the bench, in a separate process: sound, dead and trickling ones.
+"""HTTP chargers for the bench, in a separate process: sound, dead and trickling chargers.
 
-Run as a process it prints the ports, one JSON line, and serves until its standard input ends.
+The process prints the ports as one JSON line, and serves until its standard input ends.
 """
 
 import asyncio
@@ -26,7 +26,7 @@ CODES: Final = {"idle": [0], "charging": [5], "error": [8]}
 
 @contextmanager
 def http_chargers(sound: int, dead: int = 0, trickling: int = 0) -> Iterator[list[int]]:
-    """Serve so many chargers; yield their ports."""
+    """Serve these numbers of chargers; yield their ports."""
     counts = [str(count) for count in (sound, dead, trickling)]
     command = [sys.executable, "-m", "bench.charger_servers", *counts]
     far = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE)

@@ -67,7 +67,7 @@ def shipped(name: str) -> Content:
 def daemon(
     content: Content, directory: Path, transport: str = "dds", *, simulate: bool = True
 ) -> list[str]:
-    """Return a daemon's command, with this transport and loopback in place of its YAML's."""
+    """Return a daemon's command; this transport and loopback replace the YAML's."""
     file = directory.with_suffix(".yaml")
     rmf = {"transport": transport, "network": "localhost"}
     file.write_text(yaml.safe_dump({**content, "rmf": rmf}, sort_keys=False))

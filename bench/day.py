@@ -30,7 +30,7 @@ def measure(scratch: Path) -> Tables:
 
 
 class _Lift(LiftNode):
-    SCAN_S = 0.9  # and at every wake_at, request and edge: between them nothing can change
+    SCAN_S = 0.9  # and at every wake_at, request and edge; between those nothing can change
 
 
 class _Rider(Rider):

@@ -1,7 +1,7 @@
 """A day's recording of a busy lift, explained: seconds of CPU and memory, in a process of its own.
 
 86,400 s and 4,000 rides of two robots, with states, requests, the supervisor's repeats and diagnostics
-at 1 Hz. The file is written once, and not measured.
+at 1 Hz. Writing the file is not measured.
 """
 
 import json

@@ -83,7 +83,7 @@ def show(figures: dict[str, Any]) -> None:
 
 
 def main() -> int:
-    """Flood for the command line's seconds; a minute by default."""
+    """Flood for the seconds of the command line, by default 60."""
     seconds = float(sys.argv[1]) if len(sys.argv) > 1 else SECONDS
     with tempfile.TemporaryDirectory(prefix="rmf-flood-") as scratch:
         figures = measure(Path(scratch), seconds)

@@ -1,7 +1,8 @@
 """The times from request to relay, input to RMF, and hazard to all outputs off, compared with a bare
 round trip and a bare edge callback; with ROS 2 installed, also compared with a bare rclpy node.
 
-The far end, which sends and times, is the same for each: on `dds`, with the least cost.
+The far end, which sends and measures the times, is the same for each path: on `dds`, with the least
+cost.
 """
 
 import queue
@@ -49,7 +50,7 @@ Times = list[float]
 def measure(scratch: Path) -> Tables:
     """Return milliseconds, p50 and p99, of each path."""
     latencies: Rows = {}
-    for wire in reversed(WIRES):  # the hazard's figures are those of the last, dds
+    for wire in reversed(WIRES):  # the hazard's figures are those of the last wire, dds
         round_trips = _bare_round_trips(scratch, wire)
         relay, state, off, _ = daemon_paths(scratch, wire, wire)
         latencies |= {
@@ -111,7 +112,7 @@ class Graph:
         return at
 
     def state(self, since: float, true: Callable[[LiftState], bool]) -> float:
-        """Return the arrival time of the first state after `since` (monotonic s) that meets this."""
+        """Return when (monotonic s) the first state after `since` arrived for which `true` holds."""
         while True:
             at, state = self._states.get(timeout=10.0)
             if at > since and true(state):
@@ -158,7 +159,7 @@ def daemon_paths(
 ) -> tuple[Times, Times, Times, float]:
     """Return seconds from request to relay, edge to RMF and hazard to all off, and memory (MB).
 
-    `ours`: the wire of this end. `keep`: the setting for recording; default if not given.
+    `ours`: the wire of this end. `keep`: the setting for recording; without it the default.
     """
     directory = scratch / f"quick_{transport}{keep}"
     recording = {"recording": {"keep": keep}} if keep else {}
@@ -200,7 +201,7 @@ def _to_outputs_off(far: Graph, plant: Caller, hand: Caller) -> float:
     hand.order("press Lift1 fire_alarm on")
     at = plant.edge("fire_alarm", True)
     took = plant.edge("agv_mode_request", False) - at
-    # During the fire: a session that survived it would switch its relay on again at once.
+    # During the fire: a session that survived the fire would switch its relay on again at once.
     ended_at = far.send("bench", LiftRequestType.REQUEST_END_SESSION, "")
     far.state(ended_at, lambda state: not state.session_id)
     hand.order("press Lift1 fire_alarm off")

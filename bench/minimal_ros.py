@@ -1,6 +1,6 @@
-"""The baseline on ROS: an rclpy node that only sets a pin (run as its own process).
+"""The baseline on ROS: an rclpy node that only sets a pin, run as a separate process.
 
-A LiftRequest switches the pin, `on` and `off` on stdin switch an input, whose edge goes out as a
+A LiftRequest switches the pin. `on` and `off` on stdin switch an input, and its edge is published as a
 LiftState. Each edge is a line on stdout: signal, level, time (monotonic s).
 """
 

@@ -1,12 +1,13 @@
 """The page with 50 lifts, 200 doors and 50 chargers at 1 Hz, looked at by three real browsers.
 
-A lift's session carries its publishing time; a script in each browser notes the time on screen. `a
-tenth changes`: as on a busy site. `all change`: every card changes each time. Each device's daemon
+A lift's session contains the time of publishing; a script in each browser notes the time on screen. `a
+tenth changes`: as on a busy site. `all change`: every card changes each second. Each device's daemon
 publishes its diagnostics too.
 
-`an hour`, only with BENCH_PAGE_HOUR_S=N, for N seconds: memory of the page, and of browsers of the
-site and of a device after a collection, every half minute. The first ten minutes do not count: a
-device's page shows that much, and fills first. `first` and `last` are the lowest of ten minutes.
+`an hour` (only with BENCH_PAGE_HOUR_S=N, for N seconds): every half minute the memory of the page, and
+after a garbage collection the memory of two browsers, which show the site and a device. The first ten
+minutes do not count, because a device's page first fills with ten minutes of history. `first` and
+`last` are the least memory in ten minutes.
 """
 
 import os
@@ -104,7 +105,7 @@ def _tabs(playwright: Playwright, site: "_Site", address: str) -> list[Page]:
 
 
 class _Site:
-    """Publishes every state once a second, spread over that second."""
+    """Publishes every state once a second, spread over the second."""
 
     def __init__(self, domain: int, share: int) -> None:
         self._share = share
@@ -154,7 +155,7 @@ class _Site:
         return d.ChargerState(stamp(time.time()), state, f"charger{number:02}")
 
     def live(self, seconds: float, tab: Page) -> None:
-        """Publish for this time (s); `tab`: any browser; its events go on meanwhile."""
+        """Publish for this time (s). `tab`: any browser, whose events are served meanwhile."""
         began, said = time.monotonic(), 0
         while (at := time.monotonic() - began) < seconds:
             while said < at * DEVICES:

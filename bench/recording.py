@@ -1,4 +1,6 @@
-"""The cost of a ring, compared with a daemon without one, and the replay speed of a day's recording."""
+"""The cost of a ring, compared with a daemon without a ring, and the replay speed of a day's
+recording.
+"""
 
 import os
 import time
@@ -40,7 +42,7 @@ CONFIG = Path(__file__).parent.parent / "config/lift_dry_contact.yaml"
 
 
 def measure(scratch: Path) -> Tables:
-    """Measure a lift with and without a ring, in turn; its paths; and a day of one lift at 20 Hz."""
+    """Measure a lift with and without a ring in turn, its paths, and a day of a lift at 20 Hz."""
     return {
         "a lift, left alone": _idle(scratch),
         "its paths, with a ring": _paths(scratch),
@@ -144,7 +146,7 @@ class Day:
         self._recorder.close()
 
     def _tell(self) -> None:
-        """Publish each second: the state, and the request that RMF repeats."""
+        """Publish the state and RMF's repeated request each second."""
         assert self._lift.decision
         report = self._lift.decision.report
         state = state_message("Lift1", self._settings, report, Time(int(WALL + self.now)))

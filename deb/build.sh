@@ -1,9 +1,9 @@
 #!/bin/sh
 # Builds the three Debian packages of one architecture and one Python: deb/build.sh ARCH PYTHON (`make deb`).
 # rmf-bridges has the daemons and the recorder, as one archive that its postinst unpacks; rmf-bridges-workbench adds the
-# workbench and the fakes; rmf-bridges-page adds what the web page needs. The latter two lie in a folder of their version.
-# As an ordinary user, on any machine: wheels are fetched for the target. lgpio has none for Python 3.13: lgpio.sh
-# builds it.
+# workbench and the fakes; rmf-bridges-page adds the web page's libraries. The last two packages install into a
+# folder named after their version. Runs as an ordinary user, on any machine: wheels are fetched for the target. PyPI has no
+# lgpio for Python 3.13: lgpio.sh builds it.
 set -eu
 arch=$1 python=$2
 case $python in
@@ -20,15 +20,15 @@ site=$tree/lib/python$python/site-packages
 SOURCE_DATE_EPOCH=${SOURCE_DATE_EPOCH:-$(git -C "$here" log -1 --format=%ct 2>/dev/null || date +%s)}
 export SOURCE_DATE_EPOCH
 
-rm -rf "$work" "$here"/build/lib "$here"/build/bdist.* # else a wheel keeps modules that are gone
+rm -rf "$work" "$here"/build/lib "$here"/build/bdist.* # otherwise a wheel keeps deleted modules
 umask 022
 mkdir -p "$root/DEBIAN" "$bench/DEBIAN" "$page/DEBIAN" "$root/$lib/bin" "$root/usr/bin" "$tree/bin" "$work/wheel" "$wheels"
 
-# The libraries: the workbench gets those that the daemons lack, the page those that both lack. Left out: libraries of
-# Cyclone's own commands, and colorzero's build tools. They would double the byte code that an installation must make.
+# The workbench gets the libraries that the daemons lack; the page gets the libraries that daemons and workbench lack. Libraries of
+# Cyclone's own commands and colorzero's build tools are left out: they would double the byte code that an installation must make.
 [ "$python" != 3.13 ] || "$here/deb/lgpio.sh" "$arch" "$wheels"
 "$bin/pip" wheel --quiet --disable-pip-version-check --no-deps --wheel-dir "$work/wheel" "$here"
-version=$(basename "$work"/wheel/*.whl | cut -d- -f2)+$release # it has the commit: setup.py
+version=$(basename "$work"/wheel/*.whl | cut -d- -f2)+$release # with the commit (setup.py)
 fill() {
   into=$1; shift
   "$bin/python" "$here/deb/wheels.py" "$work"/wheel/*.whl --arch "$arch" --python "$python" \
@@ -52,8 +52,8 @@ for each in "$site" "$in_bench" "$in_page"; do
   find "$each" -type d -empty -delete
 done
 
-# A virtual environment that sees the system's packages (rclpy), on the system's own Python. Its program gets its first
-# line where it is unpacked (postinst), so that a daemon imports from its own tree whatever `current` says later.
+# A virtual environment that sees the system's packages (rclpy), on the system's own Python. postinst writes the first
+# line of its program, so that a daemon imports from its own tree, even if `current` later names another.
 ln -s "/usr/bin/python$python" "$tree/bin/python3"
 printf 'home = /usr/bin\ninclude-system-site-packages = true\nversion = %s\n' "$python" > "$tree/pyvenv.cfg"
 cat > "$tree/bin/rmf-bridge" <<'SCRIPT'
@@ -77,7 +77,7 @@ unit() {
 for each in rmf-bridges.target rmf-bridge@.service rmf-bridge-recorder.service rmf-bridge-outputs-off.service; do
   unit "$root" "$each"
 done
-mkdir "$root/usr/lib/systemd/system/multi-user.target.wants" # whatever is enabled: off is safe
+mkdir "$root/usr/lib/systemd/system/multi-user.target.wants" # for every enabled service, because off is safe
 ln -s ../rmf-bridge-outputs-off.service "$root/usr/lib/systemd/system/multi-user.target.wants/"
 unit "$page" rmf-bridge-page.service
 put "$root" systemd/rmf-bridges-slice.conf 'usr/lib/systemd/system/system-rmf\x2dbridge.slice.d/10-boot.conf'
@@ -99,7 +99,7 @@ mkdir -p "$bench/usr/share/doc/rmf-bridges-workbench"
 cp -R "$here/build/site" "$bench/usr/share/doc/rmf-bridges-workbench/html" # `make docs`
 
 # package NAME ROOT DEPENDS SUMMARY [TREE]: builds a package with control files, changelog, copyright and lintian's
-# overrides; description on stdin. TREE: the tree that its postinst unpacks.
+# overrides; description on stdin. TREE: the tree that the package's postinst unpacks.
 package() {
   doc=$2/usr/share/doc/$1
   mkdir -p "$doc"
@@ -128,7 +128,7 @@ CONTROL
   dpkg-deb --root-owner-group -Zxz --build "$2" "$here/dist/$1_${version}_$arch.deb"
   ! command -v lintian > /dev/null || lintian --allow-root --fail-on error "$here/dist/$1_${version}_$arch.deb"
 }
-# Depend on that Python, not on `python3`, whose version changes with the release: so an upgrade of Debian keeps us installed.
+# Depend on this Python, not on `python3`, whose version changes with the release: an upgrade of Debian keeps us installed.
 libc='libc6 (>= 2.34)' # of the wheels' tags (wheels.py, lgpio.sh)
 package rmf-bridges "$root" "python$python, $libc, systemd (>= 252)" \
   "connect Open-RMF to lifts, doors and chargers" "$tree" <<'DESCRIPTION'

@@ -1,13 +1,13 @@
 #!/bin/sh
 # Builds lgpio's wheel for a Python without a wheel on PyPI: deb/lgpio.sh ARCH DIRECTORY.
-# From its sdist, with swig and the cross compiler zig, both from PyPI: as an ordinary user, on any machine. The
-# module keeps to CPython's stable ABI, so that this machine's Python.h serves every later Python as well.
+# Built from the sdist, with swig and the cross compiler zig from PyPI, as an ordinary user, on any machine. The
+# module uses only CPython's stable ABI, so this machine's Python.h serves every later Python too.
 set -eu
 arch=$1 wheels=$2
 case $arch in amd64) machine=x86_64 ;; arm64) machine=aarch64 ;; esac
 here=$(cd "$(dirname "$0")/.." && pwd)
 bin=$here/.venv/bin
-glibc=34 # as of PyPI's own wheels: Debian 12 has 2.36
+glibc=34 # as PyPI's own wheels; Debian 12 has 2.36
 [ -z "$(find "$wheels" -name "lgpio-*_${machine}.whl" 2>/dev/null)" ] || exit 0
 
 headers=$("$bin/python" -c 'import sysconfig; print(sysconfig.get_path("include"))')
@@ -15,7 +15,7 @@ headers=$("$bin/python" -c 'import sysconfig; print(sysconfig.get_path("include"
 "$bin/pip" install --quiet --disable-pip-version-check -e "$here[deb]"
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
-# Debian's pyconfig.h includes that of the architecture. For the stable ABI the two are the same.
+# Debian's pyconfig.h includes the architecture's pyconfig.h. For the stable ABI both architectures have the same.
 for each in x86_64 aarch64; do ln -s "/usr/include/$(uname -m)-linux-gnu" "$work/$each-linux-gnu"; done
 cat > "$work/setup.cfg" <<CONFIG
 [build_ext]

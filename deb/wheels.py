@@ -1,8 +1,8 @@
 """Installs a wheel and its requirements for another machine: python deb/wheels.py --help.
 
 pip can fetch wheels of another platform, but judges conditions (`; platform_machine == ...`) by the
-machine that it runs on. So each round here finds the requirements still missing for the target machine,
-and fetches them with pip.
+machine that it runs on. So each round of this script finds the requirements still missing for the
+target machine, and fetches them with pip.
 """
 
 import argparse
@@ -20,14 +20,14 @@ from packaging.utils import canonicalize_name
 
 MACHINES = {"amd64": "x86_64", "arm64": "aarch64"}
 GLIBC = (34, 31, 28, 27, 24, 17)
-"""Minor versions in manylinux tags: Debian 12 has 2.36. A tag means that version or a newer one."""
+"""Minor versions in manylinux tags: Debian 12 has 2.36. A tag means that version or a newer version."""
 
 Without = Collection[tuple[str, ...]]
 """Pairs of a distribution and a requirement that it declares but does not need."""
 
 
 def main() -> int:
-    """Fetch until nothing is missing. Returns 1 for a requirement that the result does not meet."""
+    """Fetch until nothing is missing. Return 1 if the result does not meet a requirement."""
     args = _arguments()
     machine = {
         **default_environment(),
@@ -73,7 +73,7 @@ def _fetch(what: list[str], args: argparse.Namespace) -> None:
     options += ["--python-version", args.python, "--implementation", "cp", "--abi"]
     options += [f"cp{args.python.replace('.', '')}", "--abi", "abi3", "--abi", "none"]
     pip = [sys.executable, "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
-    with tempfile.TemporaryDirectory() as closed:  # pip leaves out what is there in part
+    with tempfile.TemporaryDirectory() as closed:  # pip leaves out a package that is partly there
         fresh = f"{closed}/fresh"  # open to all users, as a daemon's user must read the copy
         place = ["--no-deps", "--no-compile", "--only-binary", ":all:", "--target", fresh]
         subprocess.run(
@@ -85,7 +85,7 @@ def _fetch(what: list[str], args: argparse.Namespace) -> None:
 def _needed(
     target: Path, machine: dict[str, str], extras: dict[str, tuple[str, ...]], without: Without
 ) -> Iterator[Requirement]:
-    """Yield the requirements of the distributions in the target on that machine."""
+    """Yield what the distributions in the target require on the target's machine."""
     for found in distributions(path=[str(target)]):
         asked = extras.get(canonicalize_name(found.name), ())
         for text in found.requires or ():

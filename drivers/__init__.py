@@ -26,7 +26,7 @@ class Driver(Protocol[Sample, Outputs]):
         """Claim every output at its safe level. Called once, and again after a DriverError."""
 
     def read(self) -> Sample:
-        """Read every input once and decode it. Returns fresh values only, or raises."""
+        """Read and decode every input once. Returns only fresh values. Raises DriverError."""
 
     def write(self, outputs: Outputs) -> None:
         """Set every output to this level. Cheap when nothing has changed since the last write."""
@@ -43,4 +43,4 @@ class OnContacts(Protocol):
     """A driver on contacts, whose levels a person can check with a meter."""
 
     def contacts(self) -> Mapping[str, bool]:
-        """Return signal -> asserted, as last read or written, without unknown signals."""
+        """Return signal -> asserted, as last read or written, for each known signal."""

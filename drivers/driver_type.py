@@ -27,7 +27,7 @@ class DriverType(msgspec.Struct, Generic[Settings, Sample, Outputs], frozen=True
     `drivers/hal/`. `create(name, settings, bus)`: makes the driver of one device; it sends nothing
     before `open`.
 
-    The rest is optional:
+    The fields below are optional:
     `wires(settings)`: the wiring table that an electrician checks (`drivers/hal/points.py`).
     `debounce(settings)`: signal or group -> how long a change must last (s).
     `describe(settings, bus's settings)`: rows for `check` (subject, meaning) if there are no wires.

@@ -13,7 +13,7 @@ from drivers.hal import http
 class Call(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """One command to a controller."""
 
-    path: Annotated[http.Path, tells("its path below the bus's `api_base`.")]
+    path: Annotated[http.Path, tells("the path below the bus's `api_base`.")]
     method: Annotated[http.Method, tells("the HTTP method.")] = "POST"
     body: Annotated[
         Annotated[str, msgspec.Meta(max_length=1024)] | None,
@@ -37,7 +37,9 @@ class Calls(Protocol):
     def send(
         self, path: str, method: http.Method = "POST", body: str | None = None, safe: bool = False
     ) -> None:
-        """Send one request, without retry. `safe`: it switches an output off. Raises HalError."""
+        """Send one request, without retry. `safe`: the request switches an output off. Raises
+        HalError.
+        """
 
 
 class InsistentCalls(Calls, Protocol):

@@ -92,7 +92,7 @@ def found(answer: object, field: str) -> object:
 
 
 def needed(answer: Mapping[str, object], field: str) -> object:
-    """Return the field's value. Raises DriverError with a list of the present fields."""
+    """Return the field's value. Raises DriverError, with the present fields, if it is absent."""
     value = found(answer, field)
     if value is ABSENT:
         names = ", ".join(clean(name) for name in list(answer)[:5]) or "nothing"

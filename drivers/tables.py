@@ -25,7 +25,7 @@ def breaks(shown: Lines, wires: Mapping[str, Wire]) -> Iterator[tuple[str, str, 
 
 
 def one_cut(shown: Lines, wires: Mapping[str, Wire]) -> Iterator[tuple[str, dict[str, bool]]]:
-    """Yield each signal with a cut wire that changes the reading, and the changed reading."""
+    """Yield each signal whose wire, if cut, changes the reading, with the changed reading."""
     return ((signal, then) for signal, how, then in breaks(shown, wires) if how == "cut")
 
 

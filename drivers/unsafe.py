@@ -46,7 +46,9 @@ def energised_at_boot(wires: Iterable[Wire]) -> Iterator[Unsafe]:
 
 
 def unsafe_wires(wires: list[Wire], must_read: Mapping[str, tuple[bool, str]]) -> Iterator[Unsafe]:
-    """Yield both kinds above. `must_read`: signal -> `cut_must_read`'s `asserted` and `meaning`."""
+    """Yield wires whose cut reads as safe, and outputs energised at boot. `must_read`: signal ->
+    `cut_must_read`'s `asserted` and `meaning`.
+    """
     for wire in wires:
         if wire.signal in must_read:
             yield from cut_must_read(wire, *must_read[wire.signal])
@@ -64,7 +66,7 @@ def slow_alarms(wires: Iterable[Wire]) -> Remarks:
 def needlessly_accepted(found: Iterable[Unsafe], accepted: Mapping[str, str]) -> Remarks:
     """Yield the safe signals that `accept_unsafe` names, as (path, text)."""
     for signal in accepted.keys() - {signal for signal, _, _ in found}:
-        yield ("accept_unsafe", signal), f"nothing is unsafe about {signal}: delete this"
+        yield ("accept_unsafe", signal), f"nothing is unsafe about {signal}: delete this entry"
 
 
 def unaccepted(found: Iterable[Unsafe], accepted: Mapping[str, str]) -> Remarks:

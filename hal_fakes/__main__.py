@@ -1,10 +1,10 @@
 """`python -m hal_fakes FILE BUS --socket PATH`: serve the far side of one bus in a separate process.
 
-For buses whose fake is `Outside` (`hal_fakes/fake.py`). When all is ready, the replacements for
-the bus's settings are printed as one line of JSON.
+For buses whose fake is `Outside` (`hal_fakes/fake.py`). When the far side is ready, it prints the
+replacements for the bus's settings as one line of JSON.
 
-The process ends when its standard input does, so nothing is left behind however the daemon dies.
- It ignores SIGINT: Ctrl-C in a terminal reaches both, and the daemon has to finish first.
+The process ends with its standard input, so nothing is left behind however the daemon dies. The process
+ignores SIGINT: Ctrl-C in a terminal reaches daemon and far side, and the daemon has to finish first.
 """
 
 import argparse
@@ -34,7 +34,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("bus")
     parser.add_argument("--socket", type=Path, required=True)
     parser.add_argument(
-        "--log-format", choices=("text", "json"), help="say what is pressed, on standard error"
+        "--log-format", choices=("text", "json"), help="log pressed buttons to standard error"
     )
     arguments = parser.parse_args(argv)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
@@ -54,7 +54,8 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 @contextmanager
 def served(path: Path, bus_name: str, socket: Path) -> Iterator[dict[str, object]]:
-    """Serve the far side of this bus until the end of the block; yield its replaced settings.
+    """Serve the far side of this bus until the end of the block; yield the replacements for its
+    settings.
 
     Raises SettingsError, DriverError.
     """

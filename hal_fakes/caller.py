@@ -40,7 +40,7 @@ class Caller:
         return self.hear()
 
     def order(self, line: str) -> None:
-        """Send an order. Raises SimulationRefused unless it is carried out."""
+        """Send an order. Raises SimulationRefused unless the plant obeys."""
         answer = self.say(line)
         if answer != "ok":
             raise SimulationRefused(f"{line}: {answer or 'no answer'}")

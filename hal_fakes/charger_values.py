@@ -37,7 +37,7 @@ def values(
 ) -> dict[str, Value] | None:
     """Return the value of each field. `natural`: the fields' usual values, tried first.
 
-    None if no rule fits; an error without a rule is shown in the first error field.
+    Returns None if no rule fits. An error without a rule is shown in the first error field.
     """
     shown: dict[str, Value] = {at: 0 for _, at in errors.places()}
     shown |= {n.at: n.well[0] for n in errors.codes}
@@ -56,7 +56,7 @@ def values(
 
 
 def _shows_error(errors: StationErrors, shown: dict[str, Value], robot: bool) -> bool:
-    """Show an error of this side, or of the other side if this one has none."""
+    """Show an error of this side, or of the other side if this side has no error field."""
     sides = ("robot", "station") if robot else ("station", "robot")
     for side in sides:
         for number in errors.codes:

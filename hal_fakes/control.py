@@ -4,7 +4,8 @@ AF_UNIX, lines of text, words with spaces in quotes. Each line is answered `ok` 
 
 - `follow`: from now on every edge is sent as a line of JSON,
   `{"at": s monotonic, "device": …, "what": "relay"|"sensor", "signal": …, "value": …}`
-- `fail DEVICE PART MODE`: a wire or part fails (`off`, `stuck`, `slow`, `garbage`, `wrong`); `ok` mends
+- `fail DEVICE PART MODE`: a wire or part fails (`off`, `stuck`, `slow`, `garbage`, `wrong`), or works
+  again (`ok`)
 - `press DEVICE SIGNAL on|off`: a person or the building acts
 - `names`: answered with a line of JSON, `{DEVICE: {"press": [SIGNAL, …], "fail": [PART, …]}}`
 """
@@ -30,14 +31,16 @@ log = logging.getLogger(__name__)
 
 
 class Control:
-    """The server: one thread accepts, and one reads each caller."""
+    """The server: one thread accepts callers, and one thread for each caller reads orders."""
 
     def __init__(self, path: Path, plants: Mapping[str, Plant]) -> None:
         self.path = path
         self._plants = plants
         self._followers: set[socket.socket] = set()
         self._callers: dict[socket.socket, threading.Thread] = {}
-        self._lock = threading.Lock()  # guards the two above; never held while a plant is called
+        self._lock = (
+            threading.Lock()
+        )  # guards followers and callers; released before a plant is called
         self._listener = _listen(path)
         for plant in plants.values():
             plant.on_edge = self._tell
@@ -110,7 +113,7 @@ class Control:
                 log.info(pairs("pressed", device=device, signal=signal, to=how))
             case _:
                 raise ValueError(
-                    "not understood; say: follow | names | fail DEVICE PART"
+                    "not understood; write: follow | names | fail DEVICE PART"
                     " off|stuck|slow|garbage|wrong|ok | press DEVICE SIGNAL on|off"
                 )
 

@@ -1,4 +1,4 @@
-"""Find an unused ROS domain on this machine, on DDS or zenoh, for the demo and the tests."""
+"""Finds an unused ROS domain on this machine, on DDS or zenoh, for the demo and the tests."""
 
 import atexit
 import random
@@ -35,9 +35,9 @@ def domain_for_a_while() -> Iterator[int]:
 def _claimed() -> tuple[int, socket.socket]:
     """Return a free domain and the claim on it, which lasts until closed.
 
-    Raises OSError if none is free. Domain d has its ports from 7400 + 250 d: multicast discovery
-    there, participant i's unicast ports 10 + 2 i and 11 + 2 i above it (DDSI-RTPS 2.5, 9.6.2.3). The
-    first participant may have left while others remain.
+    Raises OSError if none is free. Domain d has its ports from 7400 + 250 d: the first is for multicast
+    discovery, and participant i has the unicast ports 10 + 2 i and 11 + 2 i above the first (DDSI-RTPS
+    2.5, 9.6.2.3). The first participant may have left while others remain.
     """
     for domain in random.sample(DOMAINS, len(DOMAINS)):
         base = 7400 + 250 * domain

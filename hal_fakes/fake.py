@@ -1,4 +1,4 @@
-"""Find fakes like drivers: `DRIVER` and `BUS` name a module, whose `FAKE` stands in for them.
+"""Finds fakes by name: `DRIVER` and `BUS` name a module, whose `FAKE` stands in for the hardware.
 
 Only this file imports fakes by name. A driver without a fake gets its kind's plant,
 `hal_fakes/plants/<kind>.py`, at the far end of its wires.
@@ -22,7 +22,7 @@ Station = TypeVar("Station")
 
 @dataclass(frozen=True)
 class Fake(Generic[Settings]):
-    """The fake of one sort of controller.
+    """A fake controller of one sort.
 
     `plant(name, settings, wires)`: its physics; `wires` is the driver's table.
     `station(plant, settings)`: the controller for the bus's fake, with that plant behind it. Without
@@ -51,7 +51,7 @@ class Outside(Generic[Settings, Station]):
     """The far side of a bus, in its own process.
 
     `serve(settings, stations)`: starts a real server on 127.0.0.1, or on its own line, and returns at
-    once. The server may call the plants from any thread, and does not advance their time.
+    once. The server may call the plants from any thread, and never advances the plants' time.
     """
 
     serve: Callable[[Settings, Sequence[Station]], Server]
@@ -91,10 +91,12 @@ def _station(config: Config, bus: str, name: str, plant: Plant) -> object:
 
 
 def far_side(config: Config, bus: str) -> FarSide:
-    """Return the far side of this bus. Raises HalError if its type has none."""
+    """Return the far side of this bus. Raises HalError if the bus's type has no fake."""
     name = config.bus_type(bus).fake
     if not name:
-        raise HalError(f"a bus of type {config.bus_types[bus]} cannot be simulated: it has no fake")
+        raise HalError(
+            f"a bus of type {config.bus_types[bus]} cannot be simulated, because this type has no fake"
+        )
     found: FarSide = import_module(name).FAKE
     return found
 

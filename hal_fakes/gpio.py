@@ -2,8 +2,8 @@
 
 The daemon's own code runs down to gpiozero: only the pins are ours. They claim an output at its
 safe level in one call, as `drivers/hal/gpio/pins.py` does on hardware (gpiozero's stock MockPin
-records a glitch there), and refuse what hardware refuses: a pin claimed twice, another pull where a
-resistor is fixed, driving an input, a pull on an output.
+records a glitch there), and refuse the same as hardware: a pin claimed twice, another pull on a pin
+with a fixed resistor, driving an input, a pull on an output.
 """
 
 import time
@@ -39,7 +39,7 @@ class WiredPin(MockPin):  # type: ignore[misc]
         self.factory.driven(self.point, self._state)
 
     def input_with_pull(self, pull: str) -> None:
-        """Claim as an input; its level is the wire's from the first read on."""
+        """Claim as an input, which has the wire's level from the first read on."""
         if self._safe is not None:
             raise PinInvalidFunction(f"{self.point} is an output")
         super().input_with_pull(pull)
@@ -91,7 +91,7 @@ class WiredFactory(MockFactory):  # type: ignore[misc]
                 wiring.drive(point, level, self.clock())
 
     def show(self, now: float, only: WiredPin | None = None) -> None:
-        """Bring every claimed input (or this one) to the level of its wire at `now` (s)."""
+        """Bring every claimed input (or this input) to the level of its wire at `now` (s)."""
         pins = [only] if only else list(self.pins.values())
         claimed = {pin.point: pin for pin in pins}
         with self._lock:

@@ -108,7 +108,7 @@ class _Listener(ThreadingHTTPServer):
         return caller, address
 
     def shutdown_request(self, request: socket.socket | tuple[bytes, socket.socket]) -> None:
-        assert isinstance(request, socket.socket)  # for a datagram it would be a pair
+        assert isinstance(request, socket.socket)  # a datagram's request would be a pair
         with self._lock:
             self._callers.discard(request)
         super().shutdown_request(request)
@@ -179,7 +179,8 @@ class _Call(BaseHTTPRequestHandler):
     def _send(self, head: bytes, body: bytes, failures: Failures) -> bool:
         """Write as much of an answer as the failure lets through; True to close the connection.
 
-        Head and body in one write: in two, each answer would take 40 ms (delayed ACK).
+        Head and body go out in one write, because with two writes each answer would take 40 ms (delayed
+        ACK).
         """
         whole = head + body
         if failures.get("server") == "off":
@@ -196,7 +197,7 @@ class _Call(BaseHTTPRequestHandler):
         return failures.get("headers") == "garbage"
 
     def _trickle(self, rest: bytes) -> None:
-        """Send byte by byte, so slowly that the whole overruns the caller's deadline."""
+        """Send byte by byte, so slowly that the answer overruns the caller's deadline."""
         for n in range(len(rest)):
             self._wait(self.server.timeout_s / 4)
             self.wfile.write(rest[n : n + 1])
@@ -209,7 +210,7 @@ class _Call(BaseHTTPRequestHandler):
                 raise ConnectionAbortedError("the caller has hung up")
 
     def log_message(self, format: str, *args: object) -> None:
-        """Log nothing: the daemon's log shows its requests."""
+        """Log nothing: the daemon's own log shows the requests."""
 
 
 FAKE = Outside(serve)

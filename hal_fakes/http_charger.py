@@ -20,7 +20,7 @@ from hal_fakes.plants.plant import Plant
 
 
 def build(name: str, settings: HttpChargerSettings) -> ChargerPlant:
-    """Build the station for these settings, with the robots it knows."""
+    """Build the station for these settings, with the robots of `receivers`."""
     return ChargerPlant(
         name,
         settings.receivers,
@@ -70,7 +70,7 @@ class FakeHttpCharger:
         return self.body(self.reading())
 
     def body(self, reading: Reading) -> bytes:
-        """Return the answer for this reading; wrong if that failure is ordered."""
+        """Return the answer for this reading; a wrong answer if that failure is ordered."""
         server, body = reading.failures.get("server"), reading.failures.get("body")
         if server == "stuck" and self._last is not None:
             return self._last

@@ -20,7 +20,7 @@ PARTS: Final = ("server", "headers", "body")
 
 
 def contacts(settings: HttpDoorSettings) -> list[Wire]:
-    """The controller's own contacts and relay, for the plant: they can fail like wires to us."""
+    """Return the controller's own contacts and relay, for the plant: they can fail as our wires can."""
     fields = settings.inputs.__struct_fields__
     inputs = [Wire(s, "in", s, "high") for s in fields if getattr(settings.inputs, s)]
     return [*inputs, Wire(HOLD, "out", HOLD, "high")]
@@ -55,7 +55,7 @@ class FakeHttpDoor:
             self.obey(HOLD, False)
 
     def answer(self) -> bytes:
-        """Return the present answer to `GET state_path`; wrong if that failure is ordered."""
+        """Return the present answer to `GET state_path`; a wrong answer if that failure is ordered."""
         self.tick()
         self.plant.advance(time.monotonic())
         server, body = self.plant.failures.get("server"), self.plant.failures.get("body")

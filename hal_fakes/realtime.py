@@ -35,7 +35,7 @@ class RealTime:
             self._due.notify()
 
     def show(self) -> None:
-        """Show moved contacts at once, in the caller's thread; wake ours if its sleep is too long."""
+        """Show moved contacts at once, in the caller's thread. Wake our thread if necessary."""
         with self.lock:
             if self._step() < self._next_at:
                 self.stir()

@@ -1,7 +1,7 @@
 """The hardware of `rmf-bridge run FILE --simulate`: a plant for each device behind its bus.
 
-Where it can, a far side stands in a child process on 127.0.0.1 (`hal_fakes/__main__.py`), and the real
-bus is pointed there. GPIO pins cannot leave a process, so their fake lives in the daemon's.
+If possible, a far side is a child process on 127.0.0.1 (`hal_fakes/__main__.py`), and the real bus is
+pointed there. GPIO pins cannot leave a process, so their fake lives in the daemon's.
 
 Each bus has a control socket in the runtime directory: `plant.sock`, or `plant-<bus>.sock` where
 the file has several buses.
@@ -27,12 +27,12 @@ READY_S = 15.0
 """Time limit (s) for a child's start (a busy Raspberry Pi imports slowly)."""
 PATIENCE_S = 1.5
 """A simulated bus waits at least this long (s) for an answer: its far side shares this machine,
-which may be busy. Not longer, as a call may take half of the shortest WatchdogSec
-(bridges/runtime/drop_in.py)."""
+which may be busy. The wait is no longer, because a call may take only half of the shortest
+WatchdogSec (bridges/runtime/drop_in.py)."""
 
 
 class Simulation:
-    """The far sides of a file's buses. Those in separate processes start while the daemon does.
+    """The far sides of a file's buses. Far sides in separate processes start while the daemon starts.
 
     Make it before the daemon changes directory: the file's relative paths must still be valid.
     """
@@ -40,7 +40,7 @@ class Simulation:
     def __init__(
         self, config: Config, runtime_dir: Path, *, log_format: LogFormat | None = None
     ) -> None:
-        """`log_format`: a child's format for logging presses; None if its log is not read."""
+        """Start the far sides. `log_format`: a child's format for logging presses; None: no log."""
         self._log = ["--log-format", log_format] if log_format else []
         self._config = config
         self._file = str(Path(config.path).resolve())
@@ -53,7 +53,7 @@ class Simulation:
     def open_bus(self, name: str) -> Bus:
         """Open a real bus in front of its fake. Raises HalError.
 
-        Two buses may be opened one after the other, not at once.
+        Only one thread at a time may open a bus.
         """
         if self._has_process(name):
             return self._config.bus_type(name).open_bus(self._pointed_at_child(name))
@@ -69,7 +69,7 @@ class Simulation:
         return self._runtime_dir / (f"plant-{name}.sock" if several else "plant.sock")
 
     def _has_process(self, name: str) -> bool:
-        """Has the bus's fake a process? Found without importing it: its libraries are unwanted here."""
+        """Has the bus's fake a process? This is found without importing the fake and its libraries."""
         bus_type = self._config.bus_type(name)
         return bool(bus_type.fake) and not bus_type.fake_inside
 
@@ -117,7 +117,9 @@ def _first_line(child: "subprocess.Popen[bytes]", bus_name: str) -> dict[str, ob
         ready.register(child.stdout, selectors.EVENT_READ)
         line = child.stdout.readline() if ready.select(READY_S) else b""
     if not line:
-        raise HalError(f"the simulated far side of bus {bus_name} did not start; its log says why")
+        raise HalError(
+            f"the simulated far side of bus {bus_name} did not start; its log has the reason"
+        )
     return msgspec.json.decode(line, type=dict[str, object])
 
 

@@ -1,6 +1,6 @@
 """The wires between a plant's signals and a bus's points (with addresses and levels).
 
-For buses with points (GPIO, Modbus). `plants/contact.py` says how wires fail.
+For buses with points (GPIO, Modbus). `plants/contact.py` describes how wires fail.
 """
 
 from collections.abc import Callable, Iterable
@@ -27,6 +27,6 @@ class PlantWiring:
         return {p: w.level(self.plant.sense(w.signal)) for p, w in self.inputs.items()}
 
     def drive(self, point: str, level: bool, now: float) -> None:
-        """Set an output to the bus's level at `now`. KeyError if it is not wired here."""
+        """Set an output to the bus's level at `now`. Raises KeyError if it is not wired."""
         wire = self.outputs[point]
         self.plant.drive(wire.signal, wire.asserted(level), now)

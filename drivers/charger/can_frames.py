@@ -48,7 +48,7 @@ class FrameChargerSettings(ChargerSettings, frozen=True, kw_only=True, forbid_un
         if self.on_death == "keep":
             yield (
                 ("on_death",),
-                "it stops when our frames cease, so it cannot be kept: leave this out",
+                "a charge ends when our frames cease, so it cannot be kept: delete on_death",
             )
         before = list(PROFILE.problems(self.profile, self.map))
         yield from before
@@ -56,12 +56,12 @@ class FrameChargerSettings(ChargerSettings, frozen=True, kw_only=True, forbid_un
             yield from _setpoint_problems(self)
 
     def can_stop(self) -> bool:
-        """Always True: a frame stops the charger, and so does the end of our frames."""
+        """Always True: a frame stops the charger, and the charger also stops without frames."""
         return True
 
 
 def frame_map(settings: FrameChargerSettings) -> FrameMap:
-    """Return the map in the YAML, or else the profile's."""
+    """Return the YAML's map, or else the profile's map."""
     return PROFILE.chosen(settings.profile, settings.map)
 
 
@@ -113,7 +113,8 @@ def _encoding_problems(settings: FrameChargerSettings, sent: Sent, on: bool) -> 
 
 
 def claims(settings: FrameChargerSettings) -> Iterator[tuple[str, tuple[str, ...]]]:
-    """Yield (place, path) of the frames, exclusive to this device; nothing while the map has problems.
+    """Yield (place, path) of the frames that no other device may use; nothing while the map has
+    problems.
 
     CANopen's NMT frame is shared by all devices.
     """
@@ -139,7 +140,7 @@ def describe(
     return [
         ("bus", can.describe(bus_settings)),
         *rows(found),
-        ("end of the daemon", f"power off is sent; unfed it stops after {after}"),
+        ("end of the daemon", f"power off is sent; without frames the charger stops after {after}"),
         *(found.state.codes.rows() if found.state else ()),
     ]
 
@@ -154,10 +155,12 @@ def warnings(settings: FrameChargerSettings) -> Remarks:
     yield from PROFILE.warnings(settings.profile, "watch the first charge")
     found = frame_map(settings)
     if found.receiver is None and settings.receivers:
-        yield ("receivers",), "the map has no receiver: it will charge nobody"
+        yield ("receivers",), "the map has no receiver: no robot will be charged"
     if settings.limits.peer_internal_timeout_s is None:
-        text = "ask the maker after how long without frames it stops, and pull the plug to see it"
-        yield (), f"{text}; write it down as limits: {{peer_internal_timeout_s: …}}"
+        text = (
+            "ask the maker how long the charger charges without frames, and pull the plug to check"
+        )
+        yield (), f"{text}; write that time as limits: {{peer_internal_timeout_s: …}}"
 
 
 def create(name: str, settings: FrameChargerSettings, bus: can.CanBus) -> "FrameDriver":
@@ -215,7 +218,7 @@ class FrameDriver:
             try:
                 self.make_safe()
             except DriverError:
-                return  # its frames cease, so it stops by itself
+                return  # our frames cease, so the charger stops by itself
 
     def _read(self) -> Values:
         """Return the values of fresh frames. Without any, send a due wake frame. Raises HalError."""
@@ -265,8 +268,8 @@ def _meant(found: FrameMap, values: Values) -> Meant:
 def _errors(found: FrameMap, values: Values, activity: Activity) -> Found:
     """Return the errors in the received frames, in any state.
 
-    The signal of `out_of_range` is an error only in an error state; otherwise it tells the robot's
-    position.
+    The signal of `out_of_range` is an error only in an error state; in other states it shows the
+    robot's position.
     """
     position = "" if activity is Activity.ERROR else found.out_of_range
     return found.errors.found(lambda at: 0 if at == position else values.get(at))
@@ -274,7 +277,7 @@ def _errors(found: FrameMap, values: Values, activity: Activity) -> Found:
 
 def _measured(found: FrameMap, frames: dbc.Dbc, values: Values) -> Measured:
     def is_valid(signal: str) -> bool:
-        """Is the value within the DBC file's [min|max]? If not, it is no reading."""
+        """Is the value within the DBC file's [min|max]? A value outside is no reading."""
         low, high = frames.bounds(*signal.split("."))
         return low <= values[signal] <= high
 
@@ -295,7 +298,7 @@ def _measured(found: FrameMap, frames: dbc.Dbc, values: Values) -> Measured:
 
 
 def _sequel(found: FrameMap) -> Sequel:
-    """Return the error frames to wait for: they may follow the frame of the state.
+    """Return the error frames to wait for, because they may follow the frame of the state.
 
     An error without a known side would count as the station's and take it out of service.
     """
@@ -326,7 +329,7 @@ def _said(found: FrameMap, frames: dbc.Dbc) -> dict[str, Said]:
 
 def _heard(values: Values, signal: str) -> float:
     if signal not in values:
-        raise DriverError(f"{signal} is not heard, and a rule looks at it")
+        raise DriverError(f"{signal} is not heard, and a rule tests its value")
     return values[signal]
 
 

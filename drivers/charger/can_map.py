@@ -19,7 +19,7 @@ from drivers.charger.state_codes import Codes
 from drivers.hal.can import named
 from drivers.profiles import Profile
 
-STATE_IS_NEEDED: Final = "needs state (its number, and what that means), or rules"
+STATE_IS_NEEDED: Final = "needs state (a signal, and the meanings of its numbers), or rules"
 Signal = Annotated[
     str,
     msgspec.Meta(
@@ -41,25 +41,31 @@ class State(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     """The charger's state, as one number."""
 
     at: Annotated[Signal, tells("the state's signal.")]
-    codes: Annotated[Codes, tells("the meanings of its numbers.")]
+    codes: Annotated[Codes, tells("the meanings of the signal's numbers.")]
 
 
 class Sent(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """A frame that the driver sends periodically. Give `on`, `off` or both."""
 
-    frame: Annotated[Name, tells("its name in the DBC file.")]
-    every_s: Annotated[Period, tells("how often it is sent.")]
+    frame: Annotated[Name, tells("the frame's name in the DBC file.")]
+    every_s: Annotated[Period, tells("how often the frame is sent.")]
     on: Annotated[
         dict[Name, float] | None,
-        tells("signal -> value while the charger may charge; when absent, nothing is sent then."),
+        tells(
+            "signal -> value while charging is allowed; when absent, the frame is not sent then."
+        ),
     ] = None
     setpoints: Annotated[
         dict[Name, Name],
-        tells("signal -> the name of the device's setpoint that it carries while it may charge."),
+        tells(
+            "signal -> the device's setpoint, by name, for this signal while charging is allowed."
+        ),
     ] = {}
     off: Annotated[
         dict[Name, float] | None,
-        tells("signal -> value while it must not charge; when absent, nothing is sent then."),
+        tells(
+            "signal -> value while charging is forbidden; when absent, the frame is not sent then."
+        ),
     ] = None
 
     def problems(self) -> Remarks:
@@ -79,10 +85,8 @@ class Sent(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
 class Wake(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """A frame that wakes a silent charger. It must not start a charge."""
 
-    frame: Annotated[Name, tells("its name in the DBC file; none of those in `send`.")]
-    every_s: Annotated[
-        WakeEvery, tells("how often it is sent, until the charger is heard and while it is silent.")
-    ]
+    frame: Annotated[Name, tells("the frame's name in the DBC file; not a frame of `send`.")]
+    every_s: Annotated[WakeEvery, tells("how often the frame is sent while the charger is silent.")]
     says: Annotated[dict[Name, float], tells("signal -> value.")]
 
 
@@ -91,11 +95,13 @@ class FrameMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
 
     dbc: Annotated[Name, tells("the DBC file, in drivers/profiles/ or by its absolute path.")]
     masks: Annotated[
-        dict[Name, Mask], tells("frame -> the compared bits of its id, where that has a node id.")
+        dict[Name, Mask],
+        tells("frame -> the bits to compare in its id, if the id contains a node id."),
     ] = {}
-    state: Annotated[State | None, tells("its state as a number; not needed with `rules`.")] = None
+    state: Annotated[State | None, tells("the state as a number; not needed with `rules`.")] = None
     state_timeout_s: Annotated[
-        Fresh, tells("the state is stale after this time without its frame, or a frame of a rule.")
+        Fresh,
+        tells("the state is stale after this time without the frame of `state` or of a rule."),
     ]
     others_timeout_s: Annotated[
         Fresh, tells("any other value is stale after this time without its frame.")
@@ -103,29 +109,30 @@ class FrameMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     volts: Annotated[Signal | None, tells("the voltage at the battery.")] = None
     amps: Annotated[Signal | None, tells("the current into the battery.")] = None
     receiver: Annotated[
-        Signal | None, tells("the receiver's id; 0 is none. Without its frame there is no reading.")
+        Signal | None,
+        tells("the receiver's id; 0: no receiver. Without its frame there is no reading."),
     ] = None
     out_of_range: Annotated[
         Signal | None,
-        tells("""not 0 while the robot stands where it cannot be charged. If it is in `errors`
-        too, it counts as an error only in an error state: a robot that has not arrived yet is
-        no error."""),
+        tells("""not 0 while the robot stands where it cannot be charged. A signal that is in `errors`
+        too counts as an error only in an error state: a robot that has not arrived yet is no
+        error."""),
     ] = None
     range_ok: Annotated[
         Signal | None,
-        tells("""not 0 while the robot stands where it can be charged, if the charger says so all
-        the time. While it is 0 there is no power; without its frame there is no reading."""),
+        tells("""for a charger that always reports this: not 0 while the robot stands where it can
+        be charged. There is no power while the signal is 0, and no reading without its frame."""),
     ] = None
     at_height: Annotated[
         Signal | None,
-        tells("""not 0 while the charger's moving pad is in its charging position. While it is 0
-        there is no power; without its frame there is no reading."""),
+        tells("""not 0 while the charger's moving pad is in its charging position. There is no power
+        while the signal is 0, and no reading without its frame."""),
     ] = None
     temperatures: Annotated[
         dict[Name, Signal],
         tells("name -> a temperature's signal (°C), for status and diagnostics."),
     ] = {}
-    rules: Annotated[list[Rule], tells("derive the state from other signals; before codes.")] = []
+    rules: Annotated[list[Rule], tells("the state by other signals; tried before codes.")] = []
     errors: Annotated[StationErrors, tells("signals that mean an error in any state.")] = (
         StationErrors()
     )
@@ -161,7 +168,10 @@ class FrameMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     def _wake_problems(self, found: Frames, path: tuple[str, ...], wake: Wake) -> Remarks:
         """Yield a problem for a wake frame that `send` has too, or that cannot be encoded."""
         if wake.frame in (sent.frame for sent in self.send):
-            yield (*path, "frame"), f"{wake.frame} is in send: what wakes a charger must not charge"
+            yield (
+                (*path, "frame"),
+                f"{wake.frame} is in send: a frame that wakes a charger must not start a charge",
+            )
         lacks = list(_lacks(found, (*path, "frame"), wake.frame))
         for signal in wake.says if not lacks else ():
             lacks += _lacks(found, (*path, "says", signal), wake.frame, signal)
@@ -236,7 +246,7 @@ def tables(found: FrameMap, setpoints: Mapping[str, float]) -> Iterator[Table]:
     """Yield the frames as bytes, to compare with `candump`: sent frames, and samples of read frames."""
     frames = dbc.load(found.dbc)
     sent = [_sent(frames, sent, on, setpoints) for sent in found.send for on in (True, False)]
-    woken = [_row(frames, w.frame, "it is silent", w.every_s, w.says) for w in found.wake]
+    woken = [_row(frames, w.frame, "charger silent", w.every_s, w.says) for w in found.wake]
     yield Table(
         "frames that are sent",
         ("frame", "id", "while", "every", "bytes", "says"),

@@ -53,7 +53,9 @@ class CanOpenChargerSettings(
     """One receiver."""
 
     node: Annotated[
-        int, msgspec.Meta(ge=1, le=127), tells("its CANopen node id; the maker's default is 10.")
+        int,
+        msgspec.Meta(ge=1, le=127),
+        tells("the receiver's CANopen node id; the maker's default is 10."),
     ]
     heartbeat: Annotated[
         Literal["required", "none"], tells("`none` for old firmware, which sends no heartbeat.")
@@ -83,7 +85,9 @@ def warnings(settings: CanOpenChargerSettings) -> Remarks:
     """Yield valid settings that deserve a second look: (path, text)."""
     found = list(xnergy.warnings(settings, "CAN"))
     if settings.heartbeat == "none":
-        found.append((("heartbeat",), "without it the restart of a receiver is not noticed"))
+        found.append(
+            (("heartbeat",), "without a heartbeat the restart of a receiver is not noticed")
+        )
     return sorted(found)
 
 

@@ -38,7 +38,7 @@ class Dbc:
         }
 
     def frames(self) -> list[str]:
-        """Return the names of its frames."""
+        """Return the names of the file's frames."""
         return list(self._messages)
 
     def signals(self, frame: str) -> list[str]:
@@ -89,7 +89,9 @@ class Dbc:
         return -math.inf if low is None else low, math.inf if high is None else high
 
     def sample(self, frame: str, signal: str, value: float) -> bytes | None:
-        """Encode a frame with this value in one signal, 0 in the others; None where impossible."""
+        """Encode a frame with this value in one signal and 0 in all other signals; None if
+        impossible.
+        """
         from cantools.database.errors import Error
 
         message = self._messages[frame]

@@ -1,4 +1,4 @@
-"""A charging station on dry contacts: a relay enables it, contacts show what it does.
+"""A charging station on dry contacts: a relay enables charging, contacts show the station's state.
 
 They are on the GPIO header or on a Modbus I/O module (coils and discrete inputs). The relay is off
 whenever the daemon does not run, so a charge ends with the daemon.
@@ -30,8 +30,8 @@ from drivers.unsafe import Unsafe, needlessly_accepted, unaccepted, unsafe_wires
 CUT_MUST_READ: Final = {
     "fault": (True, "a fault of the station is not seen"),
     "ready": (False, "a station that is not ready reads ready"),
-    "at_height": (False, "a pad that is down reads at its height, and is energised"),
-    "range_ok": (False, "a robot that stands badly reads in range, and is energised"),
+    "at_height": (False, "a lowered pad reads as raised, and is energised"),
+    "range_ok": (False, "a badly placed robot reads in range, and is energised"),
 }
 """Signal -> (the safe level of a cut wire, the consequence of the other level)."""
 ENABLE: Final = "enable"
@@ -42,13 +42,13 @@ class ChargerInputWiring(msgspec.Struct, frozen=True, kw_only=True, forbid_unkno
 
     charging: Annotated[Input, tells("current flows, also while it ramps down.")]
     ready: Annotated[
-        Input | None, tells("the station can charge the next robot: always, without this contact.")
+        Input | None, tells("the station can charge the next robot; without this contact, always.")
     ] = None
     fault: Annotated[Input | None, tells("the station is out of order.")] = None
     at_height: Annotated[
         Input | None,
-        tells("""the pad, which the station moves, is where it charges. Without it there is no
-        power; it is a fault if it is lost while current flows."""),
+        tells("""the station's moving pad is in its charging position. Without this signal there is
+        no power; a loss of the signal while current flows is a fault."""),
     ] = None
     range_ok: Annotated[
         Input | None, tells("the robot stands where it can be charged. If not, there is no power.")
@@ -73,9 +73,9 @@ class DryContactChargerSettings(
         """Yield problems that involve more than one field."""
         yield from super().problems()
         if self.on_death == "keep":
-            yield ("on_death",), "its relay is off without the daemon: leave this out"
+            yield ("on_death",), "without the daemon the relay is off: delete on_death"
         if self.receivers:
-            yield ("receivers",), "contacts show no receiver's id: leave this out"
+            yield ("receivers",), "contacts show no receiver's id: delete receivers"
         yield from unaccepted(_unsafe(self), self.accept_unsafe)
 
 
@@ -90,7 +90,7 @@ def _unsafe(settings: DryContactChargerSettings) -> Iterator[Unsafe]:
 
 
 def tables(settings: DryContactChargerSettings) -> Iterator[Table]:
-    """Yield the meanings of the contacts together, also with a cut wire, and the relay's drive."""
+    """Tabulate each combination of contacts, with its readings after a cut, and the relay's drive."""
     table = {wire.signal: wire for wire in wires(settings) if wire.direction == "in"}
     rows = []
     for on in itertools.product((False, True), repeat=len(table)):
@@ -117,7 +117,10 @@ def warnings(settings: DryContactChargerSettings) -> Remarks:
             text = "contacts of a charger are not debounced: the next scan corrects a bounce"
             yield (*wire.path, "debounce_s"), f"{text}; leave this out"
         if wire.signal == "charging" and wire.broken_reads() is not True:
-            yield wire.path, "a cut wire reads as no charge: look at it where a charge never begins"
+            yield (
+                wire.path,
+                "a cut wire reads as no charge: check the wire if a charge never begins",
+            )
     if settings.inputs.fault is None:
         yield ("inputs",), "without a fault contact a station that is out of order reads idle"
     yield from needlessly_accepted(_unsafe(settings), settings.accept_unsafe)

@@ -39,13 +39,14 @@ class HttpChargerSettings(ChargerSettings, frozen=True, kw_only=True, forbid_unk
         Codes | None, tells("the meanings of the maker's state numbers; not needed with `rules`.")
     ] = None
     rules: Annotated[
-        list[Rule], tells("derive the state from other fields of the answer; tried before `codes`.")
+        list[Rule], tells("the state by other fields of the answer; tried before `codes`.")
     ] = msgspec.field(default_factory=list)
     errors: Annotated[StationErrors, tells("fields that mean an error, whatever the state is.")] = (
         StationErrors()
     )
     state_words: Annotated[
-        dict[Word, Code], tells("word -> its number in `codes`, where the states are words.")
+        dict[Word, Code],
+        tells("word -> its number in `codes`, for a station that names its states."),
     ] = msgspec.field(default_factory=dict)
     state_path: Annotated[http.Path, tells("the path that GET reads the state from.")] = "/state"
     fields: Annotated[Fields, tells("the fields of that answer.")] = Fields()
@@ -79,14 +80,14 @@ class HttpChargerSettings(ChargerSettings, frozen=True, kw_only=True, forbid_unk
         yield from _place_problems(self)
         yield from _timer_problems(self)
         if self.receivers and self.fields.receiver_id is None:
-            text = "receivers needs it: where does the station say whose receiver it sees?"
+            text = "receivers needs the field with the id of the receiver that the station sees"
             yield ("fields", "receiver_id"), text
         if self.start and not self.stop:
             yield ("start",), "needs stop as well: a charge that cannot be stopped is not started"
         if self.range_check and self.fields.in_range is None:
-            yield ("fields", "in_range"), "range_check needs it: where is its result?"
+            yield ("fields", "in_range"), "range_check needs the field with the check's result"
         if self.on_death == "keep" and self.stop is None:
-            yield ("on_death",), "this station cannot be stopped: leave this out"
+            yield ("on_death",), "this station cannot be stopped: delete on_death"
 
 
 def _place_problems(settings: HttpChargerSettings) -> Remarks:
@@ -101,13 +102,16 @@ def _timer_problems(settings: HttpChargerSettings) -> Remarks:
     """Yield problems with the timer of a relay: only the timer can act when the network is gone."""
     timer = settings.switches_off_after_s
     if timer and not settings.start:
-        yield ("switches_off_after_s",), "is set by start: give it, or leave this out"
+        yield (
+            ("switches_off_after_s",),
+            "start sets this timer: give start, or delete switches_off_after_s",
+        )
     if timer and settings.on_death == "keep":
-        yield ("on_death",), "it switches off when it is not told again: leave this out"
+        yield ("on_death",), "the station switches off when start is not repeated: delete on_death"
     if settings.start and settings.codes is None and timer is None:
         text = (
-            "when the network dies nothing switches the power off: have start set the relay's own"
-            " timer, and write that as switches_off_after_s"
+            "when the network dies nothing switches the power off: let start set the relay's own"
+            " timer, and write its time as switches_off_after_s"
         )
         yield from unaccepted([(POWER, ("switches_off_after_s",), text)], settings.accept_unsafe)
 
@@ -155,8 +159,8 @@ def warnings(settings: HttpChargerSettings) -> Remarks:
     """Yield (path, text) for missing abilities, and for settings that deserve a second look."""
     missing = [name for name in ("receiver_id", "stop") if _lacks(settings, name)]
     consequences = {
-        "receiver_id": "the robot on the pad is not verified, a robot at the wrong station is not"
-        " refused",
+        "receiver_id": "the robot on the pad is not verified, and a robot at the wrong station is"
+        " not refused",
         "stop": "power is not switched off after a fault",
     }
     if missing:
@@ -164,12 +168,15 @@ def warnings(settings: HttpChargerSettings) -> Remarks:
         what = ", and ".join(consequences[name] for name in missing)
         yield (), f"{sort}without {' and '.join(missing)}, {what}"
     if not _lacks(settings, "receiver_id") and not settings.receivers:
-        yield ("fields",), "receiver_id is read, but without receivers nobody is verified"
+        yield ("fields",), "receiver_id is read, but without receivers no robot is verified"
     off_s = settings.switches_off_after_s
     if settings.start and off_s is not None and (text := timer_unseen(settings.start, off_s)):
         yield ("start", "path"), text
     if settings.codes and not settings.codes.error:
-        yield ("codes",), "no code means error: each of them will be shown as an unknown state"
+        yield (
+            ("codes",),
+            "no code is listed as an error: an error will be shown as an unknown state",
+        )
 
     known = settings.codes.meanings() if settings.codes else {}
     for word, code in settings.state_words.items():
@@ -230,8 +237,8 @@ class HttpCharger:
     def write(self, outputs: ChargerOutputs) -> None:
         """Set the power, off first.
 
-        A clear or a range check is sent once, even if its answer is lost: it counts as done before it
-        is sent.
+        A clear or a range check is sent once, even if its answer is lost, because it counts as done
+        before sending.
         """
         if outputs.power is False:
             self._stop_if_needed()

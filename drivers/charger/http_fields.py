@@ -30,9 +30,9 @@ class JsonNumber(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
 class Fields(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """The fields of the answer to `state_path`: names with dots between them."""
 
-    state: Annotated[Field, tells("the station's state; `codes` says what it means.")] = "state"
+    state: Annotated[Field, tells("the station's state; `codes` has the meanings.")] = "state"
     error_text: Annotated[
-        Field, tells("the station's text for an error: any text means one, in any state.")
+        Field, tells("the station's text for an error: any text means an error, in any state.")
     ] = "error_msg"
     error_texts: Annotated[
         dict[Word, TextMeans],
@@ -40,23 +40,27 @@ class Fields(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
         means no error (`OK`). For other texts `codes` gives the side, if it can."""),
     ] = {}
     receiver_id: Annotated[
-        Field | None, tells('the id of the receiver that it sees; null or "" when it sees none.')
+        Field | None, tells('the id of the receiver on the pad; null or "" without a receiver.')
     ] = None
-    in_range: Annotated[JsonFlag | None, tells("the robot stands where it can be charged.")] = None
+    in_range: Annotated[JsonFlag | None, tells("the robot stands where charging is possible.")] = (
+        None
+    )
     range_ok: Annotated[
         JsonFlag | None,
-        tells("""whether the robot stands where it can be charged, if the station says so all the
-        time: without it there is no power."""),
+        tells("""the robot stands where it can be charged; for a station that always reports this.
+        Unless the flag is true there is no power."""),
     ] = None
     at_height: Annotated[
         JsonFlag | None,
-        tells("""whether a pad that the station moves is where it charges: without it there is no
-        power, and a fault if it is lost while current flows."""),
+        tells("""the station's moving pad is in its charging position. Unless the flag is true there
+        is no power; a loss of the flag while current flows is a fault."""),
     ] = None
     volts: Annotated[JsonNumber | None, tells("the voltage at the battery.")] = None
     amps: Annotated[JsonNumber | None, tells("the current into the battery.")] = None
     battery_percent: Annotated[JsonNumber | None, tells("the battery's charge, 0 to 100.")] = None
-    time_to_full_s: Annotated[JsonNumber | None, tells("the time until it is full (s).")] = None
+    time_to_full_s: Annotated[
+        JsonNumber | None, tells("the time until the battery is full (s).")
+    ] = None
     temperatures: Annotated[
         dict[Name, JsonNumber],
         tells("name -> a temperature (°C), shown in status and diagnostics."),
@@ -113,7 +117,7 @@ class Fields(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
 def _number(
     answer: Answer, number: JsonNumber | None, most: float = math.inf, bounds: str = ""
 ) -> float | None:
-    """Return the value in our unit, from 0 to `most` where it has `bounds`. Raises DriverError."""
+    """Return the value in our unit. Raises DriverError, also for a value beyond its bounds."""
     value = json_fields.number(answer, number.field, number.scale) if number else None
     if number and value is not None and bounds and not 0 <= value <= most:
         raise json_fields.wrong(number.field, value, bounds)

@@ -35,7 +35,7 @@ PLACES: Final[Mapping[str, str]] = {
 class ModbusChargerSettings(ChargerSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """One receiver."""
 
-    unit: Annotated[Unit, tells("its Modbus unit id; the maker's default is 16.")]
+    unit: Annotated[Unit, tells("the receiver's Modbus unit id; the maker's default is 16.")]
 
 
 def points(settings: ModbusChargerSettings) -> dict[str, Point]:
@@ -44,7 +44,7 @@ def points(settings: ModbusChargerSettings) -> dict[str, Point]:
 
 
 def claims(settings: ModbusChargerSettings) -> Iterator[tuple[str, tuple[str, ...]]]:
-    """Yield (place, path) of its coils, which no other device may use."""
+    """Yield (place, path) of the receiver's coils, which no other device may use."""
     for name in (xnergy.ENABLE, xnergy.CHECK_RANGE):
         yield str(points(settings)[name]), ("unit",)
 

@@ -1,7 +1,7 @@
 """A charging station of any make on Modbus registers, described by a register map.
 
-Power is a level: the driver writes the level while the station shows a different one. The driver writes
-nothing when the daemon starts, so a restart does not end a charge.
+Power is a level: the driver writes the wanted level while the station shows a different level. The
+driver writes nothing when the daemon starts, so a restart does not end a charge.
 """
 
 from collections.abc import Iterator, Mapping
@@ -30,7 +30,7 @@ class RegisterChargerSettings(
 ):
     """One station."""
 
-    unit: Annotated[Unit, tells("its Modbus unit id.")]
+    unit: Annotated[Unit, tells("the station's Modbus unit id.")]
     profile: Annotated[
         Name | None, tells("the name of a file in drivers/profiles/ that holds the map.")
     ] = None
@@ -48,14 +48,14 @@ class RegisterChargerSettings(
         if before:
             return
         if self.receivers and "receiver" not in charger_map(self).values:
-            text = "the map needs the value receiver: whose receiver does the station see?"
+            text = "the map needs the value receiver: the id of the receiver that the station sees"
             yield ("receivers",), text
         if self.on_death == "keep" and not self.can_stop():
-            yield ("on_death",), "this station cannot be stopped: leave this out"
+            yield ("on_death",), "this station cannot be stopped: delete on_death"
 
 
 def charger_map(settings: RegisterChargerSettings) -> ChargerMap:
-    """Return the map in the YAML, or else the profile's."""
+    """Return the YAML's map, or else the profile's map."""
     return PROFILE.chosen(settings.profile, settings.map)
 
 
@@ -66,7 +66,7 @@ def cells(settings: RegisterChargerSettings) -> dict[str, list[Point]]:
 
 
 def orders(settings: RegisterChargerSettings) -> dict[str, Point]:
-    """Return order -> the place that it is written to."""
+    """Return order -> the place where the order is written."""
     return {n: at(settings.unit, text) for n, text in charger_map(settings).orders().items()}
 
 
@@ -112,9 +112,9 @@ def warnings(settings: RegisterChargerSettings) -> Remarks:
     yield from PROFILE.warnings(settings.profile, "watch the first charge")
     found = charger_map(settings)
     if found.power is None:
-        yield (), "observe-only: the map has no power, so it is not switched off after a fault"
+        yield (), "observe-only: the map has no command power, so no fault switches the station off"
     elif not found.power.read_back:
-        yield (), "power cannot be read back: that it was taken away is not verified"
+        yield (), "the command power cannot be read back: switching off is not verified"
     if not settings.receivers:
         yield (), "without receivers the robot on the pad is not verified"
 
@@ -180,7 +180,7 @@ class RegisterCharger:
                     raise DriverError(f"{point} is not off after {command.stop} was written")
 
     def close(self) -> None:
-        """Do what `make_safe` does, if the power was ever written and may be on. Does not raise."""
+        """Make the station safe, if the power was ever written and may be on. Does not raise."""
         if self._touched and self._power is not False:
             self._bus.insist()
             try:

@@ -24,16 +24,16 @@ KNOWN: Final = ("state", "receiver", "in_range", "range_ok", "at_height", *MEASU
 class RegisterNumber(Placed, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """One value of the station."""
 
-    words: Annotated[Literal[1, 2], tells("how many registers it takes: 2 for 32 bits.")] = 1
+    words: Annotated[Literal[1, 2], tells("the number of registers: 2 for 32 bits.")] = 1
     low_first: Annotated[bool, tells("the first of the two registers holds the low word.")] = False
-    signed: Annotated[bool, tells("it is signed (two's complement).")] = False
-    bit: Annotated[LongBit | None, tells("only this bit of it; 0 is the least significant.")] = None
+    signed: Annotated[bool, tells("the number is signed (two's complement).")] = False
+    bit: Annotated[LongBit | None, tells("only this bit of the number; 0 is the least.")] = None
     scale: Annotated[
         float, tells("the factor from the maker's unit to ours (0.1 for tenths of an ampere).")
     ] = 1.0
 
     def problems(self) -> Remarks:
-        """Yield problems: an invalid place; options that do not fit its table or width."""
+        """Yield problems: an invalid place; options that do not fit the place's table or width."""
         yield from super().problems()
         of_registers = (self.words, self.signed, self.bit) != (1, False, None)
         if of_registers and self.is_in("coil", "discrete input"):
@@ -45,7 +45,7 @@ class RegisterNumber(Placed, frozen=True, kw_only=True, forbid_unknown_fields=Tr
             yield ("low_first",), "is for two registers: words: 2"
 
     def places(self) -> list[str]:
-        """Return its registers, the high word's first."""
+        """Return the number's registers, the high word's first."""
         table, address = place(self.at)
         found = [f"{table} {address + n}" for n in range(self.words)]
         return found[::-1] if self.low_first else found
@@ -74,10 +74,10 @@ class Power(WrittenLevels, frozen=True, kw_only=True, forbid_unknown_fields=True
     ON = "start"
     OFF = "stop"
 
-    start: Annotated[Word, tells("the value that lets it charge.")]
-    stop: Annotated[Word, tells("the value that keeps it from charging.")]
+    start: Annotated[Word, tells("the value that lets the station charge.")]
+    stop: Annotated[Word, tells("the value that keeps the station from charging.")]
     read_back: Annotated[
-        bool, tells("false where it can only be written; then it is written in every scan.")
+        bool, tells("false where the command can only be written; then every scan writes it.")
     ] = True
 
 
@@ -94,29 +94,27 @@ class ChargerMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
         dict[Name, RegisterNumber],
         msgspec.Meta(min_length=1),
         tells("""name -> its place. `state` is the number that `codes` lists; `volts`, `amps`,
-        `battery_percent` and `time_to_full_s` are shown; `receiver` is the id of the receiver that
-        it sees, 0 for none; `in_range` is not 0 while a robot stands where it can be charged.
-        `range_ok` is the same where the station needs no check for it, and `at_height` is not 0
-        while a pad that it moves is where it charges: while one of these is 0 there is no power.
-        Rules and errors may use any name."""),
+        `battery_percent` and `time_to_full_s` are shown; `receiver` is the id of the receiver on
+        the pad, 0 for none; `in_range` is not 0 while a robot stands where it can be charged.
+        `range_ok` is the same for a station that reports it without a range check; `at_height` is
+        not 0 while the station's moving pad is in its charging position. While `range_ok` or
+        `at_height` is 0 there is no power. Rules and errors may use any name."""),
     ]
     codes: Annotated[
         Codes | None, tells("the meanings of `state`'s numbers; not needed with `rules`.")
     ] = None
-    rules: Annotated[
-        list[Rule], tells("derive the state from other `values`; tried before `codes`.")
-    ] = []
+    rules: Annotated[list[Rule], tells("the state by other `values`; tried before `codes`.")] = []
     temperatures: Annotated[
         dict[Name, Name],
         tells("name -> the value that is this temperature (°C), shown in status and diagnostics."),
     ] = {}
-    errors: Annotated[
-        StationErrors, tells("those of `values` that mean an error in any state.")
-    ] = StationErrors()
+    errors: Annotated[StationErrors, tells("the `values` that mean an error in any state.")] = (
+        StationErrors()
+    )
     power: Annotated[
-        Power | None, tells("lets it charge; without it the station is only observed.")
+        Power | None, tells("lets the station charge; without this it is only observed.")
     ] = None
-    clear_error: Annotated[Order | None, tells("the command that clears its error.")] = None
+    clear_error: Annotated[Order | None, tells("the command that clears an error.")] = None
     range_check: Annotated[
         Order | None,
         tells("orders a check of the robot's position, if the station needs an order."),
@@ -139,7 +137,7 @@ class ChargerMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
                 text = unknown("value", name, KNOWN)
                 yield ("values", name), f"{text}; rules and errors do not use it either"
         if self.range_check and "in_range" not in self.values:
-            yield ("range_check",), "needs the value in_range: where is its result?"
+            yield ("range_check",), "needs the value in_range, for the check's result"
 
     def orders(self) -> Mapping[str, str]:
         """Return command -> its place, for each given command."""

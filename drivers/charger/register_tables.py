@@ -24,7 +24,7 @@ SAMPLES: Final = {
 
 
 def samples(found: ChargerMap, cells: Mapping[str, list[Point]]) -> Table:
-    """Tabulate each value of the map. `cells`: its registers, or its coil or discrete input."""
+    """Tabulate each value of the map. `cells`: value -> its registers, coil or discrete input."""
     rows = (
         (name, " and ".join(map(str, points)), _held(found.values[name], points, value), means)
         for name, points in cells.items()

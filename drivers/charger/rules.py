@@ -20,7 +20,7 @@ Read = Callable[[str], object]
 """Returns the value at a place; raises DriverError if there is none."""
 Meaning = tuple[Activity, FaultSide]
 Found = list[tuple[FaultSide, str]]
-"""Errors: the side of each, and its text."""
+"""Errors, each with its side and its text."""
 
 MEANINGS: Final[Mapping[str, Meaning]] = {
     **{str(a): (a, "") for a in Activity if a is not Activity.UNKNOWN},
@@ -81,7 +81,7 @@ class Rule(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
 
 
 class ErrorNumber(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """An error as one number. An unlisted number is shown as it is."""
+    """An error as one number. An unlisted number is shown as a number."""
 
     at: Annotated[Name, tells("its place.")]
     well: Annotated[tuple[int, ...], tells("the numbers that mean no error.")] = (0,)
@@ -93,12 +93,12 @@ class ErrorNumber(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     def problems(self) -> Remarks:
         """Yield a problem for each number with two meanings."""
         for number in self.station.keys() & self.robot.keys():
-            yield ("robot", str(number)), f"{number} is a fault of the station already"
+            yield ("robot", str(number)), f"{number} is already a fault of the station"
         for number in {*self.station, *self.robot}.intersection(self.well):
-            yield ("well",), f"{number} is an error as well"
+            yield ("well",), f"{number} is already an error"
 
     def errors(self, value: object) -> Found:
-        """Return the error for this number; none for a number of `well`."""
+        """Return the error for this number; no error for a number in `well`."""
         if not isinstance(value, int | float) or value in self.well:
             return [] if isinstance(value, int | float) else [("", f"error {value}")]
         sides: tuple[tuple[FaultSide, Mapping[int, str]], ...] = (
@@ -124,7 +124,7 @@ class ErrorBits(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
     def problems(self) -> Remarks:
         """Yield a problem for each bit with two meanings."""
         for bit in self.station.keys() & self.robot.keys():
-            yield ("robot", str(bit)), f"bit {bit} is a fault of the station already"
+            yield ("robot", str(bit)), f"bit {bit} is already a fault of the station"
 
     def errors(self, value: object) -> Found:
         """Return the errors of the set bits: the station's first, the robot's last."""
@@ -149,7 +149,7 @@ class StationErrors(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
     bits: Annotated[list[ErrorBits], tells("errors as the bits of a flag byte or word.")] = []
 
     def found(self, read: Read) -> Found:
-        """Return all present errors, the station's first; None is unknown and means no error."""
+        """Return all present errors, the station's first. A value of None is unknown: no error."""
         sides: tuple[tuple[FaultSide, Mapping[str, str]], ...] = (
             ("station", self.station),
             ("robot", self.robot),
@@ -186,9 +186,10 @@ def judge(rules: list[Rule], read: Read) -> Rule | None:
 
 
 class JudgedState(msgspec.Struct, frozen=True):
-    """The station's activity, the side of an error, the state's code for texts, and the errors.
+    """The station's activity, the side of its error, its state's code (for texts), and its errors'
+    text.
 
-    `does`: the activity beneath an error.
+    `does`: the activity by the state alone. `activity` is ERROR whenever there is an error.
     """
 
     activity: Activity
@@ -280,17 +281,17 @@ def rows(rules: list[Rule], errors: StationErrors) -> Iterator[tuple[str, str]]:
 def problems(rules: list[Rule], has_codes: bool) -> Remarks:
     """Yield problems: rules that are never reached; no state. Paths are below the station."""
     if not rules and not has_codes:
-        yield ("codes",), "needs codes (what the maker's state numbers mean), or rules"
+        yield ("codes",), "needs codes (the meanings of the maker's state numbers), or rules"
     for n, rule in enumerate(rules[:-1]):
         if not rule.when:
             yield (
                 ("rules", str(n)),
-                f"rule {n + 1} always holds: the rules below it are never asked",
+                f"rule {n + 1} always holds: the rules after it are never tried",
             )
             return
     means = {rule.means for rule in rules}
     if rules and not has_codes and not {"idle", "charging"} <= means:
-        yield ("rules",), "must say what is idle and what is charging"
+        yield ("rules",), "needs a rule for idle and a rule for charging"
 
 
 def said(found: Found) -> str:

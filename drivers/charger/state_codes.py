@@ -31,12 +31,12 @@ class Codes(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     released: Annotated[list[Code], tells("disconnected, not ready for another robot yet.")] = []
     error: Annotated[
         list[Code],
-        tells("out of service, also by hand; with `robot_error`, errors of the station."),
+        tells("out of service, also by hand. With `robot_error`, only the station's errors."),
     ] = []
     station_error: Annotated[
         list[Code],
-        tells("""out of service by an error that the maker assigns to the station; if given, `error`
-        may be of either side."""),
+        tells("""out of service by an error that the maker assigns to the station. With this key,
+        errors of either side may be in `error`."""),
     ] = []
     robot_error: Annotated[
         list[Code], tells("an error of the robot's side: the station itself is well.")
@@ -56,8 +56,9 @@ class Codes(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
         return made
 
     def unnamed_side(self, code: object) -> FaultSide:
-        """Return the side of an error number that nothing else gives a side: the station, if the
-        robot's errors have numbers of their own."""
+        """Return the side of an error number without a stated side: the station if only `robot_error`
+        is given, else "".
+        """
         told_apart = self.robot_error and not self.station_error
         return "station" if told_apart and code in self.error else ""
 
@@ -90,6 +91,8 @@ class Codes(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
 
 
 def first_side(sides: Collection[FaultSide]) -> FaultSide:
-    """Return the side of an error with several sources: the station if any says so, else the robot."""
+    """Return the side of an error with several sources: the station if any source names the station,
+    else the robot.
+    """
     known: tuple[FaultSide, ...] = ("station", "robot")
     return next((side for side in known if side in sides), "")

@@ -89,7 +89,7 @@ ERROR_BITS: Final[Mapping[int, tuple[FaultSide, str]]] = {
 """The bits of the 32-bit error number, whose upper half is the high word."""
 
 IN_RANGE: Final = 1
-"""The range check's result for a robot in range. Others: 0 under way, 2 out of range, 240 failed."""
+"""The range check's result for a robot in range (0: under way, 2: out of range, 240: failed)."""
 
 
 def activity(code: int) -> Activity:
@@ -143,7 +143,7 @@ def error_number(words: Words) -> int:
 
 
 def _text(words: Words, found: list[tuple[FaultSide, str]]) -> str:
-    """Return the errors' texts; an error of another side than the first has its side before it."""
+    """Return the errors' texts, each with its side if that differs from the first error's side."""
     if found:
         main = found[0][0]
         return "; ".join(
@@ -166,7 +166,7 @@ def _units(word: int | None) -> float | None:
 # ---- starting and stopping
 
 RANGE_SETTLE_S: Final = 1.0
-"""The time after a range check until its result is valid (s); before, the last result is read."""
+"""The time after a range check until its result is valid (s); until then the last result is read."""
 
 
 class Written(Struct, frozen=True):
@@ -198,8 +198,8 @@ def steer(
 ) -> tuple[Written, Orders]:
     """Return the commands for state `code`, after the new `Written`, valid once they are written.
 
-    A start and a range check are written only in state idle, each once. A stop is written once, and
-    repeated while the receiver still charges. `power` None writes neither start nor stop.
+    A start and a range check are written only in state idle, each once. A stop is written again while
+    the receiver still charges. `power` None writes neither start nor stop.
     """
     ask = outputs.range_checks != written.range_checks
     if ask and code == IDLE:
@@ -287,7 +287,7 @@ class Receiver:
             self._enable(False)
 
     def close(self) -> None:
-        """Do what `make_safe` does, if the receiver was ever driven and may be on. Does not raise."""
+        """Make the receiver safe, if it was ever driven and may be on. Does not raise."""
         if self._touched and self._written.enabled is not False:
             self._wire.insist()
             try:
@@ -332,4 +332,4 @@ def warnings(settings: ChargerSettings, wire: str) -> Remarks:
     name = "an RCU rides on a robot and is no station"
     yield (), f"{name}: the device is named after the waypoint where that robot charges"
     if settings.receivers:
-        yield ("receivers",), "this controller tells no receiver's id: it will charge nobody"
+        yield ("receivers",), "this controller gives no receiver's id: no robot will be charged"

@@ -40,9 +40,9 @@ class DoorInputWiring(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_
     opened: Annotated[Input | None, tells("the door is fully open, by its limit contact.")] = None
     closed: Annotated[Input | None, tells("the door is closed, by its limit contact.")] = None
     obstruction: Annotated[
-        Input | None, tells("somebody is in the doorway: a hold lasts until it is clear.")
+        Input | None, tells("somebody is in the doorway: a hold lasts until the doorway is clear.")
     ] = None
-    fire: Annotated[Input | None, tells("the fire alarm; `on_fire` says what it does.")] = None
+    fire: Annotated[Input | None, tells("the fire alarm; `on_fire` sets its effect.")] = None
 
 
 class Hold(Output, frozen=True, forbid_unknown_fields=True):
@@ -75,10 +75,13 @@ class DryContactDoorSettings(DoorSettings, frozen=True, kw_only=True, forbid_unk
         if self.inputs.fire and self.on_fire is None:
             yield (
                 ("inputs", "fire"),
-                "say what a fire alarm does: on_fire: open, or on_fire: release",
+                "give the effect of a fire alarm: on_fire: open, or on_fire: release",
             )
         if self.on_fire and self.inputs.fire is None:
-            yield ("on_fire",), "there is no fire input; wire one under inputs, or leave this out"
+            yield (
+                ("on_fire",),
+                "there is no fire input; wire a fire input under inputs, or delete on_fire",
+            )
         yield from self._flash_problems()
         yield from unaccepted(_unsafe(self), self.accept_unsafe)
 
@@ -96,10 +99,10 @@ class DryContactDoorSettings(DoorSettings, frozen=True, kw_only=True, forbid_unk
         missing = [s for s in ("opened", "closed") if getattr(self.inputs, s) is None]
         if self.feedback == "sensors":
             for signal in missing:
-                text = f"needs '{signal}'; without that contact say feedback: estimated"
+                text = f"needs '{signal}'; without that contact write feedback: estimated"
                 yield ("inputs",), text
         elif not missing:
-            yield ("feedback",), "both limit contacts are wired: leave feedback out"
+            yield ("feedback",), "both limit contacts are wired: delete feedback"
 
 
 def wires(settings: DryContactDoorSettings) -> list[Wire]:
@@ -134,12 +137,12 @@ def warnings(settings: DryContactDoorSettings) -> Remarks:
         if wire.signal == "closed" and wire.broken_reads() is not False:
             yield (
                 wire.path,
-                "a cut wire may read as a closed door; wire a contact that shuts with it",
+                "a cut wire may read as a closed door; wire a contact that the door closes",
             )
     yield from slow_alarms(w for w in wires(settings) if w.signal in ("fire", "obstruction"))
     yield from needlessly_accepted(_unsafe(settings), settings.accept_unsafe)
     if settings.feedback == "estimated":
-        yield ("feedback",), "RMF is told OPEN or CLOSED by the clock, whatever the door does"
+        yield ("feedback",), "OPEN and CLOSED for RMF follow the clock, whatever the door does"
 
 
 def create(name: str, settings: DryContactDoorSettings, bus: PointsBus) -> "DryContactDoor":

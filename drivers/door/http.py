@@ -32,9 +32,10 @@ class DoorInputFields(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_
     opened: Annotated[JsonFlag | None, tells("the door is fully open.")] = None
     closed: Annotated[JsonFlag | None, tells("the door is closed.")] = None
     obstruction: Annotated[
-        JsonFlag | None, tells("somebody is in the doorway: a hold lasts until it is clear.")
+        JsonFlag | None,
+        tells("somebody is in the doorway: a hold lasts until the doorway is clear."),
     ] = None
-    fire: Annotated[JsonFlag | None, tells("the fire alarm; `on_fire` says what it does.")] = None
+    fire: Annotated[JsonFlag | None, tells("the fire alarm; `on_fire` sets its effect.")] = None
 
 
 class HttpDoorSettings(DoorSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -43,7 +44,9 @@ class HttpDoorSettings(DoorSettings, frozen=True, kw_only=True, forbid_unknown_f
     state_path: Annotated[http.Path, tells("the path that GET reads the inputs from.")]
     inputs: Annotated[DoorInputFields, tells("the fields of that answer.")] = DoorInputFields()
     hold: Annotated[Call, tells("switches on the relay that holds the door open.")]
-    release: Annotated[Call, tells("switches it off, so that the door closes by its own rules.")]
+    release: Annotated[
+        Call, tells("switches this relay off, so that the operator closes the door.")
+    ]
     held: Annotated[
         JsonFlag | None, tells("the relay is on; without this field nothing proves that it is off.")
     ] = None
@@ -66,22 +69,22 @@ class HttpDoorSettings(DoorSettings, frozen=True, kw_only=True, forbid_unknown_f
         ]
         if self.feedback == "sensors":
             for signal in missing:
-                text = f"needs '{signal}'; where nothing says so, write feedback: estimated"
+                text = f"needs '{signal}'; without that input write feedback: estimated"
                 yield ("inputs",), text
         elif not missing:
-            yield ("feedback",), "both ends are read: leave feedback out"
+            yield ("feedback",), "both ends are read: delete feedback"
         if bool(self.inputs.fire) != bool(self.on_fire):
-            yield ("inputs",), "a fire input and on_fire go together: give both, or none"
+            yield ("inputs",), "a fire input and on_fire need each other: give both, or delete both"
         if self.hold == self.release:
-            yield ("release",), "is the command of hold"
+            yield ("release",), "is the same command as hold"
         yield from unaccepted(_unsafe(self), self.accept_unsafe)
 
 
 def _unsafe(settings: HttpDoorSettings) -> Iterator[Unsafe]:
     if settings.switches_off_after_s is None:
         text = (
-            "when the network dies nothing releases the door: have hold set the relay's own timer, and"
-            " write that as switches_off_after_s"
+            "when the network dies nothing releases the door: let hold set the relay's own timer, and"
+            " write its time as switches_off_after_s"
         )
         yield HOLD, ("hold",), text
 
@@ -117,17 +120,15 @@ def _renewed(settings: HttpDoorSettings, bus: http.HttpSettings) -> str:
 def warnings(settings: HttpDoorSettings) -> Remarks:
     """Yield valid settings to review before the door goes into service: (path, text)."""
     if settings.switches_off_after_s is not None:
-        text = (
-            "pull the network plug while the door is held, and see that it is released in this time"
-        )
+        text = "pull the network plug while the door is held: it must be released within this time"
         yield ("switches_off_after_s",), text
         if text := timer_unseen(settings.hold, settings.switches_off_after_s):
             yield ("hold", "path"), text
     yield from needlessly_accepted(_unsafe(settings), settings.accept_unsafe)
     if settings.held is None:
-        yield (), "held is not read: that the door was released is not verified"
+        yield (), "held is not read: a release of the door is not verified"
     if settings.feedback == "estimated":
-        yield ("feedback",), "RMF is told OPEN or CLOSED by the clock, whatever the door does"
+        yield ("feedback",), "OPEN and CLOSED for RMF follow the clock, whatever the door does"
 
 
 def create(name: str, settings: HttpDoorSettings, bus: InsistentCalls) -> "HttpDoor":

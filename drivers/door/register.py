@@ -1,7 +1,7 @@
 """A door operator that is read and commanded through Modbus registers.
 
 Its status is one number. The map lists the numbers for open, closed, moving and faults; an unlisted
-number is a fault too, because it leaves the door's position open. A position value, if there is one,
+number is a fault too, because the door's position is then unknown. A position value, if there is one,
 must agree with the status. The command holds the door open or releases it; nothing drives it shut.
 """
 
@@ -45,27 +45,30 @@ class RegisterDoorSettings(DoorSettings, frozen=True, kw_only=True, forbid_unkno
         before = list(PROFILE.problems(self.profile, self.map))
         yield from before
         if self.map and self.changes:
-            yield ("changes",), "is for a profile: change the map that is written here"
+            yield (
+                ("changes",),
+                "is for a profile: this device has a map of its own, so change the map",
+            )
         if not before and max(map(_address, door_map(self).places().values())) > (
             65535 - self.base_address
         ):
-            yield ("base_address",), "with it an address is beyond 65535, the last"
+            yield ("base_address",), "with this offset an address is above 65535, the last address"
         if self.feedback == "estimated":
-            yield ("feedback",), "the status says where the door is: leave feedback out"
+            yield ("feedback",), "the status gives the door's position: delete feedback"
         if self.on_fire:
-            yield ("on_fire",), "an operator on registers has no fire input: leave this out"
+            yield ("on_fire",), "an operator on registers has no fire input: delete on_fire"
 
 
 PROFILE: Final = Profile("door_register", "map", DoorMap)
 
 
 def door_map(settings: RegisterDoorSettings) -> DoorMap:
-    """Return the map in the YAML, or else the profile's."""
+    """Return the YAML's map, or else the profile's map."""
     return PROFILE.chosen(settings.profile, settings.map).changed(settings.changes)
 
 
 def points(settings: RegisterDoorSettings) -> dict[str, Point]:
-    """Return the place at this operator of each part of the map, by the part's name."""
+    """Return part -> its place at this operator, for each part of the map."""
     return {
         part: at(settings.unit, text, settings.base_address)
         for part, text in door_map(settings).places().items()
@@ -73,7 +76,7 @@ def points(settings: RegisterDoorSettings) -> dict[str, Point]:
 
 
 def claims(settings: RegisterDoorSettings) -> Iterator[tuple[str, tuple[str, ...]]]:
-    """Yield (place, path) of the command, exclusive to this device; none for an invalid map."""
+    """Yield (place, path) of the command, which no other device may use; nothing for an invalid map."""
     if any(PROFILE.problems(settings.profile, settings.map)):
         return
     place_of_command = door_map(settings).command.at
@@ -118,7 +121,7 @@ def warnings(settings: RegisterDoorSettings) -> Remarks:
     if not door_map(settings).command.read_back:
         written = _command_in(settings)
         path = (*written, "read_back") if written else ("profile",)
-        yield path, "the command cannot be read back: that the door was released is not verified"
+        yield path, "the command cannot be read back: a release of the door is not verified"
 
 
 def _command_in(settings: RegisterDoorSettings) -> tuple[str, ...]:

@@ -61,7 +61,8 @@ class OperatorFaults(InRegister, frozen=True, kw_only=True, forbid_unknown_field
     """The faults that the operator reports. They are shown only; no decision depends on them."""
 
     bits: Annotated[
-        dict[Bit, Name], tells("bit (0: least significant) -> fault; others are shown by number.")
+        dict[Bit, Name],
+        tells("bit (0: least significant) -> fault; other bits are shown by number."),
     ] = msgspec.field(default_factory=dict)
 
 
@@ -71,14 +72,14 @@ class HoldCommand(WrittenLevels, frozen=True, kw_only=True, forbid_unknown_field
     ON = "hold"
     OFF = "release"
 
-    hold: Annotated[Word, tells("the value that holds it open.")]
+    hold: Annotated[Word, tells("the value that holds the door open.")]
     release: Annotated[
-        Word, tells("the value that releases it, so that the operator closes it by its own rules.")
+        Word, tells("the value that releases the door, so that the operator closes it.")
     ]
     read_back: Annotated[
         bool,
-        tells("""false where the command can only be written; then it is written in every scan, and
-        nothing proves that the operator took it."""),
+        tells("""false where the command can only be written; then every scan writes the command, and
+        nothing proves that the operator accepted it."""),
     ] = True
 
 
@@ -89,7 +90,8 @@ class Parts(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     position: Annotated[DoorPosition | None, tells("the door's position.")] = None
     errors: Annotated[OperatorFaults | None, tells("the operator's faults.")] = None
     obstruction: Annotated[
-        RegisterBit | None, tells("somebody is in the doorway: a hold lasts until it is clear.")
+        RegisterBit | None,
+        tells("somebody is in the doorway: a hold lasts until the doorway is clear."),
     ] = None
     command: Annotated[HoldCommand | None, tells("the command that holds the door open.")] = None
 

@@ -2,8 +2,8 @@
 
 The file or folder is named after the bus `type:` of the YAML and holds a `BUS`. A Bus belongs to one
 thread. Every failure is a HalError, raised within the bus's I/O timeout. After a failure the bus backs
-off for 0.5 to 30 s, during which calls fail at once. So a dead device costs the others on its bus at
-most one timeout per backoff.
+off for 0.5 to 30 s, during which calls fail at once. So a dead device costs the other devices on its
+bus at most one timeout per backoff.
 """
 
 from collections.abc import Callable, Iterable, Sequence
@@ -96,15 +96,15 @@ class BusType(msgspec.Struct, Generic[Settings], frozen=True):
 
     `settings`: the struct below the bus's name in the YAML, with `scan_s` (the period of readings).
     `open_bus(settings)`: makes the bus, which sends nothing yet. Raises HalError.
-    `open_to_switch_off(settings)`: the same for a process that only switches off, if there is a bus
-    that is quicker to load; else None.
+    `open_to_switch_off(settings)`: makes a bus that is quicker to load, for a process that only
+    switches off; None without such a bus.
     `where(settings)`: its place in the building; None if files never share such a bus.
     `needs(settings)`: its needs of the machine, beside IP.
     `warnings(settings)`: (path, text) of legal settings that are worth a look. `fake`: the name of the
     module with the far side (`hal_fakes/fake.py`); without a name there is no simulation.
     `fake_inside`: the fake must run in the daemon's process, as for pins.
-    `unwatched(settings, places)`: remarks on those of `places`, written by the daemon, that keep their
-    value when its machine or the network dies.
+    `unwatched(settings, places)`: remarks on outputs at `places` that keep their value when the
+    daemon's machine or the network dies. The daemon writes all of `places`.
     `tables(settings)`: further facts for `check`, such as the values that are written to a watchdog.
     `paced(settings, devices, points)`: remarks on settings that are too slow for these devices on the
     bus, and for its canonical points in use.

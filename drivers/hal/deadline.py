@@ -159,7 +159,7 @@ class Dialler:
             found = answer.get(timeout=self.deadline.left())
         except queue.Empty:
             raise TimeoutError("the name's lookup takes too long") from None
-        self._lookup = None  # it has answered; its thread may need a moment more to end
+        self._lookup = None  # the lookup has answered; its thread may end a moment later
         if isinstance(found, OSError):
             raise found
         return found

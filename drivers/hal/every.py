@@ -1,4 +1,4 @@
-"""Tries several steps, all of them even when one fails."""
+"""Tries several steps: if a step fails, the next steps are still tried."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager

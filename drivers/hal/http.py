@@ -72,12 +72,13 @@ class HttpSettings(BusSettings, frozen=True, kw_only=True, forbid_unknown_fields
         Name | None, tells("a file with a bearer token or API key, which only the daemon may read.")
     ] = None
     token_header: Annotated[
-        Header | None, tells("its header (`X-API-Key`); `Authorization: Bearer …` when absent.")
+        Header | None,
+        tells("the token's header (`X-API-Key`); `Authorization: Bearer …` when absent."),
     ] = None
     ca_file: Annotated[
         AbsolutePath | None,
         tells("""with https, a PEM file with the certificate of the controller or of its authority;
-        the public authorities when absent."""),
+        when absent, the public authorities count."""),
     ] = None
 
     def problems(self) -> Remarks:
@@ -88,9 +89,9 @@ class HttpSettings(BusSettings, frozen=True, kw_only=True, forbid_unknown_fields
             yield ("api_base",), str(error)
             return
         if self.ca_file and not tls:
-            yield ("ca_file",), "is for https: write api_base: https://…, or leave this out"
+            yield ("ca_file",), "is for https: write api_base: https://…, or delete ca_file"
         if self.token_header and not self.token_file:
-            yield ("token_header",), "needs token_file: the file with what the header says"
+            yield ("token_header",), "needs token_file: the file with the header's value"
 
 
 def warnings(settings: HttpSettings) -> Remarks:
@@ -191,7 +192,7 @@ class HttpBus(Bus):
                 body = _capped(answer.raw)
         except HalError:
             raise
-        except Exception as error:  # a server's bytes make the libraries raise any, ValueError too
+        except Exception as error:  # a server's bytes can make the libraries raise anything
             raise self._explained(url, error) from error
         if len(body) > BODY_MAX:
             raise HalError(

@@ -33,7 +33,7 @@ def _no_number(word: str) -> NoReturn:
 
 
 def _without_doubles(pairs: list[tuple[str, object]]) -> dict[str, object]:
-    """Refuse an object with a duplicate key: JSON does not define the valid one."""
+    """Refuse an object with a duplicate key: JSON does not define which key counts."""
     found = dict(pairs)
     if len(found) < len(pairs):
         raise ValueError("a key occurs twice in one object")

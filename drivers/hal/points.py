@@ -25,11 +25,11 @@ class Input(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """One contact that is read."""
 
     point: Annotated[
-        Point, tells("its address: `BCM4` or `J8:7` on GPIO, `unit 1 discrete input 0` on Modbus.")
+        Point, tells("the address: `BCM4` or `J8:7` on GPIO, `unit 1 discrete input 0` on Modbus.")
     ]
     active: Annotated[Active, tells("the level of an asserted signal (`high` is 1 on Modbus).")]
     pull: Annotated[
-        Pull | None, tells("the resistor of a GPIO input; required there, and there alone.")
+        Pull | None, tells("the resistor of an input; required on GPIO, refused on Modbus.")
     ] = None
     debounce_s: Annotated[
         DebounceSeconds | None,
@@ -37,7 +37,7 @@ class Input(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     ] = None
 
     def wire(self, signal: str, path: tuple[str, ...], debounce_s: float | None) -> "Wire":
-        """Return its row of the wiring table; `debounce_s` is the default."""
+        """Return the input's row of the wiring table; `debounce_s` is the default."""
         own_s = debounce_s if self.debounce_s is None else self.debounce_s
         return Wire(signal, "in", self.point, self.active, self.pull, own_s, path)
 
@@ -46,12 +46,12 @@ class Output(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """One relay or line that is driven. Its safe level is always not asserted."""
 
     point: Annotated[
-        Point, tells("its address: `BCM18` or `J8:12` on GPIO, `unit 1 coil 0` on Modbus.")
+        Point, tells("the address: `BCM18` or `J8:12` on GPIO, `unit 1 coil 0` on Modbus.")
     ]
-    active: Annotated[Active, tells("the level at which it is asserted.")]
+    active: Annotated[Active, tells("the level of an asserted output.")]
 
     def wire(self, signal: str, path: tuple[str, ...], flash: "Flash | None" = None) -> "Wire":
-        """Return its row of the wiring table."""
+        """Return the output's row of the wiring table."""
         return Wire(signal, "out", self.point, self.active, path=path, flash=flash)
 
 
@@ -119,7 +119,7 @@ class Lines(Protocol):
     def write(self, levels: Mapping[str, bool]) -> None:
         """Drive these outputs. Raises HalError; then their levels are unknown.
 
-        Tries every output that goes to its safe level, even when others fail.
+        Tries every output that goes to its safe level, even after another output has failed.
         """
 
     def outputs(self) -> Mapping[str, int] | None:
@@ -203,16 +203,16 @@ class Points:
     def flash(self, signal: str) -> None:
         """Let the module time a pulse of this output; its level is unknown from now on.
 
-        Raises HalError; then there may be a pulse, and a second request would prolong it.
+        Raises HalError; then there may be a pulse, and a second request would prolong the pulse.
         """
         wire, point = self._out[signal]
-        assert wire.flash  # or the driver would not ask
-        assert isinstance(self._lines, FlashLines)  # or `wire_problems` of its bus has said so
+        assert wire.flash  # only an output with `flash` gets here
+        assert isinstance(self._lines, FlashLines)  # `wire_problems` refuses `flash` on other buses
         self._written = None
         self._lines.flash(point, wire.flash)
 
     def make_safe(self) -> None:
-        """Write every output off, even those believed off, and read them back where possible."""
+        """Switch every output off, even outputs believed off, and read them back where possible."""
         self._written = None
         self.write({})
         levels = self._lines.outputs()

@@ -1,7 +1,7 @@
 """Finds misreadings of a lift's codes when one of their lines is cut or shorted.
 
-A service or motion code is unsafe if it then shows a safer state than the lift's real one. A floor code
-gives a warning if it then shows another floor.
+A service or motion code is unsafe if it then shows a safer state than the lift's real state. A floor
+code gives a warning if it then shows another floor.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -14,7 +14,7 @@ from drivers.tables import Lines, breaks
 from drivers.unsafe import Unsafe
 
 SERVES = {"agv_mode": 0, "normal": 1, "overload": 1}
-"""A state's restriction of RMF; every unlisted state takes the lift away from RMF."""
+"""How far a state restricts robots; every unlisted state takes the lift away from RMF."""
 TAKEN_AWAY = 2
 
 
@@ -55,7 +55,9 @@ def unsafe_codes(wiring: LiftWiring, table: Mapping[str, Wire]) -> Iterator[Unsa
 
 
 def floor_warnings(code: FloorCode, table: Mapping[str, Wire]) -> str:
-    """Describe the floors that read as another floor with one broken line; "" for none."""
+    """Describe the floors that read as another floor with one broken line; "" if there are no such
+    floors.
+    """
     shown: dict[str, list[Lines]] = {}
     for _, level, lines in code.shows():
         if level is not None:

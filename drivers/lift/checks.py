@@ -74,10 +74,10 @@ def missing(
     """
     by_call = settings.agv_mode == "by_call"
     if not told:
-        yield path, "no agv_mode: the lift cannot confirm that it obeys"
+        yield path, "no agv_mode: the lift cannot confirm that it serves the robot"
     elif not asks and not by_call:
         text = (
-            "no agv_mode_request asks for AGV mode, and it is awaited: the lift must grant it alone"
+            "no agv_mode_request, and AGV mode is awaited: the lift must enter AGV mode by itself"
         )
         yield (*path[:-1], "outputs") if path == ("inputs",) else path, text
     if by_call and not holds:
@@ -108,7 +108,7 @@ def notes(settings: LiftSettings, sees: Sees) -> Remarks:
 def alarm(settings: LiftSettings) -> Remarks:
     """Yield a problem for `alarm_on` without a topic for its alarms."""
     if settings.alarm == "none" and settings.alarm_on != [Hazard.FIRE]:
-        yield ("alarm_on",), "nothing is told with alarm: none; write alarm: emergency_signal"
+        yield ("alarm_on",), "alarm: none sends no alarm; write alarm: emergency_signal"
 
 
 def unseen(settings: LiftSettings, sees: Sees) -> Remarks:
@@ -116,16 +116,18 @@ def unseen(settings: LiftSettings, sees: Sees) -> Remarks:
     for n, hazard in enumerate(settings.alarm_on if settings.alarm != "none" else ()):
         if not sees(hazard):
             path = ("alarm_on", str(n)) if settings.alarm_on != [Hazard.FIRE] else ("alarm",)
-            yield path, f"no {hazard}: this lift does not report it, so nobody is told"
+            yield path, f"no {hazard}: this lift does not report it, so RMF gets no alarm"
 
 
 def by_call(settings: LiftSettings, told: bool, asks: bool, request: tuple[str, ...]) -> Remarks:
-    """Check `by_call`: the lift reports AGV mode, and no output requests it. `request`: its path."""
+    """Check `by_call`: the lift reports AGV mode, and no output requests AGV mode. `request`: the path
+    of such an output.
+    """
     if settings.agv_mode == "by_call" and not told:
-        text = "by_call needs an agv_mode input: nothing else tells that a call was taken"
+        text = "by_call needs an agv_mode input: nothing else shows that the lift accepted a call"
         yield ("agv_mode",), text
     if settings.agv_mode == "by_call" and asks:
-        yield request, "agv_mode is by_call, so calls ask for AGV mode: delete one of the two"
+        yield request, "with agv_mode: by_call the calls request AGV mode: delete one of the two"
 
 
 def unsafe(wiring: LiftWiring) -> Iterator[Unsafe]:
@@ -153,7 +155,7 @@ def floors(wiring: LiftSettings) -> Remarks:
     """Yield problems: no floors; a floor, or one door of a landing, that is named twice."""
     stops = wiring.stops()
     if not stops:
-        yield ("floors",), "no floors: name those of RMF's map that this lift serves"
+        yield ("floors",), "no floors: list this lift's floors by their names on RMF's map"
     if len(stops) != len(wiring.floors):
         yield ("floors",), "a floor is named twice: delete one"
     seen: dict[object, str] = {}
@@ -183,7 +185,7 @@ def counts_down(settings: LiftSettings, codes: Mapping[int, str], path: tuple[st
 def named(
     what: str, section: tuple[str, ...], given: Collection[str], levels: Collection[str]
 ) -> Remarks:
-    """Check that `given` has every landing and nothing else. `what`: the missing entry's name."""
+    """Check that `given` has exactly the landings. `what`: the name of an entry."""
     for level in given:
         if level not in levels:
             yield section, f"{level!r} is not a landing of this lift, which has {', '.join(levels)}"
@@ -224,7 +226,7 @@ def _calls(wiring: LiftWiring) -> Remarks:
         yield from named("call", ("calls",), wiring.calls, wiring.levels())
         return
     if wiring.calls:
-        yield ("calls",), "calls and call_code are two ways of calling: keep one"
+        yield ("calls",), "calls and call_code are two ways of calling: delete one of the two"
     yield from named("code", ("call_code", "codes"), set(code.codes.values()), wiring.levels())
     for number in code.codes:
         if number == 0 or number >> len(code.bits):
@@ -239,7 +241,10 @@ def _doors(wiring: LiftWiring) -> Remarks:
         single = getattr(inputs, prefix)
         two = [getattr(inputs, f"{prefix}_{end}") for end in ("opened", "closed")]
         if single and any(two):
-            yield ("inputs", prefix), f"{prefix} is the only contact: delete the others, or this"
+            yield (
+                ("inputs", prefix),
+                f"{prefix} stands for one contact alone: delete {prefix}, or the other contacts",
+            )
         elif any(two) and not all(two):
             have = f"{prefix}_opened" if two[0] else f"{prefix}_closed"
             end = "open" if two[0] else "closed"
@@ -263,7 +268,7 @@ def _motion(wiring: LiftWiring) -> Remarks:
     if have not in ([], ["moving"], ["stopped"], ["up", "down"], ["motion"]):
         yield (
             ("inputs", have[0]),
-            f"motion is moving, or stopped, or up with down, or motion; not {' with '.join(have)}",
+            f"give motion as moving, or stopped, or up with down, or motion; not {' with '.join(have)}",
         )
     motion = wiring.inputs.motion
     if motion is None:
@@ -284,14 +289,14 @@ def _agv(wiring: LiftWiring) -> Remarks:
     told, asks = bool(by_line) or by_code, bool(wiring.outputs.agv_mode_request)
     yield from by_call(wiring, told, asks, ("outputs", "agv_mode_request"))
     if by_line and by_code:
-        yield ("inputs", "agv_mode"), "service shows agv_mode too: keep one"
+        yield ("inputs", "agv_mode"), "service shows agv_mode too: delete one of the two"
     for signal, path, line in input_rows(wiring):
         if not line.valid_when:
             continue
         if not by_line and not by_code:
             yield path, "valid_when: agv_mode needs an agv_mode input"
         elif signal == "agv_mode" or signal.startswith("service_"):
-            yield path, f"{signal} itself tells AGV mode: delete valid_when"
+            yield path, f"{signal} itself shows AGV mode: delete valid_when"
 
 
 def _service(wiring: LiftWiring) -> Remarks:
@@ -300,7 +305,7 @@ def _service(wiring: LiftWiring) -> Remarks:
         return
     every = set(range(2 ** len(service.bits)))
     for number in sorted(every - service.codes.keys()):
-        yield ("inputs", "service", "codes"), f"{number} is missing: say what it means"
+        yield ("inputs", "service", "codes"), f"{number} is missing: write its meaning"
     for number in sorted(service.codes.keys() - every):
         yield ("inputs", "service", "codes", str(number)), f"{number} does not fit on the bits"
 

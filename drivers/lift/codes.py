@@ -1,4 +1,4 @@
-"""Converts numbers on several lines, least significant first: binary, Gray, BCD, as for floors."""
+"""Converts numbers on several lines, least significant first: binary, Gray or BCD."""
 
 from collections.abc import Mapping, Sequence
 from typing import Literal

@@ -53,11 +53,17 @@ class RegisterLiftSettings(LiftSettings, frozen=True, kw_only=True, forbid_unkno
         yield from checks.by_call(self, told, asks, ("map", "commands", "agv_mode_request"))
         for name, part in self.map.parts().items():
             if part.valid_when and not told:
-                yield ("map", name), "valid_when: agv_mode needs agv_mode, or service to show it"
+                yield (
+                    ("map", name),
+                    "valid_when: agv_mode needs agv_mode, or a service state agv_mode",
+                )
             elif part.valid_when and name in ("agv_mode", "service"):
-                yield ("map", name), f"{name} itself tells AGV mode: delete valid_when"
+                yield ("map", name), f"{name} itself shows AGV mode: delete valid_when"
         if self.accept_unsafe:
-            yield ("accept_unsafe",), "a map has no wires that could be unsafe: delete this"
+            yield (
+                ("accept_unsafe",),
+                "a map has no wires that could be unsafe: delete accept_unsafe",
+            )
 
 
 def _rear_door(settings: RegisterLiftSettings) -> Remarks:
@@ -80,7 +86,7 @@ def warnings(settings: RegisterLiftSettings) -> Remarks:
     yield from checks.unseen(settings, found.shows)
     yield from checks.counts_down(settings, found.floor.codes, ("map", "floor", "codes"))
     if not commands.read_back:
-        text = "commands cannot be read back: that they are off is not verified"
+        text = "commands cannot be read back: switching off is not verified"
         yield ("map", "commands", "read_back"), text
 
 

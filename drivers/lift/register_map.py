@@ -42,7 +42,7 @@ class NumberField(InRegister, frozen=True, kw_only=True, forbid_unknown_fields=T
         """Yield problems: an invalid place, a bit listed twice, numbers of `key` that do not fit."""
         yield from InRegister.problems(self)
         if len(set(self.bits)) < len(self.bits):
-            yield ("bits",), "a bit stands here twice"
+            yield ("bits",), "a bit is listed twice"
         for number in numbers:
             if self.bits and number >> len(self.bits):
                 yield (key, str(number)), f"{number} does not fit on {len(self.bits)} bits"
@@ -88,7 +88,7 @@ class MotionField(NumberField, frozen=True, kw_only=True, forbid_unknown_fields=
     ]
 
     def problems(self) -> Remarks:
-        """Yield problems: those of `fits`; no code for standing, or none for moving."""
+        """Yield problems: those of `fits`; no code for standing, or no code for moving."""
         yield from self.fits(self.codes, "codes")
         shown = set(self.codes.values())
         if "stopped" not in shown or not ("moving" in shown or {"up", "down"} <= shown):
@@ -117,9 +117,9 @@ Number: TypeAlias = FloorField | DoorField | MotionField | ServiceField
 
 
 class LiftFlag(Placed, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """One bit."""
+    """A flag: one bit."""
 
-    bit: Annotated[Bit | None, tells("its number; 0 is the least significant.")] = None
+    bit: Annotated[Bit | None, tells("the bit's number; 0 is the least significant.")] = None
     active: Annotated[Literal["high", "low"], tells("the asserted level; `high` is 1.")]
     valid_when: Annotated[
         Literal["agv_mode"] | None, tells("`agv_mode` if it is valid only while AGV mode is on.")
@@ -130,7 +130,7 @@ class LiftFlag(Placed, frozen=True, kw_only=True, forbid_unknown_fields=True):
         return bool(word >> (self.bit or 0) & 1) == (self.active == "high")
 
     def word(self, asserted: bool) -> int:
-        """Return the value of its register or bit for an asserted or clear flag."""
+        """Return the value of the flag's register or bit for an asserted or clear flag."""
         return (asserted == (self.active == "high")) << (self.bit or 0)
 
     def problems(self) -> Remarks:
@@ -170,7 +170,7 @@ class CallCommand(WrittenPlace, frozen=True, kw_only=True, forbid_unknown_fields
         """Yield problems: a place that cannot be written; a landing with the number of no call."""
         yield from super().problems()
         if self.none in self.codes:
-            yield ("codes", str(self.none)), f"{self.none} is no call, as none says"
+            yield ("codes", str(self.none)), f"{self.none} is the number for no call (none)"
 
 
 class Commands(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -191,8 +191,8 @@ class Commands(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     call: Annotated[CallCommand | None, tells("calls as numbers in one register.")] = None
     read_back: Annotated[
         bool,
-        tells("""false where commands can only be written; then they are written in every scan, and
-        nothing proves that the gateway took them."""),
+        tells("""false where commands can only be written; then every scan writes them, and nothing
+        proves that the gateway accepted them."""),
     ] = True
 
     def singles(self) -> Iterator[tuple[str, tuple[str, ...], LiftCommand]]:
@@ -226,7 +226,7 @@ class Commands(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     def problems(self) -> Remarks:
         """Yield problems: both `calls` and `call`; commands that use the same bit of a register."""
         if self.calls and self.call:
-            yield ("calls",), "calls and call are two ways of calling: keep one"
+            yield ("calls",), "calls and call are two ways of calling: delete one of the two"
         taken: dict[str, int] = {}
         owners: dict[str, list[str]] = {}
         values = [(p, c.at, {"ask": c.ask, "release": c.release}) for _, p, c in self.singles()]
@@ -254,7 +254,7 @@ class LiftMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=T
         ServiceField | None, tells("the lift's service state; it may include hazards and AGV mode.")
     ] = None
     agv_mode: Annotated[
-        LiftFlag | None, tells("the controller confirms AGV mode; or `service` does.")
+        LiftFlag | None, tells("the controller confirms AGV mode; not needed if `service` does.")
     ] = None
     fire_alarm: Annotated[
         LiftFlag | None, tells("the fire alarm; MODE_FIRE, latched with `fire_reset: manual`.")
@@ -263,7 +263,7 @@ class LiftMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=T
     earthquake: Annotated[LiftFlag | None, tells("an earthquake sensor; MODE_EMERGENCY.")] = None
     emergency: Annotated[LiftFlag | None, tells("the car's emergency stop; MODE_EMERGENCY.")] = None
     out_of_service: Annotated[
-        LiftFlag | None, tells("it is off or out of order; MODE_OFFLINE.")
+        LiftFlag | None, tells("the lift is off or out of order; MODE_OFFLINE.")
     ] = None
     manual_mode: Annotated[
         LiftFlag | None, tells("inspection or manual drive (key switch); MODE_OFFLINE.")

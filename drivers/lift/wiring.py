@@ -1,4 +1,4 @@
-"""A lift's wiring in the YAML. Sites differ in every signal, so all of it is configuration."""
+"""A lift's wiring in the YAML. Sites differ in every signal, so every signal is configured."""
 
 from collections.abc import Iterator, Mapping
 from typing import Annotated, Literal
@@ -22,8 +22,8 @@ class LiftInput(Input, frozen=True, kw_only=True, forbid_unknown_fields=True):
     valid_when: Annotated[
         Literal["agv_mode"] | None,
         tells("""`agv_mode` if the line is valid only while AGV mode is on. Outside AGV mode
-        its floor or motion is unknown, its door is neither open nor closed, and its hazard is
-        clear."""),
+        the line's floor or motion is unknown, its door is neither open nor closed, and its
+        hazard is clear."""),
     ] = None
 
 
@@ -32,7 +32,7 @@ class DoorInput(LiftInput, frozen=True, kw_only=True, forbid_unknown_fields=True
 
     proves: Annotated[
         Literal["open", "closed"],
-        tells("what the asserted contact proves; the other end is estimated by `door_travel_s`."),
+        tells("the end that the asserted contact proves; `door_travel_s` estimates the other end."),
     ]
 
 
@@ -40,7 +40,7 @@ class ParityInput(LiftInput, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     """A parity line, which reveals a broken line of the code."""
 
     total: Annotated[
-        Literal["even", "odd"], tells("the number of asserted lines, this line included.")
+        Literal["even", "odd"], tells("the number of asserted lines, including the parity line.")
     ]
 
 
@@ -102,37 +102,37 @@ class LiftInputWiring(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_
         None
     )
     out_of_service: Annotated[
-        LiftInput | None, tells("it is off or out of order; MODE_OFFLINE.")
+        LiftInput | None, tells("the lift is off or out of order; MODE_OFFLINE.")
     ] = None
     manual_mode: Annotated[
         LiftInput | None, tells("inspection or manual drive (key switch); MODE_OFFLINE.")
     ] = None
     overload: Annotated[LiftInput | None, tells("the car is too heavy; delays the ride.")] = None
     agv_mode: Annotated[
-        LiftInput | None, tells("the controller confirms AGV mode; or `service` does.")
+        LiftInput | None, tells("the controller confirms AGV mode; not needed if `service` does.")
     ] = None
     service: Annotated[ServiceCode | None, tells("the lift's service state as a code.")] = None
     door: Annotated[DoorInput | None, tells("the door's only contact.")] = None
     door_opened: Annotated[
-        LiftInput | None, tells("the car's door is open; with a contact at its closed end too.")
+        LiftInput | None, tells("the car's door is open; needs `door_closed` as well.")
     ] = None
     door_closed: Annotated[
-        LiftInput | None, tells("the car's door is closed; with a contact at its open end too.")
+        LiftInput | None, tells("the car's door is closed; needs `door_opened` as well.")
     ] = None
     rear_door: Annotated[DoorInput | None, tells("the rear door's only contact.")] = None
     rear_door_opened: Annotated[
-        LiftInput | None, tells("the rear door is open; with a contact at its closed end too.")
+        LiftInput | None, tells("the rear door is open; needs `rear_door_closed` as well.")
     ] = None
     rear_door_closed: Annotated[
-        LiftInput | None, tells("the rear door is closed; with a contact at its open end too.")
+        LiftInput | None, tells("the rear door is closed; needs `rear_door_opened` as well.")
     ] = None
     moving: Annotated[LiftInput | None, tells("the car moves, up or down.")] = None
     stopped: Annotated[LiftInput | None, tells("the car stands.")] = None
     up: Annotated[
-        LiftInput | None, tells("the car moves up; with neither `up` nor `down` it stands.")
+        LiftInput | None, tells("the car moves up; without `up` and `down` the car stands.")
     ] = None
     down: Annotated[
-        LiftInput | None, tells("the car moves down; with neither `up` nor `down` it stands.")
+        LiftInput | None, tells("the car moves down; without `up` and `down` the car stands.")
     ] = None
     motion: Annotated[MotionCode | None, tells("motion as a code.")] = None
 
@@ -146,13 +146,14 @@ class FloorCode(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
     ]
     bits: Annotated[list[LiftInput], tells("the number's lines, least significant first.")] = []
     codes: Annotated[dict[Number, Name], tells("number -> landing.")] = {}
-    parity: Annotated[ParityInput | None, tells("a line that reveals a broken one.")] = None
+    parity: Annotated[ParityInput | None, tells("a line that reveals a broken line.")] = None
     lines: Annotated[
         dict[Name, LiftInput],
-        tells("with `one_hot`, landing -> its line; between floors none is asserted."),
+        tells("with `one_hot`, landing -> its line; between floors no line is asserted."),
     ] = {}
     between_floors: Annotated[
-        list[Number], tells("the numbers for a car between floors; others unlisted are a fault.")
+        list[Number],
+        tells("the numbers for a car between floors; other unlisted numbers are a fault."),
     ] = msgspec.field(default_factory=lambda: [0])
 
     def inputs(self) -> Iterator[tuple[str, tuple[str, ...], LiftInput]]:
@@ -182,7 +183,7 @@ class FloorCode(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
         return None, "" if number in self.between_floors else f"code {number} is not a floor's"
 
     def show(self, level: str | None) -> dict[str, bool]:
-        """Return signal -> asserted at a landing (None: between floors). ValueError without a code."""
+        """Return signal -> asserted at a landing (None: between floors), or raise ValueError."""
         for _, shown_level, shown in self.shows():
             if shown_level == level:
                 return shown

@@ -1,12 +1,13 @@
 """Profiles: a make's register or frame map as drivers/profiles/NAME.yaml, for `profile: NAME`.
 
-    for: door_register       the driver that reads it
+    for: door_register       the driver that reads the profile
     hardware: untried        `tried` on the hardware, `untried`, or `none`: an example of no make
-    source: "..."            where its numbers come from
-    map: {...}               the content, under the key that holds it in a device YAML
+    source: "..."            where the numbers come from
+    map: {...}               the content, under the key for it in a device YAML
 
 A profile is parsed like a device YAML, so each problem has its file, line and column. The parser is
-imported only then: switching off contacts by a daemon's record needs no parser.
+imported only for a profile, because `outputs-off` reads a contact's record
+without a parser.
 """
 
 import functools
@@ -47,7 +48,7 @@ class Profile(Generic[Content]):
         return found
 
     def chosen(self, name: str | None, inline: Content | None) -> Content:
-        """Return the content in the YAML, or else the profile's. Raises SettingsError."""
+        """Return the YAML's content, or else the profile's content. Raises SettingsError."""
         return inline or self.load(name or "")
 
     def problems(self, name: str | None, inline: object) -> Remarks:
@@ -56,7 +57,7 @@ class Profile(Generic[Content]):
             text = f"needs '{self.key}', or a profile: {either(self.names())}"
             yield ("profile",), text
         elif name is not None and inline is not None:
-            yield ("profile",), f"'{self.key}' is written out as well: delete one of the two"
+            yield ("profile",), f"'{self.key}' is given as well: delete one of the two"
         elif name is not None and name not in self.names():
             yield ("profile",), unknown("profile", name, self.names())
         elif name is not None:

@@ -3,7 +3,7 @@
 A daemon records these texts together with its claims. `outputs-off` may run much later, even after an
 upgrade that changed the files; with the recorded texts it reads the same maps as the daemon.
 
-A file of drivers/profiles/ is stored under its name, any other under its path.
+A file of drivers/profiles/ is stored under its name, any other file under its path.
 """
 
 from collections.abc import Callable, Mapping

@@ -1,7 +1,7 @@
 """The far side of a `can` bus, across processes: controllers behind an slcan adapter on a pty.
 
-Failures: of the bus in `hal_fakes/can/side.py`, of a CANopen receiver in `canopen_rcu.py`, of a charger
-with its own frames in `frame_charger.py`.
+`side.py` lists the failures of the bus, `canopen_rcu.py` those of a CANopen receiver,
+`frame_charger.py` those of a charger with its own frames.
 """
 
 from collections.abc import Sequence

@@ -2,12 +2,12 @@
 
 It charges while every frame of its map comes on time with the values of `on`. It stops when a frame has
 the values of `off`, or is missing for three periods. A busy machine delays this station as well as the
-daemon, so a long gap between two looks counts as one look only. If the map has a wake-up, the charger
-sleeps until woken, and again after being off.
+daemon, so a long gap between two looks counts as one short gap. If the map has wake frames, the charger
+sleeps until a wake frame comes, and sleeps again after being off.
 
 Failing part `node`, in addition to those of plant and bus: `off` is silent, `stuck` repeats its last
-status, `slow` sends it every two seconds, `garbage` sends frames of six bytes, `wrong` an unlisted
-state.
+status, `slow` sends a status every two seconds, `garbage` sends frames of six bytes, `wrong` an
+unlisted state.
 """
 
 import time
@@ -40,7 +40,7 @@ FLAGS: Final = {
     "too_far": "BadCoilPosition",
     "too_near": "BadCoilPosition",
 }
-"""The plant's faults and their error signals; none is published for foreign objects."""
+"""The plant's faults and their error signals; no signal for foreign objects is published."""
 ROBOTS_FAULTS: Final = frozenset(FLAGS) - {"transmitter_fault", "foreign_object"}
 
 
@@ -64,7 +64,7 @@ class FrameCharger:
         self._status: list[can.Message] = []
 
     def hear(self, message: can.Message, now: float, send: Send) -> None:
-        """Take a frame that keeps the charge going or ends it."""
+        """Take a frame that keeps the charge going, or ends the charge."""
         self._look(now)
         extended = dbc.EXTENDED if message.is_extended_id else 0
         heard = message.arbitration_id | extended
@@ -82,7 +82,7 @@ class FrameCharger:
         self.plant.drive("power", self._fed(), now)
 
     def tick(self, now: float, send: Send) -> None:
-        """Stop if frames that keep it charging are missing; send the status."""
+        """Stop if the frames for charging are missing; send the status."""
         self._look(now)
         mode = self.plant.failures.get("node")
         self.plant.drive("power", self._fed() and mode != "off", now)
@@ -160,7 +160,7 @@ class FrameCharger:
     def _by_rules(
         self, reading: Reading, natural: Mapping[str, float], wrong: bool
     ) -> dict[str, float]:
-        """Return values for the signals of rules, error numbers and error bits; no error flags."""
+        """Return values for signals of rules, error numbers and error bits, without error flags."""
         known = self._map
         flags = (*known.errors.station, *known.errors.robot)
         numbers = StationErrors(codes=known.errors.codes, bits=known.errors.bits)

@@ -1,13 +1,14 @@
 """The far side of a CAN bus: a medium with stations, in their own thread.
 
 The medium is python-can's `virtual` bus within one process, or an slcan adapter on a pseudo-terminal
-across processes (`hal_fakes/can/slcan_port.py`). A part `bus` of any plant on it fails as buses do:
+across processes (`hal_fakes/can/slcan_port.py`). The part `bus` of any plant on the medium fails as
+buses do:
 
 - `off`: the adapter is unplugged; a virtual bus is silent
 - `stuck`: nothing passes in either direction
 - `slow`: every frame from the far side comes too late
 - `garbage`: noise: bytes that are no slcan, or frames with random ids and content
-- `wrong`: the controller reports bus-off; an adapter, unable to report, passes only foreign frames
+- `wrong`: the controller reports bus-off; an adapter cannot report, and passes only foreign frames
 """
 
 import heapq
@@ -41,13 +42,13 @@ class Medium(Protocol):
     replace: dict[str, object]
 
     def receive(self, wait_s: float) -> can.Message | None:
-        """Return the daemon's next frame; None if none comes within `wait_s`."""
+        """Return the daemon's next frame; None if no frame comes within `wait_s`."""
 
     def send(self, message: can.Message) -> None:
         """Send to the daemon. The frame is lost if no program has the bus open."""
 
     def fail(self, mode: FailureMode | None) -> None:
-        """Fail in this way from now on; None: work. Called often."""
+        """Fail in this way from now on; None ends the failure. Called often."""
 
     def close(self) -> None:
         """End. May be called twice."""
@@ -75,7 +76,7 @@ class CanStation(Protocol):
 class VirtualBus:
     """python-can's `virtual` bus, opened by both sides under the name `channel`.
 
-    `interface`: another of python-can's, such as `socketcan` with its channel vcan0.
+    `interface`: another interface of python-can, such as `socketcan` with the channel vcan0.
     """
 
     def __init__(self, channel: str, interface: str = "virtual") -> None:
@@ -94,7 +95,7 @@ class VirtualBus:
             self._bus.send(message)
 
     def fail(self, mode: FailureMode | None) -> None:
-        """Send noise while the mode is `garbage`. Report bus-off once, and its end once."""
+        """Send noise while the mode is `garbage`. Report each bus-off once, and its end once."""
         if mode == "garbage":
             self.send(any_frame(self._noise))
         if (mode == "wrong") != self._off_told:

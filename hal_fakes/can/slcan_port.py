@@ -1,9 +1,9 @@
 """An slcan adapter behind a pseudo-terminal (LAWICEL): frames as lines of text, for another process.
 
-    t123 2 0102 CR     frame 0x123 with two bytes; T and eight digits: with 29 bits
+    t123 2 0102 CR     frame 0x123 with two bytes; T and eight digits for an id of 29 bits
     Sn CR, O CR, C CR  bitrate, open, close
 
-It acknowledges a frame with `z` or `Z`, and passes frames only while it is open.
+The adapter acknowledges a frame with `z` or `Z`, and passes frames only while it is open.
 """
 
 import os
@@ -60,7 +60,9 @@ class SlcanPort:
             self._write(encoded(message))
 
     def fail(self, mode: FailureMode | None) -> None:
-        """`off` unplugs the adapter, `garbage` sends noise, `wrong` passes only others' frames."""
+        """`off` unplugs the adapter, `garbage` sends noise, `wrong` passes only other stations'
+        frames.
+        """
         if (mode == "off") != (self.adapter.wire is None):
             self._heard, self._open = b"", False
             (self.adapter.pull if mode == "off" else self.adapter.plug)()
@@ -89,7 +91,7 @@ class SlcanPort:
 
     def _write(self, text: bytes) -> None:
         wire = self.adapter.wire
-        with suppress(OSError):  # nobody reads: lost, as on a bus
+        with suppress(OSError):  # without a reader the bytes are lost, as on a bus
             if wire is not None:
                 os.write(wire, text)
 

@@ -1,7 +1,7 @@
 """`make demo-page`: two lifts, two doors, two chargers, five robots riding endlessly, and the page.
 
-The daemons and the page are processes of their own; this one plays the fleet adapters, and lets
-something fail every minute. It ends with Ctrl-C.
+The daemons and the page are processes of their own. This process plays the fleet adapters, lets
+something fail every minute, and ends with Ctrl-C.
 """
 
 import secrets
@@ -56,7 +56,7 @@ class Rider:
         self._until = 0.0
 
     def go_on(self, now: float) -> None:
-        """Begin the next step, if this one is done."""
+        """Begin the next step, if the present step is done."""
         match self._step:
             case Phase():
                 done = self.robot.done
@@ -76,7 +76,7 @@ class Rider:
 def errands(
     robot: RobotContext, lift: str, door: str, floors: tuple[str, str], levels: dict[str, str]
 ) -> Iterator[Step]:
-    """Yield steps endlessly: through a door, up or down in a lift, a rest. `levels`: each robot's."""
+    """Yield steps endlessly: through a door, up or down in a lift, a rest. `levels`: robot -> level."""
     there = cycle((floors, floors[::-1]))
     for start, goal in there:
         yield DoorOpen(door)

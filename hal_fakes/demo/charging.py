@@ -1,10 +1,10 @@
 """`make demo-charging`: the numbered scenarios of shared chargers, and the verdict on each.
 
-Two chargers on HTTP and the coordinator, each a process of its own. This one plays two fleets of two
-brands, an operator and a technician: a robot that its schedule charges (1), wishes of a robot and of
-an operator (2), more robots than chargers and a blocked pad (3), a robot at the wrong charger (4),
-chargers that overheat (5a), and a robot that cannot be charged (5b). A line that begins with `so:` is
-an awaited fact: without it the demo ends with exit code 1.
+Two chargers on HTTP and the coordinator are processes of their own. This process plays two fleets of
+two brands, an operator and a technician. The scenarios: a robot charged by the schedule (1), requests
+of a robot and of an operator (2), more robots than chargers and a blocked pad (3), a robot at the wrong
+charger (4), chargers that overheat (5a), and a robot that cannot be charged (5b). A line that begins
+with `so:` is an awaited fact: without it the demo ends with exit code 1.
 """
 
 from collections.abc import Iterable
@@ -41,7 +41,10 @@ def live(world: World) -> None:
     world.join(fleets)
     with world.leg("1 scheduled", f"all day {ONE} is to be charged to 96 %"):
         _scheduled(world, fleets)
-    with world.leg("2 ad-hoc", "a robot asks for itself, and an operator for one on the pad"):
+    with world.leg(
+        "2 ad-hoc",
+        "a robot requests a charge, and an operator requests a charge for the robot on the pad",
+    ):
         _ad_hoc(world, fleets)
     with world.leg("3 stacked", f"{PORTER} is full and stays on its pad; {ONE} and {TWO} come"):
         _stacked(world, fleets)
@@ -125,7 +128,7 @@ def _ad_hoc(world: World, fleets: DemoFleets) -> None:
     _shown(world, fleets, B, f"CHARGING porter/{PORTER}, by an operator")
     _charges(world, A, TWO)
     _shown(world, fleets, A, f"CHARGING tiny/{TWO}, by the robot")
-    full = "both are full, and their chargers have let them go"
+    full = "both are full, and their chargers have released them"
     world.shows(full, lambda: world.charger_is(A, "IDLE") and world.charger_is(B, "RELEASED"))
 
 
@@ -241,13 +244,13 @@ DEMO: Final = Demo(
     dawns=dawns,
     live=live,
     problems=problems,
-    right="each scenario went as its slide says; never two robots at one charger.",
+    right="each scenario went as planned; never two robots at one charger.",
     outcomes={
         "1 scheduled": f"{ONE} came home at 92 %, was called by the schedule and charged",
-        "2 ad-hoc": f"{TWO} asked through its fleet, an operator for {PORTER} on the pad: both charged",
+        "2 ad-hoc": f"{TWO}'s fleet requested a charge, an operator another for {PORTER}: both charged",
         "3 stacked": f"{TWO} waited, a person was told who blocks {B}, and {TWO} was next there",
-        "4 wrong station": f"{B} gave {ONE} no power; {ONE} was sent on and charged at {A}",
+        "4 wrong station": f"{B} gave {ONE} no power; {ONE} was sent to {A} and charged there",
         "5a station faulty": f"{ONE} was charged twice at the other charger, and is not suspected",
-        "5b robot faulty": f"{TWO} was tried at two chargers and no more; {ONE} was charged meanwhile",
+        "5b robot faulty": f"{TWO} was tried at two chargers only; {ONE} was charged meanwhile",
     },
 )

@@ -22,13 +22,13 @@ TAIL = 15
 
 
 class DemoFailed(Exception):
-    """The demo did not go as it should; the text says what was missing."""
+    """The demo failed; the text names the missing event."""
 
 
 class Program:
     """One `rmf-bridge …`, in its own session.
 
-    A Ctrl-C in the terminal then reaches the demo alone, which stops every program in order.
+    So Ctrl-C in the terminal reaches only the demo, which stops every program in order.
     """
 
     def __init__(self, name: str, log: Path, words: Iterable[str], domain_id: int) -> None:
@@ -48,12 +48,12 @@ class Program:
             )
 
     def check(self) -> None:
-        """Raises DemoFailed when the daemon has died."""
+        """Raise DemoFailed if the daemon has died."""
         if self._exited():
-            raise DemoFailed(f"the daemon {self.name} has died; its log says why")
+            raise DemoFailed(f"the daemon {self.name} has died; its log has the reason")
 
     def tail(self) -> str:
-        """Return the end of its log."""
+        """Return the end of the daemon's log."""
         return "\n".join(self.log.read_text(errors="replace").splitlines()[-TAIL:])
 
     def ask_to_stop(self) -> None:
@@ -62,7 +62,7 @@ class Program:
             os.kill(self._process.pid, signal.SIGTERM)
 
     def end(self, deadline: float) -> None:
-        """Wait for its end, then kill any rest of its session."""
+        """Wait for the program's end, then kill the rest of its session."""
         while not self._exited() and time.monotonic() < deadline:
             time.sleep(0.02)
         if self._process.returncode is None:
@@ -70,7 +70,7 @@ class Program:
         self._process.wait()
 
     def _exited(self) -> bool:
-        """Has it exited? It is not reaped: pid and session id stay reserved until `end`."""
+        """Has the program exited? It is not reaped: pid and session id stay reserved until `end`."""
         if self._process.returncode is not None:
             return True
         look = os.WEXITED | os.WNOHANG | os.WNOWAIT
@@ -86,13 +86,13 @@ class DaemonProcess(Program):
         super().__init__(file.stem, directory / f"{file.stem}.log", words, domain_id)
 
     def follow(self, tell: Callable[[Edge], None]) -> None:
-        """Call `tell`, on a thread, with every edge of its plants from now on."""
+        """Call `tell`, on a thread, with every edge of the daemon's plants from now on."""
         caller = self._caller()
         caller.order("follow")
         threading.Thread(target=_read, args=(caller, tell), daemon=True).start()
 
     def order(self, line: str) -> None:
-        """Give its plants one order. Raises DemoFailed when they refuse it."""
+        """Give the daemon's plants one order. Raises DemoFailed if they refuse."""
         with self._caller() as caller:
             try:
                 caller.order(line)
@@ -134,13 +134,13 @@ class PageProcess(Program):
         while not (said := [line for line in self.tail().splitlines() if "http://" in line]):
             self.check()
             if time.monotonic() > deadline:
-                raise DemoFailed("the page did not say where it is")
+                raise DemoFailed("the page did not log its address")
             time.sleep(0.05)
         return f"{said[0]}; log in as demo, password {self._password}"
 
 
 def _page_port() -> str:
-    """Return PAGE_PORT, else 8080, or a free port if that is taken."""
+    """Return PAGE_PORT if it is set, else 8080, or 0 (any free port) if 8080 is taken."""
     if given := os.environ.get("PAGE_PORT"):
         return given
     try:

@@ -36,12 +36,12 @@ class Interrupted(Exception):
 
 @dataclass(frozen=True, slots=True)
 class Demo:
-    """`files`: device -> its daemon's YAML. `dawn`: the state of everything in the morning, checked
-    by `dawns`. `live`: the day itself; raises DemoFailed when an awaited event is late.
+    """`files`: device -> its daemon's YAML. `dawn`: the state of everything in the morning, in words;
+    `dawns` checks it. `live`: the day itself; raises DemoFailed when an awaited event is late.
     `problems`: the errors of the day, from the journal alone. `right`: the day in a sentence.
     `outcomes`: the results of the parts of the day, if the summary lists them.
     `page_password`: the page is served too; user `demo` may log in with this password.
-    `publishes`: the topics of RMF's side; without the supervisors' if real ones run."""
+    `publishes`: the topics of RMF's side; without the supervisors' topics if real supervisors run."""
 
     files: dict[str, Path]
     dawn: str
@@ -146,11 +146,11 @@ class DemoRun:
             transport.close()
 
     def _interrupt(self, number: int, frame: FrameType | None) -> None:
-        """Only note the signal: each step is completed first, so nothing is left behind."""
+        """Only note the signal: the step under way is completed first, so nothing is left behind."""
         self._interrupted = True
 
     def _check(self) -> None:
-        """Raises Interrupted, or DemoFailed when a daemon has died."""
+        """Raise Interrupted after a signal, or DemoFailed if a daemon has died."""
         sys.stdout.flush()
         if self._interrupted:
             raise Interrupted

@@ -1,7 +1,7 @@
 """The fleets of `make demo-charging` and the pads that their robots stand on.
 
-A robot that arrives at a charger's waypoint stands on that charger's pad, and its battery fills while
-the charger says that it charges. The first fleet's finishing request is `charge`, the second's is
+A robot that arrives at a charger's waypoint stands on that charger's pad, and the battery fills while
+the charger reports CHARGING. The first fleet's finishing request is `charge`, the second fleet's is
 `nothing`.
 """
 
@@ -22,13 +22,14 @@ WARD: Final = "ward"
 DRIVE_S: Final = 1.0
 FILLS_PER_S: Final = 15.0
 CONFIGURED: Final = {"tiny": Path(__file__).parents[2] / "config" / "fleet_tiny.yaml"}
-"""Fleets started from their adapter's configuration; the others have only the setting below."""
+"""Fleets made from their adapter's configuration; other fleets have only FINISHING."""
 FINISHING: Final[dict[str, Finishing]] = {"porter": "nothing"}
 
 
 class DemoFleets(Party):
-    """Both fleets, as one party on RMF's side, and the coordinator's diagnostics: its `queue`, and
-    `shown`: key -> value of all of them."""
+    """Both fleets, as one party on RMF's side, and the coordinator's diagnostics: `queue` is its queue,
+    `shown` has all keys and values.
+    """
 
     subscribes: Sequence[AnyTopic] = (CHARGING_ASSIGNMENTS, DIAGNOSTICS)
 
@@ -64,7 +65,7 @@ class DemoFleets(Party):
         return said
 
     def wake_at(self) -> float:
-        """Due all the time."""
+        """Return 0, because the fleets are always due."""
         return 0.0
 
     # ---- calls of the day
@@ -92,7 +93,7 @@ class DemoFleets(Party):
         fleet.rests(who, self.world.wall())
 
     def strays(self, who: str, place: str) -> None:
-        """Drive the robot to a place without being sent."""
+        """Drive the robot to a place that nobody assigned."""
         self.world.note(f"drives to {place} by mistake", who)
         self.fleets[self._who[who].fleet].strays(who, place, self.world.wall())
 

@@ -11,7 +11,7 @@ from hal_fakes.plants.plant import Edge
 
 What = Literal["robot", "request", "relay", "sensor", "state", "place", "alert", "demo"]
 SETTLES_S = 0.15
-"""Seconds for which lines wait to be sorted: events arrive by several ways, stamped at their source."""
+"""How long lines wait to be sorted (s): events arrive on several ways, each stamped at its source."""
 COLOURS = {
     "request": 36,
     "relay": 33,
@@ -55,7 +55,7 @@ class Journal:
         self._told: dict[tuple[str, str], str] = {}
 
     def edge(self, edge: Edge) -> None:
-        """Note a change of our relay or of the plant's contact."""
+        """Note a change of a daemon's relay or of a plant's contact."""
         self.edges.append(edge)
         value = ("off", "on")[edge.value] if isinstance(edge.value, bool) else edge.value
         self._add(JournalLine(edge.at, edge.what, edge.device, f"{edge.signal} {value}"))
@@ -89,7 +89,7 @@ class Journal:
             self._write(line.render(self.began_at, colour=self._colour) + "\n")
 
     def begin_day(self) -> None:
-        """Begin to count: keep only the last state of each device."""
+        """Start the counts: keep only the last state of each device."""
         self.states = [*{words.device(state): state for state in self.states}.values()]
         self.edges, self.requests = [], []
 
@@ -110,7 +110,7 @@ class Journal:
         return counts
 
     def _once(self, line: JournalLine) -> None:
-        """Add a line, unless equal to the last one of this sort for the device."""
+        """Add a line, unless it equals the device's last line of this sort."""
         key = (line.what, line.device)
         if self._told.get(key) != line.text:
             self._told[key] = line.text

@@ -1,7 +1,7 @@
 """RMF's side of a demo on a real graph: supervisors, fleet adapters, robots, and the messages heard.
 
-Requests take RMF's whole way: a fleet adapter publishes on the adapter topics, the supervisor hears
-them from the wire and publishes on the daemon's topic.
+Requests go the whole way through RMF: a fleet adapter publishes on the adapter topics; the supervisor
+hears them on the wire and publishes on the daemon's topic.
 """
 
 import time
@@ -59,9 +59,10 @@ class World:
         *,
         publishes: Iterable[AnyTopic] = PUBLISHED,
     ) -> None:
-        """`check`: called all the time; raises when the demo must end. `patience`: factor on the time
-        limits of `until`. `publishes`: the topics published here; a supervisor that hears another
-        publisher of its topics waits."""
+        """Join the graph. `check`: called all the time; raises when the demo must end. `patience`:
+        factor on the time limits of `until`. `publishes`: the topics published here; a supervisor that
+        hears another publisher of its topics waits.
+        """
         self.daemons = daemons
         self.journal = journal
         self.places: dict[str, str] = {}
@@ -115,13 +116,13 @@ class World:
         )
 
     def alerted(self, code: str) -> bool:
-        """Was a person told this?"""
+        """Has RMF alerted a person with this text?"""
         return any(alert.subtitle == code for alert in self.alerts)
 
     # ---- actions of the day
 
     def say(self, said: Iterable[Said]) -> None:
-        """Publish these messages, and note those to a daemon in the journal."""
+        """Publish these messages, and note messages to a daemon in the journal."""
         for topic, message in said:
             if topic in TO_DAEMONS:
                 assert isinstance(message, Requested)
@@ -155,7 +156,7 @@ class World:
     def until(
         self, ready: Callable[[], bool], within_s: float, what: str, repeat: Said | None = None
     ) -> None:
-        """Run until `ready`. `repeat`: published now and every second meanwhile.
+        """Run until `ready`. `repeat`: messages to publish now and every second.
 
         Raises DemoFailed with `what` after `within_s` times the patience.
         """

@@ -32,7 +32,7 @@ from hal_fakes.modbus.units import FakeUnits, FarSide
 
 _aiohttp = sys.modules.get("aiohttp")
 sys.modules["aiohttp"] = None  # type: ignore[assignment]  # as if it were not installed
-try:  # pymodbus would import it for an unused page; that takes half of a far side's start
+try:  # pymodbus would import aiohttp for an unused page: half of a start's time
     from pymodbus.server import ModbusTcpServer
 finally:
     del sys.modules["aiohttp"]
@@ -41,7 +41,7 @@ finally:
 
 TRANSACTION: Final = 0
 UNIT: Final = 6
-"""Their positions in a reply on TCP."""
+"""Positions of transaction number and unit in a reply on TCP."""
 LOOK_S: Final = 0.02
 """Greatest delay (s) with which the server obeys `off`."""
 READY_S: Final = 10.0
@@ -68,7 +68,7 @@ class ModbusServer:
         self._noise = random.Random("modbus")
         self._kinds = itertools.cycle((0, 1))
         self._port = 0
-        self._server: Any = None  # pymodbus types neither its sockets nor a context of ours
+        self._server: Any = None  # pymodbus has no types for its sockets, or for our context
         self._closed = False
         self._loop = asyncio.new_event_loop()
         self._thread = threading.Thread(target=self._loop.run_forever, name="modbus", daemon=True)
@@ -110,7 +110,7 @@ class ModbusServer:
         await asyncio.sleep(0)  # the connections close in the loop's next round
 
     async def _look(self) -> None:
-        """Stop and start the server as told, and let watchdogs trip."""
+        """Stop or start the server as ordered, and let watchdogs trip."""
         while True:
             self._units.tick()
             off = self._units.failure("server") == "off"
@@ -135,7 +135,7 @@ class ModbusServer:
 
 
 def _placeholder() -> SimDevice:
-    """Make the registers that pymodbus demands; ours are the plants'."""
+    """Make the registers that pymodbus demands; the plants have the real registers."""
     return SimDevice(0, simdata=SimData(0, datatype=DataType.REGISTERS))
 
 

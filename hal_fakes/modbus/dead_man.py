@@ -1,9 +1,9 @@
 """The watchdog of a simulated I/O module, as in couplers of the WAGO 750 series.
 
 Its holding registers: 0x1000 time (x 100 ms), 0x1003 trigger, 0x1006 state (0 stopped, 1 running,
-2 tripped), 0x1007 restart. A trigger counts if its value differs from the last one; the first starts
-the watchdog. When the watchdog trips, the module's coils go off and writes to them get exception 4,
-until it is restarted.
+2 tripped), 0x1007 restart. A trigger counts if its value differs from the last trigger's; the first
+trigger starts the watchdog. When the watchdog trips, the module's coils go off, and writes to coils get
+exception 4 until the watchdog is restarted.
 """
 
 from typing import Final
@@ -35,11 +35,11 @@ class ModuleWatchdog:
         return self._registers[STATE] == TRIPPED
 
     def get(self, point: Point, now: float) -> int:
-        """Return the value there."""
+        """Return the register's value."""
         return self._registers[point.address]
 
     def set(self, point: Point, value: int, now: float) -> bool:
-        """Write a value; False if nothing can be written there now."""
+        """Write a register; False if it cannot be written now."""
         state = self._registers[STATE]
         if point.address == STATE or (point.address == TIME and state == RUNNING):
             return False

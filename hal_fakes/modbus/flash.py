@@ -13,7 +13,7 @@ COIL_VALUES: Final = (0xFF00, 0)
 
 
 class TimedCoilRequest(WriteSingleCoilRequest):
-    """Function 5 with its value as sent. Other values than on and off make `FakeUnits` flash."""
+    """Function 5, with the value as sent. A value other than on or off makes `FakeUnits` flash."""
 
     def decode(self, data: bytes) -> None:
         """Keep the value."""

@@ -28,7 +28,7 @@ class FakeRegisterCharger:
         self.outputs = frozenset(self._orders)
 
     def get(self, point: Point, now: float) -> int:
-        """Return the register at `now` (monotonic s): several values may share one."""
+        """Return the register at `now` (monotonic s); several values may share a register."""
         if point in self._written:
             return self._written[point]
         self.plant.advance(now)

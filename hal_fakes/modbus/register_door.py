@@ -1,6 +1,7 @@
 """A door operator behind Modbus registers: its plant's contacts in the numbers of its register map.
 
-It knows its end positions: they read 0 and 100; between them it reads the number for `unknown`, or 50.
+The operator knows only its end positions, 0 and 100; between them its position is the number for
+`unknown`, or 50.
 """
 
 from drivers.door.register import RegisterDoorSettings, door_map, points
@@ -16,7 +17,7 @@ NONSENSE = 65535
 
 
 def contacts(settings: RegisterDoorSettings) -> list[Wire]:
-    """The operator's own contacts and relay, for the plant: they can fail like wires to us."""
+    """Return the operator's own contacts and relay, for the plant: they can fail as our wires can."""
     at = points(settings)
     signals = {"opened": "status", "closed": "status", "obstruction": "obstruction"}
     inputs = [Wire(s, "in", str(at[part]), "high") for s, part in signals.items() if part in at]
@@ -24,7 +25,7 @@ def contacts(settings: RegisterDoorSettings) -> list[Wire]:
 
 
 class FakeRegisterDoor:
-    """The cells of one operator. `points`: all of them, including `outputs`; `unit`: its unit."""
+    """The cells of one operator, at `unit`. `points`: all cells, including `outputs`."""
 
     def __init__(self, plant: Plant, settings: RegisterDoorSettings) -> None:
         self.plant = plant
@@ -36,7 +37,7 @@ class FakeRegisterDoor:
         self.outputs = frozenset({self._parts["command"]})
 
     def get(self, point: Point, now: float) -> int:
-        """Return the value there at `now` (monotonic s)."""
+        """Return this point's value at `now` (monotonic s)."""
         self.plant.advance(now)
         value = 0
         for part, where in self._parts.items():

@@ -1,7 +1,7 @@
 """A lift's gateway: its plant's contacts in the numbers of its register map, its commands as relays.
 
-Behind the gateway is a lift on contacts, which can be cut like wires to us: one for each floor, two
-for a door, one for each hazard.
+Behind the gateway is a lift on contacts: one for each floor, two for a door, one for each hazard. These
+contacts can be cut, as our wires can.
 """
 
 from collections.abc import Iterator
@@ -28,7 +28,7 @@ from hal_fakes.plants.lift import LiftPace, LiftPlant
 from hal_fakes.plants.plant import Plant
 
 NONSENSE = 65535
-"""Whole register's value for a door that is open and closed at once."""
+"""The whole register's value for a door that is open and closed at once."""
 
 
 def contacts(settings: RegisterLiftSettings) -> dry_contact.DryContactLiftSettings:
@@ -66,7 +66,7 @@ def contacts(settings: RegisterLiftSettings) -> dry_contact.DryContactLiftSettin
 
 
 class FakeRegisterLift:
-    """The cells of one gateway. `points`: all of them, including `outputs`; `unit`: its unit."""
+    """The cells of one gateway, at `unit`. `points`: all cells, including `outputs`."""
 
     def __init__(self, plant: Plant, settings: RegisterLiftSettings) -> None:
         self.plant = plant
@@ -80,7 +80,7 @@ class FakeRegisterLift:
         self.outputs = frozenset(self._written)
 
     def get(self, point: Point, now: float) -> int:
-        """Return the value there at `now` (monotonic s)."""
+        """Return this point's value at `now` (monotonic s)."""
         self.plant.advance(now)
         value = self._written.get(point, 0)
         for name, where in self._parts.items():
@@ -89,7 +89,7 @@ class FakeRegisterLift:
         return value
 
     def set(self, point: Point, value: int, now: float) -> bool:
-        """Write a value; False if not writable. Relays go off before others go on."""
+        """Write a value; False if not writable. Relays go off before other relays go on."""
         if point not in self._written:
             return False
         self._written[point] = value

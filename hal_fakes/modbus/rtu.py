@@ -4,7 +4,7 @@ An absent unit is silent. A pseudo-terminal has no baud rate, so this file delay
 on the wire. A request ends with 3.5 characters of silence; then the reply begins.
 With `ignore_echo` in the settings the adapter echoes. `port` is a link that stays the same when the
 adapter is unplugged and plugged in, as in /dev/serial/by-id. On command (`fail DEVICE unit|server
-MODE`) one unit, or the server, which is the line with all of them, is
+MODE`) one unit, or the server (the line with all units), is
 
 - `off`: the unit is silent; the server's adapter is unplugged
 - `stuck`: the unit's inputs stay as they were; the line is cut, and silent
@@ -137,7 +137,7 @@ class RtuLine:
             (self.adapter.pull if pulled else self.adapter.plug)()
 
     def _listen(self) -> None:
-        """Read until something is due. Characters take their time on the wire."""
+        """Read until something is due. Each character takes its time on the wire."""
         wire = self.adapter.wire
         readable = select.select([wire] if wire is not None else [], [], [], self._idle_s())[0]
         sent = b""
@@ -184,7 +184,7 @@ class RtuLine:
         self._put(reply, heard_at + (self._slow_s if "slow" in modes else 0.0))
 
     def _reply(self, frame: bytes) -> bytes:
-        """Return the unit's reply; none to a broken frame."""
+        """Return the unit's reply; no reply to a broken frame."""
         crc = int.from_bytes(frame[-2:], "big")
         if len(frame) < 4 or not FramerRTU.check_CRC(frame[:-2], crc):
             return b""

@@ -1,6 +1,7 @@
 """The units behind pymodbus's servers: bits and registers with plants behind them, and their failures.
 
-A gateway (`hal_fakes/modbus/__init__.py`) and a serial line (`hal_fakes/modbus/rtu.py`) use the same.
+A gateway (`hal_fakes/modbus/__init__.py`) and a serial line (`hal_fakes/modbus/rtu.py`) share this
+code.
 """
 
 import asyncio
@@ -20,7 +21,7 @@ Part = Literal["unit", "server"]
 
 
 class UnitCells(Protocol):
-    """Registers and bits of one unit, with a plant behind them. `outputs`: the writable ones."""
+    """Registers and bits of one unit, with a plant behind them. `outputs`: the writable cells."""
 
     unit: int
     points: frozenset[Point]
@@ -28,13 +29,13 @@ class UnitCells(Protocol):
 
     @property
     def plant(self) -> Plant | None:
-        """The plant; None for registers of the module itself."""
+        """Return the plant; None for registers of the module itself."""
 
     def get(self, point: Point, now: float) -> int:
-        """Return the value there at `now` (monotonic s)."""
+        """Return this point's value at `now` (monotonic s)."""
 
     def set(self, point: Point, value: int, now: float) -> bool:
-        """Write a value; False if nothing can be written there."""
+        """Write a value; False if this point cannot be written."""
 
 
 FarSide: TypeAlias = PlantWiring | UnitCells

@@ -1,18 +1,18 @@
 """A wireless charger on any wire: its pad, the robot on the pad, battery and heat.
 
-To press: `robot` (one stands on the pad), or a robot of the YAML's `receivers` by its name
-(`tiny/AMR02`), or a `stranger`; several may stand there, and the last to come is seen. `misparked`:
-the robot stands off centre. `foreign_object` (something lies on the
-pad), `over_temperature`, `transmitter_fault`. A robot comes with its battery 40 % full. The pad rises
-to it; the station shakes hands, charges, ramps down when the battery is full, waits, and is idle again
-until another robot comes. Current warms the coil, and a fan cools it. An error stays until its cause
-is gone and the error is cleared or (if nothing can clear it) the power is off; a robot's error
+To press: `robot` (a robot stands on the pad), or a robot of the YAML's `receivers` by its name
+(`tiny/AMR02`), or a `stranger`. Several robots may stand there; the station sees the last that came.
+`misparked`: the robot stands off centre. `foreign_object` (something lies on the pad),
+`over_temperature`, `transmitter_fault`. A robot comes with its battery 40 % full. The pad rises to the
+robot; the station shakes hands, charges, ramps down when the battery is full, waits, and is idle again
+until another robot comes. Current warms the coil, and a fan cools it. An error stays until its cause is
+gone and the error is cleared or, if no command clears it, the power is off; a robot's error
 (ROBOTS_FAULTS) stays until the robot leaves.
 
 To drive: `clear_error`, and on a commanded station `power` (needed for charging) and `range_check`
 (its result comes a moment later; a station without range checks knows at once). On
-contacts: the relay `enable`; `charging` while current flows, `ready` while it could, `fault` in an
-error, `at_height` and `range_ok` of the pad.
+contacts: the relay `enable`; `charging` while current flows, `ready` while current could flow, `fault`
+in an error, `at_height` and `range_ok` of the pad.
 
 Failing parts, with the effects of `off`, `stuck`, `slow`, `garbage` and `wrong`; `pad` is in `pad.py`:
 
@@ -45,7 +45,7 @@ RANGE_CHECK_S: Final = 0.3
 EMPTY_V, FULL_V, CURRENT_A = 24.0, 29.2, 30.0
 HOT_C, COOLED_C, UNCOOLED_C = 97.0, 60.0, 140.0
 FIRST, STRANGER = "4711", "815"
-"""The receivers of `robot`, if the YAML lists none, and of a `stranger`."""
+"""The receivers of a `robot` (if the YAML lists no receivers) and of a `stranger`."""
 
 PARTS: Final = ("pad", "receiver", "fan", "battery", "thermometer")
 CAUSES: Final = ("foreign_object", "over_temperature", "transmitter_fault")
@@ -66,12 +66,13 @@ RANGES: Final = {"in": True, "out": False, "failed": False}
 
 @dataclass(frozen=True, slots=True)
 class Reading:
-    """The knowledge of a controller without contacts at one instant.
+    """A controller's knowledge at one instant.
 
-    `progress`: of the activity, 0-1. `faults`: keys of TEXTS. `here`: is a robot there? `receiver`: the
-    one seen, "" for none. `couples`: could current flow now? `range_result`: of the last range check,
-    `none`, `ongoing`, `in`, `out` or `failed`; `in_range`: the same, or `couples` without checks.
-    `range_ok`: does the robot stand well? `battery`: 0-1. `time_to_full_s`: while current flows.
+    `progress`: the activity's progress, 0-1. `faults`: keys of TEXTS. `here`: is a robot on the pad?
+    `receiver`: its receiver's id, or "". `couples`: could current flow now? `range_result`: the last
+    range check's result: `none`, `ongoing`, `in`, `out` or `failed`. `in_range`: is that result `in`?
+    Without range checks `couples` counts. `range_ok`: is the robot well placed? `battery`: 0-1.
+    `time_to_full_s`: while current flows.
     """
 
     activity: Activity
@@ -93,27 +94,27 @@ class Reading:
 
     @property
     def error_text(self) -> str:
-        """Describe the faults in the station's words."""
+        """Return the faults in the station's words."""
         return ", ".join(text for fault, text in TEXTS.items() if fault in self.faults)
 
     @property
     def robots(self) -> bool:
-        """Is it the robot's fault?"""
+        """Is any fault the robot's?"""
         return bool(self.faults & ROBOTS_FAULTS)
 
     @property
     def number(self) -> float:
-        """The receiver's number; 0 if it has none."""
+        """Return the receiver's number; 0 for a receiver without a number."""
         return float(self.receiver) if self.receiver.isdecimal() else 0.0
 
 
 class ChargerPlant(WiredPlant):
-    """`battery`: 0-1, of the robot on the pad; meaningless without one.
+    """`battery`: 0-1, of the robot on the pad; meaningless without a robot.
 
-    `receivers`: id -> robot. `commanded`: it charges only while `power` is on. `asked`: it knows
-    whether a robot is in range only by a range check. `cleared`: an error stays until it is cleared.
-    `pace`: handshake, movement and stopping are so many times faster than a real charger's.
-    `wires`: its contacts, if any. `links`: the parts of its wire that can fail.
+    `receivers`: id -> robot. `commanded`: the station charges only while `power` is on. `asked`: only a
+    range check shows whether a robot is in range. `cleared`: an error stays until it is cleared.
+    `pace`: how many times faster handshake, movement and stopping are than a real charger's. `wires`:
+    the station's contacts, if any. `links`: the parts of the wire that can fail.
     """
 
     def __init__(
@@ -147,7 +148,7 @@ class ChargerPlant(WiredPlant):
     # ---- the controller's readings and commands
 
     def reading(self) -> Reading:
-        """Return everything at once."""
+        """Return the whole reading."""
         lasts = self._until - self._since
         flows = self.activity in CURRENT_FLOWS
         draws = flows and self.failures.get("battery") not in ("off", "garbage")
@@ -187,7 +188,7 @@ class ChargerPlant(WiredPlant):
         self.power = energised
 
     def drive(self, signal: str, asserted: bool, now: float) -> None:
-        """Obey a command or the relay. `power` is a level; True requests one of the others."""
+        """Obey a command or the relay. `power` is a level; True triggers any other command."""
         if signal in self._relays:
             super().drive(signal, asserted, now)
             return
@@ -208,7 +209,7 @@ class ChargerPlant(WiredPlant):
     # ---- physics
 
     def event_at(self) -> float:
-        """Time at which a running activity ends by itself."""
+        """Return the time at which a running activity ends by itself."""
         return min(self._until, self.pad.rises_until, self._range_until, self._coil.trips_at())
 
     def act(self, signal: str, asserted: bool) -> None:
@@ -223,7 +224,7 @@ class ChargerPlant(WiredPlant):
             self.battery = self.battery if self._here else 0.0
 
     def run(self) -> None:
-        """End due activities; begin those demanded by pad, heat and causes."""
+        """End due activities; begin the activities that pad, heat and causes demand."""
         if self.pad.follow(self.now, bool(self._here), self.failures.get("pad"), self.pace):
             self.note("sensor", "gap_mm", self.pad.gap_mm())
         if self.now >= self._range_until:
@@ -299,7 +300,7 @@ class ChargerPlant(WiredPlant):
         self._enter(Activity.HANDSHAKE, LASTS_S[Activity.HANDSHAKE] / self.pace * slowness)
 
     def _end(self) -> None:
-        """End the present activity: its time is over."""
+        """End the present activity, whose time is over."""
         receiver = self.failures.get("receiver")
         match self.activity:
             case Activity.HANDSHAKE if receiver == "wrong":
@@ -331,7 +332,7 @@ class ChargerPlant(WiredPlant):
         return HOT_C if self.pressed["over_temperature"] else self._coil.celsius(self.now)
 
     def _fills(self) -> float:
-        """Return the share of the battery filled in a second."""
+        """Return the share of the battery that fills in a second."""
         mode = self.failures.get("battery")
         slowness = SLOWNESS if mode == "slow" else 1.0
         return 0.0 if mode in ("stuck", "off", "garbage") else 1.0 / FILL_S / slowness

@@ -1,12 +1,12 @@
 """One wire between a plant and a bus, and the ways in which wires fail.
 
-The same five for every bus, so a test scenario on GPIO also works on Modbus:
+Every bus has the same five failures, so a test scenario on GPIO also works on Modbus:
 
-- `off`: cut. An input falls to its pull (or reads 0 at a module, or floats where nothing pulls it);
+- `off`: cut. An input falls to its pull (it reads 0 at a module, and floats without a pull);
   the relay behind a cut output never energises.
 - `stuck`: holds its last value (a welded relay, a jammed contact).
 - `slow`: everything arrives SLOW_S late.
-- `garbage`: random, another value every GARBAGE_S at the most, the same ones in each run.
+- `garbage`: random, a new value every GARBAGE_S at the most, the same values in each run.
 - `wrong`: inverted (normally open taken for normally closed).
 """
 
@@ -44,14 +44,14 @@ class Contact:
         self._settle(now)
 
     def fail(self, mode: FailureMode | None, now: float) -> None:
-        """Fail this way from `now` on; None mends it."""
+        """Fail this way from `now` on; None mends the wire."""
         self.mode = mode
         self._late.clear()
         self._noise_at = now
         self._settle(now)
 
     def next_at(self) -> float:
-        """Next time (s) at which `shows` may change by itself; inf for never, and for a sound wire."""
+        """Return the next time (s) at which `shows` may change by itself; inf on a sound wire."""
         if self._late:
             return self._late[0][0]
         return self._noise_at if self._noisy() else float("inf")

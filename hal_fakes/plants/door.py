@@ -1,7 +1,7 @@
 """A pedestrian door with an operator: opens while held or pushed, and closes by itself.
 
 Contacts: `opened` and `closed` at its end positions, `obstruction` (light curtain), `fire` (the
-building's). Relay: `hold_open`. To press: `push` (a person's button or hand), `obstruction`,
+building's alarm). Relay: `hold_open`. To press: `push` (a person's button or hand), `obstruction`,
 `fire`. Failing part `operator`: `off` and `stuck` stand still, `slow` takes five times as long,
 `wrong` inverts each command, `garbage` stops halfway. At a Modbus module `unit` and `server`
 fail as well (`hal_fakes/modbus/`).
@@ -33,8 +33,8 @@ def build(
 class DoorPlant(WiredPlant):
     """The door: `position` is 0 when closed and 1 when open.
 
-    `open_s`, `close_s`: the time of a whole travel. `auto_close_s`: the operator's wait before
-    closing a door no longer held. `parts`: the parts of its controller that can fail.
+    `open_s`, `close_s`: the times of a whole travel (s). `auto_close_s`: the operator's wait before it
+    closes a released door. `parts`: the parts of the controller that can fail.
     """
 
     def __init__(
@@ -82,7 +82,7 @@ class DoorPlant(WiredPlant):
         self._steer(1 if wanted or self.now < self._close_at else -1)
 
     def event_at(self) -> float:
-        """Time of arrival at an end position, or of the start of closing."""
+        """Return the time of arrival at an end position, or of the start of closing."""
         waits = not self._wanted and self.now < self._close_at
         return min(self._arrives_at, self._close_at if waits else float("inf"))
 

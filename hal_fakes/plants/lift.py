@@ -1,18 +1,18 @@
 """A lift with its controller: car, doors, AGV key logic, people, and the hazards that take it from RMF.
 
-- AGV mode is granted some time after its request, once people's calls are done, and never under
-  a hazard; it ends when the request ends or a hazard comes.
-- With `agv_mode: by_call` a call requests it, and counts until the door there is open and not held
-  (as in open-rmf/mock-lift-io, firmware/Mock-Lift/src/main.cpp).
-- In AGV mode a call takes the car to that landing; there the door opens, stays for its dwell time,
-  and longer while its open relay is on. The car leaves with its doors closed.
-- Fire: the car goes to the lowest landing and stands there open. Emergency, earthquake: it stops at
-  the next landing and opens. Code blue, out of service, manual: only AGV mode ends.
-- AGV mode lost on the way: it stops at the next landing and opens for its dwell time.
-- Overload: it stays where it is, open.
+- AGV mode begins some time after its request, once people's calls are done, and never under a hazard.
+  AGV mode ends when the request ends or a hazard comes.
+- With `agv_mode: by_call` a call requests AGV mode, and counts until the door at its landing is open
+  and not held (as in open-rmf/mock-lift-io, firmware/Mock-Lift/src/main.cpp).
+- In AGV mode a call brings the car to its landing; there the door opens, and stays open for its dwell
+  time and while its open relay is on. The car leaves with its doors closed.
+- Fire: the car goes to the lowest landing and stays there, open. Emergency, earthquake: the car stops
+  at the next landing and opens. Code blue, out of service, manual: only AGV mode ends.
+- AGV mode lost on the way: the car stops at the next landing and opens for its dwell time.
+- Overload: the car stays at its landing, open.
 
 To press: each wired hazard, `hall_<landing>` (a person's call), `obstruction`, `rear_obstruction`.
-Parts that fail: `car` (`off`, `stuck`: stands where it is; `slow`; `wrong`: goes a floor too far),
+Failing parts: `car` (`off`, `stuck`: stands still; `slow`; `wrong`: goes a floor too far),
 `door_operator` and `rear_door_operator` (`off`, `stuck`: stands; `slow`; `wrong`: inverted),
 `controller` (`off`: no AGV mode; `stuck`: AGV mode stays as it is; `slow`). Wires fail as in
 `hal_fakes/plants/contact.py`.
@@ -91,7 +91,7 @@ class LiftPlant(WiredPlant):
         return self._asserted.get(signal, False)
 
     def actuate(self, signal: str, energised: bool) -> None:
-        """Take a change of our relay; a call counts once it has been stable for a moment."""
+        """Take a change of our relay; a call counts once its relay has been stable for a moment."""
         (self._on.add if energised else self._on.discard)(signal)
         if signal.startswith("call_"):
             self._seen, self._seen_at = self._called(), self.now + CALL_SETTLES_S
@@ -102,19 +102,19 @@ class LiftPlant(WiredPlant):
             self._people.append(self._levels.index(signal.removeprefix("hall_")))
 
     def fail(self, part: str, mode: FailureMode | None) -> None:
-        """Make a wire or part fail; None mends it. ValueError names the known ones."""
+        """Make a wire or part fail; None mends it. Raises ValueError with the known names."""
         if mode is not None and mode not in FAILS.get(part, (mode,)):
             raise ValueError(f"{part} does not fail by {mode!r}, but by {', '.join(FAILS[part])}")
         super().fail(part, mode)
 
     def run(self) -> None:
-        """Do all that is due now, then its consequences."""
+        """Run all due events, then their consequences."""
         for door in self.doors.values():
             door.run(self.now)
         self._take_call()
         self.car.run(self.now, self._goal(), self._floor_s())
         self._arrive()
-        self._grant()  # may follow from the arrival; may bring a call to the car's landing
+        self._grant()  # possible after an arrival, and may bring a call to this landing
         self._arrive()
         for side, door in self.doors.items():
             turned = self.failures.get(f"{PREFIX[side]}door_operator") == "wrong"
@@ -124,7 +124,7 @@ class LiftPlant(WiredPlant):
         self._asserted = self._lines()
 
     def event_at(self) -> float:
-        """Time of the next own event of car, doors or controller."""
+        """Return the time of the next event of car, doors or controller."""
         dwells = [d.dwell_until for d in self.doors.values() if d.dwell_until > self.now]
         doors = [d.due_at for d in self.doors.values()]
         return min([self.car.event_at(), self._grant_at, self._seen_at, *doors, *dwells])
@@ -135,7 +135,7 @@ class LiftPlant(WiredPlant):
         return any(self.pressed.get(h, False) for h in hazards)
 
     def _called(self) -> int | None:
-        """Return the landing whose call is on; None for none, or for a code that means none."""
+        """Return the landing whose call is on; None without a call, or for a code of no landing."""
         code = self._wiring.call_code
         for i, level in enumerate(self._levels):
             lines = code.lines(level) if code else {f"call_{level}": True}
@@ -147,7 +147,7 @@ class LiftPlant(WiredPlant):
     def _take_call(self) -> None:
         if self._seen_at <= self.now:
             self._seen_at = NEVER
-            if self._seen is not None:  # a call counts while AGV mode is on, and starts it anew
+            if self._seen is not None:  # a call counts in AGV mode, and requests AGV mode anew
                 self._call = self._seen
                 self._called_for_agv = True
 
@@ -183,7 +183,7 @@ class LiftPlant(WiredPlant):
         return self._called_for_agv
 
     def _goal(self) -> int | None:
-        """Return the landing for the car to go to; None: the next possible stop."""
+        """Return the landing to drive to; None: the next possible stop."""
         if self._hazard(Hazard.FIRE):
             return 0
         if self._hazard(*OPENS_UP):
@@ -194,7 +194,7 @@ class LiftPlant(WiredPlant):
         return goal
 
     def _arrive(self) -> None:
-        """At the goal: end the call, and open the landing's door for its dwell time."""
+        """End the call at the goal, and open the door there for its dwell time."""
         goal = self._goal()
         if not self.car.standing or not (self._let_out or self.car.floor == goal):
             return
@@ -277,7 +277,7 @@ class LiftPlant(WiredPlant):
         return codes.lines("service", number, len(code.bits))
 
     def _floor_lines(self) -> dict[str, bool]:
-        """Return the floor code; a controller without a code for between floors keeps the last."""
+        """Return the floor code; a controller without a code for between floors keeps the last code."""
         shown = self.car.shown
         try:
             self._code = self._wiring.floor_code.show(

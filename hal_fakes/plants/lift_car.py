@@ -4,12 +4,12 @@ from typing import Literal
 
 NEVER = float("inf")
 
-# A floor's travel: the car still shows the floor it leaves, then none, then the next one.
+# A floor's travel: the car still shows the floor that it leaves, then no floor, then the next floor.
 LEGS = {"leaving": 0.25, "between": 0.5, "arriving": 0.25}
 
 
 class Car:
-    """`floor`: the landing's index, 0 for the lowest; `leg`: the present part of its way."""
+    """`floor`: the landing's index, 0 for the lowest; `leg`: the present part of the way."""
 
     def __init__(self) -> None:
         self.floor = 0
@@ -25,7 +25,7 @@ class Car:
 
     @property
     def shown(self) -> int | None:
-        """The landing that the floor code shows; None between two."""
+        """Return the landing that the floor code shows; None between landings."""
         return None if self.leg == "between" else self.floor
 
     def run(self, now: float, goal: int | None, floor_s: float | None) -> None:
@@ -46,7 +46,7 @@ class Car:
             self._begin("leaving", now, floor_s)
 
     def event_at(self) -> float:
-        """Time at which the next leg begins."""
+        """Return the time at which the next leg begins."""
         return NEVER if self._frozen else self.due_at
 
     def _next_leg(self, goal: int | None, floor_s: float) -> None:
@@ -68,7 +68,7 @@ class Car:
 
 
 class CarDoor:
-    """One door of the car with its landing door. `dwell_until`: end of its stay open."""
+    """One door of the car with its landing door. `dwell_until`: the door stays open until then."""
 
     def __init__(self) -> None:
         self.dwell_until = 0.0
@@ -80,12 +80,12 @@ class CarDoor:
 
     @property
     def opened(self) -> bool:
-        """Is it fully open, by its limit contact?"""
+        """Is the door fully open, by its limit contact?"""
         return self._position == 1.0 and not self._course
 
     @property
     def closed(self) -> bool:
-        """Is it fully closed and locked?"""
+        """Is the door fully closed and locked?"""
         return self._position == 0.0 and not self._course
 
     def run(self, now: float) -> None:

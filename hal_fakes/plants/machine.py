@@ -1,7 +1,8 @@
 """The common base of plants: a record of edges, failing wires, failing parts, a clock.
 
-A kind's plant derives from WiredPlant and adds its physics. Edges are those of the terminal block: the
-relay as we drove it, the contact as its wire showed it, so a cut wire is an edge like any other.
+A kind's plant derives from WiredPlant and adds its physics. Edges are those of the terminal block: a
+relay as we drove it, a contact as its wire showed it. So the edge of a cut wire is recorded like any
+other edge.
 """
 
 from abc import ABC, abstractmethod
@@ -59,11 +60,11 @@ class WiredPlant(ABC):
 
     @abstractmethod
     def run(self) -> None:
-        """Run the physics at `self.now`: do every own event that is due. May be called at any time."""
+        """Run the physics at `self.now`: every due event. May be called at any time."""
 
     @abstractmethod
     def event_at(self) -> float:
-        """Time of the next own event: s, or inf. `run` at that time must use it up."""
+        """Return the time of the next event (s), or inf. After `run` at that time the event is over."""
 
     def act(self, signal: str, asserted: bool) -> None:  # noqa: B027
         """Take a press or release. Most plants need only `pressed`."""
@@ -99,11 +100,11 @@ class WiredPlant(ABC):
         return None
 
     def next_at(self) -> float:
-        """Time of the next change without a command: s, or inf."""
+        """Return the time of the next change without a command (s), or inf."""
         return min([self.event_at(), *(contact.next_at() for contact in self._broken)])
 
     def fail(self, part: str, mode: FailureMode | None) -> None:
-        """Make a wire or part fail from now on; None mends it. ValueError lists the known parts."""
+        """Make a wire or part fail; None mends it. Raises ValueError with the known parts."""
         contact = self._sensors.get(part) or self._relays.get(part)
         if contact is None and part not in self._parts:
             known = ", ".join(self.names()["fail"])
@@ -126,7 +127,7 @@ class WiredPlant(ABC):
         return {"press": list(self.pressed), "fail": parts}
 
     def press(self, signal: str, asserted: bool, now: float) -> None:
-        """Act as a person or the building. ValueError names the known signals."""
+        """Act as a person or the building. Raises ValueError with the known signals."""
         if signal not in self.pressed:
             known = ", ".join(self.pressed)
             raise ValueError(f"{self.name} has no {signal!r} to press; there are {known}")
@@ -149,7 +150,7 @@ class WiredPlant(ABC):
             self.on_edge(edge)
 
     def _settle(self) -> None:
-        """Pass relays to the controller, run its physics, pass its contacts to us."""
+        """Pass relays to the controller, run the physics, pass the contacts to us."""
         self._settled = True
         for signal, relay in self._relays.items():
             relay.feed(self._driven[signal], self.now)

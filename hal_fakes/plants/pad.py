@@ -17,7 +17,7 @@ CLEARANCE_MM: Final = 60.0
 RISE_MM: Final = 40.0
 RISE_S: Final = 0.4
 HEIGHTS_MM: Final[dict[FailureMode | None, float]] = {"off": 0.0, "garbage": 20.0, "wrong": 52.0}
-"""The pad's height if it does not reach RISE_MM."""
+"""The height of a pad that does not reach RISE_MM."""
 GAP_MM: Final = (10.0, 30.0)
 """The range of gaps (mm) at which pad and receiver can couple."""
 
@@ -34,7 +34,7 @@ class LiftingPad:
         self._height_mm = 0.0
 
     def gap_mm(self) -> float:
-        """The gap between the pad and a robot's receiver."""
+        """Return the gap between the pad and a robot's receiver."""
         return CLEARANCE_MM - self._height_mm
 
     def at_height(self) -> bool:
@@ -46,7 +46,7 @@ class LiftingPad:
         return GAP_MM[0] <= self.gap_mm() <= GAP_MM[1]
 
     def follow(self, now: float, robot: bool, mode: FailureMode | None, pace: float) -> bool:
-        """Rise to a robot, sink without one. True if the pad has just risen."""
+        """Rise to a robot, sink without a robot. True if the pad has just risen."""
         goal = HEIGHTS_MM.get(mode, RISE_MM) if robot else 0.0
         if mode == "stuck" or self._height_mm == goal:
             self.rises_until = NEVER
@@ -76,7 +76,7 @@ class Coil:
         return self._goal + (self._celsius - self._goal) * rest
 
     def trips_at(self) -> float:
-        """Time at which it gets too hot, or cool enough again: s, or inf."""
+        """Return the time at which the coil gets too hot, or cool enough again (s), or inf."""
         if (self._goal > TRIP_C) == (self._celsius >= TRIP_C):
             return NEVER
         rest = (self._goal - TRIP_C) / (self._goal - self._celsius)

@@ -1,6 +1,6 @@
 """The protocol of plants: physics driven by commands and time, with recorded edges and failures.
 
-`machine.py` has all of it but the physics. A kind's plants are in `<kind>.py`.
+`machine.py` implements all but the physics. A kind's plants are in `<kind>.py`.
 """
 
 from collections.abc import Callable, Mapping
@@ -34,7 +34,7 @@ class Plant(Protocol):
 
     @property
     def failures(self) -> Mapping[str, FailureMode]:
-        """Part -> failure mode. The far side of a bus looks for its own parts here."""
+        """Part -> failure mode. The far side of a bus reads the failures of its parts here."""
 
     def drive(self, signal: str, asserted: bool, now: float) -> None:
         """Take a change of our relay."""
@@ -49,10 +49,10 @@ class Plant(Protocol):
         """Return the reading of a controller without contacts; None if it has contacts alone."""
 
     def next_at(self) -> float:
-        """Time of the next change without a command: monotonic s, or inf."""
+        """Return the time of the next change without a command (monotonic s), or inf."""
 
     def fail(self, part: str, mode: FailureMode | None) -> None:
-        """Make a signal or part fail this way; None mends it. ValueError names the known parts."""
+        """Make a signal or part fail; None mends it. Raises ValueError with the known parts."""
 
     def names(self) -> Mapping[str, list[str]]:
         """Return the names for `press` and `fail`."""

@@ -35,7 +35,7 @@ RANGES: Final = {"none": 0, "ongoing": 0, "in": IN_RANGE, "out": 2, "failed": 24
 
 
 def words(reading: Reading, latched: int = 0) -> dict[str, int]:
-    """Return the words by the names in `drivers.charger.xnergy`. `latched`: earlier errors."""
+    """Return the words under their names of `drivers.charger.xnergy`. `latched`: earlier errors."""
     now = sum(ERRORS[fault] for fault in reading.faults)
     shadow = now | latched
     return {
@@ -53,7 +53,7 @@ def words(reading: Reading, latched: int = 0) -> dict[str, int]:
 
 
 def state(reading: Reading) -> int:
-    """Return the state code; a handshake has four."""
+    """Return the state code; a handshake has four codes."""
     if reading.activity is Activity.HANDSHAKE:
         return HANDSHAKE[min(int(reading.progress * len(HANDSHAKE)), len(HANDSHAKE) - 1)]
     return STATES[reading.activity]
@@ -67,7 +67,7 @@ def rcu_plant(name: str, *links: str) -> ChargerPlant:
 class ModbusRcu:
     """The registers and coils of one receiver, with a plant behind them (`hal_fakes.modbus.units`).
 
-    `points`: all of them, including `outputs`; `unit`: its unit.
+    `points`: all cells, including `outputs`; `unit`: the receiver's unit.
     """
 
     def __init__(self, plant: Plant, settings: ModbusChargerSettings) -> None:
@@ -80,7 +80,7 @@ class ModbusRcu:
         self.outputs = frozenset(self._coils)
 
     def get(self, point: Point, now: float) -> int:
-        """Return the value there at `now` (monotonic s)."""
+        """Return this point's value at `now` (monotonic s)."""
         if point in self._coils:
             return self._coils[point]
         self.plant.advance(now)

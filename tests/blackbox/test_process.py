@@ -79,7 +79,7 @@ def test_a_person_records_an_incident_and_replays_it(
     assert {one.topic for one in heard_in(file)} == {"lift_states", "diagnostics"}
     assert (told.returncode, json.loads(told.stdout)["differences"]) == (0, [])
     assert json.loads(told.stdout)["decisions"] > 5
-    assert (ring.returncode, ring.stdout.splitlines()[-1]) == (0, "all as recorded")
+    assert (ring.returncode, ring.stdout.splitlines()[-1]) == (0, "every decision is as recorded")
     assert bridge("replay", file, "--config", other).stdout.endswith("changed no decision\n")
 
 

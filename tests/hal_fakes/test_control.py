@@ -86,7 +86,7 @@ def test_presses_and_failures_are_made_on_command(world: World) -> None:
         *(
             (
                 line,
-                "error not understood; say: follow | names | fail DEVICE PART"
+                "error not understood; write: follow | names | fail DEVICE PART"
                 " off|stuck|slow|garbage|wrong|ok | press DEVICE SIGNAL on|off",
             )
             for line in ("", "press Lift1 fire_alarm yes", "follow me", "\x00\xff")

@@ -1,4 +1,4 @@
-"""Files named in docs/explanation/architecture.md, CONTRIBUTING.md and the README exist."""
+"""Files that the documentation names exist."""
 
 import re
 from pathlib import Path, PurePath
@@ -38,6 +38,18 @@ def test_every_file_that_is_named_exists(page: str) -> None:
     found = named((ROOT / page).read_text())
     assert len(found) > 10
     assert [n for n in found if not any(path.match(n.rstrip("/")) for path in THERE)] == []
+
+
+def test_each_program_that_a_page_names_by_its_folder_exists() -> None:
+    """Decisions too: they name a moved file by its present place."""
+    programs = [path for path in THERE if path.suffix == ".py"]
+    lost = [
+        f"{page.name}: {found}"
+        for page in (ROOT / "README.md", *(ROOT / "docs").rglob("*.md"))
+        for found in named(page.read_text())
+        if "/" in found and found.endswith(".py") and not any(p.match(found) for p in programs)
+    ]
+    assert lost == []
 
 
 @pytest.mark.parametrize("way", WAYS)

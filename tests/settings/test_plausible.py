@@ -67,7 +67,7 @@ def test_why_a_unit_may_keep_its_outputs_is_noted(file: Path) -> None:
         "5:87: warning: bus 'module': nothing is written to unit 3: delete this"
     ]
     assert problems_of(file, WATCHED) == [
-        "5:125: 'without_watchdog': unit 1 has a module_watchdog too: delete one"
+        "5:125: 'without_watchdog': unit 1 is in module_watchdog too: delete one of the two"
     ]
 
 
@@ -87,7 +87,7 @@ REFUSED = {
     ),
     "a unit that is everybody": (
         door(LINE).replace("unit 1 coil", "unit 0 coil"),
-        "12:26: unit 0 addresses all units, and none answers: units on a serial line are 1 to 247",
+        "12:26: unit 0 addresses all units, and no unit answers: units on a serial line are 1 to 247",
     ),
     "a unit that only TCP has": (
         door(LINE).replace("unit 1 coil", "unit 255 coil"),
@@ -139,7 +139,7 @@ PINS = {
     "BCM2": "BCM2 is for I2C (dtparam=i2c_arm=on), and has a fixed 1.8 kΩ pull-up",
     "J8:5": "BCM3 is for I2C (dtparam=i2c_arm=on), and has a fixed 1.8 kΩ pull-up",
     "BCM0": "BCM0 is for a HAT's EEPROM, which the firmware reads at boot",
-    "BCM14": "BCM14 is for the serial console, which sends and switches it at boot (enable_uart=1)",
+    "BCM14": "BCM14 is for the serial console, which drives the pin at boot (enable_uart=1)",
     "BCM15": "BCM15 is for the serial console (enable_uart=1)",
 }
 

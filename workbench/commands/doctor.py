@@ -1,7 +1,7 @@
 """`rmf-bridge doctor FILE`: find and explain the obstacles to a working bridge on this machine.
 
-For the target machine, before and after installing. It only reads; `--kill-test` alone switches one
-output. It opens no bus of a running service. Its subjects: `commissioning/doctor/`.
+For the target machine, before and after installing. The doctor only reads, except that `--kill-test`
+switches one output. It opens no bus of a running service. Its subjects: `commissioning/doctor/`.
 """
 
 import argparse
@@ -52,11 +52,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="SECONDS",
         help="how long to hear RMF's graph (default 3; 0: do not join it)",
     )
-    parser.add_argument("--localhost", action="store_true", help="join the graph on loopback alone")
+    parser.add_argument(
+        "--localhost", action="store_true", help="join the graph on the loopback interface only"
+    )
     parser.add_argument("--domain-id", type=int, metavar="N", help="overrides the YAML's domain_id")
     parser.add_argument("--transport", choices=TRANSPORTS, help="overrides the YAML's transport")
     parser.add_argument(
-        "--building-map", metavar="MAP", help="compare the names with RMF's, as check does"
+        "--building-map",
+        metavar="MAP",
+        help="compare the names with this map or graph of RMF, as check does",
     )
     kill = parser.add_argument_group("the kill test, the only thing that switches an output on")
     kill.add_argument(
@@ -68,14 +72,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--device", metavar="NAME", help="the output's device (default: the first)"
     )
     completed_by(device, device_names)
-    kill.add_argument("--output", metavar="NAME", help="which output, as walk names it")
+    kill.add_argument("--output", metavar="NAME", help="the output, as walk names it")
     kill.add_argument("--yes", action="store_true", help="do not ask again")
     parser.add_argument("--runtime-dir", metavar="DIR", help="the daemon's runtime directory")
 
 
 def run(args: argparse.Namespace) -> int:
     """Return 0: all well, 1: warnings, 2: something is wrong, 64: not confirmed, 78: wrong YAML."""
-    log.start("CRITICAL")  # findings replace the buses' log messages
+    log.start("CRITICAL")  # the findings say what the buses would log
     try:
         config = load(args.file)
         config = replace(config, rmf=overridden(config.rmf, args))
@@ -130,8 +134,8 @@ def _not_confirmed(config: Config, args: argparse.Namespace) -> str:
         return str(error)
     step = step_called(config, args.device, args.output)
     if step is None:
-        return f"{args.device} has no such output: rmf-bridge walk shows those that it has"
-    text = f"{step.name} of {args.device} will be ON for some seconds: it {step.does}."
+        return f"{args.device} has no such output: rmf-bridge walk shows its outputs"
+    text = f"{step.name} of {args.device} will be ON for some seconds. This output {step.does}."
     if args.yes:
         return ""
     if not sys.stdin.isatty():
@@ -159,7 +163,7 @@ def _examined(
 
 
 def _nothing(one: Finding) -> None:
-    """Show nothing: JSON is printed at the end."""
+    """Show nothing, because JSON is printed at the end."""
 
 
 class FindingsText:

@@ -1,6 +1,6 @@
 """`rmf-bridge explain`: why a robot waits for a lift, a door or a charger, in one screen of sentences.
 
-From a recording, or live from the graph. The sentences are made in `workbench/explain/`.
+From a recording, or live from the graph. `workbench/explain/` makes the sentences.
 """
 
 import argparse
@@ -47,7 +47,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="a recording: MCAP (ours, or of `ros2 bag`), .db3, or a folder of `ros2 bag record`",
     )
     parser.add_argument(
-        "device", nargs="?", metavar="DEVICE", help="its name; default: every device"
+        "device", nargs="?", metavar="DEVICE", help="the device's name; default: every device"
     )
     parser.add_argument("--live", metavar="DEVICE", help="listen to the graph instead of a FILE")
     parser.add_argument(
@@ -116,17 +116,17 @@ def _all(site: HeardDevices, devices: list[tuple[Kind, str]], *, as_json: bool) 
         return 0
     for one in told:
         print(f"{one.kind} {one.device}: {one.now[0]}")
-    print("\nFor more about one of them, give its name after FILE.")
+    print("\nFor more about a device, give its name after FILE.")
     return 0
 
 
 def _one(site: HeardDevices, args: argparse.Namespace) -> int:
-    """Print the named device, or the only one."""
+    """Print the named device, or the only device."""
     name = args.device or args.live or site.devices()[0][1]
     kinds = [args.kind] if args.kind else site.kinds(name) or ["lift"]
     if len(kinds) > 1:
         several = " and a ".join(kinds)
-        complain("explain", f"'{name}' is a {several}: say which with --kind")
+        complain("explain", f"'{name}' is a {several}: choose with --kind")
         return 2
     found = site.explain(kinds[0], name, None, faults.for_explain())
     _tell(found, as_json=args.json)

@@ -13,10 +13,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "part",
         metavar="PART",
         nargs="?",
-        help="a signal of the file, or a part such as car; without one: print what there is",
+        help="a signal of the file, or a part such as car; without PART: list signals and parts",
     )
     completed_by(part, names("fail"))
-    parser.add_argument("mode", nargs="?", choices=MODES, help="how it fails; ok mends it")
+    parser.add_argument(
+        "mode", nargs="?", choices=MODES, help="how the part fails; ok mends the part"
+    )
 
 
 def run(args: argparse.Namespace) -> int:
@@ -24,5 +26,5 @@ def run(args: argparse.Namespace) -> int:
     if args.part is None:
         return tell(args, "fail")
     if args.mode is None:
-        args.usage(f"how does {args.part} fail? {', '.join(MODES[:-1])}; ok mends it")
+        args.usage(f"give a MODE for {args.part}: {', '.join(MODES[:-1])}; or ok, which mends it")
     return obey(args, "fail", args.part, args.mode)

@@ -1,6 +1,6 @@
 """`rmf-bridge init FILE`: write a first YAML for the device in front of you.
 
-It asks, or takes every answer as an option. The new file passes `check`; no file is overwritten.
+The command asks, or takes answers as options. The new file passes `check`; no file is overwritten.
 """
 
 import argparse
@@ -59,7 +59,9 @@ def _on_the_header(given: Given) -> bool:
 
 QUESTIONS: Final = (
     Question("kind", "What is it?", lambda given: "lift", lambda given: get_args(Kind)),
-    Question("name", "Its name on RMF's map?", lambda given: f"{given['kind'].capitalize()}1"),
+    Question(
+        "name", "The device's name on RMF's map?", lambda given: f"{given['kind'].capitalize()}1"
+    ),
     Question(
         "wiring",
         "How is it wired?",
@@ -68,7 +70,7 @@ QUESTIONS: Final = (
     ),
     Question(
         "address",
-        "Its host, serial port or CAN interface?",
+        "The host, serial port or CAN interface?",
         lambda given: ADDRESSES[given["wiring"]],
         needed=lambda given: given["wiring"] in ADDRESSES,
     ),
@@ -79,7 +81,11 @@ QUESTIONS: Final = (
         needed=lambda given: given["wiring"] in ("modbus", "rs485"),
     ),
     Question(
-        "floors", "Its floors, from below?", lambda given: "L1,L2,L3", needed=_is_lift, several=True
+        "floors",
+        "The lift's floors, from below?",
+        lambda given: "L1,L2,L3",
+        needed=_is_lift,
+        several=True,
     ),
     Question(
         "signals",
@@ -91,7 +97,7 @@ QUESTIONS: Final = (
     ),
     Question(
         "encoding",
-        "How do the lines say the floor?",
+        "How do the lines show the floor?",
         lambda given: "binary",
         lambda given: get_args(Encoding),
         needed=_is_lift,
@@ -124,7 +130,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--unit", help="unit id of a Modbus module")
     parser.add_argument("--floors", help="such as L1,L2,L3, from below")
     parser.add_argument("--signals", help=f"some of: {', '.join(LIFT_INPUTS)}")
-    parser.add_argument("--encoding", choices=get_args(Encoding), help="of the floor lines")
+    parser.add_argument(
+        "--encoding", choices=get_args(Encoding), help="the encoding of the floor lines"
+    )
     parser.add_argument("--contacts", choices=get_args(Level), help="level of a closed contact")
     parser.add_argument("--relays", choices=get_args(Level), help="level that switches a relay on")
     parser.add_argument("--domain-id", help="RMF's ROS_DOMAIN_ID")
@@ -132,16 +140,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--from",
         dest="map",
         metavar="MAP",
-        help="take the name and the floors from RMF's building map or navigation graph",
+        help="read the name and the floors from RMF's building map or navigation graph",
     )
     parser.add_argument(
-        "-y", "--yes", action="store_true", help="ask nothing: take what is offered"
+        "-y", "--yes", action="store_true", help="ask nothing: accept every offered answer"
     )
 
 
 def run(args: argparse.Namespace) -> int:
     """Return 0; 64: answers missing or contradictory; 66: unreadable map; 73: the file exists."""
-    if os.path.lexists(args.file):  # before anything is asked
+    if os.path.lexists(args.file):  # before the first question
         return _there_already(args.file)
     if why := no_folder(args.file):
         return not_written(args.file, why)
@@ -187,7 +195,7 @@ def _written(file: Path, given: Given) -> int:
 
 
 def answered(args: argparse.Namespace, found: BuildingMap | None) -> Given:
-    """Return every answer: from the options, else from the map, else by asking. Raises Impossible."""
+    """Return every answer, by option, else by map, else by the person. Raises Impossible."""
     given: Given = {}
     for question in QUESTIONS:
         if not _needed(question, given, args):
@@ -212,7 +220,7 @@ def _needed(question: Question, given: Given, args: argparse.Namespace) -> bool:
 
 
 def _of_map(name: str, given: Given, found: BuildingMap | None) -> str | None:
-    """Return the answer if the map has only one."""
+    """Return the answer if the map allows only one answer."""
     if found is None:
         return None
     if name == "name" and len(names := tuple(found.named[given["kind"]])) == 1:
@@ -230,8 +238,8 @@ def _ask(question: Question, offered: str, given: Given, found: BuildingMap | No
         import questionary
     except ModuleNotFoundError:
         raise Impossible(
-            "asking needs questionary: in the clone, .venv/bin/pip install '.[laptop]'. Without it,"
-            " give every answer as an option, or --yes"
+            "asking needs questionary: in the clone, .venv/bin/pip install '.[laptop]'. Or give every"
+            " answer as an option, or --yes"
         ) from None
     choices = question.choices(given)
     if found is not None and question.name == "name":
@@ -279,7 +287,7 @@ def write(path: Path, text: str) -> None:
 
 
 def _schema_line() -> str:
-    """Return the line with which editors complete and check the file; "" if no schema can be stored.
+    """Return the line that names the schema for editors; "" if no schema can be stored.
 
     This version's schema is stored in the user's data directory.
     """

@@ -1,9 +1,9 @@
 """`rmf-bridge judge`: check any lift, door or charger node against RMF's contract.
 
 `workbench/judge/` has the laws and the plays; here are the options, the graph, the clock and the
-verdict. Exit code 0: every observed law is kept. 1: one is broken. 2: a wrong command line.
-66: the recording cannot be read. 69: nothing was heard, the graph cannot be joined, or the play was
-not performed.
+verdict. Exit code 0: every observed law is kept. 1: a law is broken. 2: a wrong command line. 66: the
+recording cannot be read. 69: nothing was heard, the graph cannot be joined, or the play was not
+performed.
 """
 
 import argparse
@@ -94,15 +94,17 @@ def _add_plays(parser: argparse.ArgumentParser) -> None:
         "--ride", nargs=2, metavar="FLOOR", help="play a robot that rides from one floor to another"
     )
     parser.add_argument(
-        "--robots", type=int, choices=(1, 2), default=1, help="two: the second rides back"
+        "--robots", type=int, choices=(1, 2), default=1, help="two robots: the second rides back"
     )
     parser.add_argument("--passages", type=int, metavar="N", help="play N passages of a door")
-    parser.add_argument("--charge", action="store_true", help="request a charger, and cancel")
+    parser.add_argument(
+        "--charge", action="store_true", help="request a charger, and cancel the request"
+    )
     parser.add_argument(
         "--robot",
         default=f"{FLEET}/robot1",
         metavar="FLEET/ROBOT",
-        help="the robot to request the charger for; one that the charger knows",
+        help="the robot to request the charger for; the charger must know it",
     )
     parser.add_argument(
         "--restarts",
@@ -114,7 +116,7 @@ def _add_plays(parser: argparse.ArgumentParser) -> None:
         action="append",
         choices=tuple(BESIDE),
         default=[],
-        help="play although this one is on the graph; rides and passages go through a supervisor",
+        help="play although this node is on the graph; rides and passages go through a supervisor",
     )
     parser.add_argument(
         "--patience",
@@ -138,7 +140,7 @@ def performance_of(args: argparse.Namespace) -> Scenario | None:
     if wanted != [args.kind]:
         args.usage("a lift is played by --ride A B, a door by --passages N, a charger by --charge")
     if not args.active:
-        args.usage(f"this moves {words_of(args)}: add --active")
+        args.usage(f"the play moves {words_of(args)}: add --active")
     if args.restarts and not args.localhost:
         args.usage("--restarts needs --localhost: never restart a supervisor with a real device")
     through = "supervisor" in args.beside
@@ -166,12 +168,12 @@ def run(args: argparse.Namespace) -> int:
         print(markdown(args.kind))
         return 0
     if not args.name:
-        args.usage(f"which {args.kind}? Give its NAME")
+        args.usage(f"which {args.kind}? Give the NAME")
     performance = performance_of(args)
     if args.recording is None:
         return _live(args, performance)
     if performance is not None:
-        args.usage("a recording is only judged: leave --active out")
+        args.usage("a recording is only judged: delete --active")
     try:
         return _recorded(args)
     except BagError as error:
@@ -211,9 +213,9 @@ def _live(args: argparse.Namespace, performance: Scenario | None) -> int:
 
 
 def _begins(args: argparse.Namespace, performance: Scenario | None) -> str:
-    """Describe the judging under way to the waiting user."""
+    """Tell the waiting user what is being judged."""
     if performance is not None:
-        return f"plays with {words_of(args)}; Ctrl-C releases it, and judges"
+        return f"plays with {words_of(args)}; Ctrl-C releases the device, and judges"
     until = "until Ctrl-C" if args.for_s == NEVER else f"for {args.for_s:g} s"
     return f"listens to {words_of(args)} {until}"
 
@@ -257,10 +259,10 @@ class Live:
             return ""
         who = [name for name, topics in BESIDE.items() if set(topics) & set(found)]
         beside = " ".join(f"--beside {name}" for name in who)
-        return f"others publish on {', '.join(found)}: to play all the same, add {beside}"
+        return f"other nodes publish on {', '.join(found)}: to play nevertheless, add {beside}"
 
     def judge(self, judging: JudgeRun) -> None:
-        """Run until there is a verdict. However a play ends, the device is released first."""
+        """Run until there is a verdict. However a play ends, it first releases the device."""
         judging.begin(time.monotonic(), time.time())
         try:
             with _told_to_end() as told:
@@ -295,7 +297,7 @@ class Live:
 
 @contextmanager
 def _told_to_end() -> Iterator[Callable[[], bool]]:
-    """Has Ctrl-C, SIGTERM or SIGHUP come? None of them interrupts the present step."""
+    """Has Ctrl-C, SIGTERM or SIGHUP come? Such a signal never interrupts the present step."""
     told: list[int] = []
     with ended_by(lambda number, _: told.append(number)):
         yield lambda: bool(told)

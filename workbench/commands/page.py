@@ -1,7 +1,7 @@
 """`rmf-bridge page`: a web page of RMF's graph, live, or of one recording.
 
-It needs the extra `page` (NiceGUI), which no daemon imports. It listens on 127.0.0.1 unless `--listen`
-says otherwise, which needs a password file or a reverse proxy.
+The page needs the extra `page` (NiceGUI), which no daemon imports. It listens on 127.0.0.1. For another
+address (`--listen`) it needs a password file or a reverse proxy.
 """
 
 import argparse
@@ -34,7 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=_address,
         default=(LOOPBACK, PORT),
         metavar="ADDRESS:PORT",
-        help=f"default: {LOOPBACK}:{PORT}; port 0 takes a free one",
+        help=f"default: {LOOPBACK}:{PORT}; with port 0 a free port",
     )
     parser.add_argument(
         "--host",
@@ -44,7 +44,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="another name that browsers use for this page, such as rmf.hospital.example",
     )
     parser.add_argument(
-        "--passwords", type=Path, metavar="FILE", help="who may log in and act (see --add-user)"
+        "--passwords",
+        type=Path,
+        metavar="FILE",
+        help="the file of users who may log in and act (see --add-user)",
     )
     parser.add_argument(
         "--add-user", metavar="NAME", help="ask for a password, write it to --passwords, and end"
@@ -61,7 +64,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="the folder of recorded incidents (default: the recorder's)",
     )
     parser.add_argument(
-        "--runtime-dirs", type=Path, metavar="DIR", help="the daemons of this machine are here"
+        "--runtime-dirs", type=Path, metavar="DIR", help="the folder of this machine's daemons"
     )
     add_graph_arguments(parser)
 
@@ -108,7 +111,7 @@ def run(args: argparse.Namespace) -> int:
         opened = socket.create_server(args.listen, family=_family(address))
     except OSError as error:
         why = os.strerror(error.errno) if error.errno else str(error)
-        other = f"another port: --listen {address}:0 takes a free one"
+        other = f"for a free port: --listen {address}:0"
         complain("page", f"{address} port {port}: {why}; {other}")
         return os.EX_UNAVAILABLE
     with opened:
@@ -116,7 +119,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _serve(args: argparse.Namespace, opened: socket.socket, known: Mapping[str, str]) -> int:
-    """Serve with NiceGUI. Errors are reported before: its import takes seconds on a Raspberry Pi."""
+    """Serve with NiceGUI, imported last, because the import takes seconds on a Raspberry Pi."""
     try:
         from workbench.page import web
     except ImportError as error:
@@ -150,7 +153,7 @@ def _add_user(args: argparse.Namespace) -> int:
     from workbench.page.access import add_user
 
     if args.passwords is None:
-        complain("page", "--add-user needs --passwords FILE, where the user is written")
+        complain("page", "--add-user needs --passwords FILE, the file for the new user")
         return os.EX_USAGE
     if sys.stdin.isatty():
         password = getpass.getpass(f"Password of {args.add_user}: ")

@@ -1,7 +1,7 @@
 """`rmf-bridge plot`: the timeline of a device from a recording, as one file: HTML, SVG or PNG.
 
-The file needs no network and no script. HTML has the explanation under the picture. PNG is rendered
-from the SVG by resvg, an extra, imported only here.
+The file needs no network and no script. HTML has the explanation under the picture. resvg, an extra
+that only this file imports, renders the PNG from the SVG.
 """
 
 import argparse
@@ -37,7 +37,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "file", type=Path, metavar="FILE", help="a recording, as `explain` reads it"
     )
-    parser.add_argument("--device", metavar="NAME", help="default: the only one in the recording")
+    parser.add_argument("--device", metavar="NAME", help="default: the recording's only device")
     parser.add_argument("--kind", choices=KINDS, help="where a lift and a door have the same name")
     parser.add_argument(
         "-o",
@@ -52,12 +52,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=_width,
         default=1200,
         metavar="PIXELS",
-        help=f"of the picture, {NARROWEST} to {WIDEST} (default 1200)",
+        help=f"the picture's width, {NARROWEST} to {WIDEST} (default 1200)",
     )
     parser.add_argument(
         "--theme",
         choices=("light", "dark"),
-        help="default: as the reader's screen; a PNG is light",
+        help="default: the style of the reader's screen; a PNG is light",
     )
     add_span_arguments(parser)
 
@@ -101,7 +101,7 @@ def _only(args: argparse.Namespace) -> str:
     names = {name: f"{kind} {name}" for kind, name in site.devices() if args.kind in (None, kind)}
     if len(names) > 1:
         listed = ", ".join([*names.values()][:20])
-        raise PlotError(f"say with --device which one: {listed}")
+        raise PlotError(f"choose with --device: {listed}")
     for name in names:
         return name
     raise PlotError(f"{args.file} holds no state of any lift, door or charger in that time")
@@ -117,7 +117,7 @@ def _read(args: argparse.Namespace, name: str) -> tuple[Timeline, list[str]]:
             drawing.take(heard)
     kinds = [kind for kind, shown in site.devices() if shown == name and kind in drawings]
     if len(kinds) > 1:
-        raise PlotError(f"'{name}' is a {' and a '.join(kinds)}: say which with --kind")
+        raise PlotError(f"'{name}' is a {' and a '.join(kinds)}: choose with --kind")
     for kind in kinds:
         site.story_from(span.begins_at)
         words = lines(site.explain(kind, name, None, faults.for_explain()))
@@ -166,7 +166,7 @@ def _page(picture: str, words: list[str], theme: Theme | None) -> Iterator[str]:
 
 
 def _write(file: Path, content: bytes) -> None:
-    """Write the whole file or none. Raises PlotError."""
+    """Write the whole file or no file. Raises PlotError."""
     beside = file.with_name(f".{file.name}.{os.getpid()}")
     try:
         try:

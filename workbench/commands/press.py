@@ -10,7 +10,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options of `press`."""
     add_simulation(parser)
     signal = parser.add_argument(
-        "signal", metavar="SIGNAL", nargs="?", help="without one: print what there is"
+        "signal", metavar="SIGNAL", nargs="?", help="without SIGNAL: list the signals"
     )
     completed_by(signal, names("press"))
     parser.add_argument("how", nargs="?", choices=("on", "off"), default="on", help="default: on")

@@ -1,6 +1,6 @@
 """`rmf-bridge release LIFT`: an operator ends a lift's present session.
 
-This is `send lift LIFT --end` under an operator's word: it sends the holder's END_SESSION to the lift
+This is `send lift LIFT --end` under a name for operators: it sends the holder's END_SESSION to the lift
 supervisor until the lift shows the session's end. If the supervisor is missing or does not obey within
 seconds, the request goes directly to the lift's own daemon; if a robot may be in the car, only with
 `--car-empty`. After the end, `release` watches for 5 s, and tells who has the lift and whether
@@ -21,7 +21,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--car-empty",
         action="store_true",
-        help="somebody has looked: no robot is in the car, so its own daemon may be asked to let go",
+        help="somebody has looked: no robot is in the car, so its own daemon may release the lift",
     )
     parser.set_defaults(falls_back=True, direct=False)
     parser.set_defaults(kind="lift", end=True, floor=None, granted_only=False)
@@ -29,5 +29,5 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Return 0 if the session was seen to end, else 1 with the reason, as `send`."""
+    """Return 0 if the lift showed the session's end, else 1 with the reason, as `send`."""
     return send.run(args)

@@ -32,11 +32,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--config", type=Path, metavar="YAML", help="show what this YAML would have changed"
     )
-    parser.add_argument("--json", action="store_true", help="the same as JSON")
+    parser.add_argument("--json", action="store_true", help="the result as JSON")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Return 0: every decision is the same. 1: one differs. 65: not replayable. 66: FILE is no
+    """Return 0: every decision is the same. 1: a decision differs. 65: not replayable. 66: FILE is no
     readable recording. 78: a YAML is wrong."""
     notes = Notes()
     try:
@@ -81,7 +81,7 @@ def _told(
         if notes.damage:
             print(notes.damage, file=sys.stderr)
     if not course.decisions:
-        print(f"{args.file} has nothing that can be replayed", file=sys.stderr)
+        print(f"{args.file} has no decision that can be replayed", file=sys.stderr)
         return EX_DATAERR
     return 1 if differences else 0
 
@@ -118,9 +118,13 @@ def _lines(
         for one in differences:
             yield from _difference(one)
     if len(differences) == MOST:
-        yield f"… and no more than {MOST} are shown"
+        yield f"… only the first {MOST} are shown"
     if not differences:
-        same = f"{args.config} would have changed no decision" if args.config else "all as recorded"
+        same = (
+            f"{args.config} would have changed no decision"
+            if args.config
+            else "every decision is as recorded"
+        )
         yield same
 
 

@@ -1,7 +1,7 @@
-"""`rmf-bridge send`: one request to a lift, door or charger, as RMF would send it, and its effect.
+"""`rmf-bridge send`: send one request to a lift, door or charger, as RMF would, and show its effect.
 
-Exit code 0 if the effect was seen, 1 if not (with the reason), 2 for a wrong command line, 130 after
-Ctrl-C.
+Exit code 0: the effect was seen. 1: it was not, and the reason is printed. 2: a wrong command line.
+130: Ctrl-C.
 """
 
 import argparse
@@ -37,7 +37,7 @@ from workbench.graph.requests.lift import LiftEnd, LiftRide, aftermath
 NODE_NAME = "rmf_bridge_send"
 LOOK_EVERY_S = 0.1
 STATES = (topics.LIFT_STATES, topics.DOOR_STATES, topics.CHARGER_STATES)
-"""All kinds' states: the given name may belong to another kind."""
+"""The states of all kinds, because the given name may belong to another kind."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -45,13 +45,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     kinds = parser.add_subparsers(dest="kind", required=True, metavar="lift|door|charger")
     for kind, (text, example, add) in {
         "lift": (
-            "ask for a lift, or end its session",
+            "request a lift, or end a session",
             "Lift1 L3 --session fleet/robot",
             _lift_arguments,
         ),
         "door": ("hold a door open, or let it close", "ward_door open", _door_arguments),
         "charger": (
-            "assign a charger, or cancel that",
+            "assign a charger, or cancel the assignment",
             "any --queue --robot fleet/robot",
             _charger_arguments,
         ),
@@ -61,7 +61,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def add_shared_arguments(parser: argparse.ArgumentParser, *, direct: bool) -> None:
-    """Add the options: graph, time, and with `direct` the addressee."""
+    """Add the options for graph and time, and with `direct` the option for the addressee."""
     add_graph_arguments(parser)
     parser.add_argument(
         "--timeout",
@@ -81,12 +81,12 @@ def add_shared_arguments(parser: argparse.ArgumentParser, *, direct: bool) -> No
 
 def _lift_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("name", metavar="NAME", help="the lift, as RMF names it")
-    parser.add_argument("floor", metavar="FLOOR", nargs="?", help="its name in LiftState")
+    parser.add_argument("floor", metavar="FLOOR", nargs="?", help="the floor's name in LiftState")
     parser.add_argument("--session", default="", metavar="ID", help="fleet/robot, or any name")
     parser.add_argument(
         "--end",
         action="store_true",
-        help="end the session that --session names (default: the holder's)",
+        help="end the session of --session (default: the holder's session)",
     )
     parser.add_argument(
         "--granted-only", action="store_true", help="wait for the session, not for the car"
@@ -113,7 +113,7 @@ def _charger_arguments(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="ask the charger coordinator, which may choose another charger; NAME may be `any`",
     )
-    parser.add_argument("--request-id", metavar="ID", help="default: a new one")
+    parser.add_argument("--request-id", metavar="ID", help="default: a new id")
     parser.add_argument(
         "--start-timeout",
         type=seconds(0, 86400),
@@ -148,7 +148,7 @@ def _lift_request(args: argparse.Namespace) -> Request:
         fall = getattr(args, "falls_back", False), getattr(args, "car_empty", False)
         return LiftEnd(args.name, args.session, *fall, direct=args.direct, line=line)
     if not args.session:
-        args.usage("whose session is it? --session FLEET/ROBOT, or any name")
+        args.usage("give the session's name: --session FLEET/ROBOT, or any name")
     return LiftRide(
         args.name, args.floor, args.session, args.granted_only, direct=args.direct, line=line
     )
@@ -183,7 +183,7 @@ def run(args: argparse.Namespace) -> int:
     except TransportError as error:
         complain(args.command, error)
         return 1
-    except KeyboardInterrupt:  # before anything was sent
+    except KeyboardInterrupt:  # before the first request
         return _interrupted(args.command, sent=False)
 
 
@@ -242,7 +242,7 @@ class _Exchange:
         self._last_before = 0
 
     def look(self) -> int | None:
-        """Take the messages heard and do the next step; return an exit code at the end."""
+        """Take the messages heard and do the next step. Return an exit code at the end."""
         for heard in self.ear.listen(LOOK_EVERY_S):
             self._take(heard)
         now = time.monotonic()
@@ -266,7 +266,7 @@ class _Exchange:
         return self.publishers[topic.name]
 
     def _listeners(self) -> int:
-        """Count our listeners; 0 while the node that would forward the request is missing."""
+        """Count the request's listeners; 0 while the node that would forward the request is missing."""
         if self.supervisor is not None and not self.supervisor.matched():
             return 0
         return self.publisher.matched()
@@ -321,7 +321,7 @@ class _Exchange:
 
 
 def _boarded(message: d.DiagnosticArray, lift: str) -> str:
-    """Return a lift's own diagnostics about a robot inside; "" for another lift's."""
+    """Return `boarded` of this lift's own diagnostics; "" for other diagnostics."""
     for status in message.status:
         values = {value.key: value.value for value in status.values}
         if (status.hardware_id, values.get("kind")) == (lift, "lift"):

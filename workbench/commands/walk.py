@@ -1,8 +1,8 @@
 """`rmf-bridge walk FILE`: try every wire of a device with the electrician, and sign the results.
 
 Every input is shown live; a key switches each output on alone, for a few seconds. No daemon may serve
-the device meanwhile. However the walk ends, every output is off: a guard switches them off even after
-a kill -9.
+the device meanwhile. However the walk ends, every output is off: a guard switches the outputs off even
+after a kill -9.
 """
 
 import argparse
@@ -36,7 +36,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     completed_by(device, device_names)
     parser.add_argument(
-        "--by", metavar="NAME", help="who does it, for the record (default: the user)"
+        "--by", metavar="NAME", help="the person's name, for the record (default: the user)"
     )
     parser.add_argument(
         "--record",
@@ -70,7 +70,7 @@ def run(args: argparse.Namespace) -> int:
     try:
         held = runtime.held(args.file, args.runtime_dir, serves=False, simulated=args.simulate)
     except (runtime.AlreadyRunning, PermissionError) as error:
-        print(f"walk needs the device for itself: {error}", file=sys.stderr)
+        print(f"walk needs the device alone: {error}", file=sys.stderr)
         return os.EX_UNAVAILABLE
     try:
         return _walk(args, config, device, held, end)
@@ -159,7 +159,7 @@ def _on(
                     noted = bench.memory.results
                     note("not ended")
     except OSError as error:
-        how = f"interrupted: {error.strerror}"  # the terminal has gone
+        how = f"interrupted: {error.strerror}"  # the terminal is gone
     finally:
         off = "every output verified off" if bench.verified_off else "outputs NOT verified off"
         bus.close()

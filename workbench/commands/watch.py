@@ -1,7 +1,7 @@
 """`rmf-bridge watch`: the lifts, doors and chargers of the RMF graph, live, one row each.
 
 `board.py` makes the rows. On a terminal the table is redrawn in place; a pipe gets one line for each
-change. Ctrl-C is the normal end, so it exits 0.
+change. Ctrl-C is the normal end, with exit code 0.
 """
 
 import argparse
@@ -35,10 +35,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         nargs="?",
         const=3.0,
         metavar="SECONDS",
-        help="listen for SECONDS (default 3), print the table, exit 0, or 1 if nothing was heard",
+        help="listen for SECONDS (default 3), print the table, exit; 1 if nothing was heard, else 0",
     )
     parser.add_argument(
-        "--json", action="store_true", help="a line of JSON for each change; with --once one list"
+        "--json",
+        action="store_true",
+        help="print a line of JSON for each change, or one list with --once",
     )
 
 
@@ -89,7 +91,7 @@ def show_once(ear: Ear, seconds: float, out: TextIO, *, as_json: bool = False) -
 
 
 def settled(board: Board, now: float, wall: float) -> list[BoardRow]:
-    """Return the rows, without devices that may still turn out to be simulated."""
+    """Return the rows, without devices that may still prove to be simulated."""
     young = board.unsettled(now)
     return [row for row in board.rows(now, wall) if (row.kind, row.name) not in young]
 

@@ -1,4 +1,5 @@
-"""Examples for the keys of the reference: from a shipped file, else the default, else by type.
+"""Examples for the keys of the reference: from a shipped file, else the default, else a value of the
+type.
 
 Shipped files are tested, so these examples stay valid.
 """
@@ -46,7 +47,7 @@ WRITTEN: dict[str, object] = {
     "doors": ["ward_door"],
     "lifts": ["Lift1"],
 }
-"""Examples for keys missing in shipped files. Each of these keys means the same everywhere."""
+"""Examples for keys missing in shipped files. Each key has the same meaning in every section."""
 
 Found = dict[tuple[type, str], str]
 
@@ -114,7 +115,7 @@ def _note(found: Found, struct: type, name: str, text: str) -> None:
 
 
 def field_names(base: type) -> tuple[str, ...]:
-    """Return a struct's field names; none for msgspec.Struct and its bases."""
+    """Return a struct's field names; no names for msgspec.Struct and its bases."""
     if not issubclass(base, msgspec.Struct) or base is msgspec.Struct:
         return ()
     return base.__struct_fields__

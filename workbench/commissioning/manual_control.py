@@ -1,4 +1,6 @@
-"""Hold one device by hand (`walk`, the kill test): its record, its guard, and its outputs off."""
+"""Controls one device by hand (`walk`, the kill test): its lock, its record, its guard, and outputs
+off.
+"""
 
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -16,7 +18,8 @@ def guarded(
     held: runtime_directory.RuntimeDirectory,
     outputs_off: Sequence[str],
 ) -> tuple[Bus, Callable[[], None]]:
-    """Return the device's bus, and a function to call once all is verified off. Raises HalError.
+    """Return the device's bus, and a function to call once every output is verified off. Raises
+    HalError.
 
     Record and guard (which runs `outputs_off` if we die) start once the bus is open, before an
     output is claimed. A bus that cannot be opened leaves nothing to switch off.
@@ -34,7 +37,7 @@ def guarded(
 
 
 def not_off(driver: Driver[Any, Any], insist: Callable[[], None]) -> str:
-    """Switch every output off. Return why this is unverified, or "". `insist`: end the bus's pauses."""
+    """Switch every output off. Return "", or why that is unverified. `insist`: end the bus's pauses."""
     insist()
     try:
         driver.make_safe()

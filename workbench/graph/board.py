@@ -1,6 +1,6 @@
 """The rows of `watch`, made from messages and a time. Pure.
 
-RMF's states have no field for faults, queues and simulations. Our daemons publish those on
+RMF's states have no field for faults, queues and simulations. Our daemons publish this information on
 `/diagnostics`.
 """
 
@@ -27,19 +27,19 @@ SETTLES_S: Final = 1.5
 """A daemon's diagnostics come at 1 Hz."""
 HEADINGS: Final = ("kind", "name", "state", "held by", "waiting", "age", "", "faults")
 MOST_PLACES: Final = 500
-"""Limit of robots: anybody can make names up, and the page listens for months."""
+"""The most robots to remember: anybody can make names up, and the page listens for months."""
 SECONDS: Final = re.compile(r"\d+(\.\d+)? (s|min)\b")
 
 Device = tuple[str, str]
-"""Its kind and its name, as they are shown."""
+"""A device's kind and its name, as shown."""
 
 
 class BoardRow(Struct, frozen=True):
     """One device, the charger coordinator, or a robot with its assigned place.
 
-    `waiting`: the waiting ones, or the thing that the holder waits for. `age`: of the reading.
-    `mark`: why the row may be wrong. `simulated`: is it without hardware? `faults`: reported by
-    its daemons.
+    `waiting`: the waiting robots, or what the holder waits for. `age`: the reading's age. `mark`: why
+    the row may be wrong. `simulated`: is the device without hardware? `faults`: the faults that its
+    daemons report.
     """
 
     kind: str
@@ -58,7 +58,7 @@ class BoardRow(Struct, frozen=True):
         return bool(self.mark or self.faults)
 
     def cells(self) -> tuple[str, ...]:
-        """The row's texts, in the order of HEADINGS."""
+        """Return the row's texts, in the order of HEADINGS."""
         marks = " ".join(
             word for word in ("SIMULATED" if self.simulated else "", self.mark) if word
         )
@@ -66,7 +66,7 @@ class BoardRow(Struct, frozen=True):
         return (*state, self.waiting, self.age, marks, self.faults)
 
     def news(self) -> tuple[object, ...]:
-        """The parts whose change is printed, without running seconds."""
+        """Return the parts whose changes are printed, without running seconds."""
         told = (self.state, self.held_by, self.waiting, self.mark, self.faults)
         return (self.simulated, *(SECONDS.sub("", text) for text in told))
 
@@ -75,7 +75,7 @@ class Board:
     """The latest state and diagnosis of each device."""
 
     def __init__(self, graph: ObservedGraph[Any] | None = None) -> None:
-        """`graph`: the memory of the devices, if filled elsewhere."""
+        """Begin empty. `graph`: the memory of the devices, if another object fills it."""
         self._graph = graph or PlainGraph()
         self._places: dict[str, str] = {}
 
@@ -85,7 +85,7 @@ class Board:
         self.note(heard)
 
     def note(self, heard: Heard) -> None:
-        """Take a message's charging assignments; the device memory takes the rest."""
+        """Take the charging assignments of a message; the device memory takes all other messages."""
         if not isinstance(heard.message, d.ChargingAssignments):
             return
         for one in heard.message.assignments:
@@ -95,7 +95,7 @@ class Board:
                 self._places[who] = place
 
     def unsettled(self, now: float) -> set[Device]:
-        """Kind and name of devices just heard, whose daemons may yet report a simulation."""
+        """Return kind and name of devices just heard, whose daemons may still report a simulation."""
         return {
             (one.kind, words.printable(one.id))
             for one in self._graph.stated()
@@ -163,19 +163,19 @@ class Board:
 
 
 def _said(device: AnyDevice, now: float) -> list[Diagnosis]:
-    """Return our nodes' present diagnostics about it."""
+    """Return our nodes' present diagnostics about this device."""
     return [one for one in device.diagnoses.values() if one.is_current(now)]
 
 
 def _waiting(said: Diagnosis) -> str:
-    """Name the waiting ones and the reason: `fleet/b (12 s): for END of fleet/a`."""
+    """Name the waiting robots and the reason: `fleet/b (12 s): for END of fleet/a`."""
     return ": ".join(filter(None, (said.value("waiting"), said.value("waits"))))
 
 
 def _coordinates(diagnosis: Diagnosis) -> str:
     """Describe the coordinator's work and schedule."""
     silent = diagnosis.value("assigns").startswith("no:")
-    does = "asks for chargers that another node assigns" if silent else "assigns chargers"
+    does = "requests chargers that another node assigns" if silent else "assigns chargers"
     schedule = diagnosis.value("schedule")
     return words.printable(f"{does}, schedule {schedule}" if schedule else does)
 

@@ -1,8 +1,8 @@
 """Decide when `send` publishes, when it ends, and what it prints if the request has no effect.
 
 Pure: `step(request, seen, now)`. A request is repeated at 1 Hz until its effect is seen, as in RMF.
-Only a state heard after the first request counts, because an earlier one may show the same for another
-reason. `requests/` has each request's message and the condition that fulfils it.
+Only a state heard after the first request counts, because an earlier state may show the same for
+another reason. `requests/` has each request's message and the condition that fulfils it.
 """
 
 from collections.abc import Iterable
@@ -15,9 +15,9 @@ from workbench.graph.requests import Failed, Fulfilled, Obstacle, Request, Reque
 
 REPEAT_S: Final = 1.0
 PATIENCE_S: Final = 2.0
-"""States come at 1 Hz. After two seconds of silence a request is sent all the same."""
+"""States come at 1 Hz. After two seconds of silence a request is sent nevertheless."""
 HINT_AFTER_S: Final = 3.0
-"""A starting node needs a second or two to find the others. Then `send` prints what is missing."""
+"""A starting node needs a second or two to find other nodes. Then `send` prints what is missing."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,7 +89,7 @@ def _missed(request: Request, seen: RequestProgress) -> Obstacle | None:
 
 
 def _given_up(more: str, seen: RequestProgress) -> str:
-    """End a wait whose reason was printed at its beginning."""
+    """End a wait; its reason was printed when it began."""
     return f"gave up after {seen.timeout_s:g} s{more}"
 
 

@@ -32,7 +32,7 @@ def add_graph_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--transport",
         choices=TRANSPORTS,
-        help="ros2 needs rclpy, dds and zenoh need no ROS; auto (default) takes the first one here",
+        help="ros2 needs rclpy; dds and zenoh need no ROS; auto (default): the first installed",
     )
     parser.add_argument(
         "--localhost",
@@ -94,7 +94,7 @@ class Renamed:
 
     @property
     def release(self) -> Release:
-        """The release of RMF's messages spoken now."""
+        """Return the release of RMF's messages in use."""
         return self._transport.release
 
     def faults(self) -> list[tuple[str, str]]:
@@ -103,7 +103,7 @@ class Renamed:
 
     @property
     def lives(self) -> bool:
-        """Does its thread run?"""
+        """Does the transport's thread run?"""
         return self._transport.lives
 
     def _named(self, topic: Topic[M]) -> Topic[M]:
@@ -158,10 +158,10 @@ def complain(command: str, text: object) -> None:
 
 @dataclass(frozen=True, slots=True)
 class CommandLine:
-    """The command line as typed, so that a proposed command has the same options and can be copied.
+    """The command line as typed: a proposed command repeats its options, so it can be copied.
 
-    `typed`: every word after `rmf-bridge`. `options`: those with which another command acts on the
-    same graph.
+    `typed`: every word after `rmf-bridge`. `options`: the options for another command on the same
+    graph.
     """
 
     typed: tuple[str, ...] = ()
@@ -178,7 +178,7 @@ class CommandLine:
 
 
 def command_line(args: argparse.Namespace) -> CommandLine:
-    """Make it from parsed arguments; `args.typed`: the words given to `cli`."""
+    """Make the CommandLine from parsed arguments. `args.typed`: the words given to `cli`."""
     options = ["--direct"] if getattr(args, "direct", False) else []
     if args.config is not None:
         options += ["--config", str(args.config)]

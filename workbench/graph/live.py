@@ -28,11 +28,11 @@ OF_DEVICES: Final[tuple[AnyTopic, ...]] = (
     topics.ADAPTER_CHARGER_CANCELS,
     topics.DIAGNOSTICS,
 )
-"""The topics about devices. Volatile: no retained request is taken for a new one."""
+"""The topics about devices. Volatile, so that no retained request passes for a new request."""
 
 
 class Ear:
-    """Hears these topics from now on. `others_only`: without the same transport's own messages.
+    """Hears these topics from now on. `others_only`: without this transport's own messages.
     `ends`: the subscriptions by topic."""
 
     def __init__(

@@ -26,7 +26,7 @@ def add_simulation(parser: argparse.ArgumentParser) -> None:
 
 
 def names(verb: str) -> Completer:
-    """Complete the names for `press` or `fail` from the running simulation; nothing without one."""
+    """Complete the names for `press` or `fail` from the running simulation, if there is any."""
 
     def complete(prefix: str, parsed_args: argparse.Namespace, **_: object) -> list[str]:
         found = set[str]()
@@ -68,7 +68,8 @@ def tell(args: argparse.Namespace, verb: str) -> int:
 def obey(args: argparse.Namespace, verb: str, *words: str) -> int:
     """Send one command and print its effect.
 
-    Return 0; 1 if it is refused; 69 without a simulation; 64 for no such device; 78 for a wrong YAML.
+    Return 0; 1 if the plant refuses; 69 without a simulation; 64 for no such device; 78 for a wrong
+    YAML.
     """
     from bridges.settings.load import SettingsError, load
     from workbench.graph.which_device import NoDevice, device_of

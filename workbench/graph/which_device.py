@@ -8,7 +8,7 @@ class NoDevice(Exception):
 
 
 def device_of(config: Config, name: str | None) -> str:
-    """Return the named device; without a name the only one. Raises NoDevice."""
+    """Return the named device, or without a name the only device. Raises NoDevice."""
     names = list(config.devices)
     if not names:
         raise NoDevice(f"a {config.kind} has no wires")

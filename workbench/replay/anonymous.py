@@ -1,10 +1,10 @@
-"""Anonymise an incident: each of the site's names becomes `name01`, `name02` …, everywhere alike.
+"""Anonymise an incident: each of the site's names becomes `name01`, `name02` …, the same everywhere.
 
 Names come from the name fields of RMF's messages, the single words in cores' memories, the devices,
 and the YAML. They are replaced in messages, memories, notes and the YAML, also inside longer texts.
-Their sort order stays, because cores sort by names. Words of the program itself (keys and values of the
-YAML, words of a core, topics) stay, because replacing them would change the recording. Comments of the
-YAML are removed; the addresses of its buses become `192.0.2.1`.
+The names' sort order stays, because cores sort by names. Words of the program itself (keys and values
+of the YAML, words of a core, topics) stay, because replacing them would change the recording. Comments
+of the YAML are removed; the addresses of its buses become `192.0.2.1`.
 """
 
 import enum
@@ -48,7 +48,7 @@ from workbench.replay.replayed import of_head
 from workbench.replay.sources import TOPICS
 
 SAID: Final = FREE_TEXTS | {"code", "detail", "reason", "code_fault", "errors", "lost", "io_fault"}
-"""Fields in which a core keeps its own words."""
+"""Fields whose words are a core's own."""
 NAME: Final = re.compile(r"(?!\d+$)[\w./-]{1,128}")
 ADDRESS: Final = "192.0.2.1"
 HOSTS: Final = ("host", "api_base", "url")
@@ -135,7 +135,7 @@ def _subjects(incident: Incident) -> Iterator[str]:
 
 
 def _own_names(config: Config, content: dict[str, Any]) -> Iterator[str]:
-    """Return the YAML's devices and places; for a kind without hardware, every word of the site."""
+    """Return the YAML's devices and places, or for a kind without hardware every word of the site."""
     kind = kind_called(config.kind)
     yield from content.get("rmf", {}).get("topics", {}).values()
     if isinstance(kind, GraphKind):

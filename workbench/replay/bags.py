@@ -2,10 +2,10 @@
 ring itself.
 
 A recording is read as a stream, in bounded memory. Topics and types that are not RMF's are skipped and
-counted. From a damaged recording, the readable part is yielded, and then the damage noted.
+counted. The readable part of a damaged recording is yielded, then the damage is noted.
 
 In our own files `log_time` is by a clock that never steps, and `publish_time` by the wall clock. Other
-recordings have one clock; if it steps back, `at` goes on from its last value.
+recordings have one clock; if that clock steps back, `at` goes on from its last value.
 """
 
 import logging
@@ -29,7 +29,7 @@ log = logging.getLogger(__name__)
 
 NS: Final = 1e-9
 STEPPED_NS: Final = 10**9
-"""Least step back of a clock that was set back; less is disorder in the recording."""
+"""The least step back (s) of a clock that was set back; a smaller step is disorder in the recording."""
 LONGEST_MESSAGE: Final = 8 << 20
 
 
@@ -48,8 +48,8 @@ def all_in(
     """Yield RMF's messages and our recorder's texts, in the order of recording.
 
     `path`: an MCAP file, a `.db3` file, a directory of rosbag2, or a ring. Skipped messages
-    and damage go to `notes`; without `notes`, damage is logged. Samples refused by `keep` stay
-    undecoded, which takes a tenth of the time. Raises BagError if `path` is no recording.
+    and damage go to `notes`; without `notes`, damage is logged. Samples that `keep` refuses stay
+    undecoded, which saves nine tenths of the time. Raises BagError if `path` is no recording.
     """
     noted = Notes() if notes is None else notes
     clock = _Clock()
@@ -91,7 +91,7 @@ def _raw(path: Path, noted: Notes) -> Iterator[Raw]:
 
 
 def _parts(path: Path) -> list[Path]:
-    """Return the files of a recording in order; the directory itself if read as a whole."""
+    """Return the files of a recording in order, or the directory itself if it is read as a whole."""
     try:
         if not path.is_dir():
             return [path]
@@ -109,7 +109,7 @@ def _parts(path: Path) -> list[Path]:
 
 
 def continuous(files: list[Path]) -> list[Path]:
-    """Return our recorder's files that continue each other without overlap; all files if none do."""
+    """Return our recorder's files that continue each other without overlap, else all files."""
     return [file for file in files if f"_{CONTINUOUS}_" in file.name] or files
 
 
@@ -151,7 +151,7 @@ def _of_ring(path: Path) -> Iterator[Raw]:
 
 
 def _beginning(path: Path) -> bytes:
-    """Read the first bytes. Raises BagError if the file is unreadable or not a regular one."""
+    """Read the first bytes. Raises BagError if the file is unreadable or not a regular file."""
     try:
         return user_files.read(path, 15).content
     except OSError as error:

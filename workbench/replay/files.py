@@ -34,7 +34,7 @@ def opened(path: Path, notes: Notes) -> tuple[Head, Iterator[AnyEntry]]:
 
 
 def _of_all(files: list[Path], folder: Path, notes: Notes) -> tuple[Head, Iterator[AnyEntry]]:
-    """Yield the entries of the first file's daemon; only from its continuous files, if any."""
+    """Yield the entries of the first file's daemon, only from its continuous files if there are any."""
     if not files:
         raise BagError(f"{folder} holds no recording: it has no .mcap file")
     files = continuous(files)

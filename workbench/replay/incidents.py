@@ -14,7 +14,7 @@ from bridges.messages import cdr
 from workbench.replay.mcap_read import Damaged, records
 from workbench.replay.sources import BagError, Notes, NotReplayable
 
-NONE = "{} has no entries of an rmf-bridge daemon: only a recording that has them can be replayed"
+NONE = "{} has no entries of an rmf-bridge daemon, and only such entries can be replayed"
 
 
 def head_of(path: Path) -> Head:

@@ -33,7 +33,7 @@ def raw_in(path: Path, notes: Notes) -> Iterator[Raw]:
 
 
 class _Declared:
-    """A file's declarations so far. `ours`: is it our recorder's? `sources`: by channel."""
+    """A file's declarations so far. `ours`: is it our recorder's? `sources`: channel -> source."""
 
     def __init__(self) -> None:
         self.ours = False
@@ -41,7 +41,7 @@ class _Declared:
         self._types: dict[int, tuple[str, list[Release]]] = {}
 
     def is_ours(self, found: Source) -> bool:
-        """Is this one of our recorder's own topics?"""
+        """Is this topic our recorder's own?"""
         return self.ours and found.topic.startswith(OWN_TOPICS)
 
     def take(self, record: McapRecord) -> None:

@@ -2,7 +2,7 @@
 size.
 
 Everything in the file is checked before it is used: a length may be false, a chunk may unpack to
-gigabytes, the end may be missing. The index is not used and may be missing. Format:
+gigabytes, the end may be missing. The index is never used, so it may be missing. Format:
 https://mcap.dev/spec (version 0).
 """
 
@@ -25,15 +25,15 @@ LONGEST_RECORD: Final = 64 << 20
 of 1 to 8 MB."""
 MOST_UNPACKED: Final = 200
 FIRST_UNPACKED: Final = 2 << 20
-"""Limit of a file unpacked: this multiple of its size plus so many bytes; more is no recording."""
+"""Limits of an unpacked file: this multiple of the file's size, plus this number of bytes."""
 MOST_DECLARED: Final = 10_000
 """Limit of schemas and channels in a file."""
 FRAME: Final = 9
 """Each record begins with its opcode (1 byte) and its length (8 bytes)."""
 
 MESSAGE: Final = struct.Struct("<HIQQ")
-"""A message begins with channel, sequence, log time and publish time (ns). It is
-taken apart here, because there are more messages than anything else."""
+"""A message begins with channel, sequence, log time and publish time (ns). It is decoded here,
+faster than by the library, because messages are the most frequent records."""
 READ: Final[dict[int, Callable[[ReadDataStream], McapRecord]]] = {
     Opcode.HEADER: Header.read,
     Opcode.SCHEMA: Schema.read,
@@ -59,12 +59,12 @@ class Damaged(ValueError):
 def records(path: Path) -> Iterator[McapRecord]:
     """Yield every header, schema, channel, message and metadata record, in the file's order.
 
-    Raises Damaged at the place from which nothing more can be read, and OSError.
+    Raises Damaged where the file cannot be read further, and OSError.
     """
     size = path.stat().st_size
     with path.open("rb") as source:
         if source.read(len(MAGIC)) != MAGIC:
-            raise Damaged("it does not begin as an MCAP file")
+            raise Damaged("the file does not begin as an MCAP file")
         yield from _Allowances(size).records(source, size)
 
 
@@ -124,7 +124,7 @@ class _Allowances:
             raise Damaged(f"a chunk is compressed by {chunk.compression[:20]!r}, not zstd or lz4")
         if len(unpacked) != size:
             raise Damaged(
-                f"a chunk of {len(chunk.data)} bytes does not unpack to {size}, as it says"
+                f"a chunk of {len(chunk.data)} bytes does not unpack to {size} bytes, its stated size"
             )
         self._unpacked -= size
         return unpacked
@@ -138,10 +138,10 @@ def _body(source: IO[bytes], at: int, size: int) -> tuple[int, bytes]:
     """Read the next record's opcode and content. Raises Damaged."""
     frame = source.read(FRAME)
     if len(frame) < FRAME:
-        raise Damaged(f"it ends in the middle, at byte {at}")
+        raise Damaged(f"the file ends in the middle, at byte {at}")
     length = int.from_bytes(frame[1:], "little")
     if length > size - at - FRAME:
-        raise Damaged(f"it ends in the middle of the record at byte {at}")
+        raise Damaged(f"the file ends in the middle of the record at byte {at}")
     if length > LONGEST_RECORD:
         raise Damaged(f"the record at byte {at} is longer than {LONGEST_RECORD >> 20} MB")
     return frame[0], source.read(length)

@@ -1,4 +1,4 @@
-"""Common parts of the commands that read a recording: the span asked for, refusals, thinning out."""
+"""Common parts of the commands that read a recording: the span to read, refusals, thinning out."""
 
 import argparse
 import os
@@ -46,7 +46,7 @@ class TypedTime:
 
 @dataclass(slots=True)
 class RecordingSpan:
-    """The part of a recording asked for. `begins_at`: when it began, by `Heard.at`."""
+    """The part of a recording to read. `begins_at`: when the recording began, by `Heard.at`."""
 
     from_: TypedTime | None
     to: TypedTime | None
@@ -62,7 +62,7 @@ def unreadable(command: str, error: BagError) -> int:
 def add_span_arguments(parser: argparse.ArgumentParser) -> None:
     """Add `--from` and `--to`."""
     times = (
-        "14:03, 14:03:07, '2026-11-22 14:03' (this machine's time), or +90: s from its beginning"
+        "14:03, 14:03:07, '2026-11-22 14:03' (this machine's time), or +90: s from the beginning"
     )
     parser.add_argument(
         "--from", dest="from_", type=_time, metavar="TIME", help=f"begin then: {times}"
@@ -96,9 +96,9 @@ def _plus(text: str) -> float:
 class Sieve:
     """Choose the samples worth decoding, for one device or (name "") for all.
 
-    Diagnostics come each second and seldom change: if only numbers (ages, counts) differ from
-    the node's last sample, one is taken every SAME_S. From other devices the first samples are
-    taken, for their names.
+    Diagnostics come each second and seldom change: if only numbers (ages, counts) differ from the
+    node's last sample, one sample is taken every SAME_S. The first samples of other devices are taken
+    too, for the devices' names.
     """
 
     def __init__(self, name: str) -> None:
@@ -143,7 +143,8 @@ def told_between(
 def between(
     path: Path, span: RecordingSpan, command: str, keep: Keep | None = None
 ) -> Iterator[Heard | Own]:
-    """Yield a recording until the end of the span, from its beginning, because states last.
+    """Yield a recording from its beginning to the end of the span: earlier states are still valid
+    there.
 
     Damage is printed on standard error. Raises BagError.
     """

@@ -1,8 +1,8 @@
 """Replay a recording: today's core decides on the recorded events, and each decision is compared.
 
 A core is a pure function of its memory, an event, the time and its limits. A recording has the initial
-memory and every event. So the decisions come out the same, to the bit, unless the core or
-its limits have changed.
+memory and every event. So the decisions are the same, to the bit, unless the core or its limits have
+changed.
 """
 
 import struct
@@ -34,7 +34,7 @@ from workbench.replay.typed import typed, types_of
 
 AnyDecision = Decision[Any, Any, Any]
 Parts = tuple[str, Tree, Tree]
-"""A part of a decision that differs: its name, as recorded, and today."""
+"""A part of a decision that differs: the part's name, its recorded value, and today's value."""
 CONTEXT: Final = 6
 """The number of events reported before a difference."""
 PARTS: Final = ("outputs", "news", "refused")
@@ -56,7 +56,7 @@ class ReplayedCore:
 class Difference:
     """A differing decision. `wall`: its time (s since the epoch). `what`: the differing part.
 
-    `before`: the last events up to this one, each with its time, in words.
+    `before`: the last events up to this decision, each with its time, in words.
     """
 
     subject: str
@@ -147,11 +147,11 @@ class _Subject:
         return self._report is not None
 
     def memory(self) -> Tree:
-        """The present memory."""
+        """Return the present memory."""
         return tree(self._memory)
 
     def published(self) -> None:
-        """Note that the report has been published."""
+        """Record that the report has been published."""
         self._memory = self._core.published(self._memory, self._report)
 
     def step(self, step: Decided) -> list[Parts]:
@@ -191,9 +191,9 @@ class _Subject:
         self.last.append((at, event))
         try:
             decision: AnyDecision = self._core.decide(self._memory, event, at)
-        except Exception as error:  # a core never raises for a memory of its own making
+        except Exception as error:  # a core never raises for a memory that it made
             why = f"{type(error).__name__}: {error}"
-            raise UnknownValue(f"the core cannot decide on what was recorded: {why}") from error
+            raise UnknownValue(f"the core cannot decide on the recorded event: {why}") from error
         self._memory, self._report = decision.memory, decision.report
         return decision
 
@@ -321,5 +321,5 @@ def times(entry: Same) -> tuple[float, ...]:
         raise UnknownValue("not a list of times")
     found = struct.unpack(f"<{len(entry.times) // 8}d", entry.times)
     if not all(abs(at) < LATEST_S for at in found):
-        raise UnknownValue("a time of no machine")
+        raise UnknownValue("a time that no clock has")
     return found

@@ -21,19 +21,19 @@ class BagError(Exception):
 
 
 class NotReplayable(BagError):
-    """The recording is readable, but none of its decisions can be replayed."""
+    """The recording is readable, but no decision in it can be replayed."""
 
 
 @dataclass(slots=True)
 class Notes:
-    """Missing parts. `skipped`: messages by reason. `damage`: why the end is missing; else empty."""
+    """Missing parts. `skipped`: reason -> messages. `damage`: why the end is missing, or ""."""
 
     skipped: Counter[str] = field(default_factory=Counter)
     damage: str = ""
 
     def damaged(self, path: object, why: object) -> None:
         """Note why the rest of a file is missing."""
-        told = f"{path}: {why}; what comes before is used"
+        told = f"{path}: {why}; the part before is used"
         self.damage = f"{self.damage}; {told}" if self.damage else told
 
 
@@ -51,7 +51,7 @@ class Raw(NamedTuple):
 
 
 class Source(NamedTuple):
-    """A recorded topic. `decode`: None if the topic is not RMF's; `why` gives the reason."""
+    """A recorded topic. `decode`: None if the topic cannot be used; `why` gives the reason."""
 
     topic: str
     decode: Callable[[bytes], Message] | None
@@ -71,9 +71,9 @@ def source(topic: str, type_name: str, releases: list[Release]) -> Source:
 
 
 def releases(type_name: str, definition: str, digest: str = "") -> list[Release]:
-    """Return a message's possible releases; if not recorded, all releases that have the type.
+    """Return a message's possible releases: all releases that have the type, unless one is recorded.
 
-    `definition`: its text, or "". `digest`: its RIHS01 hash, or "".
+    `definition`: the type's text, or "". `digest`: the type's RIHS01 hash, or "".
     """
     message_type = MESSAGES.get(type_name)
     if message_type is None:

@@ -1,4 +1,4 @@
-"""Check recorded values against a core's own type annotations, because `trees.value` alone makes any
+"""Check recorded values against a core's own type annotations, because `value_codec.value` makes any
 type of value with anything in its fields.
 """
 
@@ -16,7 +16,9 @@ LONGEST = 100
 
 @cache
 def types_of(decide: Callable[..., Any]) -> Mapping[str, Any]:
-    """Return a core's types: `memory`, `event`, `outputs`, `report`. The last two also allow None."""
+    """Return a core's types: `memory`, `event`, `outputs`, `report`. `outputs` and `report` also allow
+    None.
+    """
     hints = get_type_hints(decide)
     memory, outputs, report = get_args(hints["return"])
     told = {"outputs": Union[outputs, None], "report": Union[report, None]}  # noqa: UP007
@@ -28,7 +30,7 @@ def typed(told: Tree, hint: Any) -> Any:
     found = value(told)
     if not _fits(found, hint):
         shown = str(told)
-        raise UnknownValue(f"not what this version's core takes: {shown[:LONGEST]}")
+        raise UnknownValue(f"this version's core does not accept {shown[:LONGEST]}")
     return found
 
 
@@ -64,7 +66,7 @@ def _parts(found: Any, args: tuple[Any, ...]) -> Iterator[tuple[Any, Any]]:
 
 @cache
 def _fields(kind: Hashable, args: tuple[Any, ...]) -> Mapping[str, Any]:
-    """Return fields and types of a struct or named tuple; empty for all else."""
+    """Return fields and types of a struct or named tuple; {} for other types."""
     if not hasattr(kind, "__struct_fields__") and not hasattr(kind, "_fields"):
         return {}
     own = dict(zip(getattr(kind, "__parameters__", ()), args, strict=False))

@@ -2,9 +2,9 @@
 
 Taken from rmf_ros2 9dedd0f (2026-05), quirks included: no timeouts, no retries, a lift's mode ignored.
 
-No I/O and no clock: each party hears a message or is ticked at its `wake_at`, and returns the
-messages to publish. `now` is RMF's clock in seconds (since the epoch, where stamps matter). A
-restarted party is a new object.
+There is no I/O and no clock: each party hears a message or is ticked at its `wake_at`, and returns the
+messages to publish. `now` is RMF's clock in seconds (since the epoch, where stamps matter). A restarted
+party is a new object.
 """
 
 from abc import ABC, abstractmethod
@@ -22,7 +22,7 @@ NEVER: Final = float("inf")
 
 
 class Party(ABC):
-    """A node on RMF's side. Some have no timer."""
+    """A node on RMF's side. Some nodes have no timer."""
 
     subscribes: Sequence[AnyTopic]
 
@@ -35,7 +35,7 @@ class Party(ABC):
         return []
 
     def wake_at(self) -> float:
-        """Time of the next timer: s, or inf."""
+        """Return the time of the next timer (s), or inf."""
         return NEVER
 
 

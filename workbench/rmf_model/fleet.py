@@ -6,15 +6,16 @@ FleetUpdateHandle.cpp) and seen with Jazzy's:
    with a new waypoint or mode restarts a running ChargeBattery, and moves no other robot. A waypoint
    missing in the graph crashes the adapter.
 2. ChargeBattery is a task if RMF finds the battery too low for the way to the dedicated waypoint (the
-   automatic retreat; never for a robot there, and Jazzy's never below the recharge threshold) or if
-   its planner wants it. That task ends at recharge_soc. As the fleet's `finishing_request: charge`
-   it is not a task, and lasts until the next task, however full the battery is. With `nothing` a
-   robot stays. With `park` it drives to a parking spot; Jazzy's (branch jazzy, 7eef65a) knows no spots,
-   and goes where ChargeBattery would, at each assignment too.
-3. A robot without a task shows the mode IDLE and no task id, also while it charges. WaitForCharge
-   alone sets CHARGING, and nothing sets it back: every later task shows it too.
-4. An EasyFullControl adapter that starts forgets the assignments: it takes the retained one, and a
-   moment later the charger of its file in its place.
+   automatic retreat; never for a robot at that waypoint; with Jazzy never below the recharge threshold)
+   or if RMF's planner plans the task. That task ends at recharge_soc. As the fleet's
+   `finishing_request: charge` it is not a task, and lasts until the next task, however full the battery
+   is. With `nothing` a robot stays. With `park` it drives to a parking spot; Jazzy's adapter (branch
+   jazzy, 7eef65a) knows no parking spots: the robot goes where ChargeBattery would, and again at each
+   assignment.
+3. A robot without a task shows the mode IDLE and no task id, also while it charges. Only WaitForCharge
+sets CHARGING, and nothing resets CHARGING: every later task shows it too.
+4. An EasyFullControl adapter that starts has forgotten the assignments. It takes the retained
+assignment, and a moment later replaces it by the charger of its file.
 """
 
 from collections.abc import Mapping, Sequence
@@ -42,9 +43,11 @@ class AdapterCrashed(Exception):
 
 @dataclass
 class FleetRobot:
-    """`place`: the waypoint at which it stands; "" on the road. `goes_to`: its destination.
-    `dedicated`, `waits`: its charging assignment. `doing`: its task, or its activity without one.
-    `task_id`: "" without a task. `mode`: as last set by a phase. `stuck`: it cannot drive."""
+    """A robot. `place`: the waypoint at which it stands; "" on the road. `goes_to`: its destination.
+    `dedicated`, `waits`: its charging assignment. `doing`: its task, or its activity without a task.
+    `task_id`: "" without a task. `mode`: the last mode that a phase set. `stuck`: the robot cannot
+    drive.
+    """
 
     name: str
     place: str
@@ -61,7 +64,7 @@ class FleetRobot:
 
     @property
     def charges(self) -> bool:
-        """Does its ChargeBattery run, as a task or without one?"""
+        """Does the robot's ChargeBattery run, as a task or without a task?"""
         return self.doing in ("charge", "idle charge")
 
 
@@ -79,7 +82,7 @@ class FleetAdapter(Party):
         finishing: Finishing = "nothing",
         jazzy: bool = False,
     ) -> None:
-        """`robots`: each at its parking spot. `drive_s`: the time of every drive.
+        """Begin with `robots` at their parking spots. `drive_s`: the time of every drive.
         `finishing`: the fleet's `finishing_request`. `jazzy`: by Jazzy's rules where they differ."""
         self.name = name
         self.graph = graph
@@ -94,7 +97,7 @@ class FleetAdapter(Party):
             self._rest(robot, 0.0)
 
     def charge(self, who: str, now: float, percent: float = 40.0) -> None:
-        """Begin ChargeBattery as a task: RMF's planner finds the battery low."""
+        """Begin ChargeBattery as a task, because RMF's planner finds the battery low."""
         self.robots[who].battery_percent = percent
         self._begin(self.robots[who], "charge", now)
 
@@ -113,7 +116,7 @@ class FleetAdapter(Party):
             self._rest(robot, now)
 
     def strays(self, who: str, place: str, now: float) -> None:
-        """Drive the robot there within its present task, against that task's purpose."""
+        """Drive the robot to a place where its present task does not send it."""
         self._go(self.robots[who], place, now)
 
     def hear(self, message: d.Message, now: float) -> list[Said]:
@@ -129,7 +132,7 @@ class FleetAdapter(Party):
         return []
 
     def tick(self, now: float) -> list[Said]:
-        """Drive robots on, retreat low ones, end full ones' tasks, and publish the state."""
+        """Drive robots on, retreat low robots, end the tasks of full robots, and publish the state."""
         for robot in self.robots.values():
             self._move(robot, now)
             self._retreat(robot, now)
@@ -140,7 +143,7 @@ class FleetAdapter(Party):
         return [(FLEET_STATES, d.FleetState(self.name, states))]
 
     def wake_at(self) -> float:
-        """Time of the next state or arrival."""
+        """Return the time of the next state or arrival."""
         ways = [robot.arrives_at for robot in self.robots.values() if robot.goes_to]
         return min([self._told_at + EVERY_S, *ways])
 

@@ -1,7 +1,7 @@
 """The phases of a robot's task that concern us: RequestLift, EndLiftSession, DoorOpen, DoorClose.
 
-Source: rmf_ros2 9dedd0f, rmf_fleet_adapter/src/rmf_fleet_adapter/phases/. None of them gives up.
-Left out, as they send nothing to us: the lift watchdog, localisation, holding points.
+Source: rmf_ros2 9dedd0f, rmf_fleet_adapter/src/rmf_fleet_adapter/phases/. No phase gives up. Three
+phases are left out because they send nothing to us: the lift watchdog, localisation, holding points.
 """
 
 from typing import Final
@@ -18,7 +18,7 @@ REPEAT_S: Final = 1.0
 class RequestLift(Phase):
     """Wait for a LiftState with our floor, DOOR_OPEN and our session; modes are ignored.
 
-    Once a destination is set, the phase's 1 s timer publishes nothing: the context repeats the
+    Once a destination is set, the phase's 1 s timer publishes nothing, because the context repeats the
     request at each LiftState.
     """
 
@@ -36,7 +36,7 @@ class RequestLift(Phase):
         return robot.set_lift_destination(self.wanted, now)
 
     def hear(self, robot: RobotContext, message: d.Message, now: float) -> list[Said]:
-        """Once the lift has come, request as from inside (RequestLift.cpp:322-326, _finish)."""
+        """Once the lift has come, request as a robot inside (RequestLift.cpp:322-326, _finish)."""
         match message:
             case d.LiftState(
                 lift_name=self.wanted.lift,
@@ -110,7 +110,7 @@ class DoorOpen(Phase):
 class DoorClose(Phase):
     """Send CLOSE at the start and every second, until a heartbeat no longer lists us.
 
-    It does not wait for the door.
+    The phase does not wait for the door.
     """
 
     def __init__(self, door: str) -> None:

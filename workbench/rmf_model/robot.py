@@ -1,4 +1,4 @@
-"""A fleet adapter's context of one robot: its own actions, common to all phases.
+"""A fleet adapter's context of one robot: the actions that are common to all phases.
 
 Source: rmf_ros2 9dedd0f, rmf_fleet_adapter/src/rmf_fleet_adapter/agv/RobotContext.cpp:1281-1324 and
 1600-1800. The phases are in `phases.py`. `jazzy`: by Jazzy's rules where they differ (branch jazzy,
@@ -27,7 +27,8 @@ class LiftDestination(Struct, frozen=True):
 class Phase(ABC):
     """One step of a robot's task.
 
-    `due_at`: its wall timer. `claims_lift`: the phase keeps an idle lift from being released.
+    `due_at`: when the phase's wall timer fires. `claims_lift`: the phase keeps the context from
+    releasing an idle lift.
     """
 
     done = False
@@ -40,7 +41,7 @@ class Phase(ABC):
 
     @abstractmethod
     def hear(self, robot: "RobotContext", message: d.Message, now: float) -> list[Said]:
-        """Take a message, after the context's own rules."""
+        """Take a message; the context has applied its own rules to it before."""
 
     def tick(self, robot: "RobotContext", now: float) -> list[Said]:
         """Fire the phase's wall timer."""
@@ -50,8 +51,8 @@ class Phase(ABC):
 class RobotContext(Party):
     """A fleet adapter's RobotContext (`requester_id` is fleet/robot) and its one running phase.
 
-    `on_task`: has the robot a task? `in_car`: is its position inside the lift? The caller sets both.
-    A cancelled phase is `robot.phase = None`.
+    `on_task`: has the robot a task? `in_car`: is its position inside the lift? The caller sets these
+    two. To cancel a phase: `robot.phase = None`.
     """
 
     subscribes: Sequence[topics.AnyTopic] = (
@@ -73,7 +74,7 @@ class RobotContext(Party):
         self._tasked_at = float("-inf")
 
     def begin(self, phase: Phase, now: float) -> list[Said]:
-        """Start this phase; drop the last one, done or not."""
+        """Start this phase; drop the last phase, done or not."""
         self.phase = phase
         return phase.begin(self, now)
 
@@ -99,7 +100,7 @@ class RobotContext(Party):
         return [] if self.phase is None or self.done else self.phase.tick(self, now)
 
     def wake_at(self) -> float:
-        """Time of the phase's wall timer."""
+        """Return the time of the phase's wall timer."""
         return NEVER if self.phase is None or self.done else self.phase.due_at
 
     # ---- lift

@@ -1,8 +1,8 @@
 """rmf_lift_supervisor and rmf_door_supervisor, rule by rule.
 
 Source: rmf_ros2 9dedd0f, rmf_fleet_adapter/src/lift_supervisor/Node.cpp and
-door_supervisor/Node.cpp. Neither remembers anything across a restart. `jazzy`: by Jazzy's rules
-where they differ (branch jazzy, 7eef65a).
+door_supervisor/Node.cpp. Neither supervisor remembers anything across a restart. `jazzy`: by Jazzy's
+rules where they differ (branch jazzy, 7eef65a).
 """
 
 from collections.abc import Sequence
@@ -17,9 +17,10 @@ from workbench.rmf_model import Party, Said, door_request
 
 
 class LiftSupervisor(Party):
-    """rmf_lift_supervisor: one slot for each lift, which holds the last request of its holder.
+    """rmf_lift_supervisor, which remembers for each lift the last request of its holder.
 
-    Jazzy's repeats the holder's request at every state, and sends END for an empty session too.
+    Jazzy's supervisor repeats the holder's request at every state, and sends END for an empty session
+    too.
     """
 
     subscribes: Sequence[topics.AnyTopic] = (topics.ADAPTER_LIFT_REQUESTS, topics.LIFT_STATES)

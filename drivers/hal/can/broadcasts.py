@@ -17,7 +17,7 @@ NEVER = float("-inf")
 class Said(NamedTuple):
     """A frame that the device sends. `mask`: the bits of its id that count. `length`: in bytes.
 
-    `fresh_s`: its validity (s). `needed`: a reading fails without this frame.
+    `fresh_s`: how long the frame is valid (s). `needed`: a reading fails without this frame.
     """
 
     id: int
@@ -71,7 +71,7 @@ class Broadcasts:
     def read(self) -> dict[str, float]:
         """Return the values of fresh frames, by Frame.Signal. Raises HalError and `decode`'s errors.
 
-        Waits for a needed frame; and, when the sequel's first frame begins to need an explanation,
+        Waits for a needed frame. When the sequel's first frame begins to need an explanation, waits
         once for the explaining frames.
         """
         self._bus.take()

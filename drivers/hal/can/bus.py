@@ -1,8 +1,8 @@
 """CAN: one bus, on an interface of the kernel (SocketCAN) or an slcan adapter, through python-can.
 
 Everything runs in the loop's thread. A reading takes all frames since the last reading and gives each
-to the devices that want it. Ids that no device wants are kept for a while, for errors about missing
-frames. Frames are sent only from a scan, never by a cyclic sender of the kernel or the library: a
+to the devices that want it. Ids that no device wants are kept for a while: errors about missing frames
+name them. Frames are sent only from a scan, never by a cyclic sender of the kernel or the library: a
 daemon that hangs falls silent.
 
 An interface that is down, gone or bus-off is closed, and opened again after a backoff of 0.5 to 30 s,
@@ -59,7 +59,7 @@ class CanBus(Bus):
         self._deaf = False
 
     def backoff(self) -> Backoff:
-        """Return the backoff of one device; `insist` ends it too."""
+        """Return a new backoff for one device; `insist` ends its pauses too."""
         made = Backoff(self.now, self._jitter)
         self._backoffs.append(made)
         return made
@@ -115,9 +115,7 @@ class CanBus(Bus):
         if not others:
             return "nothing else is heard on the bus either: power, cable, termination, bitrate?"
         shown = ", ".join(map(named, others[:OTHERS_SHOWN]))
-        return (
-            f"the bus works, and others are heard: {shown}{' …' if others[OTHERS_SHOWN:] else ''}"
-        )
+        return f"the bus works, and other ids are heard: {shown}{' …' if others[OTHERS_SHOWN:] else ''}"
 
     def others(self) -> list[int]:
         """Return the ids that were heard in the last RECENT_S and that no device wants."""

@@ -3,14 +3,14 @@
 The library encodes and decodes; this file sends, waits and backs off, in the loop's thread. The library
 alone would accept any frame with the reply's id, even a late reply. Here
 
-- a reply counts only if it has eight bytes and names the requested object; others are dropped, and
-  named in the error if no reply comes;
+- a reply counts only if it has eight bytes and names the requested object; other frames are dropped,
+  and the error names them if no reply comes;
 - after a request without a reply the node gets no request for LATE times the timeout: a late reply must
   not pass for the reply to the next request;
 - no request is sent twice;
 - a write that switches power off is sent at once, even after a failed reading.
 
-A lost node has a backoff as every device has; its heartbeat or its restart ends it.
+A lost node has a backoff, as every device has. The node's heartbeat or restart ends the backoff.
 """
 
 import struct
@@ -75,7 +75,7 @@ class CanOpenNode:
             if not self._bus.wait(self._beats, self._timeout_s):
                 raise self._beat_pause.failed(self._silent())
         if self._beat_pause.failing:
-            self.starts += 1  # it may have restarted unheard
+            self.starts += 1  # the node may have restarted unheard
         self._beat_pause.mended()
         if self._state != OPERATIONAL:
             state = STATES.get(self._state, f"in state {self._state}")

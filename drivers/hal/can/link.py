@@ -7,8 +7,8 @@ python-can opens, reads and sends. This file adds what python-can lacks:
 - If an slcan adapter returns no frame, more may follow: the adapter may have sent an acknowledgement.
 - Bytes that are not slcan break python-can's parser permanently, so the adapter is opened again.
 - python-can's slcan write waits for the adapter without limit; here it has `timeout_s`.
-- An interface that is down or gone raises many types of exceptions. Here each is a LinkDown that says
-  what to do.
+- An interface that is down or gone raises many types of exceptions. Here each exception becomes a
+  LinkDown, whose text has a remedy.
 - SocketCAN reports the bus's own troubles as error frames (linux/can/error.h).
 """
 
@@ -154,22 +154,22 @@ class Link:
 
 
 _HINTS: Final = {
-    errno.ENODEV: "there is no such interface; `ip link show type can` lists what there is",
-    errno.ENXIO: "there is no such interface; `ip link show type can` lists what there is",
+    errno.ENODEV: "no such interface; see `ip link show type can`",
+    errno.ENXIO: "no such interface; see `ip link show type can`",
     errno.ENETDOWN: "the interface is down; sudo ip link set {where} up type can bitrate 250000"
     " restart-ms 100, with the bitrate of your charger",
     errno.ENOBUFS: "frames pile up because nobody acknowledges them; is the other side powered,"
     " wired and terminated, and the bitrate the same?",
     errno.EAFNOSUPPORT: "this kernel has no CAN; sudo modprobe can-raw",
     errno.ENOENT: "the adapter is not there; is it plugged in? ls /dev/serial/by-id",
-    errno.EACCES: "it may not be opened; add the daemon's user to the group dialout",
+    errno.EACCES: "the port may not be opened; add the daemon's user to the group dialout",
     errno.EAGAIN: "another program has it open",
     errno.EBUSY: "another program has it open",
 }
 
 
 def _selecting(bus: BusABC) -> Callable[[float], bool] | None:
-    """Return a wait for the next byte or frame; None for a bus of one process, which has no file."""
+    """Return a function that waits for input; None for a bus within this process, which has no file."""
     try:
         descriptor = bus.fileno()
     except NotImplementedError:
@@ -178,7 +178,7 @@ def _selecting(bus: BusABC) -> Callable[[float], bool] | None:
 
 
 def _meaning(message: Message) -> Frame | Trouble | None:
-    """Convert a data frame or the controller's trouble; None for remote and FD frames: unused."""
+    """Convert a data frame or the controller's trouble. Return None for remote and FD frames."""
     if message.is_error_frame:
         found = message.arbitration_id
         if found & RESTARTED and not found & BUS_OFF:

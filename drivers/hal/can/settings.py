@@ -33,7 +33,7 @@ Timeout = Annotated[float, msgspec.Meta(ge=0.05, le=5, extra={"unit": "s"})]
 class Slcan(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """A serial or USB adapter that speaks slcan (LAWICEL)."""
 
-    port: Annotated[Name, tells("its path; one in /dev/serial/by-id stays the same.")]
+    port: Annotated[Name, tells("the adapter's path; a path in /dev/serial/by-id never changes.")]
     bitrate: Annotated[
         int,
         msgspec.Meta(ge=10_000, le=1_000_000, extra={"unit": "bit/s"}),
@@ -51,8 +51,10 @@ class CanSettings(BusSettings, frozen=True, kw_only=True, forbid_unknown_fields=
 
     socketcan: Annotated[
         Interface | None,
-        tells("""the kernel's interface (`can0`). `ip link` sets its bitrate. Most adapters and the
-        CAN boards of a Raspberry Pi have one."""),
+        tells(
+            """the kernel's interface (`can0`). `ip link` sets its bitrate. Most adapters and the
+        CAN boards of a Raspberry Pi have such an interface."""
+        ),
     ] = None
     slcan: Annotated[Slcan | None, tells("an adapter on a serial port.")] = None
     timeout_s: Annotated[
@@ -67,7 +69,7 @@ class CanSettings(BusSettings, frozen=True, kw_only=True, forbid_unknown_fields=
         elif self.socketcan and self.slcan:
             yield (
                 ("slcan",),
-                "a bus has either socketcan or slcan: define a second bus for the other",
+                "a bus has only one of socketcan and slcan: define a second bus",
             )
         if self.slcan and self.slcan.bitrate not in BITRATES:
             known = ", ".join(map(str, BITRATES))

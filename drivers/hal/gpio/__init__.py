@@ -1,7 +1,7 @@
 """GPIO: the pins of a Raspberry Pi's 40-pin header, through gpiozero on lgpio.
 
-Outputs are claimed at their safe level in one call and are left at it (`drivers/hal/gpio/pins.py`).
-Inputs are sampled: an edge only calls `wake`, because lgpio loses edges.
+Outputs are claimed at their safe level in one call, and released at that level
+(`drivers/hal/gpio/pins.py`). Inputs are sampled: an edge only calls `wake`, because lgpio loses edges.
 
     header.py     the spelling of pins
     bus.py        claims, samples, drives and releases pins

@@ -1,4 +1,4 @@
-"""Pins on lgpio alone, to switch off from a new process: gpiozero takes a third of its time to load.
+"""Pins on lgpio alone: a new process switches off sooner if it need not load gpiozero.
 
 Outputs are claimed, written and released by the same calls as in `pins.py`. There are no edges.
 """

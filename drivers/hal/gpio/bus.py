@@ -97,7 +97,7 @@ class GpioBus(Bus):
         try:
             self.factory.close()
         except _failures():
-            return  # the kernel releases what is left when the process ends
+            return  # the kernel releases the lines when the process ends
 
 
 class GpioLines:
@@ -113,7 +113,9 @@ class GpioLines:
         self._dropped = False
 
     def claim(self) -> None:
-        """Claim the outputs at their safe level, each in one call, then the inputs: all or none."""
+        """Claim the outputs at their safe level, each in one call, then the inputs. After a failure
+        nothing is claimed.
+        """
         self._release()
         self._dropped = False
         try:
@@ -154,7 +156,7 @@ class GpioLines:
                 try:
                     self._claimed[point].state = level
                 except _failures():
-                    continue  # the others must still drop
+                    continue  # the other outputs must still drop
 
     def outputs(self) -> dict[str, bool]:
         """Read the outputs' levels from the chip. Raises HalError."""
@@ -195,7 +197,7 @@ class GpioLines:
         pin.when_changed = self._bus.edge
 
     def _conflicts_with(self, other: object) -> bool:
-        """Does `other` hold the pin? gpiozero asks the requester."""
+        """Is `other` a different device? gpiozero asks this about the present holder of a pin."""
         return other is not self
 
     def _release(self) -> None:
@@ -203,7 +205,7 @@ class GpioLines:
             try:
                 pin.close()
             except _failures():
-                continue  # the others must still be released
+                continue  # the other pins must still be released
             finally:
                 self._bus.factory.release_pins(self, point)
         self._claimed.clear()

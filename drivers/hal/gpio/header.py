@@ -27,7 +27,7 @@ SHARED = {
     "BCM1": "a HAT's EEPROM, which the firmware reads at boot",
     "BCM2": "I2C (dtparam=i2c_arm=on), and has a fixed 1.8 kΩ pull-up",
     "BCM3": "I2C (dtparam=i2c_arm=on), and has a fixed 1.8 kΩ pull-up",
-    "BCM14": "the serial console, which sends and switches it at boot (enable_uart=1)",
+    "BCM14": "the serial console, which drives the pin at boot (enable_uart=1)",
     "BCM15": "the serial console (enable_uart=1)",
 }
 """Pins that the firmware or the kernel uses in common setups of a Raspberry Pi."""
@@ -80,7 +80,7 @@ def wire_problems(wire: Wire) -> Iterable[str]:
         return  # the check of the point's spelling reports it
     if wire.direction == "in":
         if wire.pull is None:
-            yield "pull is missing: say up, down, or none where an external resistor is fitted"
+            yield "pull is missing: write up, down, or none where an external resistor is fitted"
         elif name in FIXED_PULL_UP and wire.pull != "up":
             yield f"{name} has a fixed 1.8 kΩ pull-up: write pull: up, or use another pin"
     elif wire.pull is not None:

@@ -21,7 +21,7 @@ def _processes(proc: Path) -> Iterator[Path]:
 def _has(process: Path, chip: Path) -> bool:
     try:
         return any(os.readlink(fd) == str(chip) for fd in (process / "fd").iterdir())
-    except OSError:  # it has ended, or is another user's
+    except OSError:  # the process has ended, or is another user's
         return False
 
 

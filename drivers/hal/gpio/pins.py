@@ -16,8 +16,8 @@ from gpiozero.pins.local import LocalPiFactory, LocalPiPin
 
 from drivers.hal.gpio.chip import DEV, PULLS, claim, open_chip
 
-# Any board with the 40-pin header: gpiozero needs a board for the names of pins, and a hardened unit
-# hides /proc/cpuinfo, gpiozero's own source.
+# Any board with the 40-pin header: gpiozero needs a board for the names of pins, and our hardened
+# systemd unit hides /proc/cpuinfo, where gpiozero would read the board.
 REVISION = 0xA02082
 
 

@@ -5,9 +5,10 @@
   (new connections) and `rtu.py` (silence) keep a late reply or half a frame from passing for the reply
   to another request.
 - If the connection or port cannot be opened, the whole bus backs off for 0.5 to 30 s; if a unit fails,
-  only that unit does. Meanwhile calls fail at once with the same text. After that a request gets one
-  try until the unit answers again. A unit that has never answered gets one try too. A dead unit costs
-  the others one `timeout_s` per backoff. Between two such failed tries the live units have their turn.
+  only that unit does. During a backoff calls fail at once with the same text. After a backoff each
+  request gets only one try, until the unit answers again. A unit that has never answered also gets only
+  one try. A dead unit costs the others one `timeout_s` per backoff. Between two such failed tries the
+  live units have their turn.
 - Writes that switch off have their own backoff at each unit: a failed reading never delays the first
   such write.
 
@@ -98,10 +99,10 @@ class ModbusBus(Bus):
     def flash(self, place: Point, on_s: float) -> None:
         """Let the module time a pulse, by "flash on" of Waveshare's Modbus RTU Relay boards.
 
-        Function 5 at an own address for each relay (0x0200 plus the relay's number, from 0), with
-        tenths of a second in place of a coil's two values; the reply is an echo. Source: the maker's
-        manual, protocol V2: `01 05 02 00 00 07 8D B0` switches relay 0 of unit 1 on for 0.7 s. A repeat
-        would restart the time, so the request is sent once. Raises HalError; then there may be a pulse.
+        The request is function 5. The address is 0x0200 plus the relay's number, from 0, and the value
+        is the time in tenths of a second; the reply is an echo. Source: the maker's manual, protocol
+        V2: `01 05 02 00 00 07 8D B0` switches relay 0 of unit 1 on for 0.7 s. A repeat would restart
+        the time, so the request is sent once. Raises HalError; then there may be a pulse.
         """
         question = UnitRequest(place.unit, WRITES["coil"], place.address, round(on_s * 10))
         self._ask(f"flash at coil {place.address:#x}", question, once=True)
@@ -182,6 +183,6 @@ def _way(settings: ModbusSettings) -> tuple[UnitWire, str]:
         return SerialLine(settings.serial, settings.timeout_s), settings.serial.port
     from drivers.hal.modbus.tcp import Connection
 
-    assert settings.tcp  # or `problems` has said so
+    assert settings.tcp  # `problems` refuses other settings
     host, port = settings.tcp.host, settings.tcp.port
     return Connection(host, port, settings.timeout_s), f"{host}:{port}"

@@ -103,7 +103,7 @@ class DeviceWatchdogs:
 
 
 class Watchdogs:
-    """The watchdogs of one bus, by unit; none if the YAML has none."""
+    """The watchdogs of one bus, by unit; empty if the YAML has no watchdog."""
 
     def __init__(
         self, bus: "ModbusBus", settings: Watchdog | None, clock: Callable[[], float]
@@ -115,7 +115,7 @@ class Watchdogs:
             self._units = {unit: UnitWatchdog(bus, unit, habits) for unit in settings.units}
 
     def guard(self, units: Iterable[int]) -> DeviceWatchdogs:
-        """Return the view of a device with outputs at these units."""
+        """Return a device's watchdogs; the device has outputs at these units."""
         return DeviceWatchdogs(
             self._units[unit] for unit in sorted(set(units)) if unit in self._units
         )

@@ -56,33 +56,33 @@ REQUESTS: Final[dict[int, type[ModbusPDU]]] = {
 
 
 class Coils(ReadCoilsResponse):
-    """Bits; the byte count must be right."""
+    """Bits; a wrong byte count is refused."""
 
     def decode(self, data: bytes) -> None:
-        """Raises ValueError for another number of bytes."""
+        """Decode the bits. Raises ValueError for a wrong number of bytes."""
         if len(data) < 2 or data[0] != len(data) - 1:
             raise ValueError("its byte count is wrong")
         super().decode(data)
 
 
 class DiscreteInputs(Coils):
-    """The same for another table."""
+    """Bits, as `Coils`, of another table."""
 
     function_code = 2
 
 
 class HoldingRegisters(ReadHoldingRegistersResponse):
-    """Registers; the byte count must be right."""
+    """Registers; a wrong byte count is refused."""
 
     def decode(self, data: bytes) -> None:
-        """Raises ValueError for another number of bytes."""
+        """Decode the registers. Raises ValueError for a wrong number of bytes."""
         if len(data) < 3 or data[0] != len(data) - 1 or data[0] % 2:
             raise ValueError("its byte count is wrong")
         super().decode(data)
 
 
 class InputRegisters(HoldingRegisters):
-    """The same for another table."""
+    """Registers, as `HoldingRegisters`, of another table."""
 
     function_code = 4
 
@@ -91,9 +91,9 @@ class CoilEcho(WriteSingleCoilResponse):
     """A coil's address and value. pymodbus alone would read every value as 1."""
 
     def decode(self, data: bytes) -> None:
-        """Raises ValueError for another number of bytes."""
+        """Decode address and value. Raises ValueError for a wrong number of bytes."""
         if len(data) != 4:
-            raise ValueError("it is not a coil's value")
+            raise ValueError("the value is not a coil's")
         super().decode(data)
         self.registers = [int.from_bytes(data[2:], "big")]
 
@@ -102,9 +102,9 @@ class RegisterEcho(WriteSingleRegisterResponse):
     """A register's address and value."""
 
     def decode(self, data: bytes) -> None:
-        """Raises ValueError for another number of bytes."""
+        """Decode address and value. Raises ValueError for a wrong number of bytes."""
         if len(data) != 4:
-            raise ValueError("it is not a register's value")
+            raise ValueError("the value is not a register's")
         super().decode(data)
 
 
@@ -133,7 +133,7 @@ def tcp_answer(question: UnitRequest, number: int, heard: bytes) -> tuple[int, U
         if not content:
             return used, None
         if replied == 0:
-            raise BadReply("it is numbered 0, and must bear the number of the request")
+            raise BadReply("its transaction number is 0, not the request's")
         if (unit, replied) == (question.unit, number):
             return used, _decoded(question, content)
 

@@ -66,7 +66,7 @@ class Rivals:
     value.
 
     After the first contradiction the output is written again at once: the module may have restarted.
-    With another master, repeating this would switch the relay to and fro for ever. So after the second
+    With another master, repeated writes would switch the relay to and fro for ever. So after the second
     contradiction the output is left alone for 1 s, then for twice as long each time, up to 30 s.
     Meanwhile every write of its device fails, with an error that names the fault. Only safe values are
     still written, at once and every time.
@@ -89,16 +89,16 @@ class Rivals:
         for name in names:
             if self._now() - self._at.get(name, -math.inf) < self._pause_s.get(name, 0.0):
                 raise HalError(
-                    f"another master writes {name} too: it reads other than it was written, again and"
-                    f" again; it is tried again after {self._pause_s[name]:g} s"
+                    f"another master writes {name} too: its readings contradict the written values;"
+                    f" the next write is after {self._pause_s[name]:g} s"
                 )
 
 
 class ModbusLines:
     """One device's inputs and outputs by name (`drivers.hal.points.Lines`).
 
-    `safe`: each output's safe value. `readable`: outputs can be read back. If not, they are written in
-    every scan, for the case that the controller has restarted.
+    `safe`: each output's safe value. `readable`: outputs can be read back. If not, every scan writes
+    them, because the controller may have restarted.
     """
 
     def __init__(
@@ -155,7 +155,7 @@ class ModbusLines:
         return {name: p.of(image[p.cell]) for name, p in self._inputs.items()}
 
     def bring(self, values: Mapping[str, int]) -> None:
-        """Set these outputs, except those known to have the value. Raises HalError.
+        """Set these outputs, except outputs known to have the value already. Raises HalError.
 
         Also raises while another master writes one of the device's outputs.
         """
@@ -181,7 +181,7 @@ class ModbusLines:
         return {n: image[p] for n, p in self._outputs.items()} if self._readable else None
 
     def make_safe(self) -> None:
-        """Set every output to its safe value, even one believed safe. Raises HalError."""
+        """Set every output to its safe value, even outputs believed safe. Raises HalError."""
         self.write(self._safe)
 
     def close(self) -> None:
@@ -223,7 +223,7 @@ class ModbusLines:
                 self._rivals.check([str(point)])
                 raise HalError(
                     f"{point} reads {image[point]} after {value:d} was written: the module has"
-                    " restarted, its watchdog has tripped, or somebody else writes it"
+                    " restarted, its watchdog has tripped, or another master writes the output"
                 )
 
 

@@ -29,7 +29,7 @@ class Placed(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
             yield ("at",), reason
 
     def is_in(self, *tables: str) -> bool:
-        """Is its place in one of these tables?"""
+        """Is the part's place in one of these tables?"""
         return misplaced(self.at, tables) is None
 
 
@@ -52,7 +52,7 @@ class WrittenPlace(Placed, frozen=True, kw_only=True, forbid_unknown_fields=True
 class RegisterBit(InRegister, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """One bit of a register."""
 
-    bit: Annotated[Bit, tells("its number; 0 is the least significant.")]
+    bit: Annotated[Bit, tells("the bit's number; 0 is the least significant.")]
 
     def is_on(self, word: int) -> bool:
         """Is the bit set in a register's value?"""

@@ -131,20 +131,20 @@ def wire_problems(wire: Wire) -> Iterable[str]:
     except ValueError:
         return  # the check of the point's spelling reports it
     if wire.pull is not None:
-        yield "pull is for GPIO pins; the module has its own: leave it out"
+        yield "pull is for GPIO pins; the module has resistors of its own: delete pull"
     if wire.direction == "in":
         return
     yield from _flash_problems(wire, point)
     if point.bit is not None:
         yield (
-            "an output is a coil: to write a register would write its other bits too, which may be"
-            " somebody else's; driver: register commands with whole registers"
+            "an output is a coil: writing a register would also write its other bits, which another"
+            " device may use; driver: register writes whole registers"
         )
     elif point.table != "coil":
         yield f"an output is a coil, and a {point.table} can only be read"
     if wire.active == "low":
         yield (
-            "active: low would switch it on whenever the module restarts with its coils at 0:"
+            "active: low would switch the relay on whenever the module restarts with its coils at 0:"
             " use the relay's normally open contact and write active: high"
         )
 
@@ -154,7 +154,7 @@ def _flash_problems(wire: Wire, output: Point) -> Iterable[str]:
         return
     flash = parse(wire.flash.point)
     if flash.table != "coil":
-        yield f"flash is asked for with a write to a coil, not to a {flash.table}"
+        yield f"flash is a write to a coil, not to a {flash.table}"
     if flash.unit != output.unit:
         yield f"flash is at unit {flash.unit}, and the relay at unit {output.unit}: one is wrong"
 
@@ -175,7 +175,7 @@ def ranges(points: Iterable[Point], gap: int | None = None) -> list[Range]:
 
 
 def pieces(whole: Range, points: Iterable[Point]) -> Sequence[Range]:
-    """Return the parts of a range that hold only these points."""
+    """Return parts of a range that contain these points and no others."""
     return ranges(set(points).intersection(whole.points()), gap=0)
 
 
@@ -203,10 +203,12 @@ def _bit(text: str, table: Table, bit: str | None) -> int | None:
         return None
     if bit is None:
         raise ValueError(
-            f"{text!r}: a contact is one bit: say which of the register's, 'bit 0' say"
+            f"{text!r}: a contact is one bit: add the bit of the register, such as 'bit 0'"
         )
     if int(bit) >= BITS:
-        raise ValueError(f"{text!r}: a register has bits 0 to 15, and 0 is the least")
+        raise ValueError(
+            f"{text!r}: a register has bits 0 to 15, and bit 0 is the least significant"
+        )
     return int(bit)
 
 
@@ -228,7 +230,7 @@ def _is_model_number(table: Table, text: str) -> bool:
 
 def _model_number(table: Table, text: str, number: int) -> str:
     meant = int(text[1:]) - 1
-    hint = f"write {table} {meant}" if meant >= 0 else "the first one is address 0"
+    hint = f"write {table} {meant}" if meant >= 0 else "the first is address 0"
     return (
         f"{text} looks like a number of the data model, which begins at 1: {hint}; or 0x{number:x} if"
         f" {number} really is the address on the wire"

@@ -21,7 +21,7 @@ Place = Annotated[
     msgspec.Meta(
         min_length=1,
         max_length=40,
-        extra={"number": "its table and its address, which begins at 0 (input register 1)"},
+        extra={"number": "table and address; addresses begin at 0 (input register 1)"},
     ),
 ]
 """`holding register 4`, `input register 0x10`, `coil 0` or `discrete input 2`."""

@@ -3,7 +3,7 @@
 pyserial opens and configures the port, and pymodbus makes and reads the frames (`frames.py`). This file
 waits and times. It is imported when a bus needs it.
 
-RTU has no transaction number, so a late reply looks like a prompt one. Hence:
+RTU has no transaction number, so a late reply looks like the reply to the present request. Hence:
 
 - A request is sent only after 3.5 characters of silence; earlier bytes are dropped.
 - Frames of other units are dropped, and the wait goes on. Bytes that are no frame may be the reply in a
@@ -46,7 +46,7 @@ class Noise(BadReply):
 
 
 class SerialLine:
-    """One serial port, reopened when needed, exclusively."""
+    """One serial port, opened exclusively, and again when needed."""
 
     def __init__(self, settings: Serial, timeout_s: float) -> None:
         self._settings = settings
@@ -59,11 +59,11 @@ class SerialLine:
         self._stray = b""
 
     def owes(self, unit: int) -> bool:
-        """May this unit still reply to an older request? Then a new one should wait."""
+        """May this unit still reply to an older request? Then a new request should wait."""
         return time.monotonic() < self._late.get(unit, 0.0)
 
     def begin(self, unit: int) -> None:
-        """Wait, before a new request to this unit, until no late reply to an older one can come."""
+        """Wait, before a new request to this unit, until no reply to an older request can come."""
         time.sleep(max(0.0, self._late.pop(unit, 0.0) - time.monotonic()))
 
     def connect(self) -> None:
@@ -109,7 +109,7 @@ class SerialLine:
         port, self._port = self._port, None
         if port is not None:
             with suppress(OSError, termios.error):
-                port.reset_output_buffer()  # else closing waits until a dead line takes it
+                port.reset_output_buffer()  # bytes left for a dead line would delay closing
             with suppress(OSError, termios.error):
                 port.close()
 
@@ -122,9 +122,7 @@ class SerialLine:
             timeout=0,
             exclusive=True,
         )
-        with suppress(
-            OSError, ValueError
-        ):  # only some adapters know it; others deliver after 16 ms
+        with suppress(OSError, ValueError):  # some adapters refuse, and deliver after 16 ms
             port.set_low_latency_mode(True)
         return port
 
@@ -141,7 +139,7 @@ class SerialLine:
             self._late[request[0]] = self._sent_at + LATE * self._timeout_s
         assert self._port  # `connect` has opened it
         if os.write(self._port.fileno(), request) != len(request):
-            raise OSError(errno.EIO, "it does not take what is sent")
+            raise OSError(errno.EIO, "the port does not accept the whole request")
 
     def _heard(self, within_s: float) -> bytes:
         """Return the next bytes; b"" after `within_s` without any. Raises TimeoutError, OSError."""
@@ -152,7 +150,7 @@ class SerialLine:
             return b""
         received = os.read(descriptor, 4096)
         if not received:
-            raise OSError(errno.ENODEV, "it is gone")
+            raise OSError(errno.ENODEV, "the port is gone")
         self._busy_until = max(self._busy_until, time.monotonic())
         return received
 
@@ -162,7 +160,7 @@ class SerialLine:
         while len(heard) < len(request) and request.startswith(heard):
             heard += self._heard(self._timeout_s)
         if not heard.startswith(request):
-            raise Noise("what came first is not the echo; does the adapter echo? see ignore_echo")
+            raise Noise("the first bytes are not the echo; does the adapter echo? see ignore_echo")
         return heard[len(request) :]
 
     def _answer(self, request: bytes, heard: bytes) -> bytes:
@@ -187,7 +185,7 @@ class SerialLine:
         if is_echo and self._settings.ignore_echo:
             raise Noise("the adapter's echo came late")
         if is_echo:
-            text = "our own request comes back; does the adapter echo? say ignore_echo: true"
+            text = "our own request comes back; does the adapter echo? write ignore_echo: true"
             raise BadReply(text)
         raise BadReply(f"CRC of {frame.hex(' ')} is wrong")
 
@@ -211,9 +209,9 @@ class SerialLine:
         text = f"no serial port {self._settings.port}: "
         code = getattr(error, "errno", None)
         if code == errno.ENOENT:
-            return text + "it is not there; is the adapter plugged in? ls /dev/serial/by-id"
+            return text + "the port is not there; is the adapter plugged in? ls /dev/serial/by-id"
         if code == errno.EACCES:
-            return text + "it may not be opened: add the daemon's user to the group dialout"
+            return text + "the port may not be opened: add the daemon's user to the group dialout"
         if code in (errno.EAGAIN, errno.EBUSY):
             return text + "another program has it open"
         return text + _why(error)

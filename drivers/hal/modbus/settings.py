@@ -20,7 +20,7 @@ Timeout = Annotated[float, msgspec.Meta(ge=0.05, le=5, extra={"unit": "s"})]
 class ModbusSettings(
     BusSettings, frozen=True, kw_only=True, forbid_unknown_fields=True, tag="modbus"
 ):
-    """A module, or a gateway or serial line with several units: `tcp` or `serial`, one of the two."""
+    """A module, or a gateway or serial line with several units. Give either `tcp` or `serial`."""
 
     tcp: Annotated[Tcp | None, tells("where the module or gateway listens.")] = None
     serial: Annotated[Serial | None, tells("the serial line (Modbus RTU).")] = None
@@ -29,13 +29,13 @@ class ModbusSettings(
         int, msgspec.Meta(ge=0, le=5), tells("how many more tries a request gets after the first.")
     ] = 1
     scan_s: Annotated[Period, tells("how often every input is read.")] = 0.1
-    module_watchdog: Annotated[Watchdog | None, tells("the modules' own, for their outputs.")] = (
-        None
-    )
+    module_watchdog: Annotated[
+        Watchdog | None, tells("the modules' own watchdogs for their outputs.")
+    ] = None
     without_watchdog: Annotated[
         dict[Unit, Name],
         tells("""unit -> why its outputs may keep their value when the daemon's machine or the
-        network dies, or how the unit drops them (`its web page: all off after 5 s without a
+        network dies, or how the unit drops its outputs (`its web page: all off after 5 s without a
         master`)."""),
     ] = msgspec.field(default_factory=dict)
 
@@ -44,12 +44,12 @@ class ModbusSettings(
         if self.tcp is None and self.serial is None:
             yield (), "needs a connection: write tcp: {host: …} or serial: {port: …}"
         elif self.tcp and self.serial:
-            yield ("serial",), "a bus has either tcp or serial: define a second bus for the other"
+            yield ("serial",), "a bus has only one of tcp and serial: define a second bus"
         for unit in self.without_watchdog:
             if unit in self.watched():
                 yield (
                     ("without_watchdog", str(unit)),
-                    f"unit {unit} has a module_watchdog too: delete one",
+                    f"unit {unit} is in module_watchdog too: delete one of the two",
                 )
 
     def watched(self) -> Sequence[int]:
@@ -127,7 +127,7 @@ def unreachable(settings: ModbusSettings, point: str) -> str | None:
     unit = int(point.split()[1])
     if settings.serial is None or 1 <= unit <= 247:
         return None
-    why = "addresses all units, and none answers" if unit == 0 else "is for Modbus TCP"
+    why = "addresses all units, and no unit answers" if unit == 0 else "is for Modbus TCP"
     return f"unit {unit} {why}: units on a serial line are 1 to 247"
 
 

@@ -21,14 +21,14 @@ class Connection:
         self._where = f"{host}:{port}"
         self._dialler = Dialler(host, port, resolve)
         self._socket: socket.socket | None = None
-        self._number = 0  # counts on across connections: no late reply matches
+        self._number = 0  # continues across connections, so no late reply matches
 
     def owes(self, unit: int) -> bool:
-        """Always False: replies have numbers, so a late reply cannot pass for another."""
+        """Always False: replies have numbers, so a late reply cannot pass for a new reply."""
         return False
 
     def begin(self, unit: int) -> None:
-        """Do nothing: no late reply can pass for another."""
+        """Do nothing: no late reply can pass for a new reply."""
 
     def connect(self) -> None:
         """Connect if necessary, and start the time of one try. Raises Unreachable."""
@@ -78,9 +78,9 @@ class Connection:
     def _unreachable(self, error: OSError) -> str:
         text = f"no Modbus TCP connection to {self._where}: "
         if isinstance(error, ConnectionRefusedError):
-            return text + "it is refused; is this the module, and does it take more connections?"
+            return text + "refused; is this the module, and does it accept more connections?"
         if isinstance(error, socket.gaierror):
-            return text + "its name is not known; write its address"
+            return text + "the host's name is not known; write its address"
         if isinstance(error, TimeoutError):
             return text + f"nobody answers within {self._timeout_s:g} s; check power and cable"
         return text + (error.strerror or str(error))

@@ -19,8 +19,8 @@ BAUDRATES: Final = (
 class Tcp(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """The TCP address of a module or gateway."""
 
-    host: Annotated[Name, tells("its address or name.")]
-    port: Annotated[int, msgspec.Meta(ge=1, le=65535), tells("its TCP port.")] = 502
+    host: Annotated[Name, tells("the host's address or name.")]
+    port: Annotated[int, msgspec.Meta(ge=1, le=65535), tells("the TCP port.")] = 502
 
     def problems(self) -> Remarks:
         """Yield a problem for an invalid address."""
@@ -36,11 +36,11 @@ class Tcp(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
 class Serial(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """A serial line (RS-485). Every unit on it has these settings; a character has 8 data bits."""
 
-    port: Annotated[Name, tells("the adapter's path, best its stable one: /dev/serial/by-id/….")]
+    port: Annotated[Name, tells("the adapter's path, best the stable path: /dev/serial/by-id/….")]
     baudrate: Annotated[int, msgspec.Meta(ge=300, le=1_000_000), tells("bits a second.")]
     parity: Annotated[Literal["none", "even", "odd"], tells("the parity bit of each character.")]
     stopbits: Annotated[Literal[1, 2], tells("stop bits of each character.")]
-    ignore_echo: Annotated[bool, tells("for an adapter that hears what it sends.")] = False
+    ignore_echo: Annotated[bool, tells("true for an adapter that receives its own bytes.")] = False
 
     def problems(self) -> Remarks:
         """Yield problems: a relative path; a rate that no unit has."""

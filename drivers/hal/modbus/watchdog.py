@@ -28,14 +28,14 @@ class Refresh(WrittenPlace, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     values: Annotated[
         list[Word],
         msgspec.Meta(min_length=1),
-        tells("written in turn: some modules only count a value that differs from the last."),
+        tells("written in turn: some modules ignore a value equal to the last."),
     ]
 
 
 class Shows(Placed, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """A place, and the values to match."""
 
-    values: Annotated[list[Word], msgspec.Meta(min_length=1), tells("one of them must match.")]
+    values: Annotated[list[Word], msgspec.Meta(min_length=1), tells("the readings that match.")]
 
 
 class Habits(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -43,14 +43,18 @@ class Habits(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
 
     time_s: Annotated[Period, tells("the time that `arm` gives the module.")]
     arm: Annotated[
-        list[RegisterWrite], msgspec.Meta(min_length=1), tells("the writes that start it.")
+        list[RegisterWrite],
+        msgspec.Meta(min_length=1),
+        tells("the writes that start the watchdog."),
     ]
     armed: Annotated[
-        list[Shows], msgspec.Meta(min_length=1), tells("places that all read so while it is armed.")
+        list[Shows],
+        msgspec.Meta(min_length=1),
+        tells("places that all match while the watchdog is armed."),
     ]
-    refresh: Annotated[Refresh, tells("the write that keeps it from tripping.")]
-    refresh_s: Annotated[Period, tells("how often it is refreshed; at most half of `time_s`.")]
-    tripped: Annotated[list[Shows], tells("places; one of them reads so after a trip.")] = []
+    refresh: Annotated[Refresh, tells("the write that prevents a trip.")]
+    refresh_s: Annotated[Period, tells("the period of this write; at most half of `time_s`.")]
+    tripped: Annotated[list[Shows], tells("places; at least one matches after a trip.")] = []
     rearm: Annotated[list[RegisterWrite], tells("the writes that end a trip, before `arm`.")] = []
 
     def problems(self) -> Remarks:
@@ -65,18 +69,20 @@ class Habits(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
 class Watchdog(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """The modules' own watchdogs."""
 
-    units: Annotated[list[Unit], msgspec.Meta(min_length=1), tells("the units that have one.")]
+    units: Annotated[list[Unit], msgspec.Meta(min_length=1), tells("the units with a watchdog.")]
     profile: Annotated[Name | None, tells("a file of drivers/profiles/ for the watchdog.")] = None
-    habits: Annotated[Habits | None, tells("how to use it, written here, not in a profile.")] = None
+    habits: Annotated[
+        Habits | None, tells("the use of the watchdog, written here instead of a profile.")
+    ] = None
 
     def problems(self) -> Remarks:
         """Yield problems: neither or both of profile and habits; a profile with problems."""
         if len(set(self.units)) < len(self.units):
-            yield ("units",), "names a unit twice"
+            yield ("units",), "a unit is listed twice"
         yield from PROFILE.problems(self.profile, self.habits)
 
     def chosen(self) -> Habits:
-        """Return the habits in the YAML, or else the profile's."""
+        """Return the YAML's habits, or else the profile's habits."""
         return PROFILE.chosen(self.profile, self.habits)
 
     def rows(self) -> Iterator[tuple[str, str, str]]:

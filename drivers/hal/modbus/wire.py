@@ -32,7 +32,9 @@ EXCEPTIONS: Final = {
     11: "gateway target device failed to respond: look at the unit's power, cable and id",
 }
 """Modbus Application Protocol V1.1b3, section 7."""
-UNDEFINED: Final = "which Modbus does not define: the unit is at fault; ask its maker what it means"
+UNDEFINED: Final = (
+    "which Modbus does not define: the unit is at fault; ask its maker for the meaning"
+)
 ILLEGAL_ADDRESS: Final = 2
 
 
@@ -76,7 +78,7 @@ class UnitWire(Protocol):
     """The connection or line to some units, reopened when needed."""
 
     def owes(self, unit: int) -> bool:
-        """May this unit still reply to an older request? Then a new one should wait."""
+        """May this unit still reply to an older request? Then a new request should wait."""
 
     def begin(self, unit: int) -> None:
         """Wait, before a new request, until no late reply can pass for its reply."""

@@ -354,7 +354,7 @@ def test_frames_of_others_are_named(charger: Charger) -> None:
     charger.says(0x18FF50E6, "0000000000000005")
     charger.says(0x1FFE0101, "0000126700000000")
     assert failure(charger.driver.read) == (
-        "no ChargerStatus (0x18FF50E5) at can0 within 1 s: the bus works, and others are heard:"
+        "no ChargerStatus (0x18FF50E5) at can0 within 1 s: the bus works, and other ids are heard:"
         " 0x18FF50E6, 0x1FFE0101"
     )
 
@@ -379,7 +379,7 @@ def problems(**changed: Any) -> list[tuple[tuple[str, ...], str]]:
 def test_the_example_is_right_and_says_what_is_untried() -> None:
     texts = " ".join(map(str, load(EXAMPLE).warnings))
     assert "nobody has tried the profile wiferion" in texts
-    assert "after how long without frames it stops" in texts
+    assert "how long the charger charges without frames" in texts
 
 
 def test_setpoints_are_those_that_the_map_takes() -> None:

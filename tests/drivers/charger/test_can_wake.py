@@ -92,7 +92,7 @@ def test_the_station_itself_is_woken_charges_sleeps_when_it_was_off_and_is_woken
         bench.press("robot")
         bench.until(Activity.CHARGING, ON)
         bench.plant.fail("node", "off")
-        wait_until(lambda: bench.sample(ON) is None, "it is silent")
+        wait_until(lambda: bench.sample(ON) is None, "charger silent")
         bench.plant.fail("node", None)
         wait_until(lambda: bench.sample(ON) is not None, "it is heard again")
         bench.driver.close()
@@ -104,7 +104,7 @@ def test_the_station_itself_is_woken_charges_sleeps_when_it_was_off_and_is_woken
         (
             {"frame": "Command", "says": {"Enable": 1}},
             ("frame",),
-            "Command is in send: what wakes a charger must not charge",
+            "Command is in send: a frame that wakes a charger must not start a charge",
         ),
         ({"frame": "Nmt"}, ("frame",), "unknown frame 'Nmt': known here"),
         ({"says": {"Comand": 1, "Node": 10}}, ("says", "Comand"), "unknown signal of NmtStart"),
@@ -141,5 +141,5 @@ def test_another_device_may_send_nmt_frames_too_but_no_other_frame_that_wakes() 
 
 def test_check_prints_what_wakes_it() -> None:
     sent, _ = frame_tables(msgspec.convert({"map": WOKEN}, FrameChargerSettings))
-    woken = ("NmtStart", "0x000", "it is silent", "1 s", "01 0A", "Command 1, Node 10")
+    woken = ("NmtStart", "0x000", "charger silent", "1 s", "01 0A", "Command 1, Node 10")
     assert sent.rows[-1] == woken

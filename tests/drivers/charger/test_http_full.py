@@ -276,9 +276,9 @@ def test_the_daemons_end_stops_or_keeps_as_the_yaml_says() -> None:
     ("old", "new", "text"),
     [
         ("tiny/AMR01", "AMR01", "'AMR01' is not a robot: write FLEET/ROBOT, as RMF names them"),
-        ("      receiver_id: pad.receiver", "      #", "receivers needs it"),
+        ("      receiver_id: pad.receiver", "      #", "receivers needs the field"),
         ("    stop: {path: /output/off}", "", "needs stop as well"),
-        ("      in_range:", "      #", "range_check needs it"),
+        ("      in_range:", "      #", "range_check needs the field"),
         ("""'{"enabled": true}'""", """'{"enabled": yes}'""", "is not JSON"),
         ("pad.receiver ", "pad..receiver ", "names with dots between them"),
         ("PUT", "DELETE", "PUT"),
@@ -300,7 +300,7 @@ def test_keep_needs_a_station_that_can_be_stopped_and_serve_known_needs_receiver
     )
     assert list(seed.problems()) == [
         (("unrequested",), "serve_known needs receivers: without them no robot is known"),
-        (("on_death",), "this station cannot be stopped: leave this out"),
+        (("on_death",), "this station cannot be stopped: delete on_death"),
     ]
 
 
@@ -308,13 +308,13 @@ def test_a_whole_profile_has_no_warning_and_each_gap_has_its_own() -> None:
     assert list(warnings(FULL)) == []
     without = msgspec.structs.replace(FULL, receivers={}, state_words={"READY": 9})
     assert [text for _, text in warnings(without)] == [
-        "receiver_id is read, but without receivers nobody is verified",
+        "receiver_id is read, but without receivers no robot is verified",
         "9 is not in codes: an unknown state",
     ]
     only_stop = HttpChargerSettings(codes=FULL.codes, stop=Call(path="/off"))
     assert [text for _, text in warnings(only_stop)] == [
-        "without receiver_id, the robot on the pad is not verified, a robot at the wrong station is"
-        " not refused"
+        "without receiver_id, the robot on the pad is not verified, and a robot at the"
+        " wrong station is not refused"
     ]
 
 

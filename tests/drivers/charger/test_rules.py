@@ -124,8 +124,8 @@ def test_a_renewed_start_is_sent_in_each_scan_and_a_stop_once_it_is_off() -> Non
 WRONG = {
     "    switches_off_after_s: 30 ": (
         "    #",
-        "'charger_d': unsafe: when the network dies nothing switches the power off: have start set the"
-        " relay's own timer, and write that as switches_off_after_s;"
+        "'charger_d': unsafe: when the network dies nothing switches the power off: let"
+        " start set the relay's own timer, and write its time as switches_off_after_s;"
         " or accept_unsafe: {power: <why it is safe here>}",
     ),
     "switches_off_after_s: 30 ": (
@@ -145,7 +145,7 @@ WRONG = {
     "{above: 20}": ("{above: 20, below: 20}", "'below' must be greater than above"),
     "{means: charging, when: {apower: {above: 20}}} ": (
         "{means: idle} ",
-        "rule 2 always holds: the rules below it are never asked",
+        "rule 2 always holds: the rules after it are never tried",
     ),
 }
 

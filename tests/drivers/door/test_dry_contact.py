@@ -66,7 +66,7 @@ def test_the_shipped_door_is_sound() -> None:
         (
             {"inputs": {"opened": NONE}},
             "inputs",
-            "needs 'opened'; without that contact say feedback: estimated",
+            "needs 'opened'; without that contact write feedback: estimated",
         ),
         (
             {"limits": {"open_delay_s": 3.0}},
@@ -76,7 +76,7 @@ def test_the_shipped_door_is_sound() -> None:
         (
             {"feedback": "estimated", "limits": {"open_delay_s": 3.0}},
             "feedback",
-            "both limit contacts are wired: leave feedback out",
+            "both limit contacts are wired: delete feedback",
         ),
         (
             {"feedback": "estimated", "inputs": {"opened": NONE}},
@@ -95,12 +95,12 @@ def test_the_shipped_door_is_sound() -> None:
         (
             {"inputs": {"fire": FIRE}},
             "inputs.fire",
-            "say what a fire alarm does: on_fire: open, or on_fire: release",
+            "give the effect of a fire alarm: on_fire: open, or on_fire: release",
         ),
         (
             {"on_fire": "open"},
             "on_fire",
-            "there is no fire input; wire one under inputs, or leave this out",
+            "there is no fire input; wire a fire input under inputs, or delete on_fire",
         ),
         (
             {"outputs": {"hold_open": FLASHED}},
@@ -163,20 +163,20 @@ def test_a_relay_that_is_on_from_power_on_is_refused() -> None:
 
 def test_accepting_wiring_that_is_not_unsafe_is_warned_of() -> None:
     door = settings(accept_unsafe={"opened": "as built"})
-    text = "nothing is unsafe about opened: delete this"
+    text = "nothing is unsafe about opened: delete this entry"
     assert list(warnings(door)) == [(("accept_unsafe", "opened"), text)]
 
 
 def test_a_closed_contact_that_a_cut_wire_imitates_is_warned_of() -> None:
     inverted = {"point": "unit 1 discrete input 1", "active": "low"}
-    text = "a cut wire may read as a closed door; wire a contact that shuts with it"
+    text = "a cut wire may read as a closed door; wire a contact that the door closes"
     assert list(warnings(settings(inputs={"closed": inverted}))) == [(("inputs", "closed"), text)]
     assert list(warnings(settings())) == []
 
 
 def test_estimated_feedback_is_warned_of() -> None:
     door = settings(feedback="estimated", inputs={"opened": NONE}, limits={"open_delay_s": 4.0})
-    text = "RMF is told OPEN or CLOSED by the clock, whatever the door does"
+    text = "OPEN and CLOSED for RMF follow the clock, whatever the door does"
     assert list(warnings(door)) == [(("feedback",), text)]
 
 

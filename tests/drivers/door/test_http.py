@@ -153,8 +153,8 @@ def test_an_input_that_is_neither_yes_nor_no_gives_no_reading() -> None:
 WRONG = {
     "    switches_off_after_s: 10 ": (
         "",
-        "unsafe: when the network dies nothing releases the door: have hold set the relay's own timer,"
-        " and write that as switches_off_after_s;"
+        "unsafe: when the network dies nothing releases the door: let hold set the relay's"
+        " own timer, and write its time as switches_off_after_s;"
         " or accept_unsafe: {hold_open: <why it is safe here>}",
     ),
     "switches_off_after_s: 10 ": (
@@ -164,9 +164,9 @@ WRONG = {
     ),
     '      closed: {field: "input:1.state"} ': (
         "",
-        "'inputs' needs 'closed'; where nothing says so, write feedback: estimated",
+        "'inputs' needs 'closed'; without that input write feedback: estimated",
     ),
-    "on=false": ("on=true&toggle_after=10", "'release' is the command of hold"),
+    "on=false": ("on=true&toggle_after=10", "'release' is the same command as hold"),
 }
 
 

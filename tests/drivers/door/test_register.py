@@ -184,7 +184,7 @@ def test_a_devices_changes_are_judged_where_they_stand(
 def test_a_map_that_is_written_out_has_no_changes_beside_it(tmp_path: Path) -> None:
     text = "    changes: {command: {at: coil 4, hold: 1, release: 0}}\n"
     assert problems_of(tmp_path / "door.yaml", YAML + text) == [
-        "11:5: 'changes' is for a profile: change the map that is written here"
+        "11:5: 'changes' is for a profile: this device has a map of its own, so change the map"
     ]
 
 
@@ -228,25 +228,25 @@ def test_a_changed_command_is_claimed_and_its_warning_stands_where_it_is_changed
         (
             "unit: 1",
             "unit: 1\n    profile: generic-register-door",
-            ["8:14: 'profile': 'map' is written out as well: delete one of the two"],
+            ["8:14: 'profile': 'map' is given as well: delete one of the two"],
         ),
         (
             "unit: 1",
             "unit: 1\n    profile: generic-door",
-            ["8:14: 'profile': 'map' is written out as well: delete one of the two"],
+            ["8:14: 'profile': 'map' is given as well: delete one of the two"],
         ),
         (
             "unit: 1",
             "unit: 1\n    base_address: 65535\n    feedback: estimated",
             [
-                "9:15: the status says where the door is: leave feedback out",
+                "9:15: the status gives the door's position: delete feedback",
                 "6:3: 'front': feedback: estimated needs open_delay_s, the time the door takes to open",
             ],
         ),
         (
             "unit: 1",
             "unit: 1\n    on_fire: open",
-            ["8:14: 'on_fire': an operator on registers has no fire input: leave this out"],
+            ["8:14: an operator on registers has no fire input: delete on_fire"],
         ),
     ],
 )  # fmt: skip

@@ -51,7 +51,7 @@ WRONG: list[tuple[dict[str, Any], list[tuple[str, str]]]] = [
     (
         {"floors": [], "calls": {}, "floor_code": {"encoding": "gray"}},
         [
-            ("floors", "no floors: name those of RMF's map that this lift serves"),
+            ("floors", "no floors: list this lift's floors by their names on RMF's map"),
             ("floor_code", "no bits: list the lines, least significant first"),
         ],
     ),
@@ -96,7 +96,7 @@ WRONG: list[tuple[dict[str, Any], list[tuple[str, str]]]] = [
     ({"calls": {"B1": coil(2), "G": coil(3)}}, [("calls", "no call for 1")]),
     (
         {"call_code": {"bits": [coil(20), coil(21)], "codes": {1: "B1", 2: "G", 3: "1"}}},
-        [("calls", "calls and call_code are two ways of calling: keep one")],
+        [("calls", "calls and call_code are two ways of calling: delete one of the two")],
     ),
     (
         {"calls": {}, "call_code": {"bits": [coil(20)], "codes": {0: "B1", 1: "G", 2: "1"}}},
@@ -115,7 +115,7 @@ WRONG: list[tuple[dict[str, Any], list[tuple[str, str]]]] = [
     ),
     (
         {"inputs": inputs(door=line(40, proves="open"))},
-        [("inputs.door", "door is the only contact: delete the others, or this")],
+        [("inputs.door", "door stands for one contact alone: delete door, or the other contacts")],
     ),
     (
         {"inputs": inputs(**REAR)},
@@ -130,7 +130,7 @@ WRONG: list[tuple[dict[str, Any], list[tuple[str, str]]]] = [
         [
             (
                 "inputs.up",
-                "motion is moving, or stopped, or up with down, or motion; not up",
+                "give motion as moving, or stopped, or up with down, or motion; not up",
             )
         ],
     ),
@@ -146,11 +146,11 @@ WRONG: list[tuple[dict[str, Any], list[tuple[str, str]]]] = [
             "inputs": inputs(service={**SERVICE, "codes": {**SERVICE_CODES, 3: "normal"}}),
             "accept_unsafe": ACCEPTED_SERVICE,
         },
-        [("inputs.agv_mode", "service shows agv_mode too: keep one")],
+        [("inputs.agv_mode", "service shows agv_mode too: delete one of the two")],
     ),
     (
         {"inputs": inputs(agv_mode=None, service=SERVICE), "accept_unsafe": ACCEPTED_SERVICE},
-        [("inputs.service.codes", "3 is missing: say what it means")],
+        [("inputs.service.codes", "3 is missing: write its meaning")],
     ),
     (
         {"inputs": inputs(agv_mode=None, service={**SERVICE, "bits": bits(1, 60)})},
@@ -158,7 +158,7 @@ WRONG: list[tuple[dict[str, Any], list[tuple[str, str]]]] = [
     ),
     (
         {"inputs": inputs(agv_mode=line(1, valid_when="agv_mode"))},
-        [("inputs.agv_mode", "agv_mode itself tells AGV mode: delete valid_when")],
+        [("inputs.agv_mode", "agv_mode itself shows AGV mode: delete valid_when")],
     ),
     (
         {"inputs": inputs(agv_mode=None, moving=line(40, valid_when="agv_mode"))},
@@ -307,7 +307,7 @@ def test_the_first_public_wiring_is_possible_when_its_two_unsafe_places_are_acce
 def test_accepting_wiring_that_does_not_exist_is_pointed_out() -> None:
     wired = settings(accept_unsafe={"door_closed": "why"})
     assert warned(wired) == [
-        ("accept_unsafe.door_closed", "nothing is unsafe about door_closed: delete this")
+        ("accept_unsafe.door_closed", "nothing is unsafe about door_closed: delete this entry")
     ]
 
 
@@ -317,7 +317,7 @@ def test_accepting_wiring_that_does_not_exist_is_pointed_out() -> None:
         (
             {"inputs": inputs(agv_mode=None, fire_alarm=None)},
             [
-                ("inputs", "no agv_mode: the lift cannot confirm that it obeys"),
+                ("inputs", "no agv_mode: the lift cannot confirm that it serves the robot"),
                 ("inputs", "no fire_alarm: a fire recall would not be seen"),
             ],
         ),
@@ -386,7 +386,7 @@ def test_agv_mode_that_no_output_asks_for_is_warned_of() -> None:
     assert warned(settings(outputs={"door_open": coil(1)})) == [
         (
             "outputs",
-            "no agv_mode_request asks for AGV mode, and it is awaited: the lift must grant it alone",
+            "no agv_mode_request, and AGV mode is awaited: the lift must enter AGV mode by itself",
         )
     ]
 
@@ -397,12 +397,15 @@ BY_CALL = {"agv_mode": "by_call", "outputs": {"door_open": coil(1)}}
 def test_agv_mode_by_call_is_shown_by_the_lift_and_asked_for_by_calls_only() -> None:
     assert (found(settings(**BY_CALL)), warned(settings(**BY_CALL))) == ([], [])
     assert found(settings(**BY_CALL, inputs=inputs(agv_mode=None))) == [
-        ("agv_mode", "by_call needs an agv_mode input: nothing else tells that a call was taken")
+        (
+            "agv_mode",
+            "by_call needs an agv_mode input: nothing else shows that the lift accepted a call",
+        )
     ]
     assert found(settings(agv_mode="by_call")) == [
         (
             "outputs.agv_mode_request",
-            "agv_mode is by_call, so calls ask for AGV mode: delete one of the two",
+            "with agv_mode: by_call the calls request AGV mode: delete one of the two",
         )
     ]
     assert warned(settings(agv_mode="by_call", outputs={})) == [
@@ -434,12 +437,12 @@ def test_a_fire_that_no_topic_announces_is_noted_and_not_warned_of() -> None:
 
 
 def test_a_hazard_of_alarm_on_that_is_not_wired_is_warned_of() -> None:
-    text = "no code_blue: this lift does not report it, so nobody is told"
+    text = "no code_blue: this lift does not report it, so RMF gets no alarm"
     both = settings(alarm="emergency_signal", alarm_on=["fire_alarm", "code_blue"])
     assert [w for w in warnings(both) if w[0][0] == "alarm_on"] == [(("alarm_on", "1"), text)]
 
 
 def test_alarm_on_without_a_topic_is_refused() -> None:
-    text = "nothing is told with alarm: none; write alarm: emergency_signal"
+    text = "alarm: none sends no alarm; write alarm: emergency_signal"
     found = list(settings(alarm_on=["code_blue"]).problems())
     assert (("alarm_on",), text) in found

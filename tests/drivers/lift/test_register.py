@@ -109,7 +109,7 @@ MODEL = "looks like a number of the data model, which begins at 1"
             "coil 0\n        bits: [8",
             "32:13: 'coil 0': write 'holding register 0' or 'input register 0'; addresses begin at 0",
         ),
-        ("bits: [8, 9]", "bits: [8, 8]", "33:9: 'bits': a bit stands here twice"),
+        ("bits: [8, 9]", "bits: [8, 8]", "33:9: 'bits': a bit is listed twice"),
         ("2: down}", "4: down}", "34:39: 'codes': 4 does not fit on 2 bits"),
         (
             "0: closed, 1: moving, 2: open",
@@ -127,12 +127,12 @@ MODEL = "looks like a number of the data model, which begins at 1"
             "44:51: 'ask': door_open shares bits of holding register 10 with agv_mode_request: give"
             " each command bits of its own",
         ),
-        ("none: 0", "none: 4", "47:43: 'codes': 4 is no call, as none says"),
+        ("none: 0", "none: 4", "47:43: 'codes': 4 is the number for no call (none)"),
         (", 4: L4}\n          none", "}\n          none", "47:11: 'codes': no code for L4"),
         (
             "    floors:",
             "    agv_mode: by_call\n    floors:",
-            "44:9: 'agv_mode_request': agv_mode is by_call, so calls ask for AGV mode:"
+            "44:9: 'agv_mode_request': with agv_mode: by_call the calls request AGV mode:"
             " delete one of the two",
         ),
     ],
@@ -153,7 +153,7 @@ def test_commands_that_cannot_be_read_back_are_warned_of() -> None:
     assert list(warnings(settings)) == [
         (
             ("map", "commands", "read_back"),
-            "commands cannot be read back: that they are off is not verified",
+            "commands cannot be read back: switching off is not verified",
         )
     ]
 

@@ -44,9 +44,7 @@ def test_the_scenarios_go_as_their_slides_say_with_three_daemons_on_one_graph(
     finally:
         process.kill()
     assert process.returncode == 0, out
-    assert (
-        "\nRIGHT: each scenario went as its slide says; never two robots at one charger.\n" in out
-    )
+    assert "\nRIGHT: each scenario went as planned; never two robots at one charger.\n" in out
     assert "A robot cannot be charged: tiny/AMR02 failed at charger_a and at charger_b" in out
     assert "porter/P01 stands at charger_b, and tiny/AMR02 waits for it" in out
     summary = out.partition("RIGHT:")[2].splitlines()[2:]

@@ -104,7 +104,7 @@ def test_a_recording_that_was_cut_is_explained_as_far_as_it_goes(
     cut = tmp_path / "cut.mcap"
     cut.write_bytes(whole.read_bytes()[: -(whole.stat().st_size // 10)])
     assert run("explain", cut) in (0, 1)
-    assert "what comes before is used" in capsys.readouterr().err
+    assert "the part before is used" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

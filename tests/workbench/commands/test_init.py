@@ -117,7 +117,7 @@ def test_a_missing_folder_is_reported_before_any_question_is_asked(
         ("--kind lift --floors L1 --yes", "a lift has at least two floors, each name once, not L1"),
         (
             "--kind lift --floors A,B,C,D,E,F,G,H,I,J,K --encoding one_hot --yes",
-            "more signals than",
+            "the header has too few free pins",
         ),
         ("--kind lift --signals fire --yes", "a lift has no input fire; there are fire_alarm"),
         ("--kind door --unit 0 --yes", "unit is '0': write a whole number from 1 to 247"),
@@ -149,11 +149,11 @@ def test_on_a_terminal_it_asks_one_thing_after_the_other(tmp_path: Path) -> None
     terminal = Terminal("init", str(file), "--domain-id", "5")
     terminal.wait_for("What is it?")
     terminal.type("\x1b[B\r")  # down: door
-    terminal.wait_for("Its name on RMF's map?")
+    terminal.wait_for("The device's name on RMF's map?")
     terminal.type("ward\r")
     terminal.wait_for("How is it wired?")
     terminal.type("\r")
-    terminal.wait_for("Its host")
+    terminal.wait_for("The host")
     terminal.type("\r")
     terminal.wait_for("unit id?")
     terminal.type("\r")

@@ -105,7 +105,7 @@ def test_a_part_without_a_failure_is_answered_with_the_failures(
     with pytest.raises(SystemExit) as left:
         say(tmp_path, "fail", "car")
     assert left.value.code == 2
-    assert "how does car fail? off, stuck, slow, garbage, wrong; ok" in capsys.readouterr().err
+    assert "give a MODE for car: off, stuck, slow, garbage, wrong; or ok" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("words", [("press",), ("press", "fire_alarm")])

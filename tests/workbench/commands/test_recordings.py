@@ -68,7 +68,7 @@ def test_a_recording_of_no_daemon_can_be_read_and_not_replayed(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert cli.main(["replay", str(write(tmp_path / "bag", [], NEWEST))]) == os.EX_DATAERR
-    assert "only a recording that has them can be replayed" in capsys.readouterr().err
+    assert "only such entries can be replayed" in capsys.readouterr().err
 
 
 def test_every_command_that_reads_a_recording_is_here() -> None:

@@ -22,7 +22,7 @@ from workbench.graph.requests.lift import LiftEnd, aftermath
 LINE = CommandLine(("release", "Lift1"))
 RELEASE = LiftEnd("Lift1", "", True, line=LINE)
 LOOK = (
-    "Lift1 still shows the session, and its robot may be in the car: look into it;"
+    "Lift1 still shows the session, and a robot may be in the car: look inside;"
     " if the car is empty: rmf-bridge release Lift1 --car-empty"
 )
 
@@ -58,7 +58,7 @@ def test_while_a_robot_may_be_inside_somebody_must_say_that_the_car_is_empty(boa
     assert {to for _, to in sent} == {"supervisor"}
     assert hints == [LOOK]
     assert isinstance(outcome, Failed)
-    assert "look into it" in outcome.text
+    assert "look inside" in outcome.text
     sent, *_ = told(dataclasses.replace(RELEASE, car_empty=True), [GRANTED] * 6 + [LIFT], boarded)
     assert sent[-1] == (5, "direct")
 

@@ -146,7 +146,7 @@ def test_a_refused_request_for_a_charger_ends_with_who_has_it(
     assert send.send(Command(device), wanted, 60.0, io.StringIO()) == 1
     assert capsys.readouterr().err == (
         "rmf-bridge send: a refuses the request: charger occupied: fleet/other has it"
-        " (request r1); to cancel that: rmf-bridge send charger a --cancel r1\n"
+        " (request r1); to cancel that request: rmf-bridge send charger a --cancel r1\n"
     )
 
 

@@ -323,7 +323,7 @@ def test_the_coordinator_has_a_row_with_its_queue_its_faults_and_whether_it_assi
     site["assigns"] = "no: another node publishes charging_assignments"
     site["schedule"] = "22:00-05:00 tiny to 98 %: under way"
     beside = (
-        "asks for chargers that another node assigns, schedule 22:00-05:00 tiny to 98 %: under way"
+        "requests chargers that another node assigns, schedule 22:00-05:00 tiny to 98 %: under way"
     )
     assert board(told(passive=False)).rows(100.0, WALL) == [replace(row, state=beside)]
     assert board(told(passive=False)).rows(104.0, WALL) == []

@@ -94,8 +94,8 @@ def test_a_lift_is_asked_for_as_fleets_ask_once_a_second_until_it_is_there() -> 
         [(0.5, request), (1.5, request), (2.5, request)],
         [],
         Fulfilled(
-            "Lift1 is at L3, door open, held by fleet/robot;"
-            " to end that: rmf-bridge send lift Lift1 --end --direct --localhost"
+            "Lift1 is at L3, door open, held by fleet/robot; to end that session:"
+            " rmf-bridge send lift Lift1 --end --direct --localhost"
         ),
         2.8,
     )
@@ -200,7 +200,7 @@ def test_where_a_robot_may_be_in_the_car_the_remedy_asks_to_look_into_it() -> No
         ),
         (
             LIFT,
-            "Lift1 did not grant the session: its daemon's log says why"
+            "Lift1 did not grant the session: see its daemon's log"
             " (last state: car at L1, door closed, mode HUMAN)",
         ),
         (
@@ -406,11 +406,11 @@ def test_a_charger_that_shows_our_request_has_taken_it(state: int) -> None:
     [
         (
             CHARGER,
-            "a did not accept the request: its daemon's log says why (last state: idle)",
+            "a did not accept the request: see its daemon's log (last state: idle)",
         ),
         (
             replace(CHARGER, state=3, request_id="r0"),
-            "a serves request r0; to cancel that: rmf-bridge send charger a --cancel r0\n"
+            "a serves request r0; to cancel that request: rmf-bridge send charger a --cancel r0\n"
             "gave up after 10 s; last state: charging, for request r0",
         ),
         (
@@ -442,7 +442,7 @@ def test_a_refusal_ends_the_command_at_once_and_says_who_has_the_charger() -> No
     ran = tell(CHARGE, [(0.5, busy), (0.6, others.message()), (0.7, REFUSAL.message())])
     text = (
         "a refuses the request: charger occupied: fleet/other has it (request r0);"
-        " to cancel that: rmf-bridge send charger a --cancel r0"
+        " to cancel that request: rmf-bridge send charger a --cancel r0"
     )
     assert (ran.outcome, ran.at) == (Failed(text), 0.7)
 

@@ -183,6 +183,6 @@ def test_other_speakers_are_named_with_the_option_that_permits_them(
         node.close()
     assert (code, asked) == (69, [])
     assert notes == [
-        "not played to its end: others publish on lift_requests: to play all the same, add"
-        " --beside supervisor"
+        "not played to its end: other nodes publish on lift_requests: to play nevertheless,"
+        " add --beside supervisor"
     ]

@@ -56,7 +56,7 @@ def read(path: Path, content: bytes) -> tuple[list[str], str]:
     path.write_bytes(content)
     notes = Notes()
     found = [one.message.lift_name for one in heard_in(path, notes)]  # type: ignore[union-attr]
-    return found, notes.damage.replace(str(path), "").replace("; what comes before is used", "")
+    return found, notes.damage.replace(str(path), "").replace("; the part before is used", "")
 
 
 def test_a_file_cut_anywhere_gives_what_was_complete(tmp_path: Path) -> None:
@@ -68,7 +68,7 @@ def test_a_file_cut_anywhere_gives_what_was_complete(tmp_path: Path) -> None:
     for end in range(len(MAGIC), len(whole), 37):
         found, damage = read(tmp_path / "a.mcap", whole[:end])
         assert found == everything[: len(found)]
-        assert damage.startswith(": it ends in the middle") or found == everything
+        assert damage.startswith(": the file ends in the middle") or found == everything
         gained.append(len(found))
     assert gained == sorted(gained)
     assert {0, 20} < set(gained)
@@ -101,7 +101,11 @@ def test_what_unpacks_to_more_than_any_recording_is_not_unpacked(
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
 
-    said = f"does not unpack to {says}, as it says" if says == 10 else "unpacks to more than "
+    said = (
+        f"does not unpack to {says} bytes, its stated size"
+        if says == 10
+        else "unpacks to more than "
+    )
     assert f"a chunk of {len(packed)} bytes {said}" in damage
     assert peak < 3 * LONGEST_RECORD
 
@@ -127,7 +131,10 @@ def test_two_kilobytes_of_tiny_records_are_not_worth_a_minute(tmp_path: Path) ->
 @pytest.mark.parametrize(
     ("content", "said"),
     [
-        (record(Opcode.MESSAGE, b"", 2**63), ": it ends in the middle of the record at byte 8"),
+        (
+            record(Opcode.MESSAGE, b"", 2**63),
+            ": the file ends in the middle of the record at byte 8",
+        ),
         (record(Opcode.MESSAGE, b"ab"), ": the record at byte 8 is invalid: unpack_from requires"),
         (record(Opcode.SCHEMA, b"\1\0\xff\xff\xff\x7f"), ": the record at byte 8 is invalid:"),
         (chunk(b"brotli", b"", 0), ": the record at byte 8 is invalid: a chunk is compressed by"),

@@ -1,4 +1,5 @@
-"""Find devices on a file's buses: read each named one once, then scan a bounded range for others.
+"""Find devices on a file's buses: read each device of the file once, then scan a bounded range for
+other devices.
 
 Nothing is written. Drivers are read but never opened, because opening claims outputs and may switch
 them off. The modules' watchdogs are removed from the settings, so no driver arms one.
@@ -70,19 +71,19 @@ def readings(config: Config, bus_name: str, bus: Any, subject: str) -> Iterator[
         try:
             sample = _read(driver.read, bus)
         except DriverError as error:
-            means = f"{name} cannot be served: RMF is told that it is out of order"
+            means = f"{name} cannot be served: for RMF it is out of order"
             yield wrong(
                 subject, f"{name}: {error}", means, LOOK_AT.get(config.bus_types[bus_name], TEXTS)
             )
             continue
         if fault := getattr(sample, "code_fault", ""):
             do = "compare codes: with the lines, in rmf-bridge walk"
-            yield warning(subject, f"{name}: {fault}", "RMF is told no floor", do)
+            yield warning(subject, f"{name}: {fault}", "RMF gets no floor", do)
         yield ok(subject, f"{name} answers: {plain(sample)}")
 
 
 def _read(read: Callable[[], Any], bus: Bus) -> Any:
-    """Read, several times if a sleeping line answers late. Raises DriverError."""
+    """Read; if a sleeping line answers late, read several times. Raises DriverError."""
     for _ in range(TRIES - 1):
         bus.insist()
         try:
@@ -94,7 +95,7 @@ def _read(read: Callable[[], Any], bus: Bus) -> Any:
 
 
 def _listened(bus: Any) -> None:
-    """On CAN: receive for a while; the readings report faults of the bus."""
+    """On CAN, receive for a while. Faults of the bus show in the readings."""
     if not hasattr(bus, "wait"):
         return
     try:
@@ -132,7 +133,9 @@ def _can(config: Config, bus_name: str, bus: Any, whole: bool) -> Iterator[Findi
 
     if others := bus.others():
         heard = ", ".join(map(named, others))
-        yield note(f"bus {bus_name}", f"frames of no device of this file are heard: {heard}")
+        yield note(
+            f"bus {bus_name}", f"there are frames that no device of this file sends: {heard}"
+        )
 
     def answering(node: int) -> bool:
         bus.insist()
@@ -169,9 +172,9 @@ def _scanned(
     )
     strangers = sorted(set(found) - ours)
     if found == asked:
-        return note(subject, text, f"it answers for every {what}, as many TCP modules do")
+        return note(subject, text, f"the module answers for every {what}, as many TCP modules do")
     if strangers and not ours <= set(found):
-        do = f"write the {what} that answers, or give the device its own"
+        do = f"write the {what} that answers, or set the device to the {what} of this file"
         means = f"{what} {ranges(sorted(ours))} of this file may be wrong"
         return warning(subject, text, means, do)
     if strangers:

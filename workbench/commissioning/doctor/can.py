@@ -1,4 +1,4 @@
-"""The kernel's CAN interfaces (SocketCAN): there, up, at the right bitrate, and able to recover."""
+"""The kernel's CAN interfaces (SocketCAN): present, up, at the right bitrate, and able to recover."""
 
 from collections.abc import Iterator
 from typing import Final
@@ -17,7 +17,7 @@ HOW: Final = 'docs/how-to/wire.md, "CAN": sudo ip link set {} up type can bitrat
 
 
 def interface(machine: Machine, name: str, bitrate: int | None) -> Iterator[Finding]:
-    """Examine `can`. `bitrate`: the stations' (bit/s); None where each site chooses its own."""
+    """Examine `can`. `bitrate`: the stations' bit/s; None if each site chooses a bitrate."""
     rate = str(bitrate or "250000")
     folder = f"/sys/class/net/{name}"
     if not machine.at(folder).is_dir():
@@ -28,7 +28,10 @@ def interface(machine: Machine, name: str, bitrate: int | None) -> Iterator[Find
         return
     if not _is_can(machine, name):
         yield wrong(
-            CAN, f"{name} is not a CAN interface", DEAF, "write the name of one under socketcan:"
+            CAN,
+            f"{name} is not a CAN interface",
+            DEAF,
+            "write the name of a CAN interface under socketcan:",
         )
         return
     if not int(machine.text(f"{folder}/flags") or "0", 16) & IFF_UP:
@@ -36,10 +39,10 @@ def interface(machine: Machine, name: str, bitrate: int | None) -> Iterator[Find
         return
     details = _details(machine, name)
     if details is None:
-        found = f"{name} is up; its bitrate is not known without the command ip"
+        found = f"{name} is up; only the command ip can show its bitrate"
         yield note(CAN, found, "", "sudo apt install iproute2")
     elif details.kind != "can":
-        yield note(CAN, f"{name} is up, and {details.kind}: it has no wire")
+        yield note(CAN, f"{name} is up, but is {details.kind}, without a wire")
     else:
         yield from _controller(name, details.told, bitrate)
 
@@ -83,16 +86,18 @@ def _controller(name: str, told: Controller, bitrate: int | None) -> Iterator[Fi
     rate = told.bittiming.bitrate
     how = HOW.format(name, bitrate or rate)
     if bitrate is not None and rate != bitrate:
-        found = f"{name} has {rate} bit/s, but these stations come with {bitrate}"
+        found = f"{name} has {rate} bit/s, but these stations are delivered with {bitrate}"
         yield warning(CAN, found, "one station at another bitrate stops the whole bus", how)
     else:
         yield ok(CAN, f"{name} is up at {rate} bit/s; compare that with the stations")
     state = told.state.upper()
     check = "bitrate, termination (60 Ω between CAN_H and CAN_L with everything off), cable, supply"
     if state == "BUS-OFF":
-        yield wrong(CAN, f"{name} is bus-off: it has left the bus", DEAF, f"{check}; then {how}")
+        yield wrong(
+            CAN, f"{name} is bus-off: the controller has left the bus", DEAF, f"{check}; then {how}"
+        )
     elif state not in ("ERROR-ACTIVE", "?"):
-        yield warning(CAN, f"{name} is {state.lower()}", "it counts many errors", check)
+        yield warning(CAN, f"{name} is {state.lower()}", "the controller counts many errors", check)
     if not told.restart_ms:
         means = "after a bus-off nothing is heard until the interface is set down and up"
         yield warning(CAN, f"{name} has no restart-ms", means, how)

@@ -32,7 +32,7 @@ class Options:
     """The command line's choices. `kill_test`: device and output; None without the test.
 
     `whole_scan`: every unit or node of a bus. `listen_s`: how long to listen to RMF's graph; 0: not
-    at all. `line`: with the options that name that graph.
+    at all. `line`: the command line, with the options of that graph.
     """
 
     runtime_dir: str | None = None
@@ -131,7 +131,7 @@ def _answering(
     try:
         held = runtime_directory.RuntimeDirectory(places, config.path.absolute(), serves=False)
     except (runtime_directory.AlreadyRunning, PermissionError) as error:
-        yield wrong(DAEMON, str(error), NOT_ASKED, "stop what uses it, and try again")
+        yield wrong(DAEMON, str(error), NOT_ASKED, "stop the other program, and try again")
         return
     try:
         for name in names:
@@ -148,13 +148,16 @@ def _killed(
 
     if now.busy:
         yield wrong(
-            KILL_TEST, now.busy, "a device has one master: nothing was switched", "stop it first"
+            KILL_TEST,
+            now.busy,
+            "a device has only one master: nothing was switched",
+            "stop it first",
         )
         return
     assert options.kill_test is not None
     device, output = options.kill_test
     step = step_called(config, device, output)
-    assert step is not None  # or the command would have ended
+    assert step is not None  # without a step the command has ended
 
     def still_driven() -> bool | None:
         """On GPIO: is one of the device's lines still an output?"""
@@ -162,7 +165,7 @@ def _killed(
         if config.bus_types[bus] != "gpio":
             return None
         chip = gpio.header(machine, config.buses[bus].chip)
-        assert chip is not None  # or the output could not have been switched on
+        assert chip is not None  # without a chip no output was switched on
         outputs = [wire for wire in config.wires(device) if wire.direction == "out"]
         return any(line(machine, chip, _bcm(wire.point)).output for wire in outputs)
 

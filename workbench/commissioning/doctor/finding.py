@@ -22,7 +22,7 @@ class Finding(msgspec.Struct, frozen=True):
 
 
 def ok(subject: str, found: str) -> Finding:
-    """Make a finding: all is well."""
+    """Make a finding that all is well."""
     return Finding(subject, "ok", found)
 
 
@@ -32,12 +32,12 @@ def note(subject: str, found: str, means: str = "", do: str = "") -> Finding:
 
 
 def warning(subject: str, found: str, means: str, do: str) -> Finding:
-    """Make a finding: works now, but may fail later."""
+    """Make a finding about something that works now, but may fail later."""
     return Finding(subject, "warning", found, means, do)
 
 
 def wrong(subject: str, found: str, means: str, do: str) -> Finding:
-    """Make a finding: cannot work like this."""
+    """Make a finding about something that cannot work."""
     return Finding(subject, "wrong", found, means, do)
 
 

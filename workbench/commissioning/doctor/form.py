@@ -1,5 +1,5 @@
-"""The form for an afternoon with real hardware (docs/how-to/hardware.md): machine and
-findings are filled in; a person fills in the rest.
+"""The form for an afternoon with real hardware (docs/how-to/hardware.md): machine and findings are
+filled in; a person fills in the other cells.
 """
 
 import platform
@@ -35,7 +35,9 @@ STEPS: Final = (
     ),
     FormStep("H3", ALL, "off after SIGSTOP with the output on; s until off"),
     FormStep(
-        "H4", ALL, "the Pi's power is cut with the output on: off at once, or s after power is back"
+        "H4",
+        ALL,
+        "the Pi's power is cut with the output on: off at once, or s until off after power returns",
     ),
     FormStep(
         "H5",
@@ -46,7 +48,7 @@ STEPS: Final = (
     FormStep(
         "H7",
         frozenset({"modbus"}),
-        "ms from request's end to A-B free and to the reply; none lost",
+        "ms from request's end to A-B free and to the reply; no reply lost",
     ),
     FormStep(
         "H8",

@@ -33,7 +33,7 @@ KILL_TEST: Final = "rmf-bridge doctor FILE --kill-test shows it with one output"
 
 
 def gpio(machine: Machine, chip: int | None, who: User) -> Iterator[Finding]:
-    """Examine `gpio`: is the header's chip there, may the daemon use it? `chip`: from the YAML."""
+    """Examine `gpio`: may the daemon use the header's chip? `chip`: from the YAML."""
     if not machine.installed("lgpio"):
         do = "sudo apt install python3-lgpio, or in the clone .venv/bin/pip install '.[gpio]'"
         yield wrong(GPIO, "this Python has no lgpio", "no pin can be claimed", do)
@@ -52,13 +52,13 @@ def gpio(machine: Machine, chip: int | None, who: User) -> Iterator[Finding]:
             GPIO,
             f"the YAML names gpiochip{chip}, whose label is {found.label}",
             f"the header's label begins with {HEADER_LABEL}: this may be another chip",
-            "leave chip: out, and the header is found by its label",
+            "delete chip:, and the header is found by its label",
         )
     yield _permission(machine, found, who)
 
 
 def header(machine: Machine, chip: int | None) -> Chip | None:
-    """Return the daemon's chip: the named one, or else the one with the header's label."""
+    """Return the daemon's chip: the chip of the YAML, or else the chip with the header's label."""
     for one in chips(machine):
         if one.number == chip or (chip is None and one.label.startswith(HEADER_LABEL)):
             return one
@@ -71,16 +71,16 @@ def _no_header(machine: Machine, chip: int | None) -> Finding:
         names = ", ".join(device.name for device in devices(machine))
         do = "use sudo, or join the group gpio"
         text = f"of {names} this user may only open: {seen or 'nothing'}"
-        return wrong(GPIO, text, "it is not known whether the header is there", do)
+        return wrong(GPIO, text, "nobody knows whether the header is there", do)
     text = f"no chip is {'the header' if chip is None else f'gpiochip{chip}'}; there is {seen}"
-    return wrong(GPIO, text, "no pin can be claimed", "look at gpiodetect; leave chip: out on a Pi")
+    return wrong(GPIO, text, "no pin can be claimed", "look at gpiodetect; on a Pi delete chip:")
 
 
 def _permission(machine: Machine, chip: Chip, who: User) -> Finding:
     state = chip.device.stat()
     group = group_of(machine, state.st_gid)
     if who.may(state):
-        return ok(GPIO, f"{who.name} may use it")
+        return ok(GPIO, f"{who.name} may use {machine.named(chip.device)}")
     mode = f"mode {state.st_mode & 0o777:o}, group {group}"
     text = f"{who.name} may not use {machine.named(chip.device)} ({mode})"
     do = join(who, "gpio")
@@ -90,27 +90,29 @@ def _permission(machine: Machine, chip: Chip, who: User) -> Finding:
 
 
 def lines(machine: Machine, chip: Chip, wires: Iterable[Wire]) -> Iterator[Finding]:
-    """While no daemon runs: does another program hold one of these pins?"""
+    """Find other programs that hold these pins, while no daemon runs."""
     free = True
     for wire in wires:
         try:
             now = line(machine, chip, _offset(wire))
         except OSError as error:
-            found = f"{describe(wire.point)} ({wire.signal}) cannot be looked at: {error.strerror}"
-            yield note(GPIO, found, "it is not known who holds it", "use a kernel of 5.10 or newer")
+            found = f"{describe(wire.point)} ({wire.signal}) cannot be examined: {error.strerror}"
+            yield note(
+                GPIO, found, "the holder of the pin is not known", "use a kernel of 5.10 or newer"
+            )
             return
         if now.consumer:
             free = False
             names = " or ".join(holders(chip.device, machine.at("/proc"))) or repr(now.consumer)
             found = f"{describe(wire.point)} ({wire.signal}) is held by {names}"
             do = "stop that program or take its overlay out of config.txt; or use another pin"
-            yield wrong(GPIO, found, "the daemon cannot claim it", do)
+            yield wrong(GPIO, found, "the daemon cannot claim the pin", do)
     if free:
         yield ok(GPIO, "no other program holds a pin of this file")
 
 
 def boot(machine: Machine, wires: Iterable[Wire], accepted: Mapping[str, str]) -> Iterator[Finding]:
-    """Examine `gpio at boot`: which relays are on from power-on until the daemon starts?"""
+    """Examine `gpio at boot`: find relays that are on from power-on until the daemon starts."""
     firmware, off = _firmware(machine), list[str]()
     for wire in (wire for wire in wires if wire.direction == "out"):
         level = firmware.get(_offset(wire))
@@ -155,22 +157,22 @@ def _pins(text: str) -> Iterator[int]:
 
 
 def death(machine: Machine) -> Iterator[Finding]:
-    """Examine `gpio after a death`: does the kernel go on driving an output after its holder died?"""
+    """Examine `gpio after a death`: does the kernel still drive an output after its holder's death?"""
     said = next(filter(None, map(machine.text, PERSIST)), "")
     strict = any(
         re.search(r"^\s*dtparam=.*\bstrict_gpiod\b", machine.text(path) or "", re.MULTILINE)
         for path in CONFIGS
     )
-    means = "after a kill -9 a relay stays on until outputs-off has run, or for good if that fails"
+    means = "after a kill -9 a relay stays on until outputs-off succeeds, or for ever"
     if said in ("Y", "1"):
         do = "dtparam=strict_gpiod in /boot/firmware/config.txt, and reboot"
         if strict:
-            do = "reboot: strict_gpiod is in config.txt, and not in effect yet"
+            do = "reboot: strict_gpiod is in config.txt, but not yet in effect"
         yield warning(DEATH, "the kernel keeps an output's level", means, f"{do}. {KILL_TEST}")
     elif said in ("N", "0"):
         yield ok(DEATH, f"the kernel turns a released output into an input. {KILL_TEST}")
     else:
-        found = "it is not known whether the kernel keeps an output's level"
+        found = "nobody knows whether the kernel keeps an output's level"
         yield warning(DEATH, found, means, KILL_TEST)
 
 

@@ -11,21 +11,19 @@ from workbench.commissioning.doctor.machine import Machine
 from workbench.commissioning.doctor.users import User
 
 FREE_LEAST: Final = 50 << 20
-"""Least free space (bytes); below, a growing log soon fills the disk."""
+"""Least free space (bytes); with less, a growing log soon fills the disk."""
 
 
 def clock(machine: Machine) -> Iterator[Finding]:
     """Examine `clock`: RMF compares the stamps of states with its own clock."""
     found = "the clock is not synchronised"
-    means = (
-        "states carry wrong stamps, and RMF may take them for old; durations do not depend on it"
-    )
+    means = "states carry wrong stamps, and RMF may take states for old; durations are right"
     do = "timedatectl timesync-status; is the time server reached? A Pi has no clock of its own"
     synchronised = machine.synchronised()
     if synchronised:
         yield ok("clock", "the clock is synchronised")
     elif synchronised is None:
-        yield note("clock", "the kernel does not say whether it is synchronised", means, do)
+        yield note("clock", "the kernel does not show whether the clock is synchronised", means, do)
     elif "NTP=no" in (machine.printed("timedatectl", "show") or "").splitlines():
         yield warning("clock", f"{found}, and NTP is off", means, "sudo timedatectl set-ntp true")
     else:
@@ -43,10 +41,8 @@ def watchdog(machine: Machine) -> Iterator[Finding]:
     words = ("systemctl", "show", "--property=RuntimeWatchdogUSec", "--value")
     fed = (machine.printed(*words) or "").strip()
     if not fed:
-        do = "systemctl show --property=RuntimeWatchdogUSec on the target"
-        yield note(
-            subject, "it is not known whether systemd feeds the hardware watchdog", means, do
-        )
+        do = "run on the target: systemctl show --property=RuntimeWatchdogUSec"
+        yield note(subject, "nobody knows whether systemd feeds the hardware watchdog", means, do)
     elif fed in ("0", "infinity"):
         do = (
             "RuntimeWatchdogSec=10 below [Manager] in /etc/systemd/system.conf.d/watchdog.conf, then"
@@ -68,14 +64,14 @@ def directories(machine: Machine, places: Directories, who: User) -> Iterator[Fi
             yield wrong(
                 "disk",
                 f"{who.name} may not write in {machine.named(found)}, where {folder} belongs",
-                "there is no status, and after a death nobody knows what was on",
-                "start the daemon as a user who may, or give it another place with --runtime-dir",
+                "there is no status, and after a death nobody knows which outputs were on",
+                "start the daemon as a user who may write there, or choose another --runtime-dir",
             )
 
 
 def disk(what: str, found: os.statvfs_result) -> Finding:
     """Examine the free space. A disk in memory may be small."""
-    means = "the device is served all the same, but status, log and the record of outputs get lost"
+    means = "the device is served nevertheless, but status, log and the record of outputs get lost"
     if found.f_flag & os.ST_RDONLY:
         do = "an overlay or tmpfs for this directory; after errors of an SD card: replace it"
         return wrong("disk", f"{what} is on a disk that is read-only", means, do)

@@ -2,8 +2,8 @@
 
 Another process (`victim.py`) switches one output on as the daemon would, with the daemon's lock, record
 and guard, and is killed with -9. Then the guard must switch the output off and verify it, as systemd's
-ExecStopPost does after a service dies. On GPIO the line is checked in between: is it
-still an output?
+ExecStopPost does after a service dies. On GPIO the test also looks, before the guard, whether the line
+is still an output.
 """
 
 import os
@@ -31,7 +31,7 @@ LOOK_S: Final = 0.02
 CUT: Final = "cut the relays' supply; then rmf-bridge outputs-off FILE"
 
 StillDriven = Callable[[], bool | None]
-"""Does the kernel still drive the line? None where unknown."""
+"""Tells whether the kernel still drives the line; None where unknown."""
 
 
 def kill_test(
@@ -48,12 +48,17 @@ def kill_test(
     try:
         said = _line(victim, STARTS_S)
         if said != "on":
-            why = said or "the test's process says nothing"
-            yield wrong(KILL_TEST, f"{name} was not switched on: {why}", "nothing is shown", why)
+            why = said or "the test's process is silent"
+            yield wrong(
+                KILL_TEST, f"{name} was not switched on: {why}", "the test shows nothing", why
+            )
             return
         if early := _line(victim, SEEN_S) or _ended_early(victim):
             yield wrong(
-                KILL_TEST, f"{name} went off before the kill: {early}", "nothing is shown", early
+                KILL_TEST,
+                f"{name} went off before the kill: {early}",
+                "the test shows nothing",
+                early,
             )
             return
         victim.kill()
@@ -73,14 +78,14 @@ def _kernel(name: str, still: bool | None) -> Iterator[Finding]:
         means = "if outputs-off cannot run, the relay stays on"
         yield warning(KILL_TEST, f"{name}: the kernel kept the line as it was", means, do)
     else:
-        yield ok(KILL_TEST, f"{name}: the kernel let the line go at once")
+        yield ok(KILL_TEST, f"{name}: the kernel released the line at once")
 
 
 def _outcome(name: str, off_after_s: float | None) -> Finding:
     if off_after_s is None:
         found = f"{name} is not verified off {OFF_WITHIN_S:g} s after kill -9"
         return wrong(KILL_TEST, found, "IT MAY STILL BE ON", CUT)
-    done = "the guard switched it off and verified that"
+    done = "the guard switched the output off, verified"
     found = f"{name} was on, its process was killed with -9, and {done}"
     return ok(KILL_TEST, f"{found} after {off_after_s:.1f} s")
 
@@ -98,7 +103,7 @@ def _started(
 
 
 def _line(victim: "subprocess.Popen[bytes]", within_s: float) -> str:
-    """Return the victim's next line; "" if none comes in time, or the victim has ended."""
+    """Return the victim's next line; "" if no line comes in time, or the victim has ended."""
     assert victim.stdout
     if not select.select([victim.stdout], [], [], within_s)[0]:
         return ""

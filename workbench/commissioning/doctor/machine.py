@@ -1,7 +1,7 @@
 """This machine as the doctor sees it: its files, its commands' output, its devices' answers.
 
 The doctor reaches the machine only through this module. In tests `root` is the directory of a made-up
-machine; its commands are scripts in `usr/bin` there, and `ioctl` answers for its devices.
+machine: scripts in its `usr/bin` are the commands, and `ioctl` answers for its devices.
 """
 
 import fcntl
@@ -46,8 +46,8 @@ def _synchronised() -> bool | None:
 class Machine:
     """The doctor's access. `ioctl(device, request, argument)`: the kernel's reply, or OSError.
 
-    `installed(package)`: can this Python import it? `synchronised()`: is the clock? None if
-    unknown. `uid`, `gids`: of this process.
+    `installed(package)`: can this Python import the package? `synchronised()`: is the clock
+    synchronised? None if unknown. `uid`, `gids`: of this process.
     """
 
     root: Path = Path("/")

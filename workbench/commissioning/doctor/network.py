@@ -1,6 +1,6 @@
 """RMF's graph as this machine sees it: interface, domain, nodes, and message versions.
 
-The doctor joins it as `watch` does, for some seconds: it listens, and publishes nothing.
+The doctor joins the graph as `watch` does, for some seconds, and only listens.
 """
 
 import importlib.metadata
@@ -35,14 +35,14 @@ SENDERS: Final = {
     "adapter_door_requests": "RMF's fleet adapters",
     "fleet_states": "RMF's fleet adapters",
 }
-"""Requests need these topics. The others may be silent."""
+"""Requests need these topics. Other topics may be silent."""
 LIBRARIES: Final = {"dds": "cyclonedds", "zenoh": "eclipse-zenoh"}
 
 
 @dataclass(frozen=True, slots=True)
 class GraphLook:
-    """Settings of the look. `listen_s`: its length. `serving`: is our own daemon on the graph?
-    None if unknown. `watch`: the command that shows this graph.
+    """Settings for examining the graph. `listen_s`: how long to listen. `serving`: is our own daemon on
+    the graph? None if unknown. `watch`: the command that shows this graph.
     """
 
     localhost: bool
@@ -73,7 +73,7 @@ def graph(config: Config, look: GraphLook) -> Iterator[Finding]:
                 yield from _heard(config, transport, look)
                 yield from _messages(transport)
         for text in dict.fromkeys(said):
-            yield warning(GRAPH, text, "the transport says this of its peers", look.alone)
+            yield warning(GRAPH, text, "the transport reports this about its peers", look.alone)
     except TransportError as error:
         yield wrong(GRAPH, str(error), "RMF neither hears nor is heard", look.alone)
 
@@ -85,12 +85,15 @@ def _interface(domain: int, loopback: bool) -> Finding:
         return note(NETWORK, f"domain {domain}, on this machine alone", means, do)
     found = sorted(address for _, address in addresses())
     if not found:
-        means = "RMF on another machine is not heard; dds and zenoh join when an address comes"
+        means = "RMF on another machine is not heard; dds and zenoh join once an address is there"
         return wrong(NETWORK, "no interface with a link has an IPv4 address", means, "ip addr")
     text = f"domain {domain}, by {' and '.join(found)}"
     if len(found) > 1 and not os.environ.get("CYCLONEDDS_URI"):
         return note(
-            NETWORK, text, "DDS takes one of them", 'docs/how-to/ros.md, "Two network interfaces"'
+            NETWORK,
+            text,
+            "DDS uses only one of these interfaces",
+            'docs/how-to/ros.md, "Two network interfaces"',
         )
     return ok(NETWORK, text)
 
@@ -132,31 +135,31 @@ def _senders(topic: str, end: Subscription, look: GraphLook) -> Finding:
 
 
 def _rivals(ends: Sequence[Subscription], serving: bool | None) -> Iterator[Finding]:
-    """Find other nodes that serve the same device."""
+    """Find other nodes with the same task as ours."""
     rivals = max((end.matched() for end in ends), default=0) - (serving is not False)
     if rivals > 0:
-        means = "ours only listens (passive) while the other one is there"
-        do = "stop RMF's own, or this one"
-        yield warning(GRAPH, f"{rivals} other node(s) do the same", means, do)
+        means = "our node only listens (passive) while the other node is there"
+        do = "stop RMF's own node, or ours"
+        yield warning(GRAPH, f"{rivals} other node(s) have the same task", means, do)
 
 
 def _ours(devices: Sequence[str], heard: set[str], look: GraphLook) -> Iterator[Finding]:
     serving = look.serving
     for name in devices:
         if name in heard and serving is False:
-            means = "two nodes would publish one name, and RMF would believe both in turn"
-            do = "stop the other one, on whichever machine it runs"
+            means = "two nodes would publish the same name, and RMF would believe each in turn"
+            do = "stop the other node, which may run on another machine"
             yield wrong(GRAPH, f"somebody already publishes {name}", means, do)
         elif serving and name not in heard:
             do = f"rmf-bridge log FILE; {look.alone}"
             yield warning(
-                GRAPH, f"{name} is not heard from our daemon", "RMF may not hear it either", do
+                GRAPH, f"{name} is not heard from our daemon", "RMF may not hear {name} either", do
             )
         elif serving:
             yield ok(GRAPH, f"{name} is heard")
     if others := sorted(heard - set(devices)):
         shown = words.printable(", ".join(others))
-        yield note(GRAPH, f"others of this kind are heard: {shown}")
+        yield note(GRAPH, f"other devices of this kind are heard: {shown}")
 
 
 def _messages(transport: Transport) -> Iterator[Finding]:
@@ -182,15 +185,15 @@ def _installed() -> Iterator[Finding]:
         except TransportError as error:
             problems.append(str(error))
     for text in problems:
-        means = "its samples would be misread, so it is not used"
+        means = "the package's samples would be misread, so the package is not used"
         yield wrong(MESSAGES, text, means, "install the same release of RMF's packages everywhere")
     if not problems:
-        yield ok(MESSAGES, "the installed ROS packages are those that this version knows")
+        yield ok(MESSAGES, "the installed ROS packages agree with RMF's releases")
 
 
 @contextmanager
 def overheard() -> Iterator[list[str]]:
-    """Collect the transports' warnings and errors meanwhile."""
+    """Collect the transports' warnings and errors during the block."""
     said: list[str] = []
     ears = logging.Handler(logging.WARNING)
     ears.emit = lambda record: said.append(record.getMessage())  # type: ignore[method-assign]

@@ -29,9 +29,12 @@ def port(machine: Machine, path: str, who: User, *, served: bool) -> Iterator[Fi
     yield _permission(machine, path, device, who)
     yield from _stable(machine, path, device)
     if device in _consoles(machine):
-        do = "sudo raspi-config: no login shell over serial; or take console= out of cmdline.txt"
+        do = "sudo raspi-config: no login shell over serial; or remove console= from cmdline.txt"
         yield wrong(
-            PORT, f"the kernel's console is on {device}", "its texts go out on the line", do
+            PORT,
+            f"the kernel's console is on {device}",
+            "the console's texts go out on the line",
+            do,
         )
     others = [] if served else holders(machine.at(device), machine.at("/proc"))
     if others:
@@ -42,7 +45,7 @@ def port(machine: Machine, path: str, who: User, *, served: bool) -> Iterator[Fi
 def _permission(machine: Machine, path: str, device: str, who: User) -> Finding:
     state = machine.at(device).stat()
     if who.may(state):
-        return ok(PORT, f"{path} is there, and {who.name} may use it")
+        return ok(PORT, f"{path} is there, and {who.name} may use this port")
     group = group_of(machine, state.st_gid)
     text = f"{who.name} may not open {device} (mode {state.st_mode & 0o777:o}, group {group})"
     return wrong(PORT, text, DEAF, join(who, group))
@@ -54,9 +57,14 @@ def _stable(machine: Machine, path: str, device: str) -> Iterator[Finding]:
         return
     same = [machine.named(one) for one in machine.folder(BY_ID)]
     same = [name for name in same if machine.target(name) == device]
-    do = f"port: {same[0]}" if same else "port: what ls /dev/serial/by-id/* prints"
+    do = (
+        f"port: {same[0]}" if same else "write as port: the path that ls /dev/serial/by-id/* prints"
+    )
     yield warning(
-        PORT, f"{path} is named by its number", "after a boot it may be another adapter", do
+        PORT,
+        f"the path {path} has a number",
+        "after a boot the number may be another adapter's",
+        do,
     )
 
 

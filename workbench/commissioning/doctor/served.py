@@ -17,12 +17,12 @@ from bridges.system.directories import Directories
 from workbench.commissioning.doctor.finding import Finding, note, ok, warning, wrong
 
 DAEMON: Final = "daemon"
-NOT_ASKED: Final = "its buses are not asked, because a controller has one master"
+NOT_ASKED: Final = "its buses are not read here, because a controller has only one master"
 
 
 @dataclass(frozen=True, slots=True)
 class ServingDaemon:
-    """The daemon's state. `busy`: why its buses must not be opened; "" if they may be.
+    """The daemon's state. `busy`: why its buses must not be opened; "" if they may be opened.
 
     `serving`: does a daemon serve this file? None if unknown. `simulated`: on fake hardware,
     and on loopback.
@@ -43,51 +43,61 @@ def served(places: Directories, file: Path, wall: float) -> ServingDaemon:
     if held_by is None:
         return _nobody(places, file)
     if not held_by.serves:
-        found = f"{held_by} uses it: walk, outputs-off or another doctor"
-        return ServingDaemon([warning(DAEMON, found, NOT_ASKED, "wait until it has ended")], found)
+        found = f"{held_by} uses the file's devices: walk, outputs-off or another doctor"
+        return ServingDaemon(
+            [warning(DAEMON, found, NOT_ASKED, "wait until that process has ended")], found
+        )
     one = next(daemons([places.runtime], {}, wall))
-    busy, simulated = f"process {held_by.pid} serves it", bool(one.status.get("simulated"))
+    busy, simulated = f"process {held_by.pid} serves this file", bool(one.status.get("simulated"))
     return ServingDaemon(list(_told(one)), busy, True, simulated)
 
 
 def unseen(why: str) -> ServingDaemon:
     """Warn that this user cannot see whether a daemon runs."""
-    return ServingDaemon([wrong(DAEMON, why, NOT_ASKED, "sudo before the command")], why, None)
+    return ServingDaemon(
+        [wrong(DAEMON, why, NOT_ASKED, "write sudo before the command")], why, None
+    )
 
 
 def _nobody(places: Directories, file: Path) -> ServingDaemon:
     if Records(places, file).unreleased():
-        found = "it has died, and may have left outputs on"
+        found = "the daemon has died, and may have left outputs on"
         do = f"rmf-bridge outputs-off {file}"
         return ServingDaemon([wrong(DAEMON, found, "a relay may hold a door or a call", do)], found)
-    return ServingDaemon([ok(DAEMON, "none serves this file, so its buses are asked here")])
+    return ServingDaemon([ok(DAEMON, "no daemon serves this file, so its buses are read here")])
 
 
 def _told(one: DaemonStatus) -> Iterator[Finding]:
     if one.state != "serving":
         do = "rmf-bridge log FILE; then restart it"
         age = "never" if one.age_s is None else f"{one.age_s:.0f} s ago"
-        yield wrong(DAEMON, f"it runs, but wrote its status {age}", "it may hang", do)
+        yield wrong(
+            DAEMON, f"the daemon runs, but wrote its status {age}", "the daemon may hang", do
+        )
     else:
         version = one.status.get("version", "?")
-        yield ok(DAEMON, f"it serves this file, version {version}; {NOT_ASKED}")
+        yield ok(DAEMON, f"the daemon serves this file, version {version}; {NOT_ASKED}")
     if one.status.get("simulated"):
-        means = "no hardware moves; what follows about pins and ports is for a real device"
-        yield note(DAEMON, "it is a SIMULATION", means, "run it without --simulate on the Pi")
+        means = "no hardware moves; findings below about pins and ports are for a real device"
+        yield note(
+            DAEMON, "the daemon is a SIMULATION", means, "run it without --simulate on the Pi"
+        )
     else:
         yield from _listeners(one.status)
     yield from _faults("", one.status)
     for name, device in one.devices.items():
         age_s = device.get("input_age_s")
         if age_s is None:
-            yield wrong(DAEMON, f"{name} was never read", "RMF is told nothing of it", "its faults")
+            yield wrong(
+                DAEMON, f"{name} was never read", "RMF gets no state of {name}", "its faults"
+            )
         else:
             yield ok(DAEMON, f"{name} was read {age_s:.1f} s before its status")
         yield from _faults(f"{name}: ", device)
 
 
 def _listeners(status: Status) -> Iterator[Finding]:
-    """Check for listeners to the states. Other topics often have none."""
+    """Check for listeners to the states. Other topics often have no listener."""
     for topic, nodes in status.get("heard_by", {}).items():
         if nodes:
             yield ok(DAEMON, f"{topic}: heard by {nodes} node{'s' if nodes > 1 else ''}")

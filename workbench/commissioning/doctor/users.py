@@ -20,7 +20,7 @@ UNIT: Final = "rmf-bridge@.service"
 
 @dataclass(frozen=True, slots=True)
 class User:
-    """The user who opens the devices. `service`: systemd's unit starts the daemon."""
+    """The user who opens the devices. `service`: does systemd's unit start the daemon?"""
 
     name: str
     uid: int
@@ -64,8 +64,8 @@ def users(machine: Machine) -> Iterator[Finding]:
         name = _name(machine, machine.uid)
         yield note(
             subject,
-            f"the unit {UNIT} is not installed; what follows is checked for {name}",
-            "the daemon does not start at boot, and nobody restarts it",
+            f"the unit {UNIT} is not installed; the findings below are for {name}",
+            "the daemon does not start at boot, and nobody restarts the daemon",
             "docs/how-to/install.md",
         )
         return
@@ -81,7 +81,7 @@ def users(machine: Machine) -> Iterator[Finding]:
         yield wrong(
             subject,
             f"there is no group {' and no group '.join(missing)}, which a service may need",
-            "`rmf-bridge enable` cannot give it to the daemon, which then cannot open its devices",
+            "`rmf-bridge enable` cannot put the daemon into the group, so it cannot open its devices",
             "; ".join(f"sudo groupadd --system {group}" for group in missing)
             + "; then sudo rmf-bridge enable FILE",
         )
@@ -97,7 +97,7 @@ def join(who: User, group: str) -> str:
 
 
 def group_of(machine: Machine, gid: int) -> str:
-    """Return a group's name; its number if it has none."""
+    """Return a group's name, or its number if the group has no name."""
     return next((n for n, (found, _) in _groups(machine).items() if found == gid), str(gid))
 
 

@@ -1,7 +1,7 @@
-"""The process that the kill test kills: it switches one output on as the daemon would, and says `on`.
+"""The process that the kill test kills: it switches one output on as the daemon would, and prints `on`.
 
-`python -m workbench.commissioning.doctor.victim FILE DEVICE STEP RUNTIME_DIR`. It switches off and ends
-when its input ends or after ON_S, because its parent may have died.
+`python -m workbench.commissioning.doctor.victim FILE DEVICE STEP RUNTIME_DIR`. The process switches off
+and ends when its input ends or after ON_S, because its parent may have died.
 """
 
 import select
@@ -57,13 +57,13 @@ def _held(
 
 
 def step_called(config: Config, device: str, name: str | None) -> WalkStep | None:
-    """Return the output of this name; without a name the first; None if unknown."""
+    """Return the output of this name, or the first output if there is no name; None if unknown."""
     return next((step for step in steps(config, device) if name in (None, step.name)), None)
 
 
 def _on_for_a_while(driver: Driver[Any, Any], bus: Bus, step: WalkStep | None) -> bool:
-    """Switch on, and off again if we still live. True if verified off."""
-    assert step is not None  # or the kill test would not have started
+    """Switch on for ON_S, and off again if not killed. True if verified off."""
+    assert step is not None  # without a step there is no kill test
     try:
         driver.open()
         if why := step.hindrance(driver.read()):

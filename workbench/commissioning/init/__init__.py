@@ -37,7 +37,7 @@ ADDRESSES: Final = {
     "http": "192.168.1.60",
     "can": "can0",
 }
-"""The address offered for each wiring; a GPIO header has none."""
+"""The address offered for each wiring; a GPIO header has no address."""
 HAZARDS: Final = LIFT_INPUTS[:7]
 DOOR_ENDS: Final = {"door_opened": "open", "door_closed": "closed"}
 BOOLEANS: Final = ("y", "n", "yes", "no", "on", "off", "true", "false", "null")
@@ -54,7 +54,7 @@ SHELLY: Final = """\
     release: {path: "/rpc/Switch.Set?id=0&on=false", method: GET}
     switches_off_after_s: 10         # the same number as toggle_after"""
 CHARGER_HTTP: Final = """\
-    # What the maker's state numbers mean: ask the maker. An unlisted number is an error.
+    # The meanings of the maker's state numbers: ask the maker. An unlisted number is an error.
     codes:
       idle: [0]
       handshake: [1, 2, 3, 4]
@@ -64,8 +64,8 @@ CHARGER_HTTP: Final = """\
       error: [8, 255]"""
 CHARGER_CANOPEN: Final = """\
     node: 10                         # the receiver's node id
-    heartbeat_timeout_s: 0.5         # it comes each 0.1 s
-    on_death: stop                   # what the daemon's end means for a charge: stop, or keep"""
+    heartbeat_timeout_s: 0.5         # a heartbeat comes each 0.1 s
+    on_death: stop                   # a charge under way when the daemon ends: stop, or keep"""
 
 
 def draft(answers: DraftAnswers) -> str:
@@ -77,7 +77,7 @@ def draft(answers: DraftAnswers) -> str:
     address = answers.address or ADDRESSES.get(answers.wiring, "")
     lines = [
         f"# {answers.name}: compare every point with the wires, then `rmf-bridge check` this file.",
-        "# docs/reference/configuration.md lists every key, docs/how-to/wire.md says how wires fail.",
+        "# docs/reference/configuration.md lists every key, docs/how-to/wire.md shows how wires fail.",
         f"kind: {answers.kind}",
         f"driver: {DRIVERS.get(answers.wiring, 'dry_contact')}",
         "",
@@ -102,7 +102,7 @@ def _lift(answers: DraftAnswers, points: FreePoints) -> Iterator[str]:
         raise Impossible(f"a lift has at least two floors, each name once, not {', '.join(floors)}")
     calls = [
         f"      {floor}: {{{points.relay()}}}" for floor in floors
-    ]  # floors first: they need most pins
+    ]  # floors first, because they need most pins
     request, hold = points.relay(), points.relay()
     yield f"    floors: [{', '.join(floors)}]        # RMF's names, from below"
     yield "    inputs:"
@@ -129,17 +129,17 @@ def _input(signal: str, answers: DraftAnswers, points: FreePoints) -> str:
 
 
 def _floor_code(answers: DraftAnswers, floors: list[str], points: FreePoints) -> Iterator[str]:
-    yield "    floor_code:                # lines that say where the car is"
+    yield "    floor_code:                # lines for the car's floor"
     yield f"      encoding: {answers.encoding}"
     if answers.encoding == "one_hot":
-        yield "      lines:                   # one for each floor; none is between floors"
+        yield "      lines:                   # one for each floor; no line on is between floors"
         for floor in floors:
             yield f"        {floor}: {{{points.contact()}}}"
         return
     yield "      bits:                    # least significant first"
     for _ in range(len(floors).bit_length()):
         yield f"        - {{{points.contact()}}}"
-    yield "      # The parity line shows a broken line. A lift without it: leave it out; check warns."
+    yield "      # The parity line shows a broken line. A lift without parity: delete it; check warns."
     yield f"      parity: {{{points.contact()}, total: even}}"
     codes = ", ".join(f"{number}: {floor}" for number, floor in enumerate(floors, start=1))
     yield f"      codes: {{{codes}}}"
@@ -171,7 +171,7 @@ def _charger(answers: DraftAnswers, points: FreePoints) -> Iterator[str]:
 
 
 def _said(struct: type, key: str) -> str:
-    """Return a key's comment: the beginning of its description."""
+    """Return the comment for a key: the beginning of the key's description."""
     return f"# {re.split('[;:.]', meaning(struct, key))[0]}"
 
 

@@ -24,9 +24,9 @@ class Impossible(Exception):
 class DraftAnswers(msgspec.Struct, frozen=True, kw_only=True):
     """The device to be connected, as the integrator describes it.
 
-    `address`: host, serial port or CAN interface; "" for the usual one. `floors`: RMF's names, from
+    `address`: host, serial port or CAN interface; "" for the usual address. `floors`: RMF's names, from
     below. `signals`: a lift's inputs. `contacts`: the level of a closed contact on the header: high
-    if wired to 3.3 V, low if wired to ground. `relays`: the level that switches them on.
+    if wired to 3.3 V, low if wired to ground. `relays`: the level that switches relays on.
     """
 
     kind: Kind

@@ -9,7 +9,8 @@ from workbench.commissioning.init.answers import DraftAnswers, Impossible, Level
 REST_LOW: Final = (11, 13, 15, 16, 18, 22, 32, 33, 35, 36, 37, 38, 40, 12)
 REST_HIGH: Final = (7, 29, 31, 26, 24)
 """Positions on J8 by the level to which the Pi pulls them from power-on until the daemon starts: a
-relay belongs where that keeps it off. Source: BCM2835 ARM Peripherals, table 6-31 (BCM0 to 8 high)."""
+relay belongs on a pin whose level keeps it off. Source: BCM2835 ARM Peripherals, table 6-31 (BCM0
+to 8 high)."""
 
 
 class FreePoints(Protocol):
@@ -55,8 +56,8 @@ class PinHeader:
 def _first(pins: list[int]) -> int:
     if not pins:
         raise Impossible(
-            "more signals than the header has free pins that suit: leave some out, take encoding"
-            " binary, relays that are on at high, or a Modbus I/O module"
+            "the header has too few free pins that suit: leave signals out, or choose the"
+            " encoding binary, relays that are on at high, or a Modbus I/O module"
         )
     return pins.pop(0)
 
@@ -83,7 +84,7 @@ class Module:
 
 
 def points_for(answers: DraftAnswers) -> FreePoints:
-    """Return all points of this wiring, none taken yet."""
+    """Return the points of this wiring, all free."""
     if answers.wiring == "gpio":
         return PinHeader(answers.contacts, answers.relays)
     return Module(answers.unit)

@@ -1,4 +1,6 @@
-"""Scan one device for a walk, on its own thread: a slow or dead terminal delays no switching off."""
+"""Scan one device for a walk on a thread, so that a slow or dead terminal never delays switching
+off.
+"""
 
 import threading
 import time
@@ -27,7 +29,7 @@ SCAN_S: Final = 0.05
 
 @dataclass(slots=True)
 class ContactReading:
-    """One contact's latest reading. `seen`: its meanings seen so far."""
+    """One contact's latest reading. `seen`: the meanings (on, off) seen so far."""
 
     wire: Wire
     point: str
@@ -37,14 +39,14 @@ class ContactReading:
 
     @property
     def asserted(self) -> bool | None:
-        """The level's meaning; None before the first reading."""
+        """Return the level's meaning; None before the first reading."""
         return None if self.level is None else self.wire.asserted(self.level)
 
 
 class Bench:
-    """A device under test on its tapped bus. `off`: the outputs with every one off.
+    """A device under test on its tapped bus. `off`: the outputs, all off.
 
-    Use as a context: at its end every output is off; `verified_off`: was this read back?
+    Use as a context: at its end every output is switched off. `verified_off`: was that read back?
     """
 
     def __init__(
@@ -125,7 +127,7 @@ class Bench:
         return InputsRead(sample)
 
     def _make_safe(self) -> bool:
-        """Switch all outputs off. Without outputs to try do nothing: a running charge goes on."""
+        """Switch all outputs off. Without outputs to try do nothing, so a charge goes on."""
         if not self.steps:
             return True
         if why := not_off(self._driver, self._bus.insist):

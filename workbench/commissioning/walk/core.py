@@ -1,8 +1,8 @@
 """Decide when an output of a walk is on and when its effect counts as seen. Pure: time is an argument.
 
-One output at a time, for ON_S at most; off at once if a reading fails, grows old, or shows that the
-output must not be on. Feedback may follow late: a car needs time to move. Inputs that were already on
-before the output do not count as feedback.
+One output is on at a time, for ON_S at most. It goes off at once if a reading fails, grows old, or
+shows that the output must not be on. Feedback may follow late, because a car needs time to move. Inputs
+that were on before the output do not count as feedback.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -12,12 +12,13 @@ from typing import Any, Final
 ON_S: Final = 5.0
 FEEDBACK_S: Final = 120.0
 STALE_S: Final = 1.0
-"""Oldest reading with which an output is switched on or stays on."""
+"""The greatest age (s) of the readings while an output is switched on or stays on."""
 
 
 @dataclass(frozen=True, slots=True)
 class WalkStep:
-    """One output to try. `outputs`: the driver's, with this one on. `expects`: the effect to see.
+    """One output to try. `outputs`: the driver's outputs, with this output on. `expects`: the effect to
+    see.
 
     `seen(sample)`: is the effect there? None if no input shows it. `hindrance(sample)`: why the
     output must not be on now, "" if it may.
@@ -33,10 +34,10 @@ class WalkStep:
 
 @dataclass(frozen=True, slots=True)
 class WalkMemory:
-    """The memory of a walk. `on`: the step whose output is on. `off_at`: time of its end (s).
+    """The memory of a walk. `on`: the step whose output is on. `off_at`: when the output goes off (s).
 
     `waits`: the step whose feedback may still come, until `waits_until`. `results`: step -> the effect
-    seen. `says`: why the last key did nothing, or an output went off.
+    seen. `says`: why the last key had no effect, or why an output went off.
     """
 
     sample: Any = None
@@ -115,7 +116,7 @@ def _switch(memory: WalkMemory, step: int, now: float, steps: Sequence[WalkStep]
     proves = tried.seen is None or not tried.seen(memory.sample)
     told = "switched on, and nothing was seen"
     if not proves:
-        told = "switched on; the inputs showed that before, so it proves nothing"
+        told = "switched on; the inputs showed the effect before, so they prove nothing"
     return replace(
         memory,
         on=step,
@@ -125,7 +126,7 @@ def _switch(memory: WalkMemory, step: int, now: float, steps: Sequence[WalkStep]
         results={**memory.results, step: told},
         says=""
         if proves
-        else f"the inputs already show the effect of {tried.name}: that proves nothing",
+        else f"the inputs already show the effect of {tried.name}, so they would prove nothing",
     )
 
 

@@ -19,7 +19,7 @@ from workbench.commissioning.walk.signed import NOT_TRIED
 
 HELP: Final = "ENTER on/off   n next   p back   y seen   x not seen   q end"
 WIDE: Final = 60
-"""Least columns for showing the wires too; a phone has about 40."""
+"""Least number of columns for showing the wires too; a phone has about 40."""
 HEADINGS: Final = 2
 BOLD, DIM, ALARM, ON = "1", "2", "1;31", "1;33"
 HIDE_CURSOR, SHOW_CURSOR = "\x1b[?25l", "\x1b[?25h"
@@ -52,7 +52,7 @@ class Screen:
         plain = not coloured(sys.stdout)
         page = self.page(now, *shutil.get_terminal_size())
         *above, (last, _) = [(text, "" if plain else style) for text, style in page]
-        sys.stdout.write(f"{repainted(above, self._above)}\r{last}")  # no newline: it would scroll
+        sys.stdout.write(f"{repainted(above, self._above)}\r{last}")  # a newline would scroll
         sys.stdout.flush()
         self._above = len(above)
 
@@ -102,7 +102,7 @@ class Screen:
         return f"{step.name} {step.does}; should be seen: {step.expects}. So far: {seen}"
 
     def _inputs(self, now: float, most: int, columns: int) -> Lines:
-        """List every input; without enough room, the latest changes."""
+        """List every input; without enough room, the inputs that changed last."""
         known = self._bench.inputs
         if not known:
             nothing = "no contacts: registers or messages, decoded"
@@ -120,7 +120,7 @@ class Screen:
         ]
 
     def _outputs(self, now: float, most: int, columns: int) -> Lines:
-        """List every output; without enough room, those around the cursor."""
+        """List every output; without enough room, the outputs around the cursor."""
         memory, steps = self._bench.memory, self._bench.steps
         rows, styles = [("", "output", "is", "seen")], [DIM]
         first = max(0, min(self._cursor - most // 2, len(steps) - most))
@@ -145,7 +145,7 @@ def room(rows: int, inputs: int, outputs: int) -> Room:
     least = min(outputs, 3)
     if inputs + least <= rows:
         return Room(inputs, min(outputs, rows - inputs))
-    for_inputs = max(1, rows - least - 1)  # one row counts the hidden ones
+    for_inputs = max(1, rows - least - 1)  # one row counts the hidden inputs
     return Room(for_inputs, least)
 
 
@@ -192,7 +192,7 @@ def keyboard() -> Iterator[int]:
 
 
 def keys(terminal: int, wait_s: float) -> list[str]:
-    """Return the pressed keys; none after `wait_s`, "q" if the terminal is gone."""
+    """Return the pressed keys; [] without a key in `wait_s`, "q" if the terminal is gone."""
     if not select.select([terminal], [], [], wait_s)[0]:
         return []
     try:

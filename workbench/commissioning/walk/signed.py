@@ -27,7 +27,7 @@ def record(
     end: str,
     simulated: bool,
 ) -> dict[str, Any]:
-    """Return the record. `at`: start of the walk. `end`: how the walk ended, or that it has not."""
+    """Return the record. `at`: start of the walk. `end`: how the walk ended, or that it goes on."""
     return {
         "file": str(file),
         "sha256": hashlib.sha256(file.read_bytes()).hexdigest(),

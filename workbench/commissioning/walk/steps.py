@@ -85,7 +85,7 @@ def _door(settings: object, wired: Wired) -> Iterator[WalkStep]:
 
 def _charger(settings: object, wired: Wired) -> Iterator[WalkStep]:
     if wired is None:
-        return  # a charge over HTTP, CAN or registers is a request: `rmf-bridge send charger`
+        return  # without contacts a charge is a request: `rmf-bridge send charger`
 
     def at_fault(sample: ChargerSample) -> str:
         return f"the station shows an error {sample.error_text}".rstrip() if _fault(sample) else ""

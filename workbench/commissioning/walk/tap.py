@@ -1,4 +1,4 @@
-"""A bus with a tap: the driver works as usual, and the levels it reads can be seen."""
+"""A bus with a tap: the driver works as usual, and a person can see the levels that it reads."""
 
 from collections.abc import Mapping
 from typing import Any

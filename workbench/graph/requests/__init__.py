@@ -1,8 +1,8 @@
 """Every request that `send` can make: its message, its fulfilment, and its obstacles.
 
 Messages and the conditions that fulfil them are those of RMF's fleet adapters (rmf_ros2 9dedd0f).
-There is one file for each kind of device; this one has the common part. A request's `obstacles` are a
-table, most specific first; the last one always applies.
+There is one file for each kind of device; this file has the common part. A request's `obstacles` are a
+table, most specific first; the last obstacle always applies.
 """
 
 from abc import ABC, abstractmethod
@@ -29,11 +29,11 @@ NEVER_AT: Final = float("-inf")
 class RequestProgress(Struct, frozen=True):
     """The events since the command began; times are monotonic s.
 
-    `listeners`: matched subscriptions of the request's topic. `states`: those that concern the
+    `listeners`: matched subscriptions of the request's topic. `states`: the states that concern the
     request, in order, the last at `stated_at`. `there`: kind and name of every device heard.
-    `graph`: where we listen, for people. `hinted`: the hints printed. `heartbeat`: the latest of the
-    door supervisor, at `heartbeat_at`. `boarded`: is a robot inside, by the lift's diagnostics?
-    "yes" or "no"; "" if not heard. `refusals`: those of chargers, after our first request.
+    `graph`: where we listen, for people. `hinted`: the hints printed. `heartbeat`: the door
+    supervisor's latest, at `heartbeat_at`. `boarded`: is a robot inside, by the lift's diagnostics?
+    "yes" or "no"; "" if not heard. `refusals`: the chargers' refusals after our first request.
     """
 
     began_at: float
@@ -71,7 +71,7 @@ class RequestProgress(Struct, frozen=True):
         return sorted(name for one, name in self.there if one == kind)
 
     def sends(self, now: float) -> "RequestProgress":
-        """Note that the request is sent now."""
+        """Record that the request is sent now."""
         first = now if self.first_sent_at is None else self.first_sent_at
         return replace(self, first_sent_at=first, last_sent_at=now)
 
@@ -80,14 +80,14 @@ class RequestProgress(Struct, frozen=True):
         return [state for state in self.states if isinstance(state, kind)]
 
     def answer(self, kind: type[State]) -> State | None:
-        """The last state if it was heard after our first request, else None."""
+        """Return the last state if it was heard after our first request, else None."""
         sent_at = self.first_sent_at
         if sent_at is None or not self.states or self.stated_at < sent_at:
             return None
         return self.states_of(kind)[-1]
 
     def requesters(self, door: str) -> list[str] | None:
-        """Return the door's holders, by a heartbeat after our first request; None without one."""
+        """Return the door's holders by a heartbeat after our first request; None before that."""
         sent_at = self.first_sent_at
         if self.heartbeat is None or sent_at is None or self.heartbeat_at < sent_at:
             return None
@@ -122,7 +122,7 @@ class Obstacle(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Request(ABC):
-    """A request about the device of this `name`: to its daemon if `direct`, else to the supervisor.
+    """A request about the device of this `name`, to its daemon if `direct`, else to the supervisor.
 
     `answers`: topics to hear besides the states.
     """
@@ -140,7 +140,7 @@ class Request(ABC):
 
     @property
     def topic(self) -> AnyTopic:
-        """The daemon's own topic, or the fleet adapters'."""
+        """Return the daemon's own topic, or the fleet adapters' topic."""
         return self.own if self.direct or self.adapter is None else self.adapter
 
     @property
@@ -150,19 +150,19 @@ class Request(ABC):
 
     @abstractmethod
     def message(self, seen: RequestProgress) -> words.Requested | None:
-        """The message to send, without its stamp; None while it cannot be made yet."""
+        """Return the message to send, without a stamp; None while it cannot be made yet."""
 
     @abstractmethod
     def outcome(self, seen: RequestProgress) -> Fulfilled | Failed | None:
-        """The outcome, if the states show one."""
+        """Return the outcome, if the states show an outcome."""
 
     @abstractmethod
     def obstacles(self, seen: RequestProgress) -> Iterable[Obstacle]:
-        """Return the possible reasons for no effect by the last state; the first `present` counts."""
+        """Return possible reasons for no effect; the first that is `present` counts."""
 
     @property
     def supervisor(self) -> AnyTopic | None:
-        """The topic that shows a supervisor, if daemons too listen to adapters."""
+        """Return the topic that only a supervisor publishes; None where that is not needed."""
         return None
 
     def goes_direct(self, seen: RequestProgress, now: float) -> bool:
@@ -178,7 +178,7 @@ class Request(ABC):
         return bool(seen.states)
 
     def misnamed(self, seen: RequestProgress) -> str:
-        """Return the other kind of device with this name; "" if none was heard."""
+        """Return the other kind of device with this name; "" if no such device was heard."""
         if self.ready(seen):
             return ""
         kinds = sorted(kind for kind, name in seen.there if name == self.name and kind != self.kind)
@@ -210,7 +210,7 @@ class Request(ABC):
         return Obstacle(True, f"no '{self.name}' on {topic}; {self._hears(seen)}")
 
     def _hears(self, seen: RequestProgress) -> str:
-        """Name the devices heard: of the kind, else any; else the graph."""
+        """Name the heard devices of the kind, else all heard devices, else the graph."""
         if names := seen.names(self.kind):
             near = "" if self.name in names else nearest(self.name, names)
             return f"{self.kind}s heard: {', '.join(names)}{near}"
@@ -219,7 +219,7 @@ class Request(ABC):
         return f"nothing is heard{seen.graph and f' by {seen.graph}'}"
 
     def _elsewhere(self, seen: RequestProgress) -> str:
-        """Suggest other places of the device: loopback, another domain, another transport."""
+        """Suggest other places to look for the device: loopback, another domain, another transport."""
         if self._loopback():
             return self._loopback()
         return "" if seen.there else WHERE
@@ -232,7 +232,7 @@ class Request(ABC):
 
 
 def nearest(name: str, names: Iterable[str]) -> str:
-    """`; did you mean 'Lift1'?`, or "" when no name is similar."""
+    """Return `; did you mean 'Lift1'?`, or "" when no name is similar."""
     folded = {n.lower(): n for n in names}
     near = get_close_matches(name.lower(), folded, n=1, cutoff=0.6)
     return f"; did you mean '{folded[near[0]]}'?" if near else ""

@@ -44,8 +44,9 @@ class RobotCharge(_Charger):
         return d.ChargerRequest(charger, self.fleet, self.robot, limit, self.request_id)
 
     def outcome(self, seen: RequestProgress) -> Fulfilled | Failed | None:
-        """Done when a state with our id shows that the charger serves the robot; Failed when the
-        request is refused."""
+        """Return Fulfilled once a state with our id shows that the charger serves the robot; Failed
+        after a refusal.
+        """
         answer = seen.answer(d.ChargerState)
         if answer is None or answer.state not in SERVING or answer.request_id != self.request_id:
             return self._refused(seen)
@@ -60,7 +61,7 @@ class RobotCharge(_Charger):
         if refusal.reason != OCCUPIED or not refusal.held_request:
             return Failed(text)
         cancel = ("send", "charger", refusal.charger, "--cancel", refusal.held_request)
-        return Failed(f"{text}; to cancel that: {self.line.other(*cancel)}")
+        return Failed(f"{text}; to cancel that request: {self.line.other(*cancel)}")
 
     def obstacles(self, seen: RequestProgress) -> Iterable[Obstacle]:
         """Return the obstacles: an error, or another request."""
@@ -71,9 +72,9 @@ class RobotCharge(_Charger):
             Obstacle(
                 state.request_id not in ("", self.request_id),
                 f"{self.name} serves request {state.request_id}",
-                f"to cancel that: {cancel}",
+                f"to cancel that request: {cancel}",
             ),
-            Obstacle(True, f"{self.name} did not accept the request: its daemon's log says why"),
+            Obstacle(True, f"{self.name} did not accept the request: see its daemon's log"),
         )
 
 
@@ -91,11 +92,13 @@ class ChargeCancel(_Charger):
     own: ClassVar[AnyTopic] = topics.CHARGER_CANCELS
 
     def message(self, seen: RequestProgress) -> d.ChargerCancel:
-        """The cancel of this request id."""
+        """Return the cancel of this request id."""
         return d.ChargerCancel(self.name, self.request_id)
 
     def outcome(self, seen: RequestProgress) -> Fulfilled | Failed | None:
-        """Done when the charger is released or shows another id; Failed if it never showed this one."""
+        """Return Fulfilled once the charger is free or shows another id; Failed if it never showed
+        ours.
+        """
         answer = seen.answer(d.ChargerState)
         if answer is None or self._holds(answer):
             return None
@@ -110,7 +113,7 @@ class ChargeCancel(_Charger):
 
     def obstacles(self, seen: RequestProgress) -> Iterable[Obstacle]:
         """Return the obstacle: the charger still serves the request."""
-        text = f"{self.name} still serves request {self.request_id}: its daemon's log says why"
+        text = f"{self.name} still serves request {self.request_id}: see its daemon's log"
         return (Obstacle(True, text),)
 
 
@@ -119,14 +122,14 @@ COORDINATOR: Final = "charger coordinator"
 
 @dataclass(frozen=True, slots=True)
 class QueuedCharge(RobotCharge):
-    """Ask the coordinator for the charger of this `name`, or for any (ANY), for this robot."""
+    """Request the charger of this `name`, or any charger (ANY), for this robot from the coordinator."""
 
     own = topics.ADAPTER_CHARGER_REQUESTS
     listener = COORDINATOR
 
     @property
     def who(self) -> str:
-        """The robot as FLEET/ROBOT."""
+        """Return the robot as FLEET/ROBOT."""
         return f"{self.fleet}/{self.robot}"
 
     def about(self, state: words.Stated) -> bool:
@@ -140,7 +143,7 @@ class QueuedCharge(RobotCharge):
         return bool(seen.names(self.kind))
 
     def outcome(self, seen: RequestProgress) -> Fulfilled | Failed | None:
-        """Done when a charger serves the robot; Failed when the coordinator refuses the request."""
+        """Return Fulfilled once a charger serves the robot; Failed if the coordinator refuses."""
         answer = seen.answer(d.ChargerState)
         if answer is None or answer.state not in SERVING:
             return self._refused(seen)
@@ -148,7 +151,7 @@ class QueuedCharge(RobotCharge):
         return Fulfilled(f"{answer.charger_name} is {state} for {self.who}")
 
     def unheard(self, seen: RequestProgress) -> Obstacle:
-        """No charger shows the robot yet: it probably waits in the queue."""
+        """Explain that no charger shows the robot yet, which probably waits in the queue."""
         if not seen.names(self.kind):
             return super(QueuedCharge, self).unheard(seen)
         cancel = ("send", "charger", ANY, "--queue", "--cancel", self.request_id)
@@ -162,23 +165,23 @@ class QueuedCharge(RobotCharge):
 
     def obstacles(self, seen: RequestProgress) -> Iterable[Obstacle]:
         """Return the obstacles: the charger's error, or no charger assigned."""
-        text = f"the {COORDINATOR} has not assigned {self.who} a charger: its log says why"
+        text = f"the {COORDINATOR} has not assigned {self.who} a charger: see its log"
         return _error(seen.states_of(d.ChargerState)[-1]), Obstacle(True, text)
 
 
 @dataclass(frozen=True, slots=True)
 class QueuedCancel(ChargeCancel):
-    """Withdraw a queued request; no state shows whether there was one."""
+    """Withdraw a queued request; no state shows whether the request was queued."""
 
     own = topics.ADAPTER_CHARGER_CANCELS
     listener = COORDINATOR
 
     def message(self, seen: RequestProgress) -> d.ChargerCancel:
-        """The cancel of this request id, for any charger."""
+        """Return the cancel of this request id, for any charger."""
         return d.ChargerCancel("", self.request_id)
 
     def about(self, state: words.Stated) -> bool:
-        """No state shows a queued request."""
+        """Is the state about this request? Never: no state shows a queued request."""
         return False
 
     def ready(self, seen: RequestProgress) -> bool:
@@ -186,11 +189,11 @@ class QueuedCancel(ChargeCancel):
         return bool(seen.names(self.kind))
 
     def outcome(self, seen: RequestProgress) -> Fulfilled | None:
-        """Done once the cancel has been sent."""
+        """Return Fulfilled once the cancel has been sent."""
         if seen.first_sent_at is None:
             return None
         return Fulfilled(f"the {COORDINATOR} was told that request {self.request_id} is withdrawn")
 
     def unheard(self, seen: RequestProgress) -> Obstacle:
-        """The cancel was never sent."""
+        """Explain that the cancel was never sent."""
         return Obstacle(True, f"the cancel was not sent: no {COORDINATOR} listens")

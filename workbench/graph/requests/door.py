@@ -12,8 +12,8 @@ from workbench.graph.requests import Fulfilled, Obstacle, Request, RequestProgre
 class DoorMove(Request):
     """Open or close the door.
 
-    On the adapter topic it also waits for the supervisor's heartbeat, as a fleet adapter does: it must
-    list us while we hold the door, and no longer after we have released it.
+    On the adapter topic it also waits for the supervisor's heartbeat, as a fleet adapter does. The
+    heartbeat must list us while we hold the door, and must no longer list us after the release.
     """
 
     opened: bool
@@ -26,11 +26,11 @@ class DoorMove(Request):
 
     @property
     def mode(self) -> d.DoorModeValue:
-        """The requested mode."""
+        """Return the requested mode."""
         return d.DoorModeValue.MODE_OPEN if self.opened else d.DoorModeValue.MODE_CLOSED
 
     def message(self, seen: RequestProgress) -> d.DoorRequest:
-        """The request for that mode."""
+        """Return the request for that mode."""
         return d.DoorRequest(
             requester_id=self.requester,
             door_name=self.name,
@@ -38,7 +38,9 @@ class DoorMove(Request):
         )
 
     def outcome(self, seen: RequestProgress) -> Fulfilled | None:
-        """Done when the door has the mode and, on the adapter topic, the heartbeat agrees."""
+        """Return Fulfilled once the door has the mode, and the heartbeat (on the adapter topic)
+        agrees.
+        """
         answer = seen.answer(d.DoorState)
         if answer is None or answer.current_mode.value != self.mode:
             return None

@@ -25,7 +25,7 @@ class _Lift(Request):
 
     @property
     def supervisor(self) -> AnyTopic | None:
-        """A supervisor is known by its publishing to the lift: daemons hear adapters too."""
+        """Return the lift's topic, on which only supervisors publish."""
         return None if self.direct else self.own
 
     @property
@@ -42,7 +42,7 @@ class LiftRide(_Lift):
     granted_only: bool = False
 
     def message(self, seen: RequestProgress) -> d.LiftRequest:
-        """Always AGV_MODE with DOOR_OPEN: fleets send nothing else."""
+        """Return the request, always AGV_MODE with DOOR_OPEN, because fleets send nothing else."""
         return d.LiftRequest(
             lift_name=self.name,
             session_id=self.session,
@@ -52,7 +52,7 @@ class LiftRide(_Lift):
         )
 
     def outcome(self, seen: RequestProgress) -> Fulfilled | Failed | None:
-        """Done when RequestLift's four fields match; an unserved floor fails at once."""
+        """Return Fulfilled once RequestLift's four fields match; Failed for an unserved floor."""
         states = seen.states_of(d.LiftState)
         served = states[-1].available_floors if states else ()
         if served and self.floor not in served:
@@ -62,7 +62,7 @@ class LiftRide(_Lift):
             return None
         where = "" if self.granted_only else f" at {self.floor}, door open,"
         return Fulfilled(
-            f"{self.name} is{where} held by {self.session}; to end that: {self._release}"
+            f"{self.name} is{where} held by {self.session}; to end that session: {self._release}"
         )
 
     def _remedy(self, seen: RequestProgress) -> str:
@@ -90,7 +90,7 @@ class LiftRide(_Lift):
                 self._remedy(seen),
             ),
             Obstacle(mode in HAZARDS, f"{name} serves no robot while its mode is {word}"),
-            Obstacle(not session, f"{name} did not grant the session: its daemon's log says why"),
+            Obstacle(not session, f"{name} did not grant the session: see its daemon's log"),
             Obstacle(
                 mode != d.LiftMode.MODE_AGV,
                 f"{name} granted the session, but its mode is {word}, not AGV"
@@ -108,8 +108,8 @@ class LiftRide(_Lift):
 class LiftEnd(_Lift):
     """End `session`; "": the session of the first LiftState heard.
 
-    `falls_back`: if the supervisor does not obey within OBEYS_WITHIN_S, the lift's own daemon is asked;
-    where a robot may be inside, only if the operator says that the car is empty (`car_empty`).
+    `falls_back`: if the supervisor does not obey within OBEYS_WITHIN_S, the lift's own daemon is asked.
+    If a robot may be inside, the operator must first confirm that the car is empty (`car_empty`).
     """
 
     session: str = ""
@@ -121,8 +121,9 @@ class LiftEnd(_Lift):
         return self.session or next(first, "")
 
     def message(self, seen: RequestProgress) -> d.LiftRequest | None:
-        """END_SESSION without a floor, as fleets send it; DOOR_OPEN tells our lifts that a person
-        ends it, which outranks a robot that goes on requesting."""
+        """Return END_SESSION without a floor, as fleets send it. DOOR_OPEN tells our lifts that a
+        person ends the session, which outranks a robot that goes on requesting.
+        """
         session = self._ending(seen)
         if not session:
             return None
@@ -134,7 +135,7 @@ class LiftEnd(_Lift):
         )
 
     def outcome(self, seen: RequestProgress) -> Fulfilled | None:
-        """Done when the state shows another session, or none."""
+        """Return Fulfilled once the state shows another session, or no session."""
         session = self._ending(seen)
         if seen.states and not session:
             return Fulfilled(f"{self.name} has no session: nothing to end")
@@ -153,7 +154,7 @@ class LiftEnd(_Lift):
         return MOVES_WITHIN_S if self.falls_back else 0.0
 
     def goes_direct(self, seen: RequestProgress, now: float) -> bool:
-        """Has the supervisor, if any, had its time, and is the car empty?"""
+        """Has the supervisor, if any, had OBEYS_WITHIN_S, and is the car empty?"""
         asked_at = seen.began_at if seen.first_sent_at is None else seen.first_sent_at
         late = now >= asked_at + OBEYS_WITHIN_S
         return self.falls_back and not self.direct and late and self._outside(seen)
@@ -173,11 +174,13 @@ class LiftEnd(_Lift):
     def obstacles(self, seen: RequestProgress) -> Iterable[Obstacle]:
         """Return the obstacles: the session is still shown."""
         if self.falls_back and not self._outside(seen):
-            text = f"{self.name} still shows the session, and its robot may be in the car: look into it"
+            text = (
+                f"{self.name} still shows the session, and a robot may be in the car: look inside"
+            )
             there = self.line.again_with("--car-empty")
             return (Obstacle(True, text, f"if the car is empty: {there}"),)
         if self.direct or self.falls_back:
-            text = f"{self.name} still shows the session: its daemon's log says why"
+            text = f"{self.name} still shows the session: see its daemon's log"
             return (Obstacle(True, text),)
         text = f"{self.name} still shows the session: the supervisor may have dropped the request"
         there = self.line.again_with("--direct")

@@ -81,7 +81,7 @@ def test_a_silent_bus_is_distinguished_from_one_on_which_others_speak(ends: Ends
     far.send(0x70B, "05")
     far.send(0x18FF50E5, "00", extended=True)
     bus.take()
-    told = "the bus works, and others are heard: 0x70B, 0x18FF50E5"
+    told = "the bus works, and other ids are heard: 0x70B, 0x18FF50E5"
     assert bus.silence() == told
     clock.now += 10
     assert bus.silence() == SILENT
@@ -225,7 +225,7 @@ def wrapped(code: int) -> Exception:
 @pytest.mark.parametrize(
     ("error", "text"),
     [
-        (OSError(errno.ENODEV, "x"), "there is no such interface"),
+        (OSError(errno.ENODEV, "x"), "no such interface"),
         (wrapped(errno.ENETDOWN), "the interface is down; sudo ip link set can0 up type can"),
         (OSError(errno.EAFNOSUPPORT, "x"), "this kernel has no CAN; sudo modprobe can-raw"),
         (wrapped(errno.ENOBUFS), "frames pile up because nobody acknowledges them"),
@@ -309,7 +309,7 @@ def test_a_bus_is_one_of_the_two_sorts() -> None:
     [(nowhere, what)] = problems(CanSettings())
     assert (nowhere, what[:18]) == ((), "needs an interface")
     [(path, text)] = problems(CanSettings(socketcan="can0", slcan=place))
-    assert (path, text[:37]) == (("slcan",), "a bus has either socketcan or slcan: ")
+    assert (path, text[:37]) == (("slcan",), "a bus has only one of socketcan and s")
 
 
 def test_a_bitrate_that_no_adapter_knows_is_a_problem() -> None:

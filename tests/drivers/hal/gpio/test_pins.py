@@ -70,7 +70,7 @@ def test_pins_are_pulled_up_to_bcm8_and_down_from_bcm9_until_they_are_claimed() 
         (wire("BCM4", pull="none"), []),
         (
             wire("BCM4"),
-            ["pull is missing: say up, down, or none where an external resistor is fitted"],
+            ["pull is missing: write up, down, or none where an external resistor is fitted"],
         ),
         (wire("J8:3", pull="up"), []),
         (

@@ -57,8 +57,8 @@ def test_the_default_timeout_and_scan_are_a_second() -> None:
 def test_a_setting_without_effect_is_refused() -> None:
     made = HttpSettings(api_base="tpu", ca_file="/etc/ca.pem", token_header="X-API-Key")
     assert list(made.problems()) == [
-        (("ca_file",), "is for https: write api_base: https://…, or leave this out"),
-        (("token_header",), "needs token_file: the file with what the header says"),
+        (("ca_file",), "is for https: write api_base: https://…, or delete ca_file"),
+        (("token_header",), "needs token_file: the file with the header's value"),
     ]
 
 

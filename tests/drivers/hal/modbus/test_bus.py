@@ -33,9 +33,7 @@ def test_unit_0_is_asked_as_any_other_and_no_other_unit_answers_for_it(module: M
 def test_a_reply_numbered_0_says_what_the_gateway_must_do(module: Module) -> None:
     door(module)
     module.reply = lambda request: bytes(2) + module.answer(request)[2:]
-    assert "it is numbered 0, and must bear the number of the request" in fails(
-        bus_to(module.port), IN0
-    )
+    assert "its transaction number is 0, not the request's" in fails(bus_to(module.port), IN0)
 
 
 def test_a_refused_connection_pauses_the_bus_and_asks_once_a_pause() -> None:
@@ -44,7 +42,7 @@ def test_a_refused_connection_pauses_the_bus_and_asks_once_a_pause() -> None:
     clock = Time()
     bus = bus_to(port, clock)
     text = fails(bus, IN0)
-    assert text.startswith(f"no Modbus TCP connection to 127.0.0.1:{port}: it is refused")
+    assert text.startswith(f"no Modbus TCP connection to 127.0.0.1:{port}: refused")
     with socket.create_server(("127.0.0.1", port)) as listener:
         listener.settimeout(0.05)
         assert fails(bus, "unit 2 coil 9") == text

@@ -303,7 +303,7 @@ def test_the_fake_modules_pulse_is_ended_by_a_coil_that_is_written_off(
         ),
         (
             "unit 1 discrete input 9",
-            "30:7: 'hold_open': flash is asked for with a write to a coil, not to a discrete input",
+            "30:7: 'hold_open': flash is a write to a coil, not to a discrete input",
         ),
         (
             "unit 1 coil 0",

@@ -84,7 +84,7 @@ MODEL = "looks like a number of the data model, which begins at 1"
         ),
         (
             "unit 1 coil 00",
-            f"00 {MODEL}: the first one is address 0; or 0x0 if 0 really is the address on the wire",
+            f"00 {MODEL}: the first is address 0; or 0x0 if 0 really is the address on the wire",
         ),
         ("unit 248 coil 0", "unit 248 does not exist: units are 0 to 247, and 255 on Modbus TCP"),
         ("unit 1 coil 65536", "address 65536 does not exist: addresses are 0 to 65535"),
@@ -104,12 +104,13 @@ MODEL = "looks like a number of the data model, which begins at 1"
         ),
         (
             "unit 1 holding register 4",
-            "'unit 1 holding register 4': a contact is one bit: say which of the register's, 'bit 0'"
-            " say",
+            "'unit 1 holding register 4': a contact is one bit: add the bit of the"
+            " register, such as 'bit 0'",
         ),
         (
             "unit 1 holding register 4 bit 16",
-            "'unit 1 holding register 4 bit 16': a register has bits 0 to 15, and 0 is the least",
+            "'unit 1 holding register 4 bit 16': a register has bits 0 to 15, and bit 0 is"
+            " the least significant",
         ),
         (
             "unit 1 coil 4 bit 0",
@@ -165,7 +166,7 @@ def test_a_sound_wire_has_no_problem(wire: Wire) -> None:
     [
         (
             entry("unit 1 discrete input 0", "up"),
-            "pull is for GPIO pins; the module has its own: leave it out",
+            "pull is for GPIO pins; the module has resistors of its own: delete pull",
         ),
         (
             output("unit 1 discrete input 0"),
@@ -173,12 +174,13 @@ def test_a_sound_wire_has_no_problem(wire: Wire) -> None:
         ),
         (
             output("unit 1 holding register 0 bit 3"),
-            "an output is a coil: to write a register would write its other bits too, which may be"
-            " somebody else's; driver: register commands with whole registers",
+            "an output is a coil: writing a register would also write its other bits, which"
+            " another device may use; driver: register writes whole registers",
         ),
         (
             output("unit 1 coil 0", "low"),
-            "active: low would switch it on whenever the module restarts with its coils at 0: use"
+            "active: low would switch the relay on whenever the module restarts with its"
+            " coils at 0: use"
             " the relay's normally open contact and write active: high",
         ),
     ],

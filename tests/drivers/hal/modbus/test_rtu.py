@@ -191,7 +191,7 @@ def test_an_adapter_that_echoes_unannounced_is_named(line: SerialModule) -> None
     door(line)
     line.on_wire = lambda frame: frame + _answer(line, frame)
     text = fails(bus_to(line.port, timeout_s=1.0), IN0)
-    assert "our own request comes back; does the adapter echo? say ignore_echo: true" in text
+    assert "our own request comes back; does the adapter echo? write ignore_echo: true" in text
 
 
 def test_a_second_echo_is_that_of_an_earlier_try_and_the_file_is_not_blamed(
@@ -209,7 +209,7 @@ def test_an_adapter_that_does_not_echo_although_the_file_says_so_is_named(
 ) -> None:
     door(line)
     text = fails(bus_to(line.port, ignore_echo=True), IN0)
-    assert "what came first is not the echo; does the adapter echo? see ignore_echo" in text
+    assert "the first bytes are not the echo; does the adapter echo? see ignore_echo" in text
 
 
 def test_a_port_that_vanishes_is_found_again_by_its_path(line: SerialModule) -> None:
@@ -219,7 +219,7 @@ def test_a_port_that_vanishes_is_found_again_by_its_path(line: SerialModule) -> 
     lines = bus.lines({IN0: None}, {})
     assert lines.read() == {IN0: False}
     line.pull()
-    text = f"no serial port {line.port}: it is not there; is the adapter plugged in?"
+    text = f"no serial port {line.port}: the port is not there; is the adapter plugged in?"
     assert fails(bus, IN0).startswith(text)
     line.plug()
     assert fails(bus, "unit 2 coil 0").startswith(text)  # the whole bus pauses
@@ -246,7 +246,7 @@ def test_a_port_that_another_program_has_open_is_left_alone(line: SerialModule) 
     ("port", "text"),
     [
         ("/dev/null", "Inappropriate ioctl for device"),
-        ("/dev/nowhere", "it is not there; is the adapter plugged in? ls /dev/serial/by-id"),
+        ("/dev/nowhere", "the port is not there; is the adapter plugged in? ls /dev/serial/by-id"),
         (os.path.dirname(__file__), "Is a directory"),
     ],
 )

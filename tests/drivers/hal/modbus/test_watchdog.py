@@ -277,7 +277,7 @@ SHORT = (
         ("{units: [1], profile: wago-750}", []),
         ("{units: [1], habits: " + SHORT % ("0.5", "coil 2") + "}", []),
         ("{units: [1]}", ["7:5: 'module_watchdog' needs 'habits', or a profile: wago-750"]),
-        ("{units: [1, 1], profile: wago-750}", ["7:23: 'units': names a unit twice"]),
+        ("{units: [1, 1], profile: wago-750}", ["7:23: 'units': a unit is listed twice"]),
         (
             "{units: [1], profile: wago}",
             ["7:44: unknown profile 'wago': did you mean 'wago-750'? known here: wago-750"],

@@ -31,10 +31,10 @@ def unreachable(failure: OSError) -> str:
 @pytest.mark.parametrize(
     ("failure", "text"),
     [
-        (socket.gaierror(-2, "unknown"), "its name is not known; write its address"),
+        (socket.gaierror(-2, "unknown"), "the host's name is not known; write its address"),
         (TimeoutError(), "nobody answers within 0.3 s; check power and cable"),
         (OSError(errno.ENETUNREACH, "Network is unreachable"), "Network is unreachable"),
-        (ConnectionRefusedError(), "it is refused; is this the module, and does it take more"),
+        (ConnectionRefusedError(), "refused; is this the module, and does it accept more"),
         (OSError("odd"), "odd"),
     ],
 )
@@ -80,7 +80,7 @@ LINE = {"port": "/dev/serial/by-id/a", "baudrate": 19200, "parity": "none", "sto
         ({}, ["needs a connection: write tcp: {host: …} or serial: {port: …}"]),
         (
             {"tcp": {"host": "a"}, "serial": LINE},
-            ["a bus has either tcp or serial: define a second bus for the other"],
+            ["a bus has only one of tcp and serial: define a second bus"],
         ),
     ],
 )

@@ -109,7 +109,7 @@ def test_a_module_is_read_and_its_units_are_found_and_nothing_is_written(
     reading, scan = found["bus module"]
     assert reading == ("ok", "ward_door answers: closed yes")
     assert scan[1].startswith("of the units 1 to 16 these answer: 1 (")
-    assert found["daemon"] == [("ok", "none serves this file, so its buses are asked here")]
+    assert found["daemon"] == [("ok", "no daemon serves this file, so its buses are read here")]
     assert tapped.functions <= READS
     assert module.relay() == []
     assert code in (0, 1)  # the machine that runs this test may have no watchdog
@@ -135,11 +135,13 @@ def test_the_bus_of_a_running_daemon_is_not_opened(
         assert module.relay() == []
         told = found["daemon"]
         assert [level for level, _ in told] == ["ok", "warning", "ok"]
-        assert told[0][1].endswith("its buses are not asked, because a controller has one master")
+        assert told[0][1].endswith(
+            "its buses are not read here, because a controller has only one master"
+        )
         assert told[1][1] == "door_states: nobody listens"
         assert told[2][1].startswith("ward_door was read ")
         assert "bus module" not in found
-        assert found["kill test"] == [("wrong", f"process {running.process.pid} serves it")]
+        assert found["kill test"] == [("wrong", f"process {running.process.pid} serves this file")]
 
 
 def test_where_a_daemon_cannot_be_seen_no_bus_is_opened(
@@ -161,7 +163,7 @@ def test_after_a_death_the_outputs_come_first(
     code, found = doctor(tapped.file, tmp_path, "--listen", "0")
     assert (code, found["daemon"]) == (
         2,
-        [("wrong", "it has died, and may have left outputs on")],
+        [("wrong", "the daemon has died, and may have left outputs on")],
     )
     assert tapped.clients == 0
 
@@ -329,7 +331,7 @@ def test_a_canopen_receiver_answers_and_is_found_by_its_node(tmp_path: Path) -> 
         code, found = doctor(file, tmp_path, "--listen", "0")
         (heard, silent, scanned) = sorted(found["bus can"])
         assert code == 2
-        assert heard[1].startswith("frames of no device of this file are heard: 0x70A")
+        assert heard[1].startswith("there are frames that no device of this file sends: 0x70A")
         assert "these answer: 10 (" in silent[1]
         assert "no heartbeat within 2 s, but of node 10" in scanned[1]
 
@@ -388,7 +390,7 @@ def test_a_supervisor_beside_another_one_would_be_passive(domain: int, tmp_path:
     finally:
         rmf.close()
     assert code == 1
-    assert ("warning", "1 other node(s) do the same") in found["RMF"]
+    assert ("warning", "1 other node(s) have the same task") in found["RMF"]
 
 
 def test_a_name_that_is_not_on_the_map_is_wrong(module: Module, tmp_path: Path) -> None:
@@ -406,7 +408,7 @@ def test_a_simulation_is_named_and_looked_for_on_loopback(tmp_path: Path) -> Non
         found = served(Directories(folder, folder), tmp_path / "lift_a.yaml", time.time())
     assert found.simulated
     assert [(one.level, one.found) for one in found.findings][1:] == [
-        ("note", "it is a SIMULATION")
+        ("note", "the daemon is a SIMULATION")
     ]
 
 

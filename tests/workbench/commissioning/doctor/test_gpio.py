@@ -53,7 +53,7 @@ def test_the_header_is_found_by_its_label(made: MadeUp, label: str, board: str) 
     made.chip(11, label)
     assert list(gpio(made.machine, None, made.user)) == [
         ok("gpio", f"gpiochip11 is {label}, {board}, 58 lines"),
-        ok("gpio", "pi may use it"),
+        ok("gpio", "pi may use /dev/gpiochip11"),
     ]
 
 
@@ -124,7 +124,7 @@ def test_a_doctor_without_permission_for_the_chip_says_so_and_judges_nothing_on_
             "wrong",
             "of gpiochip0, gpiochip10 this user may only open:"
             " gpiochip10 (gpio-brcmstb@107d508500)",
-            "it is not known whether the header is there",
+            "nobody knows whether the header is there",
             "use sudo, or join the group gpio",
         )
     ]

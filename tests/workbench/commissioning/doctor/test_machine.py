@@ -37,7 +37,7 @@ def test_the_exit_code_is_that_of_the_worst_finding() -> None:
 
 def test_without_the_unit_the_user_who_asks_counts_as_the_daemons(made: MadeUp) -> None:
     assert told(list(users(made.machine))) == [
-        ("note", f"the unit {UNIT} is not installed; what follows is checked for pi")
+        ("note", f"the unit {UNIT} is not installed; the findings below are for pi")
     ]
     assert (user(made.machine).name, user(made.machine).service) == ("pi", False)
 
@@ -67,7 +67,7 @@ def test_the_services_user_has_the_groups_of_the_unit(made: MadeUp) -> None:
         (True, "NTP=no", [("ok", "the clock is synchronised")]),  # chrony keeps it
         (False, "NTP=no", [("warning", "the clock is not synchronised, and NTP is off")]),
         (False, "NTP=yes", [("warning", "the clock is not synchronised")]),
-        (None, "", [("note", "the kernel does not say whether it is synchronised")]),
+        (None, "", [("note", "the kernel does not show whether the clock is synchronised")]),
     ],
 )
 def test_the_clock_is_judged_by_the_kernel_and_ntp(
@@ -141,7 +141,7 @@ def test_a_port_that_exists_and_is_permitted_is_well(made: MadeUp) -> None:
     made.write("/dev/ttyUSB0")
     made.link(BY_ID, "../../ttyUSB0")
     assert list(port(made.machine, BY_ID, made.user, served=False)) == [
-        ok("serial port", f"{BY_ID} is there, and pi may use it")
+        ok("serial port", f"{BY_ID} is there, and pi may use this port")
     ]
 
 
@@ -209,8 +209,8 @@ def test_an_interface_that_is_up_and_recovers_by_itself_is_well(made: MadeUp) ->
 def test_each_fault_of_a_can_interface_is_named(made: MadeUp) -> None:
     can0(made, state="BUS-OFF", bittiming={"bitrate": 500000})
     assert can_found(made, 250_000) == [
-        ("warning", "can0 has 500000 bit/s, but these stations come with 250000"),
-        ("wrong", "can0 is bus-off: it has left the bus"),
+        ("warning", "can0 has 500000 bit/s, but these stations are delivered with 250000"),
+        ("wrong", "can0 is bus-off: the controller has left the bus"),
         ("warning", "can0 has no restart-ms"),
     ]
     can0(made, state="ERROR-PASSIVE", bittiming={"bitrate": 500000}, restart_ms=100)
@@ -228,6 +228,4 @@ def test_an_interface_that_is_down_or_missing_or_not_can_is_wrong(made: MadeUp) 
 def test_without_the_command_ip_the_bitrate_is_not_known(made: MadeUp) -> None:
     can0(made)
     (made.root / "usr/bin/ip").unlink()
-    assert can_found(made) == [
-        ("note", "can0 is up; its bitrate is not known without the command ip")
-    ]
+    assert can_found(made) == [("note", "can0 is up; only the command ip can show its bitrate")]
