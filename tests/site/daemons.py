@@ -35,15 +35,17 @@ LEAST_GAP_S = 0.001
 
 
 class DeviceDaemon:
-    """Serves one device. `wall_step_s` is the step of its wall clock.
+    """Serves one device. `wall_step_s` is the step of its wall clock. `node` is the name on the graph, by
+    default the device's.
 
     `looks` is called with each time at which the plant is about to change or be scanned, `scanned`
     after each scan, `relayed` with each edge of a relay, `started` at the start, `hears` with each
     message that arrives.
     """
 
-    def __init__(self, timeline: Timeline, air: Air, device: Device) -> None:
+    def __init__(self, timeline: Timeline, air: Air, device: Device, node: str = "") -> None:
         self.name = device.name
+        self.node = node or device.name
         self.device = device
         self.alive = False
         self.scans = 0
@@ -70,7 +72,7 @@ class DeviceDaemon:
         """Start a new daemon, which remembers nothing."""
         self.started(self)
         device, kind = self.device, self.device.kind
-        self._place = Place(self._air, self.name, lambda: None)
+        self._place = Place(self._air, self.node, lambda: None)
         topics = [kind.states, *kind.publishes(device.settings)]
         self._publishers = {topic.name: self._place.publisher(topic) for topic in topics}
         limits = kind.limits(device.settings, device.debounce)
@@ -138,6 +140,10 @@ class DeviceDaemon:
     def status(self) -> Status:
         """Return the status as in the status file."""
         return self._node.status()
+
+    def says(self, topic: Topic[Any], message: Message) -> None:
+        """Publish this message beside those of the node."""
+        self._place.publisher(topic).publish(message)
 
     def faults(self) -> list[str]:
         """Return the codes of the faults in the status."""
@@ -271,6 +277,10 @@ class GraphDaemon:
         """Reset the daemon as `rmf-bridge reset` does."""
         self.node.reset()
         self._round()
+
+    def says(self, topic: Topic[Any], message: Message) -> None:
+        """Publish this message beside those of the node."""
+        self._place.publisher(topic).publish(message)
 
     def summary(self) -> Mapping[str, Status]:
         """Return each subject's status as in the status file."""

@@ -31,6 +31,10 @@ class Timeline:
         """Let this happen so many seconds from now."""
         self.at(self.now + seconds, what)
 
+    def next_at(self) -> float:
+        """When the next thing happens; inf: never."""
+        return self._due[0][0] if self._due else NEVER
+
     def run(self, until: float) -> None:
         """Run all events until this time."""
         due = self._due

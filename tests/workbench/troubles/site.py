@@ -1,0 +1,215 @@
+"""A whole site in virtual time: our daemons with their rings, RMF's supervisors, one fleet, and the
+machine's recorder.
+
+Everything is as at the soak's site (`tests/site`), with the names that `expected.toml` has.
+"""
+
+import os
+import subprocess
+from collections.abc import Mapping
+from functools import partial
+from pathlib import Path
+from typing import Any, Final
+
+from msgspec.structs import replace
+
+from bridges.blackbox.entries import Head
+from bridges.blackbox.recorder import Recorder
+from bridges.blackbox.recordings import Recordings
+from bridges.blackbox.ring import Ring
+from bridges.kinds.charger_coordinator import KIND as COORDINATOR
+from bridges.kinds.charger_coordinator.settings import (
+    CoordinatorSettings,
+    FleetSettings,
+    RobotSettings,
+    StationSettings,
+    Waypoint,
+)
+from bridges.kinds.lift_supervisor import KIND as LIFT_SUPERVISOR
+from bridges.kinds.lift_supervisor.settings import LiftSupervisorSettings
+from bridges.kinds.shared.graph_kind import AnyGraphKind
+from bridges.messages import topics
+from bridges.messages.stamps import stamp
+from bridges.runtime import diagnostics
+from bridges.runtime.clock import Clock
+from bridges.runtime.ring_writer import RingWriter
+from bridges.runtime.subject import Status
+from drivers.door import dry_contact as door_dry_contact
+from drivers.lift import dry_contact as lift_dry_contact
+from hal_fakes.plants.lift import LiftPace
+from tests.blackbox import kept
+from tests.site import building
+from tests.site.building import Device
+from tests.site.daemons import DeviceDaemon, GraphDaemon
+from tests.site.timeline import EPOCH, Timeline
+from tests.workbench.explain.story import Scene
+from tests.workbench.troubles.fleet import FLEET, ROBOTS, Fleet, Robot
+
+RING: Final = 1_000_000
+LIFT, OTHER_LIFT, DOOR, OTHER_DOOR = "Lift1", "Lift2", "ward_door", "lab_door"
+CHARGER, OTHER_CHARGER = "charger_a", "charger_b"
+KINDS: Final = {"lift": LIFT, "door": DOOR, "charger": CHARGER}
+PACE: Final = LiftPace(floor_s=6.0, door_s=3.0)
+PLACES: Final = {
+    CHARGER: ("L1", 10.0, 2.0),
+    OTHER_CHARGER: ("L1", 10.0, 6.0),
+    "wait_red": ("L1", 0.0, 2.0),
+    "wait_blue": ("L1", 0.0, 4.0),
+    "wait_green": ("L1", 0.0, 6.0),
+}
+
+
+class Site(Scene):
+    """`folder`: for rings and recordings. `mortal`: a daemon that will be killed as a process is."""
+
+    def __init__(self, folder: Path, mortal: str = "") -> None:
+        super().__init__(rmf=True, diagnoses=False)
+        self.devices = devices(self.timeline)
+        self.recordings = Recordings(folder / "recordings")
+        self._before: set[str] = set()
+        self.process = subprocess.Popen(["sleep", "600"]) if mortal else None
+        self._mortal = mortal
+        self._folder = folder
+        self._rings: dict[str, Path] = {}
+        self._recorder = Recorder(
+            lambda: [*self._rings.values()], self.recordings, lambda: self.timeline.now
+        )
+        for device in self.devices.values():
+            self.serve(device, f"rmf_bridge_{device.name}")
+        self.fleet = Fleet(self.timeline, self.air, PLACES)
+        self.red, self.blue = Robot(self.fleet, "red"), Robot(self.fleet, "blue")
+        self._each_second()
+        self.run(10.0)
+
+    def serve(self, device: Device, node: str) -> None:
+        """A daemon of ours for this device, on a machine of the site."""
+        daemon = self.daemons[node.removeprefix("rmf_bridge_")] = DeviceDaemon(
+            self.timeline, self.air, device, node
+        )
+        daemon.writer = self._writer(node.removeprefix("rmf_bridge_"), kept.of_device(device))
+        daemon.start()
+
+    def takes_over(self, settings: LiftSupervisorSettings) -> None:
+        """Our lift supervisor, in the place of RMF's."""
+        self.supervisors.pop("rmf_lift_supervisor").kill()
+        self._ours("lift_supervisor", LIFT_SUPERVISOR, settings)
+
+    def coordinates(self) -> None:
+        """Our charger coordinator, for the fleet's robots and both chargers."""
+        waypoints = {name: Waypoint(level=at[0], x=at[1], y=at[2]) for name, at in PLACES.items()}
+        chargers = [CHARGER, OTHER_CHARGER]
+        robots = {
+            name: RobotSettings(stations=chargers, waits_at=f"wait_{name}") for name in ROBOTS
+        }
+        settings = CoordinatorSettings(
+            stations={name: StationSettings() for name in chargers},
+            fleets={FLEET: FleetSettings(waypoints=waypoints, robots=robots)},
+        )
+        self._ours("charger_coordinator", COORDINATOR, settings)
+
+    def trouble_begins(self) -> None:
+        """From now on the recorder's files count."""
+        self._before = {path.name for path in self.recordings.folder.glob("*")}
+
+    def kills(self, name: str) -> None:
+        """The daemon's process is killed; its service switches its outputs off."""
+        if name == self._mortal and self.process:
+            self.process.kill()
+            self.process.wait()
+        self.daemons[name].kill()
+
+    def close(self) -> None:
+        """The end."""
+        if self.process:
+            self.process.kill()
+            self.process.wait()
+
+    def boards(self, robot: Robot, start: str, end: str) -> None:
+        """The robot has come into Lift1's car, and asks for another floor."""
+        robot.asks(LIFT, start)
+        self.until(robot)
+        self.run(6.0)
+        robot.asks(LIFT, end, inside=True)
+
+    def passes(self, robot: Robot, door: str) -> None:
+        """A passage through a door."""
+        robot.opens(door)
+        self.until(robot)
+        self.run(5.0)
+        robot.closes(door)
+        self.until(robot)
+        self.run(10.0)
+
+    def file(self, name: str, within_s: float = 260.0) -> Path | None:
+        """The first file that the recorder writes of this daemon after the trouble began."""
+        until = self.timeline.now + within_s
+        while not (found := self._written(name)) and self.timeline.now < until:
+            self.run(1.0)
+        return found[0] if found else None
+
+    def ring(self, name: str) -> Path:
+        """The runtime directory with this daemon's ring."""
+        return self._rings[name]
+
+    # ---- inside
+
+    def _ours(self, name: str, kind: AnyGraphKind, settings: Any) -> None:
+        node = f"rmf_bridge_{name}"
+        ours = GraphDaemon(self.timeline, self.air, node, kind, settings=settings)
+        ours.writer = self._writer(name, kept.of_graph(name, kind, settings))
+        self.supervisors[node] = ours
+        ours.start()
+        self.run(6.0)
+
+    def _each_second(self) -> None:
+        """Each daemon publishes its diagnostics (`bridges/runtime/daemon.py`, `_tell`), and the
+        recorder looks at the rings."""
+        for daemon in self.daemons.values():
+            if daemon.alive:
+                told = {daemon.name: daemon.status()}
+                self._tell(daemon, daemon.node, daemon.device.kind.name, {}, told)
+        for node in self.supervisors.values():
+            if isinstance(node, GraphDaemon) and node.alive:
+                self._tell(node, node.name, node.kind.name, node.node.status(), node.summary())
+        self._recorder.look()
+        self.timeline.after(1.0, self._each_second)
+
+    def _tell(
+        self, daemon: Any, node: str, kind: str, own: Status, of: Mapping[str, Status]
+    ) -> None:
+        at = stamp(EPOCH + self.timeline.now)
+        found = diagnostics.diagnosis(node, kind, own, of, at)
+        daemon.says(topics.DIAGNOSTICS, found)
+        daemon.writer.look()
+        daemon.writer.spoken(topics.DIAGNOSTICS.name, found, sent=True)
+
+    def _written(self, name: str) -> list[Path]:
+        files = sorted(self.recordings.folder.glob(f"{name}_2*.mcap"), key=os.path.getmtime)
+        return [path for path in files if path.name not in self._before]
+
+    def _writer(self, name: str, head: Head) -> RingWriter:
+        pid = self.process.pid if self.process and name == self._mortal else os.getpid()
+        head = replace(head, run=f"{len(self._rings) + 1:08x}", pid=pid)
+        self._rings[name] = folder = self._folder / name
+        folder.mkdir()
+        clock = Clock(lambda: self.timeline.now, lambda: EPOCH + self.timeline.now)
+        return RingWriter(partial(Ring, folder, head, RING), clock, lambda: self.air.release)
+
+
+def devices(timeline: Timeline) -> dict[str, Device]:
+    """Two of each kind: Lift1 with both door contacts and the doors at Modbus modules."""
+    content = {**building._lift2(), "fire_reset": "auto", "alarm": "fire_alarm_trigger"}
+    settings = building._convert(lift_dry_contact, content)
+    other = building._shipped("lift_dry_contact", LIFT)
+    [(_, ward, _), (_, lab, _), *_] = building._dry_doors()
+    found = [
+        building._lift(timeline, LIFT, settings, "modbus"),
+        building._lift(timeline, OTHER_LIFT, other, "gpio"),
+        building._dry_door(timeline, DOOR, building._convert(door_dry_contact, ward), "gpio"),
+        building._dry_door(timeline, OTHER_DOOR, building._convert(door_dry_contact, lab), "modbus"),
+        building._charger(timeline, CHARGER, 0),
+        building._charger(timeline, OTHER_CHARGER, 0),
+    ]
+    for device in found[:2]:
+        device.plant._pace = PACE  # type: ignore[attr-defined]
+    return {device.name: device for device in found}

@@ -1,0 +1,32 @@
+"""Each of the twelve troubles is explained as `expected.toml` has it, live and from its file."""
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import pytest
+
+from tests.workbench.troubles import asked
+from tests.workbench.troubles.site import KINDS, Site
+from tests.workbench.troubles.stories import TROUBLES, Trouble
+from tests.workbench.troubles.verdicts import VERDICTS, Verdict, wrong
+
+
+def told(trouble: Trouble, verdict: Verdict, folder: Path) -> tuple[str, Mapping[str, str]]:
+    """The screen, and the names of the nodes."""
+    site = Site(folder, trouble.mortal)
+    try:
+        names = trouble.stage(site) or {}
+        device = KINDS[verdict.device]
+        if verdict.view == "live":
+            return asked.live_screen(site, device), names
+        return asked.file_screen(site, device, trouble.daemon, trouble.note), names
+    finally:
+        site.close()
+
+
+@pytest.mark.parametrize("verdict", VERDICTS, ids=lambda verdict: "-".join(verdict.key))
+def test_a_trouble_is_explained_as_expected(verdict: Verdict, tmp_path: Path) -> None:
+    assert verdict.key in TROUBLES, "it has no story"
+    screen, names = told(TROUBLES[verdict.key], verdict, tmp_path)
+    found = wrong(verdict, screen, names)
+    assert not found, "\n".join([*found, "", screen, "", verdict.story])
