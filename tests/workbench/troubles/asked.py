@@ -4,7 +4,6 @@ import io
 from collections import deque
 from contextlib import redirect_stderr, redirect_stdout
 from functools import partial
-from pathlib import Path
 from queue import Empty
 from typing import Any, Final
 
@@ -15,11 +14,10 @@ from bridges.commands import incident
 from tests.site.network import Place
 from tests.site.timeline import EPOCH, Timeline
 from tests.workbench.troubles.site import Site
-from workbench.commands import explain
+from workbench.commands import explain, send
 from workbench.graph import live
 
 LISTENS_S: Final = 10.0
-LISTENER: Final = "rmf_bridge_explain"
 
 
 def live_screen(site: Site, device: str) -> str:
@@ -39,23 +37,28 @@ def file_screen(site: Site, device: str, daemon: str = "", note: str = "") -> st
     return f"{path.name}\n{_typed(site, 'explain', str(path), device)}"
 
 
+def release_screen(site: Site, device: str) -> str:
+    """`release`, by a person who knows that the car is empty."""
+    return _typed(site, "release", device)
+
+
 def _typed(site: Site, *words: str) -> str:
+    def joined(args: Any, name: str) -> Place:
+        return Place(site.air, name, lambda: None)
+
     told = io.StringIO()
     with pytest.MonkeyPatch.context() as patch, redirect_stdout(told), redirect_stderr(told):
         patch.setenv("COLUMNS", "100")
         patch.setenv("LINES", "41")
         time = _Time(site.timeline)
-        for module in (explain, live):
+        for module in (explain, live, send):
             patch.setattr(module, "time", time)
+        for module in (explain, send):
+            patch.setattr(module, "open_graph", joined)
         patch.setattr(incident, "machine_s", time.monotonic)
         patch.setattr(live, "SimpleQueue", partial(_Queue, site.timeline))
-        patch.setattr(explain, "open_graph", lambda args, name: Place(site.air, name, _nothing))
         cli.main(list(words))
     return told.getvalue()
-
-
-def _nothing() -> None:
-    pass
 
 
 class _Time:

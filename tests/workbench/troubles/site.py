@@ -9,6 +9,7 @@ import subprocess
 from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
+from random import Random
 from typing import Any, Final
 
 from msgspec.structs import replace
@@ -49,6 +50,8 @@ RING: Final = 1_000_000
 LIFT, OTHER_LIFT, DOOR, OTHER_DOOR = "Lift1", "Lift2", "ward_door", "lab_door"
 CHARGER, OTHER_CHARGER = "charger_a", "charger_b"
 KINDS: Final = {"lift": LIFT, "door": DOOR, "charger": CHARGER}
+TIMEOUT_S: Final = 0.5
+TOO_LATE: Final = "modbus unit 1 at 192.168.1.50:502, read discrete inputs 0 to 13: no reply within 0.5 s, tried 2x"
 PACE: Final = LiftPace(floor_s=6.0, door_s=3.0)
 PLACES: Final = {
     CHARGER: ("L1", 10.0, 2.0),
@@ -69,6 +72,7 @@ class Site(Scene):
         self._before: set[str] = set()
         self.process = subprocess.Popen(["sleep", "600"]) if mortal else None
         self._mortal = mortal
+        self._random = Random(31)
         self._folder = folder
         self._rings: dict[str, Path] = {}
         self._recorder = Recorder(
@@ -117,6 +121,19 @@ class Site(Scene):
             self.process.kill()
             self.process.wait()
         self.daemons[name].kill()
+
+    def retires(self, name: str) -> None:
+        """The daemon shuts down in good order, and is not started again."""
+        daemon = self.daemons.pop(name)
+        daemon.kill()
+        daemon.writer.ended(safe=True)
+
+    def slow(self, name: str) -> None:
+        """The device's unit answers after 0.1 to 4 s from now on, so that most replies are too late."""
+        late_s = self._random.uniform(0.1, 4.0)
+        self.devices[name].far.down = TOO_LATE if late_s > TIMEOUT_S else ""
+        self.daemons[name].scan()
+        self.timeline.after(TIMEOUT_S, lambda: self.slow(name))
 
     def close(self) -> None:
         """The end."""
@@ -206,7 +223,9 @@ def devices(timeline: Timeline) -> dict[str, Device]:
         building._lift(timeline, LIFT, settings, "modbus"),
         building._lift(timeline, OTHER_LIFT, other, "gpio"),
         building._dry_door(timeline, DOOR, building._convert(door_dry_contact, ward), "gpio"),
-        building._dry_door(timeline, OTHER_DOOR, building._convert(door_dry_contact, lab), "modbus"),
+        building._dry_door(
+            timeline, OTHER_DOOR, building._convert(door_dry_contact, lab), "modbus"
+        ),
         building._charger(timeline, CHARGER, 0),
         building._charger(timeline, OTHER_CHARGER, 0),
     ]

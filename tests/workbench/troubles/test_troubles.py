@@ -17,6 +17,8 @@ def told(trouble: Trouble, verdict: Verdict, folder: Path) -> tuple[str, Mapping
     try:
         names = trouble.stage(site) or {}
         device = KINDS[verdict.device]
+        if trouble.release:
+            return asked.release_screen(site, device), names
         if verdict.view == "live":
             return asked.live_screen(site, device), names
         return asked.file_screen(site, device, trouble.daemon, trouble.note), names

@@ -21,7 +21,8 @@ class Rule(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Verdict(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """One entry. `says`, `next_says`: each list needs one of its phrases. `never`, `next_never`: none."""
+    """One entry. `says`, `next_says`: each list needs one of its phrases. `never`, `next_never`: no
+    phrase of theirs may occur."""
 
     name: str
     view: str

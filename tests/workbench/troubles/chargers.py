@@ -1,0 +1,24 @@
+"""Troubles at a charging station: charger_a, under our coordinator."""
+
+from tests.workbench.troubles.site import CHARGER, Site
+
+
+def daemon_killed(site: Site) -> None:
+    """The station's daemon is killed while a robot charges."""
+    site.coordinates()
+    site.fleet.robots.charge("red", site.fleet.now)
+    site.run(40.0)
+    site.press(CHARGER, "robot", True)
+    site.run(30.0)
+    site.trouble_begins()
+    site.kills(CHARGER)
+    site.run(30.0)
+
+
+def robot_never_comes(site: Site) -> None:
+    """The coordinator has granted the station to a robot that does not drive."""
+    site.coordinates()
+    site.trouble_begins()
+    site.fleet.robots.robots["red"].stuck = True
+    site.fleet.robots.charge("red", site.fleet.now)
+    site.run(75.0)

@@ -1,0 +1,270 @@
+"""Troubles at a lift: Lift1, under RMF's own supervisor where nothing else is said."""
+
+from typing import Any, Final
+
+from msgspec.structs import replace
+
+from bridges.kinds.lift_supervisor.settings import LiftSupervisorSettings
+from bridges.messages import definitions as d
+from bridges.messages import topics
+from bridges.messages.stamps import in_seconds, stamp
+from drivers.hal import HalError
+from tests.site.daemons import RmfsSupervisor
+from tests.site.network import Place
+from tests.site.timeline import EPOCH
+from tests.workbench.troubles.site import LIFT, Site, devices
+from workbench.rmf_model import Said
+from workbench.rmf_model.supervisors import LiftSupervisor
+
+RMFS: Final = "rmf_lift_supervisor"
+SUPERVISOR: Final = "lift_supervisor"
+HOUR_S: Final = 3600.0
+OLD_S: Final = 10.0
+NOT_WRITTEN: Final = (
+    "unit 1 coil 0 reads 0 after 1 was written: the module has restarted, its watchdog has tripped,"
+    " or somebody else writes it"
+)
+
+
+def robot_dies_in_car(site: Site) -> None:
+    """Its adapter speaks for it no longer, and goes on for another robot."""
+    site.boards(site.red, "L1", "L3")
+    site.run(4.0)
+    site.blue.asks(LIFT, "L1")
+    site.until(site.red)
+    site.run(2.0)
+    site.trouble_begins()
+    site.red.is_dropped()
+    site.run(120.0)
+
+
+def robot_dies_in_car_b(site: Site) -> None:
+    """Its adapter does not notice."""
+    site.boards(site.red, "L1", "L3")
+    site.run(4.0)
+    site.trouble_begins()
+    site.blue.asks(LIFT, "L1")
+    site.until(site.red)
+    site.run(150.0)
+
+
+def fire_mid_ride(site: Site) -> None:
+    """The car is on its way down to the recall floor, and its robot's adapter asks for that floor."""
+    _fire_between_floors(site)
+    site.red.asks(LIFT, "L1", inside=True)
+    site.run(5.0)
+
+
+def fire_mid_ride_to_its_end(site: Site) -> None:
+    """The robot leaves at the recall floor."""
+    fire_mid_ride(site)
+    site.until(site.red)
+    site.run(2.0)
+    site.red.ends(LIFT)
+    site.until(site.red)
+
+
+def fire_mid_ride_b(site: Site) -> None:
+    """The car stands open at the recall floor, and the adapter goes on asking for L3."""
+    _fire_between_floors(site)
+    site.run(80.0)
+
+
+def lift_door_contact_cut(site: Site) -> None:
+    """The door's 'opened' wire is cut during a ride."""
+    site.boards(site.red, "L1", "L3")
+    site.run(8.0)
+    site.trouble_begins()
+    site.fail(LIFT, "door_opened", "off")
+    site.run(40.0)
+
+
+def supervisor_killed(site: Site) -> None:
+    """RMF's supervisor is dead when two robots ask for the free lift."""
+    site.rides(site.red, LIFT, "L1", "L2")
+    site.run(5.0)
+    site.supervisors[RMFS].kill()
+    site.run(60.0)
+    site.trouble_begins()
+    site.red.asks(LIFT, "L1")
+    site.blue.asks(LIFT, "L3")
+    site.run(20.0)
+
+
+def supervisor_killed_b(site: Site) -> None:
+    """RMF's supervisor dies during a ride; the robot leaves the car and its adapter sends END."""
+    site.boards(site.red, "L1", "L3")
+    site.run(5.0)
+    site.trouble_begins()
+    site.supervisors[RMFS].kill()
+    site.blue.asks(LIFT, "L1")
+    site.until(site.red)
+    site.run(6.0)
+    site.red.ends(LIFT)
+    site.run(120.0)
+
+
+def rmf_silent_robot_asks(site: Site) -> None:
+    """RMF's supervisor dies when the robot has just boarded."""
+    site.red.asks(LIFT, "L1")
+    site.until(site.red)
+    site.run(3.0)
+    site.trouble_begins()
+    site.supervisors[RMFS].kill()
+    site.run(5.0)
+    site.red.asks(LIFT, "L3", inside=True)
+    site.run(60.0)
+
+
+def slow_modbus_unit(site: Site) -> None:
+    """The lift's unit answers now and then."""
+    site.run(5.0)
+    site.trouble_begins()
+    site.slow(LIFT)
+    site.run(10.0)
+    site.blue.asks(LIFT, "L2")
+    site.run(40.0)
+
+
+def two_daemons_one_name(site: Site) -> dict[str, str]:
+    """A second daemon of ours, for another lift, has the same name."""
+    site.rides(site.red, LIFT, "L2", "L1")
+    site.run(60.0)
+    site.trouble_begins()
+    other = devices(site.timeline)[LIFT]
+    site.serve(other, "rmf_bridge_lift_north")
+    site.press("lift_north", "hall_L3", True)
+    site.press("lift_north", "obstruction", True)
+    site.red.asks(LIFT, "L1")
+    site.run(40.0)
+    return {"node_a": f"rmf_bridge_{LIFT}", "node_b": "rmf_bridge_lift_north"}
+
+
+def two_foreign_nodes(site: Site) -> dict[str, str]:
+    """Two nodes of another maker publish the same states; our supervisor serves the lifts."""
+    site.retires(LIFT)
+    site.takes_over(LiftSupervisorSettings())
+    site.run(20.0)
+    site.trouble_begins()
+    Foreign(site, "lift_gateway")
+    site.run(0.4)
+    Foreign(site, "old_lift_gateway", behind_s=0.7)
+    site.run(60.0)
+    return {"node_a": "lift_gateway", "node_b": "old_lift_gateway"}
+
+
+def robot_clock_hour_off(site: Site) -> None:
+    """The adapter's clock is an hour behind, under a supervisor that drops old requests.
+
+    Ours believes a requester that repeats itself (FRESHNESS-5), so the supervisor is another maker's.
+    """
+    site.supervisors.pop(RMFS).kill()
+    name = "site_lift_supervisor"
+    foreign = RmfsSupervisor(
+        site.timeline, site.air, name, StrictSupervisor, [topics.LIFT_REQUESTS]
+    )
+    site.supervisors[name] = foreign
+    foreign.start()
+    site.trouble_begins()
+    site.fleet.behind_s = HOUR_S
+    site.red.asks(LIFT, "L1")
+    site.run(30.0)
+
+
+def robot_clock_hour_off_b(site: Site) -> None:
+    """The adapter's clock is an hour ahead, under RMF's supervisor; a ride goes on."""
+    site.fleet.behind_s = -HOUR_S
+    site.trouble_begins()
+    site.boards(site.red, "L1", "L4")
+    site.blue.asks(LIFT, "L1")
+    site.run(4.0)
+
+
+def daemon_killed(site: Site) -> None:
+    """The lift's daemon is killed during a ride."""
+    site.boards(site.red, "L1", "L3")
+    site.run(8.0)
+    site.trouble_begins()
+    site.kills(LIFT)
+    site.run(30.0)
+
+
+def fleet_adapter_killed(site: Site) -> None:
+    """The adapter of the robot in the car is killed, while another robot of it waits."""
+    site.boards(site.red, "L1", "L3")
+    site.blue.asks(LIFT, "L2")
+    site.until(site.red)
+    site.run(3.0)
+    site.trouble_begins()
+    site.fleet.dies()
+    site.run(30.0)
+
+
+def human_mode_with_fault(site: Site) -> None:
+    """The relay that asks for AGV mode reads back off."""
+    lines: Any = site.devices[LIFT].far
+    drives = lines.drive
+
+    def refuses(levels: Any) -> None:
+        if any(levels.values()):
+            raise HalError(NOT_WRITTEN)
+        drives(levels)
+
+    lines.drive = refuses
+    site.trouble_begins()
+    site.red.asks(LIFT, "L1")
+    site.run(40.0)
+
+
+def human_mode_relays_off(site: Site) -> None:
+    """An unsteady input takes the relays off again and again, until they must rest."""
+    site.trouble_begins()
+    site.fail(LIFT, "manual_mode", "garbage")
+    site.red.asks(LIFT, "L1")
+    site.run(40.0)
+
+
+def human_mode_asked(site: Site) -> None:
+    """The relay asks for AGV mode, and the controller does not confirm it."""
+    site.fail(LIFT, "controller", "off")
+    site.trouble_begins()
+    site.red.asks(LIFT, "L1")
+    site.run(75.0)
+
+
+def _fire_between_floors(site: Site) -> None:
+    site.boards(site.red, "L1", "L3")
+    site.run(13.0)
+    site.trouble_begins()
+    site.press(LIFT, "fire_alarm", True)
+
+
+class StrictSupervisor(LiftSupervisor):
+    """A supervisor that drops requests older than OLD_S."""
+
+    def hear(self, message: d.Message, now: float) -> list[Said]:
+        if isinstance(message, d.LiftRequest) and now - in_seconds(message.request_time) > OLD_S:
+            return []
+        return super().hear(message, now)
+
+
+class Foreign:
+    """Another maker's lift node, which says the same each second. `behind_s`: its clock's error."""
+
+    def __init__(self, site: Site, node: str, behind_s: float = 0.0) -> None:
+        self._timeline = site.timeline
+        self._behind_s = behind_s
+        self._place = Place(site.air, node, lambda: None)
+        self._mouth = self._place.publisher(topics.LIFT_STATES)
+        self._state = d.LiftState(
+            lift_name=LIFT,
+            available_floors=("L1", "L2", "L3", "L4"),
+            current_floor="L1",
+            current_mode=d.LiftMode.MODE_AGV,
+        )
+        self._say()
+
+    def _say(self) -> None:
+        at = stamp(EPOCH + self._timeline.now - self._behind_s)
+        self._mouth.publish(replace(self._state, lift_time=at))
+        self._timeline.after(1.0, self._say)
