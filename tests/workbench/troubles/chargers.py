@@ -22,3 +22,10 @@ def robot_never_comes(site: Site) -> None:
     site.fleet.robots.robots["red"].stuck = True
     site.fleet.robots.charge("red", site.fleet.now)
     site.run(75.0)
+
+
+def robot_never_comes_in_time(site: Site) -> None:
+    """The same, until start_timeout is near."""
+    robot_never_comes(site)
+    site.run(200.0)
+    site.trouble_begins()

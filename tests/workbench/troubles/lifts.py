@@ -1,6 +1,6 @@
 """Troubles at a lift: Lift1, under RMF's own supervisor where nothing else is said."""
 
-from typing import Any, Final
+from typing import Final
 
 from msgspec.structs import replace
 
@@ -8,10 +8,11 @@ from bridges.kinds.lift_supervisor.settings import LiftSupervisorSettings
 from bridges.messages import definitions as d
 from bridges.messages import topics
 from bridges.messages.stamps import in_seconds, stamp
-from drivers.hal import HalError
+from drivers.hal.modbus.points import parse
 from tests.site.daemons import RmfsSupervisor
 from tests.site.network import Place
 from tests.site.timeline import EPOCH
+from tests.workbench.troubles.module import ModuleFar
 from tests.workbench.troubles.site import LIFT, Site, devices
 from workbench.rmf_model import Said
 from workbench.rmf_model.supervisors import LiftSupervisor
@@ -20,10 +21,7 @@ RMFS: Final = "rmf_lift_supervisor"
 SUPERVISOR: Final = "lift_supervisor"
 HOUR_S: Final = 3600.0
 OLD_S: Final = 10.0
-NOT_WRITTEN: Final = (
-    "unit 1 coil 0 reads 0 after 1 was written: the module has restarted, its watchdog has tripped,"
-    " or somebody else writes it"
-)
+FLICKERS_S: Final = 1.6
 
 
 def robot_dies_in_car(site: Site) -> None:
@@ -76,7 +74,7 @@ def lift_door_contact_cut(site: Site) -> None:
     site.run(8.0)
     site.trouble_begins()
     site.fail(LIFT, "door_opened", "off")
-    site.run(40.0)
+    site.run(45.0)
 
 
 def supervisor_killed(site: Site) -> None:
@@ -175,7 +173,7 @@ def robot_clock_hour_off_b(site: Site) -> None:
     """The adapter's clock is an hour ahead, under RMF's supervisor; a ride goes on."""
     site.fleet.behind_s = -HOUR_S
     site.trouble_begins()
-    site.boards(site.red, "L1", "L4")
+    site.boards(site.red, "L1", "L3")
     site.blue.asks(LIFT, "L1")
     site.run(4.0)
 
@@ -202,15 +200,9 @@ def fleet_adapter_killed(site: Site) -> None:
 
 def human_mode_with_fault(site: Site) -> None:
     """The relay that asks for AGV mode reads back off."""
-    lines: Any = site.devices[LIFT].far
-    drives = lines.drive
-
-    def refuses(levels: Any) -> None:
-        if any(levels.values()):
-            raise HalError(NOT_WRITTEN)
-        drives(levels)
-
-    lines.drive = refuses
+    far = site.devices[LIFT].far
+    assert isinstance(far, ModuleFar)
+    far.dead = frozenset({parse("unit 1 coil 0")})
     site.trouble_begins()
     site.red.asks(LIFT, "L1")
     site.run(40.0)
@@ -218,10 +210,13 @@ def human_mode_with_fault(site: Site) -> None:
 
 def human_mode_relays_off(site: Site) -> None:
     """An unsteady input takes the relays off again and again, until they must rest."""
-    site.trouble_begins()
-    site.fail(LIFT, "manual_mode", "garbage")
     site.red.asks(LIFT, "L1")
-    site.run(40.0)
+    while not site.daemons[LIFT].faults() or "RELAY_RESTS" not in site.daemons[LIFT].faults():
+        site.trouble_begins()
+        site.press(LIFT, "manual_mode", True)
+        site.run(0.2)
+        site.press(LIFT, "manual_mode", False)
+        site.run(FLICKERS_S)
 
 
 def human_mode_asked(site: Site) -> None:
@@ -234,7 +229,7 @@ def human_mode_asked(site: Site) -> None:
 
 def _fire_between_floors(site: Site) -> None:
     site.boards(site.red, "L1", "L3")
-    site.run(13.0)
+    site.run(18.0)
     site.trouble_begins()
     site.press(LIFT, "fire_alarm", True)
 

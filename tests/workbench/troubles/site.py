@@ -4,6 +4,7 @@ machine's recorder.
 Everything is as at the soak's site (`tests/site`), with the names that `expected.toml` has.
 """
 
+import dataclasses
 import os
 import subprocess
 from collections.abc import Mapping
@@ -45,14 +46,15 @@ from tests.site.daemons import DeviceDaemon, GraphDaemon
 from tests.site.timeline import EPOCH, Timeline
 from tests.workbench.explain.story import Scene
 from tests.workbench.troubles.fleet import FLEET, ROBOTS, Fleet, Robot
+from tests.workbench.troubles.module import ModuleFar
 
 RING: Final = 1_000_000
 LIFT, OTHER_LIFT, DOOR, OTHER_DOOR = "Lift1", "Lift2", "ward_door", "lab_door"
 CHARGER, OTHER_CHARGER = "charger_a", "charger_b"
 KINDS: Final = {"lift": LIFT, "door": DOOR, "charger": CHARGER}
 TIMEOUT_S: Final = 0.5
-TOO_LATE: Final = "modbus unit 1 at 192.168.1.50:502, read discrete inputs 0 to 13: no reply within 0.5 s, tried 2x"
-PACE: Final = LiftPace(floor_s=6.0, door_s=3.0)
+TOO_LATE: Final = "modbus unit 1 at 192.168.1.50:502, read inputs: no reply within 0.5 s, tried 2x"
+PACE: Final = LiftPace(floor_s=8.0, door_s=3.0)
 PLACES: Final = {
     CHARGER: ("L1", 10.0, 2.0),
     OTHER_CHARGER: ("L1", 10.0, 6.0),
@@ -78,7 +80,7 @@ class Site(Scene):
         self._recorder = Recorder(
             lambda: [*self._rings.values()], self.recordings, lambda: self.timeline.now
         )
-        for device in self.devices.values():
+        for device in [*self.devices.values()]:
             self.serve(device, f"rmf_bridge_{device.name}")
         self.fleet = Fleet(self.timeline, self.air, PLACES)
         self.red, self.blue = Robot(self.fleet, "red"), Robot(self.fleet, "blue")
@@ -87,10 +89,10 @@ class Site(Scene):
 
     def serve(self, device: Device, node: str) -> None:
         """A daemon of ours for this device, on a machine of the site."""
-        daemon = self.daemons[node.removeprefix("rmf_bridge_")] = DeviceDaemon(
-            self.timeline, self.air, device, node
-        )
-        daemon.writer = self._writer(node.removeprefix("rmf_bridge_"), kept.of_device(device))
+        name = node.removeprefix("rmf_bridge_")
+        self.devices[name] = device
+        self.daemons[name] = daemon = DeviceDaemon(self.timeline, self.air, device, node)
+        daemon.writer = self._writer(name, kept.of_device(device))
         daemon.start()
 
     def takes_over(self, settings: LiftSupervisorSettings) -> None:
@@ -130,8 +132,9 @@ class Site(Scene):
 
     def slow(self, name: str) -> None:
         """The device's unit answers after 0.1 to 4 s from now on, so that most replies are too late."""
-        late_s = self._random.uniform(0.1, 4.0)
-        self.devices[name].far.down = TOO_LATE if late_s > TIMEOUT_S else ""
+        far, late_s = self.devices[name].far, self._random.uniform(0.1, 4.0)
+        assert isinstance(far, ModuleFar)
+        far.silent(TOO_LATE if late_s > TIMEOUT_S else "")
         self.daemons[name].scan()
         self.timeline.after(TIMEOUT_S, lambda: self.slow(name))
 
@@ -214,21 +217,31 @@ class Site(Scene):
 
 
 def devices(timeline: Timeline) -> dict[str, Device]:
-    """Two of each kind: Lift1 with both door contacts and the doors at Modbus modules."""
+    """Two of each kind. Lift1, with two door contacts, and both doors are at Modbus modules."""
     content = {**building._lift2(), "fire_reset": "auto", "alarm": "fire_alarm_trigger"}
     settings = building._convert(lift_dry_contact, content)
     other = building._shipped("lift_dry_contact", LIFT)
-    [(_, ward, _), (_, lab, _), *_] = building._dry_doors()
+    (_, lab, _) = building._dry_doors()[1]
     found = [
-        building._lift(timeline, LIFT, settings, "modbus"),
+        _at_module(timeline, building._lift(timeline, LIFT, settings, "modbus"), lift_dry_contact),
         building._lift(timeline, OTHER_LIFT, other, "gpio"),
-        building._dry_door(timeline, DOOR, building._convert(door_dry_contact, ward), "gpio"),
-        building._dry_door(
-            timeline, OTHER_DOOR, building._convert(door_dry_contact, lab), "modbus"
-        ),
+        _at_module(timeline, _door(timeline, DOOR, lab), door_dry_contact),
+        _door(timeline, OTHER_DOOR, lab),
         building._charger(timeline, CHARGER, 0),
         building._charger(timeline, OTHER_CHARGER, 0),
     ]
     for device in found[:2]:
         device.plant._pace = PACE  # type: ignore[attr-defined]
     return {device.name: device for device in found}
+
+
+def _door(timeline: Timeline, name: str, content: dict[str, Any]) -> Device:
+    settings = building._convert(door_dry_contact, content)
+    return building._dry_door(timeline, name, settings, "modbus")
+
+
+def _at_module(timeline: Timeline, device: Device, driver: Any) -> Device:
+    """The device, with the HAL's own lines between its driver and its module."""
+    far = ModuleFar(timeline, device.plant, driver.wires(device.settings))
+    made = partial(driver.create, device.name, device.settings, far)
+    return dataclasses.replace(device, far=far, driver=made)

@@ -14,8 +14,8 @@ Stage = Callable[[Site], Mapping[str, str] | None]
 
 @dataclass(frozen=True)
 class Trouble:
-    """`daemon`: the owner of the file, if not the device's. `note`: of a person who asks for a file that
-    the recorder does not write by itself. `mortal`: the daemon that is killed. `release`: the person
+    """`daemon`: the owner of the file, if not the device's. `note`: a person's, with which to ask for a
+    file that the recorder does not write. `mortal`: the daemon that is killed. `release`: the person
     types `rmf-bridge release`."""
 
     stage: Stage
@@ -65,7 +65,7 @@ TROUBLES: Final[Mapping[tuple[str, str, str], Trouble]] = {
     ("daemon_killed", FILE, DOORS): Trouble(doors.daemon_killed, mortal=DOOR),
     ("daemon_killed", LIVE, CHARGER): Trouble(chargers.daemon_killed),
     ("robot_never_reaches_charger", LIVE, CHARGER): Trouble(chargers.robot_never_comes),
-    ("robot_never_reaches_charger", FILE, CHARGER): Trouble(chargers.robot_never_comes),
+    ("robot_never_reaches_charger", FILE, CHARGER): Trouble(chargers.robot_never_comes_in_time),
     ("fleet_adapter_killed", LIVE, LIFT): Trouble(lifts.fleet_adapter_killed),
     ("fleet_adapter_killed", FILE, LIFT): Trouble(
         lifts.fleet_adapter_killed, note="red stands in the car"

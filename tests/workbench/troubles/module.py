@@ -1,0 +1,50 @@
+"""A Modbus module in virtual time, under the HAL's own lines: read-back, contradictions and pauses.
+
+Only the wire is missing, with its timeouts and its backoff (`drivers/hal/modbus/bus.py`).
+"""
+
+from collections.abc import Mapping
+
+from drivers.hal.modbus.lines import ModbusLines
+from drivers.hal.modbus.points import Point, parse
+from drivers.hal.points import Pull
+from hal_fakes.wiring import PlantWiring
+from tests.drivers.far import PointsFar, RegisterFar
+
+
+class ModuleFar(PointsFar):
+    """The far side of a device at a module. `dead`: coils that stay off, whatever is written."""
+
+    dead: frozenset[Point] = frozenset()
+
+    def lines(  # type: ignore[override]
+        self, inputs: Mapping[str, Pull | None], outputs: Mapping[str, bool]
+    ) -> ModbusLines:
+        units = RegisterFar(self._clock, _Cells(self, self._wiring))
+        self.units = units
+        found = {name: parse(name) for name in inputs}, {name: parse(name) for name in outputs}
+        return ModbusLines(units, *found, dict(outputs))  # type: ignore[arg-type]
+
+    def silent(self, why: str) -> None:
+        """It does not answer from now on, for this reason; "": it does."""
+        self.down = self.units.down = why
+
+
+class _Cells:
+    def __init__(self, far: ModuleFar, wiring: PlantWiring) -> None:
+        self._far = far
+        self._wiring = wiring
+        self._coils: dict[Point, int] = {}
+        self._names = {parse(name): name for name in (*wiring.inputs, *wiring.outputs)}
+        self.outputs = frozenset(parse(name) for name in wiring.outputs)
+
+    def get(self, point: Point, now: float) -> int:
+        name = self._names.get(point, "")
+        if name in self._wiring.inputs:
+            return self._wiring.levels(now)[name]
+        return self._coils.get(point, 0)
+
+    def set(self, point: Point, value: int, now: float) -> bool:
+        self._coils[point] = 0 if point in self._far.dead else value
+        self._wiring.drive(self._names[point], bool(self._coils[point]), now)
+        return True
