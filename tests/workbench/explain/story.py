@@ -3,6 +3,7 @@
 Everything that is said on the graph is kept as `Heard`, as a recording or a listener would have it.
 """
 
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from random import Random
 from typing import Any
@@ -37,25 +38,14 @@ SUPERVISORS: dict[str, AnyGraphKind] = {
 }
 
 
-class Guest:
-    """A fleet adapter with one robot, on the air. `behind_s`: its clock's error."""
+class Rider(ABC):
+    """A robot as its task goes on. `robot`: what its fleet adapter knows of it."""
 
-    def __init__(self, timeline: Timeline, air: Air, name: str) -> None:
-        self.robot = RobotContext(name)
-        self.behind_s = 0.0
-        self.place = Place(air, name, lambda: None)
-        self._timeline = timeline
-        self._alarm = Alarm(timeline, self._tick)
-        self._mouths = {
-            topic.name: self.place.publisher(topic)
-            for topic in (topics.ADAPTER_LIFT_REQUESTS, topics.ADAPTER_DOOR_REQUESTS)
-        }
-        for topic in self.robot.subscribes:
-            self.place.subscribe(topic, self._hear)
+    robot: RobotContext
 
+    @abstractmethod
     def begin(self, phase: Phase) -> None:
         """Its task comes to this phase."""
-        self._say(self.robot.begin(phase, self._now))
 
     def asks(self, lift: str, floor: str, *, inside: bool = False) -> None:
         """RequestLift."""
@@ -72,6 +62,26 @@ class Guest:
     def closes(self, door: str) -> None:
         """DoorClose."""
         self.begin(DoorClose(door))
+
+
+class Guest(Rider):
+    """A fleet adapter with one robot, on the air. `behind_s`: its clock's error."""
+
+    def __init__(self, timeline: Timeline, air: Air, name: str) -> None:
+        self.robot = RobotContext(name)
+        self.behind_s = 0.0
+        self.place = Place(air, name, lambda: None)
+        self._timeline = timeline
+        self._alarm = Alarm(timeline, self._tick)
+        self._mouths = {
+            topic.name: self.place.publisher(topic)
+            for topic in (topics.ADAPTER_LIFT_REQUESTS, topics.ADAPTER_DOOR_REQUESTS)
+        }
+        for topic in self.robot.subscribes:
+            self.place.subscribe(topic, self._hear)
+
+    def begin(self, phase: Phase) -> None:
+        self._say(self.robot.begin(phase, self._now))
 
     def dies(self) -> None:
         """Its adapter is gone, without a word."""
@@ -125,14 +135,14 @@ class Scene:
         """So much time passes."""
         self.timeline.run(self.timeline.now + seconds)
 
-    def until(self, guest: Guest, within_s: float = 90.0) -> None:
+    def until(self, guest: Rider, within_s: float = 90.0) -> None:
         """Until the robot's phase is done."""
         end = self.timeline.now + within_s
         while not guest.robot.done:
             assert self.timeline.now < end, f"not within {within_s} s"
             self.run(0.25)
 
-    def rides(self, guest: Guest, lift: str, start: str, end: str) -> None:
+    def rides(self, guest: Rider, lift: str, start: str, end: str) -> None:
         """A whole ride."""
         guest.asks(lift, start)
         self.until(guest)

@@ -7,9 +7,9 @@ from bridges.messages import topics
 from bridges.messages.topics import Topic
 from tests.site.network import Air, Place
 from tests.site.timeline import EPOCH, Alarm, Timeline
+from tests.workbench.explain.story import Rider
 from workbench.rmf_model import Party
 from workbench.rmf_model.fleet import FleetAdapter
-from workbench.rmf_model.phases import DoorClose, DoorOpen, EndLiftSession, RequestLift
 from workbench.rmf_model.robot import Phase, RobotContext
 
 FLEET: Final = "fleet"
@@ -76,36 +76,24 @@ class Fleet:
                 self.say(party.tick(self.now + 1e-6))
 
 
-class Robot:
-    """One robot of the fleet. `robot`: what its adapter knows of it."""
+class Robot(Rider):
+    """One robot of the fleet."""
 
     def __init__(self, fleet: Fleet, name: str) -> None:
-        self.name = f"{FLEET}/{name}"
-        self.robot = RobotContext(self.name)
+        self.robot = RobotContext(f"{FLEET}/{name}")
         self._fleet = fleet
         fleet.add(self.robot)
 
     def begin(self, phase: Phase) -> None:
-        """Its task comes to this phase."""
         self._fleet.say(self.robot.begin(phase, self._fleet.now))
 
     def asks(self, lift: str, floor: str, *, inside: bool = False) -> None:
-        """RequestLift."""
         self.robot.in_car = inside
-        self.begin(RequestLift(lift, floor, inside=inside))
+        super().asks(lift, floor, inside=inside)
 
     def ends(self, lift: str) -> None:
-        """It is out of the car: EndLiftSession."""
         self.robot.in_car = False
-        self.begin(EndLiftSession(lift))
-
-    def opens(self, door: str) -> None:
-        """DoorOpen."""
-        self.begin(DoorOpen(door))
-
-    def closes(self, door: str) -> None:
-        """DoorClose."""
-        self.begin(DoorClose(door))
+        super().ends(lift)
 
     def is_dropped(self) -> None:
         """Its adapter says nothing for it any more."""

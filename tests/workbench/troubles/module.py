@@ -17,7 +17,7 @@ class ModuleFar(PointsFar):
 
     dead: frozenset[Point] = frozenset()
 
-    def lines(  # type: ignore[override]
+    def lines(
         self, inputs: Mapping[str, Pull | None], outputs: Mapping[str, bool]
     ) -> ModbusLines:
         units = RegisterFar(self._clock, _Cells(self, self._wiring))

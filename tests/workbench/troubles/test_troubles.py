@@ -28,7 +28,7 @@ OTHERWISE: Mapping[str, str] = {
     " its log alone",
     "human_mode_relays_off": "an input that takes AGV mode's relay off is a hazard, with a mode of its"
     " own, so HUMAN mode begins when the relay rests; the file's reason is RELAY_RESTS",
-    "slow_modbus_unit": "a lift is OFFLINE 1 s after its last reading, so it flips sooner than each 3 s",
+    "slow_modbus_unit": "a lift is OFFLINE 1 s after its last reading, so it flips faster",
     "two_foreign_nodes": "the file is our lift supervisor's",
 }
 """Stories that are staged otherwise than they are told, and why."""
