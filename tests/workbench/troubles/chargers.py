@@ -6,7 +6,7 @@ from tests.workbench.troubles.site import CHARGER, Site
 def daemon_killed(site: Site) -> None:
     """The station's daemon is killed while a robot charges."""
     site.coordinates()
-    site.fleet.robots.charge("red", site.fleet.now)
+    site.fleet.robots.charge("red", site.fleet.wall())
     site.run(40.0)
     site.press(CHARGER, "robot", True)
     site.run(30.0)
@@ -20,7 +20,7 @@ def robot_never_comes(site: Site) -> None:
     site.coordinates()
     site.trouble_begins()
     site.fleet.robots.robots["red"].stuck = True
-    site.fleet.robots.charge("red", site.fleet.now)
+    site.fleet.robots.charge("red", site.fleet.wall())
     site.run(75.0)
 
 

@@ -1,12 +1,12 @@
 """A fleet adapter's node with its robots, by RMF's rules."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any, Final
 
 from bridges.messages import topics
 from bridges.messages.topics import Topic
-from tests.site.network import Air, Place
-from tests.site.timeline import EPOCH, Alarm, Timeline
+from bridges.transports.transport import Transport
+from tests.site.timeline import Alarm, Timeline
 from tests.workbench.explain.story import Rider
 from workbench.rmf_model import Party
 from workbench.rmf_model.fleet import FleetAdapter
@@ -22,24 +22,80 @@ SAYS: Final[tuple[Topic[Any], ...]] = (
 )
 
 
-class Fleet:
+Join = Callable[[str], Transport]
+"""Takes part in the graph as a node of this name."""
+
+
+class PartyNode:
+    """One of RMF's nodes, played by its rules. `wall`: its clock (s since the epoch)."""
+
+    def __init__(
+        self,
+        timeline: Timeline,
+        join: Join,
+        wall: Callable[[], float],
+        name: str,
+        party: Party,
+        says: Iterable[Topic[Any]],
+    ) -> None:
+        self.name = name
+        self.wall = wall
+        self._parties = [party]
+        self._timeline = timeline
+        self._alarm = Alarm(timeline, self._tick)
+        self._place = join(name)
+        self._mouths = {topic.name: self._place.publisher(topic) for topic in says}
+
+    def start(self) -> None:
+        """It hears what its parties subscribe to."""
+        heard = {topic for party in self._parties for topic in party.subscribes}
+        for topic in sorted(heard, key=lambda topic: topic.name):
+            self._place.subscribe(topic, self._hear)
+        self._tick()
+
+    def kill(self) -> None:
+        """It is killed, and leaves the graph."""
+        self._place.close()
+        self._parties.clear()
+
+    def say(self, said: Any) -> None:
+        """Publish what a party sends, and be called when the next one is due."""
+        for topic, message in said:
+            self._mouths[topic.name].publish(message)
+        left_s = min(party.wake_at() for party in self._parties) - self.wall()
+        self._alarm.set(self._timeline.now + max(left_s, 0.001))
+
+    def _hear(self, message: Any) -> None:
+        for party in [*self._parties]:
+            self.say(party.hear(message, self.wall()))
+
+    def _tick(self) -> None:
+        for party in [*self._parties]:
+            if party.wake_at() <= self.wall() + 1e-6:
+                self.say(party.tick(self.wall() + 1e-6))
+
+
+class Fleet(PartyNode):
     """One adapter for all robots of one fleet. `behind_s`: its clock's error."""
 
     def __init__(
-        self, timeline: Timeline, air: Air, places: Mapping[str, tuple[str, float, float]]
+        self,
+        timeline: Timeline,
+        join: Join,
+        wall: Callable[[], float],
+        places: Mapping[str, tuple[str, float, float]],
     ) -> None:
         parked = {robot: f"wait_{robot}" for robot in ROBOTS}
-        self.name = f"{FLEET}_fleet_adapter"
         self.behind_s = 0.0
         self.robots = FleetAdapter(FLEET, places, parked, DRIVE_S)
-        self._parties: list[Party] = [self.robots]
-        self._timeline = timeline
-        self._alarm = Alarm(timeline, self._tick)
-        self._place = Place(air, self.name, lambda: None)
-        self._mouths = {topic.name: self._place.publisher(topic) for topic in SAYS}
-        for topic in (*RobotContext.subscribes, *FleetAdapter.subscribes):
-            self._place.subscribe(topic, self._hear)
-        self._tick()
+        super().__init__(
+            timeline,
+            join,
+            lambda: wall() - self.behind_s,
+            f"{FLEET}_fleet_adapter",
+            self.robots,
+            SAYS,
+        )
 
     def add(self, robot: RobotContext) -> None:
         """The adapter speaks for this robot from now on."""
@@ -48,32 +104,6 @@ class Fleet:
     def drop(self, robot: RobotContext) -> None:
         """The adapter speaks for this robot no longer."""
         self._parties.remove(robot)
-
-    def dies(self) -> None:
-        """The adapter is killed."""
-        self._place.close()
-        self._parties.clear()
-
-    @property
-    def now(self) -> float:
-        """The adapter's own clock (s since the epoch)."""
-        return EPOCH + self._timeline.now - self.behind_s
-
-    def say(self, said: Any) -> None:
-        """Publish what a party sends, and be called when the next one is due."""
-        for topic, message in said:
-            self._mouths[topic.name].publish(message)
-        due = min(party.wake_at() for party in self._parties) - EPOCH + self.behind_s
-        self._alarm.set(max(due, self._timeline.now + 0.001))
-
-    def _hear(self, message: Any) -> None:
-        for party in [*self._parties]:
-            self.say(party.hear(message, self.now))
-
-    def _tick(self) -> None:
-        for party in [*self._parties]:
-            if party.wake_at() <= self.now + 1e-6:
-                self.say(party.tick(self.now + 1e-6))
 
 
 class Robot(Rider):
@@ -85,7 +115,7 @@ class Robot(Rider):
         fleet.add(self.robot)
 
     def begin(self, phase: Phase) -> None:
-        self._fleet.say(self.robot.begin(phase, self._fleet.now))
+        self._fleet.say(self.robot.begin(phase, self._fleet.wall()))
 
     def asks(self, lift: str, floor: str, *, inside: bool = False) -> None:
         self.robot.in_car = inside

@@ -9,9 +9,7 @@ from bridges.messages import definitions as d
 from bridges.messages import topics
 from bridges.messages.stamps import in_seconds, stamp
 from drivers.hal.modbus.points import parse
-from tests.site.daemons import RmfsSupervisor
-from tests.site.network import Place
-from tests.site.timeline import EPOCH
+from tests.workbench.troubles.fleet import PartyNode
 from tests.workbench.troubles.module import ModuleFar
 from tests.workbench.troubles.site import LIFT, Site, devices
 from workbench.rmf_model import Said
@@ -156,13 +154,15 @@ def robot_clock_hour_off(site: Site) -> None:
 
     Ours believes a requester that repeats itself (FRESHNESS-5), so the supervisor is another maker's.
     """
-    site.supervisors.pop(RMFS).kill()
-    name = "site_lift_supervisor"
-    foreign = RmfsSupervisor(
-        site.timeline, site.air, name, StrictSupervisor, [topics.LIFT_REQUESTS]
-    )
-    site.supervisors[name] = foreign
-    foreign.start()
+    site.supervisors[RMFS].kill()
+    PartyNode(
+        site.timeline,
+        site.join,
+        site.wall,
+        "site_lift_supervisor",
+        StrictSupervisor(),
+        [topics.LIFT_REQUESTS],
+    ).start()
     site.trouble_begins()
     site.fleet.behind_s = HOUR_S
     site.red.asks(LIFT, "L1")
@@ -194,7 +194,7 @@ def fleet_adapter_killed(site: Site) -> None:
     site.until(site.red)
     site.run(3.0)
     site.trouble_begins()
-    site.fleet.dies()
+    site.fleet.kill()
     site.run(30.0)
 
 
@@ -247,10 +247,9 @@ class Foreign:
     """Another maker's lift node, which says the same each second. `behind_s`: its clock's error."""
 
     def __init__(self, site: Site, node: str, behind_s: float = 0.0) -> None:
-        self._timeline = site.timeline
+        self._site = site
         self._behind_s = behind_s
-        self._place = Place(site.air, node, lambda: None)
-        self._mouth = self._place.publisher(topics.LIFT_STATES)
+        self._mouth = site.join(node).publisher(topics.LIFT_STATES)
         self._state = d.LiftState(
             lift_name=LIFT,
             available_floors=("L1", "L2", "L3", "L4"),
@@ -260,6 +259,6 @@ class Foreign:
         self._say()
 
     def _say(self) -> None:
-        at = stamp(EPOCH + self._timeline.now - self._behind_s)
+        at = stamp(self._site.wall() - self._behind_s)
         self._mouth.publish(replace(self._state, lift_time=at))
-        self._timeline.after(1.0, self._say)
+        self._site.timeline.after(1.0, self._say)

@@ -17,9 +17,7 @@ class ModuleFar(PointsFar):
 
     dead: frozenset[Point] = frozenset()
 
-    def lines(
-        self, inputs: Mapping[str, Pull | None], outputs: Mapping[str, bool]
-    ) -> ModbusLines:
+    def lines(self, inputs: Mapping[str, Pull | None], outputs: Mapping[str, bool]) -> ModbusLines:
         units = RegisterFar(self._clock, _Cells(self, self._wiring))
         self.units = units
         found = {name: parse(name) for name in inputs}, {name: parse(name) for name in outputs}

@@ -36,6 +36,7 @@ from bridges.runtime import diagnostics
 from bridges.runtime.clock import Clock
 from bridges.runtime.ring_writer import RingWriter
 from bridges.runtime.subject import Status
+from bridges.transports.transport import Transport
 from drivers.door import dry_contact as door_dry_contact
 from drivers.lift import dry_contact as lift_dry_contact
 from hal_fakes.plants.lift import LiftPace
@@ -43,6 +44,7 @@ from tests.blackbox import kept
 from tests.site import building
 from tests.site.building import Device
 from tests.site.daemons import DeviceDaemon, GraphDaemon
+from tests.site.network import Place
 from tests.site.timeline import EPOCH, Timeline
 from tests.workbench.explain.story import Scene
 from tests.workbench.troubles.fleet import FLEET, ROBOTS, Fleet, Robot
@@ -82,10 +84,19 @@ class Site(Scene):
         )
         for device in [*self.devices.values()]:
             self.serve(device, f"rmf_bridge_{device.name}")
-        self.fleet = Fleet(self.timeline, self.air, PLACES)
+        self.fleet = Fleet(self.timeline, self.join, self.wall, PLACES)
         self.red, self.blue = Robot(self.fleet, "red"), Robot(self.fleet, "blue")
+        self.fleet.start()
         self._each_second()
         self.run(10.0)
+
+    def join(self, name: str) -> Transport:
+        """Take part in the graph as a node of this name."""
+        return Place(self.air, name, lambda: None)
+
+    def wall(self) -> float:
+        """The wall clock (s since the epoch)."""
+        return EPOCH + self.timeline.now
 
     def serve(self, device: Device, node: str) -> None:
         """A daemon of ours for this device, on a machine of the site."""
