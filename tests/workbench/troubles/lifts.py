@@ -52,8 +52,13 @@ def fire_mid_ride(site: Site) -> None:
 
 
 def fire_mid_ride_to_its_end(site: Site) -> None:
-    """The robot leaves at the recall floor."""
+    """The same, and the robot leaves at the recall floor."""
     fire_mid_ride(site)
+    robot_leaves(site)
+
+
+def robot_leaves(site: Site) -> None:
+    """The robot in the car sees its floor, and drives out."""
     site.until(site.red)
     site.run(2.0)
     site.red.ends(LIFT)

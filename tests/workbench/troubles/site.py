@@ -55,6 +55,7 @@ LIFT, OTHER_LIFT, DOOR, OTHER_DOOR = "Lift1", "Lift2", "ward_door", "lab_door"
 CHARGER, OTHER_CHARGER = "charger_a", "charger_b"
 KINDS: Final = {"lift": LIFT, "door": DOOR, "charger": CHARGER}
 TIMEOUT_S: Final = 0.5
+START_TIMEOUT_S: Final = 300.0
 TOO_LATE: Final = "modbus unit 1 at 192.168.1.50:502, read inputs: no reply within 0.5 s, tried 2x"
 PACE: Final = LiftPace(floor_s=8.0, door_s=3.0)
 PLACES: Final = {
@@ -113,16 +114,7 @@ class Site(Scene):
 
     def coordinates(self) -> None:
         """Our charger coordinator, for the fleet's robots and both chargers."""
-        waypoints = {name: Waypoint(level=at[0], x=at[1], y=at[2]) for name, at in PLACES.items()}
-        chargers = [CHARGER, OTHER_CHARGER]
-        robots = {
-            name: RobotSettings(stations=chargers, waits_at=f"wait_{name}") for name in ROBOTS
-        }
-        settings = CoordinatorSettings(
-            stations={name: StationSettings() for name in chargers},
-            fleets={FLEET: FleetSettings(waypoints=waypoints, robots=robots)},
-        )
-        self._ours("charger_coordinator", COORDINATOR, settings)
+        self._ours("charger_coordinator", COORDINATOR, coordinator_settings(START_TIMEOUT_S))
 
     def trouble_begins(self) -> None:
         """From now on the recorder's files count."""
@@ -256,3 +248,15 @@ def _at_module(timeline: Timeline, device: Device, driver: Any) -> Device:
     far = ModuleFar(timeline, device.plant, driver.wires(device.settings))
     made = partial(driver.create, device.name, device.settings, far)
     return dataclasses.replace(device, far=far, driver=made)
+
+
+def coordinator_settings(start_timeout_s: float) -> CoordinatorSettings:
+    """The fleet's robots may use both chargers."""
+    waypoints = {name: Waypoint(level=at[0], x=at[1], y=at[2]) for name, at in PLACES.items()}
+    chargers = [CHARGER, OTHER_CHARGER]
+    robots = {name: RobotSettings(stations=chargers, waits_at=f"wait_{name}") for name in ROBOTS}
+    return CoordinatorSettings(
+        stations={name: StationSettings() for name in chargers},
+        fleets={FLEET: FleetSettings(waypoints=waypoints, robots=robots)},
+        start_timeout_s=start_timeout_s,
+    )

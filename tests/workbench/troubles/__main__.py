@@ -1,0 +1,102 @@
+"""`python -m tests.workbench.troubles [NAME …]`: the twelve troubles with real processes on loopback.
+
+A table at the end has each trouble's verdict, live and from its file. Exit code 1 if any is wrong.
+"""
+
+import argparse
+import sys
+import tempfile
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+from hal_fakes.domain import domain_for_a_while
+from tests.workbench.troubles import chargers, doors, lifts
+from tests.workbench.troubles.site import CHARGER, DOOR, KINDS, LIFT, OTHER_LIFT
+from tests.workbench.troubles.verdicts import VERDICTS, wrong
+from tests.workbench.troubles.wire import LEASE_S, WireSite
+
+Stage = Callable[[Any], Any]
+
+
+@dataclass(frozen=True)
+class Real:
+    """One trouble. `serves`: the daemons that it needs. `daemon`: the owner of the file. `then`: what
+    happens after the live question, before the file is written."""
+
+    stage: Stage
+    kind: str = "lift"
+    serves: tuple[str, ...] = (LIFT,)
+    daemon: str = ""
+    then: Stage | None = None
+
+
+TROUBLES: Final = {
+    "robot_dies_in_car": Real(lifts.robot_dies_in_car),
+    "fire_mid_ride": Real(lifts.fire_mid_ride, then=lifts.robot_leaves),
+    "lift_door_contact_cut": Real(lifts.lift_door_contact_cut),
+    "door_end_contact_cut": Real(doors.open_contact_cut, "door", (DOOR,)),
+    "supervisor_killed": Real(lifts.supervisor_killed),
+    "supervisor_killed_b": Real(lifts.supervisor_killed_b),
+    "slow_modbus_unit": Real(lifts.slow_modbus_unit),
+    "two_daemons_one_name": Real(lifts.two_daemons_one_name),
+    "two_foreign_nodes": Real(
+        lifts.two_foreign_nodes, serves=(LIFT, OTHER_LIFT), daemon=lifts.SUPERVISOR
+    ),
+    "robot_clock_hour_off": Real(lifts.robot_clock_hour_off),
+    "daemon_killed": Real(lifts.daemon_killed, serves=(LIFT, OTHER_LIFT)),
+    "robot_never_reaches_charger": Real(chargers.robot_never_comes, "charger", (CHARGER,)),
+    "fleet_adapter_killed": Real(lifts.fleet_adapter_killed),
+}
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Play the troubles that are named; without a name, all."""
+    parser = argparse.ArgumentParser(prog="python -m tests.workbench.troubles", description=__doc__)
+    parser.add_argument("names", nargs="*", metavar="NAME", choices=[*TROUBLES, []])
+    parser.add_argument("--screens", action="store_true", help="print each screen that is wrong")
+    options = parser.parse_args(argv)
+    rows = [("name", "live", "file")]
+    for name in options.names or TROUBLES:
+        rows.append((name, *_played(name, TROUBLES[name], screens=options.screens)))
+        _print(" · ".join(rows[-1]))
+    _print("", *(f"{name:30} {live:12} {file}" for name, live, file in rows))
+    return int(any("wrong" in row for row in rows))
+
+
+def _played(name: str, trouble: Real, *, screens: bool) -> tuple[str, str]:
+    device = KINDS[trouble.kind]
+    with domain_for_a_while() as domain, tempfile.TemporaryDirectory() as folder:
+        site = WireSite(Path(folder), domain, trouble.serves)
+        try:
+            names = trouble.stage(site) or {}
+            site.waits(LEASE_S)
+            live = _judged(name, "live", trouble, site.live(device), names, screens=screens)
+            if trouble.then:
+                trouble.then(site)
+            told = site.file(device, trouble.daemon)
+            return live, _judged(name, "file", trouble, told, names, screens=screens)
+        finally:
+            site.close()
+
+
+def _judged(
+    name: str, view: str, trouble: Real, screen: str, names: dict[str, str], *, screens: bool
+) -> str:
+    verdict = next((v for v in VERDICTS if v.key == (name, view, trouble.kind)), None)
+    if verdict is None:
+        return "no verdict"
+    found = wrong(verdict, screen, names)
+    if found and screens:
+        _print(f"--- {name}, {view}", *found, "", screen)
+    return "wrong" if found else "right"
+
+
+def _print(*told: str) -> None:
+    sys.stdout.write("\n".join(told) + "\n")
+    sys.stdout.flush()
+
+
+if __name__ == "__main__":
+    sys.exit(main())
