@@ -23,31 +23,34 @@ Stage = Callable[[Any], Any]
 @dataclass(frozen=True)
 class Real:
     """One trouble. `serves`: the daemons that it needs. `daemon`: the owner of the file. `then`: what
-    happens after the live question, before the file is written."""
+    happens after the live question, before the file is written. `dead`: the question comes once DDS has
+    noticed that a node was killed. `slow`: a part of the device that is slow all the time."""
 
     stage: Stage
     kind: str = "lift"
     serves: tuple[str, ...] = (LIFT,)
     daemon: str = ""
     then: Stage | None = None
+    dead: bool = False
+    slow: str = ""
 
 
 TROUBLES: Final = {
-    "robot_dies_in_car": Real(lifts.robot_dies_in_car),
-    "fire_mid_ride": Real(lifts.fire_mid_ride, then=lifts.robot_leaves),
-    "lift_door_contact_cut": Real(lifts.lift_door_contact_cut),
-    "door_end_contact_cut": Real(doors.open_contact_cut, "door", (DOOR,)),
-    "supervisor_killed": Real(lifts.supervisor_killed),
-    "supervisor_killed_b": Real(lifts.supervisor_killed_b),
+    "robot_dies_in_car": Real(lifts.robot_dies_in_car, dead=True),
+    "fire_mid_ride": Real(lifts.fire_mid_ride, then=lifts.robot_leaves, slow="car"),
+    "lift_door_contact_cut": Real(lifts.lift_door_contact_cut, dead=True),
+    "door_end_contact_cut": Real(doors.open_contact_cut, "door", (DOOR,), dead=True),
+    "supervisor_killed": Real(lifts.supervisor_killed, dead=True),
+    "supervisor_killed_b": Real(lifts.supervisor_killed_b, dead=True),
     "slow_modbus_unit": Real(lifts.slow_modbus_unit),
     "two_daemons_one_name": Real(lifts.two_daemons_one_name),
     "two_foreign_nodes": Real(
         lifts.two_foreign_nodes, serves=(LIFT, OTHER_LIFT), daemon=lifts.SUPERVISOR
     ),
     "robot_clock_hour_off": Real(lifts.robot_clock_hour_off),
-    "daemon_killed": Real(lifts.daemon_killed, serves=(LIFT, OTHER_LIFT)),
+    "daemon_killed": Real(lifts.daemon_killed, serves=(LIFT, OTHER_LIFT), dead=True),
     "robot_never_reaches_charger": Real(chargers.robot_never_comes, "charger", (CHARGER,)),
-    "fleet_adapter_killed": Real(lifts.fleet_adapter_killed),
+    "fleet_adapter_killed": Real(lifts.fleet_adapter_killed, dead=True),
 }
 
 
@@ -70,8 +73,10 @@ def _played(name: str, trouble: Real, *, screens: bool) -> tuple[str, str]:
     with domain_for_a_while() as domain, tempfile.TemporaryDirectory() as folder:
         site = WireSite(Path(folder), domain, trouble.serves)
         try:
+            if trouble.slow:
+                site.fail(device, trouble.slow, "slow")
             names = trouble.stage(site) or {}
-            site.waits(LEASE_S)
+            site.waits(LEASE_S if trouble.dead else 0.0)
             live = _judged(name, "live", trouble, site.live(device), names, screens=screens)
             if trouble.then:
                 trouble.then(site)

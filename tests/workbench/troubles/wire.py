@@ -20,7 +20,13 @@ from bridges.blackbox.recordings import Recordings
 from bridges.kinds.charger_coordinator import KIND as COORDINATOR
 from bridges.kinds.lift_supervisor import KIND as LIFT_SUPERVISOR
 from bridges.kinds.lift_supervisor.settings import LiftSupervisorSettings
-from bridges.messages.topics import DOOR_REQUESTS, DOOR_SUPERVISOR_HEARTBEAT, LIFT_REQUESTS
+from bridges.messages import definitions as d
+from bridges.messages.topics import (
+    DOOR_REQUESTS,
+    DOOR_STATES,
+    DOOR_SUPERVISOR_HEARTBEAT,
+    LIFT_REQUESTS,
+)
 from bridges.runtime.clock import machine_s
 from bridges.transports.transport import Transport
 from hal_fakes.demo.daemons import DaemonProcess, stop_all
@@ -35,10 +41,10 @@ from workbench.rmf_model.supervisors import DoorSupervisor, LiftSupervisor
 
 PASSES_S: Final = 4.0
 WITHIN_S: Final = 90.0
-RECORDED_S: Final = 60.0
+RECORDED_S: Final = 100.0
 LEASE_S: Final = 25.0
 """After this long DDS has noticed a killed node."""
-START_TIMEOUT_S: Final = 15.0
+START_TIMEOUT_S: Final = 40.0
 
 
 class WireSite:
@@ -63,6 +69,9 @@ class WireSite:
         self.fleet = Fleet(self.timeline, self.join, self.wall, PLACES)
         self.red, self.blue = Robot(self.fleet, "red"), Robot(self.fleet, "blue")
         self.fleet.start()
+        self._doors: dict[str, int] = {}
+        self._observer = self.join("observer")
+        self._observer.subscribe(DOOR_STATES, self._door)
         self._look()
         self._until(self._all_ready, WITHIN_S)
 
@@ -97,7 +106,8 @@ class WireSite:
         self.until(robot)
         robot.closes(door)
         self.until(robot)
-        self.run(PASSES_S)
+        shut = d.DoorModeValue.MODE_CLOSED
+        self._until(lambda: self._doors.get(door) == shut, WITHIN_S)
 
     def press(self, device: str, signal: str, on: bool) -> None:
         name = LIFT if device == "lift_north" else device
@@ -124,19 +134,18 @@ class WireSite:
 
     def takes_over(self, settings: LiftSupervisorSettings) -> None:
         self.supervisors["rmf_lift_supervisor"].kill()
-        self._start("lift_supervisor", kept.of_graph("", LIFT_SUPERVISOR, settings).yaml)
-        self.run(PASSES_S)
+        self._starts("lift_supervisor", kept.of_graph("", LIFT_SUPERVISOR, settings).yaml)
 
     def coordinates(self) -> None:
         settings = coordinator_settings(START_TIMEOUT_S)
-        self._start("charger_coordinator", kept.of_graph("", COORDINATOR, settings).yaml)
-        self.run(PASSES_S)
+        self._starts("charger_coordinator", kept.of_graph("", COORDINATOR, settings).yaml)
 
     def close(self) -> None:
         """Everybody leaves."""
         stop_all(self.daemons.values())
         for node in (*self.supervisors.values(), self.fleet):
             node.kill()
+        self._observer.close()
 
     def waits(self, seconds: float) -> None:
         """So much time passes."""
@@ -176,16 +185,24 @@ class WireSite:
         return told.communicate()[0]
 
     def _start(self, name: str, content: bytes) -> None:
-        told = yaml.safe_load(content) | {"recording": {"waiting_s": 15.0}}
+        told = yaml.safe_load(content) | {"recording": {"waiting_s": 60.0}}
         file = self._folder / f"{name}.yaml"
         file.write_text(yaml.safe_dump(told, sort_keys=False), encoding="utf-8")
         self.daemons[name] = DaemonProcess(file, self._folder, self._domain)
         self._rings.append(self.daemons[name].runtime_dir)
 
+    def _starts(self, name: str, content: bytes) -> None:
+        """Start a node without hardware, and wait until it speaks."""
+        self._start(name, content)
+        self._until(lambda: _status(self.daemons[name]).get("passive") is False, WITHIN_S)
+
     def _node(self, name: str, party: Any, *says: Any) -> PartyNode:
         node = PartyNode(self.timeline, self.join, self.wall, name, party, says)
         node.start()
         return node
+
+    def _door(self, state: d.DoorState) -> None:
+        self._doors[state.door_name] = state.current_mode.value
 
     def _look(self) -> None:
         self._recorder.look()
@@ -205,9 +222,13 @@ class WireSite:
 
 
 def _is_ready(daemon: DaemonProcess) -> bool:
+    return bool(_status(daemon).get("devices"))
+
+
+def _status(daemon: DaemonProcess) -> dict[str, Any]:
     daemon.check()
     try:
-        status = json.loads((daemon.runtime_dir / "status.json").read_bytes())
+        found: dict[str, Any] = json.loads((daemon.runtime_dir / "status.json").read_bytes())
     except (OSError, ValueError):
-        return False
-    return bool(status.get("devices"))
+        return {}
+    return found
