@@ -35,8 +35,8 @@ LEAST_GAP_S = 0.001
 
 
 class DeviceDaemon:
-    """Serves one device. `wall_step_s` is the step of its wall clock. `node` is the name on the graph, by
-    default the device's.
+    """Serves one device. `wall_step_s` is the step of its wall clock. `node` is its name on the graph,
+    the device's if none is given.
 
     `looks` is called with each time at which the plant is about to change or be scanned, `scanned`
     after each scan, `relayed` with each edge of a relay, `started` at the start, `hears` with each

@@ -19,6 +19,10 @@ NO_ROBOT_AT_A_DOOR = (
 IMPOSSIBLE: Mapping[tuple[str, str, str], tuple[list[str], str]] = {
     ("door_end_contact_cut", "file", "door"): (ROBOT, NO_ROBOT_AT_A_DOOR),
     ("daemon_killed", "file", "door"): (ROBOT, NO_ROBOT_AT_A_DOOR),
+    ("two_daemons_one_name", "file", "lift"): (
+        ["{node_b}"],
+        "a daemon notes that another node publishes its states, and not the node's name",
+    ),
 }
 """Phrases of `says` for which the file has no source, and why."""
 OTHERWISE: Mapping[str, str] = {
