@@ -29,11 +29,12 @@ from workbench.graph.join import (
     seconds,
 )
 from workbench.graph.live import OF_DEVICES, Ear
+from workbench.judge.charge_scenario import ChargeScenario
 from workbench.judge.judge import KINDS, Judge, Kind
 from workbench.judge.judge_run import JudgeRun
 from workbench.judge.law import Verdict, shown
 from workbench.judge.report import Judgement, as_json, junit, markdown, report, text, verdict
-from workbench.judge.scenarios import FLEET, ChargeScenario, PassageScenario, RideScenario, Scenario
+from workbench.judge.scenarios import FLEET, PassageScenario, RideScenario, Scenario
 from workbench.replay.recordings import RecordingSpan, add_span_arguments, unreadable, within
 from workbench.replay.sources import BagError
 from workbench.rmf_model import NEVER, Said
@@ -41,6 +42,11 @@ from workbench.rmf_model import NEVER, Said
 NODE_NAME = "rmf_bridge_judge"
 LOOK_EVERY_S = 0.1
 FIRE = topics.FIRE_ALARM_TRIGGER
+STATES = {
+    "lift": topics.LIFT_STATES.name,
+    "door": topics.DOOR_STATES.name,
+    "charger": topics.CHARGER_STATES.name,
+}
 WIDTH = 120
 BESIDE: dict[str, tuple[str, ...]] = {
     "supervisor": (
@@ -249,7 +255,7 @@ class Live:
         allowed = {topic for name in beside for topic in BESIDE[name]}
         speaks = {topic.name for topic in performance.speaks} if performance else set()
         self._sole = sorted(speaks - allowed)
-        self._looks_at_fire = kind == "lift"
+        self._states = self._ear.ends[STATES[kind]]
         self._looked_at = 0.0
 
     def strangers(self) -> str:
@@ -280,8 +286,11 @@ class Live:
         for heard in self._ear.listen(waits_s):
             self._say(judging.hear(heard))
         now, wall = time.monotonic(), time.time()
-        if self._looks_at_fire and now > self._looked_at + 1.0:
+        if now > self._looked_at + 1.0:
             self._looked_at = now
+            names = self._states.senders()
+            unnamed = ["?"] * (self._states.matched() - len(names))
+            judging.judge.history.senders = (*names, *unnamed)
             publishers = self._ear.ends[FIRE.name].matched()
             supervisors = self._ear.ends[topics.LIFT_REQUESTS.name].matched()
             retaining = self._retained.matched()

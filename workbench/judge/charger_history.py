@@ -19,7 +19,9 @@ UNREQUESTED: Final = "unrequested/"
 class ChargerHistory(History[d.ChargerState]):
     """`requests`: by id, the latest. `cancels`: id -> time of the first cancel; the cancel of a
     charge that nobody requested is forgotten with it. `foreign_at`: the last cancel of an id that the
-    station does not show."""
+    station does not show. `first_asked`: the first request of each id. `elsewhere`: ids requested of other stations. `second_at`: the last request
+    with an id that the station does not show. `same_since`: since when state and request are
+    unchanged; `same_before`: the same of those before."""
 
     seen: ObservedCharger
     observes = ObservedCharger
@@ -28,12 +30,14 @@ class ChargerHistory(History[d.ChargerState]):
         super().__init__(name)
         self.requests: dict[str, d.ChargerRequest] = {}
         self.cancels: dict[str, float] = {}
-        self.foreign_at = NOT_YET
+        self.first_asked: dict[str, float] = {}
+        self.elsewhere: dict[str, float] = {}
+        self.foreign_at = self.second_at = self.same_since = self.same_before = NOT_YET
 
-    @property
-    def same_since(self) -> float:
-        """Return the time since which state and request are unchanged."""
-        return max(self.since, self.seen.condition.since.at, self.seen.request.since.at)
+    @staticmethod
+    def claims(state: d.ChargerState) -> bool:
+        """Is it any state but ERROR?"""
+        return state.state != ERROR
 
     def take_other(self, heard: Heard) -> bool:
         """Take requests to this charger, and cancels."""
@@ -42,6 +46,12 @@ class ChargerHistory(History[d.ChargerState]):
                 self.asked()
                 if not unrequested(heard.message.request_id):
                     keep(self.requests, heard.message.request_id, heard.message)
+                    self._note_first(heard.message.request_id)
+                if self.state is not None and heard.message.request_id != self.state.request_id:
+                    self.second_at = self.now
+            case d.ChargerRequest():
+                keep(self.elsewhere, heard.message.request_id, self.now)
+                return False
             case d.ChargerCancel(charger_name=self.name):
                 self._cancel(heard.message.request_id)
             case _:
@@ -50,12 +60,17 @@ class ChargerHistory(History[d.ChargerState]):
 
     def forget(self) -> None:
         """Forget what a silence may have ended."""
-        self.cancels.pop(UNREQUESTED + self.name, None)
+        self.cancels.clear()
 
     def settle(self, state: d.ChargerState) -> None:
-        """Forget the cancels of finished charges."""
+        """Note since when it is so; forget the cancels of finished charges."""
+        if self.before is None or _served(self.before) != _served(state):
+            self.same_before, self.same_since = self.same_since, self.now
         if state.state in (IDLE, RELEASED):
             self.cancels.pop(UNREQUESTED + self.name, None)
+
+    def _note_first(self, request_id: str) -> None:
+        keep(self.first_asked, request_id, self.first_asked.get(request_id, self.now))
 
     def _cancel(self, request_id: str) -> None:
         shown = self.state is not None and request_id == self.state.request_id
@@ -68,3 +83,7 @@ class ChargerHistory(History[d.ChargerState]):
 def unrequested(request_id: str) -> bool:
     """Is this id without a request?"""
     return request_id.startswith(UNREQUESTED)
+
+
+def _served(state: d.ChargerState) -> tuple[int, str]:
+    return state.state, state.request_id

@@ -20,8 +20,10 @@ from workbench.judge.law import KEPT, Doubt, Finding, Law, shown
 from workbench.judge.shared_laws import ANSWERED, ONE, RATE, STAMP, fresh, named, stamped
 
 LATE_S: Final = 10.0
-CANCELLED_WITHIN_S: Final = 5.0
-RAMPS_DOWN_S: Final = 120.0
+SEEN_S: Final = 1.0
+"""An ASSIGNED state may be heard this long (s) after its beginning."""
+ENDS_WITHIN_S: Final[dict[int, float]] = {int(ASSIGNED): 5.0, int(CHARGING): 120.0}
+"""How long (s) a station may serve a cancelled request in these states: at 120 s it has ramped down."""
 FOREIGN_S: Final = 2.0
 UNREACHED_S: Final = 15.0
 
@@ -60,8 +62,12 @@ def _has_text(history: ChargerHistory) -> Finding:
 
 def _same_robot(history: ChargerHistory) -> Finding:
     state = _known(history)
-    asked = history.requests.get(state.request_id) if state else None
-    if state is None or asked is None or state.state == IDLE:
+    if state is None or state.state == IDLE:
+        return None
+    asked = history.requests.get(state.request_id)
+    if asked is None and state.request_id in history.elsewhere:
+        return f"the request is for another station: {words.described(state)}"
+    if asked is None:
         return None
     wanted = asked.fleet_name, asked.robot_name
     if _robot(state) == wanted:
@@ -71,17 +77,35 @@ def _same_robot(history: ChargerHistory) -> Finding:
 
 
 def _keeps(history: ChargerHistory) -> Finding:
-    """One charge belongs to one request. An unrequested charge is taken over by its own robot's
+    """A station belongs to one request. An unrequested charge is taken over by its own robot's
     request when that comes, and a restarted node may know of no request."""
     state, before = history.new, history.before
-    if state is None or before is None or (before.state, state.state) != (CHARGING, CHARGING):
+    if state is None or before is None or not {state.state, before.state} <= ENDS_WITHIN_S.keys():
         return None
-    same = state.request_id == before.request_id or unrequested(state.request_id)
-    if same or not before.request_id:
-        return KEPT
+    if state.request_id == before.request_id:
+        return KEPT if history.was_tested(history.second_at) else None
+    if unrequested(state.request_id) or not before.request_id or _is_over(history, before):
+        return None
     if unrequested(before.request_id) and before.robot_name and _robot(before) == _robot(state):
-        return KEPT
-    return f"charged for {_whose(before)}, and now calls it {_whose(state)}"
+        return None
+    return f"it was {_whose(before)}, and is {_whose(state)} now"
+
+
+def _is_over(history: ChargerHistory, before: d.ChargerState) -> bool:
+    """May this promise have ended between two states, by a cancel or its start_timeout?"""
+    if before.state != ASSIGNED or unrequested(before.request_id):
+        return False
+    known = before.request_id in history.requests and before.request_id not in history.cancels
+    return (
+        not known or _overdue_s(history, before, history.first_asked[before.request_id]) > -SEEN_S
+    )
+
+
+def _overdue_s(history: ChargerHistory, state: d.ChargerState, since: float) -> float:
+    """Return how long its start_timeout has been over, if it began then; negative before."""
+    asked = history.requests.get(state.request_id)
+    limit_s = in_seconds(asked.start_timeout) if asked else 0.0
+    return history.now - since - limit_s if limit_s > 0.0 else NOT_YET
 
 
 def _robot(state: d.ChargerState) -> tuple[str, str]:
@@ -93,31 +117,29 @@ def _whose(state: d.ChargerState) -> str:
 
 
 def _starts_in_time(history: ChargerHistory) -> Finding:
-    state = history.new
-    asked = history.requests.get(state.request_id) if state else None
-    if state is None or asked is None or state.state != ASSIGNED:
+    state, before = history.new, history.before
+    if state is None:
         return None
-    limit_s, kept_s = in_seconds(asked.start_timeout), history.now - history.same_since
-    if limit_s <= 0.0:
+    if state.state != ASSIGNED:
+        ended = before is not None and before.state == ASSIGNED and state.state in (IDLE, RELEASED)
+        if before is None or not ended or before.request_id in history.cancels:
+            return None
+        return KEPT if _overdue_s(history, before, history.same_before) > -SEEN_S else None
+    if _overdue_s(history, state, history.same_since) <= LATE_S:
         return None
-    if kept_s <= limit_s + LATE_S:
-        return KEPT
-    who = shown(state.robot_name)
-    return f"assigned to {who} for {kept_s:.0f} s; its start_timeout is {limit_s:.0f} s"
+    return f"still assigned to {shown(state.robot_name)} after {history.now - history.same_since:.0f} s"
 
 
 def _cancels(history: ChargerHistory) -> Finding:
-    state = history.new
+    state, before = history.new, history.before
     if state is None:
         return None
-    at = history.cancels.get(state.request_id, NOT_YET)
-    if at == NOT_YET:
+    at, limit_s = history.cancels.get(state.request_id), ENDS_WITHIN_S.get(state.state)
+    if at is None or limit_s is None:
+        served = before is not None and before.state in ENDS_WITHIN_S
+        return KEPT if before and served and before.request_id in history.cancels else None
+    if history.now - at <= limit_s:
         return None
-    limit_s = {ASSIGNED: CANCELLED_WITHIN_S, CHARGING: RAMPS_DOWN_S}.get(
-        d.ChargerStateValue(state.state) if state.state in list(d.ChargerStateValue) else IDLE
-    )
-    if limit_s is None or history.now - at <= limit_s:
-        return KEPT
     return f"{words.described(state)} {history.now - at:.0f} s after its ChargerCancel"
 
 
@@ -129,15 +151,13 @@ def _foreign_cancel(history: ChargerHistory) -> Finding:
         return None  # it ends when its robot leaves, unannounced
     if history.now - history.foreign_at > FOREIGN_S:
         return None
-    if state.state not in (IDLE, RELEASED) or before.request_id in history.cancels:
+    if state.state not in (IDLE, RELEASED):
         return KEPT
+    if _is_over(history, before):
+        return None
     mine = before.request_id
     text = f"the ChargerCancel of another request ended {shown(mine)}"
     return Doubt(text, lambda: mine in history.cancels)
-
-
-def _claims(state: d.ChargerState) -> bool:
-    return state.state != ERROR
 
 
 CHARGER_STATE: Final = "ChargerState.msg"
@@ -160,6 +180,7 @@ LAWS: Final[tuple[Law[ChargerHistory], ...]] = (
     Law(
         "C1.numbers",
         "state is a number of ChargerState.msg: 1, 2, 3, 4 or 200",
+        "a state",
         "A vendor's codes mean something else there: an Xnergy's 3, a handshake, reads as CHARGING",
         CHARGER_STATE,
         _numbers,
@@ -167,13 +188,15 @@ LAWS: Final[tuple[Law[ChargerHistory], ...]] = (
     Law(
         "C5.id",
         "request_id is set in every state but IDLE",
+        "a state other than IDLE",
         "It says who has the station",
         CHARGER_STATE,
         _has_id,
     ),
     Law(
         "C5.robot",
-        "robot_fleet and robot_name are those of the request",
+        "robot_fleet and robot_name are those of the request, and the request is for this station",
+        "a request is served",
         "Two robots would believe that the station is theirs",
         CHARGER_STATE,
         _same_robot,
@@ -181,21 +204,24 @@ LAWS: Final[tuple[Law[ChargerHistory], ...]] = (
     Law(
         "C5.text",
         "error_message says what is wrong in ERROR, and is blank otherwise",
+        "a state",
         "It is all that a technician reads",
         CHARGER_STATE,
         _has_text,
     ),
     Law(
         "C1.keeps",
-        "A charge keeps its request_id until it ends; one that nobody requested (`unrequested/…`) may"
-        " get that of the robot that it shows",
-        "The next robot's request must not take a charge over while the first robot stands there",
+        "ASSIGNED and CHARGING keep their request_id until they end; a charge that nobody requested"
+        " (`unrequested/…`) may get that of the robot that it shows",
+        "a second request while the first is served",
+        "The next robot's request must not take over a station that is promised to the first robot",
         "ChargerRequest.msg, request_id",
         _keeps,
     ),
     Law(
         "C2.start",
         "ASSIGNED ends when start_timeout is over",
+        "no robot comes until start_timeout is over",
         "A robot that never comes would keep the station for ever",
         "ChargerRequest.msg, start_timeout",
         _starts_in_time,
@@ -203,6 +229,7 @@ LAWS: Final[tuple[Law[ChargerHistory], ...]] = (
     Law(
         "C3.cancel",
         "A ChargerCancel ends its request: at once if ASSIGNED, after the ramp-down if CHARGING",
+        "a ChargerCancel of the request that is served",
         "The station is promised to the next robot",
         "ChargerCancel.msg",
         _cancels,
@@ -211,6 +238,7 @@ LAWS: Final[tuple[Law[ChargerHistory], ...]] = (
     Law(
         "C3.foreign",
         "A ChargerCancel of another request changes nothing",
+        "a ChargerCancel of another request while a station is ASSIGNED",
         "It comes late, or is meant for a request that is over",
         "ChargerCancel.msg",
         _foreign_cancel,
@@ -218,9 +246,10 @@ LAWS: Final[tuple[Law[ChargerHistory], ...]] = (
     Law(
         "C4.fresh",
         "A station that cannot be reached is shown as ERROR; in other states charger_time advances",
+        "states other than ERROR for more than 15 s",
         "A remembered IDLE sends a robot to a station that may be on fire",
         "ChargerState.msg, charger_time",
-        fresh(_claims, UNREACHED_S),
+        fresh(UNREACHED_S),
         sensed=True,
     ),
 )

@@ -23,8 +23,9 @@ OPENING_S: Final = 1.0
 
 
 class DoorHistory(History[d.DoorState]):
-    """`latched`: the last request was OPEN. `asked_at`: the first OPEN of this latch; `asked`: OPENs
-    since the door was last seen other than closed, at `not_closed_at`. `closed_at`: the last CLOSE on
+    """`latched`: the last request was OPEN; `was_closed`: the door was closed then. `asked_at`: the first
+    OPEN of this latch; `asked`: OPENs since the door was last seen other than closed, at
+    `not_closed_at`. `closed_at`: the last CLOSE on
     door_requests; `adapter_closed_at`: that of a fleet adapter to the supervisor. `was_open`: the
     door has been open in this latch. `reopened`: when it reopened at once, in this latch. `instant`:
     how many times in a row it was OPEN as soon as that was requested; `opened`: the latest state is
@@ -35,7 +36,7 @@ class DoorHistory(History[d.DoorState]):
 
     def __init__(self, name: str) -> None:
         super().__init__(name)
-        self.latched = self.was_open = self.opened = self.left = self._was_closed = False
+        self.latched = self.was_open = self.opened = self.left = self.was_closed = False
         self.asked_at = self.not_closed_at = self.closed_at = self.adapter_closed_at = NOT_YET
         self.openings = 0
         self.reopened: deque[float] = deque(maxlen=3)
@@ -53,6 +54,11 @@ class DoorHistory(History[d.DoorState]):
     def mode_before(self) -> int:
         """The mode in the state before; -1 for none."""
         return self.before.current_mode.value if self.before else -1
+
+    @staticmethod
+    def claims(state: d.DoorState) -> bool:
+        """Is the door OPEN?"""
+        return state.current_mode.value == OPEN
 
     def take_other(self, heard: Heard) -> bool:
         """Take requests to this door, from the supervisor and from fleet adapters."""
@@ -104,7 +110,7 @@ class DoorHistory(History[d.DoorState]):
             self._people_leave(self.now - self._people_close_at < OPENING_S)
 
     def _opens(self) -> None:
-        if self.latched and self._was_closed and not self.was_open:
+        if self.latched and self.was_closed and not self.was_open:
             self.opened = True
             self.instant = self.instant + 1 if self.now - self.asked_at < AT_ONCE_S else 0
         if self.latched and self.was_open and self.now - self._left_open_at < REOPENS_WITHIN_S:
@@ -123,7 +129,7 @@ class DoorHistory(History[d.DoorState]):
     def _ask_open(self) -> None:
         if not self.latched:
             self.latched, self.asked_at = True, self.now
-            self.was_open, self._was_closed = self.mode == OPEN, self.mode == CLOSED
+            self.was_open, self.was_closed = self.mode == OPEN, self.mode == CLOSED
             self.openings = 0
             self.reopened.clear()
         self.openings += 1

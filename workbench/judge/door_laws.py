@@ -4,11 +4,13 @@ from collections.abc import Callable
 from typing import Final
 
 from bridges.messages import definitions as d
-from workbench.judge.door_history import CLOSED, OPEN, DoorHistory
+from workbench.judge.door_history import BLIND, CLOSED, OPEN, DoorHistory
 from workbench.judge.law import KEPT, Doubt, Finding, Law
 from workbench.judge.shared_laws import ANSWERED, ONE, RATE, STAMP, fresh, named, stamped
 
 OPENS_WITHIN_S: Final = 30.0
+SILENCE_S: Final = 10.0
+"""Nodes that close a door in RMF's silence wait no longer (lci-rmf-adapter)."""
 ASKED: Final = 5
 INSTANT: Final = 2
 SHUT: Final = 3
@@ -28,7 +30,8 @@ def _opens(history: DoorHistory) -> Finding:
     if history.new is None or not history.latched:
         return None
     if history.mode != CLOSED:
-        return KEPT
+        sensed = history.mode in (OPEN, d.DoorModeValue.MODE_MOVING)
+        return KEPT if sensed and history.was_closed else None
     closed_s = history.now - max(history.asked_at, history.not_closed_at)
     if closed_s < OPENS_WITHIN_S or history.openings < ASKED:
         return None
@@ -50,7 +53,8 @@ def _stays(history: DoorHistory) -> Finding:
     if history.new is None or not history.latched or not history.was_open:
         return None
     if not _left_open(history) or _bypass(history):
-        return KEPT if history.mode == OPEN else None
+        tested = history.mode == OPEN and history.now - history.asked_last > SILENCE_S
+        return KEPT if tested else None
     return Doubt("no longer open, though the last request was OPEN", _comes_back(history))
 
 
@@ -80,14 +84,14 @@ def _holds(history: DoorHistory) -> Finding:
         return None
     if history.often(history.reopened):
         return "open, not open and open again within 1 s, 3 times while it is held"
-    return KEPT
+    return KEPT if history.mode_before == OPEN else None
 
 
 def _travels(history: DoorHistory) -> Finding:
     if history.new is None or not history.opened:
         return None
     if history.instant < INSTANT:
-        return KEPT
+        return None if history.instant else KEPT
     return f"closed, and OPEN within 0.3 s of the request, {history.instant} times in a row"
 
 
@@ -95,17 +99,12 @@ def _people(history: DoorHistory) -> Finding:
     if history.new is None or not history.left:
         return None
     if history.shut < SHUT:
-        return KEPT
+        return None if history.shut else KEPT
     return f"opened by people, and closed as soon as RMF sent CLOSE, {history.shut} times in a row"
 
 
-def _opened(state: d.DoorState) -> bool:
-    return state.current_mode.value == OPEN
-
-
 def _blind(state: d.DoorState) -> bool:
-    blind = (d.DoorModeValue.MODE_OFFLINE, d.DoorModeValue.MODE_UNKNOWN)
-    return state.current_mode.value in blind
+    return state.current_mode.value in BLIND
 
 
 DOOR_OPEN: Final = "rmf_ros2 phases/DoorOpen.cpp"
@@ -124,6 +123,7 @@ LAWS: Final[tuple[Law[DoorHistory], ...]] = (
     Law(
         "T1.numbers",
         "current_mode is a number of DoorMode.msg",
+        "a state",
         "RMF compares numbers: a number that it does not know is never OPEN",
         "DoorMode.msg",
         _numbers,
@@ -131,6 +131,7 @@ LAWS: Final[tuple[Law[DoorHistory], ...]] = (
     Law(
         "D2.opens",
         "OPEN opens the door: after 30 s of requests it is no longer CLOSED",
+        "OPEN is requested of the closed door",
         "DoorOpen has no timeout: the robot waits for ever. OPEN is 2, in requests and states alike",
         DOOR_OPEN + "; DoorMode.msg",
         _opens,
@@ -139,6 +140,7 @@ LAWS: Final[tuple[Law[DoorHistory], ...]] = (
     Law(
         "D2.stays",
         "OPEN is held until CLOSE: silence closes no door",
+        "the door is OPEN for a robot, and RMF is silent for 10 s",
         "Once the door is OPEN, RMF says nothing while the robot drives through",
         DOOR_OPEN + "; " + SUPERVISOR,
         _stays,
@@ -147,6 +149,7 @@ LAWS: Final[tuple[Law[DoorHistory], ...]] = (
     Law(
         "D1.bypass",
         "A CLOSE on adapter_door_requests closes nothing; only the supervisor's CLOSE does",
+        "a fleet adapter's CLOSE while the supervisor holds the door OPEN",
         "It is from one robot: only the supervisor knows whether another stands in the doorway",
         "rmf_ros2 door_supervisor/Node.cpp; door_adapter_template",
         _bypassed,
@@ -155,6 +158,7 @@ LAWS: Final[tuple[Law[DoorHistory], ...]] = (
     Law(
         "D2.holds",
         "A door that is held stays OPEN, and does not flap",
+        "the door is OPEN for a robot for two states",
         "A robot drives off at the first OPEN",
         DOOR_OPEN,
         _holds,
@@ -163,6 +167,7 @@ LAWS: Final[tuple[Law[DoorHistory], ...]] = (
     Law(
         "D2.people",
         "CLOSE releases the door and never drives it shut: people keep a door that they opened",
+        "people open the door, and RMF sends CLOSE",
         "RMF's supervisor sends CLOSE to every open door that no robot has requested",
         SUPERVISOR,
         _people,
@@ -171,6 +176,7 @@ LAWS: Final[tuple[Law[DoorHistory], ...]] = (
     Law(
         "D3.travel",
         "OPEN is what a sensor sees at the end of the travel, not what was requested",
+        "the closed door opens for a robot",
         "A robot drives off at OPEN, and the door leaf would still be in its way",
         DOOR_OPEN,
         _travels,
@@ -179,9 +185,10 @@ LAWS: Final[tuple[Law[DoorHistory], ...]] = (
     Law(
         "D3.fresh",
         "OPEN is never a remembered state: its door_time advances",
+        "the door is OPEN for more than 5 s",
         "A controller that cannot be reached may have closed the door: show OFFLINE",
         "DoorState.msg, door_time",
-        fresh(_opened),
+        fresh(),
         sensed=True,
     ),
 )

@@ -6,7 +6,8 @@ kinds: messages, the pace and stamps of states, and the answers to requests.
 
 from abc import ABC, abstractmethod
 from collections import deque
-from typing import ClassVar, Final, Generic, TypeVar
+from itertools import pairwise
+from typing import Any, ClassVar, Final, Generic, TypeVar
 
 from msgspec.structs import replace
 
@@ -25,6 +26,13 @@ ANSWERS_WITHIN_S: Final = 0.1
 OFTEN_S: Final = 30.0
 EARLY_S: Final = 0.15
 """Least earliness (s) of a state that a timer's jitter cannot explain."""
+RHYTHM: Final = 10
+STEADY_S: Final = 0.05
+UNEVEN_S: Final = 0.1
+CROSSED_S: Final = 1.0
+"""After this time (s) a state shows the effect of a request, if the request has any."""
+TESTED_S: Final = 5.0
+SILENCES: Final = 5
 
 NOT_YET: Final = float("-inf")
 
@@ -43,10 +51,14 @@ def keep(known: dict[str, V], key: str, value: V) -> None:
 class History(ABC, Generic[T]):
     """One device. Times are those of the messages (s).
 
-    `news`: the message taken last, None when only time has passed. `seen`: the observations of it.
+    `news`: the message taken last, None when only time has passed. `seen`: the device's observations.
     `before`: the state before the latest, None at the first one, and after a silence, because the
     node may have restarted; `since`: time of that. `frozen_s`: time for which the states have shown
-    the same stamp. `burst_s`: time taken by the latest BURST unchanged states.
+    the same stamp; `claimed_s`: time for which each `claims` what a robot acts on. `burst_s`: time
+    taken by the latest BURST unchanged states. `asked_last`: the latest request. `senders`: the
+    publishers on the states' topic; none in a recording. `network_s`: the part of the time since the
+    state before in which the network was silent: nobody was heard, though other devices had been.
+    `silences`: the beginnings (wall clock) and lengths (s) of the first SILENCES of these.
     """
 
     observes: ClassVar[type[AnyDevice]]
@@ -57,20 +69,29 @@ class History(ABC, Generic[T]):
         self.now = self.since = NOT_YET
         self.news: d.Message | None = None
         self.before: T | None = None
-        self.frozen_s = 0.0
+        self.frozen_s = self.claimed_s = self.network_s = 0.0
         self.burst_s = float("inf")
+        self.senders: tuple[str, ...] = ()
+        self.silences: list[tuple[float, float]] = []
         self.states = 0
         self.others: set[str] = set()
         self._unchanged: deque[float] = deque(maxlen=BURST)
-        self._stamp = self._moved_at = NOT_YET
-        self._asked_at = NOT_YET
-        self._answers: deque[bool] = deque(maxlen=8)
+        self._stamp = self._moved_at = self._claims_since = NOT_YET
+        self.asked_last = self._quiet_since = NOT_YET
+        self._answers: deque[tuple[bool, float]] = deque(maxlen=8)
         self._quiet: deque[float] = deque(maxlen=15)
+        self._usual_s = 0.0
+        self._gaps: deque[float] = deque(maxlen=RHYTHM)
+        self._any_at = self._other_at = NOT_YET
 
-    def take(self, heard: Heard) -> bool:
-        """Take a message. False if no law need be checked, because it is not about this device."""
+    def take(self, heard: Heard, own: bool = False) -> bool:
+        """Take a message; `own`: the judge's. False if no law need be checked, because it is not about
+        this device."""
         self.now, self.news = heard.at, heard.message
         message = heard.message
+        if not own:
+            self._end_silence(heard.at, heard.wall)
+            self._any_at = heard.at
         if not isinstance(message, words.Stated | words.Requested):
             return self.take_other(heard)
         if (words.kind(message), words.device(message)) == (self.seen.kind, self.name):
@@ -80,14 +101,24 @@ class History(ABC, Generic[T]):
                 self.seen.published_by(heard.sender, Moment(heard.at, heard.wall))
                 return self._take_state(message, earlier)  # type: ignore[arg-type]
         elif isinstance(message, words.Stated):
+            self._other_at = self.now
             if words.kind(message) == self.seen.kind and len(self.others) < REMEMBERED:
                 self.others.add(words.device(message))
             return False
         return self.take_other(heard)
 
-    def pass_time(self, now: float) -> None:
+    def pass_time(self, now: float, wall: float) -> None:
         """Note that time has passed without a message."""
         self.now, self.news = now, None
+        self._end_silence(now, wall)
+        self._any_at = now
+
+    def _end_silence(self, now: float, wall: float) -> None:
+        """Note a silence of the network: nothing came, though other devices had been heard too."""
+        silent_s = now - self._any_at
+        if silent_s > SLOWEST_S and self._any_at - self._other_at <= SLOWEST_S:
+            self.network_s += silent_s
+            self.silences = [*self.silences, (wall - silent_s, silent_s)][:SILENCES]
 
     @abstractmethod
     def take_other(self, heard: Heard) -> bool:
@@ -96,6 +127,11 @@ class History(ABC, Generic[T]):
     @abstractmethod
     def settle(self, state: T) -> None:
         """Note the new state's meaning; `before` and `state` are set."""
+
+    @staticmethod
+    @abstractmethod
+    def claims(state: Any) -> bool:
+        """Would a robot act on this state?"""
 
     def forget(self) -> None:
         """Forget what a silence may have ended."""
@@ -106,7 +142,7 @@ class History(ABC, Generic[T]):
 
     def asked(self) -> None:
         """Note a request to this device."""
-        self._asked_at = self.now
+        self.asked_last = self.now
 
     @property
     def state(self) -> T | None:
@@ -124,9 +160,37 @@ class History(ABC, Generic[T]):
         return self.state if self.news is self.state else None
 
     @property
+    def tested(self) -> int:
+        """Count the latest requests, up to 8, whose next state was unchanged."""
+        return len(self._answers)
+
+    @property
     def answers(self) -> int:
-        """Count those of the latest 8 requests answered by a state that was not due."""
-        return sum(self._answers)
+        """Count those of the latest 8 requests answered by a state that was not due. Load bunches
+        messages but adds no state: at the usual pace none was an answer."""
+        pace_s = sum(gap_s for _, gap_s in self._answers) / max(1, self.tested)
+        return sum(early for early, _ in self._answers) if pace_s < self._early_s else 0
+
+    @property
+    def has_rhythm(self) -> bool:
+        """Have states come for long enough to know their rhythm, and their publishers?"""
+        return len(self._gaps) == RHYTHM
+
+    @property
+    def two_rhythms(self) -> bool:
+        """Do long and short gaps take turns, each always of the same length?"""
+        gaps = [*self._gaps]
+        steady = all(abs(b - a) < STEADY_S for a, b in zip(gaps, gaps[2:], strict=False))
+        uneven = all(abs(b - a) > UNEVEN_S for a, b in pairwise(gaps))
+        return self.has_rhythm and steady and uneven
+
+    def was_tested(self, at: float) -> bool:
+        """Has a state had the time to show the effect of a request that came then?"""
+        return CROSSED_S < self.now - at < TESTED_S
+
+    @property
+    def _early_s(self) -> float:
+        return self._usual_s - EARLY_S
 
     def _take_state(self, state: T, earlier: float) -> bool:
         """Take the new state. `earlier`: time of the one before."""
@@ -140,26 +204,36 @@ class History(ABC, Generic[T]):
         self.settle(state)
         return True
 
+    def checked(self) -> None:
+        """Begin the next gap, after the laws have read this one."""
+        if self.new is not None:
+            self.network_s = 0.0
+
     def _look_at_stamp(self, stamp: float) -> None:
         if abs(stamp - self._stamp) > FROZEN_S or self.before is None:
             self._stamp, self._moved_at = stamp, self.now
         self.frozen_s = self.now - self._moved_at
+        if self.before is None or not self.claims(self.before):
+            self._claims_since = self.now
+        self.claimed_s = self.now - self._claims_since
 
     def _look_at_pace(self, state: T, earlier: float) -> None:
         """Note the pace of unchanged states: they are due at the node's own rate, never at a
         request."""
+        self._gaps.append(self.seen.gap_s)
+        quiet_since, self._quiet_since = self._quiet_since, earlier
         if self.before is None or _content(state) != _content(self.before):
             return
         self._unchanged.append(self.now)
         if len(self._unchanged) == BURST:
             self.burst_s = self.now - self._unchanged[0]
-        if self._asked_at <= earlier:
+        if self.asked_last < quiet_since:
             self._quiet.append(self.seen.gap_s)
-        elif self._quiet:
-            at_once = self.now - self._asked_at < ANSWERS_WITHIN_S
-            usual_s = sorted(self._quiet)[len(self._quiet) * 3 // 4]
-            early = at_once and self.seen.gap_s < usual_s - EARLY_S
-            self._answers.append(early)
+            self._usual_s = sorted(self._quiet)[len(self._quiet) // 4]
+        elif self.asked_last >= earlier and self._quiet:
+            at_once = self.now - self.asked_last < ANSWERS_WITHIN_S
+            early = at_once and self.seen.gap_s < self._early_s
+            self._answers.append((early, self.seen.gap_s))
 
 
 def _content(state: words.Stated) -> words.Stated:

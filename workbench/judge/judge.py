@@ -66,12 +66,13 @@ class Judge:
         self._volatile_before: bool | None = None
         self._tallies = [_Tally(law) for law in LAWS[kind] if law.id in ids]
 
-    def hear(self, heard: Heard) -> None:
-        """Take the next message, of any device, in order of arrival."""
+    def hear(self, heard: Heard, own: bool = False) -> None:
+        """Take the next message, of any device, in order of arrival. `own`: published by the judge."""
         self.first = self.first or heard
-        if self.history.take(heard):
+        if self.history.take(heard, own):
             for tally in self._tallies:
                 self._check(tally, heard.at, heard.wall)
+            self.history.checked()
         self._resolve(heard.at)
 
     def fire_ends(
@@ -93,7 +94,7 @@ class Judge:
 
     def end(self, at: float, wall: float) -> tuple[JudgedLaw, ...]:
         """End the hearing. Return each law with its verdict, in the laws' order."""
-        self.history.pass_time(at)
+        self.history.pass_time(at, wall)
         if self.history.states:
             for tally in self._tallies:
                 self._check(tally, at, wall)
@@ -126,7 +127,6 @@ class Judge:
             doubt, evidence = tally.doubt
             if doubt.excused():
                 tally.doubt = None
-                tally.kept += 1
             elif now - evidence.at > LEEWAY_S:
                 tally.doubt = None
                 self._breaks(tally, evidence)

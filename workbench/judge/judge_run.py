@@ -172,5 +172,5 @@ class JudgeRun:
         """Judge what we publish like everybody's messages."""
         at, wall = self._last
         for topic, message in said:
-            self.judge.hear(Heard(at, wall, topic.name, message))
+            self.judge.hear(Heard(at, wall, topic.name, message), own=True)
         return said

@@ -34,7 +34,7 @@ class Doubt:
 
 
 Finding = str | Doubt | None
-"""A law's finding in the latest message: the breach, KEPT, or None if the law does not apply."""
+"""A law's finding in the latest message: the breach, KEPT, or None without an occasion to break it."""
 KEPT: Final = ""
 
 
@@ -42,12 +42,14 @@ KEPT: Final = ""
 class Law(Generic[S_contra]):
     """One sentence of RMF's contract, and its check after each message.
 
+    `occasion`: the event in which a wrong node would break it; without that event it is not seen.
     `source`: its reference. `check(history)`: a pure function of the messages heard.
     `sensed`: a stuck or noisy wire below a correct node can break it too.
     """
 
     id: str
     sentence: str
+    occasion: str
     reason: str
     source: str
     check: Callable[[S_contra], Finding]

@@ -7,7 +7,7 @@ from bridges.messages import words
 from bridges.observe.lift import HAZARDS
 from workbench.judge.history import NOT_YET
 from workbench.judge.law import KEPT, Doubt, Finding, shown
-from workbench.judge.lift_history import GRACE_S, LATE_S, LiftHistory
+from workbench.judge.lift_history import GRACE_S, LATE_S, LiftHistory, moves
 
 ENDS_WITHIN_S: Final = 3.0
 """A state period of 2 s, and one scan."""
@@ -16,17 +16,15 @@ GRANT_ASKED: Final = 10
 JUMPS_WITHIN_S: Final = 1.5
 REFUSED: Final = 3
 FOREIGN_S: Final = 2.0
+SUPERVISED_S: Final = 10.0
+"""Without a request on lift_requests for so long (s), the supervisor may be dead, or not recorded."""
 SETTLED_S: Final = 3.0
 """Time (s) after a node's first state in which it may still obey requests that we have not heard."""
 
 
-def opened(state: d.LiftState) -> bool:
-    return state.door_state == d.LiftDoor.DOOR_OPEN
-
-
 def _is_open(history: LiftHistory) -> d.LiftState | None:
     state = history.new
-    return state if state is not None and opened(state) else None
+    return state if state is not None and history.claims(state) else None
 
 
 def numbers(history: LiftHistory) -> Finding:
@@ -49,10 +47,13 @@ def numbers(history: LiftHistory) -> Finding:
 def other_lift(history: LiftHistory) -> Finding:
     """The lift is not given to a session that only asked for another lift."""
     session = history.session
-    if history.new is None or not session or session == history.session_before:
+    if history.new is None or history.before is None:
         return None
-    if session not in history.elsewhere or history.before is None:
-        return KEPT
+    if not session and history.elsewhere:
+        at = next(reversed(history.elsewhere.values()))
+        return KEPT if at > history.free_since and history.was_tested(at) else None
+    if session in ("", history.session_before) or session not in history.elsewhere:
+        return None
     return Doubt(
         f"held by {shown(session)}, which only asked for another lift",
         lambda: session in history.asks,
@@ -66,12 +67,10 @@ def own_name(history: LiftHistory) -> Finding:
         return None
     if session == history.session_before:
         return None
-    if (
-        session in history.asks
-        or session in history.elsewhere
-        or history.now - history.since < SETTLED_S
-    ):
+    if session in history.asks:
         return KEPT
+    if session in history.elsewhere or history.now - history.since < SETTLED_S:
+        return None
     return Doubt(
         f"held by {shown(session)}, which never asked for it", lambda: session in history.asks
     )
@@ -82,7 +81,8 @@ def grants(history: LiftHistory) -> Finding:
     if history.new is None or history.before is None:
         return None
     if history.session:
-        return KEPT if history.session != history.session_before else None
+        granted = history.session != history.session_before and history.session in history.asks
+        return KEPT if granted else None
     free_s = history.now - history.free_since
     for session, ask in list(history.asks.items()):
         asked = ask.direct and ask.times >= GRANT_ASKED and history.now - ask.direct_at < 3.0
@@ -98,11 +98,19 @@ def grants(history: LiftHistory) -> Finding:
 def bypassed(history: LiftHistory) -> Finding:
     """Requests of fleet adapters to the supervisor grant nothing."""
     session = history.session
-    if history.new is None or history.before is None or session in ("", history.session_before):
+    supervised = history.now - history.direct_at <= SUPERVISED_S
+    if history.new is None or history.before is None or not supervised:
         return None
+    if not session:
+        tested = (
+            history.free_since < ask.first_at and history.was_tested(ask.first_at)
+            for ask in history.asks.values()
+            if not ask.direct
+        )
+        return KEPT if any(tested) else None
     ask = history.asks.get(session)
-    if ask is None or ask.direct or history.now - history.other_asked_at > 10.0:
-        return KEPT if ask else None
+    if session == history.session_before or ask is None or ask.direct:
+        return None
 
     def excused() -> bool:
         later = history.asks.get(session)
@@ -115,11 +123,15 @@ def bypassed(history: LiftHistory) -> Finding:
 def ended_unasked(history: LiftHistory) -> Finding:
     """A session ends only by its own END."""
     old, new, since = history.session_before, history.session, history.held_since
-    if history.new is None or history.before is None or old in ("", new):
+    if history.new is None or history.before is None or not old:
         return None
+    if old == new:
+        hazard = history.new.current_mode in HAZARDS
+        tested = history.travelled or hazard or history.was_tested(history.rival_at)
+        return KEPT if tested else None
     ask = history.asks.get(old)
     if history.has_ended(old, since) or (ask and ask.human) or _foreign_end(history, old, since):
-        return KEPT
+        return None
     what = f"session {shown(old)} became {shown(new)}" if new else f"session {shown(old)} ended"
 
     def excused() -> bool:
@@ -146,7 +158,7 @@ def ended_by_another(history: LiftHistory) -> Finding:
     if not other or old not in history.asks:
         return None
     if old == history.session:
-        return KEPT
+        return KEPT if history.now - history.foreign_end_at < FOREIGN_S else None
     text = f"END_SESSION of {shown(other)} ended the session of {shown(old)}"
     return Doubt(text, lambda: history.has_ended(old, since))
 
@@ -158,7 +170,7 @@ def ends(history: LiftHistory) -> Finding:
     if history.bare_refused >= REFUSED:
         return f"{REFUSED} sessions in a row outlived an END without a floor, as fleet adapters send it"
     if history.session_before and history.session != history.session_before:
-        return KEPT
+        return KEPT if history.bare_end else None
     at = history.ending.at
     if at == NOT_YET or history.now - at < ENDS_WITHIN_S:
         return None
@@ -168,11 +180,10 @@ def ends(history: LiftHistory) -> Finding:
 
 
 def stopped(history: LiftHistory) -> Finding:
-    state = _is_open(history)
-    if state is None:
+    state = history.new
+    if state is None or not moves(state):
         return None
-    moving = state.motion_state in (d.LiftMotion.MOTION_UP, d.LiftMotion.MOTION_DOWN)
-    return words.described(state) if moving else KEPT
+    return words.described(state) if history.claims(state) else KEPT
 
 
 def somewhere(history: LiftHistory) -> Finding:
@@ -187,7 +198,9 @@ def no_jump(history: LiftHistory) -> Finding:
     if state is None or not state.current_floor:
         return None
     floor, at = history.open_seen
-    if floor in ("", state.current_floor) or history.now - at > JUMPS_WITHIN_S:
+    if floor in ("", state.current_floor):
+        return None
+    if history.now - at > JUMPS_WITHIN_S:
         return KEPT
     return f"open at {shown(floor)}, and {history.now - at:.1f} s later at {shown(state.current_floor)}"
 
@@ -209,14 +222,15 @@ def holds(history: LiftHistory) -> Finding:
         return None
     if history.often(history.reopened):
         return "open, not open and open again within 1 s, 3 times in one stop"
-    return KEPT
+    stays = history.before is not None and history.claims(history.before)
+    return KEPT if stays and history.session == history.session_before else None
 
 
 def floors(history: LiftHistory) -> Finding:
     state = history.new
-    if state is None or not state.available_floors:
+    if state is None or not state.available_floors or not state.current_floor:
         return None
-    if state.current_floor in ("", *state.available_floors):
+    if state.current_floor in state.available_floors:
         return KEPT
     return f"current_floor {shown(state.current_floor)} is not one of its available_floors"
 
@@ -226,10 +240,10 @@ def destination(history: LiftHistory) -> Finding:
     state = history.new
     if state is None or not state.session_id or not state.destination_floor:
         return None
-    if not history.known or history.was_asked_to(state.destination_floor):
+    if history.was_asked_to(state.destination_floor):
         return KEPT
-    if state.session_id not in history.asks:
-        return None  # another law says so
+    if not history.known or state.session_id not in history.asks:
+        return None  # asked before we listened, or another law says so
     floor = state.destination_floor
     return Doubt(
         f"destination {shown(floor)}, which {shown(state.session_id)} did not ask for",
@@ -239,10 +253,10 @@ def destination(history: LiftHistory) -> Finding:
 
 def unserved(history: LiftHistory) -> Finding:
     state = history.new
-    if state is None or not state.available_floors or not state.destination_floor:
+    if state is None or not state.available_floors:
         return None
-    if state.destination_floor in state.available_floors:
-        return KEPT
+    if state.destination_floor in ("", *state.available_floors):
+        return KEPT if history.was_tested(history.unserved_at) else None
     return f"destination {shown(state.destination_floor)} is not one of its available_floors"
 
 
@@ -251,7 +265,9 @@ def lets_nobody_in(history: LiftHistory) -> Finding:
     state = history.new
     if state is None or state.current_mode not in HAZARDS or not state.session_id:
         return None
-    return words.described(state) if history.offers else KEPT
+    if history.offers:
+        return words.described(state)
+    return None if history.offered else KEPT
 
 
 def grants_nothing(history: LiftHistory) -> Finding:
@@ -261,8 +277,15 @@ def grants_nothing(history: LiftHistory) -> Finding:
         return None
     new = state.session_id not in ("", before.session_id)
     again = state.session_id == history.last and history.now - history.last_at < GRACE_S + LATE_S
-    if not new or again or before.current_mode not in HAZARDS:
-        return KEPT if before.current_mode in HAZARDS else None
+    if before.current_mode not in HAZARDS or again:
+        return None
+    if not new:
+        since = history.seen.mode.since.at
+        tested = (
+            since < ask.since and ask.direct and history.was_tested(ask.since)
+            for ask in history.asks.values()
+        )
+        return KEPT if not history.session and any(tested) else None
     return f"granted in mode {words.word(d.LiftMode, state.current_mode)}: {words.described(state)}"
 
 
@@ -272,7 +295,7 @@ def no_false(history: LiftHistory) -> Finding:
         return None
     if history.often(history.false_alarms):
         return "`false` 3 times, with no alarm to call off"
-    return KEPT
+    return KEPT if history.called_off else None
 
 
 def retained(history: LiftHistory) -> Finding:

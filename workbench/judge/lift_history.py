@@ -24,10 +24,11 @@ END: Final = d.LiftRequestType.REQUEST_END_SESSION
 
 @dataclass
 class Ask:
-    """The requests of one session. `direct_at`: the latest on lift_requests. `since`:
-    the beginning of the present gapless row of requests there. `human`: did it ask for HUMAN mode?
-    `direct`: was it heard on lift_requests?"""
+    """The requests of one session, `first_at` and on. `direct_at`: the latest on lift_requests.
+    `since`: the beginning of the present gapless row of requests there. `human`: did it ask for HUMAN
+    mode? `direct`: was it heard on lift_requests?"""
 
+    first_at: float
     since: float
     floors: deque[str] = field(default_factory=lambda: deque(maxlen=FLOORS))
     times: int = 0
@@ -55,9 +56,13 @@ class LiftHistory(History[d.LiftState]):
     is not so. `ending`: the ENDs of the present session. `bare_refused`: how many sessions in a row
     outlived an END without a floor and ended at one with a floor. `reopened`: when the door
     reopened at once, in one stop. `open_seen`: floor and time of the last OPEN at another floor.
-    `other_asked_at`: when lift_requests last carried another session's request. `free_since`:
-    beginning of the present time without session and hazard.
-    `false_alarms`: times of a needless false on the fire topic. `volatile`: does its publisher
+    `direct_at`: when lift_requests last carried a request of another session, for any lift; `rival_at`:
+    for this lift; `foreign_end_at`: an END of another session. `unserved_at`: the last request, by the
+    holder or for a free lift, for a floor that is not served. `travelled`: the car has moved in this
+    session. `bare_end`: the session before ended at an END without a floor. `free_since`: beginning of
+    the present time without session and hazard.
+    `false_alarms`: times of a needless false on the fire topic; `called_off`: its latest message ended
+    an alarm. `volatile`: does its publisher
     retain nothing? None if unknown.
     """
 
@@ -76,9 +81,10 @@ class LiftHistory(History[d.LiftState]):
         self.bare_refused = 0
         self.reopened: deque[float] = deque(maxlen=3)
         self.open_seen = ("", NOT_YET)
-        self.other_asked_at = NOT_YET
+        self.direct_at = self.rival_at = self.foreign_end_at = self.unserved_at = NOT_YET
+        self.travelled = self.bare_end = False
         self.false_alarms: deque[float] = deque(maxlen=3)
-        self.alarmed = False
+        self.alarmed = self.called_off = False
         self.volatile: bool | None = None
         self.free_since = NOT_YET
         self._open: tuple[str, float] = ("", NOT_YET)
@@ -114,6 +120,7 @@ class LiftHistory(History[d.LiftState]):
         if message.lift_name != self.name:
             if message.request_type != END and direct:
                 keep(self.elsewhere, message.session_id, self.now)
+                self._hear_direct(message)
             return False
         if direct:
             self.asked()
@@ -137,12 +144,19 @@ class LiftHistory(History[d.LiftState]):
             self._changed_hands(state)
         if self.session or state.current_mode in HAZARDS:
             self.free_since = self.now
-        opened = state.door_state == d.LiftDoor.DOOR_OPEN
+        elsewhere = self.before is not None and self.before.current_floor != state.current_floor
+        self.travelled |= moves(state) or elsewhere
+        opened = self.claims(state)
         wanted = (state.destination_floor, *self._wanted())
         self.offers = bool(opened and self.session and not self.offered)
         self._look_at_door(state, opened)
         if self.offers and state.current_floor in wanted:
             self.offered = True
+
+    @staticmethod
+    def claims(state: d.LiftState) -> bool:
+        """Is the door OPEN?"""
+        return state.door_state == d.LiftDoor.DOOR_OPEN
 
     def _wanted(self) -> tuple[str, ...]:
         ask = self.asks.get(self.session)
@@ -156,7 +170,8 @@ class LiftHistory(History[d.LiftState]):
         if before:
             self.last, self.last_at = before, self.now
         self.held_since, self.granted_at = self.granted_at, self.now
-        self.known, self.ending = True, Ending()
+        self.bare_end = self.ending.bare_at > NOT_YET and self.ending.floor_at == NOT_YET
+        self.known, self.travelled, self.ending = True, False, Ending()
         self.reopened.clear()
 
     def _count_bare(self, before: str) -> None:
@@ -176,13 +191,14 @@ class LiftHistory(History[d.LiftState]):
             if same and at < self._shut_at and self.now - self._shut_at < REOPENS_WITHIN_S:
                 self.reopened.append(self.now)
             self.open_seen = self.open_seen if same else self._open
-            stands = state.motion_state not in (d.LiftMotion.MOTION_UP, d.LiftMotion.MOTION_DOWN)
-            self._open = (state.current_floor, self.now) if stands else self._open
+            self._open = self._open if moves(state) else (state.current_floor, self.now)
         elif at > self._shut_at:
             self._shut_at = self.now
 
     def _end(self, message: d.LiftRequest, direct: bool) -> None:
         keep(self.ended, message.session_id, self.now)
+        if direct and message.session_id != self.session:
+            self.foreign_end_at = self.now
         if message.session_id in self.asks:
             self.asks[message.session_id].times = 0
         if not direct or message.session_id != self.session or not self.session:
@@ -196,7 +212,7 @@ class LiftHistory(History[d.LiftState]):
 
     def _ask(self, message: d.LiftRequest, direct: bool) -> None:
         session = message.session_id
-        ask = self.asks.get(session) or Ask(self.now)
+        ask = self.asks.get(session) or Ask(self.now, self.now)
         if direct and (not ask.times or self.now - ask.direct_at > SLOWEST_S):
             ask.since = self.now
         ask.direct_at = self.now if direct else ask.direct_at
@@ -207,15 +223,32 @@ class LiftHistory(History[d.LiftState]):
         if moved:
             ask.floors.append(message.destination_floor)
         keep(self.asks, session, ask)
-        if session != self.session:
-            self.other_asked_at = self.now if direct else self.other_asked_at
-        else:
+        if direct:
+            self._hear_direct(message)
+        if session == self.session:
             self.ending = Ending()
         if session == self.session and moved:
             self.reopened.clear()
 
+    def _hear_direct(self, request: d.LiftRequest) -> None:
+        """Note what a request on lift_requests must not do."""
+        here, holds = request.lift_name == self.name, request.session_id == self.session
+        served = self.state.available_floors if self.state else ()
+        if not holds:
+            self.direct_at = self.now
+            self.rival_at = self.now if here else self.rival_at
+        if here and (holds or not self.session) and served:
+            unserved = request.destination_floor not in served
+            self.unserved_at = self.now if unserved else self.unserved_at
+
     def _alarm(self, on: bool) -> bool:
+        self.called_off = self.alarmed and not on
         if not on and not self.alarmed:
             self.false_alarms.append(self.now)
         self.alarmed = on
         return True
+
+
+def moves(state: d.LiftState) -> bool:
+    """Does it say that the car moves?"""
+    return state.motion_state in (d.LiftMotion.MOTION_UP, d.LiftMotion.MOTION_DOWN)

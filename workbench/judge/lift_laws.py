@@ -19,6 +19,7 @@ LAWS: Final[tuple[Law[LiftHistory], ...]] = (
     Law(
         "T1.numbers",
         "door_state, motion_state and modes are numbers of LiftState.msg",
+        "a state",
         "RMF compares numbers: a number that it does not know never matches",
         "LiftState.msg",
         checks.numbers,
@@ -26,6 +27,7 @@ LAWS: Final[tuple[Law[LiftHistory], ...]] = (
     Law(
         "L1.other",
         "A request for another lift changes nothing here",
+        "a request for another lift while this one is free",
         "All lifts share one topic: a node that ignores the name gives this lift to that robot",
         "LiftRequest.msg; sharp-rmf/low_level_lift did so",
         checks.other_lift,
@@ -33,6 +35,7 @@ LAWS: Final[tuple[Law[LiftHistory], ...]] = (
     Law(
         "L1.bypass",
         "A session is granted on lift_requests, not on adapter_lift_requests",
+        "a fleet adapter's request for the free lift that its supervisor does not pass on",
         "Only the supervisor decides between two robots: without it both believe they have the lift",
         A6,
         checks.bypassed,
@@ -40,6 +43,7 @@ LAWS: Final[tuple[Law[LiftHistory], ...]] = (
     Law(
         "L4.own",
         "session_id is the session_id of a request for this lift",
+        "a session begins",
         "A robot enters only when it reads its own fleet/robot there",
         REQUEST_LIFT,
         checks.own_name,
@@ -47,6 +51,7 @@ LAWS: Final[tuple[Law[LiftHistory], ...]] = (
     Law(
         "L4.grants",
         "A free lift in service shows the session of the robot that asks for it",
+        "a request for the free lift, in service",
         "A fleet adapter has no timeout: it asks and waits for ever. AGV_MODE is 1 in a request",
         "rmf_ros2 phases/RequestLift.cpp; LiftRequest.msg",
         checks.grants,
@@ -54,6 +59,7 @@ LAWS: Final[tuple[Law[LiftHistory], ...]] = (
     Law(
         "L5.ends",
         "END_SESSION of the holder ends the session, with an empty floor too, within 3 s",
+        "the holder's END_SESSION without a floor, as the first",
         "Fleet adapters send END with no floor and door 0. Refused, the lift is lost to the next robot",
         CONTEXT,
         checks.ends,
@@ -61,6 +67,7 @@ LAWS: Final[tuple[Law[LiftHistory], ...]] = (
     Law(
         "L5.foreign",
         "END_SESSION of another session changes nothing",
+        "END_SESSION of another session while a robot has the lift",
         "rmf-web sends END for every robot that it knows: a robot in the car must keep its lift",
         "rmf-web PR#808; " + A6,
         checks.ended_by_another,
@@ -68,6 +75,7 @@ LAWS: Final[tuple[Law[LiftHistory], ...]] = (
     Law(
         "L4.ends",
         "A session ends only by its END_SESSION, not by a timeout, hazard, fault or other request",
+        "in a session the car moves, a hazard comes, or another session requests the lift",
         "The supervisor frees its slot only at END: the robot would wait for a lift that dropped it",
         "rmf_ros2#314, lift_supervisor/Node.cpp:58-104",
         checks.ended_unasked,
@@ -75,6 +83,7 @@ LAWS: Final[tuple[Law[LiftHistory], ...]] = (
     Law(
         "L7.stopped",
         "DOOR_OPEN is shown only while the car stands",
+        "the car moves",
         "A robot drives by door, floor and session only; it does not read motion_state",
         REQUEST_LIFT,
         checks.stopped,
@@ -83,6 +92,7 @@ LAWS: Final[tuple[Law[LiftHistory], ...]] = (
     Law(
         "L7.floor",
         "DOOR_OPEN is shown only at a known floor",
+        "the door opens",
         "Without a floor nothing proves where the door is",
         REQUEST_LIFT,
         checks.somewhere,
@@ -91,6 +101,7 @@ LAWS: Final[tuple[Law[LiftHistory], ...]] = (
     Law(
         "L7.jump",
         "The door is not open at two floors within 1.5 s",
+        "the door opens at a second floor",
         "No car is that fast: one of the two floors was wrong, and a robot may have believed it",
         "follows from RequestLift.cpp: one state is enough",
         checks.no_jump,
@@ -99,14 +110,16 @@ LAWS: Final[tuple[Law[LiftHistory], ...]] = (
     Law(
         "L7.fresh",
         "DOOR_OPEN is never a remembered state: its lift_time advances",
+        "the door is OPEN for more than 5 s",
         "A controller that cannot be reached may have closed the door long ago",
         "LiftState.msg, lift_time",
-        fresh(checks.opened),
+        fresh(),
         sensed=True,
     ),
     Law(
         "L7.agv",
         "A robot is let in only in MODE_AGV; in LiftState that is 2, and MODE_HUMAN is 1",
+        "the door opens for a robot that boards",
         "RMF does not read the mode, so OPEN must wait for it: else people call the car away",
         "LiftState.msg; " + REQUEST_LIFT,
         checks.in_agv,
@@ -115,6 +128,7 @@ LAWS: Final[tuple[Law[LiftHistory], ...]] = (
     Law(
         "L7.holds",
         "The door stays OPEN for the session that called the lift, and does not flap",
+        "the door is OPEN at the robot's floor for two states",
         "A robot drives off at the first OPEN, and would be on its way when the door is not open",
         REQUEST_LIFT,
         checks.holds,
@@ -123,6 +137,7 @@ LAWS: Final[tuple[Law[LiftHistory], ...]] = (
     Law(
         "L8.floor",
         "current_floor is one of available_floors, or empty",
+        "a state with a floor and available_floors",
         "RMF compares the names letter by letter",
         REQUEST_LIFT,
         checks.floors,
@@ -131,6 +146,7 @@ LAWS: Final[tuple[Law[LiftHistory], ...]] = (
     Law(
         "L8.destination",
         "destination_floor is one that the holder asked for",
+        "a state with a destination, in a session seen from its beginning",
         "The supervisor repeats a request until it reads its floor there, and no other floor",
         A6,
         checks.destination,
@@ -138,6 +154,7 @@ LAWS: Final[tuple[Law[LiftHistory], ...]] = (
     Law(
         "L9.unserved",
         "destination_floor is one of available_floors, or empty",
+        "a request for a floor that is not served, by the holder or for the free lift",
         "A request for a floor that is not served is refused, and moves the car nowhere",
         "LiftRequest.msg, destination_floor",
         checks.unserved,
@@ -145,6 +162,7 @@ LAWS: Final[tuple[Law[LiftHistory], ...]] = (
     Law(
         "L10.board",
         "In FIRE, EMERGENCY or OFFLINE no robot is let in: OPEN is not shown to a session outside",
+        "FIRE, EMERGENCY or OFFLINE in the session of a robot that has not boarded",
         "RMF lets a robot in on OPEN, floor and session, in every mode: a fire holds nobody back",
         REQUEST_LIFT,
         checks.lets_nobody_in,
@@ -152,6 +170,7 @@ LAWS: Final[tuple[Law[LiftHistory], ...]] = (
     Law(
         "L10.grant",
         "In FIRE, EMERGENCY or OFFLINE no new session is granted",
+        "a request for the free lift in FIRE, EMERGENCY or OFFLINE",
         "A lift under recall is not for robots",
         "LiftState.msg, MODE_FIRE; follows from RequestLift.cpp",
         checks.grants_nothing,
@@ -159,6 +178,7 @@ LAWS: Final[tuple[Law[LiftHistory], ...]] = (
     Law(
         "L12.false",
         "fire_alarm_trigger never carries `false` without an alarm to call off",
+        "a `false` that ends an alarm",
         "One `false` ends another source's alarm, and the robots go on with their tasks",
         "octarobotics/lci-rmf-adapter; rmf_ros2 FleetUpdateHandle::handle_emergency",
         checks.no_false,
@@ -166,6 +186,7 @@ LAWS: Final[tuple[Law[LiftHistory], ...]] = (
     Law(
         "L12.retained",
         "fire_alarm_trigger is published TRANSIENT_LOCAL",
+        "a publisher of fire_alarm_trigger, beside one lift",
         "Fleet adapters subscribe transient-local: a volatile publisher never reaches them",
         "rmf_ros2#341, agv/Node.cpp:73-79",
         checks.retained,

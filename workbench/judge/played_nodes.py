@@ -81,7 +81,7 @@ class PlayedNodes:
         self._makes = supervisor
         self._supervisor = supervisor() if supervisor else None
         self._patience_s = patience_s
-        self._retained: deque[d.Message] = deque(maxlen=RETAINED)
+        self._retained: deque[d.LiftRequest] = deque(maxlen=RETAINED)
         self._deaf_until = -NEVER
 
     @property
@@ -120,12 +120,13 @@ class PlayedNodes:
         return min([*(t.wake_at() for t in self.travellers), *waits])
 
     def restart_supervisor(self, now: float) -> list[Said]:
-        """Replace the played supervisor; the new one hears fleet adapters' retained messages."""
+        """Replace the played supervisor; the new one hears fleet adapters' retained messages, one
+        adapter's after the other's."""
         if self._makes is None:
             return []
         self._supervisor = self._makes()
         said = []
-        for message in list(self._retained):
+        for message in sorted(self._retained, key=lambda one: one.session_id):
             said += self._say(self._supervisor.hear(message, now), now)
         return said
 
@@ -147,7 +148,7 @@ class PlayedNodes:
         out = []
         for topic, message in said:
             out.append((topic, message))
-            if topic == topics.ADAPTER_LIFT_REQUESTS:
+            if isinstance(message, d.LiftRequest) and topic == topics.ADAPTER_LIFT_REQUESTS:
                 self._retained.append(message)
             out += self._spread(topic.name, message, now)
         return out

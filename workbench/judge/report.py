@@ -19,8 +19,8 @@ NARROWEST: Final = 60
 @dataclass(frozen=True, slots=True)
 class Judgement:
     """One judgement. `wall`: its beginning (s since the epoch). `heard_s`: time of listening.
-    `states`: number heard. `others`: other devices of its kind. `notes`: the
-    listener's remarks."""
+    `states`: number heard. `others`: other devices of its kind. `notes`: the listener's remarks.
+    `silences` of the whole network: beginning (s since the epoch) and length (s)."""
 
     kind: Kind
     name: str
@@ -30,6 +30,7 @@ class Judgement:
     others: tuple[str, ...]
     judged: tuple[JudgedLaw, ...]
     notes: tuple[str, ...] = ()
+    silences: tuple[tuple[float, float], ...] = ()
 
     def of(self, verdict: Verdict) -> list[JudgedLaw]:
         """Return the laws with this verdict."""
@@ -40,7 +41,8 @@ def report(judge: Judge, judged: tuple[JudgedLaw, ...], heard_s: float, *notes: 
     """Report a judge's findings."""
     wall, history = judge.first.wall if judge.first else 0.0, judge.history
     others = tuple(sorted(history.others))
-    return Judgement(judge.kind, judge.name, wall, heard_s, history.states, others, judged, notes)
+    about = (judge.kind, judge.name, wall, heard_s, history.states, others, judged)
+    return Judgement(*about, notes, tuple(history.silences))
 
 
 def text(report: Judgement, width: int) -> str:
@@ -55,14 +57,22 @@ def text(report: Judgement, width: int) -> str:
     for verdict in ORDER:
         for judged in report.of(verdict):
             lines += _lines(judged, max(width, NARROWEST))
-    return "\n".join([*lines, *(f"\n{note}" for note in report.notes)])
+    quiet = [
+        f"{_time(wall)}  nobody on the network was heard for {silent_s:.0f} s: not counted"
+        for wall, silent_s in report.silences
+    ]
+    return "\n".join([*lines, *(f"\n{note}" for note in (*quiet, *report.notes))])
 
 
 def _lines(judged: JudgedLaw, width: int) -> list[str]:
     law, verdict = judged.law, judged.verdict
     line = f"{verdict.upper() if verdict is Verdict.BROKEN else verdict:8}  {law.id:14}  "
     if verdict is not Verdict.BROKEN:
-        return [line + _cut(law.sentence, width - len(line))]
+        lines = [law.sentence, *([f"needs: {law.occasion}"] if verdict is Verdict.NOT_SEEN else [])]
+        heads = (line, " " * len(line))
+        return [
+            head + _cut(one, width - len(head)) for head, one in zip(heads, lines, strict=False)
+        ]
     told = [f"            {_time(e.wall)}  {e.text}" for e in judged.evidence]
     more = judged.times - len(judged.evidence)
     told += [f"            and {more} times more"] if more else []
@@ -98,6 +108,7 @@ class LawJson(msgspec.Struct, frozen=True):
     id: str
     verdict: str
     sentence: str
+    occasion: str
     reason: str
     source: str
     times: int
@@ -114,6 +125,7 @@ class ReportJson(msgspec.Struct, frozen=True):
     heard_s: float
     states: int
     notes: tuple[str, ...]
+    silences: tuple[tuple[float, float], ...]
     laws: tuple[LawJson, ...]
 
 
@@ -126,7 +138,7 @@ def as_json(report: Judgement) -> str:
     """Return one JSON object."""
     laws = tuple(
         LawJson(
-            *(j.law.id, j.verdict, j.law.sentence, j.law.reason, j.law.source),
+            *(j.law.id, j.verdict, j.law.sentence, j.law.occasion, j.law.reason, j.law.source),
             times=j.times,
             evidence=j.evidence,
         )
@@ -135,6 +147,7 @@ def as_json(report: Judgement) -> str:
     told = ReportJson(
         *(report.kind, report.name, verdict(report), report.wall, report.heard_s, report.states),
         notes=report.notes,
+        silences=report.silences,
         laws=laws,
     )
     return msgspec.json.encode(told).decode()
@@ -169,13 +182,14 @@ def _case(suite: ElementTree.Element, report: Judgement, judged: JudgedLaw) -> N
         failure = ElementTree.SubElement(case, "failure", message=told[0])
         failure.text = "\n".join([*told, f"{law.reason} ({law.source})"])
     elif judged.verdict is Verdict.NOT_SEEN:
-        ElementTree.SubElement(case, "skipped", message="not seen")
+        ElementTree.SubElement(case, "skipped", message=f"not seen; needs: {law.occasion}")
 
 
 def markdown(kind: Kind) -> str:
     """Return a kind's laws as a table for docs/reference/laws.md; *: a wire can break it too."""
     rows = [
-        f"| `{law.id}`{'*' if law.sensed else ''} | {law.sentence} | {law.reason} | {law.source} |"
+        f"| `{law.id}`{'*' if law.sensed else ''} | {law.sentence} | {law.occasion} | {law.reason}"
+        f" | {law.source} |"
         for law in LAWS[kind]
     ]
-    return "\n".join(["| law | | why | source |", "|---|---|---|---|", *rows])
+    return "\n".join(["| law | | occasion | why | source |", "|---|---|---|---|---|", *rows])

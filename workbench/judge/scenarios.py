@@ -1,33 +1,36 @@
-"""Plays for a lift, a door and a charger: their conditions, their course, and the device's release."""
+"""Plays for a lift and a door: their conditions, their course, and the device's release."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator
 from typing import Final
 
 from bridges.messages import definitions as d
 from bridges.messages import topics, words
-from bridges.messages.stamps import duration, stamp
+from bridges.messages.stamps import stamp
 from bridges.messages.topics import AnyTopic
 from bridges.observe.lift import HAZARDS
 from workbench.judge.law import shown
 from workbench.judge.played_nodes import PlayedNodes, Step, Traveller
-from workbench.rmf_model import NEVER, Said, door_request
+from workbench.rmf_model import Said, door_request
 from workbench.rmf_model.phases import DoorClose, DoorOpen, EndLiftSession, RequestLift
 from workbench.rmf_model.robot import RobotContext
 from workbench.rmf_model.supervisors import DoorSupervisor, LiftSupervisor
 
 FLEET: Final = "rmf_bridge_judge"
-DRIVES_S: Final = 3.0
-DOORWAY_S: Final = 15.0
+DRIVES_S: Final = 6.0
+DOORWAY_S: Final = 12.0
 """Longer than the wait of any node that closes a door in silence."""
-SERVED: Final = (d.ChargerStateValue.CHARGER_ASSIGNED, d.ChargerStateValue.CHARGER_CHARGING)
+SHOWS_S: Final = 4.0
+"""In this time (s) a node shows the effect of a message that must have none."""
 STRANGER: Final = f"{FLEET}/nobody"
-STAYS_S: Final = 5.0
+BYPASSER: Final = f"{FLEET}/robot_without_supervisor"
+NOWHERE: Final = f"{FLEET} nowhere"
+"""The name of no device and no floor."""
+AGV: Final = d.LiftRequestType.REQUEST_AGV_MODE
+END: Final = d.LiftRequestType.REQUEST_END_SESSION
 LEAVES_S: Final = 10.0
 REPEAT_S: Final = 1.0
 MOST_FLOORS: Final = 20
-START_TIMEOUT_S: Final = 30.0
 
 
 def busy(state: words.Stated) -> str:
@@ -51,6 +54,7 @@ class Scenario(ABC):
     hears: tuple[AnyTopic, ...]
     play: PlayedNodes
     failed = ""
+    _disturbs: Callable[[float], list[Said]] | None = None
 
     @property
     def over(self) -> bool:
@@ -74,6 +78,11 @@ class Scenario(ABC):
         """Take a message of the graph."""
         return self.play.hear(topic, message, now)
 
+    def _disturb(self, now: float) -> list[Said]:
+        """Send what was to come between two states."""
+        disturbs, self._disturbs = self._disturbs, None
+        return disturbs(now) if disturbs else []
+
     def tick(self, now: float) -> list[Said]:
         """Fire due timers."""
         return self.play.tick(now)
@@ -96,8 +105,10 @@ class RideScenario(Scenario):
     """Robots ride from one floor to another, every second one back.
 
     `through`: a supervisor is on the graph. `restarts`: the played supervisor restarts with a robot
-    in the car. While the first robot is in the car, a robot without a session sends END, as rmf-web
-    does.
+    in the car. Without `through` there is an occasion to break each law of sessions: before the ride, a
+    request for another lift and one that no supervisor passes on; while the first robot is in the car,
+    an END and a request of another session, as rmf-web and other fleets send them; at the end, a request
+    for a floor that does not exist.
     """
 
     def __init__(
@@ -116,7 +127,6 @@ class RideScenario(Scenario):
         self._through = through
         self._state: d.LiftState | None = None
         self._leaving = 0
-        self._restart_due = self._stranger_due = False
         self.speaks = (topics.ADAPTER_LIFT_REQUESTS,)
         if not through:
             self.speaks = (*self.speaks, topics.LIFT_REQUESTS)
@@ -130,14 +140,36 @@ class RideScenario(Scenario):
 
     def _ride(self, robot: RobotContext, floors: tuple[str, str], number: int) -> Iterator[Step]:
         start, goal = floors if number % 2 == 0 else floors[::-1]
+        if not self._through:
+            yield from self._ask_aside(start, first=number == 0)
         yield RequestLift(self.lift, start, inside=False)
         yield DRIVES_S
         robot.in_car = True
-        self._restart_due, self._stranger_due = self._restarts, not self._through
+        disturbed = number == 0 and not self._through
+        self._disturbs = lambda now: self._in_the_car(disturbed, now)
         yield RequestLift(self.lift, goal, inside=True)
         yield DRIVES_S
+        if disturbed:
+            self._disturbs = lambda now: [self._send(STRANGER, start, now)]
+            yield SHOWS_S
+            self._disturbs = lambda now: [self._send(robot.requester_id, NOWHERE, now)]
+            yield SHOWS_S
         robot.in_car = False
         yield EndLiftSession(self.lift)
+
+    def _ask_aside(self, floor: str, first: bool) -> Iterator[Step]:
+        """Ask for another lift, then for this one around the supervisor. Other robots wait meanwhile."""
+        elsewhere = lambda now: [self._send(STRANGER, floor, now, lift=NOWHERE)]  # noqa: E731
+        around = lambda now: [  # noqa: E731
+            (topics.ADAPTER_LIFT_REQUESTS, self._send(BYPASSER, floor, now)[1])
+        ]
+        for disturbs in (elsewhere, around):
+            self._disturbs = disturbs if first else self._disturbs
+            yield SHOWS_S
+
+    def _in_the_car(self, disturbed: bool, now: float) -> list[Said]:
+        said = [self._send(STRANGER, "", now, END)] if disturbed else []
+        return said + (self.play.restart_supervisor(now) if self._restarts else [])
 
     def unfit(self, state: words.Stated) -> str:
         """Require an idle lift that serves both floors."""
@@ -157,42 +189,37 @@ class RideScenario(Scenario):
         said = self.play.hear(topic, message, now)
         return said + self._disturb(now)
 
-    def _disturb(self, now: float) -> list[Said]:
-        """Disturb a ride: what may happen with a robot in the car, between two states."""
-        said: list[Said] = []
-        if self._stranger_due:
-            self._stranger_due = False
-            said.append((topics.LIFT_REQUESTS, self._end(STRANGER, "", now)))
-        if self._restart_due:
-            self._restart_due = False
-            said += self.play.restart_supervisor(now)
-        return said
+    @property
+    def _names(self) -> set[str]:
+        return {*self.play.names, STRANGER, BYPASSER}
 
     def leave(self, now: float) -> list[Said]:
         """Send END for each of us, as fleet adapters do; with a floor if that has no effect."""
         self._leaving += 1
         floor = self._state.current_floor if self._state and self._leaving > 3 else ""
-        ends = [self._end(name, floor, now) for name in sorted(self.play.names)]
+        shown_now = {self._state.session_id} & self._names if self._state else set()
+        names = sorted(self.play.names | shown_now)
+        ends = [self._send(name, floor, now, END)[1] for name in names]
         return [(topic, end) for end in ends for topic in self.speaks]
 
-    def _end(self, session: str, floor: str, now: float) -> d.LiftRequest:
-        return d.LiftRequest(
-            lift_name=self.lift,
-            request_time=stamp(now),
-            session_id=session,
-            request_type=d.LiftRequestType.REQUEST_END_SESSION,
-            destination_floor=floor,
-        )
+    def _send(
+        self, session: str, floor: str, now: float, kind: int = AGV, lift: str = ""
+    ) -> tuple[AnyTopic, d.LiftRequest]:
+        """Make a supervisor's request."""
+        door = d.LiftRequestDoor.DOOR_OPEN if kind == AGV else d.LiftRequestDoor.DOOR_CLOSED
+        request = d.LiftRequest(lift or self.lift, stamp(now), session, kind, floor, door)
+        return topics.LIFT_REQUESTS, request
 
     @property
     def left(self) -> bool:
         """Was END sent, and does the lift show none of our sessions?"""
-        free = self._state is None or self._state.session_id not in self.play.names
+        free = self._state is None or self._state.session_id not in self._names
         return self._leaving > 0 and free
 
 
 class PassageScenario(Scenario):
-    """A robot goes through a door, so many times."""
+    """A robot goes through a door, so many times. While it stands in the doorway, another door and an
+    unknown fleet adapter are told to close."""
 
     def __init__(
         self,
@@ -205,7 +232,7 @@ class PassageScenario(Scenario):
     ) -> None:
         self.door = door
         self._restarts = restarts
-        self._restart_due = False
+        self._through = through
         self._leaving = 0
         self._mode = -1
         self.speaks = (topics.ADAPTER_DOOR_REQUESTS,)
@@ -218,8 +245,11 @@ class PassageScenario(Scenario):
 
     def _pass(self, times: int) -> Iterator[Step]:
         for _ in range(times):
-            self._restart_due = self._restarts
+            self._disturbs = self.play.restart_supervisor if self._restarts else None
             yield DoorOpen(self.door)
+            self._disturbs = lambda now: [] if self._through else [_closes(NOWHERE, now)]
+            yield SHOWS_S
+            self._disturbs = lambda now: [_closes(self.door, now, STRANGER)]
             yield DOORWAY_S
             yield DoorClose(self.door)
             yield from self._until_closed()
@@ -232,27 +262,18 @@ class PassageScenario(Scenario):
             yield 1.0
 
     def hear(self, topic: str, message: d.Message, now: float) -> list[Said]:
-        """Take states and heartbeats. A restart comes with the first state after the OPEN."""
+        """Take states and heartbeats. A disturbance comes with the next state."""
         if isinstance(message, d.DoorState) and message.door_name == self.door:
             self._mode = message.current_mode.value
         said = self.play.hear(topic, message, now)
-        if self._restart_due and isinstance(message, d.DoorState):
-            self._restart_due = False
-            said += self.play.restart_supervisor(now)
-        return said
+        return said + (self._disturb(now) if isinstance(message, d.DoorState) else [])
 
     def leave(self, now: float) -> list[Said]:
         """Send CLOSE, to the supervisor or in its name."""
         self._leaving += 1
         [name] = self.play.names
-        closed = d.DoorModeValue.MODE_CLOSED
-        said: list[Said] = [
-            (topics.ADAPTER_DOOR_REQUESTS, door_request(self.door, name, closed, now))
-        ]
-        if topics.DOOR_REQUESTS in self.speaks:
-            request = door_request(self.door, DoorSupervisor.REQUESTER_ID, closed, now)
-            said.append((topics.DOOR_REQUESTS, request))
-        return said
+        said = [_closes(self.door, now, name)]
+        return said if self._through else [*said, _closes(self.door, now)]
 
     @property
     def left(self) -> bool:
@@ -260,86 +281,8 @@ class PassageScenario(Scenario):
         return self._leaving > 0 and self._mode != d.DoorModeValue.MODE_OPEN
 
 
-@dataclass
-class _Asked:
-    """The progress of a charger's request: the time of each step (s)."""
-
-    asked_at: float = NEVER
-    assigned_at: float = NEVER
-    cancelled_at: float = NEVER
-    states: set[int] = field(default_factory=set)
-
-
-class ChargeScenario(Scenario):
-    """Request a station, cancel another's request, then cancel ours.
-
-    `robot`: FLEET/ROBOT. No robot need come.
-    """
-
-    def __init__(self, charger: str, robot: str, request_id: str, patience_s: float) -> None:
-        self.charger = charger
-        self._fleet, _, self._robot = robot.partition("/")
-        self._id = request_id
-        self._patience_s = patience_s
-        self._at = _Asked()
-        self._state: d.ChargerState | None = None
-        self.speaks = (topics.CHARGER_REQUESTS, topics.CHARGER_CANCELS)
-        self.hears = (topics.CHARGER_STATES, topics.CHARGER_REFUSALS)
-        self.play = PlayedNodes(charger, [], None, patience_s)
-
-    @property
-    def over(self) -> bool:
-        """Is our request cancelled, or was it never granted?"""
-        return bool(self.failed) or self._at.cancelled_at < NEVER
-
-    def begin(self, now: float) -> list[Said]:
-        """Ask."""
-        self._at.asked_at = now
-        timeout = duration(START_TIMEOUT_S)
-        request = d.ChargerRequest(self.charger, self._fleet, self._robot, timeout, self._id)
-        return [(topics.CHARGER_REQUESTS, request)]
-
-    def hear(self, topic: str, message: d.Message, now: float) -> list[Said]:
-        """Take its states, and a refusal."""
-        if isinstance(message, d.DiagnosticStatus) and message.hardware_id == self.charger:
-            if any((v.key, v.value) == ("request_id", self._id) for v in message.values):
-                self.failed = f"refused: {shown(message.message)}"
-            return []
-        if not isinstance(message, d.ChargerState) or message.charger_name != self.charger:
-            return []
-        self._state = message
-        if (
-            message.state in SERVED
-            and message.request_id == self._id
-            and self._at.assigned_at == NEVER
-        ):
-            self._at.assigned_at = now
-            return [(topics.CHARGER_CANCELS, d.ChargerCancel(self.charger, f"{self._id}-other"))]
-        return []
-
-    def tick(self, now: float) -> list[Said]:
-        """Cancel, or give up."""
-        if now - self._at.assigned_at >= STAYS_S:
-            self._at.cancelled_at = now
-            return self.leave(now)
-        if self._at.assigned_at == NEVER and now - self._at.asked_at >= self._patience_s:
-            self.failed = f"not assigned in {self._patience_s:.0f} s"
-        return []
-
-    def wake_at(self) -> float:
-        """Time of the cancel, or of giving up."""
-        if self._at.assigned_at < NEVER:
-            return self._at.assigned_at + STAYS_S
-        return self._at.asked_at + self._patience_s
-
-    def leave(self, now: float) -> list[Said]:
-        """Cancel."""
-        self._at.cancelled_at = min(self._at.cancelled_at, now)
-        return [(topics.CHARGER_CANCELS, d.ChargerCancel(self.charger, self._id))]
-
-    @property
-    def left(self) -> bool:
-        """Has the charger stopped serving our request?"""
-        state = self._state
-        shows = state is not None and state.state in SERVED and state.request_id == self._id
-        return self._at.cancelled_at < NEVER and not shows
+def _closes(door: str, now: float, who: str = DoorSupervisor.REQUESTER_ID) -> Said:
+    """Make a CLOSE of the supervisor or of a fleet adapter."""
+    direct = who == DoorSupervisor.REQUESTER_ID
+    request = door_request(door, who, d.DoorModeValue.MODE_CLOSED, now)
+    return topics.DOOR_REQUESTS if direct else topics.ADAPTER_DOOR_REQUESTS, request

@@ -13,11 +13,12 @@ from tests.workbench.judge.nodes.right_door import RightDoor
 from tests.workbench.judge.nodes.right_lift import RightLift
 from tests.workbench.judge.script import asks, lift
 from tests.workbench.judge.world import World, told
+from workbench.judge.charge_scenario import ChargeScenario
 from workbench.judge.judge import Judge
 from workbench.judge.judge_run import JudgeRun
 from workbench.judge.law import Verdict
 from workbench.judge.report import as_json, junit, report, text
-from workbench.judge.scenarios import ChargeScenario, PassageScenario, RideScenario, Scenario
+from workbench.judge.scenarios import PassageScenario, RideScenario, Scenario
 
 STATE = d.LiftState(stamp(EPOCH), "Lift1", ("L1", "L3"), "L1")
 

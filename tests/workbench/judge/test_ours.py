@@ -5,8 +5,9 @@ import pytest
 from tests.site.building import CHARGERS, DOORS, LIFTS, devices
 from tests.site.daemons import DeviceDaemon
 from tests.workbench.judge.world import World, told
+from workbench.judge.charge_scenario import ChargeScenario
 from workbench.judge.judge import Kind
-from workbench.judge.scenarios import ChargeScenario, PassageScenario, RideScenario, Scenario
+from workbench.judge.scenarios import PassageScenario, RideScenario, Scenario
 
 CASES: list[tuple[Kind, str, Scenario]] = [
     *(

@@ -10,10 +10,11 @@ from bridges.messages.topics import AnyTopic
 from bridges.transports.transport import Publisher
 from tests.site.network import CLEAR, Air, Place
 from tests.site.timeline import EPOCH, NEVER, Alarm, Timeline
+from workbench.judge.charge_scenario import ChargeScenario
 from workbench.judge.judge import Judge, Kind
 from workbench.judge.judge_run import JudgeRun
 from workbench.judge.law import Verdict
-from workbench.judge.scenarios import ChargeScenario, PassageScenario, RideScenario, Scenario
+from workbench.judge.scenarios import PassageScenario, RideScenario, Scenario
 from workbench.rmf_model import Party, Said
 
 HEARD: tuple[AnyTopic, ...] = (
@@ -23,6 +24,11 @@ HEARD: tuple[AnyTopic, ...] = (
     *(topics.CHARGER_STATES, topics.CHARGER_REQUESTS, topics.CHARGER_CANCELS),
     topics.CHARGER_REFUSALS,
 )
+STATES: dict[Kind, AnyTopic] = {
+    "lift": topics.LIFT_STATES,
+    "door": topics.DOOR_STATES,
+    "charger": topics.CHARGER_STATES,
+}
 Verdicts = dict[str, set[str]]
 
 
@@ -119,6 +125,7 @@ class World:
             for topic in (topics.FIRE_ALARM_TRIGGER.live(), topics.FIRE_ALARM_TRIGGER)
         ]
         ends.append(place.subscribe(topics.LIFT_REQUESTS, lambda message: None, others_only=True))
+        states = place.subscribe(STATES[kind], lambda message: None)
         say([])
         also(judging)
         until = self.timeline.now + most_s
@@ -127,6 +134,7 @@ class World:
             publishing, retaining, supervisors = (end.matched() for end in ends)
             now = self.timeline.now
             judging.judge.fire_ends(publishing, retaining, supervisors, now, EPOCH + now)
+            judging.judge.history.senders = tuple(states.senders())
         place.close()
         return judging
 
