@@ -20,7 +20,7 @@ class ChargerHistory(History[d.ChargerState]):
     """`requests`: by id, the latest. `cancels`: id -> time of the first cancel; the cancel of a
     charge that nobody requested is forgotten with it. `foreign_at`: the last cancel of an id that the
     station does not show. `first_asked`: the first request of each id. `elsewhere`: ids requested of other stations. `second_at`: the last request
-    with an id that the station does not show. `same_since`: since when state and request are
+    with another id than that of the request that is served. `same_since`: since when state and request are
     unchanged; `same_before`: the same of those before."""
 
     seen: ObservedCharger
@@ -47,7 +47,8 @@ class ChargerHistory(History[d.ChargerState]):
                 if not unrequested(heard.message.request_id):
                     keep(self.requests, heard.message.request_id, heard.message)
                     self._note_first(heard.message.request_id)
-                if self.state is not None and heard.message.request_id != self.state.request_id:
+                serves = self.state is not None and self.state.state in (ASSIGNED, CHARGING)
+                if serves and heard.message.request_id != self.seen.request.value:
                     self.second_at = self.now
             case d.ChargerRequest():
                 keep(self.elsewhere, heard.message.request_id, self.now)

@@ -236,7 +236,7 @@ class LiftHistory(History[d.LiftState]):
         served = self.state.available_floors if self.state else ()
         if not holds:
             self.direct_at = self.now
-            self.rival_at = self.now if here else self.rival_at
+            self.rival_at = self.now if here and self.session else self.rival_at
         if here and (holds or not self.session) and served:
             unserved = request.destination_floor not in served
             self.unserved_at = self.now if unserved else self.unserved_at

@@ -19,13 +19,14 @@ RED, BLUE = "fleet/red", "fleet/blue"
 OPEN, CLOSED = 2, 0
 AGV, FIRE = 2, 3
 IDLE, ASSIGNED, CHARGING = 1, 2, 3
+NAMES: dict[Kind, str] = {"lift": "Lift1", "door": "ward", "charger": "bay1"}
 Line = tuple[float, AnyTopic, d.Message]
 Story = Callable[[float], list[Line]]
 
 
 def is_broken(kind: Kind, law: str, lines: list[Line]) -> bool:
     """What the judge says of these, heard in the order of their times, and 2 s later."""
-    judge = Judge(kind, {"lift": "Lift1", "door": "ward", "charger": "bay1"}[kind])
+    judge = Judge(kind, NAMES[kind])
     lines.sort(key=lambda line: line[0])
     for at, topic, message in lines:
         judge.hear(Heard(at, at, topic.name, message))

@@ -1,0 +1,323 @@
+"""Each law has an occasion. Without it the law is not seen; with it a right node keeps the law, and a
+wrong node breaks it."""
+
+from collections.abc import Callable
+
+import pytest
+from msgspec.structs import replace
+
+from bridges.messages import topics
+from bridges.messages.definitions import Bool
+from bridges.messages.heard import Heard
+from tests.workbench.judge.test_limits import (
+    ASSIGNED,
+    BLUE,
+    CHARGING,
+    CLOSED,
+    FIRE,
+    IDLE,
+    NAMES,
+    OPEN,
+    Line,
+    answered,
+    asked_for_long,
+    asks,
+    cancel,
+    car,
+    charge,
+    ends,
+    flaps,
+    frozen,
+    held,
+    leaf,
+    open_at_once,
+    pushed,
+    reopens,
+    robot_asks,
+    robot_closes,
+    seconds,
+    station,
+    stays_shut,
+    to_door,
+)
+from workbench.judge.judge import KINDS, LAWS, Judge, Kind
+
+ERROR, RELEASED = 200, 4
+HUMAN, OFFLINE = 1, 4
+NEVER_READ = -1e3
+Look = Callable[[Judge], None]
+Lines = list[Line | Look]
+
+
+def senders(*names: str) -> Look:
+    """The publishers on the topic of the states."""
+
+    def look(judge: Judge) -> None:
+        judge.history.senders = names
+
+    return look
+
+
+def fire_publisher(retaining: int) -> Look:
+    """A publisher of the fire alarm, found twice."""
+
+    def look(judge: Judge) -> None:
+        for _ in range(2):
+            judge.fire_ends(1, retaining, 0, 0.0, 0.0)
+
+    return look
+
+
+def verdict(kind: Kind, law: str, lines: Lines) -> str:
+    judge = Judge(kind, NAMES[kind], only=[law])
+    told = sorted((line for line in lines if isinstance(line, tuple)), key=lambda line: line[0])
+    for look in lines:
+        if not isinstance(look, tuple):
+            look(judge)
+    for at, topic, message in told:
+        judge.hear(Heard(at, at, topic.name, message))
+    last = told[-1][0]
+    [found] = judge.end(last, last)
+    return found.verdict.value
+
+
+def moving(at: float, door: int = CLOSED) -> Line:
+    at, topic, state = car(at, door=door)
+    return at, topic, replace(state, motion_state=1)
+
+
+def alarm(at: float, on: bool) -> Line:
+    return at, topics.FIRE_ALARM_TRIGGER, Bool(on)
+
+
+def twins(line: Callable[[float], Line]) -> Lines:
+    """The states of two nodes, 0.3 s apart."""
+    return [senders("/a", "/b"), *(line(n + by) for n in range(8) for by in (0.0, 0.3))]
+
+
+def cars(until: float = 12.0) -> Lines:
+    return [*seconds(0.0, until, car)]
+
+
+def leaves(until: float = 12.0, mode: int = CLOSED) -> Lines:
+    return [*seconds(0.0, until, lambda s: leaf(s, mode))]
+
+
+def bay(until: float, state: int = IDLE, request_id: str = "", begin: float = 0.0) -> Lines:
+    return [*seconds(begin, until, lambda s: station(s, state, request_id))]
+
+
+def rides(*more: Line, until: float = 6.0, **state: int | str | float) -> Lines:
+    """RED asks at 0.5 s, and has the lift from 1 s."""
+    return [car(0.0), asks(0.5), *seconds(1.0, until, lambda s: held(s, **state)), *more]
+
+
+def opens(*more: Line, until: float = 8.0) -> Lines:
+    """OPEN is requested at 0.5 s, and shown from 3 s."""
+    way = [leaf(0.0), to_door(0.5), leaf(1.0), leaf(2.0, 1)]
+    return [*way, *seconds(3.0, until, lambda s: leaf(s, OPEN)), *more]
+
+
+def served(*more: Line, until: float = 6.0, state: int = ASSIGNED) -> Lines:
+    """r1 is requested at 0.5 s, and served from 1 s."""
+    return [station(0.0, IDLE), charge(0.5), *bay(until, state, "r1", 1.0), *more]
+
+
+def changed(line: Line, **fields: object) -> Line:
+    at, topic, message = line
+    return at, topic, replace(message, **fields)
+
+
+L1 = {"to": "L1", "door": OPEN}
+RIVAL = changed(charge(2.5), request_id="r2", robot_name="blue")
+ELSEWHERE = changed(charge(0.5), charger_name="bay2")
+ASKED = [asks(8.5 + n) for n in range(8)]
+TO_FIRE: Lines = [*seconds(0.0, 8.0, lambda s: car(s, mode=FIRE))]
+
+STORIES: dict[tuple[Kind, str], tuple[Lines, Lines, Lines]] = {
+    ("lift", "L2.rate"): ([car(0.0)], cars(2.0), [car(0.0), car(6.0)]),
+    ("lift", "L2.answer"): (
+        cars(20.0),
+        [*cars(20.0), *ASKED],
+        [*cars(), *(car(12.0 + i / 100) for i in range(21))],
+    ),
+    ("lift", "B0.one"): (cars(), [senders("/a"), *cars()], twins(car)),
+    ("lift", "L3.stamp"): (
+        [car(0.0, mode=OFFLINE, read_at=NEVER_READ)],
+        [car(0.0)],
+        [car(0.0, read_at=NEVER_READ)],
+    ),
+    ("lift", "T1.numbers"): ([asks(0.0)], [car(0.0)], [car(0.0, door=3)]),
+    ("lift", "L1.other"): (
+        rides(),
+        [*cars(6.0), asks(1.5, lift="Lift2")],
+        [*cars(3.0), asks(1.5, lift="Lift2"), *seconds(3.0, 6.0, held)],
+    ),
+    ("lift", "L1.bypass"): (
+        [*rides(), asks(0.2, BLUE, lift="Lift2"), robot_asks(0.4)],
+        [*cars(6.0), asks(0.2, BLUE, lift="Lift2"), robot_asks(1.5)],
+        [*cars(3.0), asks(0.2, BLUE, lift="Lift2"), robot_asks(1.5), *seconds(3.0, 6.0, held)],
+    ),
+    ("lift", "L4.own"): (cars(6.0), rides(), [*cars(4.0), *seconds(4.0, 7.0, held)]),
+    ("lift", "L4.grants"): (cars(6.0), rides(), [*asked_for_long(31.5)]),
+    ("lift", "L5.ends"): (
+        rides(ends(5.5, floor="L1"), car(6.0)),
+        rides(ends(5.5), car(6.0)),
+        rides(ends(1.5)),
+    ),
+    ("lift", "L5.foreign"): (
+        rides(ends(5.5), car(6.0)),
+        rides(ends(4.5, BLUE)),
+        rides(ends(5.5, BLUE), car(6.0), car(8.0)),
+    ),
+    ("lift", "L4.ends"): (
+        rides(ends(5.5), car(6.0)),
+        rides(held(6.0, floor="L3"), held(7.0, floor="L3")),
+        rides(car(6.0), car(8.0)),
+    ),
+    ("lift", "L7.stopped"): (
+        [car(0.0, door=OPEN)],
+        [car(0.0), moving(1.0)],
+        [car(0.0), moving(1.0, OPEN)],
+    ),
+    ("lift", "L7.floor"): (cars(), [car(0.0, door=OPEN)], [car(0.0, door=OPEN, floor="")]),
+    ("lift", "L7.jump"): (
+        [*seconds(0.0, 6.0, lambda s: car(s, door=OPEN))],
+        [car(0.0), car(1.0, door=OPEN), car(3.0), car(5.0, door=OPEN, floor="L3")],
+        [car(0.0), car(1.0, door=OPEN), car(2.0, door=OPEN, floor="L3")],
+    ),
+    ("lift", "L7.fresh"): (
+        [car(0.0), *seconds(1.0, 6.0, lambda s: car(s, door=OPEN)), car(6.0)],
+        [*seconds(0.0, 8.0, lambda s: car(s, door=OPEN))],
+        [*frozen(car, OPEN, 6.0)],
+    ),
+    ("lift", "L7.agv"): (rides(), rides(**L1), rides(**L1, mode=HUMAN)),
+    ("lift", "L7.holds"): (
+        [car(0.0), asks(0.5, floor="L1"), held(1.0, **L1), held(2.0)],
+        [car(0.0), asks(0.5, floor="L1"), held(1.0, **L1), held(2.0, **L1)],
+        [*reopens(3, 8.0, 0.5)],
+    ),
+    ("lift", "L8.floor"): ([car(0.0, floor="")], [car(0.0)], [car(0.0, floor="L9")]),
+    ("lift", "L8.destination"): (rides(), rides(to="L3"), rides(to="L1")),
+    ("lift", "L9.unserved"): (
+        rides(to="L3"),
+        rides(asks(2.5, floor="L9")),
+        rides(asks(2.5, floor="L9"), held(6.0, to="L9")),
+    ),
+    ("lift", "L10.board"): (rides(), rides(mode=FIRE), rides(mode=FIRE, **L1)),
+    ("lift", "L10.grant"): (
+        TO_FIRE,
+        [*TO_FIRE, asks(2.5)],
+        [*TO_FIRE, asks(7.5), held(8.0, mode=FIRE)],
+    ),
+    ("lift", "L12.false"): (
+        [car(0.0), alarm(1.0, False), alarm(2.0, True)],
+        [car(0.0), alarm(1.0, True), alarm(2.0, False)],
+        [car(0.0), *(alarm(n, False) for n in (1.0, 2.0, 3.0))],
+    ),
+    ("lift", "L12.retained"): (
+        cars(),
+        [*cars(), fire_publisher(retaining=1)],
+        [*cars(), fire_publisher(retaining=0)],
+    ),
+    ("door", "D1.rate"): ([leaf(0.0)], leaves(2.0), [leaf(0.0), leaf(6.0)]),
+    ("door", "D1.answer"): (
+        leaves(20.0),
+        [*leaves(20.0), *(to_door(8.5 + n) for n in range(8))],
+        [*answered(8, 0.4, 0.05)],
+    ),
+    ("door", "B0.one"): (leaves(), [senders("/a"), *leaves()], twins(leaf)),
+    ("door", "D3.stamp"): (
+        [leaf(0.0, 3, NEVER_READ)],
+        [leaf(0.0)],
+        [leaf(0.0, CLOSED, NEVER_READ)],
+    ),
+    ("door", "T1.numbers"): ([to_door(0.0)], [leaf(0.0)], [leaf(0.0, 5)]),
+    ("door", "D2.opens"): ([*leaves(6.0, OPEN), to_door(2.5)], opens(), [*stays_shut(31.0)]),
+    ("door", "D2.stays"): (opens(), opens(until=16.0), opens(leaf(8.0), leaf(10.0))),
+    ("door", "D1.bypass"): (
+        opens(),
+        opens(robot_closes(5.5)),
+        opens(robot_closes(7.5), leaf(8.0), leaf(10.0)),
+    ),
+    ("door", "D2.holds"): (opens(until=4.0), opens(), [*flaps(3, 8.0, 0.5)]),
+    ("door", "D2.people"): (
+        [leaf(0.0), leaf(2.0, OPEN), leaf(5.0)],
+        [*pushed(1, shuts_s=3.0)],
+        [*pushed(3, closes_s=2.0, shuts_s=0.4)],
+    ),
+    ("door", "D3.travel"): (leaves(), opens(), [*open_at_once(2, 0.1)]),
+    ("door", "D3.fresh"): (opens(until=8.0), opens(until=10.0), [*frozen(leaf, OPEN, 6.0)]),
+    ("charger", "C4.rate"): (
+        [station(0.0, IDLE)],
+        bay(2.0),
+        [station(0.0, IDLE), station(6.0, IDLE)],
+    ),
+    ("charger", "C4.answer"): (
+        bay(20.0),
+        [*bay(20.0), *(charge(8.5 + n) for n in range(8))],
+        [*bay(12.0), *(station(12.0 + i / 100, IDLE) for i in range(21))],
+    ),
+    ("charger", "B0.one"): (
+        bay(12.0),
+        [senders("/a"), *bay(12.0)],
+        twins(lambda s: station(s, IDLE)),
+    ),
+    ("charger", "C4.stamp"): (
+        [station(0.0, ERROR, read_at=NEVER_READ)],
+        bay(1.0),
+        [station(0.0, IDLE, read_at=NEVER_READ)],
+    ),
+    ("charger", "C1.numbers"): ([charge(0.0)], bay(1.0), [station(0.0, 238)]),
+    ("charger", "C5.id"): (bay(3.0), served(), [station(0.0, ASSIGNED)]),
+    ("charger", "C5.robot"): (
+        [*bay(6.0), ELSEWHERE],
+        served(),
+        [station(0.0, IDLE), ELSEWHERE, station(1.0, ASSIGNED, "r1")],
+    ),
+    ("charger", "C5.text"): ([charge(0.0)], bay(1.0), [station(0.0, ERROR, "r1")]),
+    ("charger", "C1.keeps"): (
+        served(),
+        served(RIVAL),
+        served(RIVAL, station(6.0, ASSIGNED, "r2")),
+    ),
+    ("charger", "C2.start"): (
+        served(station(6.0, RELEASED, "r1")),
+        served(station(21.5, RELEASED, "r1"), until=21.0),
+        served(until=34.0),
+    ),
+    ("charger", "C3.cancel"): (
+        served(station(6.0, RELEASED, "r1")),
+        served(cancel(5.5), station(6.0, RELEASED, "r1")),
+        served(cancel(2.5), until=10.0),
+    ),
+    ("charger", "C3.foreign"): (
+        served(cancel(5.5), station(6.0, IDLE)),
+        served(cancel(4.5, "r9")),
+        served(cancel(5.5, "r9"), station(6.0, IDLE), station(8.0, IDLE)),
+    ),
+    ("charger", "C4.fresh"): (
+        bay(15.0),
+        bay(20.0),
+        [*seconds(0.0, 18.0, lambda s: station(s, IDLE, read_at=0.0))],
+    ),
+}
+
+
+@pytest.mark.parametrize(("kind", "law"), STORIES)
+def test_a_law_needs_its_occasion(kind: Kind, law: str) -> None:
+    found = [verdict(kind, law, story) for story in STORIES[kind, law]]
+    assert found == ["not seen", "kept", "broken"]
+
+
+def test_every_law_has_its_stories() -> None:
+    assert list(STORIES) == [(kind, law.id) for kind in KINDS for law in LAWS[kind]]
+
+
+def test_a_charge_may_be_taken_over_only_after_its_end() -> None:
+    other = station(6.0, ASSIGNED, "r2")
+    assert verdict("charger", "C1.keeps", served(RIVAL, cancel(5.5), other)) == "kept"
+    late = served(RIVAL, station(21.0, ASSIGNED, "r2"), until=21.0)
+    assert verdict("charger", "C1.keeps", late) == "kept"
+    taken = served(RIVAL, station(6.0, CHARGING, "r2"), state=CHARGING)
+    assert verdict("charger", "C1.keeps", taken) == "broken"
