@@ -213,7 +213,7 @@ def _live(args: argparse.Namespace, performance: Scenario | None) -> int:
     if judging is None:
         return os.EX_UNAVAILABLE
     now = time.monotonic()
-    judged = judging.judge.end(now, time.time())
+    judged = judging.judge.end(now, time.time(), now - judging.began_at)
     notes = [f"not played to its end: {judging.note}"] if judging.note else []
     return tell(report(judging.judge, judged, now - judging.began_at, *notes), args)
 

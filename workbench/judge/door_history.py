@@ -128,7 +128,7 @@ class DoorHistory(History[d.DoorState]):
 
     def _ask_open(self) -> None:
         if not self.latched:
-            self.latched, self.asked_at = True, self.now
+            self.latched, self.asked_at, self.adapter_closed_at = True, self.now, NOT_YET
             self.was_open, self.was_closed = self.mode == OPEN, self.mode == CLOSED
             self.openings = 0
             self.reopened.clear()

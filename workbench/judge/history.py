@@ -40,18 +40,18 @@ T = TypeVar("T", d.LiftState, d.DoorState, d.ChargerState)
 V = TypeVar("V")
 
 
-def keep(known: dict[str, V], key: str, value: V) -> None:
+def keep(known: dict[str, V], key: str, value: V, most: int = REMEMBERED) -> None:
     """Put an entry last; forget the oldest if there are too many."""
     known.pop(key, None)
     known[key] = value
-    if len(known) > REMEMBERED:
+    if len(known) > most:
         del known[next(iter(known))]
 
 
 class History(ABC, Generic[T]):
     """One device. Times are those of the messages (s).
 
-    `news`: the message taken last, None when only time has passed. `seen`: the device's observations.
+    `news`: the message taken last, None when only time has passed; `own`: the judge's. `seen`: the device's observations.
     `before`: the state before the latest, None at the first one, and after a silence, because the
     node may have restarted; `since`: time of that. `frozen_s`: time for which the states have shown
     the same stamp; `claimed_s`: time for which each `claims` what a robot acts on. `burst_s`: time
@@ -74,6 +74,7 @@ class History(ABC, Generic[T]):
         self.senders: tuple[str, ...] = ()
         self.silences: list[tuple[float, float]] = []
         self.states = 0
+        self.own = False
         self.others: set[str] = set()
         self._unchanged: deque[float] = deque(maxlen=BURST)
         self._stamp = self._moved_at = self._claims_since = NOT_YET
@@ -87,7 +88,7 @@ class History(ABC, Generic[T]):
     def take(self, heard: Heard, own: bool = False) -> bool:
         """Take a message; `own`: the judge's. False if no law need be checked, because it is not about
         this device."""
-        self.now, self.news = heard.at, heard.message
+        self.now, self.news, self.own = heard.at, heard.message, own
         message = heard.message
         if not own:
             self._end_silence(heard.at, heard.wall)

@@ -23,6 +23,8 @@ SCENES: Final[Mapping[Kind, type[History[Any]]]] = MappingProxyType(
 )
 LEEWAY_S: Final = 1.0
 """Greatest difference (s) in the arrival of two topics."""
+MUTE_S: Final = 10.0
+"""A publisher that sends no state in this time (s) would not send one to RMF."""
 SHOWN: Final = 3
 """Limit of evidence stored for one law."""
 
@@ -92,10 +94,11 @@ class Judge:
                 if tally.law.id == "L12.retained":
                     self._check(tally, at, wall)
 
-    def end(self, at: float, wall: float) -> tuple[JudgedLaw, ...]:
-        """End the hearing. Return each law with its verdict, in the laws' order."""
+    def end(self, at: float, wall: float, heard_s: float = 0.0) -> tuple[JudgedLaw, ...]:
+        """End the hearing after `heard_s`. Return each law with its verdict, in the laws' order."""
         self.history.pass_time(at, wall)
-        if self.history.states:
+        mute = heard_s > MUTE_S and self.history.senders and not self.history.others
+        if self.history.states or mute:
             for tally in self._tallies:
                 self._check(tally, at, wall)
         self._resolve(at)

@@ -86,7 +86,7 @@ def grants(history: LiftHistory) -> Finding:
     free_s = history.now - history.free_since
     for session, ask in list(history.asks.items()):
         asked = ask.direct and ask.times >= GRANT_ASKED and history.now - ask.direct_at < 3.0
-        served = ask.floors[-1] in history.new.available_floors or not history.new.available_floors
+        served = ask.floor in history.new.available_floors or not history.new.available_floors
         long_s = min(free_s, history.now - ask.since)
         if asked and served and session and not ask.human and long_s > GRANTS_WITHIN_S:
             return (
@@ -240,6 +240,8 @@ def destination(history: LiftHistory) -> Finding:
     state = history.new
     if state is None or not state.session_id or not state.destination_floor:
         return None
+    if state.current_mode in HAZARDS:
+        return None  # it goes to its recall floor
     if history.was_asked_to(state.destination_floor):
         return KEPT
     if not history.known or state.session_id not in history.asks:

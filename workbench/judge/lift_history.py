@@ -9,13 +9,15 @@ from bridges.messages import topics
 from bridges.messages.heard import Heard
 from bridges.observe.lift import HAZARDS, ObservedLift
 from bridges.observe.limits import SLOWEST_S
-from workbench.judge.history import NOT_YET, History, keep
+from workbench.judge.history import CROSSED_S, NOT_YET, History, keep
 
 GRACE_S: Final = 65.0
 """Time (s) in which a session may resume: its robot may still be in the car."""
 LATE_S: Final = 5.0
 """Greatest time (s) from an END to the state that first shows its session."""
 FLOORS: Final = 8
+ASKED_S: Final = 10.0
+"""A request repeats itself at each state: a floor not asked for so long (s) was given up."""
 AT_ONCE_S: Final = 0.3
 """Longer than a scan, and than the crossing of a state and a request on the wire."""
 REOPENS_WITHIN_S: Final = 1.0
@@ -26,15 +28,20 @@ END: Final = d.LiftRequestType.REQUEST_END_SESSION
 class Ask:
     """The requests of one session, `first_at` and on. `direct_at`: the latest on lift_requests.
     `since`: the beginning of the present gapless row of requests there. `human`: did it ask for HUMAN
-    mode? `direct`: was it heard on lift_requests?"""
+    mode? `direct`: was it heard on lift_requests? `floors`: the last request for each, the latest last."""
 
     first_at: float
     since: float
-    floors: deque[str] = field(default_factory=lambda: deque(maxlen=FLOORS))
+    floors: dict[str, float] = field(default_factory=dict)
     times: int = 0
     human: bool = False
     direct_at: float = NOT_YET
     direct: bool = False
+
+    @property
+    def floor(self) -> str:
+        """The floor of the latest request."""
+        return next(reversed(self.floors), "")
 
 
 @dataclass
@@ -105,9 +112,11 @@ class LiftHistory(History[d.LiftState]):
         return self.ended.get(session, NOT_YET) > since - LATE_S
 
     def was_asked_to(self, floor: str) -> bool:
-        """Has the present session asked for this floor?"""
+        """Is this the present session's last floor, or has it just asked for this floor?"""
         ask = self.asks.get(self.session)
-        return ask is not None and floor in ask.floors
+        if ask is None or floor not in ask.floors:
+            return False
+        return floor == ask.floor or self.now - ask.floors[floor] < ASKED_S
 
     def take_other(self, heard: Heard) -> bool:
         """Take requests of this lift and of others, and the fire alarm."""
@@ -160,7 +169,7 @@ class LiftHistory(History[d.LiftState]):
 
     def _wanted(self) -> tuple[str, ...]:
         ask = self.asks.get(self.session)
-        return (ask.floors[-1],) if ask and ask.floors else ()
+        return (ask.floor,) if ask else ()
 
     def _changed_hands(self, state: d.LiftState) -> None:
         before, now = self.session_before, self.session
@@ -196,7 +205,10 @@ class LiftHistory(History[d.LiftState]):
             self._shut_at = self.now
 
     def _end(self, message: d.LiftRequest, direct: bool) -> None:
-        keep(self.ended, message.session_id, self.now)
+        if (
+            not self.own or self.now - self.last_at > CROSSED_S
+        ):  # ours does not explain an earlier end
+            keep(self.ended, message.session_id, self.now)
         if direct and message.session_id != self.session:
             self.foreign_end_at = self.now
         if message.session_id in self.asks:
@@ -219,9 +231,8 @@ class LiftHistory(History[d.LiftState]):
         ask.direct = ask.direct or direct
         ask.times += direct
         ask.human |= message.request_type == d.LiftRequestType.REQUEST_HUMAN_MODE
-        moved = message.destination_floor not in list(ask.floors)[-1:]
-        if moved:
-            ask.floors.append(message.destination_floor)
+        moved = message.destination_floor != ask.floor
+        keep(ask.floors, message.destination_floor, self.now, FLOORS)
         keep(self.asks, session, ask)
         if direct:
             self._hear_direct(message)

@@ -130,6 +130,10 @@ class PlayedNodes:
             said += self._say(self._supervisor.hear(message, now), now)
         return said
 
+    def deafen(self, until: float) -> None:
+        """Let the played supervisor hear no states until then: it would repair what a wrong node did."""
+        self._deaf_until = until
+
     def _go_on(self, now: float) -> list[Said]:
         said = []
         for traveller in self.travellers:
@@ -157,7 +161,7 @@ class PlayedNodes:
         said: list[Said] = []
         for party in self._parties():
             deaf = party is self._supervisor and now < self._deaf_until
-            deaf = deaf and isinstance(message, d.LiftState)
+            deaf = deaf and isinstance(message, words.Stated)
             if topic in (heard.name for heard in party.subscribes) and not deaf:
                 said += self._say(party.hear(message, now), now)
         bare = isinstance(message, d.LiftRequest) and not message.destination_floor

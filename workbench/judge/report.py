@@ -48,7 +48,7 @@ def report(judge: Judge, judged: tuple[JudgedLaw, ...], heard_s: float, *notes: 
 def text(report: Judgement, width: int) -> str:
     """Format one screen: broken laws first, with their evidence; a line for each other one."""
     name = words.printable(report.name)
-    if not report.states:
+    if not report.states and not report.of(Verdict.BROKEN):
         lines = [f"{report.kind} {name}: no state heard in {report.heard_s:.0f} s{_others(report)}"]
         return "\n".join([*lines, *report.notes])
     counts = ", ".join(f"{len(report.of(verdict))} {verdict}" for verdict in ORDER)

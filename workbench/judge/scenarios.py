@@ -106,9 +106,9 @@ class RideScenario(Scenario):
 
     `through`: a supervisor is on the graph. `restarts`: the played supervisor restarts with a robot
     in the car. Without `through` there is an occasion to break each law of sessions: before the ride, a
-    request for another lift and one that no supervisor passes on; while the first robot is in the car,
-    an END and a request of another session, as rmf-web and other fleets send them; at the end, a request
-    for a floor that does not exist.
+    request for another lift and one that no supervisor passes on; while the first robot has the lift, an
+    END of another session, as rmf-web sends it, a request of that session, and a request for a floor that
+    does not exist.
     """
 
     def __init__(
@@ -142,11 +142,14 @@ class RideScenario(Scenario):
         start, goal = floors if number % 2 == 0 else floors[::-1]
         if not self._through:
             yield from self._ask_aside(start, first=number == 0)
-        yield RequestLift(self.lift, start, inside=False)
-        yield DRIVES_S
-        robot.in_car = True
         disturbed = number == 0 and not self._through
-        self._disturbs = lambda now: self._in_the_car(disturbed, now)
+        yield RequestLift(self.lift, start, inside=False)
+        yield DRIVES_S / 2
+        if disturbed:
+            self._disturbs = lambda now: [self._send(STRANGER, "", now, END)]
+        yield DRIVES_S / 2
+        robot.in_car = True
+        self._disturbs = self.play.restart_supervisor if self._restarts else None
         yield RequestLift(self.lift, goal, inside=True)
         yield DRIVES_S
         if disturbed:
@@ -158,7 +161,7 @@ class RideScenario(Scenario):
         yield EndLiftSession(self.lift)
 
     def _ask_aside(self, floor: str, first: bool) -> Iterator[Step]:
-        """Ask for another lift, then for this one around the supervisor. Other robots wait meanwhile."""
+        """Ask for another lift, then for this one around the supervisor; other robots wait."""
         elsewhere = lambda now: [self._send(STRANGER, floor, now, lift=NOWHERE)]  # noqa: E731
         around = lambda now: [  # noqa: E731
             (topics.ADAPTER_LIFT_REQUESTS, self._send(BYPASSER, floor, now)[1])
@@ -166,10 +169,6 @@ class RideScenario(Scenario):
         for disturbs in (elsewhere, around):
             self._disturbs = disturbs if first else self._disturbs
             yield SHOWS_S
-
-    def _in_the_car(self, disturbed: bool, now: float) -> list[Said]:
-        said = [self._send(STRANGER, "", now, END)] if disturbed else []
-        return said + (self.play.restart_supervisor(now) if self._restarts else [])
 
     def unfit(self, state: words.Stated) -> str:
         """Require an idle lift that serves both floors."""
@@ -247,10 +246,10 @@ class PassageScenario(Scenario):
         for _ in range(times):
             self._disturbs = self.play.restart_supervisor if self._restarts else None
             yield DoorOpen(self.door)
-            self._disturbs = lambda now: [] if self._through else [_closes(NOWHERE, now)]
-            yield SHOWS_S
-            self._disturbs = lambda now: [_closes(self.door, now, STRANGER)]
+            self._disturbs = lambda now: self._tempt(now, NOWHERE)
             yield DOORWAY_S
+            self._disturbs = lambda now: self._tempt(now, self.door, STRANGER)
+            yield SHOWS_S
             yield DoorClose(self.door)
             yield from self._until_closed()
 
@@ -267,6 +266,12 @@ class PassageScenario(Scenario):
             self._mode = message.current_mode.value
         said = self.play.hear(topic, message, now)
         return said + (self._disturb(now) if isinstance(message, d.DoorState) else [])
+
+    def _tempt(self, now: float, door: str, who: str = DoorSupervisor.REQUESTER_ID) -> list[Said]:
+        """Send a CLOSE that must not close this door."""
+        direct = who == DoorSupervisor.REQUESTER_ID
+        self.play.deafen(now + (DOORWAY_S if direct else SHOWS_S))
+        return [] if direct and self._through else [_closes(door, now, who)]
 
     def leave(self, now: float) -> list[Said]:
         """Send CLOSE, to the supervisor or in its name."""

@@ -22,6 +22,8 @@ STEPS_WITHIN_S: Final = 30.0
 
 def rate(history: AnyScene) -> Finding:
     """States keep coming, unless the whole network is silent."""
+    if history.news is None and not history.states:
+        return f"no state, though its topic has a publisher: {', '.join(history.senders[:4])}"
     if history.news is None:
         silent_s = history.now - history.heard_at
         own_s = silent_s - history.network_s

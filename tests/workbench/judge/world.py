@@ -142,7 +142,7 @@ class World:
 def told(judging: JudgeRun, now: float) -> Verdicts:
     """The ids of the laws, by verdict."""
     found: Verdicts = {verdict.value: set() for verdict in Verdict}
-    for judged in judging.judge.end(now, EPOCH + now):
+    for judged in judging.judge.end(now, EPOCH + now, now - judging.began_at):
         found[judged.verdict.value].add(judged.law.id)
     return found
 

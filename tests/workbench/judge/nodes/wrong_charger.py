@@ -101,3 +101,22 @@ class ChargerWithoutStamps(RightCharger):
 
     def state(self, now: float) -> d.ChargerState:
         return replace(super().state(now), charger_time=d.Time())
+
+
+class ChargerHearsEveryName(RightCharger):
+    """Another station's request counts here too."""
+
+    def hear(self, message: d.Message, now: float) -> list[Said]:
+        if isinstance(message, d.ChargerRequest | d.ChargerCancel):
+            super().hear(replace(message, charger_name=self.name), now)
+        return []
+
+
+class PromiseIsTakenOver(RightCharger):
+    """The next request gets the station that is promised to another robot."""
+
+    def requested(self, request: d.ChargerRequest, now: float) -> None:
+        if self.shown.state == ASSIGNED:
+            self.request = request
+            self.shows(ASSIGNED, now)
+        super().requested(request, now)

@@ -104,3 +104,33 @@ class SilenceCloses(RightDoor):
     def moves(self, now: float, age_s: float) -> None:
         self.held = self.held and now - self.heard_at < 10.0
         super().moves(now, age_s)
+
+
+class DoorHearsEveryName(RightDoor):
+    """Another door's request counts here too."""
+
+    def hear(self, message: d.Message, now: float) -> list[Said]:
+        if isinstance(message, d.DoorRequest):
+            super().hear(replace(message, door_name=self.name), now)
+        return []
+
+
+class DoorOnlyOnChange(RightDoor):
+    """A state comes only when the door moves."""
+
+    period_s = 1e6
+
+
+class DoorPulses(RightDoor):
+    """OPEN is one pulse, and the operator's own timer closes the door on the robot."""
+
+    pulsed_at = 0.0
+
+    def asked(self, mode: int) -> None:
+        if mode == 2 and not self.held:
+            self.pulsed_at = self.heard_at
+        super().asked(mode)
+
+    def moves(self, now: float, age_s: float) -> None:
+        self.held = self.held and now - self.pulsed_at < 8.0
+        super().moves(now, age_s)

@@ -256,3 +256,46 @@ class ShowsWhatItWasAsked(RightLift):
 
     def state(self, now: float) -> d.LiftState:
         return replace(super().state(now), destination_floor=self.asked)
+
+
+class LiftOnlyOnChange(RightLift):
+    """A state comes only when something has changed."""
+
+    period_s = 1e6
+
+
+class LeavesWithoutSession(RightLift):
+    """The session is over for the node when the car leaves for the robot's floor."""
+
+    def moves(self, age_s: float) -> None:
+        super().moves(age_s)
+        if self.car != int(self.car):
+            self.session = ""
+
+
+class LiftReadsDoorOnce(RightLift):
+    """The door's module is lost while the door is open; the floor's is not, and the stamp is the time of
+    publishing."""
+
+    read = 0
+
+    def state(self, now: float) -> d.LiftState:
+        state = super().state(now)
+        self.read = max(self.read, state.door_state)
+        return replace(state, door_state=self.read)
+
+
+class LiftListsOtherFloors(RightLift):
+    """available_floors has the controller's numbers, current_floor the map's names."""
+
+    def serves(self, request: d.LiftRequest) -> bool:
+        return True
+
+    def state(self, now: float) -> d.LiftState:
+        return replace(super().state(now), available_floors=("1", "2", "3"))
+
+
+class HearsBothTopics(RightLift):
+    """It hears the supervisor and, around it, the fleet adapters."""
+
+    subscribes = (topics.LIFT_REQUESTS, topics.ADAPTER_LIFT_REQUESTS)
