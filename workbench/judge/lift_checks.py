@@ -141,11 +141,12 @@ def ended_unasked(history: LiftHistory) -> Finding:
 
 
 def _foreign_end(history: LiftHistory, session: str, since: float) -> str:
-    """Return the session whose END has just come, unless this session's END came later; "" for none."""
+    """Return the session whose END has just come, while this session lasted; "" for none."""
     if history.has_ended(session, since):
         return ""
-    others = (who for who in history.ended if who not in ("", session))
-    return next((who for who in others if history.now - history.ended[who] < FOREIGN_S), "")
+    others = ((who, at) for who, at in history.ended.items() if who not in ("", session))
+    lasted = ((who, at) for who, at in others if at > since + FOREIGN_S)
+    return next((who for who, at in lasted if history.now - at < FOREIGN_S), "")
 
 
 def ended_by_another(history: LiftHistory) -> Finding:

@@ -9,13 +9,15 @@ from bridges.messages import topics
 from bridges.messages.heard import Heard
 from bridges.observe.lift import HAZARDS, ObservedLift
 from bridges.observe.limits import SLOWEST_S
-from workbench.judge.history import CROSSED_S, NOT_YET, History, keep
+from workbench.judge.history import NOT_YET, History, keep
 
 GRACE_S: Final = 65.0
 """Time (s) in which a session may resume: its robot may still be in the car."""
 LATE_S: Final = 5.0
 """Greatest time (s) from an END to the state that first shows its session."""
 FLOORS: Final = 8
+OURS_S: Final = 2.0
+"""An END that we send so soon (s) after a session's end did not cause that end."""
 ASKED_S: Final = 10.0
 """A request repeats itself at each state: a floor not asked for so long (s) was given up."""
 AT_ONCE_S: Final = 0.3
@@ -205,9 +207,7 @@ class LiftHistory(History[d.LiftState]):
             self._shut_at = self.now
 
     def _end(self, message: d.LiftRequest, direct: bool) -> None:
-        if (
-            not self.own or self.now - self.last_at > CROSSED_S
-        ):  # ours does not explain an earlier end
+        if not self.own or self.now - self.last_at > OURS_S:
             keep(self.ended, message.session_id, self.now)
         if direct and message.session_id != self.session:
             self.foreign_end_at = self.now
