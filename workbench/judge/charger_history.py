@@ -12,6 +12,8 @@ ASSIGNED: Final = d.ChargerStateValue.CHARGER_ASSIGNED
 CHARGING: Final = d.ChargerStateValue.CHARGER_CHARGING
 RELEASED: Final = d.ChargerStateValue.CHARGER_RELEASED
 ERROR: Final = d.ChargerStateValue.CHARGER_ERROR
+LOST: Final = float("inf")
+"""Time of a cancel that the station may not have received."""
 UNREQUESTED: Final = "unrequested/"
 """Prefix of ids of unrequested charges. A station's next charge may have the same id."""
 
@@ -61,7 +63,8 @@ class ChargerHistory(History[d.ChargerState]):
 
     def forget(self) -> None:
         """Forget what a silence may have ended."""
-        self.cancels.clear()
+        self.cancels.pop(UNREQUESTED + self.name, None)
+        self.cancels = dict.fromkeys(self.cancels, LOST)
 
     def settle(self, state: d.ChargerState) -> None:
         """Note since when it is so; forget the cancels of finished charges."""
@@ -76,7 +79,7 @@ class ChargerHistory(History[d.ChargerState]):
     def _cancel(self, request_id: str) -> None:
         shown = self.state is not None and request_id == self.state.request_id
         if shown or not unrequested(request_id):
-            keep(self.cancels, request_id, self.cancels.get(request_id, self.now))
+            keep(self.cancels, request_id, min(self.cancels.get(request_id, LOST), self.now))
         if self.state is not None and not shown:
             self.foreign_at = self.now
 

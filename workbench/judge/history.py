@@ -26,6 +26,10 @@ ANSWERS_WITHIN_S: Final = 0.1
 OFTEN_S: Final = 30.0
 EARLY_S: Final = 0.15
 """Least earliness (s) of a state that a timer's jitter cannot explain."""
+PAUSE_S: Final = 2.0
+PAUSE: Final = 2.5
+"""A pause of so many usual gaps, and of PAUSE_S, may be a restart."""
+KNOWN: Final = 3
 RHYTHM: Final = 10
 STEADY_S: Final = 0.05
 UNEVEN_S: Final = 0.1
@@ -81,7 +85,7 @@ class History(ABC, Generic[T]):
         self.asked_last = self._quiet_since = NOT_YET
         self._answers: deque[tuple[bool, float]] = deque(maxlen=8)
         self._quiet: deque[float] = deque(maxlen=15)
-        self._usual_s = 0.0
+        self._usual_s = self._catches_up_s = 0.0
         self._gaps: deque[float] = deque(maxlen=RHYTHM)
         self._any_at = self._other_at = NOT_YET
 
@@ -197,8 +201,9 @@ class History(ABC, Generic[T]):
         """Take the new state. `earlier`: time of the one before."""
         self.states += 1
         self.before = self.seen.before
-        if self.before is None or self.seen.gap_s > SLOWEST_S:
-            self.before, self.since = None, self.now
+        if self.before is None or self._paused(words.stamped_at(self.before)):
+            self.before, self.since, self.burst_s = None, self.now, float("inf")
+            self._unchanged.clear()
             self.forget()
         self._look_at_stamp(self.seen.stamped_at)
         self._look_at_pace(state, earlier)
@@ -209,6 +214,19 @@ class History(ABC, Generic[T]):
         """Begin the next gap, after the laws have read this one."""
         if self.new is not None:
             self.network_s = 0.0
+
+    def _paused(self, stamped_before: float) -> bool:
+        """Was there a pause, long enough for a restart, or is this one of the states that a network
+        delivers together after a pause?"""
+        gap_s, step_s = self.seen.gap_s, self.seen.stamped_at - stamped_before
+        known = len(self._quiet) >= KNOWN
+        if gap_s > (max(PAUSE_S, PAUSE * self._usual_s) if known else SLOWEST_S):
+            self._catches_up_s = gap_s
+            return True
+        self._catches_up_s -= step_s - gap_s
+        if self._catches_up_s <= 0.0 or step_s < gap_s + FROZEN_S:
+            self._catches_up_s = 0.0
+        return self._catches_up_s > 0.0
 
     def _look_at_stamp(self, stamp: float) -> None:
         if abs(stamp - self._stamp) > FROZEN_S or self.before is None:

@@ -97,7 +97,7 @@ class Judge:
     def end(self, at: float, wall: float, heard_s: float = 0.0) -> tuple[JudgedLaw, ...]:
         """End the hearing after `heard_s`. Return each law with its verdict, in the laws' order."""
         self.history.pass_time(at, wall)
-        mute = heard_s > MUTE_S and self.history.senders and not self.history.others
+        mute = heard_s > MUTE_S and len(self.history.senders) > len(self.history.others)
         if self.history.states or mute:
             for tally in self._tallies:
                 self._check(tally, at, wall)

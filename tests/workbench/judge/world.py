@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable
 from functools import partial
+from random import Random
 
 from bridges.messages import topics
 from bridges.messages.definitions import Message
@@ -76,11 +77,9 @@ class Seat:
 class World:
     """A graph without loss, and everybody on it."""
 
-    def __init__(self) -> None:
-        from random import Random
-
+    def __init__(self, random: Random | None = None) -> None:
         self.timeline = Timeline()
-        self.air = Air(self.timeline, Random(1))
+        self.air = Air(self.timeline, random or Random(1))
         self.air.weather = CLEAR
 
     def add(self, *parties: Party) -> list[Seat]:
