@@ -27,7 +27,7 @@ OFTEN_S: Final = 30.0
 EARLY_S: Final = 0.15
 """Least earliness (s) of a state that a timer's jitter cannot explain."""
 PAUSE_S: Final = 2.0
-PAUSE: Final = 2.5
+PAUSE: Final = 1.4
 """A pause of so many usual gaps, and of PAUSE_S, may be a restart."""
 KNOWN: Final = 3
 RHYTHM: Final = 10
@@ -121,9 +121,10 @@ class History(ABC, Generic[T]):
     def _end_silence(self, now: float, wall: float) -> None:
         """Note a silence of the network: nothing came, though other devices had been heard too."""
         silent_s = now - self._any_at
-        if silent_s > SLOWEST_S and self._any_at - self._other_at <= SLOWEST_S:
-            self.network_s += silent_s
-            self.silences = [*self.silences, (wall - silent_s, silent_s)][:SILENCES]
+        if silent_s > PAUSE_S and self._any_at - self._other_at <= SLOWEST_S:
+            self.network_s += silent_s - PAUSE_S  # the slowest node may be silent for so long
+            if silent_s > SLOWEST_S:
+                self.silences = [*self.silences, (wall - silent_s, silent_s)][:SILENCES]
 
     @abstractmethod
     def take_other(self, heard: Heard) -> bool:

@@ -144,6 +144,8 @@ class LiftHistory(History[d.LiftState]):
     def forget(self) -> None:
         """Forget what a silence may have ended."""
         self.known = False
+        if self.seen.before is not None and self.seen.before.session_id:
+            self.last = self.seen.before.session_id
         self.granted_at = self.free_since = self.now
         self.offered = True
         self.ending = Ending()

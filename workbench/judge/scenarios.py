@@ -180,13 +180,14 @@ class RideScenario(Scenario):
 
     def hear(self, topic: str, message: d.Message, now: float) -> list[Said]:
         """Take states, until another session has the lift."""
-        if isinstance(message, d.LiftState) and message.lift_name == self.lift:
+        stated = isinstance(message, d.LiftState) and message.lift_name == self.lift
+        if isinstance(message, d.LiftState) and stated:
             self._state = message
             if message.session_id and message.session_id not in self.play.names:
                 self.failed = f"{shown(message.session_id)} has the lift now"
                 return []
         said = self.play.hear(topic, message, now)
-        return said + self._disturb(now)
+        return said + (self._disturb(now) if stated else [])
 
     @property
     def _names(self) -> set[str]:
@@ -262,10 +263,11 @@ class PassageScenario(Scenario):
 
     def hear(self, topic: str, message: d.Message, now: float) -> list[Said]:
         """Take states and heartbeats. A disturbance comes with the next state."""
-        if isinstance(message, d.DoorState) and message.door_name == self.door:
+        stated = isinstance(message, d.DoorState) and message.door_name == self.door
+        if isinstance(message, d.DoorState) and stated:
             self._mode = message.current_mode.value
         said = self.play.hear(topic, message, now)
-        return said + (self._disturb(now) if isinstance(message, d.DoorState) else [])
+        return said + (self._disturb(now) if stated else [])
 
     def _tempt(self, now: float, door: str, who: str = DoorSupervisor.REQUESTER_ID) -> list[Said]:
         """Send a CLOSE that must not close this door."""

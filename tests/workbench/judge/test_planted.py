@@ -69,7 +69,7 @@ def convicted(
         world.timeline.at(cut[0], lambda: world.air.cut_off("judge", sum(cut)))
     if restarts is not None:
         world.timeline.at(restarts, seats[0].leave)
-        world.timeline.at(restarts + 3.0, lambda: world.add(makes[0]()))
+        world.timeline.at(restarts + 2.9, lambda: world.add(makes[0]()))
     judging = world.judge(kind, name, scenario)
     return told(judging, world.timeline.now)["broken"]
 
