@@ -19,11 +19,11 @@ UNREQUESTED: Final = "unrequested/"
 
 
 class ChargerHistory(History[d.ChargerState]):
-    """`requests`: by id, the latest. `cancels`: id -> time of the first cancel; the cancel of a
-    charge that nobody requested is forgotten with it. `foreign_at`: the last cancel of an id that the
-    station does not show. `first_asked`: the first request of each id. `elsewhere`: ids requested of other stations. `second_at`: the last request
-    with another id than that of the request that is served. `same_since`: since when state and request are
-    unchanged; `same_before`: the same of those before."""
+    """`requests`: by id, the latest; `first_asked`: id -> time of the first. `elsewhere`: ids of other
+    stations' requests. `second_at`: the last request with another id than that of the request that is
+    served. `cancels`: id -> time of the first; the cancel of a charge that nobody requested is forgotten
+    with that charge. `foreign_at`: the last cancel of an id that the station does not show.
+    `same_since`: since when state and request are unchanged; `same_before`: the same of those before."""
 
     seen: ObservedCharger
     observes = ObservedCharger

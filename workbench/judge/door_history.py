@@ -23,14 +23,14 @@ OPENING_S: Final = 1.0
 
 
 class DoorHistory(History[d.DoorState]):
-    """`latched`: the last request was OPEN; `was_closed`: the door was closed then. `asked_at`: the first
-    OPEN of this latch; `asked`: OPENs since the door was last seen other than closed, at
-    `not_closed_at`. `closed_at`: the last CLOSE on
-    door_requests; `adapter_closed_at`: that of a fleet adapter to the supervisor. `was_open`: the
-    door has been open in this latch. `reopened`: when it reopened at once, in this latch. `instant`:
-    how many times in a row it was OPEN as soon as that was requested; `opened`: the latest state is
-    the first OPEN of this latch. `shut`: how many times in a row a door that people had
-    opened closed at RMF's CLOSE; `left`: the latest state ends such an opening."""
+    """`latched`: the last request was OPEN; `was_closed`: the door was closed then. `asked_at`: the
+    first OPEN of this latch; `openings`: OPENs since the door was last seen other than closed, at
+    `not_closed_at`. `closed_at`: the last CLOSE on door_requests; `adapter_closed_at`: that of a fleet
+    adapter to the supervisor, in this latch. `was_open`: the door has been open in this latch.
+    `reopened`: when it reopened at once, in this latch. `instant`: how many times in a row it was OPEN
+    as soon as that was requested; `opened`: the latest state is the first OPEN of this latch. `shut`:
+    how many times in a row a door that people had opened closed at RMF's CLOSE; `left`: the latest
+    state ends such an opening."""
 
     observes = ObservedDoor
 

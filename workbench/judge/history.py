@@ -55,14 +55,14 @@ def keep(known: dict[str, V], key: str, value: V, most: int = REMEMBERED) -> Non
 class History(ABC, Generic[T]):
     """One device. Times are those of the messages (s).
 
-    `news`: the message taken last, None when only time has passed; `own`: the judge's. `seen`: the device's observations.
-    `before`: the state before the latest, None at the first one, and after a silence, because the
-    node may have restarted; `since`: time of that. `frozen_s`: time for which the states have shown
-    the same stamp; `claimed_s`: time for which each `claims` what a robot acts on. `burst_s`: time
-    taken by the latest BURST unchanged states. `asked_last`: the latest request. `senders`: the
-    publishers on the states' topic; none in a recording. `network_s`: the part of the time since the
-    state before in which the network was silent: nobody was heard, though other devices had been.
-    `silences`: the beginnings (wall clock) and lengths (s) of the first SILENCES of these.
+    `news`: the message taken last, None when only time has passed; `own`: the judge sent it. `seen`:
+    the device's observations. `before`: the state before the latest, None at the first one, and after a
+    pause, because the node may have restarted; `since`: time of that. `frozen_s`: time for which the
+    states have shown the same stamp; `claimed_s`: time for which each `claims` what a robot acts on.
+    `burst_s`: time taken by the latest BURST unchanged states. `asked_last`: the latest request.
+    `senders`: the publishers on the states' topic; none in a recording. `network_s`: the part of the
+    time since the state before in which the network was silent: nobody was heard, though other devices
+    had been. `silences`: the beginnings (wall clock) and lengths (s) of the first SILENCES of these.
     """
 
     observes: ClassVar[type[AnyDevice]]

@@ -7,7 +7,7 @@ from bridges.messages import words
 from bridges.observe.lift import HAZARDS
 from workbench.judge.history import NOT_YET
 from workbench.judge.law import KEPT, Doubt, Finding, shown
-from workbench.judge.lift_history import GRACE_S, LATE_S, LiftHistory, moves
+from workbench.judge.lift_history import ASKED_S, GRACE_S, LATE_S, LiftHistory, moves
 
 ENDS_WITHIN_S: Final = 3.0
 """A state period of 2 s, and one scan."""
@@ -243,14 +243,16 @@ def destination(history: LiftHistory) -> Finding:
         return None
     if state.current_mode in HAZARDS:
         return None  # it goes to its recall floor
-    if history.was_asked_to(state.destination_floor):
+    floor, before = state.destination_floor, history.before
+    changed = before is None or floor != before.destination_floor
+    within_s = ASKED_S if changed else float("inf")
+    if history.was_asked_to(floor, within_s):
         return KEPT
     if not history.known or state.session_id not in history.asks:
         return None  # asked before we listened, or another law says so
-    floor = state.destination_floor
     return Doubt(
         f"destination {shown(floor)}, which {shown(state.session_id)} did not ask for",
-        lambda: history.was_asked_to(floor) or history.session != state.session_id,
+        lambda: history.was_asked_to(floor, within_s) or history.session != state.session_id,
     )
 
 

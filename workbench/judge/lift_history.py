@@ -28,9 +28,9 @@ END: Final = d.LiftRequestType.REQUEST_END_SESSION
 
 @dataclass
 class Ask:
-    """The requests of one session, `first_at` and on. `direct_at`: the latest on lift_requests.
-    `since`: the beginning of the present gapless row of requests there. `human`: did it ask for HUMAN
-    mode? `direct`: was it heard on lift_requests? `floors`: the last request for each, the latest last."""
+    """The requests of one session since `first_at`. `floors`: the last request for each. `direct`: was it
+    heard on lift_requests? `direct_at`: the latest there; `since`: the beginning of the present
+    gapless row of `times` there. `human`: did it ask for HUMAN mode?"""
 
     first_at: float
     since: float
@@ -75,6 +75,7 @@ class LiftHistory(History[d.LiftState]):
     retain nothing? None if unknown.
     """
 
+    seen: ObservedLift
     observes = ObservedLift
 
     def __init__(self, name: str) -> None:
@@ -113,12 +114,12 @@ class LiftHistory(History[d.LiftState]):
         """Has an END for this session come since then?"""
         return self.ended.get(session, NOT_YET) > since - LATE_S
 
-    def was_asked_to(self, floor: str) -> bool:
-        """Is this the present session's last floor, or has it just asked for this floor?"""
+    def was_asked_to(self, floor: str, within_s: float = float("inf")) -> bool:
+        """Has the present session asked for this floor, as its last one or not long ago?"""
         ask = self.asks.get(self.session)
         if ask is None or floor not in ask.floors:
             return False
-        return floor == ask.floor or self.now - ask.floors[floor] < ASKED_S
+        return floor == ask.floor or self.now - ask.floors[floor] < within_s
 
     def take_other(self, heard: Heard) -> bool:
         """Take requests of this lift and of others, and the fire alarm."""

@@ -131,7 +131,7 @@ class PlayedNodes:
         return said
 
     def deafen(self, until: float) -> None:
-        """Let the played supervisor hear no states until then: it would repair what a wrong node did."""
+        """Let the played supervisor hear no states until then: it would repair a wrong node's doing."""
         self._deaf_until = until
 
     def _go_on(self, now: float) -> list[Said]:

@@ -105,10 +105,10 @@ class RideScenario(Scenario):
     """Robots ride from one floor to another, every second one back.
 
     `through`: a supervisor is on the graph. `restarts`: the played supervisor restarts with a robot
-    in the car. Without `through` there is an occasion to break each law of sessions: before the ride, a
-    request for another lift and one that no supervisor passes on; while the first robot has the lift, an
-    END of another session, as rmf-web sends it, a request of that session, and a request for a floor that
-    does not exist.
+    in the car. Without `through` each law of sessions has its occasion. Before the ride: a request for
+    another lift, and a request that no supervisor passes on. While the first robot has the lift: an END
+    of another session, as rmf-web sends it, a request of that session, and a request for an unknown
+    floor.
     """
 
     def __init__(
@@ -162,13 +162,13 @@ class RideScenario(Scenario):
 
     def _ask_aside(self, floor: str, first: bool) -> Iterator[Step]:
         """Ask for another lift, then for this one around the supervisor; other robots wait."""
-        elsewhere = lambda now: [self._send(STRANGER, floor, now, lift=NOWHERE)]  # noqa: E731
-        around = lambda now: [  # noqa: E731
-            (topics.ADAPTER_LIFT_REQUESTS, self._send(BYPASSER, floor, now)[1])
-        ]
-        for disturbs in (elsewhere, around):
-            self._disturbs = disturbs if first else self._disturbs
-            yield SHOWS_S
+        if first:
+            self._disturbs = lambda now: [self._send(STRANGER, floor, now, lift=NOWHERE)]
+        yield SHOWS_S
+        if first:
+            around = topics.ADAPTER_LIFT_REQUESTS
+            self._disturbs = lambda now: [(around, self._send(BYPASSER, floor, now)[1])]
+        yield SHOWS_S
 
     def unfit(self, state: words.Stated) -> str:
         """Require an idle lift that serves both floors."""

@@ -2,6 +2,7 @@
 wrong node breaks it."""
 
 from collections.abc import Callable
+from typing import Any
 
 import pytest
 from msgspec.structs import replace
@@ -107,7 +108,7 @@ def bay(until: float, state: int = IDLE, request_id: str = "", begin: float = 0.
     return [*seconds(begin, until, lambda s: station(s, state, request_id))]
 
 
-def rides(*more: Line, until: float = 6.0, **state: int | str | float) -> Lines:
+def rides(*more: Line, until: float = 6.0, **state: Any) -> Lines:
     """RED asks at 0.5 s, and has the lift from 1 s."""
     return [car(0.0), asks(0.5), *seconds(1.0, until, lambda s: held(s, **state)), *more]
 
@@ -128,7 +129,7 @@ def changed(line: Line, **fields: object) -> Line:
     return at, topic, replace(message, **fields)
 
 
-L1 = {"to": "L1", "door": OPEN}
+BOARDS: dict[str, Any] = {"to": "L1", "door": OPEN}
 RIVAL = changed(charge(2.5), request_id="r2", robot_name="blue")
 ELSEWHERE = changed(charge(0.5), charger_name="bay2")
 ASKED = [asks(8.5 + n) for n in range(8)]
@@ -191,10 +192,10 @@ STORIES: dict[tuple[Kind, str], tuple[Lines, Lines, Lines]] = {
         [*seconds(0.0, 8.0, lambda s: car(s, door=OPEN))],
         [*frozen(car, OPEN, 6.0)],
     ),
-    ("lift", "L7.agv"): (rides(), rides(**L1), rides(**L1, mode=HUMAN)),
+    ("lift", "L7.agv"): (rides(), rides(**BOARDS), rides(**BOARDS, mode=HUMAN)),
     ("lift", "L7.holds"): (
-        [car(0.0), asks(0.5, floor="L1"), held(1.0, **L1), held(2.0)],
-        [car(0.0), asks(0.5, floor="L1"), held(1.0, **L1), held(2.0, **L1)],
+        [car(0.0), asks(0.5, floor="L1"), held(1.0, **BOARDS), held(2.0)],
+        [car(0.0), asks(0.5, floor="L1"), held(1.0, **BOARDS), held(2.0, **BOARDS)],
         [*reopens(3, 8.0, 0.5)],
     ),
     ("lift", "L8.floor"): ([car(0.0, floor="")], [car(0.0)], [car(0.0, floor="L9")]),
@@ -204,7 +205,7 @@ STORIES: dict[tuple[Kind, str], tuple[Lines, Lines, Lines]] = {
         rides(asks(2.5, floor="L9")),
         rides(asks(2.5, floor="L9"), held(6.0, to="L9")),
     ),
-    ("lift", "L10.board"): (rides(), rides(mode=FIRE), rides(mode=FIRE, **L1)),
+    ("lift", "L10.board"): (rides(), rides(mode=FIRE), rides(mode=FIRE, **BOARDS)),
     ("lift", "L10.grant"): (
         TO_FIRE,
         [*TO_FIRE, asks(2.5)],

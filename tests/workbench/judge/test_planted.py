@@ -1,8 +1,9 @@
-"""Wrong nodes planted among right ones: the judge plays with each, convicts each wrong node by its law, and
-no right node, even under load, without a network, or when a party restarts.
+"""Wrong nodes planted among right ones. The judge plays with each node: it convicts each wrong node by
+its law, and no right node, even under load, without a network, or when a party restarts.
 
-`pytest -s` prints the planted defects, their convictions and the false alarms. The defects come from the
-contract: RMF's requests and states of lifts, doors and chargers, and the field's nodes that broke them."""
+`pytest -s` prints each planted defect, the law that convicts it, and false alarms. The defects are
+breaches of the contract in RMF's messages, supervisors and fleet adapters.
+"""
 
 from collections.abc import Callable, Sequence
 from random import Random
@@ -24,7 +25,7 @@ from tests.workbench.judge.nodes.different import (
 from tests.workbench.judge.nodes.right_charger import RightCharger
 from tests.workbench.judge.nodes.right_door import RightDoor
 from tests.workbench.judge.nodes.right_lift import RightLift
-from tests.workbench.judge.world import World, told
+from tests.workbench.judge.world import Seat, World, told
 from workbench.judge.charge_scenario import ChargeScenario
 from workbench.judge.judge import Kind
 from workbench.judge.scenarios import PassageScenario, RideScenario, Scenario
@@ -55,12 +56,13 @@ def convicted(
     cut: tuple[float, float] | None = None,
     restarts: float | None = None,
 ) -> set[str]:
-    """The laws broken in a play with these nodes under one name, 0.3 s apart. `cut`: when the judge loses
-    the network, and for how long. `restarts`: when the node and RMF's supervisor restart."""
+    """The laws broken in a play with these nodes under one name, 0.3 s apart. `cut`: when the judge
+    loses the network, and for how long. `restarts`: when the node restarts; RMF's does too."""
     world = World(Random(seed))
     world.air.weather = weather
     world.add(NextLift())
-    seats = []
+    seats: list[Seat] = []
+    again: list[Seat] = []
     for n, make in enumerate(makes):
         world.timeline.run(0.3 * n)
         seats += world.add(make())
@@ -69,7 +71,7 @@ def convicted(
         world.timeline.at(cut[0], lambda: world.air.cut_off("judge", sum(cut)))
     if restarts is not None:
         world.timeline.at(restarts, seats[0].leave)
-        world.timeline.at(restarts + 2.9, lambda: world.add(makes[0]()))
+        world.timeline.at(restarts + 2.9, lambda: again.extend(world.add(makes[0]())))
     judging = world.judge(kind, name, scenario)
     return told(judging, world.timeline.now)["broken"]
 
@@ -128,9 +130,8 @@ def test_a_planted_defect_is_convicted_by_its_law_alone(
 ) -> None:
     found = convicted(*nodes)
     alarms = ", ".join(sorted(found - laws)) or "none"
-    print(
-        f"\n{defect} · {', '.join(sorted(found & laws)) or 'acquitted'} · false: {alarms}", end=""
-    )
+    convicts = ", ".join(sorted(found & laws)) or "acquitted"
+    print(f"\n{defect} · {convicts} · false alarms: {alarms}", end="")  # noqa: T201
     assert found == laws
 
 

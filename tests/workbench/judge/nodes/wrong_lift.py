@@ -274,8 +274,8 @@ class LeavesWithoutSession(RightLift):
 
 
 class LiftReadsDoorOnce(RightLift):
-    """The door's module is lost while the door is open; the floor's is not, and the stamp is the time of
-    publishing."""
+    """The door's module is lost while the door is open. The stamp is the time of publishing, and the
+    floor is read on."""
 
     read = 0
 
