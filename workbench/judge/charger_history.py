@@ -20,10 +20,10 @@ UNREQUESTED: Final = "unrequested/"
 
 class ChargerHistory(History[d.ChargerState]):
     """`requests`: by id, the latest; `first_asked`: id -> time of the first. `elsewhere`: ids of other
-    stations' requests. `second_at`: the last request with another id than that of the request that is
-    served. `cancels`: id -> time of the first; the cancel of a charge that nobody requested is forgotten
-    with that charge. `foreign_at`: the last cancel of an id that the station does not show.
-    `same_since`: since when state and request are unchanged; `same_before`: the same of those before."""
+    stations' requests. `second_at`: the last request with another id than the served request's.
+    `cancels`: id -> time of the first; the cancel of a charge that nobody requested is forgotten with
+    that charge. `foreign_at`: the last cancel of an id that the station does not show. `same_since`: the
+    beginning of the present state and request; `same_before`: that of those before."""
 
     seen: ObservedCharger
     observes = ObservedCharger

@@ -28,8 +28,8 @@ END: Final = d.LiftRequestType.REQUEST_END_SESSION
 
 @dataclass
 class Ask:
-    """The requests of one session since `first_at`. `floors`: the last request for each. `direct`: was it
-    heard on lift_requests? `direct_at`: the latest there; `since`: the beginning of the present
+    """The requests of one session since `first_at`. `floors`: the last request for each. `direct`:
+    was it heard on lift_requests? `direct_at`: the latest there; `since`: the beginning of the present
     gapless row of `times` there. `human`: did it ask for HUMAN mode?"""
 
     first_at: float

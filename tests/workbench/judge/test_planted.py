@@ -25,6 +25,7 @@ from tests.workbench.judge.nodes.different import (
 from tests.workbench.judge.nodes.right_charger import RightCharger
 from tests.workbench.judge.nodes.right_door import RightDoor
 from tests.workbench.judge.nodes.right_lift import RightLift
+from tests.workbench.judge.test_limits import Line, is_broken, leaf, to_door
 from tests.workbench.judge.world import Seat, World, told
 from workbench.judge.charge_scenario import ChargeScenario
 from workbench.judge.judge import Kind
@@ -164,3 +165,16 @@ def test_no_right_node_is_convicted_for_the_silence_of_the_network(
 @pytest.mark.parametrize("make", RIGHT, ids=NAMES)
 def test_no_right_node_is_convicted_for_a_restart(make: Make, at: float) -> None:
     assert convicted(make, restarts=at) == set()
+
+
+@pytest.mark.parametrize("jitter_s", [0.1, 0.2, 0.4])
+def test_jitter_is_no_answer_to_requests_that_arrive_together_with_states(jitter_s: float) -> None:
+    """A busy machine delivers RMF's request just before a state that comes early or late."""
+    for seed in range(30):
+        random = Random(seed)
+        lines: list[Line] = []
+        for n in range(120):
+            at = n + jitter_s * random.uniform(-1.0, 1.0)
+            lines.append(leaf(at, read_at=float(n)))
+            lines += [to_door(at - 0.05, 0)] if n > 5 + 10 * random.random() else []
+        assert not is_broken("door", "D1.answer", lines)
