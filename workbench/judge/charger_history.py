@@ -22,8 +22,8 @@ class ChargerHistory(History[d.ChargerState]):
     """`requests`: by id, the latest; `first_asked`: id -> time of the first. `elsewhere`: ids of other
     stations' requests. `second_at`: the last request with another id than the served request's.
     `cancels`: id -> time of the first; the cancel of a charge that nobody requested is forgotten with
-    that charge. `foreign_at`: the last cancel of an id that the station does not show. `same_since`: the
-    beginning of the present state and request; `same_before`: that of those before."""
+    that charge. `foreign_at`: the last cancel of an id that the station does not show. `same_since`:
+    the beginning of the present state and request; `same_before`: that of those before."""
 
     seen: ObservedCharger
     observes = ObservedCharger
@@ -48,7 +48,8 @@ class ChargerHistory(History[d.ChargerState]):
                 self.asked()
                 if not unrequested(heard.message.request_id):
                     keep(self.requests, heard.message.request_id, heard.message)
-                    self._note_first(heard.message.request_id)
+                    first_at = self.first_asked.get(heard.message.request_id, self.now)
+                    keep(self.first_asked, heard.message.request_id, first_at)
                 serves = self.state is not None and self.state.state in (ASSIGNED, CHARGING)
                 if serves and heard.message.request_id != self.seen.request.value:
                     self.second_at = self.now
@@ -72,9 +73,6 @@ class ChargerHistory(History[d.ChargerState]):
             self.same_before, self.same_since = self.same_since, self.now
         if state.state in (IDLE, RELEASED):
             self.cancels.pop(UNREQUESTED + self.name, None)
-
-    def _note_first(self, request_id: str) -> None:
-        keep(self.first_asked, request_id, self.first_asked.get(request_id, self.now))
 
     def _cancel(self, request_id: str) -> None:
         shown = self.state is not None and request_id == self.state.request_id

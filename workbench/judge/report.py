@@ -9,7 +9,7 @@ import msgspec
 
 from bridges.messages import words
 from workbench.judge.judge import LAWS, Judge, Kind
-from workbench.judge.law import Evidence, JudgedLaw, Verdict, shown
+from workbench.judge.law import JudgedLaw, Verdict, shown
 
 ORDER: Final = (Verdict.BROKEN, Verdict.KEPT, Verdict.NOT_SEEN)
 OTHERS: Final = 5
@@ -102,33 +102,6 @@ def _others(report: Judgement) -> str:
     return f"; heard: {some}" + (f" and {more} more" if more > 0 else "")
 
 
-class LawJson(msgspec.Struct, frozen=True):
-    """A law in JSON."""
-
-    id: str
-    verdict: str
-    sentence: str
-    occasion: str
-    reason: str
-    source: str
-    times: int
-    evidence: tuple[Evidence, ...]
-
-
-class ReportJson(msgspec.Struct, frozen=True):
-    """A report in JSON."""
-
-    kind: str
-    name: str
-    verdict: str
-    wall: float
-    heard_s: float
-    states: int
-    notes: tuple[str, ...]
-    silences: tuple[tuple[float, float], ...]
-    laws: tuple[LawJson, ...]
-
-
 def verdict(report: Judgement) -> Verdict:
     """The verdict on all laws together."""
     return next((v for v in ORDER if report.of(v)), Verdict.NOT_SEEN)
@@ -136,20 +109,14 @@ def verdict(report: Judgement) -> Verdict:
 
 def as_json(report: Judgement) -> str:
     """Return one JSON object."""
-    laws = tuple(
-        LawJson(
-            *(j.law.id, j.verdict, j.law.sentence, j.law.occasion, j.law.reason, j.law.source),
-            times=j.times,
-            evidence=j.evidence,
-        )
+    about = ("kind", "name", "wall", "heard_s", "states", "notes", "silences")
+    texts = ("id", "sentence", "occasion", "reason", "source")
+    laws = [
+        {key: getattr(j.law, key) for key in texts}
+        | {"verdict": j.verdict, "times": j.times, "evidence": j.evidence}
         for j in report.judged
-    )
-    told = ReportJson(
-        *(report.kind, report.name, verdict(report), report.wall, report.heard_s, report.states),
-        notes=report.notes,
-        silences=report.silences,
-        laws=laws,
-    )
+    ]
+    told = {key: getattr(report, key) for key in about} | {"verdict": verdict(report), "laws": laws}
     return msgspec.json.encode(told).decode()
 
 
