@@ -9,6 +9,7 @@ import asyncio
 import json
 import logging
 import os
+import re
 import sys
 import time
 from collections import deque
@@ -30,15 +31,24 @@ WAITS: Final = "--timeout=20"
 MOST_OUTPUT: Final = 16 * 1024
 MOST_KEPT: Final = 100
 LONGEST_FILE: Final = 1_000_000
+RESET: Final = "The daemon clears each latched fault whose cause is gone."
+REPORTS: Final = re.compile(r"^rmf-bridge \S+: ", re.M)
+"""A command's name before its complaint."""
+PROGRESS: Final = re.compile(r"^[\d.]+ s  \S+ +\S.*?  ")
+"""The time, the step and the device before a line of `send`."""
 
 
 @dataclass(frozen=True, slots=True)
 class Action:
-    """A button: its text, the question that confirms it, and the command's words."""
+    """A button: its text, the question that confirms it, and the command's words.
+
+    `done`: the sentence about its success; "": the last sentence of the command.
+    """
 
     text: str
     question: str
     words: tuple[str, ...]
+    done: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,20 +66,32 @@ class Local:
 
 @dataclass(frozen=True, slots=True)
 class PastAction:
-    """One past action. `code`: the command's exit code; None if it took too long."""
+    """One past action. `code`: the command's exit code; None if it took too long. `done`: see
+    Action."""
 
     wall: float
     user: str
     text: str
     code: int | None
     said: str
+    done: str = ""
 
     @property
     def came(self) -> str:
         """Describe the outcome in a few sentences."""
         if self.code is None:
-            return f"no answer within {TIMEOUT_S:.0f} s: check what the device does"
-        return self.said.strip() or ("done" if self.code == 0 else f"exit code {self.code}")
+            return f"{self.text}: no answer within {TIMEOUT_S:.0f} s. Check what the device does."
+        if self.code:
+            why = _sentence(REPORTS.sub("", self.said)) or f"Its exit code is {self.code}."
+            return f"{self.text}: not done. {why}"
+        lines = [*filter(None, map(str.strip, self.said.splitlines())), ""]
+        told = self.done or _sentence(PROGRESS.sub("", lines[-2] if lines[1:] else ""))
+        return f"{self.text}: done. {told}".strip()
+
+
+def _sentence(text: str) -> str:
+    text = " ".join(text.split()).rstrip(".")
+    return f"{text[:1].upper()}{text[1:]}." if text else ""
 
 
 def actions(view: DeviceView, local: Local | None, graph: Sequence[str]) -> list[Action]:
@@ -78,7 +100,12 @@ def actions(view: DeviceView, local: Local | None, graph: Sequence[str]) -> list
     if local is not None:
         words = ("reset", *_runtime(local), "--", local.file)
         found.append(
-            Action("Reset faults", "May the latched faults clear, if their cause is gone?", words)
+            Action(
+                "Reset faults",
+                "May the latched faults clear, if their cause is gone?",
+                words,
+                RESET,
+            )
         )
     return found
 
@@ -116,13 +143,16 @@ def press(local: Local, device: str, signal: str, on: bool) -> Action:
     """In a simulation: press or let go."""
     how = "on" if on else "off"
     words = ("press", f"--device={device}", *_runtime(local), "--", local.file, signal, how)
-    return Action(f"Press {signal}", f"{signal} {how}, in the simulation?", words)
+    did = f"In the simulation {signal} of {printable(device)} is {how}."
+    act = "Press" if on else "Let go of"
+    return Action(f"{act} {signal}", f"{act} {signal}, in the simulation?", words, did)
 
 
 def fail(local: Local, device: str, part: str, how: str) -> Action:
     """In a simulation: let a part fail, or mend it (`ok`)."""
     words = ("fail", f"--device={device}", *_runtime(local), "--", local.file, part, how)
-    return Action(f"Fail {part}", f"{part} {how}, in the simulation?", words)
+    did = f"In the simulation {part} of {printable(device)} is {how}."
+    return Action(f"Let {part} fail", f"Let {part} be {how}, in the simulation?", words, did)
 
 
 def _runtime(local: Local) -> tuple[str, ...]:
@@ -140,7 +170,7 @@ class Deeds:
     async def do(self, action: Action, user: str) -> PastAction:
         """Run the command. Never raises; errors are in `said`."""
         code, said = await _run(action.words)
-        done = PastAction(time.time(), user, action.text, code, said)
+        done = PastAction(time.time(), user, action.text, code, said, action.done)
         self.latest.appendleft(done)
         command = " ".join(("rmf-bridge", *action.words))
         log.info(pairs("action", user=user, command=command, exit=code))

@@ -2,8 +2,8 @@
 run."""
 
 import itertools
-import time
 from collections.abc import Sequence
+from datetime import datetime
 from typing import Final, Literal
 
 from fastapi import Request
@@ -15,6 +15,7 @@ from workbench.page.cards import AGES_S, Cards, Key
 from workbench.page.head import part
 from workbench.page.local_daemons import LocalDaemons
 from workbench.page.login import Login
+from workbench.page.tab import Tab
 from workbench.page.tables import table
 
 SHOWN_MS: Final = 10_000
@@ -34,23 +35,22 @@ class Buttons:
         self._deeds = deeds
         self._graph = graph
 
-    def show(self, key: Key, request: Request) -> None:
+    def show(self, key: Key, request: Request, tab: Tab) -> None:
         """Show the device's buttons and recent actions; nothing without a login."""
         if not self._login.user(request):
             return
         with ui.element("section").classes("panel wide-part").props('aria-label="Actions"'):
             part("<h2>Actions</h2>")
             self._all(key, request)
+            self._lately(tab)
 
-            self._lately()
-
-    def _lately(self) -> None:
+    def _lately(self, tab: Tab) -> None:
         """Show recent actions and their users, the latest first."""
         place = part()
 
         def tell() -> None:
             rows = [
-                (time.strftime("%H:%M:%S", time.localtime(one.wall)), one.user, one.text, one.came)
+                (f"{datetime.fromtimestamp(one.wall, tab.zone):%X}", one.user, one.text, one.came)
                 for one in itertools.islice(self._deeds.latest, MOST_TOLD)
             ]
             told = table(("when", "who", "what", "outcome"), rows, "Done on this page lately")
@@ -133,8 +133,9 @@ class Buttons:
             dialog.props('aria-label="Are you sure?"')
             ui.label(action.question)
             with ui.row():
-                ui.button("Yes", on_click=lambda: dialog.submit(True))
-                ui.button("No", on_click=lambda: dialog.submit(False)).props("autofocus")
+                ui.button(action.text, color="negative", on_click=lambda: dialog.submit(True))
+                no = ui.button("No, change nothing", on_click=lambda: dialog.submit(False))
+                no.props("autofocus").classes("no")
         agreed = await dialog
         dialog.delete()
         if not agreed:
@@ -145,4 +146,4 @@ class Buttons:
             return
         done = await self._deeds.do(action, user)
         kind: Literal["positive", "negative"] = "positive" if done.code == 0 else "negative"
-        ui.notify(f"{done.text}: {done.came[:LONGEST]}", type=kind, timeout=SHOWN_MS)
+        ui.notify(done.came[:LONGEST], type=kind, timeout=SHOWN_MS)

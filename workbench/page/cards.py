@@ -6,11 +6,12 @@ browser could not keep up with 300 of them in a second.
 
 import json
 import time
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Container, Iterable, Mapping
 from html import escape
 from typing import Final, Protocol
 
 from bridges.observe.limits import MOST_DEVICES, SILENT_S
+from bridges.runtime import faults
 from workbench.page import drawing
 from workbench.page.listener import Listener
 from workbench.page.live_site import DeviceView, LiveSite
@@ -22,6 +23,7 @@ Key = tuple[str, str]
 
 
 STATUS: Final = "status"
+WRONG: Final = "wrong"
 ROBOTS: Final = "robots"
 
 
@@ -32,20 +34,20 @@ def place_of(key: Key) -> str:
 
 def script(changed: Mapping[str, str]) -> str:
     """Return JavaScript that redraws these elements. `changed`: id -> content."""
-    return (
-        f"for (const [id, html] of Object.entries({json.dumps(changed)}))"
-        " { const place = document.getElementById(id); if (place) place.innerHTML = html; }"
-    )
+    return f"show({json.dumps(changed)})"
 
 
 class Wall(Protocol):
-    """One browser's view of the site."""
+    """One browser's live view."""
 
     def change(self, script: str) -> None:
-        """Show a change, by this script."""
+        """Show a change of the site, by this script."""
 
     def rebuild(self) -> None:
         """Draw everything again: cards were added or removed."""
+
+    def answer(self, wrong: int) -> None:
+        """Tell the browser that it has everything heard before it last asked."""
 
 
 class Cards:
@@ -57,10 +59,14 @@ class Cards:
         self.cards: dict[Key, str] = {}
         self.shown: dict[Key, DeviceView] = {}
         self.walls: list[Wall] = []
+        self.wrong = 0
         self._site = site
         self._listener = listener
         self._clock = clock
         self._aged_at = float("-inf")
+        self._car_places: dict[Key, float | None] = {}
+        self._parts: dict[str, str] = {}
+        self._remedies = faults.for_explain()
 
     def turn(self) -> None:
         """Take the messages heard, and draw the changes."""
@@ -69,15 +75,33 @@ class Cards:
         changed: dict[str, str] = {}
         if now - self._aged_at >= AGES_S:
             self._aged_at = now
-            changed = self._draw(self._site.devices(now, time.time()))
-            self._drop()
-            changed |= {STATUS: self.status(), ROBOTS: self.robots()}
+            every = self._site.devices(now, time.time())
+            self._drop({(one.row.kind, one.row.name) for one in every})
+            changed = self._draw(every)
         elif heard:
             changed = self._draw(self._site.changed(now, time.time()))
+        if changed or self._aged_at == now:
+            changed |= self._changed_parts()
         if changed:
             told = script(changed)
             for wall in self.walls:
                 wall.change(told)
+        for wall in self.walls:
+            wall.answer(self.wrong)
+
+    def _changed_parts(self) -> dict[str, str]:
+        self.wrong = sum(one.row.wrong for one in self.shown.values())
+        before, self._parts = self._parts, self.parts()
+        return {place: html for place, html in self._parts.items() if before.get(place) != html}
+
+    def parts(self) -> dict[str, str]:
+        """Draw all but the cards, by place."""
+        return {STATUS: self.status(), WRONG: self.attention(), ROBOTS: self.robots()}
+
+    def attention(self) -> str:
+        """List the devices that need attention, each with what is wrong and what to do."""
+        wrong = [self.shown[key] for key in sorted(self.shown) if self.shown[key].row.wrong]
+        return drawing.attention(wrong, self._remedies)
 
     def status(self) -> str:
         """Return the numbers of heard devices and of those that need attention, as one line."""
@@ -90,8 +114,8 @@ class Cards:
 
     def _told(self) -> Iterable[str]:
         yield f"{len(self.shown)} shown"
-        if wrong := sum(one.row.wrong for one in self.shown.values()):
-            yield _wrong(f"{wrong} {'needs' if wrong == 1 else 'need'} attention")
+        if self.wrong:
+            yield _wrong(f"{self.wrong} {'needs' if self.wrong == 1 else 'need'} attention")
         heard_at, trouble = self._site.heard_at, self._listener.trouble
         if trouble:
             yield _wrong(trouble)
@@ -111,8 +135,9 @@ class Cards:
         changed, added = {}, False
         for shown in every:
             key = (shown.row.kind, shown.row.name)
-            html = drawing.card(shown, before=self.shown.get(key))
-            self.shown[key] = shown
+            left = self._car_places.get(key)
+            html = drawing.card(shown, left)
+            self.shown[key], self._car_places[key] = shown, drawing.car_place(shown.state, left)
             if self.cards.get(key) == html:
                 continue
             added = added or key not in self.cards
@@ -121,10 +146,11 @@ class Cards:
             self._rebuild()
         return changed
 
-    def _drop(self) -> None:
-        gone = [key for key in self.cards if not self._site.knows(*key)]
+    def _drop(self, known: Container[Key]) -> None:
+        """Drop every device that the site no longer knows."""
+        gone = [key for key in self.cards if key not in known]
         for key in gone:
-            del self.cards[key], self.shown[key]
+            del self.cards[key], self.shown[key], self._car_places[key]
         if gone:
             self._rebuild()
 

@@ -4,16 +4,30 @@ Every text goes through `html.escape`: names come from the network. Nothing is s
 each drawing has its meaning in words.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 from typing import Final
 from urllib.parse import quote
 
 from bridges.messages import definitions as d
 from bridges.messages import words
+from bridges.messages.words import Stated
+from workbench.explain.answer import Remedies
 from workbench.page.live_site import DeviceView, RobotShown, Stands
 
 OLD: Final = ' class="old"'
+NOW: Final = '<span class="now">now</span><span class="was">was</span>'
+"""The browser shows the second word when the page's server is silent."""
+WAS: Final = "was"
+NO_FLOOR: Final = "at no known floor"
+SILENT_DO: Final = (
+    "look at its daemon, with `rmf-bridge status` on its machine, and at the network."
+)
+STALE_DO: Final = "look at the device, its bus, and the clock of its daemon's machine."
+MOST_TOLD: Final = 10
+ROBOT_SILENT_S: Final = 10.0
+HALF: Final[Mapping[int, float]] = {d.LiftMotion.MOTION_UP: -0.5, d.LiftMotion.MOTION_DOWN: 0.5}
+"""Half a floor, in the direction of each motion."""
 LONGEST: Final = 160
 """Limit of characters of a text on a card; the device's own page has the whole text."""
 MOST_FLOORS: Final = 40
@@ -24,10 +38,10 @@ LEAVES: Final = {"open": 0.12, "moving": 0.3, "closed": 0.5}
 """The share of the doorway that each leaf covers."""
 
 
-def card(view: DeviceView, *, before: DeviceView | None = None) -> str:
+def card(view: DeviceView, left: float | None = None) -> str:
     """Draw one device as a box: name, state and faults.
 
-    `before`: the last drawing's view, so the car's movement is visible.
+    `left`: the place of a lift's car in the last drawing.
     """
     row = view.row
     name = f"<h3>{_told(row.name)}</h3>"
@@ -35,10 +49,11 @@ def card(view: DeviceView, *, before: DeviceView | None = None) -> str:
     classes = " ".join(
         filter(None, ("card", row.kind, "old" if old else "", "faulty" if row.faults else ""))
     )
-    marks = "".join(_chip(text, kind) for text, kind in _marks(view))
+    marks = "".join(_marks(view))
+    facts = "".join(_facts(view, left))
     return (
         f'<article class="{classes}">{name}{marks}'
-        f'<div class="body">{_picture(view, before)}<dl>{"".join(_facts(view))}</dl></div></article>'
+        f'<div class="body">{_picture(view, left)}<dl>{facts}</dl></div></article>'
     )
 
 
@@ -47,24 +62,67 @@ def path_of(kind: str, name: str) -> str:
     return f"/{kind}/{quote(name, safe='')}"
 
 
-def _marks(view: DeviceView) -> Iterable[tuple[str, str]]:
+def attention(wrong: Sequence[DeviceView], remedies: Remedies) -> str:
+    """List what is wrong with these devices, and what to do; of many devices the first."""
+    items = "".join(_trouble(view, remedies) for view in wrong[:MOST_TOLD])
+    more = len(wrong) - MOST_TOLD
+    items += f"<li>{more} more: see “Only what needs attention”.</li>" if more > 0 else ""
+    return (
+        f'<h2>What is wrong, and what to do</h2><ul class="troubles">{items}</ul>' if wrong else ""
+    )
+
+
+def _trouble(view: DeviceView, remedies: Remedies) -> str:
+    row = view.row
+    name = _told(row.name)
+    link = (
+        f'<a href="{path_of(row.kind, row.name)}">{name}</a>' if row.kind in words.KINDS else name
+    )
+    told = [_old(view)] if row.mark else []
+    does = [SILENT_DO if row.mark.startswith("SILENT") else STALE_DO] if row.mark else []
+    for fault in filter(None, row.faults.split("; ")):
+        told.append(_told(fault))
+        does += [do for do in remedies.get(fault.partition(" (")[0], ())[1:] if do not in does]
+    steps = "".join(f"<p><b>Do:</b> {escape(do)}</p>" for do in does)
+    return f'<li class="panel">{link} <span class="wrong">✖ {"; ".join(told)}</span>{steps}</li>'
+
+
+def _old(view: DeviceView) -> str:
+    mark = view.row.mark
+    if mark.startswith("SILENT"):
+        return f"OLD: silent since {when(view.heard_wall)}" if view.heard_wall else "OLD: silent"
+    read = f"read at {when(view.read_wall)}" if view.read_wall else "never read"
+    return f"OLD: {_told(mark.lower())}, {read}"
+
+
+def when(wall: float) -> str:
+    """Return a time (s since the epoch) that the browser tells by its own zone."""
+    return f'<time data-at="{wall:.3f}"></time>'
+
+
+def _marks(view: DeviceView) -> Iterable[str]:
     row = view.row
     if row.simulated:
-        yield "SIMULATED", "simulated"
+        yield _chip("SIMULATED", "simulated")
     if row.mark:
-        yield f"OLD: {row.mark.lower()}, last reading {row.age} old", "old"
+        yield _chip(_old(view), "old")
+    else:
+        yield _chip("OLD: the page's server is silent", "old lost")
     for fault in filter(None, row.faults.split("; ")):
-        yield fault, "fault"
+        yield _chip(_told(fault), "fault")
 
 
-def _chip(text: str, kind: str) -> str:
-    sign = {"fault": "✖ ", "old": "◷ ", "simulated": "◇ "}[kind]
-    return f'<p class="chip {kind}">{sign}{_told(text)}</p>'
+def _chip(html: str, kind: str) -> str:
+    sign = {"fault": "✖ ", "old": "◷ ", "simulated": "◇ "}[kind.partition(" ")[0]]
+    return f'<p class="chip {kind}">{sign}{html}</p>'
 
 
-def _facts(view: DeviceView) -> Iterable[str]:
+def _facts(view: DeviceView, left: float | None) -> Iterable[str]:
     row = view.row
-    yield _fact("now" if not row.mark else "was", row.state)
+    state = row.state
+    if isinstance(view.state, d.LiftState):
+        state = _placed(state, view.state, left)
+    yield _fact(WAS if row.mark else NOW, state)
     if row.held_by not in ("-", ""):
         yield _fact("for" if row.kind == "charger" else "held by", row.held_by)
     if view.stands is not None:
@@ -82,7 +140,7 @@ def had(stands: Stands) -> str:
 
 
 def _fact(name: str, value: str) -> str:
-    return f"<dt>{escape(name)}</dt><dd>{_told(value)}</dd>"
+    return f"<dt>{name}</dt><dd>{_told(value)}</dd>"
 
 
 def _told(text: str) -> str:
@@ -90,11 +148,10 @@ def _told(text: str) -> str:
     return escape(text if len(text) <= LONGEST else f"{text[:LONGEST]}…")
 
 
-def _picture(view: DeviceView, before: DeviceView | None) -> str:
+def _picture(view: DeviceView, left: float | None) -> str:
     match view.state:
         case d.LiftState() as lift:
-            left = before.state if before and isinstance(before.state, d.LiftState) else lift
-            return shaft(lift, left.current_floor, old=bool(view.row.mark))
+            return shaft(lift, left, old=bool(view.row.mark))
         case d.DoorState() as door:
             word = words.plain(d.DoorModeValue, door.current_mode.value)
             return _svg(44, 44, f"door {word}", _leaves(2, 4, 40, 36, word))
@@ -104,10 +161,39 @@ def _picture(view: DeviceView, before: DeviceView | None) -> str:
             return ""
 
 
-def shaft(state: d.LiftState, left: str = "", *, old: bool = False) -> str:
-    """Draw a lift's shaft: floors, highest at the top, car at its floor, door and direction.
+def car_place(state: Stated | None, left: float | None) -> float | None:
+    """Return a lift car's place, counted from the highest floor; between two floors a half.
 
-    `left`: the car's floor in the last drawing.
+    Between floors it is half a floor from its last place, in its direction. None: nobody knows.
+    """
+    if not isinstance(state, d.LiftState):
+        return None
+    floors = floors_of(state)
+    if state.current_floor in floors:
+        return float(floors.index(state.current_floor))
+    if state.current_floor or left is None:
+        return None
+    to = floors.index(state.destination_floor) if state.destination_floor in floors else left
+    by = HALF.get(state.motion_state, (to > left) / 2 - (to < left) / 2)
+    place = left if left % 1 else left + by
+    return place if place % 1 and 0 < place < len(floors) - 1 else None
+
+
+def _placed(told: str, state: d.LiftState, left: float | None) -> str:
+    """Name the place of a car at no known floor in the words about its state."""
+    place = car_place(state, left)
+    if state.current_floor or (place is None and state.motion_state not in HALF):
+        return told
+    if place is None:
+        return told.replace(NO_FLOOR, "between floors")
+    upper, lower = map(words.printable, floors_of(state)[int(place) : int(place) + 2])
+    return told.replace(NO_FLOOR, f"between {lower} and {upper}")
+
+
+def shaft(state: d.LiftState, left: float | None = None, *, old: bool = False) -> str:
+    """Draw a lift's shaft: floors, highest at the top, the car at or between them, door and direction.
+
+    `left`: the car's place in the last drawing.
     """
     floors = floors_of(state)
     if not floors:
@@ -123,23 +209,22 @@ def shaft(state: d.LiftState, left: str = "", *, old: bool = False) -> str:
             f'<text class="floor{target}" x="{LABEL_PX - 5}" y="{y + 15}" text-anchor="end">'
             f"{sign}{escape(_short(floor))}</text>"
         )
-    if state.current_floor in floors:
-        parts.append(_car(state, floors, left))
-    said = words.condition(state) + (" (old)" if old else "")
+    said = _placed(words.condition(state), state, left) + (" (old)" if old else "")
+    if (place := car_place(state, left)) is not None:
+        parts.append(_car(state, place, left))
     return _svg(LABEL_PX + SHAFT_PX + 24, height, said, "".join(parts))
 
 
-def _car(state: d.LiftState, floors: Sequence[str], left: str) -> str:
-    place = floors.index(state.current_floor)
+def _car(state: d.LiftState, place: float, left: float | None) -> str:
     y = 4 + FLOOR_PX * place
     door = words.plain(d.LiftDoor, state.door_state)
     car = _leaves(LABEL_PX + 4, y, SHAFT_PX - 8, FLOOR_PX - 4, door)
     x = LABEL_PX + SHAFT_PX + 6
     arrow = f'<text class="arrow" x="{x}" y="{y + 14}">{_arrow(state.motion_state)}</text>'
-    if left == state.current_floor or left not in floors:
+    if left is None or left == place:
         return car + arrow
-    by = FLOOR_PX * (floors.index(left) - place)
-    return f'<g class="moves" style="--from:{by}px">{car}{arrow}</g>'
+    by = FLOOR_PX * (left - place)
+    return f'<g class="moves" style="--from:{by:g}px">{car}{arrow}</g>'
 
 
 def floors_of(state: d.LiftState) -> list[str]:
@@ -154,7 +239,7 @@ def _arrow(motion: int) -> str:
 
 
 def _short(text: str) -> str:
-    return text if len(text) <= 6 else text[:5] + "…"
+    return text if len(text) <= 6 else f"{text[:2]}…{text[-3:]}"
 
 
 def _leaves(x: float, y: float, width: float, height: float, door: str) -> str:
@@ -203,14 +288,13 @@ def robots(found: Sequence[RobotShown], now: float) -> str:
 
 def _robot(robot: RobotShown, now: float) -> str:
     state = robot.state
-    silent_s = now - robot.at
-    old = f" (OLD: silent {silent_s:.0f} s)" if silent_s > 10 else ""
-    does = words.plain(d.RobotModeValue, state.mode.mode) + old
+    old = now - robot.heard.at > ROBOT_SILENT_S
+    since = f" (OLD: silent since {when(robot.heard.wall)})" if old else ""
     cells = (
-        words.printable(f"{robot.fleet}/{state.name}"),
-        does,
-        words.printable(state.location.level_name) or "?",
+        _told(words.printable(f"{robot.fleet}/{state.name}")),
+        _told(words.plain(d.RobotModeValue, state.mode.mode)) + since,
+        _told(words.printable(state.location.level_name) or "?"),
         f"{max(0.0, min(100.0, state.battery_percent)):.0f} %",
     )
-    inner = "".join(f"<td>{_told(cell)}</td>" for cell in cells)
+    inner = "".join(f"<td>{cell}</td>" for cell in cells)
     return f"<tr{OLD if old else ''}>{inner}</tr>"

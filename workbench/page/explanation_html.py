@@ -1,10 +1,11 @@
 """An explanation (`workbench/explain/`) as HTML. Pure; every text is escaped."""
 
 from collections.abc import Iterator
+from datetime import tzinfo
 from html import escape
 
 from bridges.observe.requesters import Moment
-from workbench.explain.explanation import Explanation
+from workbench.explain.explanation import Explanation, FaultTold
 from workbench.explain.phrases import TimePhrases
 from workbench.page.tables import table
 
@@ -14,13 +15,22 @@ def explanation(found: Explanation) -> str:
     return "".join(_parts(found))
 
 
-def timeline(svg: str) -> str:
-    """Format a timeline's picture; on a narrow screen it scrolls, by keyboard too."""
-    return f'<div class="timeline" tabindex="0" role="region" aria-label="Timeline">{svg}</div>'
+def timeline(svg: str, opens_at: float = 1.0) -> str:
+    """Format a timeline's picture; on a narrow screen it scrolls, by keyboard too.
+
+    `opens_at`: the place to open it at, as a share of its length.
+    """
+    where = f'tabindex="0" role="region" aria-label="Timeline" data-open="{opens_at:.4f}"'
+    return f'<div class="timeline" {where}>{svg}</div>'
 
 
 def _parts(found: Explanation) -> Iterator[str]:
     yield "".join(f"<p>{escape(sentence)}</p>" for sentence in found.now)
+    if found.next:
+        steps = "".join(f"<li>{escape(f'{step.who}: {step.what}')}</li>" for step in found.next)
+        yield f"<p>Next:</p><ul>{steps}</ul>"
+    if found.faults:
+        yield f"<h3>Faults, and what to do</h3><ul>{''.join(map(_fault, found.faults))}</ul>"
     if found.fields:
         rows = [
             (one.name, one.shown, one.wanted, "✔ yes" if one.met else "✖ no", one.since)
@@ -28,24 +38,24 @@ def _parts(found: Explanation) -> Iterator[str]:
         ]
         headings = ("field", "shows", "wanted", "met", "since")
         yield table(headings, rows, f"What RMF checks for {found.asks}")
-    if found.next:
-        steps = "".join(f"<li>{escape(f'{step.who}: {step.what}')}</li>" for step in found.next)
-        yield f"<p>Next:</p><ul>{steps}</ul>"
-    if found.faults:
-        told = [
-            (f"{one.code} {one.since}", one.detail, one.cause or "?", one.do or "see its log")
-            for one in found.faults
-        ]
-        yield table(("fault", "detail", "likely cause", "do"), told, "Faults, and what to do")
     yield "".join(f"<p>Note: {escape(note)}</p>" for note in found.notes)
 
 
-def story(found: Explanation) -> str:
-    """Format the events, line by line."""
+def _fault(one: FaultTold) -> str:
+    told = ": ".join(filter(None, (f"{one.code} {one.since}", one.detail)))
+    cause = f"<p>Likely cause: {escape(one.cause)}</p>" if one.cause else ""
+    do = one.do or "see the log of its daemon"
+    return (
+        f'<li><span class="wrong">✖ {escape(told)}</span>{cause}<p><b>Do:</b> {escape(do)}</p></li>'
+    )
+
+
+def story(found: Explanation, zone: tzinfo | None = None) -> str:
+    """Format the events, line by line. `zone`: of the times."""
     if not found.story:
         return "<p>Nothing was heard of it.</p>"
     last = found.story[-1]
-    clock = TimePhrases(Moment(last.at, last.wall), None)
+    clock = TimePhrases(Moment(last.at, last.wall), zone)
     left_out = f"<p>{found.left_out} lines before that.</p>" if found.left_out else ""
     lines = "\n".join(f"{clock.time(line.wall)}  {line.text}" for line in found.story)
     return f"{left_out}<pre>{escape(lines)}</pre>"

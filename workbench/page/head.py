@@ -13,23 +13,26 @@ BLUE: Final = "#005a93"
 """The colour of buttons: white text is readable on it in both themes."""
 GREEN: Final = "#00674c"
 """The colour of success; on the library's own, white text is unreadable."""
+RED: Final = "#b02a00"
+"""The colour of failure, and of the button that acts."""
 
 
 def head(title: str, login: Login, request: Request) -> None:
     """The head of a view."""
     ui.dark_mode(None)
-    ui.colors(primary=BLUE, positive=GREEN)
+    ui.colors(primary=BLUE, positive=GREEN, negative=RED)
     ui.page_title(f"{printable(title)} · RMF bridges")
     who = login.form(request, login.user(request))
     links = '<a href="/">Site</a><a href="/incidents">Incidents</a>'
     skip = '<a class="skip" href="#main">To the content</a>'
-    html = f'{skip}<h1>{escape(title)}</h1><nav aria-label="Page">{links}</nav>{who}'
+    links = f'<nav aria-label="Page">{links}</nav><span class="zone"></span>'
+    html = f"{skip}<h1>{escape(title)}</h1>{links}{who}"
     ui.html(html, sanitize=False, tag="header").classes("top")
 
 
 def main(style: str = "") -> ui.element:
-    """The main part of a view."""
-    return ui.element("main").props("id=main").classes(style)
+    """The content of a view, in the library's `main`."""
+    return ui.element("div").props("id=main").classes(style)
 
 
 def part(html: str = "", style: str = "") -> ui.html:

@@ -1,10 +1,11 @@
 """The views of recordings: the folder's list, and one recording explained and drawn."""
 
 import asyncio
-import time
 from collections.abc import Iterator
+from datetime import tzinfo
 from html import escape
 from pathlib import Path
+from typing import Final
 from urllib.parse import quote
 
 from fastapi import Request, Response
@@ -14,9 +15,19 @@ from nicegui import Client, app, ui
 from bridges.messages.words import printable
 from workbench.explain.picture import svg
 from workbench.page import incidents
+from workbench.page.drawing import when
 from workbench.page.explanation_html import explanation, story, timeline
 from workbench.page.head import head, main, part
 from workbench.page.login import Login
+from workbench.page.zone import LONGEST as LONGEST_ZONE
+from workbench.page.zone import zone_of
+
+ANSWERS_S: Final = 10.0
+"""Time limit (s) for a browser to name its zone."""
+FILTER: Final = (
+    '<div class="filters"><label>Find a device, reason or day'
+    ' <input id="find" type="search"></label></div>'
+)
 
 
 class IncidentViews:
@@ -42,10 +53,16 @@ class IncidentViews:
         with main():
             part(self._list())
 
-    async def one(self, name: str, request: Request, client: Client) -> None:
+    async def one(self, name: str, request: Request, client: Client) -> Response | None:
         """A recording of the folder."""
         head(name, self._login, request)
-        await self._view(self._path(name), client, _download(name))
+        path = self._path(name)
+        if path is None:
+            with main():
+                part("<p>There is no incident of that name.</p>")
+            return client.build_response(request, 404)
+        await self._view(path, client, _download(name))
+        return None
 
     async def alone(self, request: Request, client: Client) -> None:
         """Show the only recording, given at the page's start."""
@@ -73,25 +90,25 @@ class IncidentViews:
             return (
                 f"<p>{escape(f'{self._folder}: {error.strerror}. No incident can be shown.')}</p>"
             )
-        return f'<ul class="incidents">{items}</ul>' if items else "<p>There are no incidents.</p>"
+        if not items:
+            return "<p>There are no incidents.</p>"
+        return f'{FILTER}<ul class="incidents">{items}</ul>'
 
-    async def _view(self, path: Path | None, client: Client, link: str = "") -> None:
+    async def _view(self, path: Path, client: Client, link: str = "") -> None:
         """Show the view at once, and fill it once the recording is read, which may take long."""
         with main():
-            if path is None:
-                part("<p>There is no incident of that name.</p>")
-                return
             box = part('<p role="status">The recording is being read …</p>')
         await client.connected()
         async with self._one_at_a_time:
             if client.is_deleted:
                 return
             try:
-                found = await incidents.read_apart(path)
+                zone = await client.run_javascript("ZONE", timeout=ANSWERS_S)
+                found = await incidents.read_apart(path, str(zone)[:LONGEST_ZONE])
             except incidents.BagError as error:
                 box.set_content(f"<p>{escape(str(error))}</p>")
                 return
-        box.set_content(link + "".join(_told(found)))
+        box.set_content(link + "".join(_told(found, zone_of(zone))))
 
 
 def _address(name: str) -> str:
@@ -99,26 +116,30 @@ def _address(name: str) -> str:
 
 
 def _item(one: incidents.File) -> str:
-    at = time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(one.wall))
     link = f'<a href="{_address(one.name)}">{escape(one.name)}</a>'
     if not one.name.isprintable():
         link = (
             f"<span>{escape(printable(one.name))}: a strange name; rename it to see it here</span>"
         )
-    size = f"{one.size / 1024:.0f} KiB"
-    return f'<li class="panel"><span class="when">{at}</span>{link}<span>{size}</span></li>'
+    told = escape(f"{one.device}: {one.reason.replace('-', ' ')}") if one.device else ""
+    size, wanted = f"{one.size / 1024:.0f} KiB", escape(f"{one.name.lower()} {told.lower()}")
+    return (
+        f'<li class="panel" data-find="{wanted}"><span class="when">{when(one.wall)}</span>'
+        f"<b>{told}</b>{link}<span>{size}</span></li>"
+    )
 
 
 def _download(name: str) -> str:
     return f'<p><a href="{_address(name)}/file">Download the recording (MCAP)</a></p>'
 
 
-def _told(found: incidents.ExplainedRecording) -> Iterator[str]:
+def _told(found: incidents.ExplainedRecording, zone: tzinfo | None) -> Iterator[str]:
     yield "".join(f"<p>{escape(note)}</p>" for note in found.notes)
+    yield "".join(f"<p>Kept for: {escape(text)}</p>" for _, text in found.reasons)
     if not found.devices:
         yield "<p>It has nothing about RMF's lifts, doors and chargers.</p>"
     for told, drawing in found.devices:
         yield f"<h2>{escape(f'{told.kind} {told.device}')}</h2>"
         yield explanation(told)
-        yield f"<details><summary>What happened</summary>{story(told)}</details>"
-        yield timeline(svg(drawing))
+        yield f"<details><summary>What happened</summary>{story(told, zone)}</details>"
+        yield timeline(svg(drawing, zone=zone), found.opens_at(drawing))

@@ -8,25 +8,32 @@ import asyncio
 import resource
 import sys
 import time
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from datetime import tzinfo
 from pathlib import Path
 from typing import Final
 
 import msgspec
 
-from bridges.messages.heard import Heard
+from bridges.blackbox.incident import OWN_TOPICS, Note
+from bridges.messages.heard import Heard, Own
 from bridges.runtime import faults
 from workbench.explain import heard_devices
 from workbench.explain.answer import Remedies
 from workbench.explain.device_timeline import Drawing
 from workbench.explain.explanation import Explanation
-from workbench.explain.timeline import Timeline
-from workbench.replay.bags import heard_in
+from workbench.explain.rows import label
+from workbench.explain.timeline import Mark, Timeline
+from workbench.page.zone import zone_of
+from workbench.replay.bags import all_in
 from workbench.replay.sources import BagError, Notes
 
 SUFFIX: Final = ".mcap"
+NOTES: Final = f"{OWN_TOPICS}notes"
+"""The topic of our recorder's notes."""
 MOST_LISTED: Final = 500
+MOST_REASONS: Final = 20
 MOST_DEVICES: Final = 50
 """Limit of devices shown of one recording; the others are counted."""
 LONGEST_S: Final = 20.0
@@ -40,19 +47,34 @@ MOST_MEMORY: Final = 128 << 20
 
 @dataclass(frozen=True, slots=True)
 class File:
-    """A recording in the folder. `wall`: time of the last write (s since the epoch)."""
+    """A recording in the folder. `wall`: its time (s since the epoch), by its name or its last write.
+
+    `device`, `reason`: of one of our recorder's files; else "".
+    """
 
     name: str
     size: int
     wall: float
+    device: str = ""
+    reason: str = ""
 
 
 @dataclass(frozen=True, slots=True)
 class ExplainedRecording:
-    """An explained recording: each device's explanation and timeline, and the unreadable parts."""
+    """An explained recording: each device's explanation and timeline, and the unreadable parts.
+
+    `reasons`: the recorder's notes: the time (s) and the text.
+    """
 
     devices: tuple[tuple[Explanation, Timeline], ...]
     notes: tuple[str, ...]
+    reasons: tuple[tuple[float, str], ...] = ()
+
+    def opens_at(self, timeline: Timeline) -> float:
+        """Return the reason's place in this timeline, as a share of its length; 1 without a reason."""
+        length = timeline.to_s - timeline.from_s
+        at = max((at for at, _ in self.reasons), default=timeline.to_s)
+        return min(1.0, max(0.0, (at - timeline.from_s) / length)) if length else 1.0
 
 
 def listed(folder: Path) -> list[File]:
@@ -65,7 +87,17 @@ def _files(folder: Path) -> Iterator[File]:
     for path in folder.iterdir():
         if path.suffix == SUFFIX and path.is_file() and not path.is_symlink():
             found = path.stat()
-            yield File(path.name, found.st_size, found.st_mtime)
+            yield File(path.name, found.st_size, *_named(path.stem, found.st_mtime))
+
+
+def _named(stem: str, written: float) -> tuple[float, str, str]:
+    """Return time, device and reason of `<device file>_<day>_<time>_<why>_<run>`."""
+    device, *rest = stem.rsplit("_", 4)
+    try:
+        day, clock, why, _ = rest
+        return time.mktime(time.strptime(f"{day}_{clock}", "%Y-%m-%d_%H-%M-%S")), device, why
+    except (ValueError, OverflowError):
+        return written, "", ""
 
 
 def path_in(folder: Path, name: str) -> Path | None:
@@ -73,14 +105,15 @@ def path_in(folder: Path, name: str) -> Path | None:
     return next((folder / one.name for one in _files(folder) if one.name == name), None)
 
 
-async def read_apart(path: Path) -> ExplainedRecording:
-    """Run `read` in its own process. Raises BagError."""
+async def read_apart(path: Path, zone: str = "") -> ExplainedRecording:
+    """Run `read` in its own process. `zone`: the name of the browser's. Raises BagError."""
     child = await asyncio.create_subprocess_exec(
         sys.executable,
         "-P",
         "-m",
         __name__,
         str(path.absolute()),
+        zone,
         stdin=asyncio.subprocess.DEVNULL,
         stdout=asyncio.subprocess.PIPE,
     )
@@ -96,11 +129,11 @@ async def read_apart(path: Path) -> ExplainedRecording:
     return _RECORDING.decode(told)
 
 
-def main(path: Path) -> int:
+def main(path: Path, zone: str) -> int:
     """Read, and write the recording to standard output, or why it cannot be read."""
     resource.setrlimit(resource.RLIMIT_DATA, (MOST_MEMORY, MOST_MEMORY))
     try:
-        code, told = 0, msgspec.msgpack.encode(read(path, faults.for_explain()))
+        code, told = 0, msgspec.msgpack.encode(read(path, faults.for_explain(), zone_of(zone)))
     except BagError as error:
         code, told = 1, str(error).encode()
     except MemoryError:
@@ -109,26 +142,51 @@ def main(path: Path) -> int:
     return code
 
 
-def read(path: Path, remedies: Remedies) -> ExplainedRecording:
-    """Read the recording in bounded time. Raises BagError if it is none."""
+def read(path: Path, remedies: Remedies, zone: tzinfo | None = None) -> ExplainedRecording:
+    """Read the recording in bounded time. `zone`: of its times. Raises BagError if it is none."""
     notes, story = Notes(), heard_devices.HeardDevices()
     cut = not _all_of(path, notes, story.take)
     devices = story.devices()
     drawings = {key: Drawing(*key) for key in devices[:MOST_DEVICES]}
 
-    def draw(heard: Heard) -> None:
+    reasons: list[tuple[float, str]] = []
+
+    def draw(heard: Heard | Own) -> None:
+        if isinstance(heard, Own) and len(reasons) < MOST_REASONS:
+            reasons.extend(_reason(heard))
         for drawing in drawings.values():
             drawing.take(heard)
 
     cut = not _all_of(path, Notes(), draw) or cut
-    told = [(story.explain(*key, None, remedies), one.timeline()) for key, one in drawings.items()]
-    return ExplainedRecording(tuple(told), tuple(_notes(notes, len(devices), cut=cut)))
+    told = [
+        (story.explain(*key, zone, remedies), _marked(one.timeline(), reasons))
+        for key, one in drawings.items()
+    ]
+    said = tuple(_notes(notes, len(devices), cut=cut))
+    return ExplainedRecording(tuple(told), said, tuple(reasons))
 
 
-def _all_of(path: Path, notes: Notes, take: Callable[[Heard], None]) -> bool:
+def _reason(own: Own) -> Iterator[tuple[float, str]]:
+    """Yield the time and text of a recorder's note; nothing for other texts."""
+    if not own.topic.endswith(NOTES):
+        return
+    try:
+        note = msgspec.json.decode(own.text, type=Note)
+    except msgspec.MsgspecError:
+        return
+    yield own.at, label(": ".join(filter(None, (note.code, note.subject, note.text))))
+
+
+def _marked(timeline: Timeline, reasons: Sequence[tuple[float, str]]) -> Timeline:
+    """Mark each reason for the file in the timeline."""
+    marks = [Mark(at, text, "wrong") for at, text in reasons]
+    return replace(timeline, steps=(*timeline.steps, *marks))
+
+
+def _all_of(path: Path, notes: Notes, take: Callable[[Heard | Own], None]) -> bool:
     """Take all messages. True if the time was enough."""
     until = time.monotonic() + LONGEST_S
-    for heard in heard_in(path, notes):
+    for heard in all_in(path, notes):
         take(heard)
         if time.monotonic() > until:
             return False
@@ -149,4 +207,4 @@ _RECORDING: Final = msgspec.msgpack.Decoder(ExplainedRecording)
 __all__ = ["BagError", "ExplainedRecording", "File", "listed", "path_in", "read", "read_apart"]
 
 if __name__ == "__main__":
-    sys.exit(main(Path(sys.argv[1])))
+    sys.exit(main(Path(sys.argv[1]), sys.argv[2]))

@@ -4,8 +4,10 @@ Pure: time comes with each message. Anybody on the network may make names up, so
 has a bound, and known devices are never displaced by later ones.
 """
 
+import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
+from datetime import tzinfo
 from typing import Final
 
 from msgspec.structs import replace
@@ -18,6 +20,8 @@ from bridges.messages.words import KINDS, Kind, Requested, Stated
 from bridges.observe.all_devices import Key
 from bridges.observe.charger import NOBODY, ObservedCharger
 from bridges.observe.diagnosis import about, kind_in
+from bridges.observe.limits import FORGOTTEN_S
+from bridges.observe.requesters import Moment
 from bridges.runtime.diagnostics import MOST
 from workbench.explain import heard_devices
 from workbench.explain.answer import Remedies
@@ -29,6 +33,8 @@ from workbench.graph.board import Board, BoardRow
 
 KEPT_S: Final = 600.0
 """The past that a device's page shows."""
+STEP_S: Final = 60.0
+"""The timeline moves on in steps of this length."""
 MOST_LINES: Final = 100
 """Limit of story lines of one device. Its view shows forty. With six hundred each a large site takes
 150 MB."""
@@ -60,7 +66,7 @@ class RobotShown:
 
     fleet: str
     state: d.RobotState
-    at: float
+    heard: Moment
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,12 +81,15 @@ class Stands:
 class DeviceView:
     """A device as the page draws it: its row from `watch`, and its last state, if any.
 
-    `stands`: its robot's time at the charger.
+    `stands`: its robot's time at the charger. `heard_wall`, `read_wall`: of its last state and of that
+    state's stamp (s since the epoch; 0: never).
     """
 
     row: BoardRow
     state: Stated | None = None
     stands: Stands | None = None
+    heard_wall: float = 0.0
+    read_wall: float = 0.0
 
 
 class LiveSite:
@@ -108,7 +117,7 @@ class LiveSite:
             self._story.take(heard)
             self._remember((words.kind(message), words.device(message)), heard)
         elif isinstance(message, d.FleetState):
-            self._fleet(message, heard.at)
+            self._fleet(message, Moment(heard.at, heard.wall))
         elif isinstance(message, d.DiagnosticArray):
             self._diagnosed(heard, message)
         elif isinstance(message, d.DiagnosticStatus):
@@ -133,25 +142,33 @@ class LiveSite:
         rows = self._board.rows_of(known, now, wall)
         return [_view(row, device) for row, device in zip(rows, known, strict=True)]
 
-    def knows(self, kind: str, name: str) -> bool:
-        """Is the device of this printed name still known? Always true for those without states."""
-        return kind not in KINDS or self._found(kind, name) is not None
-
     def explain(
-        self, kind: str, name: str, now: float, wall: float, remedies: Remedies
+        self,
+        kind: str,
+        name: str,
+        now: float,
+        wall: float,
+        remedies: Remedies,
+        zone: tzinfo | None = None,
     ) -> Explanation | None:
-        """Explain why somebody waits for this device, or its activity."""
+        """Explain why somebody waits for this device, or its activity. `zone`: of the times."""
         device = self._found(kind, name)
         if device is None:
             return None
         self._story.pass_time(now, wall)
-        return self._story.explain(device.kind, device.id, None, remedies)
+        return self._story.explain(device.kind, device.id, zone, remedies)
 
     def timeline(self, kind: str, name: str, now: float) -> Timeline | None:
-        """Return the last ten minutes of a device; `name`: as shown."""
+        """Return the last ten minutes of a device; `name`: as shown.
+
+        It ends at the next whole minute, so that within a minute nothing drawn moves.
+        """
         device = self._found(kind, name)
         drawing = self._drawings.get((device.kind, device.id)) if device else None
-        return drawing.timeline(now - KEPT_S) if drawing else None
+        if drawing is None:
+            return None
+        found = drawing.timeline((now - KEPT_S) // STEP_S * STEP_S)
+        return dataclasses.replace(found, to_s=(found.to_s // STEP_S + 1) * STEP_S)
 
     def _found(self, kind: str, name: str) -> Device | None:
         """Return the device of this shown name."""
@@ -183,7 +200,7 @@ class LiveSite:
         if key not in self._drawings:
             for gone in self._drawings.keys() - self._story.known.keys():
                 del self._drawings[gone]
-            self._drawings[key] = Drawing(*key, KEPT_S)
+            self._drawings[key] = Drawing(*key, KEPT_S + STEP_S)
         self._drawings[key].take(heard)
         self._changed.add(key)
 
@@ -209,11 +226,17 @@ class LiveSite:
             own = (listed[door.id],) if door.id in listed else ()
             self._remember(("door", door.id), replace(heard, message=d.SupervisorHeartbeat(own)))
 
-    def _fleet(self, message: d.FleetState, at: float) -> None:
+    def _fleet(self, message: d.FleetState, now: Moment) -> None:
+        """Take a fleet's robots. In a full table a new robot replaces the one silent for the longest,
+        if that is FORGOTTEN_S."""
         for state in message.robots:
             key = (message.name, state.name)
-            if key in self._robots or len(self._robots) < MOST_ROBOTS:
-                self._robots[key] = RobotShown(message.name, replace(state, path=()), at)
+            if self._robots.pop(key, None) is None and len(self._robots) >= MOST_ROBOTS:
+                longest = next(iter(self._robots))
+                if now.at - self._robots[longest].heard.at < FORGOTTEN_S:
+                    continue
+                del self._robots[longest]
+            self._robots[key] = RobotShown(message.name, replace(state, path=()), now)
 
 
 def _view(row: BoardRow, device: Device | None) -> DeviceView:
@@ -222,7 +245,9 @@ def _view(row: BoardRow, device: Device | None) -> DeviceView:
     if isinstance(device, ObservedCharger) and device.last_state and device.robot.value != NOBODY:
         since = device.robot.since
         stands = Stands(device.last_state.at - since.at, at_least=not since.seen)
-    return DeviceView(row, device.state if device else None, stands)
+    last = device.last_state.wall if device and device.last_state else 0.0
+    read = device.stamped_at if device else 0.0
+    return DeviceView(row, device.state if device else None, stands, last, read)
 
 
 def _is_graph(status: d.DiagnosticStatus) -> bool:

@@ -21,6 +21,7 @@ from workbench.page.access import LoginSessions, PasswordCheck
 
 COOKIE: Final = "rmf_bridge_page"
 STYLE: Final = (Path(__file__).parent / "style.css").read_text(encoding="utf-8")
+SCRIPT: Final = (Path(__file__).parent / "page.js").read_text(encoding="utf-8")
 FORM: Final = """<!doctype html><html lang="en"><head><meta charset="utf-8">
 <title>Log in · RMF bridges</title>
 <meta name="viewport" content="width=device-width, initial-scale=1"><style>{style}</style></head><body>

@@ -1,12 +1,14 @@
 """The views of a live site: all of it, and one device with its timeline, its why and its wiring."""
 
+import json
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from datetime import tzinfo
 from functools import partial
 from html import escape
 from typing import Final
 
-from fastapi import Request
+from fastapi import Request, Response
 from nicegui import Client, ui
 
 from bridges.messages.words import KINDS
@@ -16,13 +18,14 @@ from workbench.explain.picture import svg
 from workbench.page import tables
 from workbench.page.actions import Deeds
 from workbench.page.buttons import Buttons
-from workbench.page.cards import AGES_S, ROBOTS, STATUS, Cards, Key, place_of
+from workbench.page.cards import AGES_S, ROBOTS, STATUS, WRONG, Cards, Key, Wall, place_of
 from workbench.page.drawing import path_of
 from workbench.page.explanation_html import explanation, story
 from workbench.page.head import head, main, part
 from workbench.page.live_site import LiveSite
 from workbench.page.local_daemons import LocalDaemons
 from workbench.page.login import Login
+from workbench.page.tab import Tab
 
 SECTIONS: Final = (
     ("lift", "Lifts"),
@@ -32,57 +35,81 @@ SECTIONS: Final = (
     ("robot", "Charging schedule"),
 )
 WIDE: Final = "panel wide-part"
+FEW: Final = 8
+"""Beside a section of more devices there is no other."""
+LOST: Final = '<p id="lost" role="alert"></p>'
+"""The browser says here that the page's server is silent."""
+FILTERS: Final = (
+    '<div class="filters"><label>Find a device <input id="find" type="search"></label>'
+    '<label><input id="only" type="checkbox"> Only what needs attention</label></div>'
+)
 NOT_HERE: Final = (
     "Its daemon is not on this machine, or the page's user may not see it: wiring, limits and live"
     " levels are shown by a page on the daemon's own machine."
 )
 
 
-class SiteWall:
+class SiteWall(Tab):
     """One browser's view of the site. It has few elements of the library, because a browser goes
     through all of them at each update."""
 
     def __init__(self, cards: Cards, client: Client) -> None:
+        super().__init__(client)
         self._cards = cards
-        self._client = client
         self._missed = False
         self._built = 0
-        part(f'<div id="{STATUS}">{cards.status()}</div>')
-        self._find = ui.input("Find a device").props("dense clearable").classes("find")
+        part(f'<div id="{STATUS}">{cards.status()}</div>{LOST}{FILTERS}')
+        part(f'<div id="{WRONG}">{cards.attention()}</div>')
         self._box = part()
         part(f'<div id="{ROBOTS}">{cards.robots()}</div>')
-        self._find.on_value_change(self.rebuild)
         self.rebuild()
 
     def change(self, script: str) -> None:
         """Send a change; skip a browser that is away: on its return all is rebuilt."""
-        if not self._client.has_socket_connection:
+        if not self.is_here:
             self._missed = True
         elif self._missed:
             self.rebuild()
         else:
-            self._client.run_javascript(script)
+            self.run(script)
 
     def rebuild(self) -> None:
-        """Draw all cards that match the search, by kind and name."""
-        self._missed = not self._client.has_socket_connection
+        """Draw all cards, by kind and name."""
+        self._missed = not self.is_here
         self._built += 1  # makes the content differ: equal content would not be sent
-        wanted = str(self._find.value or "").lower()
-        html = "".join(self._section(*section, wanted) for section in SECTIONS)
+        html = "".join(self._section(*section) for section in SECTIONS)
         none = "<p>No device is shown.</p>"
-        self._box.set_content(f'<div data-built="{self._built}">{html or none}</div>')
+        self._box.set_content(
+            f'<div class="sections" data-built="{self._built}">{html or none}</div>'
+        )
+        self.run(f"show({json.dumps(self._cards.parts())})")
 
-    def _section(self, kind: str, title: str, wanted: str) -> str:
-        keys = [key for key in self._cards.cards if key[0] == kind and wanted in key[1].lower()]
-        slots = "".join(map(self._slot, sorted(keys)))
-        return f'<h2>{title}</h2><div class="cards">{slots}</div>' if keys else ""
+    def _section(self, kind: str, title: str) -> str:
+        keys = sorted(key for key in self._cards.cards if key[0] == kind)
+        slots = "".join(map(self._slot, keys))
+        many = ' class="many"' if len(keys) > FEW else ""
+        return (
+            f'<section{many}><h2>{title}</h2><div class="cards">{slots}</div></section>'
+            if keys
+            else ""
+        )
 
     def _slot(self, key: Key) -> str:
         """Make a card's slot. The link is outside the redrawn part, to keep the keyboard's focus."""
         card = f'<div id="{place_of(key)}">{self._cards.cards[key]}</div>'
         name, path = escape(key[1]), path_of(*key)
         link = f'<a class="cover" href="{path}" aria-label="{name}"></a>' if key[0] in KINDS else ""
-        return f'<div class="slot">{card}{link}</div>'
+        return f'<div class="slot" data-find="{name.lower()}">{card}{link}</div>'
+
+
+class DeviceTab(Tab):
+    """One browser's view of a device: it draws itself once a second, and shows nothing of the site."""
+
+    def change(self, script: str) -> None:
+        """Skip it."""
+
+    def rebuild(self) -> None:
+        """Skip it."""
 
 
 class SiteViews:
@@ -114,64 +141,82 @@ class SiteViews:
         """Show everything, as a wall of cards."""
         head("Site", self._login, request)
         with main():
-            wall = SiteWall(self._cards, client)
+            self._join(SiteWall(self._cards, client), client)
+
+    def _join(self, wall: Wall, client: Client) -> None:
         self._cards.walls.append(wall)
         client.on_delete(lambda: self._cards.walls.remove(wall))
 
-    def device(self, kind: str, name: str, request: Request) -> None:
+    def device(self, kind: str, name: str, request: Request, client: Client) -> Response | None:
         """Show one device."""
         head(name, self._login, request)
         key = (kind, name)
         with main("device"):
-            if key not in self._cards.shown:
-                part(f"<p>{escape(f'No {kind} named {name} was heard.')}</p>", WIDE)
+            if key in self._cards.shown:
+                self._parts(key, request, client)
+                return None
+            part(f"<p>{escape(f'No {kind} named {name} was heard.')}</p>", WIDE)
 
-                def look() -> None:
-                    if key in self._cards.shown:
-                        ui.navigate.reload()
+            def look() -> None:
+                if key in self._cards.shown:
+                    ui.navigate.reload()
 
-                ui.timer(AGES_S, look)
-                return
-            drawn = [(part(), self._card)]
-            with ui.element("section").classes("panel"):
-                drawn.append((part(), self._why))
-                with ui.element("details"):
-                    part("What happened").props("tag=summary")
-                    drawn.append((part(), self._story))
-            self._buttons.show(key, request)
-            with ui.element("section").classes(WIDE):
-                part("<h2>Last ten minutes</h2>")
-                with ui.element("div").classes("timeline") as scrolls:
-                    scrolls.props('tabindex=0 role=region aria-label="Timeline"')
-                    drawn.append((part(), self._timeline))
-            with ui.element("section").classes(WIDE):
-                part("<h2>Wiring and limits</h2>")
-                drawn += [(part(), self._levels), (part(), self._wiring)]
+            ui.timer(AGES_S, look)
+        return client.build_response(request, 404)
+
+    def _parts(self, key: Key, request: Request, client: Client) -> None:
+        """Fill the view of a device that was heard."""
+        tab = DeviceTab(client)
+        self._join(tab, client)
+        drawn: dict[str, Callable[[], str]] = {}
+
+        def place(name: str, draw: Callable[[], str]) -> None:
+            drawn[name] = draw
+            part(f'<div id="{name}">{draw()}</div>')
+
+        part(LOST, "wide-part")
+        place("card", lambda: self._card(key))
+        with ui.element("section").classes("panel"):
+            place("why", lambda: self._why(key, tab.zone))
+            with ui.element("details"):
+                part("What happened").props("tag=summary")
+                place("story", lambda: self._story(key, tab.zone))
+        self._buttons.show(key, request, tab)
+        with ui.element("section").classes(WIDE):
+            part("<h2>Last ten minutes</h2>")
+            with ui.element("div").classes("timeline") as scrolls:
+                scrolls.props('tabindex=0 role=region aria-label="Timeline"')
+                place("timeline", lambda: self._timeline(key, tab.zone))
+        with ui.element("section").classes(WIDE):
+            part("<h2>Wiring and limits</h2>")
+            with ui.element("div").classes("columns"):
+                place("levels", lambda: self._levels(key))
+                place("wiring", lambda: self._wiring(key))
 
         def refresh() -> None:
-            for place, draw in drawn:
-                place.set_content(draw(key))
+            for name, draw in drawn.items():
+                tab.show(name, draw())
 
-        refresh()
         ui.timer(AGES_S, refresh)
 
     def _card(self, key: Key) -> str:
         return self._cards.cards.get(key, "<p>It is no longer heard.</p>")
 
-    def _why(self, key: Key) -> str:
-        found = self._explained(key)
+    def _why(self, key: Key, zone: tzinfo | None) -> str:
+        found = self._explained(key, zone)
         return f"<h2>Why</h2>{explanation(found)}" if found else ""
 
-    def _story(self, key: Key) -> str:
-        found = self._explained(key)
-        return story(found) if found else ""
+    def _story(self, key: Key, zone: tzinfo | None) -> str:
+        found = self._explained(key, zone)
+        return story(found, zone) if found else ""
 
-    def _explained(self, key: Key) -> Explanation | None:
-        return self._site.explain(*key, time.monotonic(), time.time(), self._remedies)
+    def _explained(self, key: Key, zone: tzinfo | None) -> Explanation | None:
+        now, wall = time.monotonic(), time.time()
+        return self._site.explain(*key, now, wall, self._remedies, zone)
 
-    def _timeline(self, key: Key) -> str:
+    def _timeline(self, key: Key, zone: tzinfo | None) -> str:
         found = self._site.timeline(*key, time.monotonic())
-        return svg(found) if found else ""
+        return svg(found, zone=zone) if found else ""
 
     def _levels(self, key: Key) -> str:
         served = self._here.served.get(key)

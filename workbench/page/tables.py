@@ -7,7 +7,7 @@ from pathlib import Path
 
 from bridges.kinds.shared.table import Table
 from bridges.settings.load import SettingsError, load
-from bridges.settings.sheets.findings import WIRES, findings
+from bridges.settings.sheets.findings import SETTINGS, WIRES, findings
 
 NO_RING = "Its daemon keeps no ring, or the page's user may not read it: no live levels."
 
@@ -15,13 +15,16 @@ NO_RING = "Its daemon keeps no ring, or the page's user may not read it: no live
 def table(headings: Sequence[str], rows: Iterable[Sequence[str]], caption: str) -> str:
     """A table; every cell is text."""
     heads = "".join(f'<th scope="col">{escape(text)}</th>' for text in headings)
+    named = [f'<td data-head="{escape(text)}">' for text in headings]
     body = "".join(
-        "<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in rows
+        "<tr>"
+        + "".join(f"{td}{escape(cell)}</td>" for td, cell in zip(named, row, strict=True))
+        + "</tr>"
+        for row in rows
     )
     return (
-        f'<div class="wide" tabindex="0" role="region" aria-label="{escape(caption)}">'
         f"<table><caption>{escape(caption)}</caption>"
-        f"<thead><tr>{heads}</tr></thead><tbody>{body}</tbody></table></div>"
+        f"<thead><tr>{heads}</tr></thead><tbody>{body}</tbody></table>"
     )
 
 
@@ -34,7 +37,20 @@ def wiring(file: str, device: str, contacts: Mapping[str, bool]) -> str:
     if isinstance(found, str):
         return f"<p>{escape(found)}</p>"
     live = (_live(one, contacts) if one.title == WIRES else one for one in found)
-    return "".join(table(one.headings, one.rows, one.title) for one in live)
+    return "".join(map(_folded, live))
+
+
+def _folded(one: Table) -> str:
+    """Format a table; settings at their defaults are folded away."""
+    if one.headings != SETTINGS:
+        return table(one.headings, one.rows, one.title)
+    set_, rest = ([row for row in one.rows if bool(row[2]) == own] for own in (True, False))
+    shown = table(SETTINGS, set_, one.title) if set_ else ""
+    if not rest:
+        return shown
+    folded = f"{len(rest)} {one.title} at their defaults"
+    inner = table(SETTINGS[:2], [row[:2] for row in rest], folded)
+    return f"{shown}<details><summary>{folded}</summary>{inner}</details>"
 
 
 def _live(wires: Table, contacts: Mapping[str, bool]) -> Table:

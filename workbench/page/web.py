@@ -36,7 +36,7 @@ from workbench.page.incident_views import IncidentViews
 from workbench.page.listener import Listener
 from workbench.page.live_site import LiveSite
 from workbench.page.local_daemons import LocalDaemons
-from workbench.page.login import STYLE, Login
+from workbench.page.login import SCRIPT, STYLE, Login
 from workbench.page.site_views import SiteViews
 
 log = logging.getLogger(__name__)
@@ -98,6 +98,7 @@ def serve(
         PasswordCheck(known) if known else None, proxy=args.proxy or "", header=args.proxy_header
     )
     ui.add_css(STYLE, shared=True)
+    ui.add_head_html(f"<script>{SCRIPT}</script>", shared=True)
     # Quasar draws a progress bar that has no name over the page during each request of a script.
     app.config.quasar_config["loadingBar"]["skipHijack"] = True
     app.get("/login")(login.show)

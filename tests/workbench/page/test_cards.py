@@ -1,7 +1,6 @@
 """What browsers are sent: one script for all that has changed in a turn, and none where nothing has."""
 
 import json
-import re
 
 from msgspec.structs import replace
 
@@ -23,12 +22,13 @@ class Wall:
         self.rebuilt = 0
 
     def change(self, script: str) -> None:
-        found = re.search(r"Object\.entries\((\{.*\})\)\) \{ const place", script)
-        assert found
-        self.changes.append(list(json.loads(found[1])))
+        self.changes.append(list(json.loads(script.removeprefix("show(").removesuffix(")"))))
 
     def rebuild(self) -> None:
         self.rebuilt += 1
+
+    def answer(self, wrong: int) -> None:
+        self.wrong = wrong
 
 
 def nowhere() -> Transport:
@@ -58,10 +58,11 @@ def test_all_changes_of_a_turn_are_one_script_for_every_browser() -> None:
         walls[0].changes
         == walls[1].changes
         == [
-            ["card/lift/Lift1", "card/lift/Lift2", "status", "robots"],
+            ["card/lift/Lift1", "card/lift/Lift2", "status", "wrong", "robots"],
             ["card/lift/Lift1", "card/lift/Lift2"],
         ]
     )
+    assert [wall.wrong for wall in walls] == [0, 0]
 
 
 def test_a_script_has_every_text_as_data_in_plain_ascii() -> None:

@@ -1,0 +1,69 @@
+/* The browser's part of every view. Ages are by its own steady clock; times are in its own zone. */
+const OLD_MS = 2500, ASK_MS = 1000, LOOK_MS = 250;
+const ZONE = Intl.DateTimeFormat().resolvedOptions().timeZone || "UTC";
+const DAY = { year: "numeric", month: "2-digit", day: "2-digit" };
+const CLOCK = { hour: "2-digit", minute: "2-digit", second: "2-digit", hourCycle: "h23" };
+const pieces = {};
+let newAt = performance.now(); /* Everything shown is at least as new as this. */
+let title = "", wrong = 0;
+
+function put(id, html) {
+  const place = document.getElementById(id);
+  if (place) place.innerHTML = html;
+}
+function show(changed) {
+  for (const [id, html] of Object.entries(changed)) put(id, html);
+}
+/* Each edit replaces the pieces from `from` to `to`; the last edit comes first. */
+function patch(id, edits) {
+  const known = (pieces[id] ||= []);
+  for (const [from, to, added] of edits) known.splice(from, to - from, ...added);
+  put(id, known.join(""));
+}
+/* The page has sent everything that it had heard when we asked. */
+function fresh(asked, count) {
+  newAt = Math.max(newAt, asked);
+  wrong = count;
+  look();
+}
+function ask() {
+  if (window.did_handshake && window.socket.connected) emitEvent("ask", performance.now(), ZONE);
+}
+function look() {
+  const silent = performance.now() - newAt, old = silent > OLD_MS;
+  const told = document.getElementById("lost"), seconds = Math.floor(silent / 1000);
+  document.body.classList.toggle("stale", old);
+  told.textContent = old ? `✖ OLD: for ${seconds} s nothing has come from the page's server. Look at it and at the network.` : "";
+  title ||= document.title;
+  document.title = (old ? "OLD " : "") + (wrong ? `(${wrong}) ` : "") + title;
+}
+function filter() {
+  const wanted = (document.getElementById("find")?.value || "").toLowerCase();
+  for (const one of document.querySelectorAll("[data-find]")) one.hidden = !one.dataset.find.includes(wanted);
+}
+/* A timeline opens at `data-open`, a share of its width; without one, at its newest end. */
+function open_at(scrolls) {
+  const share = parseFloat(scrolls.dataset.open || "1");
+  scrolls.scrollLeft = share * scrolls.scrollWidth - (share < 1 ? scrolls.clientWidth / 2 : 0);
+  scrolls.dataset.opened = "";
+}
+function tell_time(place) {
+  const at = new Date(1000 * parseFloat(place.dataset.at)), today = new Date().toDateString();
+  const parts = at.toDateString() === today ? CLOCK : { ...DAY, ...CLOCK };
+  place.textContent = at.toLocaleString("sv-SE", parts);
+  place.dateTime = at.toISOString();
+}
+function fill() {
+  document.querySelectorAll("time[data-at]:empty").forEach(tell_time);
+  document.querySelectorAll(".zone:empty").forEach(place => { place.textContent = `Times: ${ZONE}`; });
+  document.querySelectorAll(".timeline:not([data-opened]):has(svg)").forEach(open_at);
+  filter();
+}
+document.addEventListener("DOMContentLoaded", () => {
+  new MutationObserver(fill).observe(document.body, { childList: true, subtree: true });
+  document.addEventListener("input", filter);
+  document.addEventListener("visibilitychange", () => document.getElementById("lost") && look());
+  setInterval(() => document.getElementById("lost") && look(), LOOK_MS);
+  setInterval(() => document.getElementById("lost") && ask(), ASK_MS);
+  fill();
+});

@@ -1,0 +1,74 @@
+"""One browser's tab: its time zone, its question whether it shows the newest, and the parts of its
+view, of which only changes are sent."""
+
+import json
+import math
+import re
+from collections.abc import Sequence
+from datetime import tzinfo
+from difflib import SequenceMatcher
+from typing import Final
+
+from nicegui import Client, ui
+from nicegui.events import GenericEventArguments
+
+from workbench.page.zone import zone_of
+
+PIECE: Final = re.compile(r"(?=<(?:rect|text|line|path|tr|p|li)\b)|(?<=\n)")
+"""A part is cut here: what moves or grows changes a few pieces."""
+WHOLE: Final = 1_000_000
+"""More pieces than any part has."""
+
+Edit = tuple[int, int, Sequence[str]]
+"""The first piece that is replaced, the first that is not, and the new pieces."""
+
+
+def edits(before: Sequence[str], after: Sequence[str]) -> list[Edit]:
+    """Return the replaced pieces, the last ones first."""
+    found = SequenceMatcher(None, before, after, autojunk=False).get_opcodes()
+    return [(i, j, after[m:n]) for what, i, j, m, n in reversed(found) if what != "equal"]
+
+
+class Tab:
+    """The tab of a client. `zone`: of its times; None until it is known: this machine's."""
+
+    def __init__(self, client: Client) -> None:
+        self.zone: tzinfo | None = None
+        self._client = client
+        self._asked: float | None = None
+        self._sent: dict[str, list[str]] = {}
+        ui.on("ask", self._ask)
+
+    @property
+    def is_here(self) -> bool:
+        """Is the browser connected?"""
+        return self._client.has_socket_connection
+
+    def run(self, script: str) -> None:
+        """Run JavaScript in the browser."""
+        self._client.run_javascript(script)
+
+    def show(self, place: str, html: str) -> None:
+        """Send the changes of this part; to a browser that was away, all of it."""
+        if not self.is_here:
+            self._sent.clear()
+            return
+        pieces = PIECE.split(html)
+        before = self._sent.get(place)
+        changed = [(0, WHOLE, pieces)] if before is None else edits(before, pieces)
+        if changed:
+            self._sent[place] = pieces
+            self.run(f"patch({json.dumps(place)}, {json.dumps(changed)})")
+
+    def answer(self, wrong: int) -> None:
+        """Answer the browser's question: what was heard before it has been sent. `wrong`: the number
+        of devices that need attention."""
+        asked, self._asked = self._asked, None
+        if asked is not None and self.is_here:
+            self.run(f"fresh({asked}, {wrong})")
+
+    def _ask(self, event: GenericEventArguments) -> None:
+        """Take the question: the browser's steady clock, and its zone."""
+        match event.args:
+            case [int() | float() as asked, str() as zone] if math.isfinite(asked):
+                self._asked, self.zone = float(asked), zone_of(zone)
