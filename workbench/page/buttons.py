@@ -39,7 +39,7 @@ class Buttons:
         """Show the device's buttons and recent actions; nothing without a login."""
         if not self._login.user(request):
             return
-        with ui.element("section").classes("panel wide-part").props('aria-label="Actions"'):
+        with ui.element("section").classes("panel").props('aria-label="Actions"'):
             part("<h2>Actions</h2>")
             self._all(key, request)
             self._lately(tab)

@@ -62,6 +62,7 @@ function fill() {
 document.addEventListener("DOMContentLoaded", () => {
   new MutationObserver(fill).observe(document.body, { childList: true, subtree: true });
   document.addEventListener("input", filter);
+  window.addEventListener("resize", () => document.querySelectorAll("[data-opened]").forEach(open_at));
   document.addEventListener("visibilitychange", () => document.getElementById("lost") && look());
   setInterval(() => document.getElementById("lost") && look(), LOOK_MS);
   setInterval(() => document.getElementById("lost") && ask(), ASK_MS);

@@ -176,7 +176,7 @@ class SiteViews:
 
         part(LOST, "wide-part")
         place("card", lambda: self._card(key))
-        with ui.element("section").classes("panel"):
+        with ui.element("section").classes("panel why"):
             place("why", lambda: self._why(key, tab.zone))
             with ui.element("details"):
                 part("What happened").props("tag=summary")

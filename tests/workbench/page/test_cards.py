@@ -5,8 +5,9 @@ import json
 from msgspec.structs import replace
 
 from bridges.messages.heard import Heard
+from bridges.messages.stamps import stamp
 from bridges.transports.transport import Transport, TransportError
-from tests.workbench.page.test_live_site import LIFT, lift
+from tests.workbench.page.test_live_site import LIFT, WALL, lift
 from workbench.page.cards import Cards, place_of, script
 from workbench.page.listener import Listener
 from workbench.page.live_site import LiveSite
@@ -52,7 +53,8 @@ def test_all_changes_of_a_turn_are_one_script_for_every_browser() -> None:
     turn()
     turn(first, second)
     moved = [replace(LIFT, lift_name=name, current_floor="L2") for name in ("Lift1", "Lift2")]
-    turn(*(replace(first, message=message) for message in moved))
+    stamped = [replace(state, lift_time=stamp(WALL + 99.0)) for state in moved]
+    turn(*(replace(first, message=message) for message in stamped))
     assert [wall.rebuilt for wall in walls] == [1, 1]
     assert (
         walls[0].changes
