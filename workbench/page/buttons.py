@@ -21,6 +21,7 @@ from workbench.page.tables import table
 SHOWN_MS: Final = 10_000
 LONGEST: Final = 400
 MOST_TOLD: Final = 10
+NO: Final = "No, change nothing"
 
 
 class Buttons:
@@ -134,7 +135,7 @@ class Buttons:
             ui.label(action.question)
             with ui.row():
                 ui.button(action.text, color="negative", on_click=lambda: dialog.submit(True))
-                no = ui.button("No, change nothing", on_click=lambda: dialog.submit(False))
+                no = ui.button(NO, color=None, on_click=lambda: dialog.submit(False))
                 no.props("autofocus").classes("no")
         agreed = await dialog
         dialog.delete()

@@ -18,6 +18,7 @@ from playwright.sync_api import Browser, BrowserContext, Page, sync_playwright
 from bridges.messages import definitions as d
 from bridges.messages import topics
 from bridges.messages.stamps import stamp
+from bridges.runtime.diagnostics import diagnosis
 from bridges.transports.transport import Transport, TransportError
 from hal_fakes.wire import join, wire
 from tests.workbench.page import recorded
@@ -56,16 +57,20 @@ class Graph:
         self.lifts: dict[str, d.LiftState] = {}
         self.doors: dict[str, d.DoorState] = {}
         self.chargers: dict[str, d.ChargerState] = {}
+        self.faults: dict[str, dict[str, str]] = {}
+        self._diagnostics = self._transport.publisher(topics.DIAGNOSTICS)
 
-    def lift(self, name: str, floor: str = "L1", door: int = 0, session: str = "") -> None:
-        """A lift of three floors stands so from now on."""
+    def lift(
+        self, name: str, floor: str = "L1", door: int = 0, session: str = "", motion: int = 0
+    ) -> None:
+        """A lift of three floors stands so from now on. `motion`: or moves."""
         floors = ("L1", "L2", "L3")
         state = d.LiftState(
             lift_name=name,
             available_floors=floors,
             current_floor=floor,
             door_state=door,
-            motion_state=0,
+            motion_state=motion,
             current_mode=2,
             session_id=session,
         )
@@ -89,6 +94,11 @@ class Graph:
             self._doors.publish(replace(door, door_time=now))
         for charger in self.chargers.values():
             self._chargers.publish(replace(charger, charger_time=now))
+        status = {
+            lift: {"faults": [{"code": code, "detail": detail} for code, detail in faults.items()]}
+            for lift, faults in self.faults.items()
+        }
+        self._diagnostics.publish(diagnosis("node", "lift", {}, status, now))
 
     def close(self) -> None:
         """Leave."""

@@ -28,6 +28,8 @@ COLOURS = """selector => { const style = getComputedStyle(document.querySelector
   return [style.color, style.backgroundColor]; }"""
 """Under a dialog axe-core takes the body's colour for every background. So a dialog has the colours of
 the buttons and panels that it has found good without one."""
+BEYOND = """() => [...document.querySelectorAll('#main :is(p, td, th, li, button)')].filter(
+  one => one.getBoundingClientRect().right > innerWidth).map(one => one.outerHTML)"""
 DOOR = Path("config/door_modbus.yaml").absolute()
 LIFT = Path("config/lift_dry_contact.yaml").absolute()
 
@@ -46,7 +48,7 @@ def confirm(tab: Page, button: str, until: Until) -> None:
     """Press a button, and say yes when it asks once more."""
     until(lambda: tab.get_by_role("button", name=button, exact=True).count() == 1, button)
     tab.get_by_role("button", name=button, exact=True).click()
-    tab.get_by_role("button", name="Yes").click()
+    tab.get_by_role("dialog").get_by_role("button").first.click()
 
 
 def now_of(tab: Page, signal: str) -> str:
@@ -101,7 +103,8 @@ def test_a_simulation_can_be_pressed_and_failed_and_each_action_is_recorded(
     assert said.evaluate("one => getComputedStyle(one).backgroundColor") == "rgb(0, 103, 76)"
     until(lambda: "fire" in tab.locator("article.card").inner_text().lower(), "the fire")
     until(lambda: now_of(tab, "fire_alarm").startswith("● asserted ("), "the contact itself")
-    until(lambda: f"{USER}\tPress fire_alarm" in main(tab), "who did what")
+    done = "Press fire_alarm: done. In the simulation fire_alarm of Lift1 is on."
+    until(lambda: f"{USER}\tPress fire_alarm\t{done}" in main(tab), "who did what, in a sentence")
     shot("actions")
     confirm(tab, "Let go", until)
     until(lambda: len(deeds(folder)) == 2, "the release of the button")
@@ -148,6 +151,23 @@ def test_a_session_that_has_ended_can_do_nothing(
     assert len(deeds(folder)) == before
 
 
+def test_settings_at_their_defaults_are_folded_and_no_column_is_beyond_the_edge(
+    tab: Page, address: str, until: Until
+) -> None:
+    tab.goto(address)
+    until(lambda: tab.get_by_role("link", name="Lift1").count() == 1, "the lift")
+    until(lambda: tab.get_by_role("link", name="ward_door").count() == 1, "the door")
+    for width in (390, 1200, 1920):
+        tab.set_viewport_size({"width": width, "height": 800})
+        for device in ("lift/Lift1", "door/ward_door"):
+            tab.goto(f"{address}{device}")
+            until(lambda: tab.get_by_text("settings at their defaults").count() > 0, "the wiring")
+            assert tab.get_by_role("cell", name="start_timeout", exact=True).count() == 0
+            assert tab.evaluate(BEYOND) == []
+    tab.get_by_text("settings at their defaults").first.click()
+    assert tab.get_by_role("table").last.is_visible()
+
+
 def test_axe_finds_no_serious_fault_in_the_question_of_an_action(
     tab: Page, address: str, until: Until
 ) -> None:
@@ -157,13 +177,14 @@ def test_axe_finds_no_serious_fault_in_the_question_of_an_action(
     until(lambda: tab.get_by_role("button", name="Let it fail").count() == 1, "the buttons")
     for button in ("Reset faults", "Press", "Let go", "Let it fail"):
         tab.get_by_role("button", name=button, exact=True).click()
-        tab.get_by_role("dialog").get_by_role("button", name="Yes").wait_for()
+        tab.get_by_role("dialog").get_by_role("button").first.wait_for()
         found = [one for one in serious_faults(tab) if one[1] != "color-contrast"]
         assert (button, found) == (button, [])
         for scheme in SCHEMES:
             tab.emulate_media(color_scheme=scheme)
             settled(tab)
-            assert colours(tab, ".q-dialog .q-btn") == colours(tab, ".actions .q-btn")
+            assert colours(tab, ".q-dialog .q-btn.no") == colours(tab, "section.panel")
+            assert colours(tab, ".q-dialog .q-btn") == ["rgb(255, 255, 255)", "rgb(176, 42, 0)"]
             assert colours(tab, ".q-dialog .q-card") == colours(tab, "section.panel")
         tab.keyboard.press("Escape")
         tab.get_by_role("dialog").wait_for(state="detached")

@@ -2,11 +2,13 @@
 
 import shutil
 from collections.abc import Iterator
+from datetime import datetime
 from pathlib import Path
+from zoneinfo import ZoneInfo
 
 import pytest
 from mcap.writer import CompressionType
-from playwright.sync_api import BrowserContext, Page
+from playwright.sync_api import Browser, BrowserContext, Page
 from zstandard import compress
 
 from tests.workbench.page import recorded
@@ -16,6 +18,9 @@ from workbench.replay.bags import heard_in
 from workbench.replay.mcap_read import LONGEST_RECORD, MAGIC
 
 pytestmark = pytest.mark.browser
+KEPT = "lift_north_2026-11-18_03-04-05_fault-overload_0a1b2c3d.mcap"
+MIDDLE = """() => { const one = document.querySelector('.timeline');
+  return (one.scrollLeft + one.clientWidth / 2) / one.scrollWidth; }"""
 HOSTILE = "<img src=x onerror=alert(1)>.mcap"
 
 
@@ -27,6 +32,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (made / HOSTILE).write_bytes(b"nothing of ours")
     (made / "bomb.mcap").write_bytes(MAGIC + chunk(b"zstd", compress(bytes(4 * LONGEST_RECORD)), 9))
     (made / "rosbag2.mcap").write_bytes(states(20, compression=CompressionType.ZSTD))
+    recorded.write(made / KEPT)
     (made / "notes.txt").write_text("secret")
     (made / "passwd.mcap").symlink_to("/etc/passwd")
     recorded.write(made / "hostile.mcap", lift="<img src=x onerror=alert(1)>")
@@ -49,6 +55,7 @@ def test_the_list_has_the_recordings_and_nothing_else(tab: Page, address: str, s
         "bomb.mcap",
         "cut.mcap",
         "hostile.mcap",
+        KEPT,
         "ride.mcap",
         "rosbag2.mcap",
     ]
@@ -73,6 +80,42 @@ def test_an_incident_opens_with_its_sentences_and_its_timeline(
     assert len(list(heard_in(kept))) == 105
 
 
+def test_the_list_shows_device_reason_and_the_browsers_time_and_has_a_filter(
+    tab: Page, address: str
+) -> None:
+    tab.goto(f"{address}incidents")
+    kept = tab.locator(".incidents li", has_text="lift_north")
+    at = datetime.strptime("2026-11-18 03:04:05", "%Y-%m-%d %H:%M:%S").timestamp()
+    zone = ZoneInfo(tab.evaluate("Intl.DateTimeFormat().resolvedOptions().timeZone"))
+    assert kept.locator("b").inner_text() == "lift_north: fault overload"
+    when = kept.locator("time")
+    assert when.inner_text() == f"{datetime.fromtimestamp(at, zone):%Y-%m-%d %H:%M:%S}"
+    assert tab.locator(".zone").inner_text() == f"Times: {zone.key}"
+    tab.get_by_label("Find a device, reason or day").fill("Overload")
+    assert tab.locator(".incidents a:visible").all_inner_texts() == [KEPT]
+
+
+def test_an_incident_opens_at_its_reason_and_in_the_browsers_zone(
+    browser: Browser, address: str
+) -> None:
+    with browser.new_context(
+        viewport={"width": 390, "height": 800}, timezone_id="Asia/Kolkata"
+    ) as context:
+        tab = context.new_page()
+        tab.goto(f"{address}incidents/{KEPT}")
+        tab.locator(".timeline[data-opened] svg").wait_for()
+        assert "Kept for: OPERATOR: Lift1: <b>it was slow</b>" in tab.locator("#main").inner_text()
+        middle = tab.evaluate(MIDDLE)
+        assert 0.4 < middle < 0.6  # the note is in the middle of the minute
+        began = datetime.fromtimestamp(recorded.WALL, ZoneInfo("Asia/Kolkata"))
+        assert f"from {began:%Y-%m-%d %H:%M:%S}" in tab.locator(".timeline").inner_text()
+
+
+@pytest.mark.parametrize("path", ["incidents/none.mcap", "nothing", "incidents/none.mcap/file"])
+def test_there_is_no_view_of_what_is_not_there(tab: Page, address: str, path: str) -> None:
+    assert tab.request.get(f"{address}{path}").status == 404
+
+
 def test_a_recording_is_shown_without_any_graph(tab: Page, address: str) -> None:
     tab.goto(address)
     tab.locator(".timeline svg").wait_for()
@@ -90,10 +133,15 @@ def test_a_recording_is_shown_without_any_graph(tab: Page, address: str) -> None
     ],
 )
 def test_a_foreign_file_is_reported_as_damaged_or_as_no_recording(
-    tab: Page, address: str, name: str, told: str
+    tab: Page, address: str, name: str, told: str, complaints: list[str]
 ) -> None:
-    tab.goto(f"{address}incidents/{name}")
+    answer = tab.goto(f"{address}incidents/{name}")
     tab.get_by_text(told).first.wait_for()
+    there = told != "no incident"
+    assert answer is not None
+    assert answer.status == (200 if there else 404)
+    assert len(complaints) == (0 if there else 1)
+    complaints.clear()
 
 
 def test_a_recording_of_rosbag2_is_shown(tab: Page, address: str) -> None:

@@ -17,6 +17,7 @@ pytestmark = pytest.mark.browser
 FOCUSED = """() => { const e = document.activeElement;
   return [e.getAttribute('aria-label') || e.textContent.trim(),
           parseFloat(getComputedStyle(e).outlineWidth)]; }"""
+BACK = "one => getComputedStyle(one).backgroundColor"
 HOSTILE = '<img src=x onerror="document.title=1">'
 
 
@@ -85,9 +86,12 @@ def test_the_timeline_of_a_device_grows(
 
 
 def test_a_page_that_was_opened_too_early_shows_its_device_once_it_is_heard(
-    tab: Page, address: str, graph: Graph, until: Until
+    tab: Page, address: str, graph: Graph, until: Until, complaints: list[str]
 ) -> None:
-    tab.goto(f"{address}lift/Lift77")
+    answer = tab.goto(f"{address}lift/Lift77")
+    assert answer is not None
+    assert answer.status == 404
+    assert ["404" in complaints.pop()] == [True]
     tab.get_by_text("No lift named Lift77 was heard").wait_for()
     graph.lift("Lift77", "L1", 0, "")
     until(lambda: tab.locator("article.card").count() == 1, "its card")
@@ -124,8 +128,15 @@ def test_a_logged_in_user_confirms_and_then_releases_a_lift(
     until(lambda: tab.get_by_role("button", name="Release the lift").count() == 1, "the button")
     tab.get_by_role("button", name="Release the lift").click()
     until(lambda: "End the session of fleet/robot?" in tab.inner_text("body"), "the question")
-    tab.get_by_role("button", name="No").click()
-    until(lambda: tab.get_by_role("dialog").count() == 0, "the question to go")
+    dialog = tab.get_by_role("dialog")
+    acts, stays = (one for one in dialog.get_by_role("button").all())
+    assert [acts.inner_text(), stays.inner_text()] == ["Release the lift", "No, change nothing"]
+    assert acts.evaluate(BACK) != stays.evaluate(BACK)
+    assert (
+        dialog.locator(".q-card").evaluate("one => parseFloat(getComputedStyle(one).padding)") >= 16
+    )
+    stays.click()
+    until(lambda: dialog.count() == 0, "the question to go")
     tab.get_by_role("button", name="Log out").click()
     until(lambda: tab.get_by_role("link", name="Log in").count() == 1, "the logout")
     (cookie,) = [one for one in context.cookies() if one["name"] == "rmf_bridge_page"] or [{}]
@@ -171,7 +182,7 @@ def test_everything_can_be_reached_by_keyboard_and_the_focus_is_seen(
         reached.append(tab.evaluate(FOCUSED))
     names = [name for name, _ in reached]
     assert names[:4] == ["To the content", "Site", "Incidents", "Log in"]
-    assert all(outline >= 2 for name, outline in reached if name != "Find a device")
+    assert all(outline >= 2 for _, outline in reached)
     tab.get_by_role("link", name="Lift1").focus()
     graph.lift("Lift1", "L2", 0, "fleet/robot")
     until(lambda: "car at L2" in drawn(tab, "Lift1"), "the car at L2")
