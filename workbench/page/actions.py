@@ -152,7 +152,8 @@ def fail(local: Local, device: str, part: str, how: str) -> Action:
     """In a simulation: let a part fail, or mend it (`ok`)."""
     words = ("fail", f"--device={device}", *_runtime(local), "--", local.file, part, how)
     did = f"In the simulation {part} of {printable(device)} is {how}."
-    return Action(f"Let {part} fail", f"Let {part} be {how}, in the simulation?", words, did)
+    act = f"Mend {part}" if how == "ok" else f"Let {part} fail"
+    return Action(act, f"{act} ({how}), in the simulation?", words, did)
 
 
 def _runtime(local: Local) -> tuple[str, ...]:

@@ -122,7 +122,7 @@ def _item(one: incidents.File) -> str:
             f"<span>{escape(printable(one.name))}: a strange name; rename it to see it here</span>"
         )
     told = escape(f"{one.device}: {one.reason.replace('-', ' ')}") if one.device else ""
-    size, wanted = f"{one.size / 1024:.0f} KiB", escape(f"{one.name.lower()} {told.lower()}")
+    size, wanted = f"{one.size / 1024:.0f} KiB", escape(printable(f"{one.name} {told}").lower())
     return (
         f'<li class="panel" data-find="{wanted}"><span class="when">{when(one.wall)}</span>'
         f"<b>{told}</b>{link}<span>{size}</span></li>"

@@ -86,13 +86,9 @@ class SiteWall(Tab):
 
     def _section(self, kind: str, title: str) -> str:
         keys = sorted(key for key in self._cards.cards if key[0] == kind)
-        slots = "".join(map(self._slot, keys))
+        cards = f'<div class="cards">{"".join(map(self._slot, keys))}</div>'
         many = ' class="many"' if len(keys) > FEW else ""
-        return (
-            f'<section{many}><h2>{title}</h2><div class="cards">{slots}</div></section>'
-            if keys
-            else ""
-        )
+        return f"<section{many}><h2>{title}</h2>{cards}</section>" if keys else ""
 
     def _slot(self, key: Key) -> str:
         """Make a card's slot. The link is outside the redrawn part, to keep the keyboard's focus."""
@@ -100,16 +96,6 @@ class SiteWall(Tab):
         name, path = escape(key[1]), path_of(*key)
         link = f'<a class="cover" href="{path}" aria-label="{name}"></a>' if key[0] in KINDS else ""
         return f'<div class="slot" data-find="{name.lower()}">{card}{link}</div>'
-
-
-class DeviceTab(Tab):
-    """One browser's view of a device: it draws itself once a second, and shows nothing of the site."""
-
-    def change(self, script: str) -> None:
-        """Skip it."""
-
-    def rebuild(self) -> None:
-        """Skip it."""
 
 
 class SiteViews:
@@ -166,7 +152,7 @@ class SiteViews:
 
     def _parts(self, key: Key, request: Request, client: Client) -> None:
         """Fill the view of a device that was heard."""
-        tab = DeviceTab(client)
+        tab = Tab(client)
         self._join(tab, client)
         drawn: dict[str, Callable[[], str]] = {}
 

@@ -60,6 +60,12 @@ class Tab:
             self._sent[place] = pieces
             self.run(f"patch({json.dumps(place)}, {json.dumps(changed)})")
 
+    def change(self, script: str) -> None:
+        """Take a change of the site's cards; a device's view draws itself."""
+
+    def rebuild(self) -> None:
+        """Take that cards were added or removed."""
+
     def answer(self, wrong: int) -> None:
         """Answer the browser's question: what was heard before it has been sent. `wrong`: the number
         of devices that need attention."""
