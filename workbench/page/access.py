@@ -23,7 +23,7 @@ COST: Final = (2**14, 8, 1)
 """N, r and p: 16 MB and about 50 ms for one try."""
 MOST_COST: Final = 2**17
 SESSION_S: Final = 12 * 3600.0
-"""A login lasts for a shift."""
+"""A login ends after a shift."""
 IDLE_S: Final = 3600.0
 MOST_SESSIONS: Final = 100
 TRIES: Final = 5
@@ -39,7 +39,7 @@ class PasswordError(Exception):
 
 
 def hashed(password: str) -> str:
-    """The password's hash, with a salt of its own, as the file has it."""
+    """Return the password's hash with its salt, as a line of the file has them."""
     salt = os.urandom(16)
     n, r, p = COST
     parts = (base64.b64encode(part).decode() for part in (salt, _scrypt(password, salt, n, r, p)))
@@ -70,7 +70,7 @@ def _scrypt(password: str, salt: bytes, n: int, r: int, p: int) -> bytes:
 
 
 def users(file: Path) -> dict[str, str]:
-    """The hash of each user. Raises PasswordError, with the file and line."""
+    """Return the hash of each user. Raises PasswordError, with the file and line."""
     try:
         content, mode = read(file, LONGEST_FILE)
     except OSError as error:
@@ -97,7 +97,7 @@ def users(file: Path) -> dict[str, str]:
 
 
 def add_user(file: Path, user: str, password: str) -> None:
-    """Add a user, or give one another password. Raises PasswordError."""
+    """Add a user, or replace a user's password. Raises PasswordError."""
     if not USER.fullmatch(user):
         raise PasswordError(f"'{user}' is not a user name: use only letters, digits and . _ @ -")
     if len(password) < SHORTEST:
@@ -115,7 +115,7 @@ def add_user(file: Path, user: str, password: str) -> None:
 
 
 class Tries:
-    """Failed logins by address. Bounded: the oldest are forgotten."""
+    """Failed logins by address. Of too many addresses the oldest are forgotten."""
 
     def __init__(self) -> None:
         self._failed_at: OrderedDict[str, list[float]] = OrderedDict()
@@ -126,7 +126,7 @@ class Tries:
         return len(recent) < TRIES
 
     def failed(self, address: str, now: float) -> None:
-        """Note one more failed try."""
+        """Count a failed try of this address."""
         recent = [at for at in self._failed_at.pop(address, ()) if now - at < TRIES_IN_S]
         self._failed_at[address] = [*recent, now]
         while len(self._failed_at) > MOST_ADDRESSES:
@@ -169,7 +169,7 @@ class LoginSessions:
         return session
 
     def end(self, secret: str | None) -> None:
-        """Log out."""
+        """End the session of this secret."""
         self._by_secret.pop(secret or "", None)
 
 
@@ -182,7 +182,7 @@ class PasswordCheck:
         self._nobody = hashed(secrets.token_urlsafe(16))
 
     def refuses(self, user: str, password: str, address: str, now: float) -> str:
-        """Return why this user is refused; "" if let in. Refusing an unknown user takes as long."""
+        """Return why this user is refused; "" if let in. A check takes as long for an unknown user."""
         if not self._tries.allowed(address, now):
             return "too many wrong passwords; wait a minute"
         right = matches(password[:1024], self._known.get(user, self._nobody))

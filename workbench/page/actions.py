@@ -33,16 +33,16 @@ MOST_KEPT: Final = 100
 LONGEST_FILE: Final = 1_000_000
 RESET: Final = "The daemon clears each latched fault whose cause is gone."
 REPORTS: Final = re.compile(r"^rmf-bridge \S+: ", re.M)
-"""A command's name before its complaint."""
+"""The name of the command at the beginning of its complaint."""
 PROGRESS: Final = re.compile(r"^[\d.]+ s  \S+ +\S.*?  ")
-"""The time, the step and the device before a line of `send`."""
+"""The time, the step and the device at the beginning of a line of `send`."""
 
 
 @dataclass(frozen=True, slots=True)
 class Action:
     """A button: its text, the question that confirms it, and the command's words.
 
-    `done`: the sentence about its success; "": the last sentence of the command.
+    `done`: the sentence that reports its success; "": the command's last line does.
     """
 
     text: str
@@ -134,13 +134,13 @@ def _on_graph(view: DeviceView, graph: Sequence[str]) -> list[Action]:
 
 
 def queue(name: str, robot: str, graph: Sequence[str]) -> Action:
-    """Ask the coordinator for a charge. `robot`: FLEET/ROBOT."""
+    """Return the action that asks the coordinator for a charge. `robot`: FLEET/ROBOT."""
     words = ("send", "charger", "--queue", f"--robot={robot}", WAITS, *graph, "--", name)
     return Action("Queue a charge", f"Ask for a charge of {printable(robot)}?", words)
 
 
 def press(local: Local, device: str, signal: str, on: bool) -> Action:
-    """In a simulation: press or let go."""
+    """Return the action that presses a signal of a simulation, or lets go of it."""
     how = "on" if on else "off"
     words = ("press", f"--device={device}", *_runtime(local), "--", local.file, signal, how)
     did = f"In the simulation {signal} of {printable(device)} is {how}."
@@ -149,7 +149,7 @@ def press(local: Local, device: str, signal: str, on: bool) -> Action:
 
 
 def fail(local: Local, device: str, part: str, how: str) -> Action:
-    """In a simulation: let a part fail, or mend it (`ok`)."""
+    """Return the action that lets a part of a simulation fail, or mends it (`how`: ok)."""
     words = ("fail", f"--device={device}", *_runtime(local), "--", local.file, part, how)
     did = f"In the simulation {part} of {printable(device)} is {how}."
     act = f"Mend {part}" if how == "ok" else f"Let {part} fail"
@@ -169,7 +169,7 @@ class Deeds:
         self.latest: deque[PastAction] = deque(maxlen=MOST_KEPT)
 
     async def do(self, action: Action, user: str) -> PastAction:
-        """Run the command. Never raises; errors are in `said`."""
+        """Run the action's command. Never raises: `said` of the result has the error."""
         code, said = await _run(action.words)
         done = PastAction(time.time(), user, action.text, code, said, action.done)
         self.latest.appendleft(done)
@@ -190,7 +190,7 @@ class Deeds:
 
 
 async def _run(words: Sequence[str]) -> tuple[int | None, str]:
-    """Run it; return the exit code and the output's beginning; None after the time limit."""
+    """Run a command. Return its exit code, None after the time limit, and the output's beginning."""
     try:
         child = await asyncio.create_subprocess_exec(
             sys.executable,

@@ -1,4 +1,4 @@
-"""The site in browsers: each card is drawn once, when it changes, for all of them.
+"""The site in browsers: a card that changes is drawn once for all browsers.
 
 The changes of a turn go to each browser as one script, made once: with an update for each card, a
 browser could not keep up with 300 of them in a second.
@@ -28,7 +28,7 @@ ROBOTS: Final = "robots"
 
 
 def place_of(key: Key) -> str:
-    """The id of the element that holds this card."""
+    """Return the id of the element that holds this card."""
     return f"card{drawing.path_of(*key)}"
 
 
@@ -44,10 +44,10 @@ class Wall(Protocol):
         """Show a change of the site, by this script."""
 
     def rebuild(self) -> None:
-        """Draw everything again: cards were added or removed."""
+        """Draw all cards again, because cards were added or removed."""
 
     def answer(self, wrong: int) -> None:
-        """Tell the browser that it has everything heard before it last asked."""
+        """Tell the browser that everything heard before its last question has been sent."""
 
 
 class Cards:

@@ -63,7 +63,7 @@ def path_of(kind: str, name: str) -> str:
 
 
 def attention(wrong: Sequence[DeviceView], remedies: Remedies) -> str:
-    """List what is wrong with these devices, and what to do; of many devices the first."""
+    """List what is wrong with the first of these devices, and what to do."""
     items = "".join(_trouble(view, remedies) for view in wrong[:MOST_TOLD])
     more = len(wrong) - MOST_TOLD
     items += f"<li>{more} more: see “Only what needs attention”.</li>" if more > 0 else ""
@@ -96,7 +96,7 @@ def _old(view: DeviceView) -> str:
 
 
 def when(wall: float) -> str:
-    """Return a time (s since the epoch) that the browser tells by its own zone."""
+    """Return the HTML of a time (s since the epoch), which the browser shows in its own zone."""
     return f'<time data-at="{wall:.3f}"></time>'
 
 
@@ -132,7 +132,7 @@ def _facts(view: DeviceView, left: float | None) -> Iterable[str]:
 
 
 def had(stands: Stands) -> str:
-    """Format in minutes, so a card does not change every second: `at least 12 min`."""
+    """Format the time in minutes, so that a card does not change every second: `at least 12 min`."""
     minutes = int(stands.for_s // 60)
     if stands.at_least:
         return f"at least {minutes} min" if minutes else "since before this page heard of it"
@@ -144,7 +144,7 @@ def _fact(name: str, value: str) -> str:
 
 
 def _told(text: str) -> str:
-    """Format as HTML; of a long text its beginning."""
+    """Format a text as HTML; a long text is cut."""
     return escape(text if len(text) <= LONGEST else f"{text[:LONGEST]}…")
 
 
@@ -164,7 +164,7 @@ def _picture(view: DeviceView, left: float | None) -> str:
 def car_place(state: Stated | None, left: float | None) -> float | None:
     """Return a lift car's place, counted from the highest floor; between two floors a half.
 
-    Between floors it is half a floor from its last place, in its direction. None: nobody knows.
+    Between floors the car is half a floor from its last place, in its direction. None: not known.
     """
     if not isinstance(state, d.LiftState):
         return None
@@ -180,7 +180,7 @@ def car_place(state: Stated | None, left: float | None) -> float | None:
 
 
 def _placed(told: str, state: d.LiftState, left: float | None) -> str:
-    """Name the place of a car at no known floor in the words about its state."""
+    """Put the place of a car at no known floor into the description of its state (`told`)."""
     place = car_place(state, left)
     if state.current_floor or (place is None and state.motion_state not in HALF):
         return told

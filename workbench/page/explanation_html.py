@@ -18,7 +18,7 @@ def explanation(found: Explanation) -> str:
 def timeline(svg: str, opens_at: float = 1.0) -> str:
     """Format a timeline's picture; on a narrow screen it scrolls, by keyboard too.
 
-    `opens_at`: the place to open it at, as a share of its length.
+    `opens_at`: the place shown first, as a share of the length.
     """
     where = f'tabindex="0" role="region" aria-label="Timeline" data-open="{opens_at:.4f}"'
     return f'<div class="timeline" {where}>{svg}</div>'
@@ -51,7 +51,7 @@ def _fault(one: FaultTold) -> str:
 
 
 def story(found: Explanation, zone: tzinfo | None = None) -> str:
-    """Format the events, line by line. `zone`: of the times."""
+    """Format the events, each as a line. `zone`: of their times."""
     if not found.story:
         return "<p>Nothing was heard of it.</p>"
     last = found.story[-1]

@@ -18,9 +18,9 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 MOST_BODY: Final = 64 * 1024
 BODY_S: Final = 5.0
-"""Time limit (s) of receiving a request."""
+"""A request must arrive within this time (s)."""
 ANSWER_S: Final = 120.0
-"""Time limit (s) of sending an answer: a recording of 16 MB in 1 Mbit/s."""
+"""An answer must be sent within this time (s), which is enough for 15 MB at 1 Mbit/s."""
 HEADERS: Final = {
     "content-security-policy": "default-src 'self'; script-src 'self' 'unsafe-inline' 'unsafe-eval';"
     " style-src 'self' 'unsafe-inline'; img-src 'self' data:; font-src 'self' data:;"
@@ -44,7 +44,7 @@ class HttpRefusal:
 def refused(scope: Scope, hosts: Collection[str]) -> str:
     """Return why this request is refused; "" if answered. `hosts`: names, with or without a port.
 
-    An address is answered as well: only a name can be made to resolve to another machine.
+    A host that is an address is answered: only a name can be made to resolve to another machine.
     """
     headers = Headers(scope=scope)
     host = headers.get("host", "").lower()

@@ -18,7 +18,7 @@ RED: Final = "#b02a00"
 
 
 def head(title: str, login: Login, request: Request) -> None:
-    """The head of a view."""
+    """Make the head of a view."""
     ui.dark_mode(None)
     ui.colors(primary=BLUE, positive=GREEN, negative=RED)
     ui.page_title(f"{printable(title)} · RMF bridges")
@@ -31,7 +31,7 @@ def head(title: str, login: Login, request: Request) -> None:
 
 
 def main(style: str = "") -> ui.element:
-    """The content of a view, in the library's `main`."""
+    """Make the content of a view; the library puts it into its `main`."""
     return ui.element("div").props("id=main").classes(style)
 
 

@@ -48,13 +48,13 @@ class IncidentViews:
         app.get("/incidents/{name}/file")(self.download)
 
     def all(self, request: Request) -> None:
-        """The list."""
+        """Show the list."""
         head("Incidents", self._login, request)
         with main():
             part(self._list())
 
     async def one(self, name: str, request: Request, client: Client) -> Response | None:
-        """A recording of the folder."""
+        """Show a recording of the folder."""
         head(name, self._login, request)
         path = self._path(name)
         if path is None:
@@ -71,7 +71,7 @@ class IncidentViews:
         await self._view(self._recording, client)
 
     def download(self, name: str) -> Response:
-        """The file itself."""
+        """Send the file."""
         path = self._path(name)
         if path is None:
             return Response("there is no incident of that name", status_code=404)
@@ -95,7 +95,7 @@ class IncidentViews:
         return f'{FILTER}<ul class="incidents">{items}</ul>'
 
     async def _view(self, path: Path, client: Client, link: str = "") -> None:
-        """Show the view at once, and fill it once the recording is read, which may take long."""
+        """Show an empty view at once, and fill it when the recording is read, which may take long."""
         with main():
             box = part('<p role="status">The recording is being read …</p>')
         await client.connected()

@@ -40,16 +40,16 @@ LONGEST_S: Final = 20.0
 """A recording is read for this long (s) at most; the page says that the rest is left out."""
 
 ENDED_S: Final = 60.0
-"""Its process is ended after this time (s): the recording is full of messages other than RMF's."""
+"""The reading process is ended after this time (s): only messages of others than RMF take so long."""
 MOST_MEMORY: Final = 128 << 20
-"""The memory of its process (bytes), which shares the unit's 256 MB with the page."""
+"""Limit of the reading process's memory (bytes). The process and the page share the unit's 256 MB."""
 
 
 @dataclass(frozen=True, slots=True)
 class File:
-    """A recording in the folder. `wall`: its time (s since the epoch), by its name or its last write.
+    """A recording in the folder. `wall`: the time in its name, else of its last write (epoch s).
 
-    `device`, `reason`: of one of our recorder's files; else "".
+    `device`, `reason`: from the name of a file of our recorder; "" for other files.
     """
 
     name: str
@@ -91,7 +91,7 @@ def _files(folder: Path) -> Iterator[File]:
 
 
 def _named(stem: str, written: float) -> tuple[float, str, str]:
-    """Return time, device and reason of `<device file>_<day>_<time>_<why>_<run>`."""
+    """Return time, device and reason by the name `<device file>_<day>_<time>_<why>_<run>`."""
     device, *rest = stem.rsplit("_", 4)
     try:
         day, clock, why, _ = rest
@@ -101,12 +101,12 @@ def _named(stem: str, written: float) -> tuple[float, str, str]:
 
 
 def path_in(folder: Path, name: str) -> Path | None:
-    """Return the recording of this name in the folder; None for every other name."""
+    """Return the path of the recording of this name; None if the folder has no such recording."""
     return next((folder / one.name for one in _files(folder) if one.name == name), None)
 
 
 async def read_apart(path: Path, zone: str = "") -> ExplainedRecording:
-    """Run `read` in its own process. `zone`: the name of the browser's. Raises BagError."""
+    """Run `read` in a process of its own. `zone`: the name of the browser's zone. Raises BagError."""
     child = await asyncio.create_subprocess_exec(
         sys.executable,
         "-P",
@@ -130,7 +130,7 @@ async def read_apart(path: Path, zone: str = "") -> ExplainedRecording:
 
 
 def main(path: Path, zone: str) -> int:
-    """Read, and write the recording to standard output, or why it cannot be read."""
+    """Read a recording, and write its explanation, or why it cannot be read, to standard output."""
     resource.setrlimit(resource.RLIMIT_DATA, (MOST_MEMORY, MOST_MEMORY))
     try:
         code, told = 0, msgspec.msgpack.encode(read(path, faults.for_explain(), zone_of(zone)))
@@ -143,7 +143,7 @@ def main(path: Path, zone: str) -> int:
 
 
 def read(path: Path, remedies: Remedies, zone: tzinfo | None = None) -> ExplainedRecording:
-    """Read the recording in bounded time. `zone`: of its times. Raises BagError if it is none."""
+    """Read the recording in bounded time. `zone`: of the times shown. Raises BagError if it is none."""
     notes, story = Notes(), heard_devices.HeardDevices()
     cut = not _all_of(path, notes, story.take)
     devices = story.devices()
@@ -167,7 +167,7 @@ def read(path: Path, remedies: Remedies, zone: tzinfo | None = None) -> Explaine
 
 
 def _reason(own: Own) -> Iterator[tuple[float, str]]:
-    """Yield the time and text of a recorder's note; nothing for other texts."""
+    """Yield the time and text of a note of our recorder; nothing for its other texts."""
     if not own.topic.endswith(NOTES):
         return
     try:
@@ -184,7 +184,7 @@ def _marked(timeline: Timeline, reasons: Sequence[tuple[float, str]]) -> Timelin
 
 
 def _all_of(path: Path, notes: Notes, take: Callable[[Heard | Own], None]) -> bool:
-    """Take all messages. True if the time was enough."""
+    """Take the messages of a recording. Return whether the time was enough for all."""
     until = time.monotonic() + LONGEST_S
     for heard in all_in(path, notes):
         take(heard)

@@ -16,7 +16,7 @@ Rows = Mapping[str, str]
 
 
 class Levels:
-    """Follows the ring of one daemon. `sensed`, `driven`: by the device's name."""
+    """Follows the ring of one daemon. `sensed`, `driven`: device's name -> its inputs, its outputs."""
 
     def __init__(self, folder: Path) -> None:
         self.sensed: dict[str, Rows] = {}

@@ -1,4 +1,4 @@
-"""The page's place on the graph: it listens and never speaks; it joins again when the graph is lost."""
+"""The page's node on the graph: it listens, never speaks, and joins again when the graph is lost."""
 
 import logging
 import threading
@@ -20,7 +20,7 @@ log = logging.getLogger(__name__)
 WAITING: Final = 20_000
 """Limit of waiting messages. More come only in a flood, and are dropped and counted."""
 LONGEST_TURN_S: Final = 0.05
-"""A flood must not keep the browsers waiting."""
+"""A turn ends after this time (s): a flood must not keep the browsers waiting."""
 AGAIN_S: Final = 3.0
 
 
@@ -54,7 +54,7 @@ class Listener:
             self.lost += 1
 
     def turn(self) -> bool:
-        """Take the waiting messages, on the caller's thread. True if there were any."""
+        """Take the waiting messages, on the caller's thread. Return whether there were any."""
         any_heard = False
         until = time.monotonic() + LONGEST_TURN_S
         while time.monotonic() < until:

@@ -34,7 +34,7 @@ from workbench.graph.board import Board, BoardRow
 KEPT_S: Final = 600.0
 """The past that a device's page shows."""
 STEP_S: Final = 60.0
-"""The timeline moves on in steps of this length."""
+"""The timeline moves on in steps of this length (s)."""
 MOST_LINES: Final = 100
 """Limit of story lines of one device. Its view shows forty. With six hundred each a large site takes
 150 MB."""
@@ -81,8 +81,8 @@ class Stands:
 class DeviceView:
     """A device as the page draws it: its row from `watch`, and its last state, if any.
 
-    `stands`: its robot's time at the charger. `heard_wall`, `read_wall`: of its last state and of that
-    state's stamp (s since the epoch; 0: never).
+    `stands`: its robot's time at the charger. `heard_wall`: the arrival of its last state. `read_wall`:
+    the stamp of that state (both s since the epoch; 0: never).
     """
 
     row: BoardRow
@@ -130,7 +130,7 @@ class LiveSite:
             self._board.note(heard)
 
     def devices(self, now: float, wall: float) -> list[DeviceView]:
-        """Return devices, coordinators, scheduled robots. `now`: monotonic s; `wall`: stamps' clock."""
+        """Return devices, coordinators and scheduled robots. `now`: steady s; `wall`: stamps' clock."""
         every, rows = self._story.stated(), self._board.rows(now, wall)
         shown = {f"{one.kind} {words.printable(one.id)}": one for one in every}
         return [_view(row, shown.get(f"{row.kind} {row.name}")) for row in rows]
@@ -151,7 +151,7 @@ class LiveSite:
         remedies: Remedies,
         zone: tzinfo | None = None,
     ) -> Explanation | None:
-        """Explain why somebody waits for this device, or its activity. `zone`: of the times."""
+        """Explain why somebody waits for this device, or its activity. `zone`: of its times."""
         device = self._found(kind, name)
         if device is None:
             return None
@@ -161,7 +161,7 @@ class LiveSite:
     def timeline(self, kind: str, name: str, now: float) -> Timeline | None:
         """Return the last ten minutes of a device; `name`: as shown.
 
-        It ends at the next whole minute, so that within a minute nothing drawn moves.
+        The timeline ends at the next whole minute: so the parts already drawn move only once a minute.
         """
         device = self._found(kind, name)
         drawing = self._drawings.get((device.kind, device.id)) if device else None
@@ -187,8 +187,8 @@ class LiveSite:
         return [robot for _, robot in sorted(self._robots.items())]
 
     def _about(self, key: Key, heard: Heard) -> None:
-        """Take a request, a cancel or a refusal. None is kept for an unknown device: anybody can
-        request anything."""
+        """Take a request, a cancel or a refusal. Drop a message for an unknown device: anybody
+        can request anything."""
         if self._device(key):
             self._story.take(heard)
             self._remember(key, heard)
@@ -227,8 +227,8 @@ class LiveSite:
             self._remember(("door", door.id), replace(heard, message=d.SupervisorHeartbeat(own)))
 
     def _fleet(self, message: d.FleetState, now: Moment) -> None:
-        """Take a fleet's robots. In a full table a new robot replaces the one silent for the longest,
-        if that is FORGOTTEN_S."""
+        """Take a fleet's robots. In a full table a new robot replaces the robot that was silent for the
+        longest, at least FORGOTTEN_S."""
         for state in message.robots:
             key = (message.name, state.name)
             if self._robots.pop(key, None) is None and len(self._robots) >= MOST_ROBOTS:

@@ -1,6 +1,7 @@
 """The daemons on this machine that the page's user may see, and the YAML that serves each device.
 
-It reads what `rmf-bridge status` reads, and asks a simulation for the names of its signals and parts.
+The page reads what `rmf-bridge status` reads. It asks a simulation for the names of its signals and
+parts.
 """
 
 import json
@@ -33,7 +34,7 @@ class ServedDevice:
 
 
 class LocalDaemons:
-    """This machine's daemons when last looked at. `served`: by kind and name."""
+    """This machine's daemons at the last look. `served`: (kind, name) -> the device."""
 
     def __init__(self, base: Path | None) -> None:
         """`base`: the folder of runtime directories, if not where `run` and systemd make them."""
@@ -42,7 +43,7 @@ class LocalDaemons:
         self._levels: dict[Path, Levels] = {}
 
     def look(self) -> None:
-        """See which daemons serve now. Raises OSError."""
+        """Find the daemons that serve now. Raises OSError."""
         base = self._base
         folders = sorted(p for p in base.iterdir() if p.is_dir()) if base else list(runtimes())
         found: dict[tuple[str, str], ServedDevice] = {}

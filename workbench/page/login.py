@@ -77,7 +77,7 @@ class Login:
         return HTMLResponse(html, status_code=status)
 
     async def log_in(self, request: Request) -> Response:
-        """Check user and password."""
+        """Check the user and the password, and begin a session."""
         fields = await _fields(request)
         user, password = fields.get("user", ""), fields.get("password", "")
         address = request.client.host if request.client else ""
@@ -114,7 +114,7 @@ class Login:
 
 
 async def _fields(request: Request) -> dict[str, str]:
-    """Return a form's fields; none of a form with too many."""
+    """Return a form's fields; a form with too many fields has none."""
     try:
         found = parse_qs((await request.body()).decode(errors="replace"), max_num_fields=10)
     except ValueError:

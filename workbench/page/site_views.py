@@ -36,7 +36,7 @@ SECTIONS: Final = (
 )
 WIDE: Final = "panel wide-part"
 FEW: Final = 8
-"""Beside a section of more devices there is no other."""
+"""A section of more devices than this takes the whole width."""
 LOST: Final = '<p id="lost" role="alert"></p>'
 """The browser says here that the page's server is silent."""
 FILTERS: Final = (
@@ -65,7 +65,7 @@ class SiteWall(Tab):
         self.rebuild()
 
     def change(self, script: str) -> None:
-        """Send a change; skip a browser that is away: on its return all is rebuilt."""
+        """Send a change. For a browser that is away all cards are drawn again at its return."""
         if not self.is_here:
             self._missed = True
         elif self._missed:
@@ -91,7 +91,7 @@ class SiteWall(Tab):
         return f"<section{many}><h2>{title}</h2>{cards}</section>" if keys else ""
 
     def _slot(self, key: Key) -> str:
-        """Make a card's slot. The link is outside the redrawn part, to keep the keyboard's focus."""
+        """Make a card's slot. Its link is outside the redrawn part, and so keeps the keyboard's focus."""
         card = f'<div id="{place_of(key)}">{self._cards.cards[key]}</div>'
         name, path = escape(key[1]), path_of(*key)
         link = f'<a class="cover" href="{path}" aria-label="{name}"></a>' if key[0] in KINDS else ""

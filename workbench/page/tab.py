@@ -1,5 +1,4 @@
-"""One browser's tab: its time zone, its question whether it shows the newest, and the parts of its
-view, of which only changes are sent."""
+"""One browser's tab: its time zone, its question for the newest, and the changes of its view."""
 
 import json
 import math
@@ -15,22 +14,22 @@ from nicegui.events import GenericEventArguments
 from workbench.page.zone import zone_of
 
 PIECE: Final = re.compile(r"(?=<(?:rect|text|line|path|tr|p|li)\b)|(?<=\n)")
-"""A part is cut here: what moves or grows changes a few pieces."""
+"""A part of a view is cut into pieces at these places. A small change concerns few pieces."""
 WHOLE: Final = 1_000_000
 """More pieces than any part has."""
 
 Edit = tuple[int, int, Sequence[str]]
-"""The first piece that is replaced, the first that is not, and the new pieces."""
+"""The number of the first replaced piece, that of the first kept piece after it, the new pieces."""
 
 
 def edits(before: Sequence[str], after: Sequence[str]) -> list[Edit]:
-    """Return the replaced pieces, the last ones first."""
+    """Return the edits that make `after` of `before`, the last edit first."""
     found = SequenceMatcher(None, before, after, autojunk=False).get_opcodes()
     return [(i, j, after[m:n]) for what, i, j, m, n in reversed(found) if what != "equal"]
 
 
 class Tab:
-    """The tab of a client. `zone`: of its times; None until it is known: this machine's."""
+    """The tab of a client. `zone`: the browser's; None until the browser has named it."""
 
     def __init__(self, client: Client) -> None:
         self.zone: tzinfo | None = None
@@ -49,7 +48,7 @@ class Tab:
         self._client.run_javascript(script)
 
     def show(self, place: str, html: str) -> None:
-        """Send the changes of this part; to a browser that was away, all of it."""
+        """Send the changes of this part; a browser that was away gets the whole part."""
         if not self.is_here:
             self._sent.clear()
             return
@@ -61,14 +60,15 @@ class Tab:
             self.run(f"patch({json.dumps(place)}, {json.dumps(changed)})")
 
     def change(self, script: str) -> None:
-        """Take a change of the site's cards; a device's view draws itself."""
+        """Ignore a change of the site: a device's view draws itself."""
 
     def rebuild(self) -> None:
-        """Take that cards were added or removed."""
+        """Ignore that cards were added or removed."""
 
     def answer(self, wrong: int) -> None:
-        """Answer the browser's question: what was heard before it has been sent. `wrong`: the number
-        of devices that need attention."""
+        """Answer the browser's question: everything heard before the question has been sent.
+
+        `wrong`: the number of devices that need attention."""
         asked, self._asked = self._asked, None
         if asked is not None and self.is_here:
             self.run(f"fresh({asked}, {wrong})")

@@ -13,7 +13,7 @@ NO_RING = "Its daemon keeps no ring, or the page's user may not read it: no live
 
 
 def table(headings: Sequence[str], rows: Iterable[Sequence[str]], caption: str) -> str:
-    """A table; every cell is text."""
+    """Return a table; every cell is text."""
     heads = "".join(f'<th scope="col">{escape(text)}</th>' for text in headings)
     named = [f'<td data-head="{escape(text)}">' for text in headings]
     body = "".join(
@@ -29,7 +29,7 @@ def table(headings: Sequence[str], rows: Iterable[Sequence[str]], caption: str) 
 
 
 def wiring(file: str, device: str, contacts: Mapping[str, bool]) -> str:
-    """The tables of the device's YAML, wires and limits, as `rmf-bridge check` prints them.
+    """Return the tables of the device's YAML, wires and limits, as `rmf-bridge check` prints them.
 
     `contacts`: known signal -> is it asserted? Shown as a column of the wires.
     """
@@ -84,7 +84,7 @@ def _changed_at(file: str) -> float:
 
 @lru_cache(maxsize=64)
 def _tables(file: str, changed_at: float, device: str) -> list[Table] | str:
-    """Return the tables, or why there are none. `changed_at`: rereads a changed file."""
+    """Return the tables, or why there are none. `changed_at`: a changed file is read again."""
     try:
         config = load(Path(file))
     except SettingsError as error:

@@ -49,9 +49,9 @@ MOST_HISTORY: Final = 100
 """Limit of missed updates sent to a returning browser; after more it reloads its view."""
 MOST_CONNECTIONS: Final = 200
 MOST_BYTES: Final = 64 * 1024
-"""The longest message from a browser; the library's own are a hundredth of it."""
+"""Limit of a message from a browser (bytes); the library's messages have a hundredth of this size."""
 MOST_BROWSERS: Final = 50
-"""The most views at once; each takes up to a megabyte. An unused view is dropped within a minute."""
+"""Limit of open views; each takes up to a megabyte. An unused view is dropped within a minute."""
 OF_EVERYBODY: Final = ("/login", "/favicon.ico")
 LIBRARY: Final = "/_nicegui/"
 """The library's own scripts and styles."""
@@ -64,14 +64,14 @@ MOST_WAITING: Final = 50
 
 
 class Gate:
-    """Admission of browsers, up to a number at once. `closed`: only logged-in users."""
+    """Admission of up to MOST_BROWSERS browsers. `closed`: only of logged-in users."""
 
     def __init__(self, login: Login, *, closed: bool) -> None:
         self._login = login
         self._closed = closed
 
     def __call__(self, scope: Scope) -> HttpRefusal | None:
-        """Return why a request is refused; None if answered."""
+        """Return why a request is refused; None if it is answered."""
         path = str(scope["path"])
         if path in OF_EVERYBODY or path.startswith(LIBRARY):
             return None
@@ -186,7 +186,7 @@ async def _end_useless() -> None:
 
 
 def _unasked(connections: Iterable[Any]) -> Iterator[tuple[Hashable, Any]]:
-    """The connections on which no request is being answered, each under its last request."""
+    """Yield the connections on which no request is being answered, each with its last request."""
     for one in connections:
         last = getattr(one, "cycle", one)
         if last is None or getattr(last, "response_complete", False):

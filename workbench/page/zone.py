@@ -8,7 +8,7 @@ LONGEST: Final = 64
 
 
 def zone_of(name: object) -> tzinfo | None:
-    """Return the zone of this name; None, this machine's, if there is none."""
+    """Return the zone of this name; None, which means this machine's zone, if there is no such zone."""
     if not isinstance(name, str) or len(name) > LONGEST:
         return None
     try:
