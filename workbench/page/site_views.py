@@ -91,7 +91,7 @@ class SiteWall(Tab):
         return f"<section{many}><h2>{title}</h2>{cards}</section>" if keys else ""
 
     def _slot(self, key: Key) -> str:
-        """Make a card's slot. Its link is outside the redrawn part, so it keeps the keyboard's focus."""
+        """Make a card's slot. Its link is not in the redrawn part, so it keeps the keyboard's focus."""
         card = f'<div id="{place_of(key)}">{self._cards.cards[key]}</div>'
         name, path = escape(key[1]), path_of(*key)
         link = f'<a class="cover" href="{path}" aria-label="{name}"></a>' if key[0] in KINDS else ""
