@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Iterator
+from functools import partial
 
 import pytest
 from playwright.sync_api import Page
@@ -35,6 +36,11 @@ def overloaded(graph: Graph) -> Iterator[str]:
     graph.faults["Lift1"] = {"OVERLOAD": "for 9 s"}
     yield faults.for_explain()["OVERLOAD"][1]
     graph.faults.clear()
+
+
+def stands_at(tab: Page, floor: str) -> bool:
+    """Is the car drawn at this floor?"""
+    return f"car at {floor}" in drawn(tab, "Lift1")
 
 
 @pytest.mark.parametrize("width", [390, 1200, 1920])
@@ -122,7 +128,7 @@ def test_a_tab_gets_what_has_changed(
     until(lambda: tab.locator("#wrong a").count() == 1, "the lift")
     for floor in ("L1", "L2", "L3") * 3:
         graph.lift("Lift1", floor)
-        until(lambda floor=floor: f"car at {floor}" in drawn(tab, "Lift1"), floor)
+        until(partial(stands_at, tab, floor), floor)
     came.clear()
     tab.goto(f"{address}lift/Lift1")
     drawings = 'patch(\\"timeline\\"'
