@@ -79,7 +79,9 @@ def _trouble(view: DeviceView, remedies: Remedies) -> str:
         f'<a href="{path_of(row.kind, row.name)}">{name}</a>' if row.kind in words.KINDS else name
     )
     told = [_old(view)] if row.mark else []
-    does = [SILENT_DO if row.mark.startswith("SILENT") else STALE_DO] if row.mark else []
+    does = []
+    if row.mark and not row.faults:
+        does.append(SILENT_DO if row.mark.startswith("SILENT") else STALE_DO)
     for fault in filter(None, row.faults.split("; ")):
         told.append(_told(fault))
         does += [do for do in remedies.get(fault.partition(" (")[0], ())[1:] if do not in does]

@@ -84,8 +84,10 @@ def test_what_is_wrong_comes_with_what_to_do() -> None:
     text = "".join(root.itertext())
     assert HOSTILE in text
     assert "OVERLOAD (3 s); NEW (x)" in text
-    assert "Do: look at its daemon" in text
     assert "Do: step <out>" in text
+    silent = DeviceView(BoardRow("lift", "A", "", mark="SILENT 5 s"))
+    told = "".join(well_formed(drawing.attention([silent], {})).itertext())
+    assert "Do: look at its daemon" in told
     assert drawing.attention([], {}) == ""
 
 
