@@ -4,6 +4,7 @@ Every text becomes a text node of an XML tree, so no name from the network can b
 needs no script, font or network.
 """
 
+import re
 import unicodedata
 from collections.abc import Callable, Iterable, Iterator
 from datetime import datetime, tzinfo
@@ -26,6 +27,8 @@ CHAR: Final = 6.6
 NARROW: Final = 1.2
 """Spans narrower than this (pixels) are drawn as one with their neighbours."""
 TICKS: Final = (1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 900, 1800, 3600, 7200, 10800, 21600, 43200)
+ROBOT: Final = re.compile(r"(?:^|(?<= for ))[^\s/]+/(?=[^\s/]+(?: \(request \S*\))?$)")
+"""The fleet before a robot's name."""
 FONT: Final = "font-family:system-ui,'Noto Sans','DejaVu Sans',sans-serif"
 TEXT: Final = ".txt{font-size:12px}.small{font-size:11px}.title{font-size:16px;font-weight:600}"
 
@@ -247,9 +250,14 @@ def _wide(text: str) -> float:
 
 
 def _fitted(text: str, room: float) -> str:
-    """Cut the text to fit; "" if almost nothing fits."""
+    """Cut the text to fit; "" if almost nothing fits. Of a robot the fleet is cut, never the name, so
+    that no two robots of a fleet read alike."""
     if _wide(text) <= room:
         return text
+    if (robot := ROBOT.sub("", text)) != text:
+        alone, for_, _ = robot.partition(" for ")
+        shorter = alone if for_ else robot.partition(" (")[0]
+        return next((one for one in (robot, shorter) if _wide(one) <= room), "")
     kept = text
     while kept and _wide(kept) + CHAR > room:
         kept = kept[: min(len(kept) - 1, int(room / CHAR))] if len(kept) > 1 else ""

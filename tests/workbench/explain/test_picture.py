@@ -91,6 +91,19 @@ def test_a_label_that_does_not_fit_is_cut_and_its_hint_is_whole() -> None:
     assert "mode: a very long label, 08:00:00.0 to 08:00:02.0 (2.0 s)" in hints(root)
 
 
+def test_of_a_robot_the_fleet_is_cut_and_never_the_name() -> None:
+    for width in range(480, 2400, 60):
+        robots = ("hospital_porters/delivery_1", "hospital_porters/delivery_2")
+        spans = tuple(LaneSpan(10 * n, 10 * n + 8, who, "held") for n, who in enumerate(robots))
+        asks = tuple(
+            LaneSpan(10 * n, 10 * n + 8, f"L4 for {who}", "asks") for n, who in enumerate(robots)
+        )
+        for lane in (Lane("sessions", "", spans, ()), Lane("requests", "", asks, ())):
+            found = [one for one in texts(drawn(lane, to_s=60, width=width)) if "deliv" in one]
+            assert len(found) == len(set(found))
+            assert all("delivery_1" in one or "delivery_2" in one for one in found)
+
+
 def test_spans_too_narrow_to_be_seen_are_joined_and_what_is_wrong_shows() -> None:
     spans = [LaneSpan(n / 10, (n + 1) / 10, f"L{n}", "calm") for n in range(1000)]
     spans[500] = LaneSpan(50.0, 50.1, "?", "wrong")
