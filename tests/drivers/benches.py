@@ -1,4 +1,4 @@
-"""What the contracts of lift, door and charger drivers share: a bench, and the buses it stands on."""
+"""The bench and the buses that the contracts of lift, door and charger drivers share."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Sequence
@@ -30,7 +30,7 @@ Outputs = TypeVar("Outputs")
 
 
 class Bench(Generic[Sample, Outputs]):
-    """One driver on one bus, with a plant behind it. `clock`: the bus's, for its pauses."""
+    """One driver on one bus with a plant behind it. `clock` is the time of the bus's pauses."""
 
     def __init__(
         self, driver: Driver[Sample, Outputs], plant: Plant, clock: Time | None = None
@@ -40,27 +40,27 @@ class Bench(Generic[Sample, Outputs]):
         self.clock = clock or Time()
 
     def relays(self) -> list[tuple[str, object]]:
-        """Every edge of every output so far."""
+        """Return every edge of every output so far."""
         return [(edge.signal, edge.value) for edge in self.plant.edges if edge.what == "relay"]
 
     def open(self) -> None:
         """Open the driver."""
-        at_last(self.driver.open, "open", self.a_moment)
+        at_last(self.driver.open, "the driver opens", self.a_moment)
 
     def read(self) -> Sample:
-        """A reading."""
-        return at_last(self.driver.read, "a reading", self.a_moment)
+        """Return a reading."""
+        return at_last(self.driver.read, "the driver reads the device", self.a_moment)
 
     def write(self, outputs: Outputs) -> None:
-        """These outputs."""
-        at_last(lambda: self.driver.write(outputs), "written", self.a_moment)
+        """Write these outputs."""
+        at_last(lambda: self.driver.write(outputs), "the outputs are written", self.a_moment)
 
     def a_moment(self) -> None:
-        """Time passes until all pauses are over."""
+        """Let time pass until all pauses of the bus are over."""
         self.clock.now += 60.0
 
     def patiently(self) -> Sample | str:
-        """Its reading, once all pauses are over; or the reason why there is none."""
+        """Return a reading after all pauses, or the error's text if reading fails."""
         self.a_moment()
         try:
             return self.driver.read()
@@ -70,7 +70,7 @@ class Bench(Generic[Sample, Outputs]):
     def until_it_fails(
         self, part: str, mode: FailureMode, makes_no_sense: Callable[[Sample], bool]
     ) -> list[Sample]:
-        """A part fails; what is still read until a reading is an error, or makes no sense."""
+        """Let a part fail; return the readings until a reading is an error or `makes_no_sense`."""
         self.plant.fail(part, mode)
         seen: list[Sample] = []
 
@@ -89,11 +89,11 @@ B = TypeVar("B", bound="Bench[Any, Any]")
 
 
 class Contract(ABC, Generic[B]):
-    """Each test of it has a bench of its own."""
+    """Tests that each get their own bench."""
 
     @abstractmethod
     def benches(self) -> AbstractContextManager[B]:
-        """A bench with a plant that is idle; nothing is open yet."""
+        """Yield a bench with an idle plant; nothing is open yet."""
 
     @pytest.fixture
     def bench(self) -> Iterator[B]:
@@ -134,7 +134,7 @@ def on_modbus(
 def on_http(
     world: RealTime, station: HttpStation, timeout_s: float
 ) -> Iterator[tuple[http.HttpBus, Time]]:
-    """A bus to a simulated controller that answers HTTP."""
+    """Yield a bus to a simulated controller that answers HTTP."""
     clock = Time()
     server = HttpServer([station], "", timeout_s)
     plain = {"type": "http", "timeout_s": timeout_s, **server.replace}
@@ -149,7 +149,7 @@ def on_http(
 
 @contextmanager
 def on_pins(world: RealTime, plant: Plant, wires: Sequence[Wire]) -> Iterator[gpio.GpioBus]:
-    """A simulated header, wired to this plant."""
+    """Yield a simulated header that is wired to this plant."""
     factory = WiredFactory([PlantWiring(plant, wires, gpio.canonical)], lock=world.lock)
     world.on_step.append(factory.show)
     bus = gpio.open_bus(gpio.GpioSettings(), factory)

@@ -1,8 +1,8 @@
-"""The far side of every bus, in virtual time: what the drivers talk to instead of `drivers/hal/`.
+"""The far side of every bus in virtual time, in place of `drivers/hal/`.
 
 A bus that is `down` raises HalError with that text, as the HAL does after its timeout. The module
-behind it drops its outputs after WATCHDOG_S, as those with a watchdog do; the GPIO header has no bus
-to lose.
+behind a down bus drops its outputs after WATCHDOG_S, like modules with a watchdog. The GPIO header has
+no bus that could be lost.
 """
 
 import json
@@ -21,11 +21,11 @@ WATCHDOG_S = 2.0
 
 
 class Clocked(Protocol):
-    """Whatever has the virtual time of the test."""
+    """An object with the virtual time of the test."""
 
     @property
     def now(self) -> float:
-        """Virtual seconds."""
+        """Return virtual seconds."""
 
 
 class Cells(Protocol):
@@ -34,10 +34,10 @@ class Cells(Protocol):
     outputs: frozenset[Point]
 
     def get(self, point: Point, now: float) -> int:
-        """What is read there."""
+        """Return the value that is read there."""
 
     def set(self, point: Point, value: int, now: float) -> bool:
-        """A write; False where nothing can be written."""
+        """Write a value; return False if nothing can be written there."""
 
 
 class PointsFar:
@@ -60,7 +60,7 @@ class PointsFar:
         return _Lines(self, dict(outputs))
 
     def watchdog(self) -> None:
-        """The module has not been spoken to for too long."""
+        """Drop the outputs if the bus has been down for too long."""
         if self.down:
             self.drive(self._safe)
 
@@ -106,7 +106,9 @@ class _Lines:
 
 
 class RegisterFar:
-    """A controller's registers (the part of `drivers.hal.modbus.ModbusBus` that its driver uses)."""
+    """A controller's registers, like the part of `drivers.hal.modbus.ModbusBus` that the driver
+    uses.
+    """
 
     def __init__(self, clock: Clocked, cells: Cells) -> None:
         self.down = ""
@@ -118,13 +120,13 @@ class RegisterFar:
         return self
 
     def check(self) -> None:
-        """For a module's watchdog: it has not tripped."""
+        """Raise nothing: no module's watchdog has tripped."""
 
     def insist(self) -> None:
-        """There is no pause to break off."""
+        """Do nothing: no pause can be cut short."""
 
     def watchdog(self) -> None:
-        """The controller has not been spoken to for too long."""
+        """Restore the first values if the bus has been down for too long."""
         if self.down:
             for point, value in self._first.items():
                 self._cells.set(point, value, self.now())
@@ -152,7 +154,7 @@ class HttpFar:
         self._station = FakeHttpCharger(plant, settings)
 
     def watchdog(self) -> None:
-        """For a station's own timeout, which this one does not have."""
+        """Do nothing: this station has no timeout of its own."""
 
     def get_json(self, path: str) -> dict[str, Any]:
         self._plant.advance(self._clock.now)
@@ -168,7 +170,7 @@ class HttpFar:
         self._plant.drive("clear_error", True, self._clock.now)
 
     def _answers(self, failures: Mapping[str, Any]) -> None:
-        """All that ends in a deadline, a refusal or nonsense is the same to the driver."""
+        """Raise HalError: a deadline, a refusal and nonsense are all the same to the driver."""
         server, body = failures.get("server"), failures.get("body")
         broken = server in ("off", "slow", "garbage") or "headers" in failures
         if self.down or broken or body in ("off", "stuck", "slow", "garbage"):

@@ -1,4 +1,4 @@
-"""Drivers, kinds and bus types are added by files alone: checked, run, simulated, no table edited."""
+"""Drivers, kinds and bus types are added by new files alone: `check` and `run` find them by name."""
 
 import json
 import shutil
@@ -60,7 +60,7 @@ ON_A_LINE = {"type": "line", "host": "192.0.2.1"}
 
 @pytest.fixture(scope="module")
 def house(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A copy of the project's folders, with the added files put beside the existing ones."""
+    """Return a copy of the project's folders, with the added files beside the existing files."""
     made = tmp_path_factory.mktemp("house")
     for room in ROOMS:
         shutil.copytree(ROOT / room, made / room)
@@ -70,7 +70,7 @@ def house(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 class Site:
-    """One file, and the commands that are asked about it in this copy."""
+    """One YAML, and the commands run on it in the copy."""
 
     def __init__(self, here: Path, domain: int, text: str, bus: dict[str, Any]) -> None:
         self.here, self._text = here, text
@@ -80,12 +80,12 @@ class Site:
         self.point_at({})
 
     def point_at(self, replace: dict[str, Any]) -> None:
-        """Write the file, with its bus pointed at this far side."""
+        """Write the YAML with its bus pointed at this far side."""
         bus = json.dumps(self._bus | replace).replace('"1":', "1:")  # JSON has no numbers as keys
         self.file.write_text(self._text.format(domain=self._domain, bus=bus))
 
     def check(self) -> list[str]:
-        """The rows that `check` prints of the door."""
+        """Return the door's rows in the output of `check`."""
         done = subprocess.run(
             command("check", self.file), env=environment(), capture_output=True, text=True
         )
@@ -95,7 +95,7 @@ class Site:
 
     @contextmanager
     def far_side(self) -> Iterator[dict[str, Any]]:
-        """The far side of the bus by itself; what the bus's settings must say of it."""
+        """Run the far side of the bus in its own process; yield the settings for the bus."""
         socket = ["--socket", str(self.here / "plant.sock")]
         child = [sys.executable, "-m", "hal_fakes", str(self.file), "b", *socket]
         pipe = subprocess.PIPE
@@ -106,11 +106,14 @@ class Site:
             running.stdin.close()
 
     def served(self, *options: str) -> dict[str, Any]:
-        """What the status file says of the door once it is known where it is; and it ends well."""
+        """Serve the door until its state is known; return the status file after a clean end."""
         status = self.here / "run" / "status.json"
         with daemon(self.file, self.here / "run", *options) as running:
             running.wait_for("ready")
-            wait_until(lambda: status.exists() and "CLOSED" in status.read_text(), "it is closed")
+            wait_until(
+                lambda: status.exists() and "CLOSED" in status.read_text(),
+                "the status shows the door closed",
+            )
             told: dict[str, Any] = json.loads(status.read_text())
             assert running.end(signal.SIGTERM) == 0
         return told

@@ -1,7 +1,7 @@
-"""What cannot be read keeps nothing on: off is written past a register, a unit, a reply that fails.
+"""A register, unit or reply that fails keeps no output on: off is written all the same.
 
-Each story has something that is on, and something else of the same device, or of its neighbour on the
-bus, that cannot be read: for once, or for ever.
+Each story has an output that is on, and a part of the same device, or of its neighbour on the bus, that
+cannot be read once or ever again.
 """
 
 import struct
@@ -36,9 +36,9 @@ SERVER_FAILURE, ILLEGAL_ADDRESS = 4, 2
 
 
 class Registers:
-    """Units of registers and coils that answer as they are told, on a module of ours.
+    """Units of registers and coils on our own module that answer as a test orders.
 
-    `refused`: (unit, reading function, address) -> its exception; 0 is silence.
+    `refused`: (unit, reading function, address) -> the exception; 0 is silence.
     """
 
     def __init__(self, module: Module) -> None:
@@ -48,7 +48,7 @@ class Registers:
         module.reply = self.answer
 
     def answer(self, request: bytes) -> bytes:
-        """By the specification: functions 1 to 6."""
+        """Answer functions 1 to 6 as the specification says."""
         unit, function, address, value = struct.unpack(">BBHH", request[6:12])
         reads = {5: 1, 6: 3}.get(function, function)
         count = value if function < 5 else 1
@@ -101,7 +101,7 @@ CONTACT_DOOR = msgspec.convert(
 
 
 def tried(step: Callable[[], object]) -> bool:
-    """Did it work?"""
+    """Did the step succeed?"""
     try:
         step()
     except DriverError:
@@ -164,7 +164,7 @@ def test_a_relay_goes_off_while_the_inputs_of_its_unit_fail_for_ever(
     door.read()
     door.write(HELD)
     registers.refused[1, 2, 0] = code
-    for _ in range(20):  # the pause is long by now, and each reading begins it anew
+    for _ in range(20):  # the pause is long by now, and each reading starts it anew
         clock.now += 30.0
         assert not tried(door.read)
     door.write(RELEASED)
@@ -266,7 +266,7 @@ def test_a_charge_on_canopen_is_stopped_while_its_state_is_not_answered() -> Non
 
 
 class HttpStation:
-    """Answers /state as told, and takes commands."""
+    """Answers /state as a test orders, and accepts commands."""
 
     def __init__(self) -> None:
         station = self
@@ -331,7 +331,7 @@ def test_a_pin_that_cannot_be_written_keeps_no_other_pin_on() -> None:
     lines.claim()
     lines.write({"BCM17": True, "BCM18": True})
     broken = factory.pin(17)
-    broken.function = "input"  # gpiozero refuses to drive it now
+    broken.function = "input"  # from now on gpiozero refuses to drive the pin
     assert not tried(lambda: lines.write({"BCM17": False, "BCM18": False}))
     assert factory.pin(18).state == 0
     bus.close()

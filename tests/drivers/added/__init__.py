@@ -1,1 +1,1 @@
-"""Files that somebody adds: they are put into the folders of a copy, and nothing there is edited."""
+"""Example files that the tests copy into a copy of the project; no existing file there is edited."""

@@ -1,6 +1,6 @@
-"""What every driver of a charger that can be switched must do, on any bus.
+"""Duties of every driver of a switchable charger, on any bus.
 
-A test class derives from `ChargerContract` and says how its benches are built.
+A test class derives from `ChargerContract` and builds its benches.
 """
 
 import time
@@ -26,14 +26,14 @@ from tests.waiting import wait_until
 
 ON, OFF, AS_IT_IS = ChargerOutputs(True), ChargerOutputs(False), ChargerOutputs(None)
 PACE = 20.0
-"""A charger so quick that no test has to wait for it."""
+"""Speed of a charger that no test has to wait for."""
 
 ChargerDriver = Driver[ChargerSample, ChargerOutputs]
 OnDeath = Literal["stop", "keep"]
 
 
 class Bench(benches.Bench[ChargerSample, ChargerOutputs]):
-    """With a charger. `new`: another driver for it, with this `on_death`."""
+    """A bench with a charger. `new` makes another driver for the same charger, with this `on_death`."""
 
     switch: ClassVar[str] = "power"
 
@@ -42,32 +42,34 @@ class Bench(benches.Bench[ChargerSample, ChargerOutputs]):
         self.new = new
 
     def press(self, signal: str, there: bool = True) -> None:
-        """Somebody comes or goes."""
+        """Let a robot, or something else, come or go."""
         self.plant.press(signal, there, time.monotonic())
 
     def switched(self, signal: str = "") -> list[object]:
-        """Every command about the power so far, or about this."""
+        """Return every command so far for this signal; without a signal, for the power."""
         wanted = signal or self.switch
         return [value for name, value in self.relays() if name == wanted]
 
     def scan(self, outputs: ChargerOutputs) -> Activity:
-        """One scan; what the station does."""
+        """Run one scan; return the station's activity."""
         activity = self.read().activity
         self.write(outputs)
         return activity
 
     def until(self, activity: Activity, outputs: ChargerOutputs) -> None:
-        """Scans, until the station reads that."""
+        """Scan until the station shows this activity."""
         wait_until(lambda: self.scan(outputs) is activity, f"the station is {activity}")
 
     def does(self) -> Activity | None:
-        """What it does, with all pauses over; None when it cannot be read."""
+        """Return the activity after all pauses; None if the station cannot be read."""
         found = self.patiently()
         return None if isinstance(found, str) else found.activity
 
 
 def behind(driver: Any, settings: Any, canonical: Callable[[str], str] = str) -> tuple[Any, Any]:
-    """The world of this driver's own fake, in a hurry; and its station, or its wires to a bus."""
+    """Return a fast world with this driver's own fake, and the fake's station, or its wires to a
+    bus.
+    """
     table = list(driver.DRIVER.wires(settings))
     fake: Fake[Any] = import_module(driver.DRIVER.fake or "hal_fakes.plants.charger").FAKE
     plant = fake.plant("a", settings, table)
@@ -80,7 +82,7 @@ def behind(driver: Any, settings: Any, canonical: Callable[[str], str] = str) ->
 
 
 def news(driver: Any, settings: Any, bus: Bus) -> Callable[[OnDeath], ChargerDriver]:
-    """How a bench makes drivers of this module."""
+    """Return a function that makes drivers of this module for a bench."""
 
     def new(on_death: OnDeath) -> ChargerDriver:
         changed = msgspec.structs.replace(settings, on_death=on_death)
@@ -91,16 +93,16 @@ def news(driver: Any, settings: Any, bus: Bus) -> Callable[[OnDeath], ChargerDri
 
 
 class ChargerContract(Contract[Bench]):
-    """On any bus. A bench begins with an empty pad."""
+    """The contract on any bus. A bench begins with an empty pad."""
 
     link: ClassVar[str]
-    """The part of the plant that is the wire."""
+    """The part of the plant whose failure breaks the wire."""
     cut: ClassVar[str] = ""
-    """The part whose `off` leaves the station alone, where that is another one."""
+    """The part whose `off` breaks the wire but leaves the station alone, if `link` does not."""
     measures: ClassVar[bool] = True
-    """Does it say how much flows?"""
+    """Does the station measure the current?"""
     foreign_object: ClassVar[str] = "foreign object"
-    """How the station calls it."""
+    """The station's words for a foreign object."""
 
     def test_an_idle_station_is_sent_nothing(self, bench: Bench) -> None:
         bench.open()
@@ -175,7 +177,7 @@ class ChargerContract(Contract[Bench]):
         assert len(self.checks(bench)) == 2
 
     def checks(self, bench: Bench) -> list[object]:
-        """The range checks that the station has been asked for."""
+        """Return the range checks that the station has been asked for."""
         return bench.switched("range_check")
 
     @pytest.mark.parametrize("mode", ["off", "slow", "garbage", "wrong"])
@@ -186,16 +188,21 @@ class ChargerContract(Contract[Bench]):
         seen = bench.until_it_fails(self.link, mode, _is_unknown)
         assert not CURRENT_FLOWS & {sample.activity for sample in seen}
         bench.plant.fail(self.link, None)
-        wait_until(lambda: bench.does() is Activity.IDLE, "back")
+        wait_until(
+            lambda: bench.does() is Activity.IDLE, "the station is idle again after the failure"
+        )
 
     def test_a_charge_survives_a_link_that_goes_away_and_comes_back(self, bench: Bench) -> None:
         bench.open()
         bench.press("robot")
         bench.until(Activity.CHARGING, ON)
         bench.plant.fail(self.cut or self.link, "off")
-        wait_until(lambda: bench.does() is None, "gone")
+        wait_until(lambda: bench.does() is None, "the lost link is noticed")
         bench.plant.fail(self.cut or self.link, None)
-        wait_until(lambda: bench.does() is Activity.CHARGING, "back")
+        wait_until(
+            lambda: bench.does() is Activity.CHARGING,
+            "the station charges again after the link is back",
+        )
         bench.scan(ON)
         assert bench.switched() == [True]
 
@@ -205,10 +212,10 @@ def _is_unknown(sample: ChargerSample) -> bool:
 
 
 class MovingPadContract(Contract[Bench]):
-    """A driver that says whether the pad is at its height and whether a robot is in range."""
+    """A driver that reads whether the pad is at its height and whether a robot is in range."""
 
     celsius: ClassVar[tuple[str, ...]] = ()
-    """The temperatures that it reads."""
+    """The temperatures that the driver reads, by name."""
 
     def test_height_and_range_are_read_as_they_are(self, bench: Bench) -> None:
         bench.open()
@@ -228,7 +235,7 @@ class MovingPadContract(Contract[Bench]):
         assert all(20 <= celsius <= 30 for _, celsius in found)
 
     def pad(self, bench: Bench, wanted: tuple[bool, bool]) -> bool:
-        """Height and range, once they are read so."""
+        """Wait until height and range are read as wanted."""
 
         def shown() -> bool:
             bench.write(OFF)

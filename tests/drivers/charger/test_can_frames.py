@@ -1,4 +1,4 @@
-"""The driver of makers' frames: published bytes, the pace of what is sent, maps that are wrong."""
+"""The driver of makers' frames: published bytes, the pace of sending, and wrong maps."""
 
 import itertools
 from collections.abc import Iterator
@@ -45,7 +45,9 @@ KEPT_OFF = [(CONTROL, "0000000000000000"), (DISABLE, "aa00000000000000")]
 
 
 class Charger:
-    """Wiferion's, in virtual time: its frames as we send them, and a log of those that it gets."""
+    """Wiferion's charger in virtual time: sends its frames when told, and logs the frames that it
+    gets.
+    """
 
     def __init__(self) -> None:
         self.far = Reactive()
@@ -61,17 +63,19 @@ class Charger:
         return []
 
     def says(self, frame_id: int, payload: str) -> None:
-        """A frame of the charger's."""
+        """Send one of the charger's frames."""
         data = bytes.fromhex(payload)
         self.far.coming.append(can.Message(arbitration_id=frame_id, is_extended_id=True, data=data))
 
     def status(self, state: int = 0) -> None:
-        """All of a status, with no volts and amps."""
+        """Send a whole status, with no volts and amps."""
         self.says(0x1FFD0101, "0000126700000000")
         self.says(0x18FF50E5, f"00000000000000{state:02x}")
 
     def scan(self, outputs: ChargerOutputs, for_s: float = 0.05) -> list[tuple[int, str]]:
-        """A status, a reading, a writing, and a scan's time; what was sent."""
+        """Send a status, read, write, and let a scan's time pass; return the frames that the driver
+        sent.
+        """
         self.status()
         self.driver.read()
         self.driver.write(outputs)
@@ -159,7 +163,7 @@ def test_height_and_range_are_signals_of_the_map_and_without_them_there_is_no_re
             "station",
             "the station is too hot; the receiver is too hot",
         ),
-        ("0000000000000010", "", ""),  # kept off by our frames: no error
+        ("0000000000000010", "", ""),  # kept off by our own frames: no error
     ],
 )
 def test_error_bits_name_the_fault_and_its_side(
@@ -252,7 +256,7 @@ def test_bad_positioning_is_out_of_range(charger: Charger) -> None:
     assert charger.driver.read().measured.in_range is True
 
 
-# ---- what is sent, and how often
+# ---- frames that the driver sends, and their pace
 
 
 def test_power_is_sent_as_the_published_frames_at_their_pace(charger: Charger) -> None:
@@ -318,7 +322,7 @@ def test_closing_takes_away_what_was_given_and_nothing_else(charger: Charger) ->
     assert charger.got == KEPT_OFF
 
 
-# ---- what is not seen
+# ---- a charger that is not seen
 
 
 def test_without_a_status_frame_there_is_no_state(charger: Charger) -> None:

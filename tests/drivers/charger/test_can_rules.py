@@ -1,4 +1,4 @@
-"""A charger on CAN without a state number: rules, an error number and a flag byte say what it does."""
+"""A charger on CAN without a state number: rules, an error number and a flag byte give its state."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -51,7 +51,7 @@ SETTINGS = msgspec.convert({"map": MAP}, FrameChargerSettings)
 
 
 class Charger:
-    """One that broadcasts its status."""
+    """A charger that broadcasts its status."""
 
     def __init__(self) -> None:
         self.far = Reactive()
@@ -59,7 +59,9 @@ class Charger:
         self.driver: FrameDriver = create("c", SETTINGS, self.bus)
 
     def shows(self, payload: str) -> tuple[Activity, int | str, str, str, bool]:
-        """What the driver makes of a status: activity, code, text, side, does it charge."""
+        """Return the driver's reading of a status: activity, code, text, side at fault, does it
+        charge.
+        """
         for frame_id, said in ((0x100, payload), (0x101, "00 00 12 67")):
             data = bytes.fromhex(said)
             message = can.Message(arbitration_id=frame_id, is_extended_id=False, data=data)
@@ -132,7 +134,7 @@ def test_a_map_must_say_in_some_way_what_the_state_is() -> None:
 
 
 class TestTheFakeShowsIt(Frames):
-    """The far side of the same map: what the plant does is what the driver reads."""
+    """The fake on the same map: the driver reads the plant's true state."""
 
     foreign_object = "foreign object"
     settings: ClassVar = {"map": MAP}

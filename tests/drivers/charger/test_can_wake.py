@@ -1,4 +1,4 @@
-"""A charger on CAN that says nothing before it is woken, as CANopen's nodes after NMT's reset."""
+"""A charger on CAN that is silent until it is woken, like CANopen nodes after NMT's reset."""
 
 import itertools
 from typing import Any
@@ -26,7 +26,9 @@ START, STOP, CHARGE = (0x000, "010a"), (0x200, "00"), (0x200, "01")
 
 
 class Sleeper:
-    """One that speaks once it is woken, in virtual time. `got`: (when, id, payload)."""
+    """A charger in virtual time that speaks after it was woken. `got`: (time, id, payload) of each
+    frame.
+    """
 
     def __init__(self) -> None:
         self.far = Reactive()
@@ -44,7 +46,9 @@ class Sleeper:
         return []
 
     def scans(self, for_s: float, power: bool | None) -> list[tuple[float, tuple[int, str]]]:
-        """Scan for so long, and write only after a first reading; what was sent."""
+        """Scan for `for_s`, and write only after a first reading; return the frames that the driver
+        sent.
+        """
         self.got.clear()
         until = self.far.now + for_s
         while self.far.now < until:
@@ -78,7 +82,7 @@ def test_one_that_falls_asleep_in_a_charge_is_told_to_stop_and_woken_and_gets_no
     sleeper.awake = True
     sleeper.scans(2.0, power=True)
     sleeper.awake = False
-    sleeper.scans(1.5, power=True)  # what it last said is fresh for a second
+    sleeper.scans(1.5, power=True)  # the charger's last status stays fresh for 1 s
     assert {frame for _, frame in sleeper.scans(3.0, power=True)} == {START, STOP}
 
 
@@ -88,13 +92,13 @@ def test_the_station_itself_is_woken_charges_sleeps_when_it_was_off_and_is_woken
     bus = CanBus(settings, Clock(), lambda: 0.0, lambda: can.Bus(name, interface="virtual"))
     with on_a_bus(can_frames, {"map": WOKEN}, VirtualBus(name), bus) as bench:
         bench.driver.open()
-        wait_until(lambda: bench.sample(ON) is not None, "it is heard")
+        wait_until(lambda: bench.sample(ON) is not None, "the woken station is heard")
         bench.press("robot")
         bench.until(Activity.CHARGING, ON)
         bench.plant.fail("node", "off")
-        wait_until(lambda: bench.sample(ON) is None, "charger silent")
+        wait_until(lambda: bench.sample(ON) is None, "the switched-off station is silent")
         bench.plant.fail("node", None)
-        wait_until(lambda: bench.sample(ON) is not None, "it is heard again")
+        wait_until(lambda: bench.sample(ON) is not None, "the station is heard again")
         bench.driver.close()
 
 

@@ -1,4 +1,4 @@
-"""The CANopen charger's driver: what it writes and when, and what `check` says of it."""
+"""The CANopen charger's driver: its writes and their times, and what `check` reports."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -25,7 +25,7 @@ ENABLE, DISABLE, CHECK = "2f00200101000000", "2f00200100000000", "2f002002010000
 
 
 class Receiver:
-    """An RCU by its objects: `words` by (index, subindex); `silent` about some of them."""
+    """An RCU with its objects: `words` by (index, subindex). Objects in `silent` give no answer."""
 
     def __init__(self) -> None:
         self.far = Reactive()
@@ -38,7 +38,7 @@ class Receiver:
         self.driver = self.made()
 
     def made(self, on_death: str = "stop") -> xnergy.Receiver:
-        """Another driver of it."""
+        """Return another driver of this RCU."""
         return create("c", CanOpenChargerSettings(node=10, on_death=on_death), self.bus)  # type: ignore[arg-type]
 
     def answer(self, request: can.Message) -> list[can.Message]:
@@ -55,12 +55,12 @@ class Receiver:
         return [can.Message(arbitration_id=0x58A, is_extended_id=False, data=reply)]
 
     def beat(self, state: int = 5) -> None:
-        """A heartbeat."""
+        """Send a heartbeat."""
         beat = can.Message(arbitration_id=0x70A, is_extended_id=False, data=bytes((state,)))
         self.far.coming.append(beat)
 
     def scan(self, outputs: ChargerOutputs) -> ChargerSample:
-        """A heartbeat, a reading, a writing."""
+        """Send a heartbeat, read, write; return the reading."""
         self.beat()
         sample = self.driver.read()
         self.driver.write(outputs)

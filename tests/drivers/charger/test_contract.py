@@ -1,4 +1,4 @@
-"""Every driver of a charger that can be switched keeps the same contract."""
+"""Every driver of a switchable charger keeps the same contract."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -26,7 +26,7 @@ CONFIG = Path(__file__).parents[3] / "config"
 
 
 def shipped(file: str, device: str) -> Any:
-    """A device's settings in an example."""
+    """Return a device's settings from a file of `config/`."""
     return load(CONFIG / file).devices[device]
 
 
@@ -85,13 +85,13 @@ class TestAnyMakeOnRegisters(ChargerContract):
 
 
 class ContactBench(Bench):
-    """A relay is on."""
+    """A bench whose command is a relay."""
 
     switch: ClassVar = "enable"
 
 
 class TestContactsAtAModule(ChargerContract):
-    """Its relay is off without its daemon, whatever that leaves behind."""
+    """A relay at a module; the module drops the relay when the daemon is gone."""
 
     link: ClassVar = "unit"
     measures: ClassVar = False

@@ -1,4 +1,4 @@
-"""Chargers on CAN keep the contract of every charger, and that of a pad with a robot on it."""
+"""Chargers on CAN keep the contract of every charger, and further rules for a pad with a robot."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -34,10 +34,10 @@ WIFERION: dict[str, Any] = {
 
 
 class PadBench(Bench):
-    """A range check's result is the last one's after a second."""
+    """A bench whose range checks need 1 s before their result counts."""
 
     def sample(self, outputs: ChargerOutputs) -> ChargerSample | None:
-        """One scan; None where it cannot be read."""
+        """Run one scan; return the reading, or None if the station cannot be read."""
         try:
             sample = self.driver.read()
         except DriverError:
@@ -46,7 +46,7 @@ class PadBench(Bench):
         return sample
 
     def fault(self) -> ChargerSample:
-        """Scan until it is an error."""
+        """Scan until the station is in error; return that reading."""
         found: list[ChargerSample] = []
 
         def failed() -> bool:
@@ -54,13 +54,13 @@ class PadBench(Bench):
             found.extend([sample] if sample and sample.activity is Activity.ERROR else [])
             return bool(found)
 
-        wait_until(failed, "an error")
+        wait_until(failed, "the station shows an error")
         return found[0]
 
     def in_range(self) -> bool | None:
-        """What a new range check says."""
+        """Return the result of a new range check."""
         asked = ChargerOutputs(False, range_checks=len(self.switched("range_check")) + 1)
-        wait_until(lambda: self.sample(asked) is not None, "it is asked")
+        wait_until(lambda: self.sample(asked) is not None, "the range check is sent")
         self.clock.now += 2.0
         samples: list[ChargerSample] = []
 
@@ -68,13 +68,13 @@ class PadBench(Bench):
             samples.extend(sample for sample in [self.sample(asked)] if sample)
             return len(samples) >= 5
 
-        wait_until(read, "readings")
+        wait_until(read, "the result of the range check is read")
         return samples[-1].measured.in_range
 
 
 @contextmanager
 def on_a_bus(driver: Any, plain: dict[str, Any], medium: Medium, bus: CanBus) -> Iterator[PadBench]:
-    """A bench whose station is on this medium."""
+    """Yield a bench whose station is on this medium."""
     settings = msgspec.convert(plain, driver.DRIVER.settings)
     world, station = behind(driver, settings)
     side = CanFarSide(medium, [station], slow_s=2 * TIMEOUT_S)
@@ -89,7 +89,7 @@ def on_a_bus(driver: Any, plain: dict[str, Any], medium: Medium, bus: CanBus) ->
 
 
 class CanContract(ChargerContract):
-    """On CAN, by the driver and its settings."""
+    """The contract on CAN, for a driver and its settings."""
 
     cut = "bus"
     parts: ClassVar[tuple[str, ...]] = ("node", "bus")
@@ -110,7 +110,7 @@ class CanContract(ChargerContract):
 
     @contextmanager
     def pads(self) -> Iterator[PadBench]:
-        """On python-can's virtual bus."""
+        """Yield a bench on python-can's virtual bus."""
         name = channel()
         vendor: Callable[[], can.BusABC] = lambda: can.Bus(name, interface="virtual")  # noqa: E731
         settings = CanSettings(socketcan="can0", timeout_s=TIMEOUT_S, scan_s=0.1)
@@ -122,7 +122,7 @@ class CanContract(ChargerContract):
         self, pad: PadBench
     ) -> None:
         pad.press("robot")
-        wait_until(lambda: pad.in_range() is True, "the pad has risen to it")
+        wait_until(lambda: pad.in_range() is True, "the pad has risen to the robot")
         pad.press("misparked")
         assert pad.in_range() is False
 
@@ -147,7 +147,9 @@ class CanContract(ChargerContract):
         sample = pad.fault()
         assert (sample.side, sample.error_text != "") == ("robot", True)
         pad.plant.fail("thermometer", None)
-        wait_until(lambda: pad.scan(OFF) is Activity.IDLE, "idle")
+        wait_until(
+            lambda: pad.scan(OFF) is Activity.IDLE, "the station is idle after the robot has gone"
+        )
 
     def test_current_and_voltage_are_those_at_the_battery(self, pad: PadBench) -> None:
         pad.press("robot")
@@ -161,7 +163,7 @@ class CanContract(ChargerContract):
         pad.press("robot", False)
         pad.plant.fail("battery", "wrong")
         pad.press("robot")
-        wait_until(lambda: pad.scan(ON) not in CURRENT_FLOWS, "it ends")
+        wait_until(lambda: pad.scan(ON) not in CURRENT_FLOWS, "the full battery ends the charge")
 
     def test_no_failure_on_the_way_to_a_free_station_reads_as_a_charge(self, pad: PadBench) -> None:
         pad.until(Activity.IDLE, OFF)
@@ -170,7 +172,7 @@ class CanContract(ChargerContract):
                 pad.plant.fail(part, mode)
                 assert not {pad.does() for _ in range(2)} & CURRENT_FLOWS
             pad.plant.fail(part, None)
-        wait_until(lambda: pad.does() is Activity.IDLE, "back")
+        wait_until(lambda: pad.does() is Activity.IDLE, "the station is idle after the failure")
 
     def test_make_safe_and_close_each_end_a_charge(self) -> None:
         for end in ("make_safe", "close"):
@@ -184,7 +186,7 @@ class CanContract(ChargerContract):
 
 
 class OnAnAdapter(CanContract):
-    """The same behind an slcan adapter."""
+    """The same contract behind an slcan adapter."""
 
     @contextmanager
     def pads(self) -> Iterator[PadBench]:
@@ -210,9 +212,9 @@ class CanOpen(CanContract):
         pad.press("robot")
         pad.until(Activity.CHARGING, ON)
         pad.plant.fail("node", "off")
-        wait_until(lambda: pad.does() is None, "gone")
+        wait_until(lambda: pad.does() is None, "the loss of the node is noticed")
         pad.plant.fail("node", None)
-        wait_until(lambda: pad.does() is Activity.IDLE, "back")
+        wait_until(lambda: pad.does() is Activity.IDLE, "the node reads idle again")
         pad.until(Activity.CHARGING, ON)
         assert pad.switched() == [True, False, True]
 
@@ -226,7 +228,7 @@ class TestACanOpenReceiverBehindAnAdapter(CanOpen, OnAnAdapter):
 
 
 class Frames(CanContract):
-    """Wiferion's. It publishes no sign of a foreign object, and knows the range by itself."""
+    """Wiferion's charger. It publishes no sign of a foreign object, and checks the range by itself."""
 
     link = "node"
     foreign_object = "the station is too hot"
@@ -235,7 +237,7 @@ class Frames(CanContract):
 
     def test_a_check_of_the_range_is_sent_once_for_a_rise(self, bench: Bench) -> None:
         bench.driver.open()
-        wait_until(lambda: bench.does() is not None, "a reading")
+        wait_until(lambda: bench.does() is not None, "the charger is read")
         bench.driver.write(ChargerOutputs(False, range_checks=1))
         assert self.checks(bench) == []
 
@@ -253,17 +255,19 @@ class Frames(CanContract):
             sample = pad.sample(OFF)
             return sample is not None and sample.measured.receiver_id == receiver
 
-        wait_until(lambda: sees(""), "nobody")
+        wait_until(lambda: sees(""), "the receiver id is empty without a robot")
         pad.press("robot")
-        wait_until(lambda: sees("4711"), "the robot")
+        wait_until(lambda: sees("4711"), "the robot's id is read")
         pad.press("robot", False)
         pad.press("stranger")
-        wait_until(lambda: sees("815"), "a stranger")
+        wait_until(lambda: sees("815"), "the stranger's id is read")
 
     def test_a_daemon_that_falls_silent_stops_the_charge(self, pad: PadBench) -> None:
         pad.press("robot")
         pad.until(Activity.CHARGING, ON)
-        wait_until(lambda: pad.switched() == [True, False], "it stops unfed")
+        wait_until(
+            lambda: pad.switched() == [True, False], "the charger stops when no frames feed it"
+        )
 
     def test_a_charger_that_is_not_seen_is_not_fed(self, pad: PadBench) -> None:
         pad.press("robot")
@@ -275,7 +279,7 @@ class Frames(CanContract):
                 pad.driver.write(ON)
             return pad.switched() == [True, False]
 
-        wait_until(unfed, "it stops")
+        wait_until(unfed, "the charger that is not seen stops")
 
 
 class TestWiferion(Frames):

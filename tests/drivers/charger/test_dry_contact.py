@@ -1,4 +1,4 @@
-"""A charger on contacts: what they mean together, and what `check` tells of them."""
+"""A charger on contacts: the meaning of the contacts together, and warnings of `check`."""
 
 from pathlib import Path
 

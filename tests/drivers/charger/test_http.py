@@ -1,4 +1,4 @@
-"""The HTTP charger's driver: JSON to a reading, and a clearing that is sent once."""
+"""The HTTP charger's driver: JSON becomes a reading, and a clearing is sent once."""
 
 import json
 from pathlib import Path
@@ -30,7 +30,7 @@ EXAMPLE = Path(__file__).parents[3] / "config" / "charger_http.yaml"
 
 
 class Station:
-    """A bus whose far side answers this."""
+    """A bus whose far side answers with `answer`."""
 
     def __init__(self, answer: Any = None) -> None:
         self.answer = answer
@@ -88,7 +88,7 @@ def test_every_code_of_a_byte_has_a_state_in_rmf_and_none_is_passed_on_raw() -> 
             sample.activity is Activity.UNKNOWN
         )
     assert states == {
-        State.CHARGER_IDLE: {0, 1, 2, 3, 4, 9, 10},  # a handshake that nobody asked for is idle
+        State.CHARGER_IDLE: {0, 1, 2, 3, 4, 9, 10},  # a handshake without a request is idle
         State.CHARGER_ASSIGNED: set(),
         State.CHARGER_CHARGING: {5, 6, 11},
         State.CHARGER_RELEASED: {7},

@@ -1,4 +1,4 @@
-"""Another make's JSON, by YAML alone: fields, words, commands, and what no answer can make of them."""
+"""Another make's JSON, by YAML alone: fields, words, commands, and answers that cannot be read."""
 
 from pathlib import Path
 from typing import Any
@@ -185,7 +185,7 @@ def test_whatever_json_comes_it_is_a_driver_error_or_a_sample_and_charging_only_
 
 
 def driver() -> tuple[Station, Any]:
-    """A station and `scan(outputs, state)`: what its driver sends after reading that state."""
+    """Return a station, and `scan(outputs, state)`: the driver's commands after reading that state."""
     station = Station(answer())
     made = create("a", FULL, station)
 

@@ -1,4 +1,4 @@
-"""Xnergy's receiver on Modbus: what it is asked for, and what `check` says of it."""
+"""Xnergy's receiver on Modbus: the requests of the driver, and what `check` reports."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Stations that move their pads: height, range and temperatures, on every wire that can carry them."""
+"""Stations that move their pads: height, range and temperatures, on every wire that carries them."""
 
 import contextlib
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""A charger on registers by a map: what its words mean, and what a map may not say."""
+"""A charger on registers by a map: the meaning of its words, and wrong maps."""
 
 from pathlib import Path
 from typing import Any

@@ -11,7 +11,9 @@ from bridges.settings.load import load
 from drivers import DriverError
 from drivers.charger.http import HttpChargerSettings, create
 from drivers.charger.rules import ErrorBits, ErrorNumber, StationErrors
-from drivers.charger.rules import Test as Condition  # pytest would collect a class named Test
+from drivers.charger.rules import (
+    Test as Condition,
+)  # pytest would collect a class with the name Test
 from hal_fakes.charger_values import values
 from tests.drivers.charger.test_http import Station
 from tests.settings.reading import changed, texts_of

@@ -1,4 +1,6 @@
-"""Xnergy's numbers: every code has a meaning, every error a side, and a start is checked first."""
+"""Xnergy's numbers: every code has a meaning, every error a side at fault, every start a range
+check.
+"""
 
 import pytest
 from hypothesis import given, settings
@@ -29,7 +31,7 @@ def test_every_code_of_a_byte_has_a_state_in_rmf() -> None:
         unknown = "unknown vendor state" in shown.error_message
         assert unknown == (made.activity is Activity.UNKNOWN) == (code not in xnergy.CODES)
     assert states == {
-        State.CHARGER_IDLE: {0, 1, 2, 3, 4, 9, 10},  # a handshake that nobody asked for is idle
+        State.CHARGER_IDLE: {0, 1, 2, 3, 4, 9, 10},  # a handshake without a request is idle
         State.CHARGER_ASSIGNED: set(),
         State.CHARGER_CHARGING: {5, 6, 11},
         State.CHARGER_RELEASED: {7},
@@ -128,7 +130,7 @@ def test_whatever_the_words_are_only_state_5_without_an_error_is_charging(
 
 
 def run(*scans: tuple[float, ChargerOutputs, int]) -> list[tuple[float, Orders]]:
-    """The orders that are not empty, with their time; each scan is a time, outputs and the state."""
+    """Return each order that is not empty, with its time; a scan is a time, outputs and a state."""
     given_, written = [], Written()
     for now, outputs, code in scans:
         written, orders = steer(written, outputs, code, now)

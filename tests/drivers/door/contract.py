@@ -1,7 +1,7 @@
-"""What every driver of a door has to do, on whatever it stands: each test of it has a bench of its own.
+"""Duties of every driver of a door, on any bus. Each test has its own bench.
 
-A test class derives from `DoorContract`, or from `WiredDoorContract` where the link can fail, and says
-how its bench is built.
+A test class derives from `DoorContract`, or from `WiredDoorContract` if the link can fail, and builds
+its bench.
 """
 
 from collections.abc import Iterable
@@ -28,26 +28,26 @@ class Pace(TypedDict):
 
 
 QUICK: Pace = {"open_s": 0.05, "close_s": 0.05, "auto_close_s": 0.05}
-"""A door so quick that no test has to wait for it."""
+"""Times of a door that no test has to wait for."""
 
 
 Ends = tuple[bool | None, bool | None]
-"""Does it read open, does it read closed?"""
+"""(reads open?, reads closed?)"""
 
 
 class Bench(benches.Bench[DoorSample, DoorOutputs]):
-    """With a door."""
+    """A bench with a door."""
 
     def relay(self) -> list[object]:
-        """Every edge of the hold so far."""
+        """Return every edge of the hold so far."""
         return [value for _, value in self.relays()]
 
     def ends(self) -> Ends:
-        """What it reads."""
+        """Return the reading of both ends."""
         return ends(self.read())
 
     def reads(self, wanted: Ends) -> bool:
-        """Does it read this, with all pauses over?"""
+        """Does the driver read these ends after all pauses?"""
         found = self.patiently()
         return isinstance(found, DoorSample) and ends(found) == wanted
 
@@ -60,7 +60,7 @@ OPEN, CLOSED, BETWEEN = (True, False), (False, True), (False, False)
 
 
 class DoorContract(Contract[Bench]):
-    """On any bus. A bench begins with a closed door."""
+    """The contract on any bus. A bench begins with a closed door."""
 
     def test_opening_the_driver_moves_nothing(self, bench: Bench) -> None:
         bench.open()
@@ -69,29 +69,29 @@ class DoorContract(Contract[Bench]):
     def test_a_held_door_opens_and_a_released_one_closes_by_itself(self, bench: Bench) -> None:
         bench.open()
         bench.write(HOLD)
-        wait_until(lambda: bench.ends() == OPEN, "open")
+        wait_until(lambda: bench.ends() == OPEN, "the held door reads open")
         bench.write(RELEASE)
-        wait_until(lambda: bench.ends() == CLOSED, "closed")
+        wait_until(lambda: bench.ends() == CLOSED, "the released door reads closed")
         assert bench.relay() == [True, False]
 
     def test_a_door_that_stops_on_its_way_reads_neither_open_nor_closed(self, bench: Bench) -> None:
         bench.open()
         bench.plant.fail("operator", "garbage")
         bench.write(HOLD)
-        wait_until(lambda: bench.ends() != CLOSED, "it has left the closed end")
+        wait_until(lambda: bench.ends() != CLOSED, "the door has left the closed end")
         assert [bench.ends() for _ in range(20)] == [BETWEEN] * 20
 
     def test_a_cut_limit_contact_never_reads_open(self, bench: Bench) -> None:
         bench.open()
         bench.write(HOLD)
-        wait_until(lambda: bench.ends() == OPEN, "open")
+        wait_until(lambda: bench.ends() == OPEN, "the held door reads open")
         bench.plant.fail("opened", "off")
-        wait_until(lambda: bench.ends() == BETWEEN, "neither")
+        wait_until(lambda: bench.ends() == BETWEEN, "the cut contact reads neither open nor closed")
 
     def test_open_and_closed_at_once_does_not_read_as_open(self, bench: Bench) -> None:
         bench.open()
         bench.plant.fail("opened", "wrong")
-        wait_until(lambda: bench.ends() != CLOSED, "seen")
+        wait_until(lambda: bench.ends() != CLOSED, "both contacts at once no longer read closed")
         sample = bench.read()
         assert sample.opened == sample.closed
         assert sample.closed or sample.lost
@@ -112,7 +112,7 @@ class DoorContract(Contract[Bench]):
 
 
 class WiredDoorContract(DoorContract):
-    """On a bus whose far side can go away: parts `server` and `unit` of the plant."""
+    """The contract on a bus whose far side can fail: parts `server` and `unit` of the plant."""
 
     @pytest.mark.parametrize("part", ["server", "unit"])
     def test_a_link_that_is_gone_is_a_driver_error_and_a_hold_survives_it(
@@ -120,13 +120,13 @@ class WiredDoorContract(DoorContract):
     ) -> None:
         bench.open()
         bench.write(HOLD)
-        wait_until(lambda: bench.ends() == OPEN, "open")
+        wait_until(lambda: bench.ends() == OPEN, "the held door reads open")
         bench.plant.fail(part, "off")
-        wait_until(lambda: isinstance(bench.patiently(), str), "gone")
+        wait_until(lambda: isinstance(bench.patiently(), str), f"the lost {part} is noticed")
         with pytest.raises(DriverError):
             bench.driver.open()
         bench.plant.fail(part, None)
-        wait_until(lambda: bench.reads(OPEN), "back")
+        wait_until(lambda: bench.reads(OPEN), f"the door reads open again after the {part} is back")
         bench.open()
         bench.write(HOLD)
         assert bench.relay() == [True]
@@ -139,9 +139,9 @@ class WiredDoorContract(DoorContract):
         seen = bench.until_it_fails("server", mode, lambda sample: False)
         assert OPEN not in map(ends, seen)
         bench.plant.fail("server", None)
-        wait_until(lambda: bench.reads(CLOSED), "back")
+        wait_until(lambda: bench.reads(CLOSED), "the door reads closed again after the failure")
 
 
 def quick(name: str, wires: Iterable[Wire]) -> DoorPlant:
-    """A door that reaches either end at once."""
+    """Return a door that reaches either end at once."""
     return DoorPlant(name, wires, **QUICK)

@@ -19,7 +19,7 @@ from tests.drivers.door.contract import Bench, DoorContract, WiredDoorContract, 
 def dry(
     points: tuple[str, str, str], flash: dict[str, str] | None = None, **pull: str
 ) -> door_dry_contact.DryContactDoorSettings:
-    """A door on contacts at these points: opened, closed, hold."""
+    """Return a door on contacts at these points: opened, closed, hold."""
     opened, closed, hold = points
     pulse = {"pulse": {"on_s": 300.0, "every_s": 600.0}} if flash else {}
     plain = {
@@ -72,7 +72,7 @@ class TestDryContactsOnGpio(DoorContract):
 
 
 class RegisterContract(WiredDoorContract):
-    """Doors on registers, by their settings."""
+    """The contract for doors on registers, by their settings."""
 
     settings: ClassVar[dict[str, Any]]
     serial: ClassVar[modbus.Serial | None] = None

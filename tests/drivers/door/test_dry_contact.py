@@ -1,4 +1,4 @@
-"""The dry-contact door: what its YAML may say, its wiring table, and its points."""
+"""The dry-contact door: its YAML, its wiring table, and its points."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -23,7 +23,7 @@ FLASHED = {"point": "unit 1 coil 0", "active": "high", "flash": "unit 1 coil 0x2
 
 
 class Noted(PointsFar):
-    """A bus that notes each write that reaches its module."""
+    """A bus that notes each write at its module."""
 
     def __init__(self, *place: Any) -> None:
         super().__init__(*place)

@@ -1,4 +1,4 @@
-"""A door on a relay that answers HTTP: the contract, the relay's timer, and what the YAML may say."""
+"""A door on a relay that answers HTTP: the contract, the relay's timer, and the YAML."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -79,13 +79,16 @@ class TestAShortTimer(HttpContract):
     def test_a_relay_that_is_not_told_again_lets_the_door_go_by_itself(self, bench: Bench) -> None:
         bench.driver.open()
         bench.driver.write(HOLD)
-        wait_until(lambda: bench.ends() == OPEN, "open")
-        wait_until(lambda: bench.ends() == CLOSED, "let go by the relay")
+        wait_until(lambda: bench.ends() == OPEN, "the held door reads open")
+        wait_until(
+            lambda: bench.ends() == CLOSED,
+            "the relay lets the door go when nobody repeats the command",
+        )
         assert bench.relay() == [True, False]
 
 
 class Relay:
-    """A bus whose far side answers this."""
+    """A bus whose far side answers these inputs and this relay."""
 
     def __init__(self, opened: Any = False, held: Any = False) -> None:
         self.inputs, self.held = [opened, not opened], held

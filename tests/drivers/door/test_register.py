@@ -1,4 +1,4 @@
-"""The door on registers: what its numbers mean, and what its YAML and profiles may say."""
+"""The door on registers: the meaning of its numbers, and its YAML and profiles."""
 
 import re
 from pathlib import Path

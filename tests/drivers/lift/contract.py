@@ -1,8 +1,8 @@
-"""What every driver of a lift has to do, on whatever it stands: each test of it has a bench of its own.
+"""Duties of every driver of a lift, on any bus. Each test has its own bench.
 
-A test class derives from `LiftContract`, or from `WiredLiftContract` where the link can fail, and says
-how its bench is built. The lift has the landings B1, G and 1 and stands at B1, its door closed. Its
-wires: `fire_alarm`, `agv_mode`, `door_opened`, `door_closed`, `moving`, and a line for each landing.
+A test class derives from `LiftContract`, or from `WiredLiftContract` if the link can fail, and builds
+its bench. The lift has the landings B1, G and 1 and stands at B1 with its door closed. The wires are
+`fire_alarm`, `agv_mode`, `door_opened`, `door_closed`, `moving`, and a line for each landing.
 """
 
 import time
@@ -19,7 +19,7 @@ from tests.drivers.benches import Contract
 from tests.waiting import wait_until
 
 QUICK = LiftPace(floor_s=0.2, door_s=0.05, agv_s=0.02, dwell_s=0.1)
-"""A lift so quick that no test has to wait for it."""
+"""Times of a lift that no test has to wait for."""
 
 IDLE = LiftSample("B1", DoorReading.CLOSED, motion=Motion.STOPPED, agv=False)
 OFF, AGV = LiftOutputs(), LiftOutputs(agv_request=True)
@@ -27,10 +27,10 @@ CALL, HOLD = LiftOutputs(True, call="1"), LiftOutputs(True, hold_door=Side.FRONT
 
 
 class Bench(benches.Bench[LiftSample, LiftOutputs]):
-    """With a lift."""
+    """A bench with a lift."""
 
     def until(self, holds: Callable[[LiftSample], bool], what: str) -> list[LiftSample]:
-        """Reads until this is so; all that was read on the way."""
+        """Read until the condition holds; return all readings on the way."""
         seen: list[LiftSample] = []
 
         def look() -> bool:
@@ -41,7 +41,7 @@ class Bench(benches.Bench[LiftSample, LiftOutputs]):
         return seen
 
     def rides(self) -> list[LiftSample]:
-        """AGV mode, a call for 1, and the door held open there; all that was read since the call."""
+        """Ride to 1 in AGV mode, and hold the door open there; return all readings since the call."""
         self.write(AGV)
         self.until(lambda sample: sample.agv is True, "AGV mode")
         self.write(CALL)
@@ -51,7 +51,7 @@ class Bench(benches.Bench[LiftSample, LiftOutputs]):
 
 
 class LiftContract(Contract[Bench]):
-    """On any bus. A bench begins with an idle lift."""
+    """The contract on any bus. A bench begins with an idle lift."""
 
     def test_opening_a_lift_switches_no_output(self, bench: Bench) -> None:
         bench.open()
@@ -117,7 +117,10 @@ class LiftContract(Contract[Bench]):
         for burns in (True, False):
             bench.plant.press("fire_alarm", burns, time.monotonic())
             hazards = {Hazard.FIRE} if burns else set()
-            wait_until(lambda hazards=hazards: bench.read().hazards == hazards, "seen")  # type: ignore[misc]
+            wait_until(
+                lambda hazards=hazards: bench.read().hazards == hazards,
+                f"the driver reads hazards {hazards}",
+            )  # type: ignore[misc]
 
     @pytest.mark.parametrize(
         ("wire", "safe"),
@@ -138,7 +141,7 @@ class LiftContract(Contract[Bench]):
 
 
 class WiredLiftContract(LiftContract):
-    """On a bus whose far side can go away: parts `server` and `unit` of the plant."""
+    """The contract on a bus whose far side can fail: parts `server` and `unit` of the plant."""
 
     @pytest.mark.parametrize("part", ["server", "unit"])
     def test_a_link_that_is_gone_is_a_driver_error_and_the_outputs_survive_it(
@@ -148,11 +151,11 @@ class WiredLiftContract(LiftContract):
         bench.rides()
         edges = bench.relays()
         bench.plant.fail(part, "off")
-        wait_until(lambda: isinstance(bench.patiently(), str), "gone")
+        wait_until(lambda: isinstance(bench.patiently(), str), "the lost link is noticed")
         with pytest.raises(DriverError):
             bench.driver.open()
         bench.plant.fail(part, None)
-        wait_until(lambda: isinstance(bench.patiently(), LiftSample), "back")
+        wait_until(lambda: isinstance(bench.patiently(), LiftSample), "the lift is read again")
         bench.open()
         bench.write(HOLD)
         assert bench.relays() == edges
@@ -164,4 +167,4 @@ class WiredLiftContract(LiftContract):
         bench.open()
         assert set(bench.until_it_fails("server", mode, lambda sample: False)) <= {IDLE}
         bench.plant.fail("server", None)
-        wait_until(lambda: bench.patiently() == IDLE, "back")
+        wait_until(lambda: bench.patiently() == IDLE, "the lift reads idle again after the failure")

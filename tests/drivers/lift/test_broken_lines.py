@@ -1,4 +1,4 @@
-"""A code with one line cut or shorted must not read safer than the truth is."""
+"""A code with one cut or shorted line must never read as a safer state than the true state."""
 
 from typing import Any
 
@@ -18,7 +18,7 @@ from tests.drivers.lift.wirings import settings as wired
 def service(
     codes: dict[int, str], lines: list[dict[str, Any]] | None = None
 ) -> DryContactLiftSettings:
-    """A lift whose AGV mode and hazards are a code."""
+    """Return a lift whose AGV mode and hazards are one code."""
     width = max(codes).bit_length()
     code = {"bits": lines or bits(width, 60), "codes": codes}
     return wired(inputs=inputs(agv_mode=None, fire_alarm=None, service=code))
@@ -122,7 +122,7 @@ def test_what_the_site_accepts_is_not_refused() -> None:
 
 
 SAFEST = ("agv_mode", "normal", "fire_alarm")
-"""From where most may be driven to where nothing may."""
+"""From the state with most permissions to the state with none."""
 
 
 @given(

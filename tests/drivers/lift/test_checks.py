@@ -1,4 +1,4 @@
-"""What a lift's wiring is refused for, what must be accepted by name, and what is only warned of."""
+"""Refusals of a lift's wiring, refusals that a file may accept by name, and warnings."""
 
 from pathlib import Path
 from typing import Any
@@ -273,7 +273,7 @@ def test_a_safe_choice_of_pins_is_not_refused() -> None:
 
 
 def test_the_first_public_wiring_is_possible_when_its_two_unsafe_places_are_accepted() -> None:
-    """The door contact reads open when cut; the door opens on low, where its pin is from boot on."""
+    """The door contact reads open when cut; the door opens on low, the level of its pin since boot."""
     literal = {
         "floors": ["L1", "L2", "L3", "L4"],
         "inputs": {

@@ -1,4 +1,4 @@
-"""How numbers stand on lines, and how a floor code is read from them."""
+"""Numbers on lines, and the reading of a floor code from lines."""
 
 from typing import Any
 
@@ -10,7 +10,7 @@ from tests.drivers.lift.wirings import FLOORS, bits, line, settings
 
 
 def on(text: str) -> list[bool]:
-    """`011` is 3: written most significant first, as people do."""
+    """Return the lines of a number: `011` is 3, written most significant first, as people write."""
     return [c == "1" for c in reversed(text)]
 
 

@@ -23,7 +23,7 @@ class TestDryContactsOnModbus(WiredLiftContract):
     serial: ClassVar[modbus.Serial | None] = None
 
     def wired(self) -> dict[str, Any]:
-        """The wiring as a YAML has it."""
+        """Return the wiring as in a YAML."""
         return whole(inputs=inputs(moving=line(4)))
 
     @contextmanager
@@ -96,7 +96,7 @@ class TestDryContactsOnRs485(TestDryContactsOnModbus):
 
 
 def in_registers(part: Any) -> Any:
-    """The same wiring, with each contact as a bit of a register of a gateway."""
+    """Return the same wiring with each contact as a bit of a gateway's register."""
     if not isinstance(part, dict):
         return part
     if "point" in part and "discrete input" in part["point"]:
@@ -114,7 +114,7 @@ class TestContactsAsBitsOfRegisters(TestDryContactsOnModbus):
 
 
 def on_header(part: Any, pins: Iterator[int]) -> Any:
-    """The same wiring on pins, taken as they come."""
+    """Return the same wiring with each point on the next of these pins."""
     if not isinstance(part, dict):
         return part
     if "point" in part:

@@ -1,4 +1,4 @@
-"""What the lines of a lift mean: truth tables from asserted signals to a sample, and back to lines."""
+"""The meaning of a lift's lines: truth tables from asserted signals to a sample, and back to lines."""
 
 from itertools import product
 from typing import Any

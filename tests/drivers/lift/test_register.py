@@ -1,4 +1,4 @@
-"""What a gateway's numbers mean, what a map is refused for, and what is written for each command."""
+"""The meaning of a gateway's numbers, the refusals of a map, and the writes for each command."""
 
 from pathlib import Path
 from typing import Any
@@ -21,7 +21,7 @@ def shipped() -> RegisterLiftSettings:
 
 
 def sample(**words: int) -> LiftSample:
-    """The shipped gateway in AGV mode at L1, with these words otherwise."""
+    """Return a reading of the shipped gateway in AGV mode at L1, with some words changed."""
     plain = {"floor": 1, "motion": 1, "door": 0, "service": 1, "overload": 0}
     return decode(shipped().map, plain | words)
 
@@ -159,7 +159,7 @@ def test_commands_that_cannot_be_read_back_are_warned_of() -> None:
 
 
 def told(title: str) -> list[tuple[str, ...]]:
-    """The rows of one table of the shipped lift."""
+    """Return the rows of one table of the shipped lift."""
     return next(list(table.rows) for table in tables(shipped()) if table.title == title)
 
 

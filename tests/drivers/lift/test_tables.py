@@ -1,4 +1,6 @@
-"""What `check` shows of a lift's codes: likely mistakes change it, and each cut line is told."""
+"""The tables of `check` for a lift's codes: likely mistakes change them, and each cut line is
+listed.
+"""
 
 from pathlib import Path
 
@@ -22,7 +24,7 @@ DOOR_OPEN = '      door_open: {point: "J8:36", active: high}\n'
 
 
 def table(tmp_path: Path, title: str, *changes: tuple[str, str]) -> list[str]:
-    """One table of the shipped lift, with these changes to its file."""
+    """Return one table of the shipped lift after these changes to its file."""
     text = SHIPPED.read_text()
     for old, new in changes:
         assert old in text

@@ -1,4 +1,4 @@
-"""Lift wirings to test with. Points are numbered as they come, so that only meanings matter."""
+"""Lift wirings for tests. Points have consecutive numbers, since only the meanings matter."""
 
 from typing import Any
 
@@ -10,12 +10,12 @@ FLOORS = ["B1", "G", "1"]
 
 
 def line(number: int, **more: Any) -> dict[str, Any]:
-    """An input whose cut wire reads not asserted."""
+    """Return an input that reads not asserted when its wire is cut."""
     return {"point": f"unit 1 discrete input {number}", "active": "high", **more}
 
 
 def alarm(number: int) -> dict[str, Any]:
-    """An input whose cut wire reads asserted."""
+    """Return an input that reads asserted when its wire is cut."""
     return line(number) | {"active": "low"}
 
 
@@ -24,7 +24,7 @@ def coil(number: int) -> dict[str, Any]:
 
 
 def whole(**changes: Any) -> dict[str, Any]:
-    """A wiring that is right; `changes` replace whole sections."""
+    """Return a right wiring; `changes` replace whole sections."""
     return {
         "floors": FLOORS,
         "inputs": {
@@ -48,7 +48,7 @@ def settings(**changes: Any) -> DryContactLiftSettings:
 
 
 def inputs(**more: Any) -> dict[str, Any]:
-    """The inputs of `whole` with more; None takes one away."""
+    """Return the inputs of `whole` with `more`; None removes an input."""
     return {k: v for k, v in {**whole()["inputs"], **more}.items() if v is not None}
 
 

@@ -9,10 +9,10 @@ from hal_fakes.fake import Outside
 
 
 class Station(Protocol):
-    """Who may answer; "" where the question is not for it."""
+    """A station that may answer; "" if the question is for another station."""
 
     def answer(self, question: str) -> str:
-        """One line."""
+        """Return one line."""
 
 
 class LineServer:
@@ -33,7 +33,7 @@ class LineServer:
         self._thread.start()
 
     def close(self) -> None:
-        """End."""
+        """Stop the server."""
         self._server.shutdown()
         self._server.server_close()
         self._thread.join()

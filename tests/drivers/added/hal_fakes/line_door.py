@@ -1,4 +1,4 @@
-"""A door that answers in words: the plant of every door behind them."""
+"""A door that answers in words; behind the words moves the plant of every door."""
 
 import time
 from typing import Any
@@ -23,7 +23,7 @@ class LineDoor:
         self._called = called
 
     def answer(self, question: str) -> str:
-        """Where it is, or that it has been held or released."""
+        """Return the door's place, or a confirmation that the door is held or released."""
         name, _, verb = question.rpartition(" ")
         if name != self._called:
             return ""

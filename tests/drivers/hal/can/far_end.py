@@ -1,4 +1,4 @@
-"""A CAN bus of python-can's `virtual` sort, and hands on the other end of it."""
+"""A `virtual` CAN bus of python-can, and test tools for its other end."""
 
 import itertools
 import time
@@ -16,58 +16,58 @@ _numbers = itertools.count()
 
 
 def channel() -> str:
-    """A virtual bus that nobody else is on."""
+    """Return the name of a virtual bus that nobody else uses."""
     return f"test-{next(_numbers)}"
 
 
 class Clock(Time):
-    """Real time that can be made to jump ahead: `now` is by how much."""
+    """Real time that can jump ahead: `now` is the sum of the jumps (s)."""
 
     def __call__(self) -> float:
         return time.monotonic() + self.now
 
 
 def data_frame(frame_id: int, payload: str, extended: bool = False) -> can.Message:
-    """A data frame; its payload in hex digits."""
+    """Return a data frame with this payload in hex digits."""
     data = bytes.fromhex(payload)
     return can.Message(arbitration_id=frame_id, is_extended_id=extended, data=data)
 
 
 class FarEnd:
-    """Whoever else is on the bus: sends anything, and has heard what we sent."""
+    """The other end of the bus: sends any frame, and hears the frames that we send."""
 
     def __init__(self, channel: str) -> None:
         self._bus = can.Bus(channel, interface="virtual")
 
     def send(self, frame_id: int, payload: str = "", extended: bool = False) -> None:
-        """A data frame; its payload in hex digits."""
+        """Send a data frame with this payload in hex digits."""
         self._bus.send(data_frame(frame_id, payload, extended))
 
     def trouble(self, error_id: int) -> None:
-        """An error frame, as SocketCAN makes them of its controller's troubles."""
+        """Send an error frame, as SocketCAN makes for troubles of its controller."""
         data = bytes(8)
         self._bus.send(can.Message(arbitration_id=error_id, is_error_frame=True, data=data, dlc=8))
 
     def put(self, message: can.Message) -> None:
-        """Any frame at all."""
+        """Send any frame."""
         self._bus.send(message)
 
     def heard(self, wait_s: float = 0.0) -> list[tuple[int, str]]:
-        """What we sent so far: (id, payload in hex)."""
+        """Return the frames that we sent so far: (id, payload in hex)."""
         found = []
         while (message := self._bus.recv(wait_s)) is not None:
             found.append((message.arbitration_id, bytes(message.data).hex()))
         return found
 
     def close(self) -> None:
-        """Leave."""
+        """Leave the bus."""
         self._bus.shutdown()
 
 
 def bus_on(
     channel: str, clock: Callable[[], float] | None = None, *, timeout_s: float = 0.1
 ) -> CanBus:
-    """Ours, whose pauses follow the clock and have no jitter."""
+    """Return our bus, whose pauses follow the clock and have no jitter."""
     settings = CanSettings(socketcan="can0", timeout_s=timeout_s, scan_s=0.05)
     vendor = lambda: can.Bus(channel, interface="virtual")  # noqa: E731
     return CanBus(settings, clock or time.monotonic, lambda: 0.0, vendor)
@@ -75,7 +75,9 @@ def bus_on(
 
 @contextmanager
 def two_ends(clock: Time | None = None) -> Iterator[tuple[CanBus, FarEnd, Time]]:
-    """A bus with somebody at the far end. Its clock stands still, so no busy machine makes it hang."""
+    """Yield our bus, its far end, and a clock that stands still, so a busy machine causes no
+    timeout.
+    """
     name, clock = channel(), clock or Time()
     far, bus = FarEnd(name), bus_on(name, clock, timeout_s=0.05)
     bus.take()
@@ -87,9 +89,9 @@ def two_ends(clock: Time | None = None) -> Iterator[tuple[CanBus, FarEnd, Time]]
 
 
 class Reactive(can.BusABC):
-    """A bus in virtual time: who is on it answers at once, and waiting is only a number.
+    """A bus in virtual time: its stations answer at once, and waiting only adds to `now`.
 
-    `later`: what comes only when it is waited for.
+    `later` has frames that come only while somebody waits.
     """
 
     def __init__(self) -> None:
@@ -108,7 +110,7 @@ class Reactive(can.BusABC):
         return None
 
     def say(self, frame_id: int, payload: str = "", extended: bool = False) -> None:
-        """Somebody on the bus sends this by itself; its payload in hex digits."""
+        """Let a station send this frame by itself; the payload is in hex digits."""
         self.coming.append(data_frame(frame_id, payload, extended))
 
     def send(self, msg: can.Message, timeout: float | None = None) -> None:
@@ -119,12 +121,12 @@ class Reactive(can.BusABC):
         return CanBus(place, lambda: self.now, lambda: 0.0, lambda: self)
 
     def shutdown(self) -> None:
-        """It stays, and the next opening finds it again."""
+        """Keep the bus, so that the next opening finds the same one."""
         self._is_shutdown = True
 
 
 def failure(call: Callable[[], object]) -> str:
-    """The text of the DriverError that this raises; "" when it raises none."""
+    """Return the text of the DriverError that this call raises, or ""."""
     try:
         call()
     except DriverError as error:

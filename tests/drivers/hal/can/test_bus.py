@@ -1,4 +1,4 @@
-"""The CAN bus: who gets which frame, what is known of a silent bus, and how it comes back."""
+"""The CAN bus: the listener of each frame, the signs of a silent bus, and its recovery."""
 
 import errno
 from collections.abc import Iterator
@@ -32,7 +32,7 @@ def ends() -> Iterator[Ends]:
 
 
 def heard_by(bus: CanBus, *wanted: FrameFilter) -> list[Frame]:
-    """What comes of these, as it comes."""
+    """Return a list to which each of these frames is added on arrival."""
     heard: list[Frame] = []
     bus.listen(wanted, lambda frame, at: heard.append(frame))
     return heard
@@ -163,7 +163,7 @@ def test_pauses_grow_while_the_bus_stays_off_and_are_short_again_after_a_frame(e
     bus, far, clock = ends
 
     def pause() -> float:
-        """How long it fails at once after a bus-off."""
+        """Return how long calls fail at once after a bus-off."""
         far.trouble(0x40)
         assert failure(bus.take)
         begun_at = clock()
@@ -198,7 +198,7 @@ def test_minor_faults_of_the_controller_are_named_where_a_station_is_silent(
 
 
 class Broken(can.BusABC):
-    """An interface that fails as it is told, once it is open."""
+    """An open interface on which one kind of call fails."""
 
     def __init__(self, error: Exception, where: str) -> None:
         super().__init__("broken")
@@ -218,7 +218,7 @@ class Broken(can.BusABC):
 
 
 def wrapped(code: int) -> Exception:
-    """As python-can passes on what a system call said."""
+    """Return python-can's exception for an error of a system call."""
     return can.CanOperationError("Failed", error_code=code)
 
 

@@ -1,4 +1,4 @@
-"""How one bus is waited for. The vendor's bus here has a file, as an interface of the kernel has."""
+"""Waiting for frames of one bus. The vendor's bus here has a file, like an interface of the kernel."""
 
 import socket
 from typing import Any
@@ -14,7 +14,9 @@ HOUR_S = 3600.0
 
 
 class Interface(can.BusABC):
-    """A bus with a file, in which a byte is a frame's id. `waits`: how long `recv` waited (s)."""
+    """A bus with a file, in which a byte is a frame's id. `waits` has the times that `recv` waited
+    (s).
+    """
 
     def __init__(self) -> None:
         self._near, self.far = socket.socketpair()
@@ -22,17 +24,17 @@ class Interface(can.BusABC):
         super().__init__("can0")
 
     def fileno(self) -> int:
-        """The file that is waited for."""
+        """Return the file on which the link waits."""
         return self._near.fileno()
 
     def _recv_internal(self, timeout: float | None) -> tuple[can.Message | None, bool]:
         self.waits.append(timeout)
         if timeout:
-            return None, False  # the clock shows how long that was
+            return None, False  # the clock measures this wait
         return can.Message(arbitration_id=self._near.recv(1)[0], is_extended_id=False), False
 
     def send(self, msg: can.Message, timeout: float | None = None) -> None:
-        """Nobody sends here."""
+        """Do nothing: no test here sends."""
 
     def shutdown(self) -> None:
         """Close both ends."""

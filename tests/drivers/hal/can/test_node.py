@@ -1,4 +1,4 @@
-"""A CANopen node: whose answer an answer is, and whether the node lives."""
+"""A CANopen node: answers that count, and signs that the node lives."""
 
 import struct
 from collections.abc import Callable
@@ -17,12 +17,12 @@ Answer = Callable[[bytes], list[str]]
 
 
 def value(request: bytes, number: int, command: int = 0x4B) -> str:
-    """The reply to a read: an expedited number of two octets."""
+    """Return the reply to a read: an expedited number of two octets."""
     return (bytes((command,)) + request[1:4] + struct.pack("<I", number)).hex()
 
 
 class Node:
-    """Answers the requests to node 10; each answer is a list of payloads in hex."""
+    """Answers requests to node 10; each answer is a list of payloads in hex."""
 
     def __init__(self, far: Reactive) -> None:
         self.answer: Answer = lambda request: [value(request, 5)]
@@ -140,7 +140,7 @@ def test_a_late_answer_is_never_the_answer_to_the_next_question(side: Side) -> N
     node.answer = lambda request: []
     assert failure(lambda: ours.read(*STATE))
     far.now += 0.6
-    far.say(0x580 + NODE, "4b02200a05000000")  # state 5, of before
+    far.say(0x580 + NODE, "4b02200a05000000")  # a late answer: state 5
     node.answer = lambda request: [value(request, 238)]
     assert ours.read(*STATE) == 238
 
@@ -149,7 +149,7 @@ def test_a_node_that_owes_an_answer_is_asked_nothing(side: Side) -> None:
     ours, node, far, _ = side
     node.answer = lambda request: []
     assert failure(lambda: ours.read(*STATE))
-    ours._sdo_pause.mended()  # no pause keeps us from asking
+    ours._sdo_pause.mended()  # end the pause, which would keep us from asking
     assert failure(lambda: ours.read(*STATE)) == (f"{NAME}, read 0x2002:0A: no reply within 0.05 s")
     assert len(node.asked) == 1
     far.now += 0.2
@@ -195,7 +195,9 @@ def test_a_heartbeat_that_stays_away_is_a_loss_and_its_return_ends_it(side: Side
 
 
 def test_a_node_that_was_lost_counts_as_restarted(side: Side) -> None:
-    """Its boot-up frame may have come while nobody listened: what it was told is told again."""
+    """A boot-up frame may have come while nobody listened, so a node that is back gets all orders
+    again.
+    """
     ours, _, far, _ = side
     far.say(0x70A, "05")
     ours.alive()

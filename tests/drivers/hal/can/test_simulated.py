@@ -1,4 +1,4 @@
-"""`run --simulate` below the daemon: the shipped chargers on CAN, each behind an adapter."""
+"""`run --simulate` without the daemon: the chargers of `config/` on CAN, each behind an adapter."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -24,7 +24,7 @@ ON, OFF = ChargerOutputs(True), ChargerOutputs(False)
 
 
 class Site:
-    """One shipped file, simulated."""
+    """One file of `config/`, simulated."""
 
     def __init__(self, shipped: tuple[str, Any, str], directory: Path) -> None:
         file, driver, name = shipped
@@ -40,7 +40,7 @@ class Site:
         assert self._caller.say(text.format(self.name)) == "ok"
 
     def sees(self, activity: Activity, outputs: ChargerOutputs) -> bool:
-        """One scan."""
+        """Run one scan; does the driver read this activity?"""
         try:
             found = self.driver.read().activity
             self.driver.write(outputs)
@@ -65,13 +65,13 @@ def site(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Site]:
 def test_a_shipped_charger_charges_a_robot_is_lost_and_found_and_shows_its_errors(
     site: Site,
 ) -> None:
-    wait_until(lambda: site.sees(Activity.IDLE, OFF), "free")
+    wait_until(lambda: site.sees(Activity.IDLE, OFF), "the charger is idle")
     site.say("press {} robot on")
-    wait_until(lambda: site.sees(Activity.CHARGING, ON), "it charges")
+    wait_until(lambda: site.sees(Activity.CHARGING, ON), "the charger charges the robot")
     site.say("fail {} bus off")
-    wait_until(lambda: not site.sees(Activity.CHARGING, ON), "it is lost")
+    wait_until(lambda: not site.sees(Activity.CHARGING, ON), "the loss of the bus is noticed")
     site.say("fail {} bus ok")
     site.bus.insist()
-    wait_until(lambda: site.sees(Activity.CHARGING, ON), "it is found")
+    wait_until(lambda: site.sees(Activity.CHARGING, ON), "the charger is found charging again")
     site.say("press {} transmitter_fault on")
-    wait_until(lambda: site.sees(Activity.ERROR, OFF), "an error")
+    wait_until(lambda: site.sees(Activity.ERROR, OFF), "the charger shows an error")

@@ -1,4 +1,4 @@
-"""An slcan adapter on a pseudo-terminal: frames on a serial port, and how a port fails."""
+"""An slcan adapter on a pseudo-terminal: frames on a serial port, and failures of a port."""
 
 import os
 import threading
@@ -17,7 +17,7 @@ from tests.waiting import PATIENCE_S, wait_until
 
 
 class Echo:
-    """A station that sends back each frame, its id one higher."""
+    """A station that returns each frame with the next higher id."""
 
     def __init__(self) -> None:
         self.plant: Plant = ChargerPlant("echo", links=["bus"])
@@ -30,11 +30,11 @@ class Echo:
         send(message)
 
     def tick(self, now: float, send: Send) -> None:
-        """Says nothing by itself."""
+        """Do nothing: the station sends nothing by itself."""
 
 
 class Desk:
-    """Our bus at an adapter, and what came of it."""
+    """Our bus at an adapter, and the frames heard on it."""
 
     def __init__(self) -> None:
         self.echo = Echo()
@@ -61,7 +61,7 @@ class Desk:
         )
 
     def text(self) -> str:
-        """Why it does not work, if it says so."""
+        """Return why the bus does not work, or ""."""
         return failure(self.bus.take)
 
     def close(self) -> None:
@@ -100,25 +100,28 @@ def test_an_adapter_that_is_pulled_is_a_failure_and_is_found_again_when_it_is_ba
 ) -> None:
     assert desk.passes()
     desk.echo.plant.fail("bus", "off")
-    wait_until(lambda: desk.text() != "", "it is missed")
+    wait_until(lambda: desk.text() != "", "the pulled adapter is noticed")
     desk.clock.now += 60
-    wait_until(lambda: "the adapter is not there; is it plugged in?" in desk.text(), "it is named")
+    wait_until(
+        lambda: "the adapter is not there; is it plugged in?" in desk.text(),
+        "the text names the missing adapter",
+    )
     desk.echo.plant.fail("bus", None)
-    wait_until(desk.passes, "it passes frames again")
+    wait_until(desk.passes, "the adapter passes frames again")
 
 
 def test_noise_on_the_adapter_is_a_failure_that_ends_with_the_noise(desk: Desk) -> None:
     assert desk.passes()
     desk.echo.plant.fail("bus", "garbage")
-    wait_until(lambda: desk.text() != "", "it is noticed")
+    wait_until(lambda: desk.text() != "", "noise on the adapter is noticed")
     desk.echo.plant.fail("bus", None)
-    wait_until(desk.passes, "it passes frames again")
+    wait_until(desk.passes, "the adapter passes frames again")
 
 
 def test_a_bus_that_passes_nothing_is_silent_and_no_failure(desk: Desk) -> None:
     assert desk.passes()
     desk.echo.plant.fail("bus", "stuck")
-    wait_until(lambda: not desk.passes(), "nothing comes back")
+    wait_until(lambda: not desk.passes(), "the stuck bus returns no frame")
     assert desk.text() == ""
 
 
@@ -185,7 +188,7 @@ def test_whatever_an_adapter_says_is_a_frame_or_a_failure_and_never_breaks_us(
         failure(lambda: bus.wait(lambda: bool(heard), 0.05))
         return bool(heard)
 
-    wait_until(again, "a good frame after it")
+    wait_until(again, "a good frame is heard after the nonsense")
     assert set(heard) == {Frame(0x321, b"\x0a")}
     bus.close()
     os.close(leader)

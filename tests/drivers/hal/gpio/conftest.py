@@ -1,4 +1,4 @@
-"""lgpio, recorded: the pin factory of the real hardware runs against a stand-in module."""
+"""lgpio, recorded: the pin factory for real hardware runs on a stand-in module."""
 
 import sys
 from collections.abc import Iterator
@@ -11,7 +11,7 @@ from tests.drivers.hal.gpio.lgpio_stand_in import StandIn
 
 @pytest.fixture
 def lgpio(monkeypatch: pytest.MonkeyPatch) -> Iterator[StandIn]:
-    """A stand-in that the real factory imports; those who imported another forget it."""
+    """Yield a stand-in that the real factory imports; modules that imported lgpio are forgotten."""
     stand_in = StandIn()
     monkeypatch.setitem(sys.modules, "lgpio", stand_in)
     forget()
@@ -20,7 +20,7 @@ def lgpio(monkeypatch: pytest.MonkeyPatch) -> Iterator[StandIn]:
 
 
 def forget() -> None:
-    """Nobody has imported lgpio."""
+    """Forget every module that has imported lgpio."""
     sys.modules.pop("gpiozero.pins.lgpio", None)
     for name in ("pins", "bare", "chip"):
         sys.modules.pop(f"drivers.hal.gpio.{name}", None)

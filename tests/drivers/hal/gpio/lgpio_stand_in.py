@@ -8,7 +8,7 @@ HANDLE = 7
 
 
 class error(Exception):
-    """As lgpio's, quotes and all."""
+    """An error that prints like lgpio's, with quotes."""
 
     def __init__(self, value: str) -> None:
         super().__init__(value)
@@ -19,7 +19,7 @@ class error(Exception):
 
 
 class Callback:
-    """What `lgpio.callback` returns."""
+    """The return value of `lgpio.callback`."""
 
     def __init__(self, calls: list[Call], gpio: int) -> None:
         self._calls = calls
@@ -30,7 +30,7 @@ class Callback:
 
 
 class StandIn(ModuleType):
-    """`chips`: number -> label; `holders`: gpio -> who has it; `levels`: what a read returns."""
+    """`chips`: number -> label; `holders`: gpio -> its holder; `levels`: gpio -> level for a read."""
 
     SET_PULL_UP, SET_PULL_DOWN, SET_PULL_NONE = 32, 64, 128
     RISING_EDGE, FALLING_EDGE, BOTH_EDGES = 1, 2, 3
@@ -53,7 +53,7 @@ class StandIn(ModuleType):
             raise error("broken")
 
     def claims(self) -> list[Call]:
-        """The calls without those that only ask."""
+        """Return the calls without mere queries."""
         asking = ("gpio_get_mode", "gpio_get_chip_info", "gpio_get_line_info")
         return [call for call in self.calls if call[0] not in asking]
 

@@ -1,4 +1,4 @@
-"""Pins of a process that only switches off: the calls of the daemon's pins, without gpiozero."""
+"""Pins of a process that only switches off: the same calls as the daemon's pins, without gpiozero."""
 
 import pytest
 

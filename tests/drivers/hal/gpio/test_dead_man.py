@@ -1,4 +1,4 @@
-"""The dead-man beside the loop. Time is virtual; only its thread is real."""
+"""The dead-man switch beside the loop. Time is virtual; only the switch's thread is real."""
 
 import pytest
 
@@ -24,7 +24,7 @@ def test_outputs_drop_when_scans_stop_and_stay_dropped_until_an_operator_resets(
     now[0] = AFTER_S
     assert not dead_man.check()
     now[0] = AFTER_S + 0.1
-    wait_until(lambda: drops == [AFTER_S + 0.1], "the thread drops the outputs, once")
+    wait_until(lambda: drops == [AFTER_S + 0.1], "the dead-man's thread drops the outputs once")
     now[0] = 100.0
     assert not dead_man.check()
     assert drops == [AFTER_S + 0.1]
@@ -42,7 +42,7 @@ def test_the_relays_fall_and_neither_reads_nor_writes_work_until_a_reset(bench: 
         bench.points.write({"call": False, "hold": True})
     edges = len(bench.relays())
     bench.points.make_safe()
-    bench.points.open()  # what an operator's reset does
+    bench.points.open()  # as an operator's reset does
     bench.points.read()
     bench.points.write({"call": True})
     assert bench.relays()[edges:] == [("call", True)]

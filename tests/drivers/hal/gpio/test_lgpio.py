@@ -1,4 +1,4 @@
-"""The factory of the real hardware, call by call, against a recording stand-in for lgpio."""
+"""The factory for real hardware, call by call, on a stand-in that records lgpio's calls."""
 
 import os
 import sys
@@ -97,7 +97,7 @@ def test_an_edge_wakes_whoever_asked(lgpio: StandIn) -> None:
     bus = header()
     lines = bus.lines({"BCM4": "down"}, {})
     lines.claim()
-    lgpio.edges[4](0, 4, 1, 0)  # nobody asked: nothing happens
+    lgpio.edges[4](0, 4, 1, 0)  # nobody listens: nothing happens
     woken = []
     bus.on_edge(lambda: woken.append("woken"))
     lgpio.edges[4](0, 4, 0, 1)

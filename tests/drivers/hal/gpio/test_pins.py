@@ -1,4 +1,4 @@
-"""What a pin may be called, and which wires cannot be on one."""
+"""Names of pins, and impossible wires of pins."""
 
 import re
 from typing import Any

@@ -1,4 +1,4 @@
-"""Raw servers on 127.0.0.1 that answer byte by byte as a test tells them to."""
+"""Raw servers on 127.0.0.1 that answer byte by byte as a test orders."""
 
 import contextlib
 import socket
@@ -16,7 +16,7 @@ class Caller:
         self._closing = closing
 
     def request(self) -> bytes:
-        """The next request's head, or b"" when the caller has hung up."""
+        """Return the head of the next request, or b"" after the caller has hung up."""
         head = b""
         while not head.endswith(b"\r\n\r\n"):
             byte = self._sock.recv(1)
@@ -26,24 +26,24 @@ class Caller:
         return head
 
     def send(self, *parts: bytes) -> None:
-        """Send each part in a segment of its own."""
+        """Send each part in its own segment."""
         for part in parts:
             self._sock.sendall(part)
 
     def for_ever(self, part: bytes, every_s: float = 0.01) -> None:
-        """Send this again and again until the caller has had enough."""
+        """Send this part again and again until the caller hangs up."""
         while not self._closing.wait(every_s):
             self._sock.sendall(part)
 
     def hold(self) -> None:
-        """Keep the connection and say nothing, until the caller has had enough."""
+        """Keep the connection in silence until the caller hangs up."""
         self._sock.recv(1)
 
 
 class FarEnd:
-    """Listens; the n-th connection gets the n-th conversation, and further ones the last.
+    """A server; connection n gets conversation n, and further connections get the last conversation.
 
-    `requests`: the heads of all that was asked. `connections`: how many there were.
+    `requests` has the heads of all requests, `connections` the number of connections.
     """
 
     def __init__(self, *conversations: Conversation) -> None:
@@ -98,13 +98,13 @@ class FarEnd:
 def answer(
     body: bytes = b'{"state": 0}', status: str = "200 OK", headers: str = "", sort: str = "json"
 ) -> bytes:
-    """A whole HTTP answer."""
+    """Return a whole HTTP answer."""
     head = f"HTTP/1.1 {status}\r\nContent-Type: application/{sort}\r\n{headers}"
     return f"{head}Content-Length: {len(body)}\r\n\r\n".encode("latin-1") + body
 
 
 def always(*parts: bytes) -> Conversation:
-    """Answer every request of a connection with this."""
+    """Return a conversation that answers every request of a connection with these parts."""
 
     def talk(caller: Caller) -> None:
         while caller.request():
@@ -114,7 +114,7 @@ def always(*parts: bytes) -> Conversation:
 
 
 def once(*parts: bytes) -> Conversation:
-    """Answer one request with this and hang up."""
+    """Return a conversation that answers one request with these parts and hangs up."""
 
     def talk(caller: Caller) -> None:
         caller.request()

@@ -1,4 +1,4 @@
-"""The `http` bus against real servers that fail in every way that one can."""
+"""The `http` bus against real servers that fail in every possible way."""
 
 import contextlib
 import itertools
@@ -26,17 +26,17 @@ from tests.drivers.hal.http.far_end import (
 )
 
 TIMEOUT_S = 0.3
-"""The timeout of a call that is meant to fail."""
+"""Timeout of a call that is expected to fail (s)."""
 
 
 class Clock:
-    """A test's time, for the backoff."""
+    """A test's time, for the bus's pauses after failures."""
 
     def __init__(self) -> None:
         self.now = 0.0
 
     def __call__(self) -> float:
-        self.now += 1000.0  # every call of the bus is long after its last failure
+        self.now += 1000.0  # so each call of the bus comes long after its last failure
         return self.now
 
 
@@ -46,7 +46,7 @@ def bus_to(port: int, timeout_s: float = 5.0, **more: Any) -> HttpBus:
 
 
 def failure(talk: Conversation, timeout_s: float = 5.0) -> str:
-    """The error text of a GET to this server."""
+    """Return the error text of a GET to this server."""
     with FarEnd(talk) as far:
         bus = bus_to(far.port, timeout_s)
         with pytest.raises(HalError) as caught:
@@ -57,9 +57,9 @@ def failure(talk: Conversation, timeout_s: float = 5.0) -> str:
 
 CHUNKED = b"HTTP/1.1 200 OK\r\nContent-Type: application/json\r\nTransfer-Encoding: chunked\r\n\r\n"
 CHUNK_SIZES = [b"-1", b"-5", b"-" + b"f" * 16, b"-" + b"f" * 5000, b"f" * 5000, b"zz", b""]
-"""No chunk can have any of these sizes."""
+"""Sizes that no chunk can have."""
 
-# ---- what works
+# ---- good answers
 
 
 def test_an_answer_that_is_a_json_object_is_read() -> None:
@@ -138,11 +138,11 @@ def test_cookies_are_not_kept() -> None:
     assert b"Cookie" not in far.requests[1]
 
 
-# ---- replies that were meant for another request
+# ---- replies to another request
 
 
 def _answers_twice(caller: Caller) -> None:
-    """Each request gets its own reply, and the previous one again."""
+    """Answer each request with its own reply, followed by the previous reply."""
     last = answer(b'{"state": 0}')
     for n in itertools.count(1):
         if not caller.request():
@@ -152,7 +152,7 @@ def _answers_twice(caller: Caller) -> None:
 
 
 def _answers_the_last_one_late(caller: Caller) -> None:
-    """A second reply comes only when the next request is already there."""
+    """Send the second reply only after the next request has arrived."""
     if caller.request():
         caller.send(answer(b'{"state": 1}'))
     if caller.request():
@@ -208,7 +208,7 @@ def test_a_post_with_another_status_fails(status: str) -> None:
         bus.close()
 
 
-# ---- what is not an HTTP answer
+# ---- bytes that are no HTTP answer
 
 
 @pytest.mark.parametrize(
@@ -271,7 +271,7 @@ def test_no_bytes_of_a_server_raise_anything_but_a_hal_error(noise: bytes, start
             bus.close()
 
 
-# ---- servers that never come to an end: each of these tests hangs if a call is not bounded
+# ---- servers that never finish: each of these tests hangs if a call is unbounded
 
 
 def _says_nothing(caller: Caller) -> None:
@@ -389,7 +389,7 @@ def test_a_refused_connection_says_so() -> None:
 
 @contextlib.contextmanager
 def full_server() -> Iterator[Any]:
-    """The address of a server that takes no more connections and refuses none."""
+    """Yield the address of a server that accepts no further connection and refuses none."""
     with contextlib.ExitStack() as opened:
         full = opened.enter_context(socket.create_server(("127.0.0.1", 0), backlog=0))
         for _ in range(4):
@@ -449,7 +449,7 @@ def test_a_lookup_that_has_answered_does_not_keep_the_next_call_waiting() -> Non
     ended = threading.Event()
 
     class Lingering(list[Any]):
-        """What a lookup has found; its thread lives on until the test ends."""
+        """Results of a lookup, whose thread lives on until the test ends."""
 
     def resolve(*_: Any, **__: Any) -> Any:
         return []
@@ -484,7 +484,7 @@ def test_a_failure_to_connect_is_not_remembered_as_the_next_calls_reason() -> No
 
 @pytest.fixture
 def dns() -> Iterator[threading.Event]:
-    """Name servers answer when this is set."""
+    """Yield an event; name servers answer after it is set."""
     event = threading.Event()
     yield event
     event.set()

@@ -1,4 +1,4 @@
-"""The faked HTTP charger: a real server, met by the real driver, failing in each of its ways."""
+"""The fake HTTP charger: a real server in each of its failures, read by the real driver."""
 
 import contextlib
 import json
@@ -29,7 +29,7 @@ IDLE = ChargerSample(Activity.IDLE, 0)
 
 
 class Fake:
-    """The example's station with everything in front of it. Its bus never backs off."""
+    """The station of the example with its server, bus and driver. The bus makes no pauses."""
 
     def __init__(self, config: Config, timeout_s: float) -> None:
         settings = msgspec.structs.replace(config.buses["tpu"], timeout_s=timeout_s)
@@ -45,7 +45,7 @@ class Fake:
         self.plant.press(signal, asserted, time.monotonic())
 
     def read_until(self, activity: Activity) -> set[int | str]:
-        """Poll until the station says that; all the numbers seen on the way."""
+        """Poll until the station shows this activity; return all numbers seen on the way."""
         seen: set[int | str] = set()
 
         def says_so() -> bool:
@@ -156,7 +156,7 @@ def test_an_answer_that_does_not_end_in_time_is_an_error_and_mending_is_enough(
         with pytest.raises(DriverError, match="no complete answer within"):
             it.driver.read()
         it.plant.fail(part, None)
-        assert at_last(it.driver.read, "an answer") == IDLE
+        assert at_last(it.driver.read, "the driver reads an answer after the failure") == IDLE
 
 
 def test_a_number_that_is_in_no_list_is_unknown() -> None:

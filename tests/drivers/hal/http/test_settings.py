@@ -1,4 +1,4 @@
-"""The `http` bus in a YAML: which addresses are one, and what is said about the others."""
+"""The `http` bus in a YAML: good addresses, and the problems of bad ones."""
 
 import msgspec
 import pytest

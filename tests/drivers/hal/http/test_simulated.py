@@ -1,4 +1,4 @@
-"""The HTTP charger of `--simulate`: a child process that a story reaches by its control socket."""
+"""The HTTP charger of `--simulate`: a child process that a test commands by its control socket."""
 
 from pathlib import Path
 
@@ -24,7 +24,7 @@ def test_a_robot_that_is_pressed_onto_the_pad_is_charged_and_the_child_ends_with
     assert driver.read().activity is Activity.IDLE
     with Caller(tmp_path / "plant.sock") as caller:
         caller.order("press charger_a robot on")
-    wait_until(lambda: driver.read().activity is Activity.CHARGING, "it charges")
+    wait_until(lambda: driver.read().activity is Activity.CHARGING, "the charger charges the robot")
     bus.close()
     simulation.close()
     assert list(tmp_path.iterdir()) == []

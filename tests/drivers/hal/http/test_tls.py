@@ -1,4 +1,4 @@
-"""An HTTP bus with TLS: whom it believes, and that its one deadline holds there too."""
+"""An HTTP bus with TLS: the trusted authorities, and the one deadline of a call, which TLS keeps."""
 
 import ssl
 import threading
@@ -15,7 +15,7 @@ from drivers.hal.http import HttpBus, HttpSettings
 
 
 class Answers(BaseHTTPRequestHandler):
-    """Answers everything with its path and its key."""
+    """Answers each request, and notes its path and key."""
 
     def do_GET(self) -> None:
         server: Any = self.server
@@ -29,11 +29,11 @@ class Answers(BaseHTTPRequestHandler):
         self.wfile.write(body)
 
     def log_message(self, format: str, *args: Any) -> None:
-        """Nobody reads what the server would log."""
+        """Log nothing: nobody reads the server's log."""
 
 
 class Site:
-    """A server with a certificate for 127.0.0.1, and the file of its authority."""
+    """A server with a certificate for 127.0.0.1, and the authority's file."""
 
     def __init__(self, tmp_path: Path) -> None:
         authority = trustme.CA()
@@ -49,7 +49,7 @@ class Site:
         self.base = f"https://127.0.0.1:{self.server.server_address[1]}"
 
     def bus(self, **also: Any) -> HttpBus:
-        """A bus to it."""
+        """Return a bus to this server."""
         return HttpBus(
             HttpSettings(
                 **{"api_base": self.base, "ca_file": str(self.ca_file), "timeout_s": 5.0, **also}

@@ -1,4 +1,6 @@
-"""A bearer token from a file: read for each call, kept from others, and never shown."""
+"""A bearer token from a file: read for each call, refused if others can read or write it, never
+shown.
+"""
 
 import os
 from pathlib import Path

@@ -10,7 +10,7 @@ from tests.drivers.hal.modbus.module import Module, opened
 
 @pytest.fixture
 def module() -> Iterator[Module]:
-    """A module that answers as the specification says."""
+    """Yield a module that answers as the specification says."""
     started = Module()
     yield started
     started.close()
@@ -18,7 +18,7 @@ def module() -> Iterator[Module]:
 
 @pytest.fixture(params=[Module, SerialModule], ids=["tcp", "rtu"])
 def either(request: pytest.FixtureRequest) -> Iterator[Module]:
-    """A module on TCP, and one on a serial line."""
+    """Yield a module on TCP and, in another run of the test, a module on a serial line."""
     started: Module = request.param()
     yield started
     started.close()
@@ -26,7 +26,7 @@ def either(request: pytest.FixtureRequest) -> Iterator[Module]:
 
 @pytest.fixture
 def line() -> Iterator[SerialModule]:
-    """A module on a serial line."""
+    """Yield a module on a serial line."""
     started = SerialModule()
     yield started
     started.close()
@@ -34,7 +34,7 @@ def line() -> Iterator[SerialModule]:
 
 @pytest.fixture(autouse=True)
 def hang_up() -> Iterator[None]:
-    """No bus is left open."""
+    """Close every bus after the test."""
     yield
     while opened:
         opened.pop().close()

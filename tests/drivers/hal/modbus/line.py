@@ -1,6 +1,6 @@
-"""A serial line in sixty lines of pseudo-terminal, written from the Modbus specification.
+"""A serial line in sixty lines on a pseudo-terminal, written from the Modbus specification.
 
-Its units answer as `module.py` does, in RTU frames, at once and without wire time.
+The line's units answer as in `module.py`, in RTU frames, at once and without wire time.
 """
 
 import os
@@ -16,7 +16,7 @@ from tests.drivers.hal.modbus.module import Module, Reply
 
 
 def crc(frame: bytes) -> bytes:
-    """Modbus over Serial Line V1.02, 6.2.2: bit by bit, low byte first."""
+    """Return the CRC of Modbus over Serial Line V1.02, 6.2.2: bit by bit, low byte first."""
     value = 0xFFFF
     for byte in frame:
         value ^= byte
@@ -26,15 +26,16 @@ def crc(frame: bytes) -> bytes:
 
 
 def rtu(frame: str) -> bytes:
-    """A frame from its hexadecimal digits, with its CRC."""
+    """Return a frame with its CRC from the frame's hexadecimal digits."""
     return bytes.fromhex(frame) + crc(bytes.fromhex(frame))
 
 
 class SerialModule(Module):
-    """A module on a line. `reply` gets and gives frames with a TCP header, as the base does.
+    """A module on a line. `reply` gets and returns frames with a TCP header, as in the base class.
 
-    `on_wire`, where it is set, is asked instead: a request's frame to every byte heard after it.
-    `frames`: what was asked, as it was on the wire.
+    `on_wire`, if set, answers instead of `reply`: from a request's frame it makes every byte that
+    follows
+    on the wire. `frames` has each request as it was on the wire.
     """
 
     def __init__(self, reply: Reply | None = None) -> None:
@@ -49,7 +50,7 @@ class SerialModule(Module):
         os.write(self._pty[0], heard)
 
     def pull(self) -> None:
-        """The adapter is pulled out."""
+        """Pull the adapter out."""
         self._link.unlink()
         os.write(self._stop[1], b".")
         self._threads.pop().join()
@@ -57,7 +58,7 @@ class SerialModule(Module):
             os.close(descriptor)
 
     def plug(self) -> None:
-        """It comes back as another device, under the same path."""
+        """Plug the adapter in again, as another device under the same path."""
         self._pty = pty.openpty()
         self._stop = os.pipe()
         tty.setraw(self._pty[1])

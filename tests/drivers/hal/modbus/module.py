@@ -1,6 +1,6 @@
-"""An I/O module in fifty lines of sockets, written from the Modbus specification and not from pymodbus.
+"""An I/O module in fifty lines of sockets, written from the Modbus specification, not from pymodbus.
 
-It shows what was really asked (`asked`: each request's bytes) and can answer anything at all.
+`asked` has the bytes of each request. A test can let the module answer anything.
 """
 
 import socket
@@ -19,13 +19,13 @@ from drivers.hal.points import HalError
 from tests.waiting import at_last
 
 Reply = Callable[[bytes], bytes | None]
-"""A request's bytes to what is sent; None hangs up."""
+"""From a request's bytes to the answer's bytes; None hangs up."""
 
 
 class Module:
-    """Units with coils and inputs behind one listening socket. `reply` may be replaced.
+    """Units with coils and inputs behind one listening socket. A test may replace `reply`.
 
-    `hangs_up`: after each reply. `where`: how the bus's texts call it.
+    `hangs_up`: the module hangs up after each reply. `where` is the module's name in the bus's texts.
     """
 
     def __init__(self, reply: Reply | None = None) -> None:
@@ -46,15 +46,17 @@ class Module:
         self._threads = [self._started(self._accept)]
 
     def functions(self) -> list[int]:
-        """The function of each request so far."""
+        """Return the function of each request so far."""
         return [request[7] for request in self.asked]
 
     def units_asked(self) -> list[int]:
-        """The unit of each request so far."""
+        """Return the unit of each request so far."""
         return [request[6] for request in self.asked]
 
     def answer(self, request: bytes) -> bytes:
-        """What a module says: Modbus Application Protocol V1.1b3, 6.1, 6.2 and 6.5; else silence."""
+        """Return the answer by Modbus Application Protocol V1.1b3, 6.1, 6.2 and 6.5; other requests get
+        silence.
+        """
         unit, function, address, value = struct.unpack(">BBHH", request[6:12])
         if unit not in self.units:
             return b""
@@ -116,17 +118,17 @@ class Module:
 
 
 def frame(request: bytes, pdu: bytes) -> bytes:
-    """A reply to this request: its MBAP header with the right length, and this PDU."""
+    """Return a reply to this request: its MBAP header with the right length, and this PDU."""
     return request[:4] + struct.pack(">H", len(pdu) + 1) + request[6:7] + pdu
 
 
 def bits_reply(request: bytes, packed: bytes) -> bytes:
-    """The reply to a read of bits."""
+    """Return the reply to a read of bits."""
     return frame(request, bytes((request[7], len(packed))) + packed)
 
 
 class Time:
-    """A clock that stands still until it is told to go."""
+    """A clock that stands still until a test sets it."""
 
     def __init__(self) -> None:
         self.now = 0.0
@@ -143,31 +145,31 @@ def door(module: Module, unit: int = 1) -> None:
 
 
 def fails(bus: ModbusBus, point: str) -> str:
-    """The text of the HalError that reading this point raises."""
+    """Return the text of the HalError that reading this point raises."""
     with pytest.raises(HalError) as caught:
         bus.lines({point: None}, {}).read()
     return str(caught.value)
 
 
 def serial(port: str, ignore_echo: bool = False) -> Serial:
-    """A quick line."""
+    """Return a fast line."""
     return Serial(port=port, baudrate=115200, parity="none", stopbits=1, ignore_echo=ignore_echo)
 
 
 def proven(
     module: Module, clock: Time | None = None, *, timeout_s: float = 2.0, retries: int = 1
 ) -> ModbusBus:
-    """A bus whose unit 1 has answered once, so that it gets its retries. `asked` begins anew."""
+    """Return a bus whose unit 1 has answered once and so gets its retries; `asked` is empty again."""
     door(module)
     bus = bus_to(module.port, clock, timeout_s=timeout_s, retries=retries)
     read = bus.lines({"unit 1 discrete input 0": None}, {}).read
-    at_last(read, "the first reading", bus.insist)
+    at_last(read, "the first reading succeeds", bus.insist)
     module.asked.clear()
     return bus
 
 
 opened: list[ModbusBus] = []
-"""By `bus_to`; the conftest closes them after each test."""
+"""Buses made by `bus_to`; the conftest closes them after each test."""
 
 
 def bus_to(
@@ -179,7 +181,7 @@ def bus_to(
     ignore_echo: bool = False,
     module_watchdog: dict[str, Any] | None = None,
 ) -> ModbusBus:
-    """A bus to this port of this machine, whose pauses follow the clock and have no jitter."""
+    """Return a bus to this port of this machine, whose pauses follow the clock and have no jitter."""
     settings = ModbusSettings(
         tcp=Tcp(host="127.0.0.1", port=port) if isinstance(port, int) else None,
         serial=serial(port, ignore_echo) if isinstance(port, str) else None,

@@ -82,7 +82,7 @@ def test_a_silent_unit_gets_two_tries_and_then_one_after_each_of_ever_longer_pau
         if bus.calls > before:
             begun.append(clock.now)
     assert begun == [0.0, 0.5, 1.5, 3.5, 7.5, 15.5, 31.5, 61.5, 91.5, 121.5]
-    wait_until(lambda: len(module.asked) > len(begun), "the last request is there")
+    wait_until(lambda: len(module.asked) > len(begun), "the module has received the last request")
     assert len(module.asked) == 1 + len(begun)
 
 
@@ -90,7 +90,7 @@ def test_a_unit_that_has_never_answered_gets_one_try(module: Module) -> None:
     module.reply = lambda request: b""
     bus = bus_to(module.port, timeout_s=1.0)
     assert fails(bus, IN0).endswith("no reply within 1 s, tried 1x")
-    wait_until(lambda: module.asked, "the request is there")
+    wait_until(lambda: module.asked, "the module has received the request")
     assert len(module.asked) == 1
 
 
@@ -110,7 +110,7 @@ def test_of_two_silent_units_one_is_tried_and_the_live_ones_have_their_turn(
     silent = ["unit 2 discrete input 0", "unit 3 discrete input 0"]
     for point in silent:
         fails(bus, point)
-    wait_until(lambda: len(module.asked) == 2, "both requests are there")
+    wait_until(lambda: len(module.asked) == 2, "the module has received both requests")
     clock.now += 0.7
     module.asked.clear()
     for _ in range(2):

@@ -1,6 +1,6 @@
-"""The Modbus bus against a module of our own, on TCP and on a serial line: the same contract.
+"""The Modbus bus against our own module, on TCP and on a serial line: the same contract.
 
-What is TCP's alone is in `test_bus.py`, and the line's alone in `test_rtu.py`.
+Stories about TCP alone are in `test_bus.py`, stories about the line alone in `test_rtu.py`.
 """
 
 import pytest

@@ -1,4 +1,4 @@
-"""What modules have said, recorded: each reply is believed, or refused, as the corpus says."""
+"""Recorded replies of modules: each is believed or refused, as the corpus says."""
 
 from itertools import chain, repeat
 from pathlib import Path
@@ -24,7 +24,7 @@ OUTCOMES = {
 
 
 class Recorded(NamedTuple):
-    """One line of the corpus. `replies`: hexadecimal, one for each request."""
+    """One line of the corpus. `replies`: one for each request, in hexadecimal."""
 
     outcome: str
     replies: tuple[str, ...]
@@ -32,7 +32,7 @@ class Recorded(NamedTuple):
 
 
 def recorded(framing: str) -> list[Recorded]:
-    """The corpus of one framing."""
+    """Return the corpus of one framing."""
     text = (Path(__file__).parent / "corpus" / f"{framing}.txt").read_text("utf-8")
     lines = [line.split("|") for line in text.splitlines() if not line.startswith("#")]
     return [
@@ -46,7 +46,7 @@ def _bytes(reply: str, request: bytes = b"") -> bytes:
 
 
 def _check(module: Module, case: Recorded) -> None:
-    """The driver reads what is recorded as it should, and a sound module afterwards."""
+    """Check the driver's reading of a recorded reply, and of a healthy module afterwards."""
     clock = Time()
     bus = bus_to(module.port, clock, timeout_s=0.05 if case.outcome == "lost" else 2.0, retries=0)
     driver = create("door", DOOR, bus)
@@ -64,7 +64,7 @@ def _check(module: Module, case: Recorded) -> None:
     module.reply = module.answer
     if isinstance(module, SerialModule):
         module.on_wire = None
-    wait_until(lambda: read() == OUTCOMES["closed"], "a sound module is believed again")
+    wait_until(lambda: read() == OUTCOMES["closed"], "the healthy module is believed again")
 
 
 @pytest.mark.parametrize("case", recorded("tcp"), ids=lambda case: case.what)

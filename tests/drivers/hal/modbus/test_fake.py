@@ -1,4 +1,4 @@
-"""The real driver and bus against the fake gateway or line: each way of failing, and the door then."""
+"""The real driver and bus against the fake gateway or line: each failure, and the door afterwards."""
 
 from collections.abc import Iterator
 
@@ -26,7 +26,7 @@ HOLD, RELEASE = DoorOutputs(hold_open=True), DoorOutputs(hold_open=False)
 
 
 def door_at(unit: int) -> DryContactDoorSettings:
-    """A door's settings at this unit."""
+    """Return the settings of a door at this unit."""
     return msgspec.convert(
         {
             "inputs": {
@@ -40,7 +40,7 @@ def door_at(unit: int) -> DryContactDoorSettings:
 
 
 class Site:
-    """Two doors at units 1 and 2 of one gateway or line, and one bus to it with its own clock."""
+    """Two doors at units 1 and 2 of one gateway or line, and one bus with its own clock."""
 
     def __init__(self, serial: modbus.Serial | None) -> None:
         self.settings = {"front": door_at(1), "ward": door_at(2)}
@@ -68,7 +68,7 @@ class Site:
         }
 
     def patiently(self, name: str) -> DoorSample | str:
-        """A reading with all pauses over: the sample, or why there is none."""
+        """Return the sample after all pauses, or the error's text."""
         self.clock.now += 60.0
         try:
             return self.doors[name].read()
@@ -76,15 +76,15 @@ class Site:
             return str(error)
 
     def reads(self, name: str) -> DoorSample:
-        """A reading, as the daemon's next scan would give it."""
-        return at_last(self.doors[name].read, "a reading", self.a_moment)
+        """Return a reading, as the daemon's next scan would get."""
+        return at_last(self.doors[name].read, "the door is read", self.a_moment)
 
     def write(self, name: str, outputs: DoorOutputs) -> None:
-        """These outputs."""
-        at_last(lambda: self.doors[name].write(outputs), "written", self.a_moment)
+        """Write these outputs."""
+        at_last(lambda: self.doors[name].write(outputs), "the outputs are written", self.a_moment)
 
     def a_moment(self) -> None:
-        """Less than a unit that does not answer is left alone for."""
+        """Let time pass, but less than the pause of a silent unit."""
         self.clock.now += 1.0
 
     def close(self) -> None:
@@ -108,8 +108,8 @@ SERIAL = {
 @pytest.fixture(params=SERIAL)
 def site(request: pytest.FixtureRequest) -> Iterator[Site]:
     built = Site(SERIAL[request.param])
-    for door in built.doors.values():  # a unit that has not answered yet gets one try at a time
-        at_last(door.open, "opened", built.a_moment)
+    for door in built.doors.values():  # a unit that has never answered gets one try at a time
+        at_last(door.open, "the driver opens", built.a_moment)
     yield built
     built.close()
 
@@ -155,9 +155,9 @@ def test_each_failure_is_a_hal_error_and_the_door_is_back_afterwards(
         found.append(str(site.patiently("front")))
         return any(reason in found[-1] for reason in REASONS[part, mode])
 
-    wait_until(failing, f"{part} {mode}")
+    wait_until(failing, f"the failure {part} {mode} is reported")
     site.plants["front"].fail(part, None)
-    wait_until(lambda: site.patiently("front") == CLOSED, "the door is back")
+    wait_until(lambda: site.patiently("front") == CLOSED, "the front door reads closed again")
     assert site.patiently("ward") == CLOSED
 
 
@@ -168,7 +168,7 @@ WAYS: dict[str, dict[FailureMode, tuple[str, ...]]] = {
         "garbage": ("half a frame", "CRC of "),
     },
 }
-"""What is said of the far side as a whole in each of its ways to be wrong, or garbled."""
+"""Error texts for each failure of the whole far side."""
 
 
 @pytest.mark.parametrize("mode", ["wrong", "garbage"])
@@ -203,13 +203,13 @@ def test_a_failing_unit_does_not_keep_the_other_from_being_read(
 
 def test_the_inputs_of_a_stuck_unit_stay_as_they_were(site: Site) -> None:
     front, plant = site.doors["front"], site.plants["front"]
-    at_last(front.read, "a reading", site.a_moment)
+    at_last(front.read, "the front door is read", site.a_moment)
     plant.fail("unit", "stuck")
     site.write("front", HOLD)
     wait_until(lambda: plant.sense("opened"), "the door is open")
-    assert at_last(front.read, "a reading", site.a_moment) == CLOSED
+    assert at_last(front.read, "the stuck unit is read", site.a_moment) == CLOSED
     plant.fail("unit", None)
-    assert at_last(front.read, "a reading", site.a_moment) == OPEN
+    assert at_last(front.read, "the mended unit is read", site.a_moment) == OPEN
 
 
 def _sample_or_none(door: DryContactDoor) -> DoorSample | None:

@@ -1,4 +1,4 @@
-"""Pulses that the module times itself: frames byte for byte, one for each, and a door on them."""
+"""Pulses that the module times itself: frames byte for byte, one frame for each pulse, and a door."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -37,7 +37,7 @@ SCAN_S = 0.125
 
 
 def pulsed(on_s: float = 0.7, every_s: float = 3.0) -> DryContactDoorSettings:
-    """A door whose operator is triggered by pulses, at relay 0 of unit 1."""
+    """Return a door whose operator is triggered by pulses, at relay 0 of unit 1."""
     plain = {
         "inputs": {
             "opened": {"point": "unit 1 discrete input 0", "active": "high"},
@@ -50,7 +50,7 @@ def pulsed(on_s: float = 0.7, every_s: float = 3.0) -> DryContactDoorSettings:
 
 
 def claimed(module: Module, **settings: Any) -> DryContactDoor:
-    """The driver, claimed, with what was asked for that forgotten."""
+    """Return an opened driver; `asked` of the module is empty again."""
     door(module)
     driver = create("door", pulsed(), bus_to(module.port, **settings))
     driver.open()
@@ -61,17 +61,17 @@ def claimed(module: Module, **settings: Any) -> DryContactDoor:
 
 
 def writes(module: Module) -> list[str]:
-    """The PDU of each write so far."""
+    """Return the PDU of each write so far."""
     return [request[7:].hex() for request in module.asked if request[7] == 5]
 
 
 def loses_replies(module: Module) -> None:
-    """The module does what it is told, and nobody hears its answers to writes."""
+    """Let the module obey writes, but lose its answers to them."""
     module.reply = lambda request: b"" if request[7] == 5 else module.answer(request)
 
 
 def answers(driver: DryContactDoor, clock: Time) -> bool:
-    """Can the door be read, with all pauses over?"""
+    """Can the door be read after all pauses?"""
     clock.now += 60.0
     try:
         driver.read()
@@ -81,9 +81,10 @@ def answers(driver: DryContactDoor, clock: Time) -> bool:
 
 
 def held(module: Module, *, lost_at: float | None = None) -> list[tuple[float, str]]:
-    """Each write while RMF opens a door at 1 s and closes it at 6 s, as the loop runs core and driver.
+    """Return each write while RMF opens a door at 1 s and closes it at 6 s, in scans of core and
+    driver.
 
-    `lost_at`: the scan in which no reply to a write arrives.
+    `lost_at` is the time of the scan in which no reply to a write arrives.
     """
     clock, settings = Time(), pulsed()
     driver = claimed(module, clock=clock, timeout_s=1.0)
@@ -177,7 +178,7 @@ def test_a_pulse_whose_reply_was_lost_is_not_repeated_but_the_next_is_sent(eithe
     with pytest.raises(HalError):
         driver.write(PULSE)
     either.reply = either.answer
-    wait_until(lambda: answers(driver, clock), "the unit is asked again")
+    wait_until(lambda: answers(driver, clock), "the unit is read again")
     for _ in range(3):
         driver.open()
         driver.read()
@@ -244,7 +245,7 @@ def test_a_pulse_whose_failure_the_core_has_heard_of_is_not_repeated_either(
 
 @contextmanager
 def site(serial: modbus.Serial | None, on_s: float) -> Iterator[tuple[DryContactDoor, DoorPlant]]:
-    """The driver in front of the fake module with a quick door behind it."""
+    """Yield the driver in front of the fake module with a quick door."""
     settings = pulsed(on_s, every_s=600.0)
     plant = DoorPlant("door", wires(settings), open_s=0.05, close_s=0.05, auto_close_s=0.05)
     world = RealTime({"door": plant})
@@ -272,10 +273,10 @@ def test_the_fake_module_ends_the_pulse_by_itself_and_never_before_its_time(
     with site(serial, on_s=0.3) as (driver, plant):
         driver.write(PULSE)
         assert relay(plant) == [True]
-        wait_until(lambda: relay(plant) == [True, False], "the pulse is over")
+        wait_until(lambda: relay(plant) == [True, False], "the module ends the pulse")
         on, off = (edge.at for edge in plant.edges if edge.what == "relay")
         assert off - on >= 0.3 - 1e-6
-        wait_until(lambda: bool(driver.read().closed), "the operator has closed the door")
+        wait_until(lambda: bool(driver.read().closed), "the operator closes the door")
         driver.write(PULSE)
         assert relay(plant) == [True, False]
         driver.write(BETWEEN)
@@ -288,7 +289,7 @@ def test_the_fake_modules_pulse_is_ended_by_a_coil_that_is_written_off(
 ) -> None:
     with site(serial, on_s=300.0) as (driver, plant):
         driver.write(PULSE)
-        wait_until(lambda: bool(driver.read().opened), "the door is open")
+        wait_until(lambda: bool(driver.read().opened), "the door opens")
         driver.make_safe()
         assert relay(plant) == [True, False]
 

@@ -1,4 +1,4 @@
-"""Whatever a module sends, on TCP or on a line: only HalErrors, no door open, no pulse by mistake."""
+"""Arbitrary replies on TCP and on a line: only HalErrors, no false open door, no false pulse."""
 
 import itertools
 from collections.abc import Callable, Iterator
@@ -32,7 +32,7 @@ DOOR = msgspec.convert(
 )
 
 Spoil = Callable[[bytes, bytes], bytes | None]
-"""A request and its good reply to what is sent instead."""
+"""From a request and its good reply to the bytes that are sent instead."""
 
 
 def _flipped(good: bytes, at: int, mask: int) -> bytes:
@@ -65,7 +65,7 @@ def one_module() -> Iterator[Module]:
 
 
 class Spoiled:
-    """Answers a door that is shut, spoiled in turn; hangs up when the spoils are used up."""
+    """Answers for a closed door, each spoiled by the next spoil; hangs up after the last spoil."""
 
     def __init__(self, module: Module, spoils: list[Spoil]) -> None:
         module.inputs.update({(1, 0): False, (1, 1): True})
@@ -142,7 +142,7 @@ def one_line() -> Iterator[SerialModule]:
 
 
 class SpoiledLine:
-    """Answers a door that is shut, spoiled in turn, over and over."""
+    """Answers for a closed door, spoiled by each spoil in turn, over and over."""
 
     def __init__(self, line: SerialModule, spoils: list[Spoil]) -> None:
         line.inputs.update({(1, 0): False, (1, 1): True})
@@ -194,7 +194,7 @@ PDUS = st.one_of(*(st.binary(max_size=8).map(b.__add__) for b in (b"", b"\3\2", 
 
 @contextmanager
 def saying(sort: type[Module], pdu: bytes) -> Iterator[tuple[Module, ModbusBus]]:
-    """A module that answers everything with this, and a bus to it."""
+    """Yield a module that answers every request with this PDU, and a bus to the module."""
     module = sort(lambda request: frame(request, pdu))
     bus = bus_to(module.port, timeout_s=0.02, retries=1)
     try:
@@ -216,7 +216,7 @@ def test_a_register_reads_as_what_was_sent_or_not_at_all(sort: type[Module], pdu
         good = b"\x01\x03\x02" + pdu[2:4]
         if sort is Module:
             assert b"\x01" + pdu == good
-        else:  # a whole frame with its CRC came first; what follows one is noise of the line
+        else:  # a whole frame with its CRC came first; later bytes are noise of the line
             assert (b"\x01" + pdu + crc(b"\x01" + pdu)).startswith(good + crc(good))
 
 
@@ -235,11 +235,11 @@ def test_a_pulse_is_requested_once_and_only_its_echo_proves_it(
                 bus.flash(Point(1, "coil", 0x200), 0.7)
                 assert pdu.hex() == "0502000007"
             except HalError as error:
-                if "no Modbus TCP connection" in str(error):  # a busy machine
+                if "no Modbus TCP connection" in str(error):  # so slow is a busy machine
                     return False
-            wait_until(lambda: module.asked, "the module has read what was asked")
+            wait_until(lambda: module.asked, "the module has received the request")
             asked.extend(module.asked)
         return True
 
-    wait_until(connected, "a connection")
+    wait_until(connected, "the bus is connected")
     assert len(asked) == 1

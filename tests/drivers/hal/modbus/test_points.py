@@ -1,4 +1,4 @@
-"""How Modbus points are spelled, which wires cannot be, and what is read together."""
+"""The spelling of Modbus points, impossible wires, and points that are read together."""
 
 import re
 

@@ -1,4 +1,4 @@
-"""Registers on the wire: what is asked, byte for byte, and what is taken for an answer."""
+"""Registers on the wire: requests byte for byte, and replies that count as answers."""
 
 import struct
 
@@ -16,7 +16,7 @@ I0, COIL = Point(1, "input register", 0), Point(1, "coil", 4)
 
 
 def registers(module: Module, *words: int) -> None:
-    """Answer every read of registers with these."""
+    """Let the module answer every read of registers with these words."""
     pdu = bytes((2 * len(words),)) + struct.pack(f">{len(words)}H", *words)
     module.reply = lambda request: frame(request, request[7:8] + pdu)
 
@@ -50,9 +50,9 @@ def test_a_coil_is_written_and_read_as_one(either: Module) -> None:
     [
         "030400010002",  # two registers for one
         "0300",
-        "03020001ff",  # a byte more than it says
+        "03020001ff",  # a byte more than its count says
         "03030001ff",  # an odd number of bytes
-        "04020001",  # of another table
+        "04020001",  # a reply for another table
         "0602000900",
         "060009abcd",
     ],

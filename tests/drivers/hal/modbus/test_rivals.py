@@ -1,4 +1,6 @@
-"""Another master on our coil: named, written against less and less often, off at once."""
+"""A second master writes our coil: the error names it, our writes grow rarer, but off is written at
+once.
+"""
 
 import itertools
 import struct
@@ -30,7 +32,7 @@ NAMED = "another master writes unit 1 coil 0 too: its readings contradict the wr
 
 
 class Door:
-    """The loop's scans of a door, and another master that writes what it likes after each scan."""
+    """A door with the loop's scans, and a second master that may write after each scan."""
 
     def __init__(self, module: Module) -> None:
         module.inputs.update({(1, 0): False, (1, 1): True})
@@ -50,7 +52,7 @@ class Door:
         return decision.outputs
 
     def scan(self) -> str:
-        """One scan; what went wrong in it."""
+        """Run one scan; return its error, or ""."""
         fault = ""
         try:
             outputs = self.decide(Sampled(self.driver.read()))
@@ -71,7 +73,7 @@ class Door:
         return [self.scan() for _ in range(round(for_s / SCAN_S))]
 
     def written(self) -> list[int]:
-        """What was written to the coil since it was asked last."""
+        """Return the values written to the coil since the last call."""
         asked = [request for request in self.module.asked if request[7] == 5]
         self.module.asked.clear()
         return [struct.unpack(">H", request[10:12])[0] >> 8 & 1 for request in asked]

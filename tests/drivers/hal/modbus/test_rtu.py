@@ -1,4 +1,4 @@
-"""The Modbus bus on a serial line: frames byte for byte, and everything that a line does to them."""
+"""The Modbus bus on a serial line: frames byte for byte, and every disturbance of a line."""
 
 import os
 import threading
@@ -19,12 +19,12 @@ IS_0, IS_1 = rtu("01020100"), rtu("01020101")
 
 
 def coils(bus: ModbusBus, count: int) -> list[int]:
-    """The first coils of unit 1."""
+    """Return the first coils of unit 1."""
     return list(bus.read(ranges(parse(f"unit 1 coil {i}") for i in range(count))[0]).values())
 
 
 def test_the_frames_are_those_of_the_makers_manual(line: SerialModule) -> None:
-    """Waveshare Modbus RTU Relay: relay 0 on and off, and the state of all eight."""
+    """Waveshare Modbus RTU Relay: relay 0 on and off, and the states of all eight relays."""
     said = {
         "01050000ff008c3a": "01050000ff008c3a",
         "010500000000cdca": "010500000000cdca",
@@ -75,7 +75,7 @@ def test_a_wrong_reply_is_refused_and_the_next_reading_is_right(
     clock.now += 60.0
     lines = bus.lines({IN0: None}, {})
     bus.insist()
-    assert at_last(lines.read, "the next reading", lambda: _later(clock)) == {IN0: False}
+    assert at_last(lines.read, "the next reading succeeds", lambda: _later(clock)) == {IN0: False}
 
 
 def _later(clock: Time) -> None:
@@ -127,9 +127,9 @@ def test_a_fault_says_which_other_unit_was_heard(line: SerialModule) -> None:
 
 
 def test_the_late_reply_to_one_question_never_answers_another(line: SerialModule) -> None:
-    """A unit that is one reply behind: what it says fits each question, and belongs to the last.
+    """A unit is one reply behind: each reply looks like an answer, but belongs to the last question.
 
-    Its last reply comes when it is asked again, or a little later when it is not.
+    The unit's last reply comes when the unit is asked again, otherwise a little later.
     """
     owed: list[bytes] = []
 
@@ -148,7 +148,7 @@ def test_the_late_reply_to_one_question_never_answers_another(line: SerialModule
     bus = proven(line, Time(), timeout_s=1.0, retries=1)
     line.on_wire = one_behind
     asked = "unit 1 discrete input 5"
-    assert bus.lines({asked: None}, {}).read() == {asked: True}  # by its second try
+    assert bus.lines({asked: None}, {}).read() == {asked: True}  # the second try succeeds
     assert bus._wire.owes(1)
     assert bus.lines({IN0: None}, {}).read() == {IN0: False}
     assert [request[9] for request in line.asked] == [5, 5, 0, 0]

@@ -1,4 +1,6 @@
-"""The module's own watchdog: armed before anything is driven, refreshed by scans, armed anew."""
+"""The module's own watchdog: armed before any output is on, refreshed by scans, armed again after a
+trip.
+"""
 
 import json
 import signal
@@ -37,7 +39,7 @@ from tests.drivers.hal.modbus.module import Time
 from tests.waiting import wait_until
 
 SLOW = 600
-"""A time (x 100 ms) in which no test is late."""
+"""A time (x 100 ms) within which every test finishes."""
 
 
 def at(address: int) -> Point:
@@ -45,7 +47,7 @@ def at(address: int) -> Point:
 
 
 def habits(time: int) -> dict[str, Any]:
-    """Those of the profile, with another time (x 100 ms)."""
+    """Return the profile's watchdog with another time (x 100 ms)."""
     plain: dict[str, Any] = msgspec.to_builtins(PROFILE.load("wago-750"))
     plain["arm"][0]["value"] = time
     plain["armed"][0]["values"] = [time]
@@ -53,7 +55,7 @@ def habits(time: int) -> dict[str, Any]:
 
 
 class Site:
-    """A door at a module with a watchdog; `bus` may be another daemon's after `restart`."""
+    """A door at a module with a watchdog; after `restart` the bus is another daemon's."""
 
     def __init__(self, time: int = SLOW, units: tuple[int, ...] = (1,)) -> None:
         self.settings = dry(("unit 1 discrete input 0", "unit 1 discrete input 1", "unit 1 coil 0"))
@@ -67,7 +69,7 @@ class Site:
         self.restart()
 
     def restart(self) -> None:
-        """A new daemon."""
+        """Start a new daemon's bus and driver."""
         plain = {"type": "modbus", "module_watchdog": self.dog, **self.server.replace}
         clock = Time()
         self.bus = modbus.ModbusBus(msgspec.convert(plain, modbus.ModbusSettings), clock)
@@ -79,7 +81,7 @@ class Site:
         return self.dead_men[0].get(at(address), 0.0)
 
     def scan(self) -> str:
-        """Like the loop's: read, write, and the scan is over; why it failed, if it did."""
+        """Read, write and end the scan, like the loop; return the error's text, or ""."""
         self.bench.clock.now += 60.0
         try:
             self.bench.driver.read()
@@ -130,8 +132,8 @@ def test_without_scans_the_module_lets_go_by_itself() -> None:
     try:
         site.bench.driver.open()
         site.bench.driver.write(HOLD)
-        wait_until(lambda: site.bench.relay() == [True, False], "the module has let go")
-    except DriverError:  # it was quicker than we were
+        wait_until(lambda: site.bench.relay() == [True, False], "the module drops its outputs")
+    except DriverError:  # the watchdog was faster than the test
         assert site.register(STATE) == TRIPPED
     finally:
         site.close()
@@ -140,25 +142,25 @@ def test_without_scans_the_module_lets_go_by_itself() -> None:
 def test_a_trip_makes_the_outputs_unknown_and_the_door_is_held_again(site: Site) -> None:
     site.bench.driver.open()
     site.scan()
-    wait_until(lambda: site.bench.ends() == OPEN, "open")
+    wait_until(lambda: site.bench.ends() == OPEN, "the held door reads open")
     site.dead_men[0].expire()
-    wait_until(lambda: site.bench.relay() == [True, False], "the module has let go")
+    wait_until(lambda: site.bench.relay() == [True, False], "the module drops its outputs")
     failures: list[str] = []
 
     def held_again() -> bool:
         failures.append(site.scan())
         return failures[-1] == "" and site.bench.relay() == [True, False, True]
 
-    wait_until(held_again, "held again")
+    wait_until(held_again, "the door is held again")
     assert "watchdog tripped and switched its outputs off; it is armed again" in "".join(failures)
     assert site.register(STATE) == RUNNING
-    wait_until(lambda: site.bench.ends() == OPEN, "open again")
+    wait_until(lambda: site.bench.ends() == OPEN, "the door reads open again")
 
 
 def test_a_trip_that_nobody_drives_through_is_seen_by_reading_back(site: Site) -> None:
     site.bench.driver.open()
     site.dead_men[0].expire()
-    wait_until(lambda: site.register(STATE) == TRIPPED, "tripped")
+    wait_until(lambda: site.register(STATE) == TRIPPED, "the watchdog has tripped")
     site.bench.clock.now += 60.0
     site.bus.scanned()
     with pytest.raises(DriverError, match="watchdog tripped"):
@@ -170,7 +172,7 @@ def test_a_trip_that_nobody_drives_through_is_seen_by_reading_back(site: Site) -
 def test_a_module_that_an_earlier_daemon_left_tripped_is_armed_again(site: Site) -> None:
     site.bench.driver.open()
     site.dead_men[0].expire()
-    wait_until(lambda: site.register(STATE) == TRIPPED, "tripped")
+    wait_until(lambda: site.register(STATE) == TRIPPED, "the watchdog has tripped")
     site.restart()
     site.bench.driver.open()
     assert (site.register(STATE), site.register(RESTART)) == (RUNNING, 1)
@@ -179,7 +181,7 @@ def test_a_module_that_an_earlier_daemon_left_tripped_is_armed_again(site: Site)
 def test_a_watchdog_that_runs_already_is_left_running(site: Site) -> None:
     site.bench.driver.open()
     site.restart()
-    site.bench.driver.open()  # setting its time while it runs would be refused
+    site.bench.driver.open()  # setting the watchdog's time while it runs would be refused
     assert site.register(STATE) == RUNNING
 
 

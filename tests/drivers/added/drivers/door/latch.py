@@ -1,4 +1,4 @@
-"""A door with a latch that is released, and one contact that sees it shut: one file is all of it."""
+"""A door whose latch is released, and whose one contact sees the door shut: a driver in one file."""
 
 from bridges.kinds.door.settings import DoorSettings
 from bridges.kinds.door.signals import DoorOutputs, DoorSample
@@ -14,7 +14,7 @@ class Settings(DoorSettings, frozen=True, kw_only=True, forbid_unknown_fields=Tr
 
 
 def wires(settings: Settings) -> list[Wire]:
-    """The table."""
+    """Return the wiring table."""
     shut, latch = settings.shut, settings.latch
     return [
         Wire("closed", "in", shut.point, shut.active, shut.pull, 0.05, ("shut",)),
@@ -30,16 +30,16 @@ class Door:
         self.open, self.make_safe, self.close = points.open, points.make_safe, points.close
 
     def read(self) -> DoorSample:
-        """Every input, read now."""
+        """Read every input now."""
         return DoorSample(closed=self._points.read()["closed"])
 
     def write(self, outputs: DoorOutputs) -> None:
-        """The latch."""
+        """Switch the latch."""
         self._points.write({"hold_open": outputs.hold_open})
 
 
 def create(name: str, settings: Settings, bus: PointsBus) -> Door:
-    """One door on its bus."""
+    """Return one door on its bus."""
     return Door(Points(wires(settings), bus))
 
 

@@ -1,4 +1,4 @@
-"""A door that is asked and told in words."""
+"""A door that takes questions and commands in words."""
 
 from typing import Protocol
 
@@ -12,11 +12,11 @@ class Asks(Protocol):
     """A bus that takes questions in words."""
 
     def ask(self, question: str) -> str:
-        """One answer. Raises HalError."""
+        """Return one answer. Raises HalError."""
 
 
 class Settings(DoorSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A door by the name that it has on its line."""
+    """A door, by the door's name on the line."""
 
     called: Name
 
@@ -29,24 +29,24 @@ class LineDoor:
         self._bus = bus
 
     def open(self) -> None:
-        """It is let go."""
+        """Release the door."""
         self.make_safe()
 
     def read(self) -> DoorSample:
-        """Its limits."""
+        """Read both limits."""
         where = self._bus.ask(f"{self._name} where")
         return DoorSample(opened=where == "open", closed=where == "closed")
 
     def write(self, outputs: DoorOutputs) -> None:
-        """Hold it or let it go."""
+        """Hold or release the door."""
         self._bus.ask(f"{self._name} {'hold' if outputs.hold_open else 'release'}")
 
     def make_safe(self) -> None:
-        """Let it go."""
+        """Release the door."""
         self._bus.ask(f"{self._name} release")
 
     def close(self) -> None:
-        """Nothing is left to do."""
+        """Do nothing: the connections are closed already."""
 
 
 DRIVER = DriverType(

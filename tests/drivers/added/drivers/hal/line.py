@@ -1,4 +1,4 @@
-"""A controller that is asked in lines of text on TCP, a connection for each."""
+"""A controller that answers lines of text on TCP, one connection for each line."""
 
 import socket
 from typing import Annotated
@@ -10,7 +10,7 @@ from drivers.hal import Bus, BusType, HalError
 
 
 class Settings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Where it listens."""
+    """The controller's address."""
 
     host: Name
     port: Annotated[int, msgspec.Meta(ge=1, le=65535)] = 4000
@@ -18,13 +18,13 @@ class Settings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
 
 
 class LineBus(Bus):
-    """The way to it."""
+    """Connections to the controller."""
 
     def __init__(self, settings: Settings) -> None:
         self._address = (settings.host, settings.port)
 
     def ask(self, question: str) -> str:
-        """One line for one line."""
+        """Send a line; return the answering line."""
         try:
             with socket.create_connection(self._address, 1.0) as wire:
                 wire.sendall(f"{question}\n".encode())

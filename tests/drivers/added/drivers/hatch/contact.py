@@ -1,4 +1,4 @@
-"""A hatch on contacts, as a door's."""
+"""A hatch on contacts, wired like a door."""
 
 from msgspec.structs import replace
 

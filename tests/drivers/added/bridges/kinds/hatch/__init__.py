@@ -1,4 +1,4 @@
-"""Hatches: to RMF they are doors, with a section of their own in the YAML."""
+"""Hatches: doors for RMF, with their own section of the YAML."""
 
 from msgspec.structs import replace
 
