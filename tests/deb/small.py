@@ -1,7 +1,7 @@
 """Small packages with our own maintainer scripts, and a root into which the real dpkg installs them.
 
-What the scripts call is real but for systemd: `systemctl` keeps a file for each unit. Each command that
-changes something counts, and at a chosen one everything is killed, dpkg included, as by a power cut.
+The scripts call real commands except `systemctl`, which keeps a file for each unit. Each command that
+changes something is counted; at a chosen count everything is killed, dpkg included, as by a power cut.
 """
 
 import os
@@ -55,7 +55,7 @@ esac
 
 
 def package(folder: Path, version: str, modules: Collection[str], *, old: bool = False) -> Path:
-    """A package of ours. `old`: as before 0.1.0+r, when dpkg owned the tree."""
+    """Return one of our packages. `old`: as before 0.1.0+r, when dpkg owned the tree."""
     work = folder / version
     tree = work / LIB if old else work.with_suffix(".tree")
     (tree / "bin").mkdir(parents=True)
@@ -73,14 +73,14 @@ def package(folder: Path, version: str, modules: Collection[str], *, old: bool =
 
 
 def archived(work: Path, tree: Path) -> None:
-    """Put this tree into a package, as deb/build.sh does."""
+    """Put this tree into a package as deb/build.sh does."""
     (work / LIB / "bin").mkdir(parents=True)
     (work / LIB / "bin/rmf-bridge").symlink_to("../current/bin/rmf-bridge")
     shutil.make_archive(str(work / LIB / "tree"), "xztar", tree)
 
 
 def built(work: Path, name: str, version: str, *more: str, scripts: bool = True) -> Path:
-    """The package of what is in this folder, with `more` fields, and with our maintainer `scripts`."""
+    """Return the package built from this folder, with `more` fields and our maintainer `scripts`."""
     fields = (f"Package: {name}", f"Version: {version}", "Architecture: all", *more)
     control = "\n".join((*fields, "Maintainer: n <n@n>", "Description: small", ""))
     (work / "DEBIAN").mkdir(parents=True)
@@ -101,7 +101,7 @@ def _replace(file: Path, text: str) -> None:
 
 
 class System:
-    """A root directory with services, on a systemd that keeps files."""
+    """A root directory with services, on a systemd that only keeps files."""
 
     def __init__(self, folder: Path) -> None:
         self.root, self.fakes = folder / "root", folder / "fakes"
@@ -127,7 +127,7 @@ class System:
         (self.fakes / "bin" / name).chmod(0o755)
 
     def service(self, name: str, state: str = "active") -> None:
-        """A service that `enable` has made."""
+        """Make a service as `enable` does."""
         (self.root / f"etc/rmf-bridges/{name}.yaml").write_text("kind: lift\n")
         self.drop_in(name).parent.mkdir(parents=True)
         self.drop_in(name).write_text("drop-in of nothing\n")
@@ -137,18 +137,18 @@ class System:
         return self.root / f"etc/systemd/system/rmf-bridge@{name}.service.d/10-enable.conf"
 
     def unit(self, name: str) -> Path:
-        """The file that has the state of this service."""
+        """Return the file with the state of this service."""
         return self.fakes / f"units/rmf-bridge@{name}.service"
 
     def states(self) -> dict[str, str]:
-        """Each service, and its state."""
+        """Return the state of each service."""
         return {
             path.name.partition("@")[2].removesuffix(".service"): path.read_text().strip()
             for path in sorted((self.fakes / "units").glob("rmf-bridge@*"))
         }
 
     def dpkg(self, *words: str | Path, cut: int = 0) -> subprocess.CompletedProcess[str]:
-        """Run dpkg; `cut`: at which counted command all of it is killed."""
+        """Run dpkg; `cut` is the number of the counted command at which everything is killed."""
         (self.fakes / "count").unlink(missing_ok=True)
         (self.fakes / "cut").write_text(str(cut))
         force = [f"--force-{each}" for each in FORCE]
@@ -162,29 +162,29 @@ class System:
         return done
 
     def fails(self, name: str) -> Callable[[], None]:
-        """Let a command fail, as on a full disk; returns what mends it."""
+        """Let a command fail, as on a full disk; return a function that mends the command."""
         file = self.fakes / "bin" / name
         real = file.read_text()
         file.write_text("#!/bin/sh\nexit 1\n")
         return partial(_replace, file, real)
 
     def called(self) -> list[str]:
-        """What systemctl was told."""
+        """Return the calls of systemctl."""
         return (self.fakes / "calls").read_text().splitlines()
 
     def counted(self) -> int:
-        """How many commands the last dpkg has counted."""
+        """Return the number of commands counted in the last run of dpkg."""
         return int((self.fakes / "count").read_text())
 
     def off(self) -> str:
-        """What `outputs-off` says now: its version, and the modules of its tree."""
+        """Return the output of `outputs-off`: its version, and the modules of its tree."""
         done = subprocess.run(
             [self.root / LIB / "bin/rmf-bridge", "outputs-off"], capture_output=True
         )
         return (done.stdout + done.stderr).decode().strip()
 
     def status(self) -> str:
-        """The package's state and version, as dpkg has it."""
+        """Return the package's state and version from dpkg."""
         words = ["dpkg-query", f"--admindir={self.root}/var/lib/dpkg", "-W"]
         text = "${db:Status-Abbrev}${Version}"
         return subprocess.run([*words, "-f", text], capture_output=True, text=True).stdout

@@ -1,6 +1,6 @@
-"""The daemons' package alone, with the workbench's beside it, and with one of another version.
+"""The daemons' package alone, with the workbench's package, and with a workbench of another version.
 
-The tree is our own code on the libraries of the tests' environment, installed by the real dpkg.
+The tree has our own code and the libraries of the tests' environment. The real dpkg installs the tree.
 """
 
 import os
@@ -30,7 +30,7 @@ sys.exit(main())
 
 
 def daemons(folder: Path, version: str) -> Path:
-    """rmf-bridges, whose tree has our code."""
+    """Return the package rmf-bridges, whose tree has our code."""
     work, tree = folder / version, folder / f"{version}.tree"
     for name in ("bridges", "drivers"):
         shutil.copytree(ROOT / name, tree / SITE / name)
@@ -54,7 +54,7 @@ def workbench(folder: Path, version: str) -> Path:
 
 
 Debs = dict[str, tuple[Path, Path]]
-"""Of each version the daemons and the workbench."""
+"""Version -> the packages of the daemons and of the workbench."""
 
 
 @pytest.fixture(scope="module")
@@ -64,7 +64,7 @@ def debs(tmp_path_factory: pytest.TempPathFactory) -> Debs:
 
 
 def ask(made: System, *words: str | Path, **also: str) -> subprocess.CompletedProcess[str]:
-    """What the installed `rmf-bridge` says."""
+    """Run the installed `rmf-bridge`; return the finished process."""
     command = [made.root / "usr/lib/rmf-bridges/bin/rmf-bridge", *words]
     env = {**os.environ, "HOME": str(made.root), **also}
     env.pop("PYTHONPATH", None)
@@ -76,7 +76,7 @@ def code(made: System, *words: str | Path) -> int:
 
 
 def completed(made: System, typed: str) -> list[str]:
-    """What a shell offers after this."""
+    """Return the words that a shell offers after these typed words."""
     told = made.root / "told"
     line = {"COMP_LINE": typed, "COMP_POINT": str(len(typed)), "_ARGCOMPLETE": "1"}
     asked = {"_ARGCOMPLETE_STDOUT_FILENAME": str(told), "_ARGCOMPLETE_IFS": "\n"}
@@ -89,7 +89,7 @@ def how(version: str) -> str:
 
 
 def serves(made: System) -> bool:
-    """Whether the daemons' commands work, and those of the workbench say what to install."""
+    """Do the daemons' commands work, and does each workbench command name the package to install?"""
     for asked in (("check", LIFT), ("outputs-off", NO_OUTPUTS), ("--help",)):
         assert code(made, *asked) == 0
     for words in (("watch",), ("walk", "--help"), ("run", "--simulate", LIFT)):

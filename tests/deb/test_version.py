@@ -1,4 +1,4 @@
-"""setup.py names the commit in the version, so that a mended package is a newer one."""
+"""setup.py names the commit in the version, so that a mended package has a newer version."""
 
 import shutil
 import subprocess

@@ -1,4 +1,4 @@
-"""deb/wheels.py fills a package's site-packages from wheels, here from two made by hand."""
+"""deb/wheels.py fills a package's site-packages from wheels; here from wheels made by the tests."""
 
 import subprocess
 import sys
@@ -9,7 +9,7 @@ WHEELS = Path(__file__).parents[2] / "deb/wheels.py"
 
 
 def wheel(folder: Path, name: str, *needs: str) -> Path:
-    """A wheel of one module, with these requirements."""
+    """Make a wheel of one module, with these requirements."""
     path = folder / f"{name}-1.0-py3-none-any.whl"
     about = f"{name}-1.0.dist-info"
     requires = "".join(f"Requires-Dist: {need}\n" for need in needs)
@@ -26,7 +26,7 @@ def wheel(folder: Path, name: str, *needs: str) -> Path:
 
 
 def fill(tmp_path: Path, arch: str, *options: str) -> Path:
-    """Fill a site-packages for this architecture; returns it."""
+    """Fill a site-packages for this architecture; return the folder."""
     for each in ("for_arm", "for_pc"):
         wheel(tmp_path, each)
     first = wheel(

@@ -1,4 +1,4 @@
-"""The five ways in which a wire fails, as histories of what its far end shows."""
+"""The five failures of a wire, as histories of the level at its far end."""
 
 from typing import Any
 
@@ -14,7 +14,7 @@ def wire(active: Any = "high", pull: Any = "down", direction: Any = "in") -> Wir
 
 
 def shown(contact: Contact, fed: str, step: float = 1.0) -> str:
-    """What is seen at each second while this is fed: 1 is asserted."""
+    """Return the level at the far end at each second for these fed levels: 1 is asserted."""
     seen = ""
     for i, value in enumerate(fed):
         contact.feed(value == "1", i * step)

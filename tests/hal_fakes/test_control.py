@@ -1,4 +1,4 @@
-"""The control socket, with a running world behind it."""
+"""The control socket of a running world."""
 
 import socket
 import time
@@ -21,7 +21,7 @@ QUICK = LiftPace(floor_s=0.02, door_s=0.02, agv_s=0.02, dwell_s=0.02)
 
 
 class World:
-    """A lift that runs, and its control socket."""
+    """A running lift and its control socket."""
 
     def __init__(self, path: Path) -> None:
         self.lift = LiftPlant("Lift1", shipped(), QUICK)
@@ -106,7 +106,7 @@ def test_a_caller_who_leaves_or_never_reads_does_not_stop_the_plants(world: Worl
     world.callers.remove(gone)
     plant = world.running.plants["Lift1"]
     told = 0
-    while told < 2000:  # many times what a socket keeps for a caller who does not read
+    while told < 2000:  # far more than a socket keeps for a caller who does not read
         for i in range(50):
             plant.drive("door_open", i % 2 == 0, time.monotonic())
         told += len(list(islice(well.edges(), 50)))

@@ -1,4 +1,4 @@
-"""The far side of a bus in a process of its own: it serves, and it never outlives the daemon."""
+"""The far side of a bus in its own process: it serves, and never outlives the daemon."""
 
 import json
 import signal
@@ -129,6 +129,7 @@ def test_a_far_side_that_cannot_start_is_a_hal_error_and_says_why(
     with pytest.raises(HalError, match=r"^the simulated far side of bus module did not start"):
         simulation.open_bus("module")
     wait_until(
-        lambda: "cannot make the plant's control socket" in capfd.readouterr().err, "its log"
+        lambda: "cannot make the plant's control socket" in capfd.readouterr().err,
+        "the far side's log names the error",
     )
     simulation.close()

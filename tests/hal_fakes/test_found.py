@@ -1,4 +1,4 @@
-"""Whatever a record names as its fake is there, so that every driver and every bus can be simulated."""
+"""Each fake named by a driver or a bus exists, so that every driver and every bus can be simulated."""
 
 from importlib import import_module
 

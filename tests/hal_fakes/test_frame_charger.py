@@ -1,4 +1,4 @@
-"""The fake charger on CAN frames: what keeps it charging."""
+"""The fake charger on CAN frames charges only while frames feed it."""
 
 import can
 import msgspec
@@ -30,7 +30,7 @@ class Bench:
         self.driver.open()
 
     def passes(self, seconds: float, fed: bool) -> None:
-        """Time passes; the charger looks at the bus all the while."""
+        """Let time pass while the charger looks at the bus; `fed`: the driver sends its frames."""
         until = self.far.now + seconds
         while self.far.now < until:
             self.far.now += STATUS_S / 2

@@ -1,4 +1,4 @@
-"""`run --simulate` below the daemon: real buses, with fakes on the far side, in real time."""
+"""`run --simulate` without the daemon: real buses, with fakes on the far side, in real time."""
 
 import threading
 from collections.abc import Callable, Iterator
@@ -20,7 +20,7 @@ CONFIG = SHIPPED.parent
 
 
 class SimulatedLift:
-    """The shipped lift, at a quick pace, as the daemon has it."""
+    """The shipped lift at a fast pace, opened as the daemon opens it."""
 
     def __init__(self, simulation: Simulation, config: Config) -> None:
         self.bus = simulation.open_bus("header")
@@ -31,7 +31,7 @@ class SimulatedLift:
         self.driver.open()
 
     def until(self, reached: Callable[[LiftSample], bool]) -> LiftSample:
-        """Read at each edge, as the loop does, until this is seen."""
+        """Read at each edge, as the loop does, until the sample is as wanted."""
         while not reached(sample := self.driver.read()):
             assert self._edge.wait(PATIENCE_S), f"no edge for long after {sample}"
             self._edge.clear()

@@ -22,21 +22,21 @@ Event = tuple[float, str, object]
 
 
 def shipped() -> DryContactLiftSettings:
-    """The shipped example of `config/`."""
+    """Return the shipped lift of `config/`."""
     settings = load(SHIPPED).devices["Lift1"]
     assert isinstance(settings, DryContactLiftSettings)
     return settings
 
 
 def lift(**changes: Any) -> LiftPlant:
-    """A lift with three landings (B1, G, 1), wired as `tests/drivers/lift/wirings.py` says."""
+    """Return a lift with three landings (B1, G, 1), wired as in `tests/drivers/lift/wirings.py`."""
     plant = LiftPlant("lift", msgspec.convert(whole(**changes), DryContactLiftSettings), PACE)
     plant.advance(0.0)
     return plant
 
 
 def history(plant: LiftPlant, *without: str) -> list[Event]:
-    """(s, signal, value) of every edge; what is `without` is not listed."""
+    """Return (s, signal, value) of every edge, except for the signals in `without`."""
     skipped = tuple(without)
     return [(round(e.at, 6), e.signal, e.value) for e in plant.edges if e.signal not in skipped]
 
@@ -56,7 +56,7 @@ class WiredLift:
         self.driver.open()
 
     def at(self, now: float) -> LiftSample:
-        """Let it run until `now`, and read every input."""
+        """Let the lift run until `now`, and read every input."""
         self.now = now
         self.factory.show(now)
         return self.driver.read()

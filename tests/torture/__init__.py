@@ -1,1 +1,3 @@
-"""docs/explanation/reliability.md: real daemons, hurt from outside, on loopback (`make torture`)."""
+"""Disturbs real daemons from outside, on loopback (`make torture`); see
+docs/explanation/reliability.md.
+"""

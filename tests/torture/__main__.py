@@ -1,6 +1,6 @@
 """`python -m tests.torture --seed 7`: the table of reliability.md in ten minutes, on loopback.
 
-Exit code 1, and what happened, when a relay stayed on or a daemon died of what may not end one.
+Exit code 1 if a relay stayed on, or if a daemon died of a disturbance that it must survive.
 """
 
 import argparse
@@ -33,7 +33,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("--recordings", type=int, default=300, help="that decode and are wrong")
     parser.add_argument("--forged-s", type=float, default=20.0, help="on each wire")
     options = parser.parse_args(argv)
-    signal.signal(signal.SIGHUP, signal.SIG_DFL)  # the daemons heed a nohup that they inherit
+    signal.signal(
+        signal.SIGHUP, signal.SIG_DFL
+    )  # the daemons would inherit an ignored SIGHUP (nohup), and obey that
     seed = secrets.randbelow(10**6) if options.seed is None else options.seed
     began, table, failed = time.monotonic(), Table(), list[str]()
     with tempfile.TemporaryDirectory(prefix="rmf-bridges-") as base:

@@ -1,4 +1,4 @@
-"""DDS hurt from outside: names of ten megabytes, and a network that goes away."""
+"""Disturbances of DDS: names of ten megabytes, and a network that goes away."""
 
 import re
 import shutil
@@ -29,11 +29,13 @@ NAMES = {"10 MB": 10_000_000, "1 MB": 1_000_000, "60 kB": 60_000}
 LOSSES_S = (9.0, 12.0, 20.0)
 BACK_S = 3.0
 DOMAIN = 5
-"""In a network namespace of its own."""
+"""Domain for the tests in their own network namespace."""
 
 
 def long_names(directory: Path, each_s: float, table: Table) -> None:
-    """Forgers write on every topic that a daemon hears: it stays below its unit's limit, and serves."""
+    """Forge samples on every topic that a daemon hears; each daemon stays below its limit, and
+    serves.
+    """
     for shown, length in NAMES.items():
         found = [_flooded(directory / f"{one}-{length}", one, length, each_s) for one in DAEMONS]
         most_mib = max(mib for mib, _ in found)
@@ -44,7 +46,7 @@ def long_names(directory: Path, each_s: float, table: Table) -> None:
 
 
 def _flooded(directory: Path, name: str, length: int, each_s: float) -> tuple[float, int]:
-    """The most memory (MiB) of a daemon while forgers write, and how many samples they wrote."""
+    """Return a daemon's peak memory (MiB) while forgers write, and the number of forged samples."""
     directory.mkdir(parents=True)
     with domain_for_a_while() as domain:
         file = _on_loopback(name, directory, domain)
@@ -76,14 +78,14 @@ def _forge(domain: int, length: int, each_s: float) -> int:
 
 
 def _most_mib(pid: int) -> float:
-    """The most memory that a process has had resident."""
+    """Return the peak resident memory of a process (MiB)."""
     found = re.search(r"VmHWM:\s+(\d+) kB", Path(f"/proc/{pid}/status").read_text())
     assert found
     return int(found[1]) / 1024
 
 
 def lost_network(table: Table) -> None:
-    """`lo` goes down, and comes back: our states are heard soon, by a node with RMF's defaults."""
+    """Take `lo` down and up; a node with RMF's defaults must soon hear our states again."""
     inside = f"ip link set lo up && exec {sys.executable} -m tests.torture.dds"
     alone = shutil.which("unshare")
     if not alone or subprocess.run([alone, "-n", "true"], capture_output=True).returncode:
@@ -112,7 +114,7 @@ def _in_the_namespace() -> None:
 
         for loss_s in LOSSES_S:
             first = sent + 1
-            wait_until(echoed, "they hear each other")
+            wait_until(echoed, "the two nodes hear each other")
             subprocess.run(["ip", "link", "set", "lo", "down"], check=True)
             time.sleep(loss_s)
             subprocess.run(["ip", "link", "set", "lo", "up"], check=True)

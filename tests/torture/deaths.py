@@ -1,4 +1,4 @@
-"""Deaths and shortages of one door's daemon on a real Modbus server whose relay is looked at."""
+"""Deaths and shortages of a door's daemon on a real Modbus server; the server's relay is watched."""
 
 import os
 import random
@@ -23,7 +23,7 @@ PATIENCE_S = 60.0
 
 
 class Door:
-    """A module on the wall, and an RMF that never stops to ask for OPEN."""
+    """A module on the wall, and an RMF that asks for OPEN all the time."""
 
     def __init__(self, directory: Path, domain: int) -> None:
         directory.mkdir()
@@ -39,18 +39,18 @@ class Door:
         return self.module.relay()[-1:] == [True]
 
     def daemon(self, **env: str) -> Daemon:
-        """A daemon that has just been started."""
+        """Start a daemon."""
         self.graph.states.clear()
         return Daemon(self.module.file, self.run, **env)
 
     def held(self) -> Daemon:
-        """A daemon with its relay on, and a unit behind it."""
+        """Start a daemon as a service, and wait until its relay is on."""
         running = self.daemon(**SERVICE)
         wait_until(self.is_on, "the relay holds the door", PATIENCE_S)
         return running
 
     def outputs_off(self, **env: str) -> int:
-        """Run outputs-off as the systemd unit does; its exit code."""
+        """Run outputs-off as the systemd unit does; return the exit code."""
         off = command("outputs-off", self.module.file, "--runtime-dir", self.run)
         environ = environment(**(SERVICE | env))
         return subprocess.run(off, env=environ, capture_output=True).returncode
@@ -73,7 +73,7 @@ class Door:
 
 @contextmanager
 def door(directory: Path) -> Iterator[Door]:
-    """One door, until the end of the block."""
+    """Yield one door, until the end of the block."""
     with domain_for_a_while() as domain:
         standing = Door(directory, domain)
         try:
@@ -83,7 +83,7 @@ def door(directory: Path) -> Iterator[Door]:
 
 
 def kills(directory: Path, rng: random.Random, times: int, table: Table) -> None:
-    """kill -9 at random points of a daemon's life; every other one by hand, with a guard."""
+    """Kill a daemon with -9 at random moments; every second daemon is started by hand, with a guard."""
     pause = threading.Event()
     with door(directory) as here:
         for n in range(times):
@@ -98,7 +98,9 @@ def kills(directory: Path, rng: random.Random, times: int, table: Table) -> None
             running.end(signal.SIGKILL)
             if not by_hand:
                 assert here.outputs_off() == 0
-            wait_until(lambda: not here.is_on() and _released(here.run), "off", PATIENCE_S)
+            wait_until(
+                lambda: not here.is_on() and _released(here.run), "the relay is off", PATIENCE_S
+            )
             way = "its guard" if by_hand else "outputs-off"
             table.count(f"kill -9, then {way}", "relay off" + (", had been on" if was_on else ""))
 
@@ -108,7 +110,7 @@ def _released(run: Path) -> bool:
 
 
 def signals(directory: Path, table: Table) -> None:
-    """Each signal that would end or suspend a process, with the relay on."""
+    """Send each signal that would end or suspend a process, while the relay is on."""
     with door(directory) as here:
         for number in sorted(ENDING - set(range(signal.SIGRTMIN + 1, signal.SIGRTMAX))):
             code = here.held().end(number)
@@ -117,7 +119,7 @@ def signals(directory: Path, table: Table) -> None:
 
 
 def shortages(directory: Path, rng: random.Random, times: int, table: Table) -> None:
-    """A daemon that holds a door lives through each, and ends in good order."""
+    """Let a daemon that holds a door live through each shortage, and then shut down cleanly."""
     with door(directory) as here:
         running = here.held()
         hurts: dict[str, Callable[[Door, int], None]] = {
@@ -153,4 +155,4 @@ def _suspended(here: Door, pid: int) -> None:
 def _removed(here: Door, pid: int) -> None:
     shutil.rmtree(here.run, ignore_errors=True)
     here.states_go_on()
-    wait_until((here.run / "status.json").exists, "the directory is there again", PATIENCE_S)
+    wait_until((here.run / "status.json").exists, "the removed directory exists again", PATIENCE_S)

@@ -1,4 +1,4 @@
-"""Forged bytes on each wire for a fixed time. The daemon lives, says little, and ends when told."""
+"""Forged bytes on each wire for a fixed time. The daemon lives, logs little, and ends when told."""
 
 import os
 import pty
@@ -22,11 +22,11 @@ from tests.torture.table import Table
 SERVICE = {"RMF_BRIDGE_SERVICE": "1"}
 SERIAL = r"/dev/serial/by-id/[^ ,}\n]*"
 LINES_MOST = 200
-"""More lines than this would be a log that strangers fill."""
+"""Most lines of a log that strangers must not be able to fill."""
 
 
 class Liar:
-    """Answers whatever comes with bytes of its own, until it is closed. `count`: of answers."""
+    """Answers everything with forged bytes until it is closed. `count` is the number of answers."""
 
     def __init__(self, rng: random.Random) -> None:
         self.count = 0
@@ -44,14 +44,14 @@ class Liar:
         raise NotImplementedError
 
     def _forged(self, heard: bytes) -> bytes:
-        """Often begins like a true answer, and never is one to the end."""
+        """Return bytes that often begin like a true answer but never are a whole true answer."""
         self.count += 1
         forged = heard[: self._rng.randrange(12)] + self._rng.randbytes(self._rng.randrange(1, 40))
         return b"HTTP/1.1 200 OK\r\n" + forged if heard.startswith(b"GET") else forged
 
 
 class TcpLiar(Liar):
-    """A server: Modbus TCP, or HTTP."""
+    """A forging server of Modbus TCP or HTTP."""
 
     def __init__(self, rng: random.Random) -> None:
         self._server = socket.create_server(("127.0.0.1", 0))
@@ -82,7 +82,7 @@ class TcpLiar(Liar):
 
 
 class LineLiar(Liar):
-    """The other end of a serial line: Modbus RTU, or CAN behind slcan."""
+    """A forger at the other end of a serial line: Modbus RTU, or CAN behind slcan."""
 
     def __init__(self, rng: random.Random) -> None:
         self._far, near = pty.openpty()
@@ -106,7 +106,9 @@ class LineLiar(Liar):
 
 
 class DatagramLiar(Liar):
-    """On DDS: messages that begin like RTPS, to every port of the domain's first processes."""
+    """A forger on DDS: sends messages that begin like RTPS to every port of the domain's first
+    processes.
+    """
 
     def __init__(self, rng: random.Random, domain: int) -> None:
         self._domain = domain
@@ -128,7 +130,7 @@ class DatagramLiar(Liar):
 
 
 def forged(directory: Path, rng: random.Random, each_s: float, table: Table) -> None:
-    """Send forged traffic on one wire after the other, for `each_s` seconds on each."""
+    """Send forged traffic for `each_s` seconds on each wire in turn."""
     for name, begin in WIRES.items():
         here = directory / name.replace(" ", "_")
         here.mkdir(parents=True)
@@ -182,7 +184,7 @@ def _line(name: str, place: str) -> Callable[[random.Random, int], tuple[Liar, s
 
 
 def _shipped(name: str, domain: int, place: str, there: str) -> str:
-    """A shipped YAML, on loopback, with its bus at the liar."""
+    """Return a shipped YAML on loopback, with its bus pointed at the forger."""
     text = (ROOT / "config" / name).read_text()
     rmf = f"rmf: {{transport: dds, network: localhost, domain_id: {domain}}}\n"
     text = re.sub(r"^rmf:\n(  .*\n)*", rmf, text, flags=re.MULTILINE)

@@ -1,18 +1,18 @@
-"""What was injected, how often, and what happened."""
+"""The table of torture: each disturbance, its number, and its result."""
 
 import threading
 from collections import Counter
 
 
 class Table:
-    """What was injected and what happened, counted by several threads."""
+    """Disturbances and results, counted by several threads."""
 
     def __init__(self) -> None:
         self._counts: Counter[tuple[str, str]] = Counter()
         self._lock = threading.Lock()
 
     def count(self, injected: str, happened: str, times: int = 1) -> None:
-        """Count it once, or so many times."""
+        """Count this disturbance and result `times` times."""
         with self._lock:
             self._counts[injected, happened] += times
 

@@ -1,4 +1,4 @@
-"""The page, and the tools that read recordings, under attack."""
+"""Attacks on the page, and on the tools that read recordings."""
 
 import random
 import threading
@@ -26,7 +26,7 @@ MOST_LINES: Final = 20
 
 
 def pages(directory: Path, rng: random.Random, table: Table) -> None:
-    """Half requests, strange frames, and names of a megabyte on its graph."""
+    """Attack the page with half requests, strange frames, and names of a megabyte on its graph."""
     directory.mkdir()
     access.add_user(directory / "passwords", USER, PASSWORD)
     log = directory / "log"
@@ -35,7 +35,9 @@ def pages(directory: Path, rng: random.Random, table: Table) -> None:
         with page(*on_graph(domain), *words, log=log) as address:
             for body, what in ((True, "bodies"), (False, "heads after a request")):
                 with half_requests(address, 250, body=body):
-                    wait_until(lambda: ask(address, "/favicon.ico")[0] == 200, "an answer", 60.0)
+                    wait_until(
+                        lambda: ask(address, "/favicon.ico")[0] == 200, "the page answers", 60.0
+                    )
                 table.count(f"half {what} to the page", "others were answered", 250)
             sent = strange_frames(address, rng, 300)
             table.count("frames of no browser to the page", "served on", sent)
@@ -58,7 +60,7 @@ def _memory(address: str, domain: int) -> float:
 
 
 def recordings(directory: Path, seed: int, times: int, table: Table) -> None:
-    """Recordings that decode and are wrong, and a file that unpacks to much."""
+    """Read recordings that decode but are wrong, and a small file that unpacks to much."""
     for ending, number in endings(Mutator(seed), times, directory).items():
         command, _, code = ending.partition(": ")
         table.count(f"wrong recordings, {command}", f"exit code {code}", number)

@@ -1,4 +1,4 @@
-"""What a daemon's wires bring that is wrong in one place: replies, routers, tokens, clocks."""
+"""Wires of a daemon with one wrong part: replies, routers, tokens, clocks."""
 
 import json
 import random
@@ -25,7 +25,7 @@ TOKENS: Final = 5000
 
 
 def wires(directory: Path, rng: random.Random, each_s: float, times: int, table: Table) -> None:
-    """All of them, one after the other."""
+    """Run all of these disturbances in turn."""
     directory.mkdir()
     _replies(directory, rng, each_s, table)
     _silences(rng, 20 * times, table)
@@ -35,10 +35,10 @@ def wires(directory: Path, rng: random.Random, each_s: float, times: int, table:
 
 
 class Almost(TcpLiar):
-    """A module whose door is open, and whose replies about that are wrong in one place."""
+    """A module whose door is open, and whose replies about the door have one wrong part."""
 
     def _forged(self, heard: bytes) -> bytes:
-        if len(heard) < 12:  # it hangs up
+        if len(heard) < 12:  # too short for a request: hang up
             return b""
         number, unit, function = heard[:2], heard[6:7], heard[7]
         if function != 2:
@@ -88,7 +88,7 @@ def _silences(rng: random.Random, times: int, table: Table) -> None:
         charger.awake = True
         assert {frame for _, frame in charger.scans(rng.uniform(1, 4), power=True)} == {CHARGE}
         charger.awake = False
-        charger.scans(1.5, power=True)  # what it last said is fresh for a second
+        charger.scans(1.5, power=True)  # the charger's last status stays fresh for 1 s
         silent = {frame for _, frame in charger.scans(rng.uniform(2, 10), power=True)}
         assert silent == {START, STOP}
         charger.bus.close()
@@ -98,7 +98,7 @@ def _silences(rng: random.Random, times: int, table: Table) -> None:
 
 @contextmanager
 def _on_zenoh(directory: Path, name: str, **env: str) -> Iterator[tuple[Daemon, Module, Path]]:
-    """A door's daemon that must stay on this machine."""
+    """Yield a door's daemon that must stay on this machine."""
     here = directory / name
     here.mkdir()
     with domain_for_a_while() as domain:
@@ -121,16 +121,16 @@ def _status(run: Path) -> dict[str, Any]:
 
 
 def _routers(directory: Path, table: Table) -> None:
-    """A router comes and goes, three times."""
+    """Let a router come and go three times."""
     with _on_zenoh(directory, "routers") as (running, module, run):
         for _ in range(3):
             router = Router(connect__endpoints=[meeting(module.domain)])
             router.start()
-            wait_until(lambda: _status(run)["faults"], "a fault", PATIENCE_S)
+            wait_until(lambda: _status(run)["faults"], "the router is a fault", PATIENCE_S)
             asked = command("status", "--runtime-dir", run)
             code = subprocess.run(asked, capture_output=True).returncode
             router.leave()
-            wait_until(lambda: not _status(run)["faults"], "it is back", PATIENCE_S)
+            wait_until(lambda: not _status(run)["faults"], "the fault is over", PATIENCE_S)
             table.count("a router beside a `network: localhost` service", f"`status` {code}, back")
         lines = running.log.read_text().count("\n")
         table.count("the log of that daemon", f"{lines} lines")
@@ -140,7 +140,11 @@ def _tokens(directory: Path, table: Table) -> None:
     with _on_zenoh(directory, "tokens") as (running, module, run), stranger(module.domain) as far:
         kind = "rmf_door_msgs::msg::dds_::DoorRequest_/RIHS01_0"
         far.claims("MP", "door_requests", kind, range(TOKENS))
-        wait_until(lambda: "crowded" in running.log.read_text(), "it is said", PATIENCE_S)
+        wait_until(
+            lambda: "crowded" in running.log.read_text(),
+            "the log names the crowd of tokens",
+            PATIENCE_S,
+        )
         written = _status(run)["pid"]
         rss = Path(f"/proc/{written}/status").read_text().partition("VmRSS:")[2].split()[0]
         said = running.log.read_text()
@@ -149,7 +153,7 @@ def _tokens(directory: Path, table: Table) -> None:
 
 
 def _past(directory: Path, table: Table) -> None:
-    """The clock of the daemon's process alone: Linux refuses to be set there."""
+    """Set the clock of the daemon's process alone; Linux refuses to be set to such a time."""
     source, library = Path(__file__).with_name("past.c"), directory / "past.so"
     subprocess.run(["cc", "-shared", "-fPIC", "-o", library, source, "-ldl"], check=True)
     past = directory / "past"
@@ -164,7 +168,7 @@ def _past(directory: Path, table: Table) -> None:
             before = (run / "status.json").stat().st_mtime
             wait_until(
                 lambda before=before: (run / "status.json").stat().st_mtime > before,  # type: ignore[misc]
-                "status goes on",
+                "the status file is still written",
                 PATIENCE_S,
             )
             table.count("a wall clock before 1970, on zenoh, 3 s", "served on")

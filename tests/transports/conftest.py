@@ -25,7 +25,7 @@ ROS2 = pytest.param("ros2", marks=pytest.mark.ros)
 
 @pytest.fixture(params=["memory", DDS, "zenoh", ROS2])
 def join(request: pytest.FixtureRequest) -> Iterator[Join]:
-    """One graph for the test, on each transport in turn; its nodes leave at the end."""
+    """Yield one graph for the test, on each transport in turn; its nodes leave at the end."""
     network = MemoryNetwork()
     on: dict[str, Join] = {
         "memory": lambda name: MemoryTransport(network, name),
@@ -38,37 +38,37 @@ def join(request: pytest.FixtureRequest) -> Iterator[Join]:
 
 @pytest.fixture(params=[DDS, "zenoh", ROS2])
 def join_any_wire(request: pytest.FixtureRequest) -> Iterator[Join]:
-    """One graph for the test, on each transport that has a wire."""
+    """Yield one graph for the test, on each transport that has a wire."""
     yield from _graph(joining(request.param, domain_of_this_run()))
 
 
 @pytest.fixture(params=["dds", ROS2])
 def join_wire(request: pytest.FixtureRequest) -> Iterator[Join]:
-    """One graph for the test, on each transport whose wire is DDS."""
+    """Yield one graph for the test, on each transport whose wire is DDS."""
     yield from _graph(joining(request.param, domain_of_this_run()))
 
 
 @pytest.fixture
 def join_dds() -> Iterator[Join]:
-    """One graph for the test, on DDS."""
+    """Yield one graph for the test, on DDS."""
     yield from _graph(joining("dds", domain_of_this_run()))
 
 
 @pytest.fixture
 def join_zenoh() -> Iterator[Join]:
-    """One graph for the test, on zenoh."""
+    """Yield one graph for the test, on zenoh."""
     yield from _graph(joining("zenoh", domain_of_this_run()))
 
 
 @pytest.fixture
 def join_ros() -> Iterator[Join]:
-    """One graph for the test, on ROS; for tests that are marked so."""
+    """Yield one graph for the test, on ROS; for tests marked for ROS."""
     yield from _graph(joining("ros2", domain_of_this_run()))
 
 
 @pytest.fixture
 def observer(join_dds: Join) -> Iterator[Any]:
-    """A DDS participant from outside this project, in the same process and domain."""
+    """Yield a DDS participant from outside this project, in the same process and domain."""
     join_dds("keeps_the_domain")
     from cyclonedds.domain import DomainParticipant
 

@@ -7,5 +7,5 @@ from hal_fakes.domain import free_domain
 
 @cache
 def domain_of_this_run() -> int:
-    """The domain that tests of this process share, unless they need one of their own."""
+    """Return the domain that tests of this process share unless a test needs its own."""
     return free_domain()

@@ -1,8 +1,7 @@
-"""What each topic of ours must be on the graph, typed by hand: `bridges/messages/topics.py` is not
-asked.
+"""Type and QoS of each of our topics, typed by hand and independent of `bridges/messages/topics.py`.
 
-A row is (type, QoS of the end that publishes, QoS of the end that subscribes). Line numbers are of
-rmf_ros2 9dedd0f (2026-05) unless said otherwise.
+A row is (type, QoS of the publishing end, QoS of the subscribing end). Line numbers are of rmf_ros2
+9dedd0f (2026-05) unless said otherwise.
 """
 
 from collections.abc import Mapping
@@ -10,7 +9,7 @@ from typing import Final, NamedTuple
 
 
 class Qos(NamedTuple):
-    """As `ros2 topic info --verbose` shows it."""
+    """QoS as `ros2 topic info --verbose` shows it."""
 
     reliability: str
     durability: str
@@ -22,9 +21,9 @@ PLAIN: Final = Qos("RELIABLE", "VOLATILE", "KEEP_LAST", 100)
 RETAINED: Final = Qos("RELIABLE", "TRANSIENT_LOCAL", "KEEP_LAST", 100)
 
 GOLDEN: Final[Mapping[str, tuple[str, Qos, Qos]]] = {
-    # Fleet adapter hears with SystemDefaults keep_last(100) (agv/Node.cpp:37,53), the lift supervisor
-    # with 10, rmf-web reliable volatile 10. One node may publish many lifts back to back: a depth
-    # of 1 (SystemDefaults on Cyclone, rmw_node.cpp:2160-2197) would lose all but the last.
+    # The fleet adapter subscribes with SystemDefaults keep_last(100) (agv/Node.cpp:37,53), the lift
+    # supervisor with 10, rmf-web with reliable volatile 10. One node may publish many lifts in a row: a
+    # depth of 1 (SystemDefaults on Cyclone, rmw_node.cpp:2160-2197) would lose all but the last.
     "lift_states": ("rmf_lift_msgs/LiftState", PLAIN, PLAIN),
     # lift_supervisor publishes reliable, transient_local, keep_last(100). A node subscribes volatile,
     # or its restart would hear up to 100 old requests.
@@ -39,25 +38,27 @@ GOLDEN: Final[Mapping[str, tuple[str, Qos, Qos]]] = {
     "adapter_door_requests": ("rmf_door_msgs/DoorRequest", PLAIN, PLAIN),
     # SystemDefaults: door_supervisor 10, fleet adapter 100.
     "door_supervisor_heartbeat": ("rmf_door_msgs/SupervisorHeartbeat", PLAIN, PLAIN),
-    # RMF has no node for chargers and names no topic: as doors and their requests are.
+    # RMF has no node for chargers and names no topic: the same QoS as doors and their requests.
     "charger_states": ("rmf_charger_msgs/ChargerState", PLAIN, PLAIN),
     "charger_requests": ("rmf_charger_msgs/ChargerRequest", PLAIN, PLAIN),
     "charger_cancels": ("rmf_charger_msgs/ChargerCancel", PLAIN, PLAIN),
-    # Ours: who asked hears why not; nothing is retained, as an old refusal tells nobody anything.
+    # Our own topic: the requester hears the reason for a refusal. Nothing is retained, because an old
+    # refusal helps nobody.
     "charger_refusals": ("diagnostic_msgs/DiagnosticStatus", PLAIN, PLAIN),
     "adapter_charger_requests": ("rmf_charger_msgs/ChargerRequest", PLAIN, PLAIN),
     "adapter_charger_cancels": ("rmf_charger_msgs/ChargerCancel", PLAIN, PLAIN),
-    # Fleet adapter publishes SystemDefaults 100.
+    # The fleet adapter publishes SystemDefaults 100.
     "charger_coordinator": ("std_msgs/Bool", PLAIN, PLAIN),
     "fleet_states": ("rmf_fleet_msgs/FleetState", PLAIN, PLAIN),
-    # Fleet adapter hears reliable transient_local: a volatile publisher never matches.
+    # The fleet adapter subscribes reliable transient_local, so a volatile publisher never matches.
     "charging_assignments": ("rmf_fleet_msgs/ChargingAssignments", RETAINED, RETAINED),
-    # rmf-web's api-server hears reliable transient_local, depth 10.
+    # rmf-web's api-server subscribes reliable transient_local, depth 10.
     "alert": ("rmf_task_msgs/Alert", RETAINED, RETAINED),
-    # Fleet adapter hears reliable transient_local, 100 (agv/Node.cpp:73-79, since rmf_ros2#341).
+    # The fleet adapter subscribes reliable transient_local, 100 (agv/Node.cpp:73-79, since
+    # rmf_ros2#341).
     "fire_alarm_trigger": ("std_msgs/Bool", RETAINED, RETAINED),
-    # Fleet adapter hears reliable transient_local keep_last(100).
+    # The fleet adapter subscribes reliable transient_local keep_last(100).
     "emergency_signal": ("rmf_fleet_msgs/EmergencySignal", RETAINED, RETAINED),
-    # diagnostic_aggregator and rqt hear with rclcpp's default: reliable, volatile, keep_last(10).
+    # diagnostic_aggregator and rqt subscribe with rclcpp's default: reliable, volatile, keep_last(10).
     "diagnostics": ("diagnostic_msgs/DiagnosticArray", PLAIN, PLAIN),
 }

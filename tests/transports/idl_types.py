@@ -1,7 +1,9 @@
-"""RMF's messages written out for cyclonedds by hand, independent of `bridges/transports/dds/idl.py`.
+"""RMF's messages written for cyclonedds by hand, independent of `bridges/transports/dds/idl.py`.
 
-Typed from the .msg files of rmf_internal_msgs 3d4df02, std_msgs and builtin_interfaces: another
-node's view of the wire. No `from __future__ import annotations` here: cyclonedds cannot read them.
+Typed from the .msg files of rmf_internal_msgs 3d4df02, std_msgs and builtin_interfaces, as another
+node would see the wire. This file has no `from __future__ import annotations`, because cyclonedds
+cannot
+read such annotations.
 """
 
 from dataclasses import dataclass
@@ -250,7 +252,7 @@ class DiagnosticArray(IdlStruct, typename="diagnostic_msgs.msg.dds_.DiagnosticAr
 
 
 def to_idl(value: Any) -> Any:
-    """One of our messages as the class of the same name here."""
+    """Return one of our messages as the class of the same name in this file."""
     if isinstance(value, tuple):
         return [to_idl(element) for element in value]
     if not isinstance(value, Struct):

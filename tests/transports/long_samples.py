@@ -1,8 +1,9 @@
-"""A DDS node with Cyclone's own settings, as RMF's nodes have them: nothing limits what it sends.
+"""A DDS node with Cyclone's own settings, like RMF's nodes: nothing limits its samples.
 
-`python -m tests.transports.long_samples DOMAIN BYTES SECONDS`: names of so many bytes on every
-topic that is heard; prints how many samples were written. With DOMAIN alone it answers each state
-of a door by a request with the same time, until its input ends.
+`python -m tests.transports.long_samples DOMAIN BYTES SECONDS` sends names of that many bytes on every
+topic that a daemon hears, and prints the number of samples. With DOMAIN alone it answers each state of
+a
+door with a request of the same time, until its stdin ends.
 """
 
 import sys
@@ -36,7 +37,7 @@ QOS_LIVE: Final = Qos(Policy.Durability.Volatile, *RELIABLE)
 
 
 def main(domain: int, length: int, seconds: float) -> None:
-    """Send in turn on each topic, as fast as it goes."""
+    """Send on each topic in turn, as fast as possible."""
     kept = Domain(domain, AS_RMF)
     participant = DomainParticipant(domain)
     pairs: list[tuple[DataWriter, Any]] = []
@@ -51,7 +52,7 @@ def main(domain: int, length: int, seconds: float) -> None:
     while time.monotonic() < until:
         for writer, message in pairs:
             if writer.get_matched_subscriptions():
-                with suppress(DDSException):  # it waited for 1 s, and its history is full
+                with suppress(DDSException):  # after a wait of 1 s the history is full
                     writer.write(message)
                     sent += 1
         time.sleep(0.001)
@@ -60,7 +61,7 @@ def main(domain: int, length: int, seconds: float) -> None:
 
 
 def echo(domain: int) -> None:
-    """Answer each DoorState."""
+    """Answer each DoorState until stdin ends."""
     kept = Domain(domain, AS_RMF)
     participant = DomainParticipant(domain)
     state, request = sample_type(DoorState), sample_type(DoorRequest)

@@ -1,9 +1,8 @@
-"""The `memory` transport: nodes of one process, for tests in virtual time. It has no thread, and reads
-only the wall clock.
+"""The `memory` transport: nodes of one process, for tests in virtual time.
 
-A message is delivered before `publish` returns, in the order in which the subscriptions were made.
-Ends match as in DDS: same name, same type, and a subscription that wants retained messages only hears
-publishers that retain them.
+The transport has no thread, and reads only the wall clock. A message is delivered before `publish`
+returns, in the order in which the subscriptions were made. Ends match as in DDS: same name, same type,
+and a subscription that wants retained messages hears only publishers that retain messages.
 """
 
 import time
@@ -64,19 +63,19 @@ class MemoryTransport:
 
     @property
     def lives(self) -> bool:
-        """Until it is closed."""
+        """Is this node still open?"""
         return not self._closed
 
     def faults(self) -> list[tuple[str, str]]:
-        """None: all nodes are of one process and one release."""
+        """Return no fault: all nodes are of one process and one release."""
         return []
 
     def wall(self) -> float:
-        """The wall clock (s since the epoch)."""
+        """Return the wall clock (s since the epoch)."""
         return time.time()
 
     def close(self) -> None:
-        """Leave the network; what this node has retained is gone."""
+        """Leave the network; messages that this node retained are gone."""
         self._closed = True
         for ends in self._network.publishers.values():
             ends[:] = [end for end in ends if end.node is not self]
@@ -109,7 +108,7 @@ class _Publisher:
                 subscription.hand_on(message, self.sender)
 
     def matched(self) -> int:
-        """How many subscriptions are reached; 0 after close."""
+        """Return the number of subscriptions reached; 0 after close."""
         return sum(end.hears(self) for end in self._heard_by) if self in self._ends else 0
 
     def close(self) -> None:
@@ -135,7 +134,7 @@ class _Subscription:
         self._others_only = others_only
 
     def hears(self, publisher: _Publisher) -> bool:
-        """Whether DDS would match the two, which have the same name."""
+        """Would DDS match the two ends, which have the same topic name?"""
         theirs, ours = publisher.topic, self.topic
         return (
             theirs.type == ours.type
@@ -150,7 +149,7 @@ class _Subscription:
         notices.hand_on(self.node.dropped, self.topic, self.received, message)
 
     def catch_up(self) -> None:
-        """Receive what each publisher has retained, the newest `depth` of each."""
+        """Receive the newest `depth` retained messages of each publisher."""
         if self.topic.subscribe.durability == "volatile":
             return
         for publisher in self._hears:
@@ -159,10 +158,10 @@ class _Subscription:
                     self.hand_on(message, publisher.sender)
 
     def matched(self) -> int:
-        """How many publishers are heard; 0 after close."""
+        """Return the number of publishers heard; 0 after close."""
         return len(self.senders())
 
     def senders(self) -> list[str]:
-        """The nodes of these publishers."""
+        """Return the nodes of the publishers heard."""
         heard = self._hears if self in self._ends else []
         return [f"/{end.node.name}" for end in heard if self.hears(end)]

@@ -1,4 +1,4 @@
-"""A DDS participant from outside this project that sees what the others announce."""
+"""Sees announced ends through a DDS participant from outside this project."""
 
 from typing import Any
 
@@ -13,13 +13,13 @@ SUBSCRIPTION = builtin.BuiltinTopicDcpsSubscription
 
 
 def seen(observer: Any, kind: Any, topic: Topic[Any]) -> Any:
-    """The one end of a topic that is announced."""
+    """Return the only announced end of a topic."""
     found: list[Any] = []
 
     def look() -> bool:
-        reader = BuiltinReader(observer, kind)  # a new one sees who is there now
+        reader = BuiltinReader(observer, kind)  # a new reader sees the present ends
         found[:] = [end for end in reader.take(100) if end.topic_name == f"rt/{topic.name}"]
         return len(found) == 1
 
-    wait_until(look, f"{topic.name} is announced, once")
+    wait_until(look, f"{topic.name} is announced by exactly one end")
     return found[0]

@@ -1,8 +1,8 @@
-"""Another process on the graph: `python -m tests.transports.peer WHAT DOMAIN TRANSPORT`; it ends
-with its stdin.
+"""Another process on the graph: `python -m tests.transports.peer WHAT DOMAIN TRANSPORT`.
 
-`echo` sends back on `pong_<topic>` whatever arrives on `ping_<topic>`, for every topic.
-`hostile` is a node that lies: what it sends as a LiftRequest is no LiftRequest (see there).
+The process ends when its stdin ends. `echo` sends each message of `ping_<topic>` back on
+`pong_<topic>`,
+for every topic. `hostile` is a lying node: its LiftRequests are forged samples.
 """
 
 import socket
@@ -29,7 +29,7 @@ TOPICS: dict[str, Topic[Any]] = {
 
 @contextmanager
 def running(what: str, domain: int, transport: str = "dds") -> Iterator[None]:
-    """The peer as a child process, until the end of the block."""
+    """Run the peer as a child process, until the end of the block."""
     command = [sys.executable, "-m", "tests.transports.peer", what, str(domain), transport]
     with subprocess.Popen(command, stdin=subprocess.PIPE) as child:
         try:
@@ -51,7 +51,7 @@ def echo(domain: int, transport: str) -> None:
 
 
 def sent(publisher: Publisher[Any], message: Any) -> bool:
-    """Publish, for a condition that is not yet met: the peer may find us later than we find it."""
+    """Publish, and return False: for a condition that fails until the peer finds this publisher."""
     publisher.publish(message)
     return False
 
@@ -60,7 +60,7 @@ GOOD = bytes.fromhex(
     "00010000 06000000 4c696674 3100 0000 05000000 06000000"
     "0c000000 666c6565 742f726f 626f7400 01 000000 03000000 4c330002"
 )
-"""LiftRequest("Lift1", Time(5, 6), "fleet/robot", 1, "L3", 2), as its CDR."""
+"""LiftRequest("Lift1", Time(5, 6), "fleet/robot", 1, "L3", 2) in CDR."""
 
 DECODED_BY_NOBODY = {
     "cut short": GOOD[:20],
@@ -68,7 +68,7 @@ DECODED_BY_NOBODY = {
     "a string without its NUL": GOOD.replace(b"Lift1\0", b"Lift1x"),
     "a string longer than the sample": GOOD.replace(b"\6\0\0\0Lift", b"\xff\xff\xff\xffLift"),
 }
-"""Cyclone's C library refuses these."""
+"""Samples that Cyclone's C library refuses."""
 
 COUNTED_AS_DROPPED = {
     "not UTF-8": GOOD.replace(b"Lift1", b"\xff\xfe\x80ft"),
@@ -76,14 +76,15 @@ COUNTED_AS_DROPPED = {
     "more than a LiftRequest": GOOD + b"\1\2\3\4\5\6\7\x08",
     "another encoding": b"\0\x07" + GOOD[2:],
 }
-"""These pass it, and are refused by our decoder."""
+"""Samples that pass Cyclone's library, and that our decoder refuses."""
 
 
 def hostile(domain: int, transport: str) -> None:
-    """Match as an honest node would, then put forged samples on the wire as the writer's own.
+    """Match like an honest node, then put forged samples on the wire under the writer's own id.
 
-    The forged ones use up the sequence numbers of the writer's next own samples: only later ones of
-    its fifty good ones arrive.
+    Forged samples use up sequence numbers of the writer's next own samples, so only later ones of its
+    fifty
+    good samples arrive.
     """
     if transport == "zenoh":
         zenoh_hostile.main(*zenoh_hostile.arguments(domain))
@@ -115,14 +116,14 @@ def hostile(domain: int, transport: str) -> None:
 
 
 def _data_packet(guid: bytes, number: int, sample: bytes) -> bytes:
-    """An RTPS 2.1 message with one DATA submessage, from this writer to all its readers."""
+    """Return an RTPS 2.1 message with one DATA submessage from this writer to all its readers."""
     header = b"RTPS\x02\x01\x01\x10" + guid[:12]
     body = struct.pack("<HHI", 0, 16, 0) + guid[12:] + struct.pack("<iI", 0, number) + sample
     return header + struct.pack("<BBH", 0x15, 0x05, len(body)) + body
 
 
 def _send_raw(domain: int, packet: bytes) -> None:
-    """To the unicast data port of each of the first processes in the domain."""
+    """Send to the unicast data port of each of the domain's first processes."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
         for index in range(4):
             sender.sendto(packet, ("127.0.0.1", 7400 + 250 * domain + 11 + 2 * index))

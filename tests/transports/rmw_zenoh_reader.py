@@ -89,7 +89,7 @@ def tell_sample(sample: zenoh.Sample) -> None:
 
 
 def gid(token: str) -> bytes:
-    """liveliness_utils.cpp: the token's XXH3, its two halves as they lie in memory."""
+    """Return the token's XXH3 as in liveliness_utils.cpp: both halves in memory order."""
     both = xxhash.xxh3_128_intdigest(token.encode())
     return struct.pack("<QQ", both & (1 << 64) - 1, both >> 64)
 
@@ -111,7 +111,7 @@ def say(session: zenoh.Session, key: str, token: str, payload: str, depth: str =
         while not publisher.matching_status:
             time.sleep(0.01)
     attachment = ext.z_serialize((ext.Int64(1), ext.Int64(time.time_ns()), gid(token)))
-    is_bridge = token.startswith("@/")  # whose DDS samples have none
+    is_bridge = token.startswith("@/")  # a bridge's DDS samples have no attachment
     publisher.put(bytes.fromhex(payload), attachment=None if is_bridge else attachment)
     tell(said=key)
     return publisher, alive

@@ -1,4 +1,4 @@
-"""What every transport with a wire does, within one process: threads, misfits, what stays behind."""
+"""Duties of every transport with a wire, within one process: threads, misfits, no remains."""
 
 import os
 import threading
@@ -31,7 +31,7 @@ def test_nodes_that_come_and_go_leave_no_thread_no_file_and_no_complaint_behind(
         node.publisher(LIFT_STATES).publish(d.LiftState())
         node.close()
 
-    for _ in range(5):  # what a library starts once and keeps
+    for _ in range(5):  # a library may start threads and files once and keep them
         come_and_go()
     before = _threads_and_files()
     for _ in range(10):
@@ -45,7 +45,7 @@ def test_a_peer_whose_durability_does_not_fit_is_named_once(
 ) -> None:
     join_any_wire("listener").subscribe(FIRE_ALARM_TRIGGER, print)
     join_any_wire("stranger").publisher(replace(FIRE_ALARM_TRIGGER, publish=VOLATILE))
-    wait_until(lambda: len(caplog.messages) == 2, "both ends say so")
+    wait_until(lambda: len(caplog.messages) == 2, "both ends log the misfit")
     assert sorted(caplog.messages) == [
         'misfit topic=fire_alarm_trigger reason="a publisher is not heard:'
         ' its durability does not fit ours"',

@@ -85,13 +85,13 @@ def test_a_range_in_which_nobody_is_found_is_refused(text: str) -> None:
 
 @pytest.fixture
 def no_ros(monkeypatch: pytest.MonkeyPatch) -> None:
-    """As on a machine without ROS, wherever this runs."""
+    """Hide ROS, as on a machine without ROS."""
     monkeypatch.setitem(sys.modules, "rclpy", None)
 
 
 @pytest.fixture
 def bare_rclpy(monkeypatch: pytest.MonkeyPatch) -> None:
-    """As on a machine with ROS but without RMF's packages."""
+    """Leave rclpy, but hide RMF's packages."""
     for package in set(PACKAGES.values()) | {"rclpy"}:
         monkeypatch.setitem(sys.modules, package, ModuleType(package))
     found = ModuleSpec("found", None)
@@ -230,7 +230,7 @@ def test_an_impossible_zenoh_setting_is_named(
 
 
 def problems_of(file: Path) -> tuple[Problem, ...]:
-    """What is wrong with a file."""
+    """Return the problems of a file."""
     try:
         load(file)
     except SettingsError as error:

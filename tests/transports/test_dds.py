@@ -1,4 +1,4 @@
-"""What is special to `dds`: noise on its ports, its place on the ROS graph, its configuration."""
+"""Properties of `dds` alone: noise on its ports, its place on the ROS graph, its configuration."""
 
 import random
 import socket
@@ -27,7 +27,7 @@ from tests.waiting import wait_until
 
 @pytest.fixture(scope="module")
 def echo() -> Iterator[None]:
-    """A second process that sends everything back."""
+    """Run a second process that sends every message back."""
     with peer.running("echo", domain_of_this_run()):
         yield
 
@@ -58,7 +58,7 @@ def test_a_peer_with_another_type_is_named_once(
 ) -> None:
     join_dds("listener").publisher(Topic("door_states", d.DoorState))
     join_dds("stranger").subscribe(Topic("door_states", d.LiftState), print)
-    wait_until(lambda: len(caplog.messages) == 2, "both ends say so")
+    wait_until(lambda: len(caplog.messages) == 2, "both ends log the misfit")
     assert sorted(caplog.messages) == [
         'misfit topic=door_states reason="a publisher is not heard: its type does not fit ours"',
         'misfit topic=door_states reason="a subscription is not served:'
@@ -66,7 +66,7 @@ def test_a_peer_with_another_type_is_named_once(
     ]
 
 
-# --- as the others see us --------------------------------------------------------------------
+# --- our node as others see it ------------------------------------------------------------------
 
 
 def test_the_node_and_its_ends_stand_on_the_ros_graph(join_dds: Join, observer: Any) -> None:
@@ -145,7 +145,9 @@ def test_a_reader_that_fails_joins_again_and_hears_again(
     assert isinstance(node, DdsTransport)
     node.subscribe(LIFT_STATES, received.append)
     publisher = join_dds("there").publisher(LIFT_STATES)
-    wait_until(lambda: received or peer.sent(publisher, d.LiftState()), "it hears")
+    wait_until(
+        lambda: received or peer.sent(publisher, d.LiftState()), "the reader hears the publisher"
+    )
     whole = node._read_once
     failures = iter([MemoryError("none left")])
 
@@ -157,12 +159,14 @@ def test_a_reader_that_fails_joins_again_and_hears_again(
     monkeypatch.setattr(node, "_read_once", fails)
     wakes = d.LiftState(lift_name="wakes it")
     wait_until(
-        lambda: any(r.exc_info for r in caplog.records) or peer.sent(publisher, wakes), "it fails"
+        lambda: any(r.exc_info for r in caplog.records) or peer.sent(publisher, wakes),
+        "the reader fails",
     )
     received.clear()
     after = d.LiftState(lift_name="after")
     wait_until(
-        lambda: after in received or peer.sent(publisher, after), "it hears when it has joined anew"
+        lambda: after in received or peer.sent(publisher, after),
+        "the reader joins again and hears again",
     )
     assert node.lives
     assert [r.getMessage() for r in caplog.records if r.exc_info] == [
@@ -183,4 +187,7 @@ def test_a_reader_that_keeps_failing_is_reported_as_dead(
 
     monkeypatch.setattr("bridges.transports.dds.transport.LOOK_EVERY_S", 0.01)
     monkeypatch.setattr(node, "_read_once", fails)
-    wait_until(lambda: peer.sent(publisher, d.LiftState()) or not node.lives, "it is dead")
+    wait_until(
+        lambda: peer.sent(publisher, d.LiftState()) or not node.lives,
+        "the node reports itself dead",
+    )

@@ -1,4 +1,4 @@
-"""Nobody who can send a datagram fills the log."""
+"""A stranger who can send datagrams cannot fill the log."""
 
 import os
 import socket

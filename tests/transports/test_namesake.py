@@ -1,4 +1,4 @@
-"""A node whose type has the name of one of ours and other fields: an older or newer RMF, or a liar."""
+"""A node whose type has the name of our type and other fields: another release of RMF, or a liar."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -28,7 +28,7 @@ class LiftRequest(IdlStruct, typename="rmf_lift_msgs.msg.dds_.LiftRequest_"):
 
 
 class Lift:
-    """The node that obeys requests, and what it has heard."""
+    """The node that obeys requests, and the requests that it has heard."""
 
     def __init__(self, domain: int) -> None:
         self.domain = domain
@@ -53,12 +53,15 @@ def test_requests_of_a_namesake_are_not_heard_and_those_of_rmf_are(
     writer = DataWriter(participant, Topic(participant, "rt/lift_requests", LiftRequest), qos=qos)
     rmf = DdsTransport("rmf", lift.domain, loopback=True)
     try:
-        wait_until(lambda: any("its type does not fit" in t for t in caplog.messages), "it says so")
+        wait_until(
+            lambda: any("its type does not fit" in t for t in caplog.messages),
+            "the log names the type that does not fit",
+        )
         writer.write(LiftRequest(7, "Lift1"))
         requests = rmf.publisher(LIFT_REQUESTS)
         wait_until(requests.matched, "RMF's own publisher is served")
         requests.publish(d.LiftRequest("Lift1"))
-        wait_until(lambda: lift.heard, "RMF is heard")
+        wait_until(lambda: lift.heard, "RMF's request is heard")
         assert lift.heard == [d.LiftRequest("Lift1")]
         assert lift.subscription.matched() == 1
     finally:

@@ -1,4 +1,4 @@
-"""A machine whose network comes, goes and changes, and ROS's variables that say whom to look for."""
+"""A machine whose network comes, goes and changes, and ROS's variables that name peers."""
 
 from collections.abc import Iterator
 from contextlib import suppress
@@ -80,20 +80,20 @@ class Machine:
         self.addresses: addresses.Addresses = frozenset({(2, "10.0.0.7")})
 
     def goes_down(self) -> None:
-        """It has no network: Cyclone finds no interface, Fast DDS no peer, and rclpy no middleware."""
+        """Take the network away: Cyclone finds no interface, Fast DDS no peer, rclpy no middleware."""
         self._monkeypatch.setenv("CYCLONEDDS_URI", LOOPBACK.replace('"lo"', '"no-such-interface"'))
         self._monkeypatch.setenv("ROS_STATIC_PEERS", "no such host")
         self.addresses = frozenset()
 
     def comes_back(self) -> None:
-        """It has a network: loopback."""
+        """Bring the network back: loopback."""
         self._monkeypatch.delenv("ROS_STATIC_PEERS", raising=False)
         self._monkeypatch.setenv("CYCLONEDDS_URI", LOOPBACK)
 
 
 @pytest.fixture
 def machine(monkeypatch: pytest.MonkeyPatch) -> Machine:
-    """A machine whose nodes go by its addresses, and in truth stay on loopback."""
+    """Yield a machine whose nodes follow its made-up addresses, but really stay on loopback."""
     made = Machine(monkeypatch)
     monkeypatch.setattr(addresses, "addresses", lambda: made.addresses)
     monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")  # for Fast DDS
@@ -102,7 +102,7 @@ def machine(monkeypatch: pytest.MonkeyPatch) -> Machine:
 
 
 class Echoed:
-    """A node under test, and a process that sends back what it hears."""
+    """A node under test, and a process that sends the node's messages back."""
 
     def __init__(self, transport: str, domain: int) -> None:
         self.domain = domain
@@ -114,7 +114,7 @@ class Echoed:
         self.alarm = self.node.publisher(ALARM)
 
     def comes_back(self, number: int) -> bool:
-        """Whether a state that is sent again and again has been there and back."""
+        """Has a state, which is sent again and again, come back?"""
         state = d.DoorState(d.Time(number), "ward")
         with suppress(TransportError):
             self.states.publish(state)
@@ -141,10 +141,10 @@ def test_another_address_is_joined_with_all_ends_and_what_was_retained_goes_out_
     with peer.running("echo", echoed.domain):
         wait_until(
             lambda: echoed.heard.count(d.Bool(True)) > before,
-            "a process that comes later hears what was retained",
+            "a process that comes later hears the retained messages",
         )
     later = echoed.node.publisher(DOOR_STATES.named("ping_door_states"))
-    wait_until(lambda: later.matched() > 0, "an end that is declared later has its place too")
+    wait_until(lambda: later.matched() > 0, "an end that is declared later is matched too")
     later.close()
     assert later.matched() == 0
 
@@ -155,7 +155,9 @@ def test_without_a_network_it_waits_says_so_once_and_is_back_when_the_network_is
     caplog: pytest.LogCaptureFixture,
 ) -> None:
     machine.goes_down()
-    wait_until(lambda: any("not_joined" in text for text in caplog.messages), "it cannot join")
+    wait_until(
+        lambda: any("not_joined" in text for text in caplog.messages), "the node cannot join"
+    )
     with pytest.raises(TransportError):
         echoed.states.publish(d.DoorState())
     assert echoed.states.matched() == 0
@@ -172,7 +174,9 @@ def test_an_alarm_that_is_raised_without_a_network_goes_out_when_there_is_one(
     echoed: Echoed, machine: Machine, caplog: pytest.LogCaptureFixture
 ) -> None:
     machine.goes_down()
-    wait_until(lambda: any("not_joined" in text for text in caplog.messages), "it cannot join")
+    wait_until(
+        lambda: any("not_joined" in text for text in caplog.messages), "the node cannot join"
+    )
     declared_meanwhile = echoed.node.publisher(ALARM)
     with pytest.raises(TransportError):
         declared_meanwhile.publish(d.Bool(True))
@@ -186,7 +190,9 @@ def test_a_transport_can_be_closed_while_there_is_no_network(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
     machine.goes_down()
-    wait_until(lambda: any("not_joined" in text for text in caplog.messages), "it cannot join")
+    wait_until(
+        lambda: any("not_joined" in text for text in caplog.messages), "the node cannot join"
+    )
     echoed.states.close()
     echoed.node.close()
     with pytest.raises(TransportError):

@@ -1,4 +1,4 @@
-"""Every topic's type and QoS, against a table that was typed independently."""
+"""Every topic's type and QoS, compared with a table typed by hand."""
 
 from typing import Any
 
@@ -14,7 +14,7 @@ TOPICS = {topic.name: topic for topic in vars(topics).values() if isinstance(top
 
 
 def typed(qos: topics.Qos) -> Qos:
-    """As the golden table has it; RELIABLE and KEEP_LAST are all that `topics.Qos` can say."""
+    """Return a QoS in the golden table's form; `topics.Qos` knows only RELIABLE and KEEP_LAST."""
     return Qos("RELIABLE", qos.durability.upper(), "KEEP_LAST", qos.depth)
 
 
@@ -39,7 +39,7 @@ def test_a_lifts_node_hears_adapters_without_what_they_retain() -> None:
 def test_on_the_memory_transport_a_late_subscriber_hears_what_the_golden_depths_retain(
     name: str,
 ) -> None:
-    """Also that publisher and subscription match where the golden table says that they do."""
+    """Publisher and subscription also match exactly where the golden table makes them match."""
     topic: Topic[Any] = TOPICS[name]
     _, publish, subscribe = GOLDEN[name]
     network = MemoryNetwork()

@@ -1,4 +1,4 @@
-"""What is special to ROS: the installed message packages, the graph as ROS shows it, --ros-args."""
+"""Properties of ROS alone: installed message packages, the graph as ROS shows it, --ros-args."""
 
 import importlib
 import os
@@ -33,7 +33,7 @@ ENUMS = [kind for kind in vars(d).values() if isinstance(kind, EnumType) and kin
 
 
 def installed(message_type: type) -> Any:
-    """The ROS class of one of our messages."""
+    """Return the ROS class of one of our messages."""
     package = d.PACKAGES[message_type]
     return getattr(importlib.import_module(f"{package}.msg"), message_type.__name__)
 
@@ -60,7 +60,7 @@ def test_our_table_has_the_constants_of_the_installed_package(enum: Any) -> None
     lacking = NOT_IN_JAZZY.get(enum, set()) if RELEASE is JAZZY else set()
     ours = {name: c.value for name, c in enum.__members__.items() if name not in lacking}
     if not ours:
-        return  # of a message that the release lacks
+        return  # the release lacks this message
     message_name = enum.__doc__.partition(".")[0]  # "LiftState.door_state."
     found = installed(getattr(d, message_name))
     prefix = os.path.commonprefix(list(ours))
@@ -170,7 +170,7 @@ def _subscriptions(looking: Any, topic: Topic[Any]) -> list[Any]:
 def test_ros_has_nothing_to_warn_about_when_a_dds_node_joins(
     domain: int, monkeypatch: pytest.MonkeyPatch, breaks: str, warns: bool
 ) -> None:
-    if breaks:  # so that we know that a warning would be seen
+    if breaks:  # to prove that a warning would be seen
         monkeypatch.setattr("bridges.transports.dds.ends.type_hash", lambda kind, release: "none")
     command = [sys.executable, "-m", "tests.transports.peer", "echo", str(domain), "ros2"]
     with subprocess.Popen(command, stdin=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as ros:
@@ -178,13 +178,13 @@ def test_ros_has_nothing_to_warn_about_when_a_dds_node_joins(
         received: list[d.LiftState] = []
         node.subscribe(LIFT_STATES.named("pong_lift_states"), received.append)
         publisher = node.publisher(LIFT_STATES.named("ping_lift_states"))
-        wait_until(lambda: received or peer.sent(publisher, d.LiftState()), "it answers")
+        wait_until(lambda: received or peer.sent(publisher, d.LiftState()), "the echo answers")
         node.close()
         _, said = ros.communicate("")
     assert bool(said) is (warns and not on_fast_dds()), said
 
 
-# --- as a ROS node is started ------------------------------------------------------------------
+# --- starting like a ROS node -------------------------------------------------------------------
 
 
 def test_name_namespace_and_topics_are_remapped_as_for_any_ros_node(join_ros: Join) -> None:
@@ -220,7 +220,9 @@ def test_ros_args_that_ros_does_not_understand_are_refused(ros_args: list[str]) 
 def test_on_fast_dds_a_node_shares_no_memory_unless_its_environment_says_so(
     monkeypatch: pytest.MonkeyPatch, given: str | None, wanted: str
 ) -> None:
-    """RMF runs as another user: each found the other, and not one sample went through."""
+    """RMF runs as another user: with shared memory the nodes found each other, but no sample
+    arrived.
+    """
     from bridges.transports.ros2.stay import FAST_DDS_SPEAKS, Stay
 
     joined: list[str | None] = []
@@ -252,7 +254,7 @@ def test_stamps_follow_the_simulated_clock_where_use_sim_time_says_so(domain: in
     node = Ros2Transport("node", domain, loopback=True, ros_args=simulated)
     gazebo: Any = joining("ros2", domain)("gazebo")
     try:
-        assert stamp(node.wall()) == d.Time()  # nobody has said what time it is
+        assert stamp(node.wall()) == d.Time()  # no /clock yet
         clock = gazebo.node.create_publisher(Clock, "/clock", QoSProfile(depth=1))
 
         def told() -> bool:
@@ -278,7 +280,7 @@ def test_what_rclpy_converts_is_what_we_put_on_the_wire(join_ros: Join) -> None:
     looking.node.create_subscription(kind, "lift_states", received.append, 10)
     state = d.LiftState(d.Time(5, 6), "Lift1", ("L1", "ü"), "L1", "L2", 2, 1, (1, 2), 2, "a/b")
     publisher = join_ros("lift").publisher(LIFT_STATES)
-    wait_until(lambda: received or peer.sent(publisher, state), "it arrives")
+    wait_until(lambda: received or peer.sent(publisher, state), "the converted message arrives")
     theirs = received[0]
     assert {f: _plain(getattr(theirs, f)) for f in d.LiftState.__struct_fields__} == {
         f: getattr(state, f) for f in d.LiftState.__struct_fields__

@@ -1,4 +1,4 @@
-"""What `ros2` takes from installed packages and from ROS's graph. ROS itself is a stand-in."""
+"""The release that `ros2` takes from installed packages and from ROS's graph; ROS is a stand-in."""
 
 import sys
 from dataclasses import dataclass, field
@@ -18,7 +18,7 @@ from bridges.transports.transport import TransportError
 
 
 def install(release: Release, monkeypatch: pytest.MonkeyPatch) -> None:
-    """ROS packages with the messages of a release."""
+    """Install stand-ins for the ROS packages of a release."""
     for package in set(d.PACKAGES.values()):
         module = ModuleType(f"{package}.msg")
         for kind in (k for k in release.messages() if d.PACKAGES[k] == package):
@@ -47,7 +47,7 @@ def test_a_message_that_the_release_lacks_is_named(monkeypatch: pytest.MonkeyPat
 
 @dataclass
 class Info:
-    """rclpy's TopicEndpointInfo, as far as it is read."""
+    """The parts of rclpy's TopicEndpointInfo that our code reads."""
 
     topic_type: str
     topic_type_hash: object

@@ -1,5 +1,7 @@
-"""What a transport with a wire does between two processes of a machine, on every wire in turn: `ros2`
-where ROS is (make test-ros), `zenoh` without a router and in both ways of naming things."""
+"""Duties of a transport between two processes of a machine, on every wire in turn.
+
+`ros2` runs where ROS is installed (make test-ros), `zenoh` without a router and in both namings.
+"""
 
 from collections.abc import Callable, Iterator
 from typing import Any
@@ -16,7 +18,7 @@ from tests.transports.values import repeatable, values
 from tests.waiting import LEASE_S, wait_until
 
 Pair = tuple[str, str]
-"""Our transport, and that of the other process."""
+"""(our transport, the other process's transport)"""
 PAIRS = [
     pytest.param(("dds", "dds"), marks=pytest.mark.dds),
     *(
@@ -29,7 +31,7 @@ RETAINED = {"EMERGENCY_SIGNAL", "FIRE_ALARM_TRIGGER", "ADAPTER_LIFT_REQUESTS"} &
 
 
 class Here:
-    """Our node, in a domain of its own, and which transport the other process has."""
+    """Our node in its own domain, and the transport of the other process."""
 
     def __init__(self, pair: Pair, domain: int) -> None:
         (self.ours, self.theirs), self.domain = pair, domain
@@ -45,7 +47,7 @@ def here(request: pytest.FixtureRequest, domain: int) -> Iterator[Here]:
 
 @pytest.fixture(scope="module", params=PAIRS)
 def echoed(request: pytest.FixtureRequest, module_domain: int) -> Iterator[Transport]:
-    """A node, and a second process that sends back what it says."""
+    """Yield a node whose messages a second process sends back."""
     made = Here(request.param, module_domain)
     with peer.running("echo", made.domain, made.theirs):
         yield made.node
@@ -98,8 +100,10 @@ def test_what_a_supervisor_retained_is_not_replayed_to_a_lift_that_starts_later(
     here.node.subscribe(LIFT_REQUESTS.named("pong_lift_requests"), received.append)
     publisher.publish(before)
     with peer.running("echo", here.domain, here.theirs):
-        wait_until(lambda: after in received or peer.sent(publisher, after), "a new one comes back")
-    # Fast DDS asks Cyclone for what was before, and gets it: docs/how-to/ros.md.
+        wait_until(
+            lambda: after in received or peer.sent(publisher, after), "a new message comes back"
+        )
+    # Fast DDS asks Cyclone for earlier messages, and gets them: docs/how-to/ros.md.
     replays = (here.ours, here.theirs) == ("dds", "ros2") and on_fast_dds()
     assert set(received) - ({before} if replays else set()) == {after}
 
@@ -108,12 +112,15 @@ def test_a_process_that_leaves_is_gone_at_once_for_the_others(here: Here) -> Non
     publisher = here.node.publisher(LIFT_STATES.named("ping_lift_states"))
     subscription = here.node.subscribe(LIFT_STATES.named("pong_lift_states"), print)
     with peer.running("echo", here.domain, here.theirs):
-        wait_until(lambda: publisher.matched() and subscription.matched(), "it is found")
-    # Without a farewell it would be missed only when its lease runs out. Fast DDS misses Cyclone's.
+        wait_until(
+            lambda: publisher.matched() and subscription.matched(), "the other process is found"
+        )
+    # Without a farewell the process would be missed only after its lease. Fast DDS misses Cyclone's
+    # farewell.
     unheard = (here.ours, here.theirs) == ("ros2", "dds") and on_fast_dds()
     wait_until(
         lambda: not publisher.matched() and not subscription.matched(),
-        "it is gone",
+        "the other process is gone",
         LEASE_S * (2 if unheard else 1),
     )
 
@@ -126,14 +133,17 @@ def test_nodes_that_stay_find_a_newcomer_after_the_first_of_them_has_gone(here: 
         heard: list[d.LiftState] = []
         subscription = stays.subscribe(states, heard.append)
         publisher = here.node.publisher(states)
-        wait_until(lambda: publisher.matched() and subscription.matched(), "they meet")
+        wait_until(
+            lambda: publisher.matched() and subscription.matched(), "the first two nodes meet"
+        )
         here.node.close()
         wait_until(lambda: not subscription.matched(), "the first has gone")
         late = joining(here.ours, here.domain)("late")
         try:
             said = late.publisher(states)
             wait_until(
-                lambda: heard or peer.sent(said, d.LiftState(lift_name="Lift1")), "they meet too"
+                lambda: heard or peer.sent(said, d.LiftState(lift_name="Lift1")),
+                "the newcomer is heard",
             )
         finally:
             late.close()

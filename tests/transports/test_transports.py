@@ -1,4 +1,4 @@
-"""What every transport does, whichever wire it speaks."""
+"""Duties of every transport, on any wire."""
 
 from typing import Any
 
@@ -121,17 +121,24 @@ def test_others_only_leaves_out_the_nodes_own_messages(join: Join) -> None:
     everything = ours.subscribe(HEARD, echoed.append)
     others_only = ours.subscribe(HEARD, from_others.append, others_only=True)
     our_voice, other_voice = ours.publisher(HEARD), other.publisher(HEARD)
-    wait_until(lambda: our_voice.matched() == 1, "ours reaches one of the two")
-    wait_until(lambda: other_voice.matched() == 2, "the other reaches both")
-    wait_until(lambda: (everything.matched(), others_only.matched()) == (2, 1), "both count")
+    wait_until(
+        lambda: our_voice.matched() == 1, "our publisher reaches one of the two subscriptions"
+    )
+    wait_until(
+        lambda: other_voice.matched() == 2, "the other node's publisher reaches both subscriptions"
+    )
+    wait_until(
+        lambda: (everything.matched(), others_only.matched()) == (2, 1),
+        "both subscriptions count their publishers",
+    )
     our_voice.publish(numbered(1))
     other_voice.publish(numbered(2))
-    wait_until(lambda: len(echoed) == 2 and from_others, "all has arrived")
+    wait_until(lambda: len(echoed) == 2 and from_others, "all messages have arrived")
     assert sorted(numbers(echoed)) == [1, 2]
     assert numbers(from_others) == [2]
     our_voice.publish(numbered(3))
-    other_voice.publish(numbered(3))  # the same words are still another's
-    wait_until(lambda: len(echoed) == 4 and len(from_others) == 2, "all has arrived")
+    other_voice.publish(numbered(3))  # equal text, but from the other node
+    wait_until(lambda: len(echoed) == 4 and len(from_others) == 2, "all messages have arrived")
     assert numbers(from_others) == [2, 3]
     assert (everything.matched(), others_only.matched()) == (2, 1)
 
@@ -144,7 +151,7 @@ def test_a_subscription_knows_the_nodes_that_send_to_it_and_leaves_itself_out(jo
     voice = other.publisher(HEARD)
     wait_until(lambda: heard.senders() == [f"/{other.name}"], "the sender has a name")
     voice.close()
-    wait_until(lambda: heard.senders() == [], "it has gone")
+    wait_until(lambda: heard.senders() == [], "the sender has gone")
 
 
 def test_a_listener_may_ask_who_published_a_message_of_two_that_say_the_same(join: Join) -> None:
@@ -178,7 +185,7 @@ def test_matches_are_counted_up_and_down(join: Join) -> None:
     first, second = join("first"), join("second")
     heard = first.subscribe(HEARD, print)
     second.subscribe(HEARD, print)
-    wait_until(lambda: (publisher.matched(), heard.matched()) == (2, 1), "both match")
+    wait_until(lambda: (publisher.matched(), heard.matched()) == (2, 1), "both subscriptions match")
     second.close()
     wait_until(lambda: publisher.matched() == 1, "the second is gone")
 
@@ -229,7 +236,7 @@ def test_what_a_node_retained_leaves_with_it(join: Join) -> None:
     stays.publish(numbered(2))
     received: list[d.DoorRequest] = []
     join("late").subscribe(KEPT, received.append)
-    wait_until(lambda: received, "what is still retained arrives")
+    wait_until(lambda: received, "the message that is still retained arrives")
     assert numbers(received) == [2]
 
 

@@ -1,4 +1,4 @@
-"""A wall clock that steps: when `dds` and `ros2` join again, and that they do."""
+"""A wall clock that steps: `dds` and `ros2` join again at the right times."""
 
 import logging
 from contextlib import suppress
@@ -53,7 +53,7 @@ def test_a_node_whose_clock_is_set_back_joins_again_with_all_its_ends(
     monkeypatch: pytest.MonkeyPatch,
     caplog: pytest.LogCaptureFixture,
 ) -> None:
-    """On loopback its thread waits for messages alone, without end: it has to be woken."""
+    """On loopback the node's thread waits for messages without a limit, so the step must wake it."""
     caplog.set_level(logging.INFO)
     ahead = [0.0]
     monkeypatch.setattr(threaded, "ahead_s", lambda: ahead[-1])
@@ -75,7 +75,7 @@ def test_a_node_whose_clock_is_set_back_joins_again_with_all_its_ends(
         wait_until(lambda: d.Bool(True) in heard, "the alarm is heard")
         heard.clear()
         ahead.append(-10 * YEAR_S)
-        wait_until(lambda: d.Bool(True) in heard, "what is retained comes from a new participant")
+        wait_until(lambda: d.Bool(True) in heard, "a new participant sends the retained message")
         wait_until(lambda: comes_back(2), "states go there and back")
         node.close()
     assert [text for text in caplog.messages if "clock" in text] == [

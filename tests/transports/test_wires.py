@@ -1,4 +1,4 @@
-"""What transports whose wire is DDS do: `dds` everywhere, `ros2` where ROS is (make test-ros)."""
+"""Duties of transports whose wire is DDS: `dds` everywhere, `ros2` where ROS is (make test-ros)."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -30,10 +30,10 @@ def test_forged_samples_are_dropped_and_the_good_ones_after_them_arrive(
     node = join_wire("listener")
     node.subscribe(LIFT_REQUESTS, received.append)
     with peer.running("hostile", domain_of_this_run()):
-        wait_until(lambda: received[-1:] == [d.LiftRequest("after")], "a good one arrives")
+        wait_until(lambda: received[-1:] == [d.LiftRequest("after")], "a good message arrives")
     names = [request.lift_name for request in received]
     assert names[names.index("Lift1") :] == ["Lift1"] + ["after"] * names.count("after")
-    # cyclonedds refuses some before they reach us; rclpy hands on whatever comes.
+    # cyclonedds refuses some samples before they reach us; rclpy hands on every sample.
     by_us, first = {
         "DdsTransport": (4, "a string is not UTF-8: 'utf-8' codec can't decode byte 0xff"),
         "Ros2Transport": (8, "cut short: unpack_from requires a buffer of at least 24 bytes"),
@@ -68,11 +68,11 @@ def test_a_type_of_the_same_name_with_other_fields_is_never_taken_for_ours(
         speaker.publish(d.LiftRequest("Lift1"))
         return len(received) >= 20
 
-    wait_until(good_arrives, "the good ones arrive")
+    wait_until(good_arrives, "the good messages arrive")
     assert set(received) == {d.LiftRequest("Lift1")}
 
 
-# --- as the others see us ----------------------------------------------------------------------
+# --- our ends as others see them ----------------------------------------------------------------
 
 
 @ALL_TOPICS
@@ -100,7 +100,7 @@ def test_each_end_has_the_type_the_type_hash_and_the_qos_of_the_golden_table(
 
 
 def as_ros_shows(qos: Any) -> golden_qos.Qos:
-    """An end's QoS on DDS, in the golden table's terms."""
+    """Return an end's QoS on DDS in the golden table's form."""
     names = {
         "Reliable": "RELIABLE",
         "Volatile": "VOLATILE",

@@ -13,8 +13,11 @@ from tests.transports.zenoh_hostile import FLOOD, GOOD, arguments
 from tests.waiting import wait_until
 
 BY_HAND = 8
-"""Without an attachment, with two malformed ones, cut short, empty, two of 10 MB, a deletion. Then
-comes a wrong hash, which is another key, and a wildcard, which is counted too."""
+"""One without an attachment, two with malformed ones, one cut short, one empty, two of 10 MB, a
+deletion.
+
+Then come a wrong hash, which makes another key, and a wildcard, which is counted too.
+"""
 
 
 def test_forged_samples_are_dropped_and_counted_and_the_good_ones_after_them_arrive(
@@ -32,21 +35,21 @@ def test_forged_samples_are_dropped_and_counted_and_the_good_ones_after_them_arr
             assert child.stdout is not None
             assert child.stdout.readline() == "flooded\n"
             received.clear()
-            wait_until(lambda: len(received) >= 3, "good ones arrive after the flood")
+            wait_until(lambda: len(received) >= 3, "good messages arrive after the flood")
             child.stdin.close()
             child.wait()
     finally:
         node.close()
     assert set(map(repr, received)) == {repr(GOOD)}
-    # Of a flood the newest hundred wait for our thread: the rest need not be looked at.
+    # Of a flood the newest hundred samples wait for our thread; the others are dropped unread.
     assert BY_HAND + 1 < node.dropped["lift_requests"] <= BY_HAND + 1 + FLOOD
-    # It is said once. On a busy machine the first of them may have been pushed out of the queue.
+    # The log notes the flood once. On a busy machine the first forged samples may have left the queue.
     (said,) = caplog.messages
     assert said.startswith("sample_dropped topic=lift_requests reason=")
 
 
 def test_nothing_forged_is_taken_for_a_message(domain: int) -> None:
-    """The hash in a key is part of it: another one is another key; a wildcard is no key of ours."""
+    """Another hash in a key makes another key, and a wildcard is no key of ours."""
     received: list[d.LiftRequest] = []
     node = ZenohTransport("listener", domain, loopback=True)
     liar = ZenohTransport("liar", domain, loopback=True)
@@ -62,7 +65,7 @@ def test_nothing_forged_is_taken_for_a_message(domain: int) -> None:
         session.put(key.rsplit("/", 1)[0] + "/*", sample)
         session.put(f"{domain}/**", sample)
         voice.publish(d.LiftRequest("true"))
-        wait_until(lambda: received, "the true one arrives")
+        wait_until(lambda: received, "the true message arrives")
         wait_until(lambda: node.dropped == {"lift_requests": 2}, "the wildcards are counted")
     finally:
         liar.close()

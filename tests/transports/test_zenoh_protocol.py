@@ -1,5 +1,7 @@
-"""Keys, tokens, attachments and caches, as a program sees them that was written from rmw_zenoh's and
-zenoh-bridge-ros2dds's documents (rmw_zenoh_reader.py)."""
+"""Keys, tokens, attachments and caches, as an independent program sees them (rmw_zenoh_reader.py).
+
+That program was written from the documents of rmw_zenoh and zenoh-bridge-ros2dds.
+"""
 
 import time
 from collections.abc import Iterator
@@ -52,7 +54,7 @@ def bridged() -> Iterator[ZenohTransport]:
 
 
 def session_of(tokens: list[str], at: int) -> str:
-    """The one session that these tokens name."""
+    """Return the session's id, the same in all these tokens."""
     (session,) = {token.split("/")[at] for token in tokens}
     assert int(session, 16) > 0
     return session
@@ -80,11 +82,11 @@ def test_a_node_and_its_ends_show_as_rmw_zenoh_shows_its_own(node: ZenohTranspor
             f"{ours}/3/MP/%/%/lift_node/%fire_alarm_trigger/{fire}/:1:,100:,:,:,,",
         ]
         alarm.close()
-        wait_until(lambda: len(told.values("token")) == 5, "one is gone")
+        wait_until(lambda: len(told.values("token")) == 5, "one token is gone")
         last = {"token": f"{ours}/3/MP/%/%/lift_node/%fire_alarm_trigger/{fire}/:1:,100:,:,:,,"}
         assert told.lines[-1] == {**last, "is_there": False}
         node.close()
-        wait_until(lambda: len(told.values("token")) == 8, "all are gone")
+        wait_until(lambda: len(told.values("token")) == 8, "all tokens are gone")
     assert [line["is_there"] for line in told.lines] == [True] * 4 + [False] * 4
 
 
@@ -103,7 +105,7 @@ def test_a_sample_has_the_key_the_bytes_and_the_attachment_of_rmw_zenoh(
             states.publish(LiftState(lift_name=str(next(sent))))
             return len(told.values("sample")) >= 3
 
-        wait_until(three_have_come, "samples arrive")
+        wait_until(three_have_come, "three samples arrive")
     gid = rmw_zenoh_reader.gid(token).hex()
     numbers = told.values("number")
     assert numbers == list(range(numbers[0], numbers[0] + len(numbers)))
@@ -135,24 +137,26 @@ def test_what_we_retain_reaches_a_late_subscriber_of_rmw_zenoh_as_deep_as_it_wan
         alarm.publish(d.LiftRequest(destination_floor=str(number)))
     key = f"{DOMAIN}/adapter_lift_requests/{REQUEST}"
     with reading(meeting(DOMAIN), f"history {key} 10", f"history {key} 1000") as told:
-        wait_until(lambda: len(told.values("number")) == 110, "both get their history")
+        wait_until(lambda: len(told.values("number")) == 110, "both subscribers get their history")
         alarm.publish(d.LiftRequest(destination_floor="new"))
-        wait_until(lambda: len(told.values("number")) == 112, "both get what is new")
+        wait_until(
+            lambda: len(told.values("number")) == 112, "both subscribers get the new message"
+        )
     assert sorted(told.values("number")) == sorted([*range(121, 131), *range(31, 131), 131, 131])
 
 
 def heard_from(
     node: ZenohTransport, topic: Any, key: str, token: str, message: Any, depth: str = ""
 ) -> list[Any]:
-    """What our subscription hears of a program that speaks as this token says."""
+    """Return the messages that our subscription hears of a program that speaks as this token says."""
     received: list[Any] = []
     subscription = node.subscribe(topic, received.append)
     order = f"say {key} {token} {encode(type(message), message).hex()} {depth}".strip()
     with reading(meeting(DOMAIN), order) as told:
-        wait_until(lambda: told.values("said"), "it has spoken")
-        wait_until(lambda: received, "it is heard")
-        wait_until(lambda: subscription.matched() == 1, "it is counted")
-    wait_until(lambda: subscription.matched() == 0, "it has gone")
+        wait_until(lambda: told.values("said"), "the program has spoken")
+        wait_until(lambda: received, "the program is heard")
+        wait_until(lambda: subscription.matched() == 1, "the program's publisher is counted")
+    wait_until(lambda: subscription.matched() == 0, "the program has gone")
     return received
 
 

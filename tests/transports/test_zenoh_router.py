@@ -1,4 +1,4 @@
-"""`zenoh` with routers that come, go and want to know who we are. All on 127.0.0.1."""
+"""`zenoh` with routers that come, go and demand credentials. All on 127.0.0.1."""
 
 import logging
 import os
@@ -33,14 +33,14 @@ class Site:
         self.nodes: list[ZenohTransport] = []
 
     def router(self, endpoint: str | None = None, **config: Any) -> Router:
-        """A router, started."""
+        """Start a router."""
         router = Router(endpoint, **config)
         self.routers.append(router)
         router.start()
         return router
 
     def node(self, name: str, *connect: str, **settings: Any) -> ZenohTransport:
-        """A node that goes by these routers."""
+        """Open a node that connects to these routers."""
         zenoh = Zenoh(connect=connect, **settings)
         self.nodes.append(ZenohTransport(name, DOMAIN, loopback=False, settings=zenoh))
         return self.nodes[-1]
@@ -57,7 +57,7 @@ def site() -> Iterator[Site]:
 
 
 class Talk:
-    """States of a lift, from one node to another."""
+    """States of a lift from one node to another."""
 
     def __init__(self, speaker: ZenohTransport, listener: ZenohTransport) -> None:
         self.heard: list[str] = []
@@ -67,14 +67,14 @@ class Talk:
         self.publisher = speaker.publisher(LIFT_STATES)
 
     def arrives(self, text: str) -> bool:
-        """Whether a state that is sent again and again has arrived."""
+        """Has a state, which is sent again and again, arrived?"""
         with suppress(TransportError):
             self.publisher.publish(d.LiftState(lift_name=text))
         return text in self.heard
 
 
 def linked(caplog: pytest.LogCaptureFixture, node: str) -> list[str]:
-    """What was logged of this node's link."""
+    """Return the log events of this node's link."""
     return [text.split(" ")[0] for text in caplog.messages if f"linked node={node} " in text]
 
 
@@ -92,16 +92,18 @@ def test_a_node_that_starts_before_its_router_is_there_as_soon_as_it_is(
     alarm = lift.publisher(FIRE_ALARM_TRIGGER)
     with suppress(
         TransportError
-    ):  # a client says that it has no session; it retains it all the same
+    ):  # a client reports that it has no session, but retains the message
         alarm.publish(d.Bool(True))
     rang: list[d.Bool] = []
     rmf.subscribe(FIRE_ALARM_TRIGGER, rang.append)
-    wait_until(lambda: linked(caplog, "lift") == ["not_linked"], "it says that nobody answers")
+    wait_until(
+        lambda: linked(caplog, "lift") == ["not_linked"], "the log says that no router answers"
+    )
     assert not talk.arrives("nobody hears")
     site.router(endpoint)
     wait_until(lambda: talk.arrives("states are out"), "RMF hears the lift")
-    wait_until(lambda: rang, "what was retained is heard")
-    wait_until(lambda: len(linked(caplog, "lift")) == 2, "it says so")
+    wait_until(lambda: rang, "the retained message is heard")
+    wait_until(lambda: len(linked(caplog, "lift")) == 2, "the log says that the router answers")
     assert linked(caplog, "lift") == ["not_linked", "linked"]
     assert rang == [d.Bool(True)]
 
@@ -128,7 +130,7 @@ def test_a_router_that_is_lost_and_comes_back_finds_states_and_what_was_retained
     late = site.node("late", router.endpoint, mode=mode)
     rang: list[d.Bool] = []
     late.subscribe(FIRE_ALARM_TRIGGER, rang.append)
-    wait_until(lambda: rang, "who comes late hears what was retained")
+    wait_until(lambda: rang, "a node that comes late hears the retained message")
     assert rang == [d.Bool(True)]
     assert linked(caplog, "lift") == ["linked", "not_linked", "linked"]
 
@@ -145,11 +147,11 @@ def test_with_two_routers_each_message_comes_once_and_one_of_them_is_enough(site
     counted = [str(number) for number in range(50)]
     for text in counted:
         talk.publisher.publish(d.LiftState(lift_name=text))
-    wait_until(lambda: talk.arrives("last") and "last" in heard, "all has arrived")
+    wait_until(lambda: talk.arrives("last") and "last" in heard, "all messages have arrived")
     assert [text for text in talk.heard if text.isdigit()] == counted
     assert [text for text in heard if text.isdigit()] == counted
     first.die()
-    wait_until(lambda: talk.arrives("one of two") and "one of two" in heard, "one is enough")
+    wait_until(lambda: talk.arrives("one of two") and "one of two" in heard, "one router is enough")
 
 
 class Machine:
@@ -166,7 +168,7 @@ def test_a_node_on_zenoh_joins_another_address_and_what_was_retained_goes_out_ag
     machine = Machine()
     monkeypatch.setattr(addresses, "addresses", lambda: machine.addresses)
     router = site.router()
-    # The kernel takes 0.0.0.0 for this machine; that it is loopback our code does not know.
+    # For the kernel 0.0.0.0 is this machine; our code does not know that 0.0.0.0 is loopback.
     anywhere = router.endpoint.replace("127.0.0.1", "0.0.0.0")
     lift = site.node("lift", anywhere)
     rmf = site.node("rmf", router.endpoint, mode="client")
@@ -177,13 +179,15 @@ def test_a_node_on_zenoh_joins_another_address_and_what_was_retained_goes_out_ag
     alarm.publish(d.Bool(True))
     wait_until(lambda: talk.arrives("before"), "RMF hears the lift")
     machine.addresses = frozenset({(2, "10.0.0.8")})
-    wait_until(lambda: "network addresses=10.0.0.8" in caplog.messages, "it is noticed")
+    wait_until(
+        lambda: "network addresses=10.0.0.8" in caplog.messages, "the new address is noticed"
+    )
     wait_until(lambda: talk.arrives("after"), "RMF hears the lift again")
     rang: list[d.Bool] = []
     site.node("late", router.endpoint, mode="client").subscribe(FIRE_ALARM_TRIGGER, rang.append)
-    wait_until(lambda: rang, "who comes late hears what was retained")
+    wait_until(lambda: rang, "a node that comes late hears the retained message")
     other, state = rmf.publisher(LIFT_STATES), d.LiftState(lift_name="to the lift")
-    wait_until(lambda: back or peer.sent(other, state), "it hears")
+    wait_until(lambda: back or peer.sent(other, state), "the lift hears RMF")
     assert set(back) == {"to the lift"}
     assert rang == [d.Bool(True)]
 
@@ -198,11 +202,13 @@ def test_nobody_of_one_domain_is_heard_in_another(site: Site) -> None:
     stranger.publish(d.LiftState(lift_name="elsewhere"))
     wait_until(lambda: talk.arrives("here"), "RMF hears the lift")
     assert set(talk.heard) == {"here"}
-    wait_until(lambda: talk.publisher.matched() == 1, "the lift's node is told of RMF's")
+    wait_until(
+        lambda: talk.publisher.matched() == 1, "the lift's node learns of RMF's subscription"
+    )
     assert stranger.matched() == 0
 
 
-# --- who may come in -----------------------------------------------------------------------------
+# --- credentials --------------------------------------------------------------------------------
 
 
 class Papers:
@@ -219,7 +225,7 @@ class Papers:
         self.directory = directory
 
     def file(self, name: str) -> str:
-        """The path of one of the files."""
+        """Return the path of a file of this name."""
         return str(self.directory / name)
 
     @staticmethod
@@ -235,7 +241,7 @@ def papers(tmp_path_factory: pytest.TempPathFactory) -> Papers:
 
 
 def guarded(site: Site, papers: Papers) -> Router:
-    """A router that wants a certificate of everybody."""
+    """Return a router that demands a certificate of every node."""
     return site.router(
         f"tls/localhost:{free_port()}",
         transport__link__tls__root_ca_certificate=papers.ca,
@@ -260,7 +266,7 @@ def test_with_its_certificate_a_node_comes_in_and_without_it_does_not(
     )
     wait_until(lambda: talk.arrives("encrypted"), "RMF hears the lift")
     site.node("stranger", router.endpoint, tls=ZenohTls(ca=papers.ca))
-    wait_until(lambda: linked(caplog, "stranger"), "the stranger is told")
+    wait_until(lambda: linked(caplog, "stranger"), "the log tells the stranger of the missing link")
     assert linked(caplog, "stranger") == ["not_linked"]
 
 
@@ -287,7 +293,9 @@ def test_with_its_password_a_node_comes_in_and_with_another_does_not(
     site.node("liar", router.endpoint, password_file=wrong, **known)
     site.node("stranger", router.endpoint, mode="client")
     for name in ("liar", "stranger"):
-        wait_until(lambda name=name: linked(caplog, name), f"the {name} is told")  # type: ignore[misc]
+        wait_until(
+            lambda name=name: linked(caplog, name), f"the log tells the {name} of the missing link"
+        )  # type: ignore[misc]
         assert linked(caplog, name) == ["not_linked"]
 
 
@@ -322,7 +330,7 @@ def test_an_address_that_cannot_be_listened_on_is_an_error() -> None:
         ZenohTransport("lift", DOMAIN, loopback=False, settings=zenoh)
 
 
-# --- what is simulated never reaches a router ----------------------------------------------------
+# --- simulated devices never reach a router -----------------------------------------------------
 
 
 def test_a_node_on_loopback_takes_no_notice_of_the_settings_and_opens_no_other_address(
@@ -344,7 +352,7 @@ def test_a_node_on_loopback_takes_no_notice_of_the_settings_and_opens_no_other_a
 
 
 def listening(pid: int) -> set[tuple[str, str]]:
-    """(address, port), in hexadecimal, of each TCP socket on which a process listens."""
+    """Return (address, port), in hexadecimal, of each TCP socket on which a process listens."""
     inodes = set()
     for descriptor in Path(f"/proc/{pid}/fd").iterdir():
         with suppress(OSError):
@@ -371,13 +379,16 @@ def test_a_router_drives_a_node_that_must_stay_here_off_the_graph_until_it_has_g
     assert lift.faults() == []
 
     router = site.router(connect__endpoints=[meeting(domain)])
-    wait_until(lambda: [code for code, _ in lift.faults()] == ["ROUTER_ON_LOOPBACK"], "it has left")
+    wait_until(
+        lambda: [code for code, _ in lift.faults()] == ["ROUTER_ON_LOOPBACK"],
+        "the lift's node has left because of the router",
+    )
     assert (talk.publisher.matched(), hears.matched(), lift.lives) == (0, 0, True)
     with pytest.raises(TransportError, match="the node is not on the graph"):
         talk.publisher.publish(d.LiftState(lift_name="away"))
     with pytest.raises(TransportError):
         alarm.publish(d.Bool(True))
-    wait_until(lambda: asks.matched() == 0, "RMF knows that it has gone")
+    wait_until(lambda: asks.matched() == 0, "RMF knows that the lift has gone")
     asks.publish(d.LiftRequest(session_id="unheard"))
 
     router.leave()
@@ -385,7 +396,10 @@ def test_a_router_drives_a_node_that_must_stay_here_off_the_graph_until_it_has_g
     rmf.subscribe(FIRE_ALARM_TRIGGER, rang.append)
     wait_until(lambda: talk.arrives("after") and rang, "RMF hears the lift again, and its alarm")
     wait_until(lambda: hears.matched() == 1, "the lift knows of RMF")
-    wait_until(lambda: asked or peer.sent(asks, d.LiftRequest(session_id="heard")), "it hears")
+    wait_until(
+        lambda: asked or peer.sent(asks, d.LiftRequest(session_id="heard")),
+        "the lift hears RMF's request",
+    )
     assert {request.session_id for request in asked} == {"heard"}
     assert "away" not in talk.heard
     assert lift.faults() == []
@@ -407,6 +421,9 @@ def test_a_node_stays_away_while_a_router_is_there_and_for_ten_seconds_after_it_
 def test_a_node_whose_router_does_not_answer_says_so_as_a_fault(site: Site) -> None:
     endpoint = f"tcp/127.0.0.1:{free_port()}"
     lift = site.node("lift", endpoint, mode="client")
-    wait_until(lambda: [code for code, _ in lift.faults()] == ["NO_ROUTER"], "it is a fault")
+    wait_until(
+        lambda: [code for code, _ in lift.faults()] == ["NO_ROUTER"],
+        "the missing router is a fault",
+    )
     site.router(endpoint)
-    wait_until(lambda: lift.faults() == [], "it is over")
+    wait_until(lambda: lift.faults() == [], "the fault is over")

@@ -1,4 +1,4 @@
-"""Floods of liveliness tokens, panics of the library, and what a session must not depend on."""
+"""Floods of liveliness tokens, panics of the library, and causes that must not disturb a session."""
 
 import json
 import logging
@@ -43,7 +43,7 @@ class Stranger:
             self._tokens.append(self.session.liveliness().declare_token(token))
 
     def drops(self, most: int) -> None:
-        """Take the first ones back."""
+        """Withdraw the first `most` tokens."""
         gone, self._tokens = self._tokens[:most], self._tokens[most:]
         for token in gone:
             token.undeclare()  # type: ignore[no-untyped-call]
@@ -101,11 +101,11 @@ def test_a_flood_of_tokens_is_walked_seldom_and_what_comes_in_it_is_heard(
         node._orders.put(hold)
         wait_until(held.is_set, "our thread is busy")
         flood.claims("MP", "lift_requests", type_text(node), range(300))
-        wait_until(lambda: hears.matched() == 300, "all are counted")
+        wait_until(lambda: hears.matched() == 300, "all publishers are counted")
         before = len(walks)
         goes_on.set()
-        wait_until(lambda: len(walks) > before, "they are walked")
-        wait_until(node._orders.empty, "nothing waits")
+        wait_until(lambda: len(walks) > before, "the tokens are walked")
+        wait_until(node._orders.empty, "no order waits")
         assert len(walks) <= before + 2
 
 
@@ -126,11 +126,17 @@ def test_beyond_the_bound_ends_are_left_out_once_said_and_counted_when_there_is_
             flood.claims(
                 "MP", "lift_requests", type_text(node), range(100 * again, 100 * again + 25)
             )
-            wait_until(lambda: hears.matched() == 20 and crowded(), "as many as may be")
+            wait_until(
+                lambda: hears.matched() == 20 and crowded(),
+                "the permitted number is counted, and the log names the crowd",
+            )
             flood.drops(20)
-            wait_until(lambda: hears.matched() == 5, "those that are left, the late ones too")
+            wait_until(
+                lambda: hears.matched() == 5,
+                "the remaining publishers are counted, the late ones too",
+            )
             flood.drops(5)
-            wait_until(lambda: hears.matched() == 0, "none is left")
+            wait_until(lambda: hears.matched() == 0, "no publisher is left")
     assert len(crowded()) == 1
     assert "most=20" in crowded()[0]
 
@@ -140,7 +146,7 @@ def test_a_token_longer_than_any_of_ros_is_nobodys(node: ZenohTransport, domain:
     with stranger(domain) as far:
         far.claims("MP", "lift_requests", type_text(node), range(1), qos="x" * 2000 + "::")
         far.claims("MP", "lift_requests", type_text(node), range(1, 2))
-        wait_until(lambda: hears.matched() == 1, "the other is counted")
+        wait_until(lambda: hears.matched() == 1, "the publisher with the short token is counted")
 
 
 def test_many_ends_that_do_not_fit_are_one_line(
@@ -153,8 +159,10 @@ def test_many_ends_that_do_not_fit_are_one_line(
         far.claims("MP", "fire_alarm_trigger", kind, range(50))
         place = node._ends[0].place
         assert place
-        wait_until(lambda: len(place.unheard) == 50, "all are seen")
-        wait_until(lambda: any("misfit" in text for text in caplog.messages), "it is said")
+        wait_until(lambda: len(place.unheard) == 50, "all publishers that do not fit are seen")
+        wait_until(
+            lambda: any("misfit" in text for text in caplog.messages), "the log names the misfit"
+        )
     assert len([text for text in caplog.messages if "misfit" in text]) == 1
 
 
@@ -162,11 +170,11 @@ def test_many_ends_that_do_not_fit_are_one_line(
 
 
 class PanicException(BaseException):
-    """As pyo3 raises for a panic."""
+    """An exception like pyo3's for a panic."""
 
 
 class Panics:
-    """An end whose library is at its end."""
+    """An end whose library panics at each call."""
 
     def put(self, *sample: object, **more: object) -> None:
         raise PanicException("called `Result::unwrap()` on an `Err` value")
@@ -189,7 +197,7 @@ def test_a_panic_on_our_thread_is_logged_and_the_thread_lives(
     done: list[int] = []
     for order in (Panics().put, lambda: done.append(1)):
         node._orders.put(order)
-    wait_until(lambda: done, "the next order is heeded")
+    wait_until(lambda: done, "the next order is obeyed")
     assert node.lives
     assert "reader_failed" in caplog.text
 
@@ -215,5 +223,5 @@ def test_samples_bear_no_time_of_zenohs_clock_which_panics_before_1970(
         key = node._keys.data(LIFT_STATES)
         far.session.declare_subscriber(key, lambda sample: stamps.append(sample.timestamp))
         publisher = node.publisher(LIFT_STATES)
-        wait_until(lambda: stamps or peer.sent(publisher, d.LiftState()), "it arrives")
+        wait_until(lambda: stamps or peer.sent(publisher, d.LiftState()), "the sample arrives")
     assert set(stamps) == {None}

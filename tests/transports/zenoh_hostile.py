@@ -1,7 +1,7 @@
-"""A program that lies: `python -m tests.transports.zenoh_hostile ENDPOINT KEY GOOD TOKEN`.
+"""A lying program: `python -m tests.transports.zenoh_hostile ENDPOINT KEY GOOD TOKEN`.
 
-It sends what is no sample of a ROS node under KEY, then ten thousand more as fast as it can, then GOOD
-(in hexadecimal) as a ROS node does, until its stdin ends.
+Under KEY it sends samples that no ROS node sends, then ten thousand more as fast as it can, then, as a
+ROS node does, GOOD (in hexadecimal) until its stdin ends.
 """
 
 import json
@@ -22,7 +22,7 @@ GOOD = d.LiftRequest("Lift1", d.Time(5, 6), "fleet/robot", 1, "L3", 2)
 
 
 def arguments(domain: int) -> tuple[str, str, str, str]:
-    """To lie to the lifts of a domain on this machine."""
+    """Return the arguments for lying to the lifts of a domain on this machine."""
     kind = f"rmf_lift_msgs::msg::dds_::LiftRequest_/{type_hash(d.LiftRequest)}"
     token = f"@ros2_lv/{domain}/5e/0/7/MP/%/%/liar/%lift_requests/{kind}/::,10:,:,:,,"
     good = encode(d.LiftRequest, GOOD).hex()

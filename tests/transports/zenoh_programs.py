@@ -1,4 +1,4 @@
-"""Other programs on zenoh for the tests: processes of their own, on 127.0.0.1."""
+"""Other programs on zenoh for the tests, in their own processes on 127.0.0.1."""
 
 import json
 import socket
@@ -16,31 +16,31 @@ READER = Path(__file__).with_name("rmw_zenoh_reader.py")
 
 
 def meeting(domain: int) -> str:
-    """Where our nodes of a domain meet on this machine."""
+    """Return the endpoint where our nodes of a domain meet on this machine."""
     return f"tcp/127.0.0.1:{LOOPBACK_PORT + domain}"
 
 
 def free_port() -> int:
-    """A TCP port that nobody holds now."""
+    """Return a free TCP port."""
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         return int(probe.getsockname()[1])
 
 
 class Written:
-    """What a program has written, line by line."""
+    """The output of a program, line by line."""
 
     def __init__(self) -> None:
         self.lines: list[dict[str, Any]] = []
 
     def values(self, key: str) -> list[Any]:
-        """The values of this key, of each line that has it."""
+        """Return the values of this key in each line that has the key."""
         return [line[key] for line in self.lines if key in line]
 
 
 @contextmanager
 def reading(endpoint: str, *orders: str) -> Iterator[Written]:
-    """The reader that knows nothing of our code, until the end of the block."""
+    """Run the reader that shares no code with us, until the end of the block."""
     written = Written()
     command = [sys.executable, str(READER), endpoint, *orders]
     with subprocess.Popen(
@@ -64,9 +64,9 @@ def _collect(lines: Any, written: Written) -> None:
 
 
 class Router:
-    """A zenoh router: this library's own, in a process that can be killed and started again.
+    """A zenoh router from this library, in a process that can be killed and started again.
 
-    `config`: what it is written besides where it listens.
+    `config` has further settings besides the endpoint.
     """
 
     def __init__(self, endpoint: str | None = None, **config: Any) -> None:
@@ -95,7 +95,7 @@ class Router:
         assert self._child.stdout.readline() == "listening\n"
 
     def leave(self) -> None:
-        """End it, as an operator does: it says farewell."""
+        """End the router with a farewell, as an operator does."""
         if self._child:
             assert self._child.stdin is not None
             assert self._child.stdout is not None

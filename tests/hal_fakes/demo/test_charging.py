@@ -66,7 +66,9 @@ def test_ctrl_c_in_the_middle_leaves_nothing_behind(directory: Path) -> None:
 
 
 def journal(*told: tuple[str, str, str]) -> Journal:
-    """Of (charger, robot it charges, request id) one after the other, IDLE between."""
+    """Return a journal of these charges in turn: (charger, robot, request id), with IDLE between
+    them.
+    """
     made = Journal(0.0, lambda text: None, colour=False)
     for charger, robot, request_id in told:
         value = int(d.ChargerStateValue.CHARGER_CHARGING)

@@ -17,7 +17,7 @@ from tests.waiting import PATIENCE_S, wait_until
 
 CONFIG = Path(__file__).parents[3] / "config"
 PATIENTLY = ("--patience", "10")
-"""A busy machine does not make a day wrong."""
+"""Options for a busy machine, which must not make a day wrong."""
 
 
 @contextmanager
@@ -44,7 +44,7 @@ def demo(directory: Path, *options: str, on: Wire | None = None) -> Iterator[sub
 
 @pytest.fixture
 def directory(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A short one: the name of a socket has 107 characters at the most."""
+    """Return a short path, since the path of a socket has at most 107 characters."""
     return tmp_path_factory.mktemp("d")
 
 
@@ -103,7 +103,7 @@ def test_a_daemon_that_cannot_start_is_noticed_and_its_log_says_why(
 ) -> None:
     daemon = DaemonProcess(CONFIG / "none_such.yaml", directory, domain)
     try:
-        wait_until(lambda: died(daemon), "the death is noticed")
+        wait_until(lambda: died(daemon), "the daemon's death is noticed")
         assert "none_such.yaml" in daemon.tail()
     finally:
         stop_all([daemon])
@@ -125,4 +125,4 @@ def test_a_daemon_that_hangs_is_killed_with_its_fake(domain: int, directory: Pat
         daemon._process.send_signal(signal.SIGSTOP)
     finally:
         stop_all([daemon], within_s=0.2)
-    wait_until(lambda: running(directory) == [], "nobody is left")
+    wait_until(lambda: running(directory) == [], "no process is left")

@@ -1,4 +1,4 @@
-"""A fleet from a configuration as RMF's tutorial shapes it."""
+"""A fleet from a configuration in the form of RMF's tutorial."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""The demo calls a day right only when it was: each thing that can go wrong is seen and named."""
+"""The demo calls only a right day right: it sees and names each possible mistake."""
 
 from collections.abc import Callable
 from typing import Any

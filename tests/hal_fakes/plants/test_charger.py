@@ -1,4 +1,4 @@
-"""The charger's physics in virtual time, each part failing as it is told."""
+"""The charger's physics in virtual time, and each failure of its parts."""
 
 import pytest
 
@@ -20,7 +20,7 @@ def at(plant: ChargerPlant, now: float) -> Reading:
 
 
 def parked(*failures: tuple[str, FailureMode]) -> ChargerPlant:
-    """A station onto whose pad a robot comes at 1 s."""
+    """Return a station with these failures; a robot comes onto its pad at 1 s."""
     plant = ChargerPlant("a")
     for part, mode in failures:
         plant.fail(part, mode)
@@ -29,13 +29,13 @@ def parked(*failures: tuple[str, FailureMode]) -> ChargerPlant:
 
 
 def commanded(asked: bool = False, cleared: bool = True) -> ChargerPlant:
-    """A station that charges only when it is told to, and knows two robots."""
+    """Return a station that charges only on command, and knows two robots."""
     robots = {"7": "tiny/AMR01", "8": "tiny/AMR02"}
     return ChargerPlant("a", robots, commanded=True, asked=asked, cleared=cleared)
 
 
 def powered(cleared: bool = True) -> ChargerPlant:
-    """A robot comes at 1 s, and may be charged from then on."""
+    """Return a station whose power is on when a robot comes at 1 s."""
     plant = commanded(cleared=cleared)
     plant.press("robot", True, 1.0)
     plant.drive("power", True, 1.0)

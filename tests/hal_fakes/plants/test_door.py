@@ -1,4 +1,4 @@
-"""The door plant moves, waits and fails as an operator does, in virtual time."""
+"""The door plant moves, waits and fails like a door operator, in virtual time."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""`rmf-bridge explain` and `plot` as they are typed, on recordings of every kind."""
+"""`rmf-bridge explain` and `plot` as typed commands, on recordings of every kind."""
 
 import json
 from pathlib import Path

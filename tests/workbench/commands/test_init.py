@@ -25,7 +25,7 @@ lifts:
 
 @pytest.fixture(autouse=True)
 def data(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """The user's data directory, where the schema is kept."""
+    """Return the user's data directory, in which the schema lies."""
     monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path / "data"))
     return tmp_path / "data"
 
@@ -96,7 +96,7 @@ def test_an_existing_file_is_never_overwritten(tmp_path: Path) -> None:
     file = tmp_path / "device.yaml"
     file.write_text("mine")
     assert cli.main(["init", str(file), "--kind", "door", "--yes"]) == 73
-    assert cli.main(["init", str(file)]) == 73  # before a question is asked
+    assert cli.main(["init", str(file)]) == 73  # before the first question
     assert file.read_text() == "mine"
 
 
@@ -148,8 +148,8 @@ def test_on_a_terminal_it_asks_one_thing_after_the_other(tmp_path: Path) -> None
     file = tmp_path / "device.yaml"
     terminal = Terminal("init", str(file), "--domain-id", "5")
     terminal.wait_for("What is it?")
-    terminal.type("\x1b[B\r")  # down: door
-    terminal.wait_for("The device's name on RMF's map?")
+    terminal.type("\x1b[B\r")  # down arrow: door
+    terminal.wait_for("Its name on RMF's map?")
     terminal.type("ward\r")
     terminal.wait_for("How is it wired?")
     terminal.type("\r")

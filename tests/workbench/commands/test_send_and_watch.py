@@ -1,4 +1,4 @@
-"""`send` and `watch` around their pure parts: on the memory transport, and as processes on DDS."""
+"""`send` and `watch` as whole commands: on the memory transport, and as processes on DDS."""
 
 import argparse
 import io
@@ -43,7 +43,7 @@ LIFT = d.LiftState(
 
 
 class Command(MemoryTransport):
-    """A node that is told a device's state as soon as it subscribes, and after each request."""
+    """A node that hears a device's state as soon as it subscribes, and after each request."""
 
     def __init__(self, device: "Device") -> None:
         super().__init__(device.network, "command")
@@ -52,14 +52,14 @@ class Command(MemoryTransport):
     def subscribe(
         self, topic: Topic[M], received: Callable[[M], None], *, others_only: bool = False
     ) -> Any:
-        """As the device publishes at 1 Hz, a subscriber soon hears it."""
+        """Subscribe, and hear a state at once; a real device publishes at 1 Hz."""
         subscription = super().subscribe(topic, received, others_only=others_only)
         self._device.tell()
         return subscription
 
 
 class Device:
-    """A lift, door or charger on the memory transport that does as it is told, at once."""
+    """A lift, door or charger on the memory transport that obeys at once."""
 
     def __init__(self, states: Topic[Any], requests: Topic[Any], state: Any) -> None:
         self.network = MemoryNetwork()
@@ -187,7 +187,7 @@ def test_what_comes_from_the_network_cannot_move_the_cursor(
 
 
 class Interrupted(io.StringIO):
-    """Ctrl-C comes while this text is printed."""
+    """A stream that gets Ctrl-C while this text is printed."""
 
     def __init__(self, at: str) -> None:
         super().__init__()
@@ -305,7 +305,7 @@ def test_a_request_id_is_new_each_time_and_begins_with_our_name() -> None:
 
 @pytest.fixture(params=sorted({runs_here(), "zenoh"}))
 def speaks(request: pytest.FixtureRequest) -> Wire:
-    """The transport of the daemon and of the command."""
+    """Return the transport of the daemon and of the command."""
     speaks: Wire = request.param
     return speaks
 
@@ -340,7 +340,7 @@ def test_a_lift_is_sent_for_by_another_process_on_the_adapter_topic(
         states = node.publisher(topics.LIFT_STATES)
         requests: list[d.LiftRequest] = []
         node.subscribe(topics.ADAPTER_LIFT_REQUESTS, requests.append)
-        node.publisher(topics.LIFT_REQUESTS)  # as a supervisor has it
+        node.publisher(topics.LIFT_REQUESTS)  # as a supervisor does
         with command("send lift Lift1 L3 --session fleet/robot", speaks, domain) as process:
             wait_until(lambda: states.matched() > 0, "send listens to lift_states")
             states.publish(LIFT)
@@ -380,14 +380,16 @@ def test_an_interrupted_send_exits_130_and_leaves_no_ghost_that_asks_for_the_doo
         command("send door ward open --direct", speaks, domain) as process,
     ):
         heard = node.subscribe(topics.DOOR_REQUESTS, lambda _: None)
-        wait_until(lambda: heard.matched() > 0, "send is there")
+        wait_until(lambda: heard.matched() > 0, "send listens to door_requests")
         process.send_signal(signal.SIGINT)
         assert process.wait(timeout=PATIENCE_S) == 130
         wait_until(lambda: heard.matched() == 0, "send has left the graph", patience_s=LEASE_S)
 
 
 def test_a_command_reaches_a_site_as_a_device_yaml_does(tmp_path: Path) -> None:
-    """Its router, its domain and its keys, by `--config`; what is beside it wins."""
+    """`--config` gives the command the site's router, domain and keys; options beside `--config`
+    win.
+    """
     router = Router()
     file = tmp_path / "lift.yaml"
     shipped = (Path(__file__).parents[3] / "config" / "lift_supervisor.yaml").read_text()

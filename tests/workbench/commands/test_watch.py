@@ -1,4 +1,4 @@
-"""What `rmf-bridge watch` shows: rows from messages and a time, in virtual time."""
+"""The rows of `rmf-bridge watch`, from messages and a time, in virtual time."""
 
 import argparse
 import json
@@ -92,7 +92,7 @@ def test_a_door_shows_who_the_supervisor_says_holds_it() -> None:
 
 
 def told(kind: str, name: str, *codes: str, node: str = "node") -> d.DiagnosticArray:
-    """What one of our daemons says of a device."""
+    """Return the diagnostics of a device from one of our daemons."""
     faults = [{"code": code, "detail": ""} for code in codes]
     status = {"faults": faults, "input_age_s": 0.1}
     return diagnosis(node, kind, {}, {name: status}, d.Time())
@@ -139,7 +139,7 @@ def test_faults_have_a_column_when_there_are_any_and_are_a_change() -> None:
 
 
 def test_a_device_is_shown_once_it_is_known_whether_it_is_simulated() -> None:
-    """A real one's daemon may be another's, and never say so: it is not waited for long."""
+    """A real device's daemon may never publish diagnostics, so `watch` does not wait long for them."""
     young = board(LIFT)
     assert watch.settled(young, 100.0, WALL) == []
     assert [row.simulated for row in watch.settled(young, 101.5, WALL)] == [False]
@@ -263,7 +263,7 @@ def test_robots_are_shown_with_the_place_that_they_are_assigned_to_charge_or_to_
 
 
 def daemon(node: str, kind: str, **status: object) -> d.DiagnosticArray:
-    """What a daemon says of itself, and of Lift1."""
+    """Return the diagnostics of a daemon and of Lift1."""
     lift = {"faults": [{"code": "OVERLOAD", "detail": "since 3 s"}], "input_age_s": 0.1}
     return diagnosis(node, kind, status, {"Lift1": lift}, d.Time())
 

@@ -1,4 +1,4 @@
-"""The module on the wall of the daemon's tests, for commands that act on real wires."""
+"""The daemon tests' module on the wall, for commands that act on real wires."""
 
 from tests.runtime.conftest import module
 

@@ -1,4 +1,4 @@
-"""Each key of the reference has an example that is right, and each heading stands there once."""
+"""Each key of the reference has a valid example, and each heading appears once."""
 
 from collections import Counter
 from pathlib import Path
@@ -18,7 +18,7 @@ from workbench.commissioning.examples import example
 
 
 def structs() -> list[type]:
-    """Every struct of the reference, those inside others too."""
+    """Return every struct of the reference, also structs inside others."""
     tops: list[type] = [Rmf, *(named.bus_called(name).settings for name in named.bus_types())]
     tops += [shape.type.settings for shape in reference.shapes()]
     tops += [kind.settings for kind in reference.graph_kinds()]
@@ -36,7 +36,7 @@ def fields(struct: type) -> tuple[mi.Field, ...]:
 
 
 def judged(struct: type, field: mi.Field) -> list[str]:
-    """The problems of an example, as the loader finds them."""
+    """Return the loader's problems with an example."""
     page = YamlFile("example")
     root = yaml.compose(f"wanted: {{{example(struct, field)}}}")
     assert root is not None

@@ -1,4 +1,4 @@
-"""Which device of a file a command is for, where the file is wrong or has several."""
+"""The device that a command finds in a file, also in a wrong file or among several devices."""
 
 import os
 from pathlib import Path

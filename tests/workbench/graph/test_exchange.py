@@ -1,4 +1,4 @@
-"""`send`, in virtual time: what it sends and when, when it is done, and what it says if it fails."""
+"""`send` in virtual time: its requests and their times, its end, and its texts for failures."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -36,7 +36,9 @@ CHARGER = d.ChargerState(state=1, charger_name="a")
 
 @dataclass
 class Ran:
-    """What a run of `send` did: when it sent, what, its hints, how it ended and when."""
+    """Record of a run of `send`: the time and request of each sending, hints, the outcome and its
+    time.
+    """
 
     sent: list[tuple[float, words.Requested]]
     hints: list[str]
@@ -53,7 +55,7 @@ def tell(
     timeout_s: float = 10.0,
     graph: str = "",
 ) -> Ran:
-    """Look every 0.1 s from 0 on; each message of the story arrives at its time."""
+    """Look every 0.1 s from 0 on; deliver each message of the story at its time."""
     left = sorted(story, key=lambda entry: entry[0])
     seen, ran = RequestProgress(0.0, timeout_s, graph=graph), Ran([], [], Fulfilled(""), 0.0)
     for tick in range(10_000):
@@ -84,7 +86,7 @@ def heartbeat(*requesters: str) -> d.SupervisorHeartbeat:
     return d.SupervisorHeartbeat((d.DoorSessions("ward", sessions),))
 
 
-# --- when it sends -----------------------------------------------------------------------------
+# --- times of sending --------------------------------------------------------------------------
 
 
 def test_a_lift_is_asked_for_as_fleets_ask_once_a_second_until_it_is_there() -> None:

@@ -1,4 +1,4 @@
-"""Incidents without names: nothing of the site is left, and they are decided as before."""
+"""Incidents without names: no name of the site is left, and the decisions stay the same."""
 
 import re
 import sys
@@ -25,7 +25,7 @@ NAMES = (b"Lift1", b"Lift2", b"red", b"green", b"white", b"black", b"bay1", b"ba
 
 
 def whole(file: Path) -> Incident:
-    """What a file holds, with its messages."""
+    """Return the content of a file, with its messages."""
     head, entries = opened(file, Notes())
     return Incident(head, list(entries), tuple(notes_in(file)))
 
@@ -77,7 +77,7 @@ def test_a_name_is_the_same_in_messages_and_decisions_and_comments_and_addresses
 def test_a_kind_whose_words_cannot_be_read_makes_nothing_anonymous(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """Its words would be taken for the site's names, and the recording could not be decided again."""
+    """The kind's words would be taken for the site's names, so the recording could not be replayed."""
     monkeypatch.setitem(sys.modules, lift.__name__ + ".report", None)
     our_words.cache_clear()
 

@@ -1,4 +1,4 @@
-"""Damaged and hostile recordings: what can be read is given, in bounded memory; the rest is told."""
+"""Damaged and hostile recordings: readable parts are given in bounded memory, damage is reported."""
 
 import io
 import random
@@ -26,7 +26,7 @@ NAME = "rmf_lift_msgs/msg/LiftState"
 
 
 def states(number: int, *, compression: CompressionType = CompressionType.NONE) -> bytes:
-    """An MCAP file with so many lift states, in chunks of a few."""
+    """Return an MCAP file with this number of lift states, in small chunks."""
     out = io.BytesIO()
     writer = Writer(out, chunk_size=1000, compression=compression)
     writer.start("ros2")
@@ -41,18 +41,18 @@ def states(number: int, *, compression: CompressionType = CompressionType.NONE) 
 
 
 def record(opcode: int, body: bytes, length: int | None = None) -> bytes:
-    """A record; `length`: what it says of itself."""
+    """Return a record; `length` is the length stated in its head."""
     return struct.pack("<BQ", opcode, len(body) if length is None else length) + body
 
 
 def chunk(compression: bytes, data: bytes, unpacked: int) -> bytes:
-    """A chunk that says that it unpacks to so many bytes."""
+    """Return a chunk that claims to unpack to this number of bytes."""
     head = struct.pack("<QQQII", 0, 0, unpacked, 0, len(compression)) + compression
     return record(Opcode.CHUNK, head + struct.pack("<Q", len(data)) + data)
 
 
 def read(path: Path, content: bytes) -> tuple[list[str], str]:
-    """The lifts heard, and what is said of the damage, without the path."""
+    """Return the lifts heard, and the report of the damage without the path."""
     path.write_bytes(content)
     notes = Notes()
     found = [one.message.lift_name for one in heard_in(path, notes)]  # type: ignore[union-attr]

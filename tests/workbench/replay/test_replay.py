@@ -1,4 +1,4 @@
-"""What the soak's daemons kept is decided again, each decision and each memory the same."""
+"""Recordings of the soak's daemons are decided again, with the same decisions and memories."""
 
 import os
 from pathlib import Path
@@ -59,8 +59,7 @@ def test_a_ring_that_has_turned_many_times_begins_where_all_is_known(tmp_path: P
 
 @pytest.mark.parametrize("file", CORPUS, ids=lambda file: file.stem)
 def test_each_incident_of_the_soak_is_decided_as_it_was_recorded(file: Path) -> None:
-    """If this fails for a change that is meant: `python -m tests.workbench.replay.corpus` renews
-    them."""
+    """After a deliberate change, renew the incidents: `python -m tests.workbench.replay.corpus`."""
     notes = Notes()
     head, entries = opened(file, notes)
     replay = Replay(entries, ReplayedCores(of_head(head)))
@@ -71,7 +70,7 @@ def test_each_incident_of_the_soak_is_decided_as_it_was_recorded(file: Path) -> 
 
 
 def test_a_change_of_a_core_is_seen_with_what_led_to_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A lift that keeps its faults to itself."""
+    """The changed lift reports no faults; the difference shows the events before it."""
     monkeypatch.setattr(lift_core, "_faults", lambda memory, view, now, limits: ())
     head, entries = opened(HERE / "Lift1_1.mcap", Notes())
 
@@ -141,7 +140,7 @@ def test_the_yaml_of_another_device_is_refused_with_both_names(
 
 
 def test_what_cannot_be_replayed_is_counted(tmp_path: Path) -> None:
-    """Entries before all is known, as a damaged beginning leaves them."""
+    """The `Known` entries are missing, as in a recording whose beginning is damaged."""
     head, entries = opened(HERE / "bay1_1.mcap", Notes())
     replay = Replay(
         [one for one in entries if not isinstance(one, Known)], ReplayedCores(of_head(head))
@@ -153,12 +152,12 @@ def test_what_cannot_be_replayed_is_counted(tmp_path: Path) -> None:
 
 
 def recorded_faults() -> tuple[Fault, ...]:
-    """The first fault that the recording of Lift1 shows."""
+    """Return the first fault in the recording of Lift1."""
     _, entries = opened(HERE / "Lift1_1.mcap", Notes())
     steps = [one for one in entries if isinstance(one, Decided) and one.faults not in ([], [[]])]
     return tuple(value(steps[0].faults[0]))
 
 
 def summary(found: Difference) -> str:
-    """A difference in one line, for a failed test."""
+    """Return a difference in one line, for a failed test."""
     return f"{found.subject} {found.what}: {found.recorded} -> {found.today} after {found.before}"

@@ -1,4 +1,4 @@
-"""RMF's rules at their edges: Jazzy's older ones, and what a mutation run found untold."""
+"""RMF's rules at their edges: Jazzy's older rules, and rules that mutation showed to be untested."""
 
 from msgspec.structs import replace
 
@@ -68,7 +68,7 @@ def test_jazzys_supervisor_passes_an_adopted_request_on_with_the_adapters_stamp(
     assert heard(LiftSupervisor(), asked, now=5.0) == [lift(asked, 5.0)]
 
 
-# ---- a lift that has come
+# ---- a lift that has arrived
 
 
 def test_a_lift_that_has_come_is_taken_as_if_from_inside() -> None:

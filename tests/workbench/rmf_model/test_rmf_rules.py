@@ -1,4 +1,4 @@
-"""The stand-in for RMF keeps the rules of its supervisors and fleet adapters, one sentence each."""
+"""The model of RMF keeps the rules of its supervisors and fleet adapters, one rule in each test."""
 
 from collections.abc import Iterable
 
@@ -48,17 +48,17 @@ def listing(*requesters: str, at: float = 0.0) -> d.SupervisorHeartbeat:
 
 
 def heard(party: Party, *messages: d.Message, now: float = 0.0) -> list[Said]:
-    """What the party says to these, one after the other."""
+    """Return the messages that a party sends in answer to these messages, in turn."""
     return [said for message in messages for said in party.hear(message, now)]
 
 
 def circulate(parties: Iterable[Party], said: list[Said], now: float) -> list[Said]:
-    """Deliver until all is quiet; everything that was said, in order."""
+    """Deliver messages until all parties are quiet; return all messages in order."""
     parties, record, left = list(parties), list[Said](), list(said)
     while left:
         topic, message = left.pop(0)
         record.append((topic, message))
-        assert len(record) < 1000, "they talk without end"
+        assert len(record) < 1000, "the parties send messages without end"
         for party in parties:
             if topic in party.subscribes:
                 left += party.hear(message, now)
@@ -322,7 +322,9 @@ def test_a_waiting_robot_costs_two_requests_for_each_state_and_one_after_arrival
 
 
 def test_a_node_that_refuses_the_floorless_end_locks_two_robots_out_for_ever() -> None:
-    """So RMF behaves: the supervisor forgets A at its END, adopts B, and drops A's repeats."""
+    """So behaves RMF: the supervisor forgets A at A's END, adopts B, and then drops A's repeated
+    ENDs.
+    """
     supervisor, a, b = LiftSupervisor(), RobotContext(A), RobotContext(B)
     parties: list[Party] = [supervisor, a, b]
     circulate(parties, a.begin(RequestLift("Lift1", "L3", inside=True), 0.0), 0.0)

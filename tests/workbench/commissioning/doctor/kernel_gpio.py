@@ -1,7 +1,7 @@
-"""GPIO chips as the kernel answers for them: structures and requests typed from linux/gpio.h.
+"""The kernel's answers about GPIO chips: structures and requests typed from linux/gpio.h.
 
-Source: include/uapi/linux/gpio.h of Linux 6.1 (since 5.10 unchanged for these): gpiochip_info,
-gpio_v2_line_attribute, gpio_v2_line_info, and the ioctl numbers by asm-generic/ioctl.h. The C compiler
+Source: include/uapi/linux/gpio.h of Linux 6.1 (these parts unchanged since 5.10): gpiochip_info,
+gpio_v2_line_attribute, gpio_v2_line_info; and the ioctl numbers by asm-generic/ioctl.h. The C compiler
 gives sizes 68 and 256, requests 8044b401 and c100b405, `flags` at 72 and `attrs` at 80.
 """
 
@@ -19,7 +19,7 @@ class GpiochipInfo(ctypes.Structure):
 
 
 class LineAttribute(ctypes.Structure):
-    """struct gpio_v2_line_attribute; its union by its widest member."""
+    """struct gpio_v2_line_attribute; the union is represented by its widest member."""
 
     _fields_ = [("id", ctypes.c_uint32), ("padding", ctypes.c_uint32), ("value", ctypes.c_uint64)]
 
@@ -39,7 +39,7 @@ class LineInfo(ctypes.Structure):
 
 
 def _request(way: int, number: int, argument: type[ctypes.Structure]) -> int:
-    """_IOR or _IOWR of the type 0xB4."""
+    """Return the number of _IOR or _IOWR of the type 0xB4."""
     return way << 30 | ctypes.sizeof(argument) << 16 | 0xB4 << 8 | number
 
 

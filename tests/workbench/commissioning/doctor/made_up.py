@@ -1,4 +1,4 @@
-"""A made-up machine: a directory tree, scripts for its commands, and what its GPIO chips answer."""
+"""A made-up machine: a directory tree, scripts for its commands, and answers of its GPIO chips."""
 
 import errno
 import os
@@ -18,12 +18,12 @@ from workbench.commissioning.doctor.machine import Machine
 from workbench.commissioning.doctor.users import User
 
 OURS = os.getegid()
-"""The group of every file here: a user in it may use them."""
+"""The group of every file here; users in this group may use the files."""
 OTHERS = OURS + 4321
 
 
 class MadeUp:
-    """Files are written below `root`; `machine` is what a doctor sees of them."""
+    """A machine whose files lie below `root`; `machine` is the doctor's view of them."""
 
     def __init__(
         self, root: Path, gids: Collection[int] = (OURS,), installed: Collection[str] = ("lgpio",)
@@ -47,20 +47,20 @@ class MadeUp:
         self.write("/etc/passwd", f"pi:x:{self.machine.uid}:1000::/home/pi:/bin/bash\n")
 
     def write(self, path: str, text: str = "", mode: int = 0o660) -> None:
-        """A file, or a device."""
+        """Write a file, also in place of a device."""
         place = self.root / path.lstrip("/")
         place.parent.mkdir(parents=True, exist_ok=True)
         place.write_text(text)
         place.chmod(mode)
 
     def link(self, path: str, to: str) -> None:
-        """A symbolic link, relative as udev makes them."""
+        """Make a symbolic link, relative as udev makes links."""
         place = self.root / path.lstrip("/")
         place.parent.mkdir(parents=True, exist_ok=True)
         place.symlink_to(to)
 
     def command(self, name: str, prints: str) -> None:
-        """A command that prints this."""
+        """Make a command that prints this text."""
         self.write(f"/usr/bin/{name}.out", prints)
         script = f"#!/bin/sh\nexec /bin/cat '{self.root}/usr/bin/{name}.out'\n"
         self.write(f"/usr/bin/{name}", script, 0o755)
@@ -73,7 +73,7 @@ class MadeUp:
         outputs: Collection[int] = (),
         mode: int = 0o660,
     ) -> None:
-        """A GPIO chip. `held`: line -> its consumer; `outputs`: the lines that are driven."""
+        """Make a GPIO chip. `held`: line -> its consumer; `outputs`: the driven lines."""
         self.write(f"/dev/gpiochip{number}", mode=mode)
         self._chips[f"gpiochip{number}"] = (label, held or {}, outputs)
 

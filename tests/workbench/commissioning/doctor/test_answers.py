@@ -1,4 +1,4 @@
-"""Every driver can be read before it was opened, which is how the doctor asks it."""
+"""Every driver can be read before it is opened; the doctor reads devices in this way."""
 
 import re
 from contextlib import closing

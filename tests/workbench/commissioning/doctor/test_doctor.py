@@ -35,12 +35,12 @@ from workbench.commissioning.doctor.served import served
 
 READS = {1, 2, 3, 4}
 LISTEN_S = "15"
-"""The doctor listens for so long, and on a busy machine nodes find each other late."""
+"""Time for which the doctor listens; on a busy machine nodes find each other late."""
 """Modbus functions that change nothing."""
 
 
 def doctor(file: Path, tmp_path: Path, *options: str) -> tuple[int, dict[str, list[Any]]]:
-    """The exit code, and the findings of each subject: (level, found)."""
+    """Return the exit code, and for each subject its findings: (level, found)."""
     words = ["doctor", str(file), "--json", "--runtime-dir", str(tmp_path / "run")]
     with redirect_stdout(io.StringIO()) as told:
         code = cli.main([*words, *options])
@@ -51,7 +51,7 @@ def doctor(file: Path, tmp_path: Path, *options: str) -> tuple[int, dict[str, li
 
 
 class Tapped:
-    """A wire to the module that notes each function that is asked, and how many have connected."""
+    """A wire to the module that notes each requested function and the number of connections."""
 
     def __init__(self, module: Module) -> None:
         self.functions: set[int] = set()
@@ -190,7 +190,9 @@ def test_a_doctor_that_dies_in_its_kill_test_leaves_nothing_on(
         wait_until(lambda: module.relay() == [True, False], "the relay is off")
         assert ended.wait(PATIENCE_S) in (-number, 130)
     places = Directories(tmp_path / "run", tmp_path / "run")
-    wait_until(lambda: not Records(places, module.file).unreleased(), "it is verified off")
+    wait_until(
+        lambda: not Records(places, module.file).unreleased(), "the outputs are verified off"
+    )
 
 
 def test_the_kill_test_switches_nothing_on_a_dead_bus(module: Module, tmp_path: Path) -> None:
@@ -201,7 +203,10 @@ def test_the_kill_test_switches_nothing_on_a_dead_bus(module: Module, tmp_path: 
     assert text.startswith("ward_door hold_open was not switched on: no Modbus TCP connection")
     module.tell("fail", "ward_door", "server", "ok")
     places = Directories(tmp_path / "run", tmp_path / "run")
-    wait_until(lambda: not Records(places, module.file).unreleased(), "its guard ends")
+    wait_until(
+        lambda: not Records(places, module.file).unreleased(),
+        "the guard has verified the outputs off",
+    )
 
 
 FIRE = """
@@ -279,7 +284,7 @@ def test_for_people_each_finding_has_a_line_below_its_subject(
 
 @contextmanager
 def far_side(yaml: str, bus: str, folder: Path) -> Iterator[Any]:
-    """The fake of one bus, and what must stand in its settings."""
+    """Yield the settings for a bus whose fake is running."""
     (folder / "far.yaml").write_text(yaml)
     with served_by(folder / "far.yaml", bus, folder / "plant.sock") as there:
         yield there

@@ -1,4 +1,4 @@
-"""Every subject of a lift's file, on a made-up Raspberry Pi that is set up well, and on another."""
+"""Every subject of a lift's file: on a made-up Raspberry Pi that is set up well, and on a bad one."""
 
 from pathlib import Path
 
@@ -14,7 +14,7 @@ PERSIST = "/sys/module/pinctrl_bcm2835/parameters/persist_gpio_outputs"
 
 
 def pi(root: Path) -> MadeUp:
-    """A Pi 4 that has all it needs."""
+    """Return a Pi 4 that is set up well."""
     root.mkdir()
     made = MadeUp(root)
     made.chip(0, "pinctrl-bcm2711")

@@ -1,4 +1,4 @@
-"""The form for real hardware: what the machine says is filled in, what a person must see is empty."""
+"""The form for real hardware: the machine's answers are filled in; what a person must see is empty."""
 
 from pathlib import Path
 

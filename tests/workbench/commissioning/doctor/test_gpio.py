@@ -1,4 +1,4 @@
-"""What the doctor finds of the header on made-up Raspberry Pis."""
+"""The doctor's findings about the header on made-up Raspberry Pis."""
 
 import ctypes
 from pathlib import Path

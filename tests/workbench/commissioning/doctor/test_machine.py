@@ -1,4 +1,4 @@
-"""What the doctor finds on made-up machines: users, clock, watchdog, disks, serial ports, CAN."""
+"""The doctor's findings on made-up machines: users, clock, watchdog, disks, serial ports, CAN."""
 
 import json
 import os
@@ -64,7 +64,7 @@ def test_the_services_user_has_the_groups_of_the_unit(made: MadeUp) -> None:
 @pytest.mark.parametrize(
     ("synchronised", "printed", "found"),
     [
-        (True, "NTP=no", [("ok", "the clock is synchronised")]),  # chrony keeps it
+        (True, "NTP=no", [("ok", "the clock is synchronised")]),  # chrony keeps the time
         (False, "NTP=no", [("warning", "the clock is not synchronised, and NTP is off")]),
         (False, "NTP=yes", [("warning", "the clock is not synchronised")]),
         (None, "", [("note", "the kernel does not show whether the clock is synchronised")]),

@@ -1,4 +1,4 @@
-"""When an output of a walk is on, in virtual time."""
+"""The times at which a walk switches an output on and off, in virtual time."""
 
 from dataclasses import dataclass
 
@@ -34,7 +34,7 @@ STEPS = [
 
 
 class Walk:
-    """A walk whose inputs are read each 0.1 s until they are lost."""
+    """A walk whose inputs are read every 0.1 s until they are lost."""
 
     def __init__(self) -> None:
         self.now = 0.0

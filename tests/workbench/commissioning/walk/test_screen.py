@@ -1,4 +1,4 @@
-"""What a walk shows on a terminal: every name is whole, and nothing scrolls away, also on a phone."""
+"""The screen of a walk: every name is whole, and nothing scrolls away, also on a phone."""
 
 from dataclasses import replace
 from typing import Any

@@ -1,4 +1,4 @@
-"""`rmf-bridge walk` as a person meets it: a real terminal, a real Modbus module, a real death."""
+"""`rmf-bridge walk` for a person: a real terminal, a real Modbus module, a real death."""
 
 import json
 import os
@@ -59,7 +59,8 @@ def test_however_it_ends_the_output_goes_off(module: Module, tmp_path: Path, how
     terminal.type("\r")
     terminal.wait_until(lambda: module.relay() == [True], "the relay is on")
     terminal.wait_until(
-        lambda: "nothing was seen" in (tmp_path / "record.md").read_text(), "it is noted"
+        lambda: "nothing was seen" in (tmp_path / "record.md").read_text(),
+        "the record notes that nothing was seen",
     )
     if how == "closed terminal":
         terminal.close()
@@ -67,7 +68,7 @@ def test_however_it_ends_the_output_goes_off(module: Module, tmp_path: Path, how
         os.kill(terminal.pid, signal.SIGKILL if how == "kill -9" else signal.SIGTERM)
     terminal.wait()
     wait_until(lambda: module.relay() == [True, False], "the relay is off")
-    wait_until(lambda: running(tmp_path / "run") == [], "its guard has ended too")
+    wait_until(lambda: running(tmp_path / "run") == [], "the walk's guard has ended too")
     assert "| the door is open | not tried |" not in (tmp_path / "record.md").read_text()
 
 

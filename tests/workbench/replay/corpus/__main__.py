@@ -1,7 +1,7 @@
-"""`python -m tests.workbench.replay.corpus` keeps what first went wrong at each daemon of the soak.
+"""`python -m tests.workbench.replay.corpus` keeps the first incident of each daemon of the soak.
 
-Run it after a deliberate change of what a core decides; `git diff --stat` then shows which incidents
-are decided in another way.
+Run it after a deliberate change of a core's decisions; `git diff --stat` then shows the incidents with
+changed decisions.
 """
 
 import sys
@@ -20,13 +20,13 @@ CHOSEN = {
     1: ("Lift1", "Lift2", "store", "bay1", "bay2", "coordinator"),
     3: ("ward", "lift_supervisor"),
 }
-"""By the day's seed: whose incidents are kept. More would only repeat these."""
+"""Seed of a day -> the daemons whose incidents are kept. More daemons would only repeat these."""
 HOURS = 0.3
 BEFORE_S, AFTER_S = 5.0, 12.0
 
 
 def incident(ring: Path) -> Incident | None:
-    """The first fault of a daemon, or else the first refusal; None if all was well."""
+    """Return the first fault of a daemon, else the first refusal, else None."""
     read = RingContent(ring)
     entries = list(read.entries())
     triggers = Triggers(60.0)
