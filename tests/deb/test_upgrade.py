@@ -1,4 +1,4 @@
-"""Upgrades by the real dpkg: after any interruption, exactly one version is whole and serves."""
+"""Upgrades by the real dpkg: after any interruption, one version is whole and serves."""
 
 import shutil
 from pathlib import Path
@@ -75,9 +75,7 @@ def test_whenever_the_power_is_cut_one_version_is_whole_and_dpkg_completes_the_o
         assert now in (whole(before), whole(after)), cut
         fits = "nothing" if now == whole(before) else after
         assert made.drop_in("door").read_text() == f"drop-in of {fits}\n", cut
-        if (
-            made.status()[1] == "H"
-        ):  # dpkg had not unpacked the package, so dpkg needs the file again
+        if made.status()[1] == "H":  # not unpacked, so dpkg needs the file again
             made.dpkg("-i", debs[after])
         else:
             made.dpkg("--configure", "-a")
@@ -120,10 +118,8 @@ def test_a_service_that_does_not_start_and_an_output_that_is_not_off_are_named_a
     )
     assert "rmf-bridge@failed.service does not serve" in told.stderr
     assert made.states() == {**SERVED, "failed": "failed"}
-    assert (made.off(), len(made.trees())) == (
-        whole(TWO),
-        2,
-    )  # the old version, until every service has served
+    # The old version's tree stays until every service has served.
+    assert (made.off(), len(made.trees())) == (whole(TWO), 2)
 
 
 @pytest.mark.parametrize("step", ["nice", "sync", "ln", "mv"])

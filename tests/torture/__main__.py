@@ -33,9 +33,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("--recordings", type=int, default=300, help="that decode and are wrong")
     parser.add_argument("--forged-s", type=float, default=20.0, help="on each wire")
     options = parser.parse_args(argv)
-    signal.signal(
-        signal.SIGHUP, signal.SIG_DFL
-    )  # the daemons would inherit an ignored SIGHUP (nohup), and obey that
+    # The daemons would inherit an ignored SIGHUP (nohup), and go on ignoring it.
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)
     seed = secrets.randbelow(10**6) if options.seed is None else options.seed
     began, table, failed = time.monotonic(), Table(), list[str]()
     with tempfile.TemporaryDirectory(prefix="rmf-bridges-") as base:

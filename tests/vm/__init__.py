@@ -1,1 +1,3 @@
-"""A real machine: Debian on a kernel with gpio-sim and vcan, booted in QEMU. `make test-vm`."""
+"""Tests on a whole machine: Debian on a kernel with gpio-sim and vcan, booted in QEMU. `make
+test-vm`.
+"""

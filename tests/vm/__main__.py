@@ -1,4 +1,6 @@
-"""`make test-vm`: boots the machine and prints a line for each check. 1: one failed; 69: none ran."""
+"""`make test-vm` boots the machine and prints a line for each check. Exit code 1: a check failed; 69:
+none ran.
+"""
 
 import argparse
 import os
@@ -26,11 +28,11 @@ RESTARTS: dict[str, Callable[[Machine], None]] = {
 ROOT = Path(__file__).parents[2]
 CACHE = ROOT / "build/vm"
 NEXT = "next"
-"""The folder, among the packages, of those to upgrade to (`guest/upgrades.py`)."""
+"""The folder, among the packages, of the next version's packages (`guest/upgrades.py`)."""
 
 
 def main() -> int:
-    """Build what is missing, then run: the whole in as many machines at once as it has parts."""
+    """Build what is missing, then run; the whole run uses one machine for each part, all at once."""
     args = _arguments()
     folder = CACHE / f"last-{args.arch}"
     folder.mkdir(parents=True, exist_ok=True)
@@ -71,7 +73,7 @@ def _steps(arch: str, part: str) -> list[str]:
 
 
 def _packages(arch: str, folder: Path) -> Path:
-    """A folder with the packages of this architecture for Debian 13. Raises Unusable."""
+    """Return a folder with the packages of this architecture for Debian 13. Raises Unusable."""
     found = sorted((ROOT / "dist").glob(f"*+deb13_{arch}.deb"))
     if not found:
         raise Unusable(f"no package: make deb ARCHS={arch} PYTHONS=3.13")
@@ -86,7 +88,7 @@ def _packages(arch: str, folder: Path) -> Path:
 
 
 def _as_next(package: Path, folder: Path) -> None:
-    """The same package with the next version, to upgrade to. Raises Unusable."""
+    """Make the same package with the next version, for the upgrade. Raises Unusable."""
     needed({"dpkg-deb": "dpkg"})
     tree = folder / "tree"
     subprocess.run(["dpkg-deb", "--raw-extract", str(package), str(tree)], check=True)
@@ -104,7 +106,9 @@ def _as_next(package: Path, folder: Path) -> None:
 
 
 def _with_a_new_module(archive: Path, folder: Path) -> None:
-    """The same tree, in which `outputs-off` needs a module that the version before has not."""
+    """Pack the same tree again, with an `outputs-off` that needs a module missing in the version
+    before.
+    """
     with tarfile.open(archive) as packed:
         packed.extractall(folder, filter="tar")
     (package,) = folder.glob("lib/python*/site-packages/bridges")
@@ -121,7 +125,7 @@ def _with_a_new_module(archive: Path, folder: Path) -> None:
 
 
 def _run(machine: Machine, steps: Iterable[str], log: Path) -> int:
-    """Take every step; returns how many checks failed."""
+    """Take every step; return the number of failed checks."""
     failed = 0
     with log.open("w") as out:
         for step in steps:

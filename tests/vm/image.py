@@ -1,10 +1,10 @@
 """A bootable Debian, built as an ordinary user and cached by its kernel and its list of packages.
 
-`mmdebstrap` makes an archive of it, and `mke2fs -d` a file system of that, under fakeroot, so that
-nothing is mounted. The first RAM disk is ours (`ram_disk.py`): a program of the target makes Debian's.
-
-For another architecture than this machine's no installer is emulated: what installers leave in /etc and
-/var is the same text for each, so this machine's tree gets the other one's packages unpacked over it.
+`mmdebstrap` makes an archive of Debian, and `mke2fs -d` makes a file system of the archive, under
+fakeroot, so that nothing is mounted. The first RAM disk is our own (`ram_disk.py`), because Debian's is
+made by a program of the target. No installer of another architecture is emulated: installers leave the
+same text in /etc and /var on each architecture, so the other packages are unpacked over this machine's
+tree.
 """
 
 import hashlib
@@ -19,7 +19,7 @@ from typing import Final
 from tests.vm.ram_disk import ram_disk
 
 KERNEL: Final = "7.3.4+deb13"
-"""Of trixie-backports, which keeps its old kernels. Debian 13's own has no gpio-sim."""
+"""A kernel of trixie-backports, which keeps old kernels. Debian 13's own kernel has no gpio-sim."""
 MIRROR: Final = "http://deb.debian.org/debian"
 SUITES: Final = ("trixie", "trixie-backports")
 SIZE: Final = "1500M"
@@ -51,10 +51,10 @@ MODULES: Final = (
     "net/9p",
     "net/can",
 )
-"""What is kept of the kernel's modules, of which there are 400 MB."""
+"""The kernel's modules that the image keeps; all modules have 400 MB."""
 DPKG: Final = "var/lib/dpkg"
 KEPT: Final = ("--exclude=./dev", "--exclude=./etc", "--exclude=./var")
-"""What this machine's installers have made stays when the other architecture's files are unpacked."""
+"""Folders of this machine's installers, kept when the other architecture's files are unpacked."""
 LEFT_OUT: Final = ("usr/share/doc", "usr/share/locale", "usr/share/man")
 TOOLS: Final = {
     "depmod": "kmod",
@@ -63,9 +63,9 @@ TOOLS: Final = {
     "mke2fs": "e2fsprogs",
     "mmdebstrap": "mmdebstrap",
 }
-"""Program -> the package that has it."""
+"""Program -> its package."""
 FILES: Final = Path(__file__).parent / "root"
-"""Copied over the tree: what makes this Debian run the checks."""
+"""Files copied over the tree, with which this Debian runs the checks."""
 
 
 class Unusable(Exception):
@@ -74,7 +74,7 @@ class Unusable(Exception):
 
 @dataclass(frozen=True, slots=True)
 class Image:
-    """What QEMU boots."""
+    """The files that QEMU boots."""
 
     kernel: Path
     ram_disk: Path
@@ -82,7 +82,9 @@ class Image:
 
 
 def image(arch: str, cache: Path) -> Image:
-    """The cached image of this architecture, built first where there is none. Raises Unusable."""
+    """Return the cached image of this architecture; build the image first if it is missing. Raises
+    Unusable.
+    """
     folder = cache / f"{arch}-{KERNEL}-{_key()}"
     made = Image(folder / "vmlinuz", folder / "initrd", folder / "root.ext4")
     if not folder.exists():
@@ -97,7 +99,7 @@ def image(arch: str, cache: Path) -> Image:
 
 
 def needed(tools: dict[str, str]) -> None:
-    """Raises Unusable that names the packages of those that are not here."""
+    """Raise Unusable with the packages of the missing tools."""
     path = f"{os.environ.get('PATH', '')}:/usr/sbin:/sbin"
     missing = sorted({deb for tool, deb in tools.items() if not shutil.which(tool, path=path)})
     if missing:
@@ -118,7 +120,7 @@ def _build(arch: str, folder: Path) -> None:
             *_filled(arch, folder, log.fileno()),
             f"mkdir {tree}/dev",
             f"cp -R {FILES}/. {tree}/",
-            f"chmod -R u+rX {tree}",  # /etc/gshadow may be read by nobody: mke2fs is not root
+            f"chmod -R u+rX {tree}",  # /etc/gshadow is readable by nobody, and mke2fs is not root
             f"chown -R 0:0 {tree}/etc",
             f"depmod -b {tree} {KERNEL}-{arch}",
             f"mke2fs -q -t ext4 -L root -d {tree} {folder}/root.ext4 {SIZE}",
@@ -132,7 +134,7 @@ def _build(arch: str, folder: Path) -> None:
 
 
 def _filled(arch: str, folder: Path, log: int) -> list[str]:
-    """Make archives; the shell's lines that make the tree of them."""
+    """Make archives; return the shell's lines that make the tree from the archives."""
     here = subprocess.check_output(["dpkg", "--print-architecture"], text=True).strip()
     kernel = [f"linux-{part}-{KERNEL}-{arch}" for part in ("binary", "modules")]
     tree, ours, other = folder / "tree", folder / "ours.tar", folder / "other.tar"
@@ -163,7 +165,7 @@ def _run(words: Iterable[str], log: int) -> None:
 
 
 def _mmdebstrap(arch: str, variant: str, packages: Iterable[str], archive: Path) -> list[str]:
-    """An ordinary user needs a user namespace, and uidmap's programs for it."""
+    """Return the command; an ordinary user needs a user namespace, and uidmap's programs for it."""
     if os.geteuid() != 0:
         needed({"newuidmap": "uidmap"})
     return [

@@ -1,7 +1,7 @@
-"""QEMU with our image: boot, run a check, cut the power. KVM where it really boots, else TCG.
+"""QEMU with our image: boot, run a check, cut the power. KVM if it really boots, else TCG.
 
-Under TCG the machine's clock counts instructions, one a nanosecond (`-icount shift=0`): times that are
-measured inside are those of a core of 1,000 MIPS, however busy the host is.
+Under TCG the machine's clock counts instructions, one for each nanosecond (`-icount shift=0`): times
+measured inside are times of a core of 1,000 MIPS, however busy the host is.
 """
 
 import json
@@ -18,12 +18,12 @@ from tests.vm.image import Image, Unusable, needed
 PROBE_S: Final = 10.0
 BOOT_S: Final = 1800.0
 ANSWER_S: Final = 3600.0
-"""Far above what is needed: both are of the host's time, and it may be busy."""
+"""Limits far above need: both are times of the host, which may be busy."""
 
 
 @dataclass(frozen=True, slots=True)
 class Arch:
-    """What QEMU wants for an architecture. `tcg`: with instructions counted."""
+    """QEMU's options for an architecture. `tcg`: with counted instructions."""
 
     program: str
     package: str
@@ -33,9 +33,10 @@ class Arch:
 
 
 FAST: Final = "mitigations=off"
-"""For the kernel: what it does against leaks of a processor that is not there costs TCG a lot.
+"""For the kernel: its protections against leaks of a processor that is not there cost TCG much time.
 
-So do five levels of pages, and what keeps the kernel off a program's pages (SMAP): amd64's has neither.
+Five levels of pages and the kernel's protection from a program's pages (SMAP) cost time too, so amd64's
+processor has neither.
 """
 COUNTED: Final = ("-accel", "tcg", "-icount", "shift=0")
 ARCHS: Final = {
@@ -55,12 +56,12 @@ ARCHS: Final = {
     ),
 }
 ENDS_WITH_US: Final = ("setpriv", "--pdeathsig", "KILL")
-"""Before a program: the kernel kills it when the thread that has started it is gone."""
+"""Words before a program: the kernel kills the program when the thread that started it is gone."""
 KVM: Final = ("-accel", "kvm", "-cpu", "host")
 
 
 def accelerated(arch: str, image: Image) -> bool:
-    """Whether KVM boots this kernel here: a device that can be opened may hang all the same."""
+    """Does KVM boot this kernel here? A device that can be opened may still hang."""
     if not os.access("/dev/kvm", os.R_OK | os.W_OK):
         return False
     found = ARCHS[arch]
@@ -79,9 +80,9 @@ def _kernel(image: Image, words: str) -> list[str]:
 
 
 class Machine:
-    """A running machine. Its disk forgets everything when it ends, but not at a power cut.
+    """A running machine. Its disk survives a power cut, but is discarded when the machine ends.
 
-    `shared`: folders by their 9p tags. `folder`: where the console is kept, and QEMU's sockets.
+    `shared`: folders by their 9p tags. `folder` has the console's log and QEMU's sockets.
     """
 
     def __init__(
@@ -123,11 +124,11 @@ class Machine:
         """Wait until the machine says that it is up. Raises Unusable."""
         self._port.settimeout(BOOT_S)
         while "booted" not in (heard := self._heard()):
-            if not heard["passed"]:  # of a check that ends with a restart
+            if not heard["passed"]:  # the result of a check that ends with a restart
                 raise Unusable(f"{heard['found']}\n{heard['log']}")
 
     def check(self, name: str) -> dict[str, Any]:
-        """Run one check; how it ended."""
+        """Run one check; return its result."""
         self._port.settimeout(ANSWER_S)
         self._port.sendall(name.encode() + b"\n")
         return self._heard()
@@ -138,7 +139,7 @@ class Machine:
         self.booted()
 
     def cut_power(self) -> None:
-        """Reset it: what was not on the disk is lost."""
+        """Reset the machine: data not yet on the disk are lost."""
         with self._connect("qmp") as qmp, qmp.makefile("rb") as answers:
             for command in ("qmp_capabilities", "system_reset"):
                 qmp.sendall(json.dumps({"execute": command}).encode())
@@ -147,7 +148,7 @@ class Machine:
         self.booted()
 
     def close(self) -> None:
-        """End it. May be called twice."""
+        """End the machine. May be called twice."""
         self._process.kill()
         self._process.wait()
         self._port.close()

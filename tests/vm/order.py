@@ -1,4 +1,4 @@
-"""The checks in turn: functions in `guest/`, and what the host does to the machine between them."""
+"""The order of the checks: functions in `guest/`, and the host's acts between them."""
 
 import os
 from typing import Final
@@ -6,9 +6,9 @@ from typing import Final
 CUT: Final = "power cut"
 REBOOT: Final = "reboot"
 CUT_OFF: Final = "upgrades.cut"
-"""A check that cuts the power itself, in the machine, at a random moment."""
+"""A check that cuts the power itself, inside the machine, at a random moment."""
 CUTS: Final = int(os.environ.get("CUTS", "3"))
-"""So often: each is a boot and two upgrades, minutes of a busy host."""
+"""Number of cuts; each takes a boot and two upgrades, minutes of a busy host."""
 LIFT: Final = ("install.package", "install.lift")
 PARTS: Final = {
     "lift": (
@@ -71,10 +71,12 @@ PARTS: Final = {
         "upgrades.purged",
     ),
 }
-"""Each is one machine from its first boot on: a check may need those before it."""
+"""Each part runs on one machine from its first boot on; a check may need the checks before it."""
 WHOLE: Final = ("lift", "site", "upgrade")
-"""The parts that have every check: they run side by side."""
+"""The parts that together have every check; they run side by side."""
 ALSO: Final = {("arm64", "lift"): ("inside.demo", "inside.transport")}
-"""What CI's own machine, an amd64, does not show."""
+"""Further checks on arm64, for differences from CI's own machine, an amd64."""
 NOT_ON: Final = {"arm64": ("network.late",)}
-"""There zenoh is spoken, which finds another machine by a router alone, and none is in the machine."""
+"""Checks not run on arm64: it uses zenoh, which finds another machine only by a router, and there is
+none.
+"""

@@ -1,6 +1,8 @@
-"""The first RAM disk: busybox, the modules that reach the root file system, and a script of ten lines.
+"""The first RAM disk: busybox, the modules for reaching the root file system, and a script of ten
+lines.
 
-An archive as in the kernel's Documentation/driver-api/early-userspace/buffer-format.rst ("newc").
+The archive's format is in the kernel's Documentation/driver-api/early-userspace/buffer-format.rst
+("newc").
 """
 
 import lzma
@@ -21,7 +23,7 @@ exec $b switch_root /root /sbin/init
 
 
 def ram_disk(tree: Path, kernel: str) -> bytes:
-    """The archive for this kernel, with what it takes from that tree."""
+    """Return the archive for this kernel, with files from that tree."""
     folders = [_entry(name, 0o040755) for name in ("bin", "dev", "modules", "root")]
     busybox = _entry("bin/busybox", 0o100755, (tree / "usr/bin/busybox").read_bytes())
     modules = (
@@ -33,7 +35,7 @@ def ram_disk(tree: Path, kernel: str) -> bytes:
 
 
 def _modules(folder: Path) -> Iterator[Path]:
-    """The wanted modules, each after those that it needs."""
+    """Yield the wanted modules, each after the modules that it needs."""
     lines = (folder / "modules.dep").read_text().splitlines()
     needs = {name: rest.split() for name, _, rest in (line.partition(":") for line in lines)}
     told: set[str] = set()
@@ -47,7 +49,7 @@ def _modules(folder: Path) -> Iterator[Path]:
 
 
 def _module(path: Path) -> bytes:
-    """Its bytes, which busybox does not unpack."""
+    """Return the module's bytes unpacked, because busybox does not unpack them."""
     content = path.read_bytes()
     return lzma.decompress(content) if path.suffix == ".xz" else content
 

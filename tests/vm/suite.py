@@ -1,4 +1,4 @@
-"""Tests for the machine to run, on what the package has installed there, and what they need."""
+"""Makes the folder of tests that the machine runs on the libraries of the installed package."""
 
 import shutil
 import subprocess
@@ -9,12 +9,13 @@ from typing import Final
 from tests.vm.image import Unusable
 
 PYTHON: Final = "3.13"
-"""Debian 13's."""
+"""Debian 13's version of Python."""
 NEEDED: Final = ("hypothesis", "pytest", "pytest-timeout", "trustme")
 
 
 def suite(arch: str, root: Path, folder: Path) -> Path:
-    """A folder with `tests`, the fakes, `config`, `pyproject.toml`, and in `site` what runs them.
+    """Return a folder with `tests`, the fakes, `config` and `pyproject.toml`; `site` has the test
+    libraries.
 
     Raises Unusable.
     """
@@ -29,7 +30,7 @@ def suite(arch: str, root: Path, folder: Path) -> Path:
 
 
 def _fetch(arch: str, root: Path, site: Path) -> None:
-    """By deb/wheels.py, as for the package: pip alone judges what is needed by this machine."""
+    """Fetch by deb/wheels.py, as for the package: pip alone would judge needs by this machine."""
     fresh = site.with_name("site.new")
     shutil.rmtree(fresh, ignore_errors=True)
     words = ["--arch", arch, "--python", PYTHON, "--find-links", ".", "--target", str(fresh)]

@@ -1,1 +1,1 @@
-"""What runs inside of the machine. Only the standard library is imported, but by the far sides."""
+"""Programs inside the machine. They import only the standard library, except the far sides."""

@@ -1,4 +1,4 @@
-"""Runs the checks that the host names, each in a process of its own, and tells it how they ended."""
+"""Runs each check that the host names in its own process, and tells the host the results."""
 
 import io
 import json
@@ -12,13 +12,15 @@ from typing import Final
 PORT: Final = Path("/dev/virtio-ports/checks")
 LONGEST_S: Final = 240.0
 BYTE_CODE: Final = ("-X", "pycache_prefix=/run/checks")
-"""Once for each boot: the folder of these files is read only. Not for a check's own commands."""
+"""Options that compile the checks once for each boot, as their folder is read only. Commands have
+none.
+"""
 
 
 def main() -> int:
     """Say that the machine is up, then read a name (`deaths.phases`) from each line, for ever."""
     os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
-    # What is measured of a boot is without these checks: they begin when it is over.
+    # The checks begin after the boot, so that they do not disturb measurements of the boot.
     subprocess.run(["systemctl", "is-system-running", "--wait"], stdout=subprocess.DEVNULL)
     while not PORT.exists():
         time.sleep(0.1)

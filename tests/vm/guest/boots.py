@@ -1,4 +1,4 @@
-"""What a boot does to relays. The host cuts the power, or lets the machine restart, in between."""
+"""Relays across a boot. Between two checks the host cuts the power or lets the machine restart."""
 
 from tests.vm.guest import header
 from tests.vm.guest.rides import LIFT, energise, send
@@ -16,7 +16,7 @@ from tests.vm.guest.system import (
 
 SERVICE = unit("lift")
 LOW = 7
-"""The output of low.yaml: it is on at low."""
+"""The output of low.yaml, which is on at low."""
 STARTS = 10
 
 
@@ -53,7 +53,9 @@ def active_low() -> str:
         sh("systemctl", "restart", service)
     starts = _written(began)
     asked = header.now()
-    send("door", "lab_door", "open", "--direct", "--timeout", "5", fails=True)  # it cannot move
+    send(
+        "door", "lab_door", "open", "--direct", "--timeout", "5", fails=True
+    )  # the door cannot move
     opened = _written(asked)
     disable("low")
     sh("sync")  # the power may be cut next

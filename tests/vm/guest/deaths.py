@@ -24,15 +24,17 @@ from tests.vm.guest.system import (
 
 SERVICE = unit("lift")
 MODE, HOLD = {18}, set(HELD)
-"""What is on together: the mode; the mode and the door's hold."""
+"""Outputs that are on together: the mode alone, then the mode and the door's hold."""
 ODD = 5
-"""The floor code's lowest bit: it falls when the car comes by L2."""
+"""The floor code's lowest bit, which falls when the car passes L2."""
 KILLED_S, STOPPED_S = 1.0, 4.0
-"""What docs/explanation/reliability.md promises of a core of 1,000 MIPS."""
+"""Limits in docs/explanation/reliability.md for a core of 1,000 MIPS."""
 
 
 def phases() -> str:
-    """kill -9 at each phase of a ride, during a start and after END, relays on: off, and it is back."""
+    """kill -9 at each phase of a ride, during a start and after END, relays on: off, and the service is
+    back.
+    """
     took = {}
     with asking("lift", "Lift1", "L3", "--session", "vm/robot"):
         took["mode asked for"] = _dies_with(set(), MODE)
@@ -46,14 +48,16 @@ def phases() -> str:
 
 
 def _dies_with(*outputs: set[int], at: Callable[[], bool] = lambda: True) -> float:
-    """kill -9 when just these outputs have been on in turn, and `at`; how long until off (s)."""
+    """Kill -9 after exactly these sets of outputs were on in turn, and `at` holds; return the time to
+    off (s).
+    """
     old = pid(SERVICE)
     _on(*outputs, at=at)
     return _killed(old, outputs[-1])
 
 
 def _on(*outputs: set[int], at: Callable[[], bool] = lambda: True) -> None:
-    """Wait until these, and no others, are the last that have been on together, and `at`."""
+    """Wait until exactly these sets of outputs were on last, one after the other, and `at` holds."""
     until(
         lambda: header.together(LIFT)[-len(outputs) :] == [*outputs] and at(),
         f"lines {outputs} are on, one set after the other",
@@ -70,8 +74,10 @@ def _killed(old: int, relays: set[int]) -> float:
 
 
 def _dies_at_start() -> float:
-    """kill -9 when a start has `outputs-off` run, as the relays are still on: that of the last death
-    was killed too."""
+    """Kill -9 a starting daemon while its `outputs-off` runs and the relays are still on.
+
+    The `outputs-off` of the death before was killed too.
+    """
     old, running = pid(SERVICE), _group() / "cgroup.procs"
     _on(MODE, HOLD)
     when = header.now()
@@ -94,7 +100,7 @@ def _dies_at_start() -> float:
 
 
 def _group() -> Path:
-    """The service's control group."""
+    """Return the service's control group."""
     return Path(f"/sys/fs/cgroup{shown(SERVICE, 'ControlGroup')['ControlGroup']}")
 
 
@@ -114,7 +120,7 @@ def out_of_memory() -> str:
     before = limit.read_text()
 
     def starve() -> None:
-        limit.write_text("4M")  # the kernel returns when it has killed
+        limit.write_text("4M")  # the kernel returns after the kill
         limit.write_text(before)
 
     took = _dies(starve)
@@ -123,7 +129,7 @@ def out_of_memory() -> str:
 
 
 def _dies(act: Callable[[], object], within_s: float = KILLED_S) -> float:
-    """`act` ends the daemon while two relays are on; how long until they were off (s)."""
+    """Let `act` end the daemon while two relays are on; return the time until they were off (s)."""
     relays, old = energise(), pid(SERVICE)
     when = header.now()
     act()
@@ -133,7 +139,7 @@ def _dies(act: Callable[[], object], within_s: float = KILLED_S) -> float:
 
 
 def off_after(relays: Mapping[int, bool], when: float, within_s: float = KILLED_S) -> float:
-    """How long after `when` (s) the last of these relays was written off."""
+    """Return how long after `when` (s) the last of these relays was written off."""
     found = until(lambda: _all_off(relays, when), "each relay is written off", 30.0)
     took = max(found.values()) - when
     if took > within_s:
@@ -161,7 +167,9 @@ def clean_stop() -> str:
 
 
 def two_on_one_pin() -> str:
-    """Another service on the lift's pins: refused by `enable`; by hand it says who has the pin."""
+    """A second service on the lift's pins: `enable` refuses it; started by hand it names the pins'
+    holder.
+    """
     copy = Path("/etc/rmf-bridges/second.yaml")
     copy.write_text(Path("/etc/rmf-bridges/lift.yaml").read_text().replace("Lift1", "Lift2"))
     sh("rmf-bridge", "enable", str(copy), fails=True)

@@ -1,4 +1,6 @@
-"""A service that does nothing, to compare ours with. `empty.py` serves, `empty.py off` ends."""
+"""A service that does nothing, for comparison. `empty.py` serves, `empty.py off` is its
+ExecStopPost.
+"""
 
 import os
 import signal

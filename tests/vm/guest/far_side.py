@@ -1,7 +1,8 @@
 """The equipment at the wires of a YAML: `python3 -m tests.vm.guest.far_side FILE`.
 
-It runs in the package's own Python. The plants of `hal_fakes/` stand behind real wires here: lines of
-gpio-sim, a pseudo-terminal, an interface of SocketCAN. They live on when the daemon dies.
+It runs in the package's own Python. The plants of `hal_fakes/` are connected to real wires here: lines
+of
+gpio-sim, a pseudo-terminal, an interface of SocketCAN. The plants live on when the daemon dies.
 """
 
 import os
@@ -35,7 +36,7 @@ def main() -> int:
     stations = stations_on(config, bus, world.plants)
     threading.excepthook = lambda failed: os._exit(
         1
-    )  # an interface that went down: systemd starts anew
+    )  # an interface that went down: systemd starts this anew
     Control(Path(f"/run/far-{config.path.stem}"), world.plants)
     _serve(config, bus, stations)
     return 0
@@ -57,7 +58,9 @@ def _serve(config: Config, bus: str, stations: Sequence[object]) -> None:
 
 
 def _be_udev(adapter: Path, port: Path) -> None:
-    """Give the adapter a name that stays, and the daemon its rights, also when it is plugged again."""
+    """Give the adapter a lasting name, and the daemon access, also after the adapter is plugged in
+    again.
+    """
     adapter.parent.chmod(0o755)
     port.parent.mkdir(parents=True, exist_ok=True)
     port.unlink(missing_ok=True)
@@ -71,7 +74,7 @@ def _be_udev(adapter: Path, port: Path) -> None:
 
 
 def _stand_at_header(wirings: Sequence[PlantWiring]) -> None:
-    """Follow the outputs, and pull the inputs, also back from where a claim has pulled them.
+    """Follow the outputs and drive the inputs, again after each claim.
 
     On gpio-sim a claimed input with a resistor reads as the resistor pulls; on a Pi the wire wins.
     """
@@ -95,7 +98,7 @@ def _number(point: str) -> int:
 
 
 def _ready() -> None:
-    """Type=notify."""
+    """Tell systemd that this unit (Type=notify) is ready."""
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as told:
         told.sendto(b"READY=1", os.environ["NOTIFY_SOCKET"])
 

@@ -1,4 +1,4 @@
-"""Times and memory beside those of an empty Python service: ratios do not depend on the machine."""
+"""Times and memory compared with an empty Python service: ratios do not depend on the machine."""
 
 import re
 import time
@@ -9,7 +9,7 @@ from tests.vm.guest.system import KEPT, Wrong, kill, pid, ready_s, sh, unit, unt
 SERVICES = ("lift", "door", "charger", "lift_supervisor", "door_supervisor")
 WHOLE_MB = 200.0
 MOST = (25, 10, 10)
-"""Times what the empty service takes, at most: start to ready, memory, kill -9 to off."""
+"""Largest ratios to the empty service: start to ready, memory, kill -9 to off."""
 EMPTY = """
 [Service]
 Type=notify
@@ -29,7 +29,7 @@ def memory() -> str:
 
 
 def ratios() -> str:
-    """Each service beside an empty Python service: start to ready, memory, kill -9 to off."""
+    """Each service compared with an empty Python service: start to ready, memory, kill -9 to off."""
     Path("/run/systemd/system/empty.service").write_text(EMPTY)
     sh("systemctl", "daemon-reload")
     sh("systemctl", "start", "empty.service")
@@ -46,7 +46,7 @@ def ratios() -> str:
 
 
 def _ends() -> float:
-    """How long the empty service takes from kill -9 to the end of its ExecStopPost's work."""
+    """Return the time of the empty service from kill -9 to the end of its ExecStopPost (s)."""
     done, when = Path("/run/empty"), time.monotonic()
     done.unlink(missing_ok=True)
     kill("empty.service", "KILL")
@@ -55,6 +55,6 @@ def _ends() -> float:
 
 
 def pss_mb(service: str) -> float:
-    """Its share of the memory (smaps_rollup's Pss), in MB."""
+    """Return the service's share of the memory (Pss of smaps_rollup), in MB."""
     text = Path(f"/proc/{pid(service)}/smaps_rollup").read_text()
     return int(re.findall(r"^Pss: +(\d+) kB", text, re.MULTILINE)[0]) / 1000

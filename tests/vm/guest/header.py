@@ -1,7 +1,7 @@
-"""The chip of a Raspberry Pi's header, simulated by gpio-sim, and every write to its outputs.
+"""The GPIO chip of a Raspberry Pi's header, simulated by gpio-sim, with every write to its outputs.
 
-Kernel documentation: admin-guide/gpio/gpio-sim.rst, and trace events of the group `gpio`. gpio-sim
-lets an output fall when its line is released, so a level proves nothing after a death: a write does.
+Kernel documentation: admin-guide/gpio/gpio-sim.rst, and trace events of the group `gpio`. gpio-sim lets
+an output fall when its line is released, so after a death only a write proves off, not a level.
 """
 
 import re
@@ -16,15 +16,15 @@ from typing import Final
 CONFIGFS: Final = Path("/sys/kernel/config/gpio-sim/header")
 TRACING: Final = Path("/sys/kernel/tracing")
 LABELS: Final = {"pinctrl-bcm2835": 54, "pinctrl-rp1": 54, "pinctrl-bcm2711": 58}
-"""Chips of the header, and their lines: Raspberry Pi 3 and older, 5, 4."""
+"""Labels of the header's chips, and their numbers of lines: Raspberry Pi 3 and older, 5, 4."""
 PI_4: Final = "pinctrl-bcm2711"
 OTHER: Final = "raspberrypi-exp-gpio"
-"""A chip that is not the header's, and gets the lower number here."""
+"""A chip that is not the header's, and has the lower number here."""
 
 
 @dataclass(frozen=True, slots=True)
 class Write:
-    """A line was written at this time (monotonic s)."""
+    """A write to a line at this time (monotonic s)."""
 
     at: float
     line: int
@@ -32,14 +32,14 @@ class Write:
 
 
 def main() -> int:
-    """At boot: watch first, so that no write is missed."""
+    """Prepare the header at boot: watch first, so that no write is missed."""
     watch()
     plug(PI_4)
     return 0
 
 
 def plug(label: str) -> None:
-    """Make the chip, beside another one."""
+    """Make the header's chip beside another chip."""
     for bank, name, lines in (("other", OTHER, 8), ("bank0", label, LABELS[label])):
         folder = CONFIGFS / bank
         folder.mkdir(parents=True)
@@ -49,7 +49,7 @@ def plug(label: str) -> None:
 
 
 def unplug() -> None:
-    """Take both away."""
+    """Remove both chips."""
     (CONFIGFS / "live").write_text("0")
     for folder in (*CONFIGFS.glob("*/num_lines"),):
         folder.parent.rmdir()
@@ -59,31 +59,31 @@ def unplug() -> None:
 
 @cache
 def _lines() -> Path:
-    """The directory of the chip that is plugged."""
+    """Return the directory of the header's chip."""
     device = (CONFIGFS / "dev_name").read_text().strip()
     chip = (CONFIGFS / "bank0/chip_name").read_text().strip()
     return Path(f"/sys/devices/platform/{device}/{chip}")
 
 
 def line(number: int) -> Path:
-    """The directory of a line: `pull` sets what an input reads, `value` shows a level."""
+    """Return the directory of a line: `pull` sets an input's level, `value` shows a level."""
     return _lines() / f"sim_gpio{number}"
 
 
 def level(number: int) -> bool:
-    """The level of a line."""
+    """Return the level of a line."""
     return (line(number) / "value").read_text().strip() == "1"
 
 
 def pull(number: int, high: bool) -> None:
-    """What an input reads from now on."""
+    """Set the level of an input."""
     wire, wanted = line(number) / "pull", "pull-up" if high else "pull-down"
     if wire.read_text().strip() != wanted:
         wire.write_text(wanted)
 
 
 def watch() -> None:
-    """Write down each write of a line, with its time."""
+    """Trace each write of a line with its time."""
     (TRACING / "trace_clock").write_text("mono")
     event = TRACING / "events/gpio/gpio_value"
     (event / "filter").write_text("get == 0")
@@ -91,7 +91,7 @@ def watch() -> None:
 
 
 def writes(since: float = 0.0) -> list[Write]:
-    """Every write since then, in turn."""
+    """Return every write since this time, in order."""
     return [each for each in _traced() if each.at >= since]
 
 
@@ -103,7 +103,7 @@ def _traced() -> Iterator[Write]:
 
 
 def _base() -> int:
-    """The number that the kernel's trace gives to the chip's first line."""
+    """Return the number of the chip's first line in the kernel's trace."""
     label = (CONFIGFS / "bank0/label").read_text().strip()
     chips = Path("/sys/class/gpio").glob("gpiochip*")
     ours = (c for c in chips if (c / "label").read_text().strip() == label)
@@ -111,13 +111,15 @@ def _base() -> int:
 
 
 def on(lines: dict[int, bool], since: float = 0.0) -> dict[int, float]:
-    """Outputs that the last write has left on, and since when. `lines`: each with its level for on."""
+    """Return the outputs whose last write was on, with its time. `lines`: each with its level for
+    on.
+    """
     last = {each.line: each for each in writes(since)}
     return {n: last[n].at for n, high in lines.items() if n in last and last[n].level == high}
 
 
 def together(lines: Mapping[int, bool]) -> list[set[int]]:
-    """Which of these outputs have been on together, in turn since the chip was plugged."""
+    """Return the sets of these outputs that were on together, in order since the chip was made."""
     found: list[set[int]] = [set()]
     for each in writes():
         if each.line in lines:
@@ -129,7 +131,7 @@ def together(lines: Mapping[int, bool]) -> list[set[int]]:
 
 
 def off_at(lines: Mapping[int, bool], after: float) -> dict[int, float]:
-    """When each of these lines was first written off after that time (monotonic s)."""
+    """Return the time (monotonic s) at which each line was first written off after `after`."""
     found: dict[int, float] = {}
     for each in writes(after):
         if each.line in lines and each.level != lines[each.line]:
@@ -138,7 +140,7 @@ def off_at(lines: Mapping[int, bool], after: float) -> dict[int, float]:
 
 
 def now() -> float:
-    """The trace's clock."""
+    """Return the time on the trace's clock."""
     return time.monotonic()
 
 

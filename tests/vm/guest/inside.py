@@ -1,16 +1,16 @@
-"""The demo and the tests of the transport, on what the package has installed."""
+"""The demo and the tests of the transport, on the libraries that the package has installed."""
 
 from typing import Final
 
 from tests.vm.guest.system import PYTHON, Wrong, mounted, sh
 
 PATIENCE: Final = "6"
-"""How many times longer the demo waits than on a laptop: there are three daemons on one slow core."""
+"""Factor for the demo's waits compared with a laptop: three daemons share one slow core."""
 
 
 def demo() -> str:
     """The demo on zenoh: a robot goes through the door, rides the lift and charges."""
-    suite = mounted("suite", "/media")  # which has the files of config/
+    suite = mounted("suite", "/media")  # this folder has the files of config/
     env = ("env", f"PYTHONPATH={suite}", "TRANSPORT=zenoh", "HOME=/root", "TERM=dumb")
     told = sh(*env, PYTHON, "-m", "hal_fakes.demo", "--patience", PATIENCE)
     return told.strip().splitlines()[-1].strip()

@@ -1,4 +1,4 @@
-"""The packages, and services made of YAMLs."""
+"""Installation of the packages, and services made from YAMLs."""
 
 import grp
 import time
@@ -45,13 +45,13 @@ def package() -> str:
 
 
 def install(*files: Path) -> None:
-    """As people do it, but that nothing is asked."""
+    """Install these files as people do, but without questions."""
     apt = ("env", "DEBIAN_FRONTEND=noninteractive", "apt-get", "install", "--yes")
     sh(*apt, "--no-install-recommends", *map(str, files))
 
 
 def debs(folder: str = ".", names: Sequence[str] = OURS) -> list[Path]:
-    """The packages of these names, which the host shares; in `next` those of the next version."""
+    """Return the packages of these names in the host's folder; `next` has the next version."""
     there = mounted("packages", "/srv") / folder
     return [file for (file,) in (there.glob(f"{name}_*.deb") for name in names)]
 
@@ -76,7 +76,7 @@ def recorder() -> str:
 
 
 def wrong_yaml() -> str:
-    """A YAML that cannot be right: exit code 78, and no restart."""
+    """A wrong YAML: exit code 78, and no restart."""
     file = Path("/etc/rmf-bridges/wrong.yaml")
     file.write_text("kind: lift\nflors: [L1]\n")
     service = unit("wrong")
@@ -91,7 +91,7 @@ def wrong_yaml() -> str:
 
 
 def page() -> str:
-    """The web page, a package of its own: started by systemd it answers, below its memory limit."""
+    """The web page, in its own package: started by systemd, it answers below its memory limit."""
     install(*debs(names=["rmf-bridges-page"]))
     began = time.monotonic()
     sh("systemctl", "start", PAGE)
@@ -128,13 +128,15 @@ def security() -> str:
 
 
 def _scores() -> dict[str, float]:
-    """Each service, and how exposed it is: 0 to 10."""
+    """Return the exposure of each service: 0 to 10."""
     table = (line.split() for line in sh("systemd-analyze", "security", "--no-pager").splitlines())
     return {words[0]: float(words[1]) for words in table if words and ".service" in words[0]}
 
 
 def upgrade() -> str:
-    """The next version is installed, two relays on: they go off and stay so, the service is back."""
+    """The next version is installed while two relays are on: they go off and stay off, the service is
+    back.
+    """
     service = unit("lift")
     relays, old = energise(), pid(service)
     when = header.now()

@@ -6,13 +6,13 @@ from typing import Final
 from tests.vm.guest.system import Wrong, disable, enable, far_side, pid, sh
 
 SITE: Final = ("ip", "-n", "site")
-"""The other machine: a network namespace at the other end of a cable."""
+"""Commands on the other machine: a network namespace at the other end of a cable."""
 MOVES: Final = (("10.7.0", "open"), ("10.8.0", "close"))
-"""Each network that comes, and what is asked over it."""
+"""Each new network, and the request sent over it."""
 
 
 def late() -> str:
-    """The service starts without a network. One comes, then another address: requests are fulfilled."""
+    """The service starts without a network. A network comes, then another: requests are fulfilled."""
     sh("ip", "netns", "add", "site")
     sh("ip", "link", "add", "eth0", "type", "veth", "peer", "name", "eth1", "netns", "site")
     sh(*SITE, "link", "set", "lo", "up")
@@ -29,7 +29,9 @@ def late() -> str:
 
 
 def _moved(addresses: str, word: str) -> float:
-    """Give both ends addresses of this network; how long it then takes to move the door from there."""
+    """Give both ends addresses of this network; return the time until a request from there moved the
+    door.
+    """
     for ip, name, last in ((("ip",), "eth0", 2), (SITE, "eth1", 3)):
         sh(*ip, "link", "set", name, "down")
         sh(*ip, "addr", "flush", "dev", name)

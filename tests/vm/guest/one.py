@@ -1,6 +1,6 @@
-"""One check: `python3 -m tests.vm.guest.one deaths.phases` prints how that function ended, as JSON.
+"""One check: `python3 -m tests.vm.guest.one deaths.phases` prints that function's result as JSON.
 
-A check returns what it has found, and raises Wrong if that is not right. What it prints is the log.
+A check returns its findings, or raises Wrong. Its output goes to the log.
 """
 
 import json
@@ -14,7 +14,7 @@ from tests.vm.guest.system import Wrong, sh
 
 
 def main() -> int:
-    """Run it; after a failure the journal goes to the log too."""
+    """Run the check; after a failure the journal goes to the log too."""
     module, _, function = sys.argv[1].partition(".")
     check = getattr(import_module(f"tests.vm.guest.{module}"), function)
     began = time.monotonic()

@@ -1,4 +1,4 @@
-"""Requests of RMF's from outside of the services."""
+"""RMF's requests from outside the services."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -8,26 +8,29 @@ from tests.vm.guest.system import Wrong, beside, sh, until
 
 ROOM = ("--domain-id", "7", "--localhost")
 LIFT = dict.fromkeys((18, 16, 22, 23, 24), True)
-"""The outputs of lift.yaml: each is on at high."""
+"""The outputs of lift.yaml, each of which is on at high."""
 HELD = [16, 18]
-"""Of these outputs: the door and the mode, which a session holds."""
+"""The outputs that a session holds: door and mode."""
 
 
 def send(*words: str, fails: bool = False) -> str:
-    """A request of RMF's, and its effect; with `fails`, it has none in time."""
+    """Send one of RMF's requests and wait for its effect; with `fails` the effect must not come in
+    time.
+    """
     return sh("rmf-bridge", "send", *words, *ROOM, fails=fails)
 
 
 @contextmanager
 def asking(*words: str) -> Iterator[None]:
-    """A request of RMF's goes out each second meanwhile, also to a service that comes back; its effect
-    is the end."""
+    """Send a request each second during the block, also to a service that restarts; wait for the effect
+    at the end.
+    """
     with beside("rmf-bridge", "send", *words, *ROOM, "--direct", "--timeout", "150"):
         yield
 
 
 def energise() -> dict[int, bool]:
-    """A session of the lift holds two relays; returns their lines, each with its level for on."""
+    """Let a session of the lift hold two relays; return their lines, each with its level for on."""
     began = header.now()
     send("lift", "Lift1", "L1", "--session", "vm/robot", "--direct")
     until(lambda: sorted(header.on(LIFT, began)) == HELD, "two relays are on")
@@ -35,13 +38,15 @@ def energise() -> dict[int, bool]:
 
 
 def end() -> None:
-    """The session ends, and every output goes off."""
+    """End the session, and wait until every output is off."""
     send("lift", "Lift1", "--end", "--session", "vm/robot", "--direct")
     until(lambda: not header.on(LIFT), "every output is off after the session")
 
 
 def ride() -> str:
-    """A robot rides from L1 to L3: requests from outside of the service, lines of the header."""
+    """A robot rides from L1 to L3 by requests from outside the service; the header's lines show the
+    ride.
+    """
     began = header.now()
     send("lift", "Lift1", "L1", "--session", "vm/robot", "--direct")
     send("lift", "Lift1", "L3", "--session", "vm/robot", "--direct")

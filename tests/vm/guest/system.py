@@ -1,4 +1,4 @@
-"""Commands, units of systemd and waiting, for the checks."""
+"""Commands, systemd units and waiting, for the checks."""
 
 import re
 import subprocess
@@ -12,19 +12,19 @@ from typing import Final, TypeVar
 CONFIG: Final = Path("/mnt/tests/vm/guest/config")
 PYTHON: Final = "/usr/lib/rmf-bridges/current/bin/python3"
 LATE_S: Final = 60.0
-"""For what has no time of its own."""
+"""Limit for waits without their own limit."""
 KEPT: Final = Path("/var/lib/checks-kept")
-"""A line for each service: how long after kill -9 its relays were off (s)."""
+"""A line for each service: the time from kill -9 until its relays were off (s)."""
 
 Found = TypeVar("Found")
 
 
 class Wrong(Exception):
-    """A check has found something that is not right; the text says what."""
+    """A check has failed; the text gives the findings."""
 
 
 def sh(*words: str, fails: bool = False) -> str:
-    """A command's output. Raises Wrong if its exit code is not 0; with `fails`, if it is."""
+    """Return a command's output. Raises Wrong if its exit code is not 0; with `fails`, if it is 0."""
     done = subprocess.run(words, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
     print(f"{time.monotonic():.3f} $ {' '.join(words)} -> {done.returncode}\n{done.stdout}", end="")
     if (done.returncode != 0) is not fails:
@@ -34,7 +34,7 @@ def sh(*words: str, fails: bool = False) -> str:
 
 @contextmanager
 def beside(*words: str) -> Iterator[None]:
-    """A command that runs meanwhile. Raises Wrong if its exit code is not 0."""
+    """Run a command during the block. Raises Wrong if its exit code is not 0."""
     with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) as it:
         try:
             yield
@@ -49,7 +49,7 @@ def beside(*words: str) -> Iterator[None]:
 def until(
     look: Callable[[], Found], what: str, within_s: float = LATE_S, pause_s: float = 0.2
 ) -> Found:
-    """What `look` sees, as soon as that is true. Raises Wrong when it is not in time."""
+    """Return the first true result of `look`. Raises Wrong if no result is true in time."""
     deadline = time.monotonic() + within_s
     while not (seen := look()):
         if time.monotonic() > deadline:
@@ -59,51 +59,51 @@ def until(
 
 
 def mounted(tag: str, place: str) -> Path:
-    """This folder of the host's, read only."""
+    """Mount this folder of the host, read only."""
     if not Path(place).is_mount():
         sh("mount", "-t", "9p", "-o", "ro,trans=virtio,version=9p2000.L", tag, place)
     return Path(place)
 
 
 def unit(name: str) -> str:
-    """The service of a YAML."""
+    """Return the service of a YAML."""
     return f"rmf-bridge@{name}.service"
 
 
 def shown(service: str, *names: str) -> dict[str, str]:
-    """These properties of a unit."""
+    """Return these properties of a unit."""
     text = sh("systemctl", "show", service, *(f"-p{name}" for name in names))
     return dict(line.split("=", 1) for line in text.splitlines())
 
 
 def is_active(service: str) -> bool:
-    """Whether it runs, and has said that it is ready."""
+    """Is the service running and ready?"""
     return shown(service, "ActiveState")["ActiveState"] == "active"
 
 
 def pid(service: str) -> int:
-    """Its main process; 0 for none."""
+    """Return the service's main process, or 0."""
     return int(shown(service, "MainPID")["MainPID"])
 
 
 def restarts(service: str) -> int:
-    """How often systemd has started it again."""
+    """Return how often systemd has restarted the service."""
     return int(shown(service, "NRestarts")["NRestarts"])
 
 
 def ready_s(service: str) -> float:
-    """How long it took from the start of its process to its "ready"."""
+    """Return the time from the start of the service's process to its "ready" (s)."""
     began = since_boot_s(service, "ExecMainStartTimestampMonotonic")
     return since_boot_s(service, "ActiveEnterTimestampMonotonic") - began
 
 
 def since_boot_s(service: str, name: str) -> float:
-    """This property of a unit, a time (monotonic s)."""
+    """Return this property of a unit, a time (monotonic s)."""
     return int(shown(service, name)[name]) / 1e6
 
 
 def kill(service: str, name: str) -> None:
-    """Send this signal to its main process alone."""
+    """Send this signal to the service's main process alone."""
     sh("systemctl", "kill", "-s", name, "--kill-whom=main", service)
 
 
@@ -118,19 +118,19 @@ def back(service: str, old: int) -> None:
 
 
 def keep(name: str, took_s: float) -> None:
-    """Write down how long this service's relays took to go off."""
+    """Note how long this service's relays took to go off."""
     with KEPT.open("a") as out:
         print(name, took_s, file=out)
 
 
 def cursor() -> str:
-    """The journal's end."""
+    """Return the journal's end."""
     text = sh("journalctl", "-n", "0", "--show-cursor")
     return text.partition("-- cursor: ")[2].strip()
 
 
 def journal(after: str, service: str) -> str:
-    """What a service has said since then."""
+    """Return the journal of a service since `after`."""
     sh("journalctl", "--sync")
     return sh("journalctl", *_monotonic(after, service))
 
@@ -140,7 +140,7 @@ def _monotonic(after: str, service: str) -> tuple[str, ...]:
 
 
 def heard(after: str, service: str, pattern: str) -> float:
-    """When a service has said a line with this in it, later than `after` (monotonic s)."""
+    """Return when a service logged a line with this pattern after `after` (monotonic s)."""
     words = ["journalctl", "--follow", "--no-tail", *_monotonic(after, service)]
     with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as follows:
         late = Timer(LATE_S, follows.kill)
@@ -158,19 +158,19 @@ def heard(after: str, service: str, pattern: str) -> float:
 
 
 def enable(name: str) -> str:
-    """Make a service of one of our YAMLs; returns its unit, ready."""
+    """Make a service of one of our YAMLs; return its unit once the service is ready."""
     sh("rmf-bridge", "enable", str(CONFIG / f"{name}.yaml"))
     until(lambda: is_active(unit(name)), f"{name} is ready")
     return unit(name)
 
 
 def disable(name: str) -> None:
-    """Stop it, and keep it from starting at boot."""
+    """Stop the service, and keep it from starting at boot."""
     sh("rmf-bridge", "disable", name)
 
 
 def far_side(name: str) -> None:
-    """Let the equipment of a YAML stand at its wires, until the next boot."""
+    """Connect the equipment of a YAML to its wires, until the next boot."""
     given = (
         "Restart=always",
         "Type=notify",

@@ -1,4 +1,4 @@
-"""Another version comes: refused, with an adapter away, on a full disk, cut off at any moment."""
+"""Upgrades to another version: refused, with an adapter away, on a full disk, cut at any moment."""
 
 import os
 import random
@@ -25,22 +25,22 @@ from tests.vm.guest.wires import tell
 
 SERVICES = ("lift", "door", "charger", "lift_supervisor", "door_supervisor", "low")
 OFF_S, READY_S = 12.0, 20.0
-"""What docs/explanation/reliability.md promises after a power cut, from the kernel's start."""
+"""Limits in docs/explanation/reliability.md after a power cut, from the kernel's start."""
 YAML = Path("/etc/rmf-bridges/lift.yaml")
 CURRENT = Path("/usr/lib/rmf-bridges/current")
 NOT_OURS = ("/var/cache/", "/run/systemd/", "/var/tmp/systemd-private-")
-"""apt's, and what systemd keeps of a unit until the next boot."""
+"""Files of apt, and files that systemd keeps for a unit until the next boot."""
 UPGRADE_S = 45.0
-"""A cut comes within this time: an upgrade takes less."""
+"""A cut comes within this time; an upgrade takes less time."""
 FORCE = ("dpkg", "--force-confold", "--install")
 BEFORE, NEXT = ".", "next"
 """The folders of both versions, among the packages."""
 TARGET = Path("/var/lib/checks-target")
-"""What was being installed when the power was cut."""
+"""The file with the packages that were being installed when the power was cut."""
 
 
 def site() -> str:
-    """Lift, two doors, charger and both supervisors serve; relays of the lift and a door are on."""
+    """Lift, two doors, charger and both supervisors serve; relays of the lift and of a door are on."""
     enable("low")
     wait = [since_boot_s(unit(name), "ActiveEnterTimestampMonotonic") for name in SERVICES]
     send("door", "ward_door", "open", "--direct")
@@ -51,7 +51,7 @@ def site() -> str:
 
 
 def booted() -> str:
-    """The whole site is up again after a power cut: off within 12 s, all ready within 20 s."""
+    """The whole site is up again after a power cut: outputs off within 12 s, all ready within 20 s."""
     until(lambda: all(map(is_active, map(unit, SERVICES))), "every service is ready")
     first, on = _first_writes()
     ready = {n: since_boot_s(unit(n), "ActiveEnterTimestampMonotonic") for n in SERVICES}
@@ -66,7 +66,9 @@ def booted() -> str:
 
 
 def _first_writes() -> tuple[float, list[header.Write]]:
-    """When the last output of the lift was first written, and the writes that switched one on."""
+    """Return the time of the first write of the last lift output, and the writes that switched an
+    output on.
+    """
     writes = [each for each in header.writes() if each.line in LIFT]
     if {each.line for each in writes} != LIFT.keys():
         raise Wrong(f"written: {writes}")
@@ -75,7 +77,7 @@ def _first_writes() -> tuple[float, list[header.Write]]:
 
 
 def _wires_back() -> None:
-    """What was at the wires is there again: a boot ends it, as it runs in this machine."""
+    """Start the equipment at the wires again: the boot has ended it, as it runs in this machine."""
     if not Path("/sys/class/net/vcan0").exists():
         sh("ip", "link", "add", "vcan0", "type", "vcan")
         sh("ip", "link", "set", "vcan0", "up")
@@ -85,34 +87,34 @@ def _wires_back() -> None:
 
 
 def version() -> str:
-    """Of the package, as dpkg has it."""
+    """Return the package's version from dpkg."""
     return sh("dpkg-query", "-W", "-f", "${Version}", "rmf-bridges")
 
 
 def _states() -> str:
-    """Of each package its state and version, as dpkg has them."""
+    """Return each package's state and version from dpkg."""
     return sh("dpkg-query", "-W", "-f", "${db:Status-Status} ${Version}, ", *OURS).rstrip(", ")
 
 
 def _is_whole() -> bool:
-    """Whether dpkg has all packages installed, in one version."""
+    """Does dpkg have all packages installed, in one version?"""
     states = set(_states().split(", "))
     return len(states) == 1 and states.pop().startswith("installed ")
 
 
 def _force(folder: str, fails: bool = False) -> str:
-    """Install these by dpkg alone, as after a cut; returns what it says."""
+    """Install the packages of this folder by dpkg alone, as after a cut; return dpkg's output."""
     return sh(*FORCE, *map(str, debs(folder)), fails=fails)
 
 
 def _held() -> dict[int, bool]:
-    """Two relays are on and stay so: the supervisor, which ends an unknown session, is stopped."""
+    """Hold two relays on; the supervisor is stopped, because it would end an unknown session."""
     sh("systemctl", "stop", unit("lift_supervisor"))
     return energise()
 
 
 def _status() -> str:
-    """What `rmf-bridge status` ends with: 0 well, 1 faults, 2 somebody died."""
+    """Return the exit code of `rmf-bridge status`: 0 well, 1 faults, 2 a daemon died."""
     import subprocess
 
     done = subprocess.run(["rmf-bridge", "status"], capture_output=True, text=True)
@@ -141,7 +143,7 @@ def refused() -> str:
 
 
 def absent() -> str:
-    """That YAML is mended, an adapter is away: `dpkg --configure -a` starts every service."""
+    """After the YAML is mended, with an adapter away, `dpkg --configure -a` starts every service."""
     tell("door", "fail ward_door server off")
     began = time.monotonic()
     told = sh("dpkg", "--configure", "-a")
@@ -169,7 +171,7 @@ def back() -> str:
 
 @contextmanager
 def _full() -> Iterator[None]:
-    """The disk is full, also for root."""
+    """Fill the disk, also for root, during the block."""
     filler = Path("/var/filler")
     try:
         with filler.open("wb") as out:
@@ -183,9 +185,11 @@ def _full() -> Iterator[None]:
 
 
 def full_var() -> str:
-    """/var is full, with all of the disk: `enable`, a ride and an upgrade leave all serving."""
+    """/var and its whole disk are full: `enable`, a ride and an upgrade leave all services running."""
     with _full():
-        sh("sh", "-c", f"rmf-bridge enable {YAML} || true")  # its record's room may be enough
+        sh(
+            "sh", "-c", f"rmf-bridge enable {YAML} || true"
+        )  # the room of its own record may suffice
         until(lambda: is_active(unit("lift")), "the lift's service is back")
         energise()
         _status()
@@ -215,7 +219,9 @@ def cut() -> str:
 
 
 def completed() -> str:
-    """After that cut: off at boot, all serve one version; dpkg completes the other, and all serve."""
+    """After that cut: off at boot, all serve in one version; dpkg completes the other, and all
+    serve.
+    """
     moment = Path("/var/lib/checks-moment").read_text()
     until(lambda: all(map(is_active, map(unit, SERVICES))), "every service is ready")
     first, on = _first_writes()
@@ -239,7 +245,7 @@ def completed() -> str:
 
 
 def purged() -> str:
-    """`apt purge`: nothing of it is left but the user and the groups."""
+    """`apt purge`: only the user and the groups of the package are left."""
     sh("env", "DEBIAN_FRONTEND=noninteractive", "apt-get", "purge", "--yes", *OURS)
     left = sh("find", "/etc", "/usr", "/var", "/run", "-xdev", "-name", "*rmf-bridge*").split()
     left = [name for name in left if not name.startswith(NOT_OURS)]

@@ -1,4 +1,4 @@
-"""A door on RS-485 and a charger on CAN: services whose relays are at the far end of a wire."""
+"""A door on RS-485 and a charger on CAN: services whose relays lie at the far end of a wire."""
 
 import json
 import socket
@@ -48,7 +48,7 @@ def door_killed() -> str:
 
 
 def adapter_pulled() -> str:
-    """The RS-485 adapter is pulled and plugged again: a fault, and its end."""
+    """The RS-485 adapter is pulled out and plugged in again: a fault comes and ends."""
     return _fault_ends(
         "door ward_door usb-rs485",
         lambda: tell("door", "fail ward_door server off"),
@@ -88,7 +88,7 @@ def charger_killed() -> str:
 
 
 def interface_down() -> str:
-    """CAN's interface goes down and comes back: a fault that names it, and its end."""
+    """CAN's interface goes down and comes back: a fault that names the interface comes and ends."""
     return _fault_ends(
         "charger charger_b vcan0",
         lambda: sh("ip", "link", "set", "vcan0", "down"),
@@ -97,7 +97,7 @@ def interface_down() -> str:
 
 
 def bus_off() -> str:
-    """CAN's controller reports bus-off and its end: a fault that says so, and its end."""
+    """CAN's controller reports bus-off and its end: a fault that names bus-off comes and ends."""
     return _fault_ends(
         "charger charger_b bus-off",
         lambda: tell("charger", "fail charger_b bus wrong"),
@@ -106,7 +106,9 @@ def bus_off() -> str:
 
 
 def _fault_ends(what: str, breaks: Callable[[], object], mends: Callable[[], object]) -> str:
-    """`what`: service, device, and a word of its fault."""
+    """Break a wire and mend it; the fault must come and end. `what`: service, device, a word of the
+    fault.
+    """
     name, device, word = what.split()
     mark, began = cursor(), time.monotonic()
     breaks()
@@ -129,7 +131,7 @@ def _killed(name: str) -> str:
 
 
 def _relay_off_at(name: str, act: Callable[[], object]) -> float:
-    """When a relay of this far side goes off after `act` (monotonic s)."""
+    """Return the time (monotonic s) at which a relay of this far side goes off after `act`."""
     with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as control, control.makefile() as lines:
         control.settimeout(LATE_S)
         control.connect(f"/run/far-{name}")
@@ -144,7 +146,7 @@ def _relay_off_at(name: str, act: Callable[[], object]) -> float:
 
 
 def tell(name: str, words: str) -> None:
-    """A story for a far side (`hal_fakes/control.py`)."""
+    """Send a command to a far side (`hal_fakes/control.py`)."""
     with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as control:
         control.connect(f"/run/far-{name}")
         control.sendall(words.encode() + b"\n")

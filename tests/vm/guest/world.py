@@ -1,4 +1,4 @@
-"""What happens around a service: its file, its disks, its clock, the kind of Pi."""
+"""Changes around a service: its file, its disks, its clock, the model of the Pi."""
 
 import os
 import re
@@ -14,19 +14,19 @@ from tests.vm.guest.system import Wrong, back, far_side, is_active, kill, pid, s
 SERVICE = unit("lift")
 YAML = Path("/etc/rmf-bridges/lift.yaml")
 MOVED = {"BCM18": "BCM25", "BCM16": "BCM26"}
-"""Pins of the outputs that a session holds, and others that are free."""
+"""Pins of the outputs that a session holds -> free pins."""
 EVENT = re.compile(r"[a-z_]+( [a-z_]+=\S|$)")
 SYSRQ = Path("/proc/sysrq-trigger")
 STEPS = (10, -20, 10)
-"""Years by which the clock steps: ten too far, ten too few, and right again."""
+"""Years by which the clock steps: ten ahead, then ten behind, then right again."""
 MEANWHILE_S = 12.0
-"""Longer than the watchdog's time and a node's lease: who sleeps by the wall clock shows it."""
+"""Longer than the watchdog's time and a node's lease, so that a sleep by the wall clock is noticed."""
 HEARD_S = 20.0
-"""A request has its effect so long after a step, at the latest: a ride takes 5 s of it."""
+"""Latest effect of a request after a step; 5 s of this time are the ride."""
 
 
 def edited_yaml() -> str:
-    """The YAML gets other pins while two relays are on, then kill -9: the old pins are off."""
+    """The YAML gets other pins while two relays are on, then kill -9: the old pins go off."""
     relays, old, text = energise(), pid(SERVICE), YAML.read_text()
     YAML.write_text(re.sub("|".join(MOVED), lambda found: MOVED[found[0]], text))
     when = header.now()
@@ -44,7 +44,9 @@ def edited_yaml() -> str:
 
 
 def full_run() -> str:
-    """/run is full, two relays on, kill -9: off; back as soon as there is room, or before."""
+    """/run is full, two relays are on, kill -9: off; the service is back when there is room, or
+    before.
+    """
     relays, old = energise(), pid(SERVICE)
     filler = Path("/run/filler")
     with filler.open("wb") as out:
@@ -63,7 +65,7 @@ def full_run() -> str:
 
 
 def clock() -> str:
-    """The clock steps by ten years, forth and back: two relays stay on, a request is heard."""
+    """The clock steps by ten years, forth and back: two relays stay on, and requests are fulfilled."""
     relays, old, waits = energise(), pid(SERVICE), []
     for years, floor in zip(STEPS, ("L3", "L1", "L3"), strict=True):
         when = header.now()
@@ -77,7 +79,9 @@ def clock() -> str:
 
 
 def _goes_to(floor: str) -> float:
-    """How long a request from a new node takes to have its effect, the session's relays on (s)."""
+    """Return how long a new node's request takes to have its effect, with the session's relays on
+    (s).
+    """
     began = header.now()
     send("lift", "Lift1", floor, "--session", "vm/robot", "--direct")
     took = header.now() - began
@@ -90,7 +94,7 @@ def read_only_root() -> str:
     """The root file system is read only: the service starts, serves, dies, and is off."""
     sh("systemctl", "stop", SERVICE)
     sh("journalctl", "--relinquish-var")
-    SYSRQ.write_text("u")  # whoever writes there, as when the kernel has seen a damaged disk
+    SYSRQ.write_text("u")  # remounts read only, as the kernel does for a damaged disk
     until(lambda: "ro" in _options("/"), "the root is read only")
     try:
         sh("systemctl", "start", SERVICE)
@@ -114,7 +118,7 @@ def _options(mount: str) -> set[str]:
 def labels() -> str:
     """The header's chip is found by its label: Raspberry Pi 3, 5 and 4."""
     sh("systemctl", "stop", SERVICE, "far-lift.service")
-    for label in header.LABELS:  # that of the other checks is the last one
+    for label in header.LABELS:  # the last label is the label of the other checks
         header.unplug()
         header.plug(label)
         sh("udevadm", "settle")
@@ -125,7 +129,7 @@ def labels() -> str:
 
 
 def _claims(label: str, lines: Iterable[int]) -> None:
-    """Start the service until it has written each output, and stop it."""
+    """Start the service until it has written each output, then stop the service."""
     when = header.now()
     sh("systemctl", "start", SERVICE)
     written = {each.line for each in header.writes(when)}
