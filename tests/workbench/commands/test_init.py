@@ -149,7 +149,7 @@ def test_on_a_terminal_it_asks_one_thing_after_the_other(tmp_path: Path) -> None
     terminal = Terminal("init", str(file), "--domain-id", "5")
     terminal.wait_for("What is it?")
     terminal.type("\x1b[B\r")  # down arrow: door
-    terminal.wait_for("Its name on RMF's map?")
+    terminal.wait_for("The device's name on RMF's map?")
     terminal.type("ward\r")
     terminal.wait_for("How is it wired?")
     terminal.type("\r")
