@@ -1,4 +1,4 @@
-"""The kinds of bridges, a folder for each. Their rules are pure; this file finds the folders.
+"""The kinds of bridges: each has a folder with its pure rules, which this file finds.
 
 A kind is found by its name in a YAML. Only existing folders are imported: there is no table to
 edit, and no other file imports a kind by its name.
@@ -25,21 +25,21 @@ def kind_names() -> list[str]:
 def holding(
     roots: Iterable[str], pattern: str, record: str, name: Callable[[Path], str]
 ) -> list[str]:
-    """List the names of the files in these folders that define `record`."""
+    """List the names of the files in these folders that define `record`; `name` maps path to name."""
     return sorted({name(path) for path in _files(tuple(roots), pattern, record)})
 
 
 @cache
 def _files(roots: tuple[str, ...], pattern: str, record: str) -> list[Path]:
-    """Find the files that define `record`. They are read once, and not imported: some need a vendor's
-    library."""
+    """Find the files that define `record`. They are read once as text and not imported, because some
+    need a vendor's library."""
     found = (path for root in roots for path in Path(root).glob(pattern))
     holds = re.compile(rf"^{record}(:| =)", re.MULTILINE).search
     return [path for path in found if holds(path.read_text("utf-8"))]
 
 
 def kind_called(name: str) -> "AnyKind":
-    """Return the kind with this name, one of `kind_names()`."""
+    """Return the kind with this name, which is in `kind_names()`."""
     kind: AnyKind = _package(name).KIND
     return kind
 

@@ -7,12 +7,12 @@ CHARGER-1. The states are IDLE → ASSIGNED → CHARGING → RELEASED → IDLE, 
 CHARGER-2. A request is granted while the state is IDLE. Its repeats change nothing, even after its end.
    Other requests are refused until the station is IDLE. There is one exception: a request for the robot
    on the pad, if the station can identify that robot (`pad.py`).
-CHARGER-3. `start_timeout` counts from the grant. A request without a charge by then ends, through
-   RELEASED to IDLE. The reason is shown as a fault, as RMF's error message is blank unless the state is
-   ERROR.
+CHARGER-3. `start_timeout` counts from the grant. If no charge has started by then, the request ends,
+   and the state goes through RELEASED to IDLE. The reason is shown as a fault, because RMF's error
+   message is blank unless the state is ERROR.
 CHARGER-4. A cancel ends only the request that it names. If current flows, the power is switched
-   off, and the state stays CHARGING until the station has stopped. A full battery ends a request
-   likewise.
+   off, and the state stays CHARGING until the station has stopped. A full battery ends a request in the
+   same way.
 CHARGER-5. The station is energised only for its assigned robot, once that robot is seen on the pad and
    in range, and while a movable pad is at its height. Another robot gets no power: the state is ERROR
    with that robot's name, and the request goes on waiting.
@@ -21,8 +21,8 @@ CHARGER-6. At a fault the power is switched off before the fault is reported. Po
    service (PROTECTION): the state is ERROR until its errors have been cleared and a good reading
    follows. A fault of the robot does not take the station out of service.
 CHARGER-7. Failed polls say nothing about the charge. After `misses` failed polls the state is ERROR,
-   and robot and request stay. Only a good reading ends a request or frees a station; or an operator,
-   after the station must have switched off by itself (`peer_internal_timeout_s`).
+   and robot and request stay. Only a good reading ends a request or frees a station. An operator can
+   free a station that must have switched off by itself (`peer_internal_timeout_s`).
 CHARGER-8. If a charge is under way when the daemon starts, or when it reaches the station again, it is
    shown and not stopped. The next request gets that charge only if its robot is seen on the pad.
 CHARGER-9. Errors are cleared by an operator's order, and by the daemon at most `clear_errors_per_h`
@@ -66,7 +66,7 @@ from bridges.kinds.shared.durations import AGES_AGO, NEVER, RIVAL_QUIET_S
 REMEMBERED = 8
 """The number of ended requests remembered, to refuse their late repeats."""
 CLEARED_WITHIN_S = 30.0
-"""A good reading proves the success of a clearing up to this long after it."""
+"""A good reading within this time after the errors were cleared proves that clearing succeeded."""
 
 
 def initial(limits: ChargerLimits, now: float) -> ChargerMemory:
@@ -77,7 +77,7 @@ def initial(limits: ChargerLimits, now: float) -> ChargerMemory:
 def decide(
     memory: ChargerMemory, event: Event, now: float, limits: ChargerLimits
 ) -> Decision[ChargerMemory, ChargerOutputs, ChargerReport]:
-    """Decide one scan: take the event in, then derive outputs and report afresh."""
+    """Decide one scan: apply the event, then derive the outputs and the report afresh."""
     memory, refused = _take(memory, event, now, limits)
     memory = replace(memory, power=_power(memory, now, limits))
     outputs = ChargerOutputs(memory.power, memory.clear_errors, memory.range_checks)
@@ -144,7 +144,7 @@ def _held(memory: ChargerMemory, holder: ChargeSession | None) -> ChargerMemory:
 
 
 def _watched(memory: ChargerMemory, now: float) -> ChargerMemory:
-    """Note the start of a charge against our order to stop."""
+    """Note since when the station has charged against our order to stop."""
     sample = memory.sample
     charges = sample and (sample.activity is Activity.CHARGING or sample.charges)
     if memory.power is not False or not charges:
@@ -154,8 +154,8 @@ def _watched(memory: ChargerMemory, now: float) -> ChargerMemory:
 
 
 def _protected(memory: ChargerMemory, now: float, limits: ChargerLimits) -> ChargerMemory:
-    """Take the station out of service at its fault, and into service at a good reading after a
-    clearing."""
+    """Put the station out of service at its fault, and back into service at a good reading after its
+    errors were cleared."""
     sample, since = memory.sample, memory.disobeyed_since
     assert sample
     if not limits.can_stop:

@@ -17,7 +17,7 @@ from bridges.kinds.shared.durations import AGES_AGO, RIVAL_QUIET_S
 
 
 class ChargerLimits(msgspec.Struct, frozen=True):
-    """The core's share of a charger's settings. `t`: durations and counts.
+    """The settings of a charger that its core needs. `t`: durations and counts.
 
     `receivers`: receiver id -> robot; empty if robots are not verified. `can_stop`: the station obeys
     `power`.
@@ -62,14 +62,14 @@ class ChargeSession(msgspec.Struct, frozen=True):
 
 
 class ChargerMemory(msgspec.Struct, frozen=True):
-    """Everything that outlives a scan. `sample`: the last good reading, taken at `read_at`.
+    """The memory of one charger from scan to scan. `sample`: the last good reading, at `read_at`.
 
     `misses`: failed polls in a row. `write_misses`: scans in a row with failed commands;
-    `write_failed`: this scan's commands failed. `power`: as last decided; `disobeyed_since`: the start
-    of a charge although `power` is off. `adopted`: the station was charging when we reached it, and
-    that charge is left alone. `protection`: the reason why the station is out of service, "" while in
-    service; `clear_by`: a good reading until then proves the success of a clearing. `over`: the
-    requests that ended last.
+    `write_failed`: this scan's commands failed. `power`: as last decided; `disobeyed_since`: the time
+    since which the station has charged although `power` is off. `adopted`: the station was charging
+    when we reached it, and that charge is left alone. `protection`: the reason why the station is out
+    of service, "" while in service; `clear_by`: a good reading until then proves that the errors were
+    cleared. `over`: the requests that ended last.
     """
 
     sample: ChargerSample | None = None

@@ -1,4 +1,4 @@
-"""ChargerRequest and ChargerCancel in, ChargerState out. Is a message well formed?"""
+"""The messages of a charger: check requests and cancels and turn them into events; make a state."""
 
 from collections.abc import Mapping
 
@@ -42,7 +42,7 @@ def accept_request(request: ChargerRequest, settings: ChargerSettings) -> Charge
 def accept_cancel(cancel: ChargerCancel, settings: ChargerSettings) -> Cancelled:
     """Turn a ChargerCancel into an event. Raises RequestRefused if it is malformed.
 
-    To cancel a charge without a request, give the request id of its published state.
+    A charge without a request is cancelled by the request id in its published state.
     """
     _check("request_id", cancel.request_id)
     if cancel.request_id == UNREQUESTED + cancel.charger_name:

@@ -5,8 +5,8 @@ no robot is verified: any robot counts as the request's robot. With `receivers`,
 nobody if it does not identify the receiver that it sees.
 
 A station that moves its pad, or checks the robot's range, gives no power unless the pad is at its
-height and the robot in range. Nothing announces that a robot leaves, so height and range are only read:
-a pad that has left its height while current flows is a fault of the station.
+height and the robot in range. No message announces that a robot leaves; only the readings of height and
+range show that. A pad that has left its height while current flows is a fault of the station.
 
 A wrong robot or receiver on the pad is named in ChargerState's error_message. `Misplaced.text` writes
 that text and `misplaced_in` reads it. An id that would make the text ambiguous is quoted as in JSON, so
@@ -53,7 +53,7 @@ class PadOccupant(msgspec.Struct, frozen=True):
     robot: RobotName | None = None
 
     def may_be(self, who: RobotName) -> bool:
-        """Can this robot be the one on the pad, as far as the station can tell?"""
+        """Can this robot be on the pad, as far as the station can tell?"""
         return self.sort == "unverified" or self.robot == who
 
     def is_another(self, who: RobotName) -> bool:

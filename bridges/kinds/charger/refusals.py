@@ -1,4 +1,4 @@
-"""The published answer to a refused ChargerRequest, and its reader.
+"""The published answer to a refused ChargerRequest, and the function that reads it.
 
 ChargerState shows only the station's true state, and RMF has no message for a refusal. So a refusal is
 published as a diagnostic_msgs/DiagnosticStatus on our own topic `charger_refusals`: every ROS machine
@@ -20,7 +20,7 @@ from bridges.messages.words import LONGEST_NAME
 
 NAME = "ChargerRequest refused"
 OCCUPIED = "charger occupied"
-"""The only reason that ends with the charger's release."""
+"""The only reason for a refusal that passes when the charger is released."""
 LONGEST_REASON = 500
 
 
@@ -67,7 +67,7 @@ def read(status: DiagnosticStatus) -> ChargerRefusal | None:
 
 
 def refused(request_id: str, charger: str, who: RobotName, reason: str) -> ChargerRefusal:
-    """Make the refusal of a request. It may be malformed, with names of any length."""
+    """Make the refusal of a request, which may be malformed and have names of any length."""
     return ChargerRefusal(
         request_id=_cut(request_id),
         charger=_cut(charger),

@@ -1,4 +1,4 @@
-"""A charger's report to RMF, the log and the status file; and the reader of its error texts.
+"""A charger's report to RMF, the log and the status file; and the diagnosis of its error texts.
 
 RMF's ChargerState has one text for all errors. From that text the coordinator
 (`bridges/kinds/charger_coordinator/`) must find the side at fault: `error_message` writes
@@ -81,8 +81,8 @@ class ChargerReport(msgspec.Struct, frozen=True):
     `read_at`: monotonic seconds of the last good reading, None before the first. `error_message`:
     blank unless `state` is CHARGER_ERROR. `request_id`: blank while no request holds the station.
     `fleet`, `robot`: the request's robot; without a request, the robot on the pad of a station that is
-    not idle. `verified`: the station sees that robot's receiver. `waits`: the reason why the request is
-    not charged yet; "" without a request, and while it is charged, over or in ERROR.
+    not idle. `verified`: the station sees that robot's receiver. `waits`: the reason why the robot is
+    not charged yet; "" without a request, during and after the charge, and in ERROR.
     """
 
     read_at: float | None
@@ -124,7 +124,7 @@ def report(memory: ChargerMemory, now: float, limits: ChargerLimits) -> ChargerR
 
 
 def _waits(memory: ChargerMemory, shown: ChargerStateValue, limits: ChargerLimits) -> str:
-    """Explain why the request is not charged yet, or must not be charged now."""
+    """Return the reason why the robot is not charged yet, or must not be charged now."""
     holder, sample = memory.holder, memory.sample
     if not holder or not sample or shown not in (ASSIGNED, CHARGING):
         return ""
@@ -176,7 +176,7 @@ def errors(memory: ChargerMemory, now: float, limits: ChargerLimits) -> list[Fau
 
 
 def error_text(sample: ChargerSample) -> str:
-    """Return a station's error in its own words, after the side at fault."""
+    """Return the side at fault, and a station's own words about its error."""
     text = sample.error_text or f"the charger reports an error (vendor state {sample.code})"
     if diagnosis(text) in (FaultCause.PAD, FaultCause.LOST):
         text = f"the charger says: {text}"

@@ -62,8 +62,8 @@ def shown_released(holder: ChargeSession, now: float, limits: ChargerLimits) -> 
 def _beside_another(
     holder: ChargeSession, now: float, limits: ChargerLimits
 ) -> ChargeSession | None:
-    """Advance the session with another robot on the pad: a waiting robot waits on, a charged one has
-    left."""
+    """Advance the session while another robot is on the pad: the request's robot still waits, or has
+    left after its charge."""
     if shown_released(holder, now, limits):
         return None
     if holder.released_at is not None:

@@ -69,7 +69,7 @@ class ChargerDurations(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown
     peer_internal_timeout_s: Annotated[
         Seconds | None,
         tells("""after how long without the daemon the station has certainly switched off by itself.
-        Without it an operator cannot free a station that does not answer."""),
+        When absent, an operator cannot free a station that does not answer."""),
     ] = None
 
 
@@ -81,13 +81,13 @@ class ChargerSettings(DeviceSettings, frozen=True, kw_only=True, forbid_unknown_
     )
     receivers: Annotated[
         dict[ReceiverId, Name],
-        tells("""receiver id -> FLEET/ROBOT, the robot that carries it. With this table only the
-        robot that the station is assigned to is charged."""),
+        tells("""receiver id -> FLEET/ROBOT, the robot that carries it. With this table a station
+        charges only its assigned robot."""),
     ] = msgspec.field(default_factory=dict)
     unrequested: Annotated[
         Unrequested,
         tells("""what happens to a robot of `receivers` on the pad without a request. `serve_known`
-        charges it; `refuse` does not, and says which robot it is."""),
+        charges the robot; `refuse` only reports its name."""),
     ] = "refuse"
     on_death: Annotated[
         Literal["stop", "keep"], tells("`stop` or `keep` a charge under way when the daemon ends.")
@@ -98,7 +98,7 @@ class ChargerSettings(DeviceSettings, frozen=True, kw_only=True, forbid_unknown_
         return True
 
     def problems(self) -> Remarks:
-        """Yield names not of the form FLEET/ROBOT. A robot may have two receivers, for a spare."""
+        """Yield names not of the form FLEET/ROBOT. A robot may have a second receiver as a spare."""
         for receiver, text in self.receivers.items():
             try:
                 robot(text)

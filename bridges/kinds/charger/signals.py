@@ -75,10 +75,10 @@ class ChargerSample(msgspec.Struct, frozen=True):
 class ChargerOutputs(msgspec.Struct, frozen=True):
     """Every command to a station.
 
-    `power`: may it energise? None changes nothing: neither a charge that we did not start nor a station
-    that does not answer is started or stopped blindly.
-    `clear_errors`, `range_checks`: the numbers of clearings of errors and of range checks
-    ordered since the daemon's start. The commands are not idempotent, so they are counts: a
+    `power`: may it energise? None: the driver sends no order, because we did not start the charge under
+    way, or because the station does not answer.
+    `clear_errors`, `range_checks`: how often we have ordered the station to clear its errors, and to
+    check the range, since the daemon's start. These commands are not idempotent, so they are counts: a
     driver sends one command when a count rises, and never repeats it, even if it failed. A station
     that always knows the position ignores `range_checks`.
     """

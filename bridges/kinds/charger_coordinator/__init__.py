@@ -1,4 +1,4 @@
-"""The charger coordinator: the allotment of all chargers of a site, and the queue."""
+"""The charger coordinator: it allots all chargers of a site to robots, and queues the robots."""
 
 from bridges.kinds.charger_coordinator import (
     core,

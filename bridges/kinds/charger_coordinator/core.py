@@ -2,20 +2,20 @@
 
 Its inputs are FleetState, ChargerState and the requests of operators. It sends ChargerRequest and
 ChargerCancel; no part of RMF sends these. A wish is a robot's need to be charged. Rules:
-COORDINATOR-1. `wishes.py` finds the robots with a wish. An operator's wish lasts until its request is
-   over or the robot is full.
+COORDINATOR-1. `wishes.py` finds the robots with a wish. An operator's wish lasts until the operator's
+   request is over or the robot is full.
 COORDINATOR-2. Wishes are served first come, first served, among the suitable stations (`queue.py`). A
    station has one robot at a time. Another robot gets the station only after the station's state shows
    the release of the first.
-COORDINATOR-3. A request is repeated until the station shows it. A station that does not take it within
+COORDINATOR-3. A request is repeated until the station shows it. A station that does not show it within
    TAKEN_S is passed over for SHUNNED_S, and the wish goes to the end of the queue.
 COORDINATOR-4. The end of a request, and the side at fault, are read from the stations' states
    (`stations.py`).
 COORDINATOR-5. A robot on a wrong pad is told to leave the pad, or a person is alerted (`wrong_pad.py`).
-COORDINATOR-6. A request for one of our robots counts as that robot's, even if another node has made it.
-COORDINATOR-7. During the quiet start it only listens. Beside another publisher of charging assignments
-   (RMF's rmf_charging_schedule) it sends no assignments, and requests the stations dedicated by that
-   publisher.
+COORDINATOR-6. Another node's request for one of our robots counts as if we had made it.
+COORDINATOR-7. During the quiet start the coordinator only listens. Beside another publisher of charging
+   assignments (RMF's rmf_charging_schedule) the coordinator sends no assignments, and requests the
+   stations that this publisher dedicates to the robots.
 """
 
 from msgspec.structs import replace
@@ -51,7 +51,7 @@ def idle(memory: SiteMemory, now: float) -> bool:
 
 
 def decide(memory: SiteMemory, event: Event, now: float, site: SiteLimits) -> Decided:
-    """Take the event in, allot free stations, and send the messages that are due. Never raises."""
+    """Apply the event, allot free stations, and publish the messages that are due. Never raises."""
     memory, refused = _take(memory, event, now, site)
     memory = stations.in_time(stations.adopted(memory, now, site), now, site)
     if memory.may_speak:
@@ -88,7 +88,8 @@ def _take(memory: SiteMemory, event: Event, now: float, site: SiteLimits) -> tup
 
 
 def _may_speak(memory: SiteMemory, yes: bool, alone: bool, now: float) -> SiteMemory:
-    """Start or stop publishing. Requests not shown yet count from now; assignments are sent again."""
+    """Start or stop publishing. The time of requests not shown yet restarts; assignments are sent
+    again."""
     grants = {
         name: grant if grant.shown else replace(grant, made_at=now)
         for name, grant in memory.grants.items()
@@ -97,7 +98,8 @@ def _may_speak(memory: SiteMemory, yes: bool, alone: bool, now: float) -> SiteMe
 
 
 def _as_dedicated(memory: SiteMemory, site: SiteLimits) -> SiteMemory:
-    """Beside another node's schedule, give up stations to which RMF will not bring their robots."""
+    """Give up stations to which RMF will not bring their robots, because another node's schedule
+    dedicates other stations."""
     if memory.alone:
         return memory
     for name, grant in memory.grants.items():

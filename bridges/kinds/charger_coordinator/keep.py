@@ -1,7 +1,7 @@
-"""The memory across a restart: the queue, the stations' robots, and robots' failures at stations.
+"""The memory on disk, for a restart: the queue, the stations' robots, and robots' failures.
 
-States of robots and stations come again within a second. A request that was sent but not saved is
-recognised by its id in the station's state.
+States of robots and stations are not saved, because they come again within a second. A request that was
+sent but not saved is recognised by its id in the station's state.
 """
 
 from collections.abc import Mapping
@@ -21,7 +21,7 @@ SITE: Final = "site"
 
 
 class WishRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A Wish; `robot` is FLEET/ROBOT, as everywhere here."""
+    """A Wish. `robot` is FLEET/ROBOT, as everywhere in this file."""
 
     robot: Text
     by: By

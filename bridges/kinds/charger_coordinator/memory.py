@@ -23,7 +23,7 @@ NODE: Final = "charger_coordinator"
 STATION_SILENT_S: Final = 5.0
 """A station is silent after this long without a state. States come at 1 Hz."""
 STRIKES: Final = 2
-"""A robot is not tried again after this many failures; at two stations, if two suit it."""
+"""A robot is not tried again after this many failures, which are at two stations if two suit it."""
 
 IDLE: Final = ChargerStateValue.CHARGER_IDLE
 ASSIGNED: Final = ChargerStateValue.CHARGER_ASSIGNED
@@ -34,7 +34,7 @@ ERROR: Final = ChargerStateValue.CHARGER_ERROR
 
 @dataclass(frozen=True, slots=True)
 class SiteLimits:
-    """The core's share of the settings.
+    """The settings that the core needs.
 
     `robots`: robot -> its suitable stations, best first. `waits_at`: robot -> its waypoint for
     waiting. `places`: station -> fleet -> waypoint. `receivers`: receiver id -> robot.
@@ -60,7 +60,7 @@ class SiteLimits:
         object.__setattr__(self, "_stations", found)
 
     def station_at(self, fleet: str, place: str | None) -> str | None:
-        """Find the station at this waypoint of the fleet's graph; None for none."""
+        """Find the station at this waypoint of the fleet's graph; None if there is no station."""
         return self._stations.get((fleet, place or ""))
 
     @classmethod
@@ -89,11 +89,11 @@ WHOSE: Final[Mapping[By, str]] = {
 
 
 class Wish(msgspec.Struct, frozen=True):
-    """One robot's need to be charged. `by`: its origin (the fleet's state, schedule, or an operator).
+    """One robot's need to be charged. `by`: its origin (the fleet's state, the schedule, an operator).
 
     `task_id`: the robot's task, unless an operator wants the charge. `called`: that task began after
-    the robot was given a station, so it is the drive there. `station`, `request_id`, `start_timeout_s`:
-    from the operator's request.
+    a station was allotted to the robot, so the task is the drive to that station. `station`,
+    `request_id`, `start_timeout_s`: from the operator's request.
     """
 
     robot: RobotName
@@ -117,7 +117,7 @@ class Wish(msgspec.Struct, frozen=True):
 
 
 class Grant(msgspec.Struct, frozen=True):
-    """A station given to a robot, since `made_at`, by the request `request_id`.
+    """A station that was allotted to a robot at `made_at`, by the request `request_id`.
 
     `shown`: the station's state has shown the request. `started`: current has flowed. `over`: the
     robot no longer has the station, but no other robot gets it until the station's release.
@@ -137,8 +137,8 @@ class Grant(msgspec.Struct, frozen=True):
 
 
 class Standing(msgspec.Struct, frozen=True):
-    """A robot as its fleet showed it at `at`. `since`: the last change of place, mode or task;
-    `here_since`: the last change of place (-inf: none since the first state)."""
+    """A robot as its fleet showed it at `at`. `since`: the time of its last change of place, mode or
+    task. `here_since`: the time of its last change of place (-inf: no change since the first state)."""
 
     sighting: Sighting
     at: float
@@ -152,8 +152,8 @@ class Standing(msgspec.Struct, frozen=True):
 
 
 class StationSeen(msgspec.Struct, frozen=True):
-    """A station's last state, heard at `at`. `since`: the last change of state or error.
-    `full_in_s`: the station's own figure at `at`."""
+    """A station's last state, heard at `at`. `since`: the time of its last change of state or error.
+    `full_in_s`: the time until the robot is full (s), as the station reported it at `at`."""
 
     state: ChargerStateValue
     request_id: str
@@ -171,7 +171,7 @@ class StationSeen(msgspec.Struct, frozen=True):
 
 class Nudge(msgspec.Struct, frozen=True):
     """Orders to a robot to leave a pad. `why`: the request of its own station, or the station that it
-    blocks. `count`: their number. `at`: the time of the last one."""
+    blocks. `count`: the number of orders. `at`: the time of the last order."""
 
     why: str
     count: int
@@ -179,18 +179,18 @@ class Nudge(msgspec.Struct, frozen=True):
 
 
 class SiteMemory(msgspec.Struct, frozen=True):
-    """Everything that outlives an event.
+    """The memory of the site from event to event.
 
-    `may_speak`: it may publish. `passive`: the reason why requesters wait while it may not publish.
-    `alone`: no other node publishes charging assignments.
+    `may_speak`: the coordinator may publish. `passive`: the reason why requesters wait while it may
+    not. `alone`: no other node publishes charging assignments.
 
     `wishes`: in the order of service. `grants`: by station. `strikes`: robot -> the stations where it
     has failed. `served`: robot -> the task in which it was charged. `rested`: robots that the schedule
-    does not charge again in its present time. `absent`: robot -> end of the time without a new call, as
-    it did not leave its place. `over`: ids of the operators' requests that ended last, to refuse late
-    repeats. `count`: requests made so far. `robots`, `stations`: as last heard, and when. `shunned`:
-    station -> end of the time in which it is passed over, because it took no request. `preferred`:
-    robot -> the station dedicated to it by another node.
+    does not charge again in its present time. `absent`: robot -> the time when it may be called again,
+    after it did not leave its place when called. `over`: ids of the operators' requests that ended
+    last, to refuse late repeats. `count`: the number of requests made. `robots`, `stations`: their last
+    states. `shunned`: station -> the time until which it is passed over, because it took no request.
+    `preferred`: robot -> the station dedicated to it by another node.
     `nudges`: robots told to leave a pad. `receivers`: robot -> the error of its own receiver.
     `when`: the local time. `assigned`: the assignments published last, at `assigned_at`.
     `alerts`: the faults already sent as alerts.
@@ -220,20 +220,20 @@ class SiteMemory(msgspec.Struct, frozen=True):
     alerts: frozenset[str] = frozenset()
 
     def wish(self, robot: RobotName) -> Wish | None:
-        """Find this robot's wish; None for none."""
+        """Find this robot's wish; None without a wish."""
         return next((wish for wish in self.wishes if wish.robot == robot), None)
 
     def station_of(self, robot: RobotName) -> str | None:
-        """Find this robot's station; None for none."""
+        """Find this robot's station; None without a station."""
         return next((s for s, g in self.grants.items() if g.robot == robot and not g.over), None)
 
     def place_of(self, robot: RobotName) -> str | None:
-        """Return the waypoint of our YAML at which its fleet last saw this robot; None for none."""
+        """Return the waypoint of our YAML at which the robot's fleet last saw it; None elsewhere."""
         standing = self.robots.get(robot)
         return standing.sighting.place if standing else None
 
     def stands_at(self, robot: RobotName, site: SiteLimits) -> str | None:
-        """Return the station at which its fleet last saw this robot; None for none."""
+        """Return the station at which the robot's fleet last saw it; None elsewhere."""
         return site.station_at(robot.fleet, self.place_of(robot))
 
     @property
@@ -242,7 +242,7 @@ class SiteMemory(msgspec.Struct, frozen=True):
         return self.may_speak and self.alone
 
     def faulty(self, robot: RobotName) -> bool:
-        """Has this robot failed too often? It is not tried again until an operator resets."""
+        """Has this robot failed so often that it is not tried again until an operator's reset?"""
         return len(self.strikes.get(robot, ())) >= STRIKES
 
     def speaks(self, station: str, now: float) -> bool:
@@ -250,14 +250,14 @@ class SiteMemory(msgspec.Struct, frozen=True):
         return station in self.stations and now < self.stations[station].at + STATION_SILENT_S
 
     def silent_since(self, station: str) -> float:
-        """Return the time of the station's silence, in the future if it is not silent yet."""
+        """Return the time when the station counts as silent, in the past or in the future."""
         seen = self.stations.get(station)
         return STATION_SILENT_S + (self.began_at if seen is None else seen.at)
 
     # ---- changed copies
 
     def with_grant(self, station: str, grant: Grant | None) -> "SiteMemory":
-        """Return the memory with this grant of the station; None: granted to nobody."""
+        """Return the memory with this grant of the station; None: the station is granted to nobody."""
         rest = without(self.grants, station)
         return replace(self, grants=rest | ({} if grant is None else {station: grant}))
 
@@ -277,7 +277,7 @@ class SiteMemory(msgspec.Struct, frozen=True):
         return replace(self, wishes=(*(w for w in self.wishes if w is not wish), wish))
 
     def takes_back(self, robot: RobotName) -> "SiteMemory":
-        """Return the memory with an order to this robot's station to release it."""
+        """Return the memory in which this robot's station must release the robot."""
         station = self.station_of(robot)
         if station is None:
             return self

@@ -1,4 +1,4 @@
-"""Messages of fleets, stations, schedules and operators in: each well formed, and for this site."""
+"""From messages of fleets, stations, schedules and operators to events, with checks of each message."""
 
 import math
 from collections.abc import Mapping
@@ -74,7 +74,7 @@ def _sighting(
 
 
 def _nearest(at: d.Location, fleet: FleetSettings, places: set[str], near_m: float) -> str | None:
-    """Find the nearest of these waypoints within `near_m`; None for none."""
+    """Find the nearest of these waypoints; None if it is farther away than `near_m`."""
     away = {
         name: math.dist((at.x, at.y), (waypoint.x, waypoint.y))
         for name, waypoint in fleet.waypoints.items()
@@ -87,7 +87,8 @@ def _nearest(at: d.Location, fleet: FleetSettings, places: set[str], near_m: flo
 def accept_state(
     state: d.ChargerState, settings: CoordinatorSettings, wall: float
 ) -> ChargerStateHeard | ReceiverHeard:
-    """Turn a station's, or a robot's receiver's, ChargerState into an event. Raises RequestRefused."""
+    """Turn the ChargerState of a station, or of a robot's receiver, into an event. Raises
+    RequestRefused."""
     receiver_of = settings.rcus().get(state.charger_name)
     if receiver_of is None and state.charger_name not in settings.stations:
         raise RequestRefused("station not ours", f"{state.charger_name!r}")
@@ -148,7 +149,7 @@ def accept_assignments(
 
 
 def subject(message: object) -> str:
-    """Return the site for every message: the queue spans its stations."""
+    """Return the site for every message, because one queue spans all its stations."""
     return SITE
 
 

@@ -2,14 +2,15 @@
 
 A station is free if its last state is IDLE and no older than STATION_SILENT_S, no robot has it, it has
 not just failed to take a request, and no other robot stands there. A robot on a station's pad without
-a request (the station shows an error or an unrequested charge) may have that very station. So may a
-released robot that still stands there.
+a request (the station shows an error or an unrequested charge) may have that very station. A released
+robot that still stands at a station may have that station too.
 
-A station where a robot has failed is tried again only if no other station suits the robot: a second
-station shows the side at fault.
+A station where a robot has failed is tried again only if no other station suits the robot, because a
+second station shows the side at fault.
 
-Beside another node's charging schedule, a robot gets the station that the schedule has dedicated to it:
-RMF drives it to no other. A robot without a dedicated station may have the station where it stands.
+Beside another node's charging schedule, a robot gets the station that the schedule has dedicated to it,
+because RMF drives it to no other station. A robot without a dedicated station may have the station
+where it stands.
 """
 
 from collections.abc import Mapping, Sequence
@@ -90,7 +91,8 @@ def _free(memory: SiteMemory, station: str, robot: RobotName, now: float, here: 
 
 
 def standing(memory: SiteMemory, now: float, site: SiteLimits) -> Here:
-    """List the robots standing at each station, by their fleets' states of the last REMEMBERED_S."""
+    """List the robots at each station, from the states that their fleets sent in the last
+    REMEMBERED_S."""
     here: dict[str, list[RobotName]] = {}
     for who, seen in memory.robots.items():
         station = memory.stands_at(who, site)
@@ -100,5 +102,5 @@ def standing(memory: SiteMemory, now: float, site: SiteLimits) -> Here:
 
 
 def in_the_way(here: Here, station: str, robot: RobotName) -> RobotName | None:
-    """Find another robot standing at the station; None for none."""
+    """Find another robot that stands at the station; None if there is no other."""
     return next((who for who in here.get(station, ()) if who != robot), None)

@@ -1,4 +1,4 @@
-"""The queue as shown: each waiting robot with the origin of its wish, its obstacles, and its wait.
+"""The shown queue: each waiting robot with the origin of its wish, its obstacles and its waiting time.
 
 A charge's end is known only if the station reports it. Each robot is shown with its probable station:
 the suitable station that is free first and goes to no robot ahead in the queue.
@@ -49,7 +49,7 @@ def reasons(memory: SiteMemory, now: float, site: SiteLimits) -> Iterator[str]:
 
 
 def free_in_s(memory: SiteMemory, station: str, now: float) -> float:
-    """Return the rest of the station's charge (s), by its own figure; NEVER: not known."""
+    """Return the rest of the charge (s), as the station reports it; NEVER: not known."""
     seen = memory.stations.get(station)
     if seen is None or seen.state is not CHARGING or not seen.full_in_s:
         return NEVER

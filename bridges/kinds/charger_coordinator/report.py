@@ -1,11 +1,11 @@
-"""Messages to stations, fleet adapters and technicians, and the report to the log and status file.
+"""Messages to stations, fleet adapters and technicians; the report to the log and the status file.
 
 COORDINATOR-REPORT-1. A request is repeated each second until its station shows it. A cancel is repeated
    each second while the station still shows the request.
 COORDINATOR-REPORT-2. Every robot is assigned one place of its own: its station (MODE_CHARGE), else its
-   waypoint for waiting (MODE_WAIT). When a place changes, the assignments of all fleets are published:
-   they are retained for fleet adapters that start later. RMF drives the robot to the place if it has a
-   charging task (rmf_ros2 9dedd0f, ChargeBattery.cpp, _consider_restart).
+   waypoint for waiting (MODE_WAIT). When a place changes, the assignments of all fleets are published,
+   and retained for fleet adapters that start later. RMF drives a robot with a charging task to its
+   place (rmf_ros2 9dedd0f, ChargeBattery.cpp, _consider_restart).
 COORDINATOR-REPORT-3. Each fault is sent as an Alert once; rmf-web shows it to a person.
 """
 
@@ -54,17 +54,17 @@ TITLES: Final = {
     "REQUEST_NOT_TAKEN": "A charger takes no request",
 }
 ASKS_S: Final = 5.0
-"""A robot that comes to a pad unannounced requests it by its fleet's state a few seconds later."""
+"""A few seconds after a robot has come to a pad unannounced, its fleet's state requests the pad."""
 AGAIN_S: Final = 15.0
 ERRORS: Final = ("ROBOT_FAULTY", "STATION_OUT_OF_SERVICE")
 
 
 class SiteReport(msgspec.Struct, frozen=True):
-    """The site as shown. `read_at`: the time of the last station's state (monotonic s). `stations`:
+    """The shown site. `read_at`: the time of the last state of any station (monotonic s). `stations`:
     (station, text of its state, its robot and the origin of the wish). `queue`: the waiting robots in
-    order, with their reasons. `waiting`: the same robots alone. `assigns`: the robots' places are
-    assigned by us, or by another node. `schedule`: its times. `absent`: robots that did not come when
-    called."""
+    order, with their reasons. `waiting`: these robots without reasons. `assigns`: do we assign the
+    robots' places, or does another node? `schedule`: the times of the schedule. `absent`: robots that
+    did not come when called."""
 
     read_at: float | None
     stations: tuple[tuple[str, str], ...] = ()
@@ -76,7 +76,7 @@ class SiteReport(msgspec.Struct, frozen=True):
     faults: tuple[Fault, ...] = ()
 
     def news(self) -> object:
-        """Return the facts whose change is logged: everything but running times."""
+        """Return the facts whose change is logged: everything except running times."""
         return self.stations, self.waiting, self.assigns, self.schedule, self.absent
 
 
@@ -192,7 +192,7 @@ def _again_at(memory: SiteMemory, site: SiteLimits) -> Iterator[float]:
     """Yield times to repeat the assignments of robots that stand elsewhere without a task.
 
     An EasyFullControl adapter takes the retained assignment at its start, and a moment later replaces
-    it by the charger of its own file (seen with Jazzy's). No message shows this moment, so the
+    it by the charger of the adapter's own file (seen in Jazzy). No message shows this moment, so the
     assignment is published every AGAIN_S until the robot moves, or has lost the station.
     """
     for name, grant in memory.grants.items():
@@ -246,7 +246,8 @@ def _assignments(
 
 
 def _alert(fault: Fault) -> d.Alert:
-    """Make the Alert of a fault. `stamped` appends the time to its id: rmf-web drops known ids."""
+    """Make the Alert of a fault. `stamped` appends the time to its id, because rmf-web drops known
+    ids."""
     tier = d.AlertTier.TIER_ERROR if fault.code in ERRORS else d.AlertTier.TIER_WARNING
     return d.Alert(
         id=f"{NODE}/{fault.code}/{fault.detail}",

@@ -1,7 +1,7 @@
-"""The coordinator's own charging schedule: times of the week for charging robots, and their target.
+"""The coordinator's own charging schedule: times of the week at which robots are charged to a target.
 
-Pure: the local time of day and the day of the week are inputs. An end at or before the beginning is on
-the next day; the whole time belongs to the day on which it begins.
+The functions are pure: the local time of day and the day of the week are inputs. An end at or before
+the beginning is on the next day; the whole time belongs to the day on which it begins.
 """
 
 from collections.abc import Iterable
@@ -28,7 +28,7 @@ Target = Annotated[float, Meta(ge=1, le=100, extra={"unit": "%"})]
 
 
 class LocalTime(NamedTuple):
-    """`day`: 0 is Monday. `minute`: since local midnight."""
+    """A local time. `day`: 0 is Monday. `minute`: since local midnight."""
 
     day: int
     minute: int
@@ -37,11 +37,11 @@ class LocalTime(NamedTuple):
 class Charging(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """One time of the week at which robots without a task are charged."""
 
-    at: Annotated[TimeOfDay, tells("when it begins.")]
-    until: Annotated[TimeOfDay, tells("when it ends.")]
-    days: Annotated[list[Day], tells("the days on which it begins; every day when absent.")] = (
-        msgspec.field(default_factory=lambda: list(DAYS))
-    )
+    at: Annotated[TimeOfDay, tells("when charging begins.")]
+    until: Annotated[TimeOfDay, tells("when charging ends.")]
+    days: Annotated[
+        list[Day], tells("the days on which charging begins; every day when absent.")
+    ] = msgspec.field(default_factory=lambda: list(DAYS))
     fleets: Annotated[
         list[Name], tells("the fleets to be charged; all when `robots` is absent too.")
     ] = []
@@ -49,26 +49,28 @@ class Charging(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
         list[Name],
         tells("the robots to be charged, as FLEET/ROBOT; all when `fleets` is absent too."),
     ] = []
-    percent: Annotated[Target, tells("the battery charge up to which they are charged.")] = 100.0
+    percent: Annotated[
+        Target, tells("the battery charge up to which these robots are charged.")
+    ] = 100.0
 
     def concerns(self, who: RobotName) -> bool:
-        """Does it apply to this robot?"""
+        """Does this part of the schedule apply to the robot?"""
         everybody = not self.fleets and not self.robots
         return everybody or who.fleet in self.fleets or str(who) in self.robots
 
     def under_way(self, when: LocalTime) -> bool:
-        """Is it in force at this time?"""
+        """Does `when` lie between the beginning and the end?"""
         begins, lasts = _minute(self.at), self.lasts_min()
         today, yesterday = DAYS[when.day], DAYS[when.day - 1]
         began_today = today in self.days and 0 <= when.minute - begins < lasts
         return began_today or (yesterday in self.days and when.minute + DAY_MIN - begins < lasts)
 
     def lasts_min(self) -> int:
-        """Return its length in minutes: at most a day."""
+        """Return the time from the beginning to the end (minutes): at most a day."""
         return (_minute(self.until) - _minute(self.at) - 1) % DAY_MIN + 1
 
     def text(self, when: LocalTime | None) -> str:
-        """Describe it: `22:00-05:00 mon tue tiny to 100 %: under way`."""
+        """Describe the times, robots and target: `22:00-05:00 mon tue tiny to 100 %: under way`."""
         days = "" if set(self.days) == set(DAYS) else f" {' '.join(self.days)}"
         whom = " ".join([*self.fleets, *self.robots]) or "everybody"
         now = "" if when is None else f": {'under way' if self.under_way(when) else 'not now'}"

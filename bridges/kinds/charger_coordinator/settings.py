@@ -29,16 +29,17 @@ Stations = Annotated[list[Name], Meta(min_length=1)]
 class Waypoint(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """A named vertex of the fleet's navigation graph, with the graph's coordinates."""
 
-    level: Annotated[Name, tells("its level's name.")]
-    x: Annotated[Metres, tells("its x coordinate in the graph.")]
-    y: Annotated[Metres, tells("its y coordinate in the graph.")]
+    level: Annotated[Name, tells("the name of the waypoint's level.")]
+    x: Annotated[Metres, tells("the waypoint's x coordinate in the graph.")]
+    y: Annotated[Metres, tells("the waypoint's y coordinate in the graph.")]
 
 
 class StationSettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """A charger, under the name published by its own daemon."""
 
     waypoint: Annotated[
-        Name | None, tells("the place's name in the navigation graphs; the charger's when absent.")
+        Name | None,
+        tells("the place's name in the navigation graphs; when absent, the charger's name."),
     ] = None
     waypoints: Annotated[
         dict[Name, Name], tells("fleet -> the place's name in that fleet's graph, if different.")
@@ -50,13 +51,14 @@ class RobotSettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
 
     stations: Annotated[Stations, tells("its suitable stations, best first.")]
     waits_at: Annotated[
-        Name, tells("its own waypoint, where it waits for a station and stays when it needs none.")
+        Name,
+        tells("its own waypoint, where it waits for a station and stays when it needs no charge."),
     ]
     receivers: Annotated[list[ReceiverId], tells("the ids of its receivers.")] = []
     rcu: Annotated[
         Name | None,
-        tells("""the name under which the daemon of its own receiver publishes, if it has one: a
-        robot's part, and no station."""),
+        tells("""the name under which the daemon of the robot's receiver publishes, if the receiver
+        has a daemon. The receiver is a part of the robot, and no station."""),
     ] = None
 
 
@@ -65,8 +67,8 @@ class FleetSettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
 
     waypoints: Annotated[
         dict[Name, Waypoint],
-        tells("""the stations' and waiting places in its navigation graph. RMF's fleet adapter
-        crashes on a name that its graph does not have, so it is sent no other names."""),
+        tells("""the places of stations and waiting robots in the fleet's navigation graph. RMF's
+        fleet adapter crashes on a name that its graph lacks, so only these names are sent to it."""),
     ]
     robots: Annotated[
         dict[Name, RobotSettings], tells("the robots that charge, by the adapter's names.")
@@ -80,27 +82,31 @@ class CoordinatorSettings(GraphSettings, frozen=True, kw_only=True, forbid_unkno
         dict[Name, StationSettings],
         tells("the chargers, by the names under which their daemons publish."),
     ]
-    fleets: Annotated[dict[Name, FleetSettings], tells("the fleets whose robots charge at them.")]
+    fleets: Annotated[
+        dict[Name, FleetSettings], tells("the fleets whose robots charge at these stations.")
+    ]
     start_timeout_s: Annotated[
         StartTimeout, tells("how long a station stays assigned to a robot that is on its way.")
     ] = 300.0
     near_m: Annotated[
-        Near, tells("a robot stands at the nearest waypoint, if that is no farther away than this.")
+        Near, tells("the greatest distance from which a robot counts as standing at a waypoint.")
     ] = 1.0
     full_percent: Annotated[Full, tells("the charge at which a robot leaves its station.")] = 100.0
     again_percent: Annotated[
         Low,
-        tells("""below this charge a robot without a task is charged. A robot that was charged
-        during a task is charged again in the same task only below this."""),
+        tells("""a robot without a task is charged below this percentage. A robot that was charged
+        during a task is charged again in the same task only below this percentage."""),
     ] = 90.0
     leaves_s: Annotated[
-        Timeout, tells("how long a robot may stay on a pad without need while another waits.")
+        Timeout,
+        tells("how long a robot may stay on a pad without need while another robot waits for it."),
     ] = 60.0
     schedule: Annotated[
         list[Charging], tells("times of the week at which robots without a task are charged.")
     ] = msgspec.field(default_factory=list)
     timezone: Annotated[
-        Name | None, tells("the schedule's time zone (Asia/Singapore); this machine's when absent.")
+        Name | None,
+        tells("the schedule's time zone (Asia/Singapore); when absent, this machine's zone."),
     ] = None
 
     def on_map(self) -> Iterator[Place]:
@@ -169,7 +175,8 @@ class CoordinatorSettings(GraphSettings, frozen=True, kw_only=True, forbid_unkno
                     yield path, f"'{station}' is at '{place}', not in this fleet's list ({known})"
 
     def _doubles(self) -> Remarks:
-        """Yield places or receivers of two robots, and names of two stations or receivers."""
+        """Yield each place or receiver with two robots, and each name with two stations or
+        receivers."""
         taken: dict[tuple[str, str], str] = {}
         for station, places in self.places().items():
             for fleet, place in places.items():
@@ -215,7 +222,7 @@ class CoordinatorSettings(GraphSettings, frozen=True, kw_only=True, forbid_unkno
         }
 
     def rcus(self) -> dict[str, RobotName]:
-        """Map the published name of a robot's own receiver -> the robot."""
+        """Map the name under which a robot's receiver publishes -> the robot."""
         return {robot.rcu: who for who, robot in self.robots().items() if robot.rcu}
 
 
@@ -271,7 +278,7 @@ def warnings(settings: CoordinatorSettings) -> Remarks:
 
 
 def _near(settings: CoordinatorSettings) -> Remarks:
-    """Yield places too close together for a robot's position to distinguish."""
+    """Yield places that are too close together to be told apart by a robot's position."""
     for fleet_name, fleet in settings.fleets.items():
         names = list(fleet.waypoints)
         for i, name in enumerate(names):

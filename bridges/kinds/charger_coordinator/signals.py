@@ -51,14 +51,14 @@ class ChargerStateHeard(msgspec.Struct, frozen=True):
 
 
 class ReceiverHeard(msgspec.Struct, frozen=True):
-    """A ChargerState of a robot's own receiver, which is no station. `error`: "" for none."""
+    """A ChargerState of a robot's own receiver, which is no station. `error`: "" without an error."""
 
     robot: RobotName
     error: str
 
 
 class ChargeWanted(msgspec.Struct, frozen=True):
-    """An operator wants this robot charged; `station`: preferably there, "" for anywhere."""
+    """An operator wants this robot charged. `station`: the operator's choice, "" for any station."""
 
     robot: RobotName
     station: str
@@ -73,7 +73,7 @@ class ChargeUnwanted(msgspec.Struct, frozen=True):
 
 
 class Dedicated(msgspec.Struct, frozen=True):
-    """Another node's charging assignments: each robot and its station, or ""."""
+    """Another node's charging assignments: each robot and its station ("" without a station)."""
 
     stations: tuple[tuple[RobotName, str], ...]
 

@@ -1,19 +1,19 @@
 """The stations' states: the fate of requests, and the side at fault.
 
-COORDINATOR-STATIONS-1. A station shows the end of a request. Released after charging: the wish is
-   fulfilled. Released without charging: the robot did not come. Then a fleet's wish goes to the end of
-   the queue if its robot stands at one of our waypoints. Any other wish is over. A robot that stands at
-   that very station has failed there. A station that no longer shows a request without a release has
-   forgotten the request: its daemon was restarted. The wish stays, and the request is sent again
-   (`_forgot`). The power may have been switched off meanwhile: a charge that ends within PROVEN_S of
-   the restart was cut short.
+COORDINATOR-STATIONS-1. A station shows the end of a request. If it releases the robot after charging,
+   the wish is fulfilled. If it releases the robot without charging, the robot did not come. Then a
+   fleet's wish goes to the end of the queue if its robot stands at one of our waypoints, and any other
+   wish is over. A robot that stands at that very station has failed there. A station that stops showing
+   a request without a release has forgotten the request, because its daemon was restarted. The wish
+   stays, and the request is sent again (`_forgot`). The restart may have switched the power off, so a
+   charge that ends within PROVEN_S of the restart was cut short.
 COORDINATOR-STATIONS-2. After an error of the station, the robot gets another station and keeps its
    place in the queue. If the robot is at fault, or the side at fault is unclear, the error also counts
    as a failure of the robot. After the second failure (at a second station if one suits) the robot is
    not tried again, and a technician is told.
-COORDINATOR-STATIONS-3. A failure is forgotten when the robot has been charged for PROVEN_S, or fully;
-   also when the station proves to be at fault: its error names the station, or lasted until the robot
-   was gone for PROVEN_S or longer.
+COORDINATOR-STATIONS-3. A failure is forgotten when the robot has been charged for PROVEN_S, or fully.
+   It is also forgotten when the station proves to be at fault, because its error names the station, or
+   still lasted when the robot had been gone for PROVEN_S.
 COORDINATOR-STATIONS-4. If another robot is on the pad, the assigned robot keeps the station for its
    start_timeout. A station out of reach says nothing about the charge. A robot that was charging there
    keeps it; a robot on its way gets another station after LOST_S.
@@ -50,7 +50,7 @@ PROVEN_S: Final = 10.0
 
 
 def heard(memory: SiteMemory, state: ChargerStateHeard, now: float, site: SiteLimits) -> SiteMemory:
-    """Take a station's state in."""
+    """Apply a station's state."""
     name, before = state.station, memory.stations.get(state.station)
     same = before is not None and (before.state, before.error) == (state.state, state.error)
     since = before.since if before is not None and same else now
@@ -74,8 +74,8 @@ def heard(memory: SiteMemory, state: ChargerStateHeard, now: float, site: SiteLi
 
 
 def _forgot(memory: SiteMemory, name: str, grant: Grant, now: float, site: SiteLimits) -> bool:
-    """Has the station forgotten the request that it has shown? An IDLE station may also have released
-    it without our notice: then the robot has left, or did not come in time."""
+    """Has the station forgotten the request that it has shown? An IDLE station may instead have
+    released the robot without our notice; then the robot has left, or did not come in time."""
     seen = memory.stations[name]
     if seen.state is not IDLE:
         return seen.request_id.startswith(UNREQUESTED)
@@ -85,7 +85,8 @@ def _forgot(memory: SiteMemory, name: str, grant: Grant, now: float, site: SiteL
 
 
 def _repeated(grant: Grant, seen: StationSeen, now: float) -> Grant | None:
-    """Keep the grant while the station does not show its request yet; None if it will not take it."""
+    """Keep the grant while the station does not show its request yet; return None if the station will
+    not take the request."""
     before = seen.state is RELEASED or seen.request_id.startswith(UNREQUESTED)
     may_come = seen.state is IDLE or (before and seen.robot == grant.robot)
     if not may_come or not grant.request_id.startswith(f"{NODE}/"):
@@ -115,7 +116,7 @@ def _followed(
 
 
 def _ended(memory: SiteMemory, name: str, grant: Grant, now: float, site: SiteLimits) -> SiteMemory:
-    """Handle a request's end without our cancel."""
+    """Apply the end of a request that we did not cancel."""
     who, wish = grant.robot, memory.wish(grant.robot)
     if grant.started and now < grant.forgotten_at + PROVEN_S:
         return memory
@@ -128,7 +129,7 @@ def _ended(memory: SiteMemory, name: str, grant: Grant, now: float, site: SiteLi
 
 
 def _struck(memory: SiteMemory, name: str, who: RobotName) -> SiteMemory:
-    """Note the robot's failure at this station. After its second failure it is not tried again."""
+    """Note the robot's failure at this station. After its second failure a robot is not tried again."""
     strikes = {**memory.strikes, who: (*memory.strikes.get(who, ()), name)}
     memory = replace(memory, strikes=strikes)
     return memory.without_wish(who) if memory.faulty(who) else memory
@@ -162,7 +163,7 @@ def _adopt(
 
 
 def _waits_at(memory: SiteMemory, station: str, site: SiteLimits) -> RobotName | None:
-    """Find the robot of a charge without a name: a robot with a wish that stands here."""
+    """Find the robot of a charge without a robot's name: a robot with a wish that stands here."""
     here = (w.robot for w in memory.wishes if memory.stands_at(w.robot, site) == station)
     return next((who for who in here if memory.station_of(who) is None), None)
 
@@ -187,13 +188,13 @@ def in_time(memory: SiteMemory, now: float, site: SiteLimits) -> SiteMemory:
 
 
 def not_taken_at(grant: Grant) -> float:
-    """Return the time when a station that does not show this request is passed over."""
+    """Return the time from which a station that does not show this request is passed over."""
     return max(grant.made_at, grant.forgotten_at) + TAKEN_S
 
 
 def hopeless_at(memory: SiteMemory, name: str, grant: Grant) -> float:
-    """Return the time when a robot on its way should get another station. Reasons: the station's daemon
-    is silent, it does not reach the station, or another robot does not leave the pad."""
+    """Return the time when a robot on its way should get another station, because the station's daemon
+    is silent or does not reach the station, or because another robot does not leave the pad."""
     seen, at = memory.stations.get(name), memory.silent_since(name) + LOST_S
     if seen is not None and seen.diagnosis is FaultCause.LOST:
         at = min(at, seen.since + LOST_S)
@@ -214,7 +215,7 @@ def absent_at(memory: SiteMemory, name: str, grant: Grant, site: SiteLimits) -> 
 def _acquitted(
     memory: SiteMemory, name: str, before: StationSeen | None, now: float, site: SiteLimits
 ) -> SiteMemory:
-    """Forget robots' failures at this station if they prove to be the station's fault."""
+    """Forget robots' failures at this station if the station proves to be at fault."""
     for who, failed_at in memory.strikes.items():
         if name in failed_at and _was_the_stations(memory, who, name, before, now, site):
             left = tuple(station for station in failed_at if station != name)
@@ -231,7 +232,7 @@ def _was_the_stations(
     now: float,
     site: SiteLimits,
 ) -> bool:
-    """Does the error name the station, or did it outlast the robot's departure?"""
+    """Does the error name the station, or did the error last on after the robot had left?"""
     seen, standing = memory.stations[name], memory.robots.get(who)
     if seen.state is ERROR:
         return diagnosis(seen.error.removeprefix(OUT_OF_SERVICE)) is FaultCause.STATION

@@ -1,20 +1,21 @@
 """Robots that want to be charged. Place, battery and task decide; the mode is a hint.
 
-RMF's fleet adapter shows the mode CHARGING from the first charge on, in every later task too, and
-IDLE in none (rmf_ros2 9dedd0f: TaskManager::robot_mode; RobotContext::current_mode, which WaitForCharge
-and DockRobot alone set). The id of a task shows if it came from RMF's dispatcher, and so is no charge.
+RMF's fleet adapter shows the mode CHARGING from the first charge on, in every later task too, and never
+shows IDLE in a task (rmf_ros2 9dedd0f: TaskManager::robot_mode; RobotContext::current_mode, which only
+WaitForCharge and DockRobot set). The id of a task shows whether it came from RMF's dispatcher; such a
+task is no charge.
 For a robot that has stood at one of our waypoints for SETTLES_S:
-COORDINATOR-WISHES-1. Below `again_percent` it wants to be charged, if it has no task, or shows CHARGING
-   or DOCKING.
+COORDINATOR-WISHES-1. Below `again_percent` the robot wants to be charged if it has no task, or shows
+   CHARGING or DOCKING.
 COORDINATOR-WISHES-2. Above that, and below `full_percent`, only a task that shows CHARGING or DOCKING
    is believed. A robot that was charged in that task is not served again. A robot that has not left our
-   waypoints since its charge may be waiting for traffic on its pad: it is believed after LINGERS_S.
-COORDINATOR-WISHES-3. Without a task, it wants to be charged when the schedule says so, and not again in
-   the same time of the schedule until it has worked.
+   waypoints since its charge may be waiting for traffic on its pad, so it is believed after LINGERS_S.
+COORDINATOR-WISHES-3. A robot without a task wants to be charged when the schedule says so, but only
+   once in the same time of the schedule unless it has worked since.
 COORDINATOR-WISHES-4. A wish lasts while these rules hold, and while the robot drives to its station: in
    the same task, or without a task while a station is assigned to it. A task that begins within COMES_S
-   of the call is that drive: RMF's automatic retreat, or its ChargeBattery started again; but never a
-   dispatched task.
+   of the call is that drive (RMF's automatic retreat, or its restarted ChargeBattery), unless the
+   dispatcher gave the task.
 COORDINATOR-WISHES-5. Under `finishing_request: nothing` RMF moves no robot without a task until its
    battery is very low. The same holds under `park`, except in Jazzy, which drives to the assigned
    place. Such a robot stays where it is when called. After COMES_S it loses the station, and ABSENT_S
@@ -41,14 +42,14 @@ from bridges.kinds.charger_coordinator.signals import ChargeWanted, Sighting, is
 SETTLES_S: Final = 2.0
 """A robot that passes by on another task may still show the mode CHARGING."""
 LINGERS_S: Final = 300.0
-"""Longer than any traffic jam: a robot that stands there even longer waits for its battery."""
+"""No traffic jam lasts this long: a robot that stays on its pad longer wants to be charged."""
 COMES_S: Final = 60.0
 """RMF acts on a charging assignment within this time, or not at all."""
 ABSENT_S: Final = 600.0
 
 
 def sighted(memory: SiteMemory, sighting: Sighting, now: float, site: SiteLimits) -> SiteMemory:
-    """Take one robot of a fleet's state in."""
+    """Apply one robot's part of a fleet's state."""
     who = sighting.who
     standing = _standing(memory.robots.get(who), sighting, now)
     memory = replace(memory, robots={**memory.robots, who: standing})
@@ -66,7 +67,7 @@ def sighted(memory: SiteMemory, sighting: Sighting, now: float, site: SiteLimits
 
 
 def wanted(memory: SiteMemory, event: ChargeWanted, site: SiteLimits) -> tuple[SiteMemory, str]:
-    """Take an operator's request in; also return the reason for a refusal, "" for none."""
+    """Apply an operator's request; also return the reason for a refusal, "" for none."""
     who = event.robot
     if event.request_id in memory.over:
         return memory, "request is over"
@@ -96,7 +97,7 @@ def unwanted(memory: SiteMemory, request_id: str) -> tuple[SiteMemory, str]:
 
 
 def fulfilled(memory: SiteMemory, who: RobotName, site: SiteLimits) -> SiteMemory:
-    """Note the robot's charge in its present task, and forget its failures."""
+    """Note that the robot was charged in its present task, and forget its failures."""
     standing = memory.robots.get(who)
     served = {**memory.served, who: standing.sighting.task_id if standing else ""}
     memory = replace(memory, served=served, strikes=without(memory.strikes, who))
@@ -106,7 +107,7 @@ def fulfilled(memory: SiteMemory, who: RobotName, site: SiteLimits) -> SiteMemor
 
 
 def stays_away(memory: SiteMemory, station: str, grant: Grant, site: SiteLimits) -> bool:
-    """Is the robot, without a task, still where it was when called?"""
+    """Has the robot no task, and does it still stand where it stood when called?"""
     standing, wish = memory.robots.get(grant.robot), memory.wish(grant.robot)
     if standing is None or wish is None or wish.by == "operator" or standing.sighting.task_id:
         return False
@@ -143,8 +144,8 @@ def _served(memory: SiteMemory, sighting: Sighting) -> SiteMemory:
 
 
 def _rested(memory: SiteMemory, sighting: Sighting, site: SiteLimits) -> SiteMemory:
-    """Note if the robot is full enough for the schedule. This holds until the schedule's time is over,
-    or the robot has worked."""
+    """Note a robot that is full enough for the schedule, and forget this note when the schedule's time
+    is over, or the robot has worked."""
     who = sighting.who
     aim = schedule.target(site.schedule, who, memory.when)
     worked = bool(sighting.task_id) and sighting.place is None
@@ -198,7 +199,7 @@ def _asks(memory: SiteMemory, standing: Standing, now: float, site: SiteLimits) 
 
 
 def _believed(memory: SiteMemory, standing: Standing, now: float) -> bool:
-    """Does the mode belong to its present task, and not to an earlier one?"""
+    """Does the shown mode belong to the robot's present task, and not to an earlier task?"""
     served = memory.served.get(standing.sighting.who)
     if served is None:
         return True

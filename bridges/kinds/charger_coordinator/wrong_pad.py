@@ -3,15 +3,16 @@
 RMF's fleet adapter starts a robot's ChargeBattery again when the waypoint or the mode of its charging
 assignment changes (rmf_ros2 9dedd0f, ChargeBattery.cpp, _consider_restart). That moves a robot, but
 only while its ChargeBattery runs: as a task, or as `finishing_request: charge`. Rules:
-COORDINATOR-WRONG-PAD-1. A robot expected at one station that comes to another, or does not leave
-   another for LEAVES_S, is told to wait, and TOLD_S later to charge at its own station. This happens at
-   most twice for one request.
-COORDINATOR-WRONG-PAD-2. A robot without a station, on a pad that another robot waits for, is told to
-   wait again, by the other mode for TOLD_S. This happens `leaves_s` after its arrival or its release by
-   the station.
-COORDINATOR-WRONG-PAD-3. If we may not assign, or the robot is in another task, nothing is told: RMF
-   would not move it.
-COORDINATOR-WRONG-PAD-4. If it still stands there OBEYS_S later, or cannot be told, a person is alerted.
+COORDINATOR-WRONG-PAD-1. A robot with a station that comes to another station, or stays at another for
+   LEAVES_S, is told to wait, and TOLD_S later to charge at its own station. This happens at most twice
+   for one request.
+COORDINATOR-WRONG-PAD-2. A robot without a station, on a pad for which another robot waits, is told
+   again to wait: its assignment shows the other mode for TOLD_S. This happens `leaves_s` after the
+   robot arrived or the station released it.
+COORDINATOR-WRONG-PAD-3. If we may not assign, or the robot is in another task, the robot is not told to
+   leave, because RMF would not move it.
+COORDINATOR-WRONG-PAD-4. If the robot still stands there OBEYS_S later, or cannot be told to leave, a
+   person is alerted.
 A robot's place is known from its fleet (FleetState's position), or from a station that reads receivers.
 """
 
@@ -35,8 +36,8 @@ TRIES: Final = 2
 
 
 class OnWrongPad(NamedTuple):
-    """A robot `who` at `station` since `since`. `expected`: its own station; None if it has none, and
-    `waiter` waits for `station`. `tries`: the greatest number of orders to leave."""
+    """A robot `who` at `station` since `since`. `expected`: its own station; None for a robot without a
+    station, which is in the way of `waiter`. `tries`: the greatest number of orders to leave."""
 
     who: RobotName
     station: str
@@ -48,8 +49,8 @@ class OnWrongPad(NamedTuple):
 
 
 def found(memory: SiteMemory, now: float, site: SiteLimits) -> dict[RobotName, OnWrongPad]:
-    """Find every robot at the wrong station or in another robot's way. If `now` is NEVER, also robots
-    that will count as such unless somebody moves."""
+    """Find every robot at the wrong station or in another robot's way. If `now` is NEVER, also find
+    the robots that will be in this position later unless a robot moves."""
     astray: dict[RobotName, OnWrongPad] = {}
     for one in (*_strayed(memory, now, site), *_blocking(memory, now, site)):
         astray.setdefault(one.who, one)
@@ -57,7 +58,7 @@ def found(memory: SiteMemory, now: float, site: SiteLimits) -> dict[RobotName, O
 
 
 def nudged(memory: SiteMemory, now: float, site: SiteLimits) -> SiteMemory:
-    """Nudge the robots that are to leave, and forget the nudges of robots that have left."""
+    """Tell the robots on a wrong pad to leave, and forget the orders to robots that have left."""
     astray = found(memory, now, site)
     nudges = {who: n for who, n in memory.nudges.items() if _matters(memory, who, n, astray)}
     for who, one in astray.items():
@@ -69,7 +70,7 @@ def nudged(memory: SiteMemory, now: float, site: SiteLimits) -> SiteMemory:
 
 
 def is_nudged(memory: SiteMemory, who: RobotName, now: float) -> bool:
-    """Is the robot now told to leave, by a changed assignment?"""
+    """Does a changed assignment tell the robot to leave now?"""
     return who in memory.nudges and now < memory.nudges[who].at + TOLD_S
 
 
@@ -92,7 +93,7 @@ def due(memory: SiteMemory, now: float, site: SiteLimits) -> Iterator[float]:
 
 
 def _strayed(memory: SiteMemory, now: float, site: SiteLimits) -> Iterator[OnWrongPad]:
-    """Yield robots that have a station, were not charged there yet, and stand at another."""
+    """Yield robots that have a station, were not charged there yet, and stand at another station."""
     for name, grant in memory.grants.items():
         if grant.over or grant.started:
             continue
@@ -115,7 +116,7 @@ def _stands(
 
 
 def _blocking(memory: SiteMemory, now: float, site: SiteLimits) -> Iterator[OnWrongPad]:
-    """Yield robots without a station on a pad that another robot waits for."""
+    """Yield robots without a station on a pad for which another robot waits."""
     here = standing(memory, AGES_AGO if now == NEVER else now, site)
     idle = {name: who for name in here if (who := _idle_at(memory, name, here)) is not None}
     for wish in memory.wishes if idle else ():
@@ -141,8 +142,8 @@ def _idle_at(memory: SiteMemory, station: str, here: Here) -> RobotName | None:
 def _matters(
     memory: SiteMemory, who: RobotName, nudge: Nudge, astray: Mapping[RobotName, OnWrongPad]
 ) -> bool:
-    """Does this nudge still count? The nudges of a robot with a station count until its next request,
-    even if it goes astray twice."""
+    """Do these orders still count? The orders to a robot with a station count until its next request,
+    even if the robot goes to a wrong pad twice."""
     station = memory.station_of(who)
     if station is not None:
         return memory.grants[station].request_id == nudge.why
@@ -155,7 +156,8 @@ def _can_be_nudged(memory: SiteMemory, who: RobotName) -> bool:
 
 
 def _next_at(memory: SiteMemory, one: OnWrongPad) -> float:
-    """Return the time of the next order to leave; NEVER if it was told often enough, or cannot be."""
+    """Return the time of the next order to leave; NEVER if the robot was told often enough, or cannot
+    be told."""
     nudge = memory.nudges.get(one.who)
     if not _can_be_nudged(memory, one.who):
         return NEVER
@@ -174,7 +176,7 @@ def _alarm_at(memory: SiteMemory, one: OnWrongPad) -> float:
 
 
 def on_pad(error: str, site: SiteLimits) -> RobotName | None:
-    """Find our robot on the pad by the station's error; None if it is none of ours."""
+    """Find our robot that the station's error names; None if it names no robot of ours."""
     seen = misplaced_in(error)
     if seen is None:
         return None

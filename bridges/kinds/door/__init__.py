@@ -1,4 +1,4 @@
-"""Doors: RMF's DoorRequest becomes a relay or register, and the door's inputs become DoorState."""
+"""Doors: a DoorRequest switches a relay or a register, and the door's inputs make a DoorState."""
 
 from bridges.kinds.door import core, memory, messages, report, signals
 from bridges.kinds.door.memory import DoorLimits, DoorMemory

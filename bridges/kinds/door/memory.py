@@ -11,7 +11,7 @@ from bridges.kinds.shared.durations import NEVER, RIVAL_QUIET_S
 
 
 class DoorLimits(msgspec.Struct, frozen=True):
-    """The core's share of a door's settings. `t`: the durations. `debounce`: signal -> s.
+    """The settings of a door that its core needs. `t`: the durations. `debounce`: signal -> s.
 
     `estimated`: time replaces a missing limit contact.
     """
@@ -39,7 +39,7 @@ Contact = Settled[bool | None]
 
 
 class DoorSenses(msgspec.Struct, frozen=True):
-    """Each contact; None before its first reading.
+    """The door's contacts, each None before its first reading.
 
     `read_at`: the time of the last reading. `linked_since`: the time since which no read or write has
     failed; None after a failure. `lost`, `errors`: from the last `DoorSample`.
@@ -59,10 +59,10 @@ class DoorMemory(msgspec.Struct, frozen=True):
     """Everything that the next decision needs to know of the past. Times are monotonic seconds.
 
     `latched_at`: the time since which RMF wants the door open. `close_at`: the time when a CLOSE
-    releases the hold. `held`: the hold is on; `held_since`: its last switching on or off.
-    `closing`: the hold has ended, and the door was not seen closed since. `between_since`: the start of
-    its stay between the end positions; `shut_since`: of its time not fully open; `unattended_since`: of
-    the time without publishers of door requests.
+    releases the hold. `held`: the hold is on. `held_since`: the time when the hold was last switched.
+    `closing`: the hold has ended, and the door has not been seen closed since. The last three are times
+    since which the door has been between its end positions (`between_since`), has not been fully open
+    (`shut_since`), and has had no publisher of requests (`unattended_since`).
     """
 
     latched_at: float | None = None
@@ -84,29 +84,32 @@ def rivalled(memory: DoorMemory, now: float) -> bool:
 
 
 def travel_ends_at(memory: DoorMemory, limits: DoorLimits) -> float:
-    """Return the time limit of a door at neither end position; a change of the hold restarts it."""
+    """Return the time by which a door between its end positions must have arrived; NEVER for another.
+
+    Switching the hold restarts the allowed time, `travel_s`.
+    """
     if memory.between_since is None:
         return NEVER
     return max(memory.between_since, memory.held_since) + limits.t.travel_s
 
 
 def opening_ends_at(memory: DoorMemory, limits: DoorLimits) -> float:
-    """Return the time limit for opening a held door; NEVER if it is open or not held."""
+    """Return the time by which a held door must be open; NEVER if the door is open or not held."""
     if memory.shut_since is None or not memory.held:
         return NEVER
     return max(memory.shut_since, memory.held_since) + limits.t.open_timeout_s
 
 
 def too_long_at(memory: DoorMemory, limits: DoorLimits) -> float:
-    """Return the end of `max_hold_s` of a hold by RMF; NEVER without this limit or a hold."""
+    """Return the time when RMF has held the door for `max_hold_s`; NEVER without a limit or a hold."""
     if memory.latched_at is None or limits.t.max_hold_s is None:
         return NEVER
     return memory.latched_at + limits.t.max_hold_s
 
 
 def lost_at(memory: DoorMemory, limits: DoorLimits) -> float:
-    """Return the end of `supervisor_lost_s` without a supervisor; NEVER if the limit is not set or a
-    supervisor is there."""
+    """Return the time when a supervisor will have been absent for `supervisor_lost_s`; NEVER if a
+    supervisor is present or the limit is not set."""
     if memory.unattended_since is None or limits.t.supervisor_lost_s is None:
         return NEVER
     return memory.unattended_since + limits.t.supervisor_lost_s

@@ -1,4 +1,4 @@
-"""DoorRequest in, DoorState out. Is a request well formed?"""
+"""The messages of a door: check a DoorRequest and turn it into an event; make a DoorState."""
 
 from collections.abc import Mapping
 

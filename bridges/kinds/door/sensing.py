@@ -1,13 +1,13 @@
 """Judgement of a door's inputs: debounce, age, and estimates for contacts that are not wired.
 
 Rules:
-DOOR-SENSING-1. A change counts once it has lasted for its signal's debounce. The end of a fire alarm or
-   an obstruction counts once it has lasted for `hazard_clear_s`. Until such an input has settled for
-   the first time, a single reading of the hazard counts.
-DOOR-SENSING-2. After `stale_after_s` without a reading all inputs are unknown again: the door may have
-   moved.
-DOOR-SENSING-3. A missing limit contact is estimated only if the YAML says so, from how long the relay
-   has been on or off. A failed read or write starts that time again.
+DOOR-SENSING-1. A change of an input counts once it has lasted for the signal's debounce; the end of a
+   fire alarm or an obstruction, once it has lasted for `hazard_clear_s`. Before the input of a hazard
+   has settled for the first time, a single reading of the hazard counts.
+DOOR-SENSING-2. After `stale_after_s` without a reading all inputs are unknown again, because the door
+   may have moved.
+DOOR-SENSING-3. If the YAML says so, a missing limit contact is estimated from the time for which the
+   relay has been on or off. A failed read or write restarts that time.
 DOOR-SENSING-4. A controller's report that the door's position is unknown (`lost`) counts at once,
    without debounce.
 """
@@ -27,10 +27,10 @@ HAZARDS = ("obstruction", "fire")
 
 
 class BelievedDoor(msgspec.Struct, frozen=True):
-    """The inputs as they are believed at one instant.
+    """The judged inputs at one instant.
 
     `fresh`: the last reading is younger than `stale_after_s`. `seen`: `fresh`, and each input has
-    settled, so the door's position is known. `estimated`: the end positions without a contact.
+    settled, so the door's position is known. `estimated`: the end positions that have no contact.
     `changes_at`: the next time when the view may change without a reading (s). `lost`, `errors`: see
     DoorSample.
     """
@@ -67,7 +67,7 @@ def take(senses: DoorSenses, sample: DoorSample, now: float, limits: DoorLimits)
 
 
 def miss(senses: DoorSenses) -> DoorSenses:
-    """Restart the debounce and the estimates' time after a failed read."""
+    """Restart the debounce, and the time of the estimates, after a failed read."""
     return replace(
         senses,
         opened=forget(senses.opened),
@@ -139,7 +139,7 @@ def _feared(contact: Contact | None) -> bool:
 def _estimates(
     senses: DoorSenses, held: bool, held_since: float, limits: DoorLimits
 ) -> tuple[float, float]:
-    """Return the times from which a door without contacts counts as open and as closed (NEVER: not)."""
+    """Return the times when a door without contacts counts as open, and as closed (NEVER: does not)."""
     if not limits.estimated or senses.linked_since is None:
         return NEVER, NEVER
     since = max(held_since, senses.linked_since)

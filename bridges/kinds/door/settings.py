@@ -19,10 +19,12 @@ class DoorDurations(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
         StaleAfter, tells("after so long without a good reading: OFFLINE, and the hold is off.")
     ] = 1.0
     close_grace_s: Annotated[
-        Seconds, tells("how long after a CLOSE the hold is released; an OPEN before cancels it.")
+        Seconds,
+        tells("how long after a CLOSE the hold ends; an OPEN in that time cancels the CLOSE."),
     ] = 3.0
     travel_s: Annotated[
-        Timeout, tells("how long the door may be between its ends; then its state is UNKNOWN.")
+        Timeout,
+        tells("how long the door may be between its end positions; then its state is UNKNOWN."),
     ] = 10.0
     open_timeout_s: Annotated[
         Timeout, tells("how long a held door may take to open; after that a fault is shown.")
@@ -35,7 +37,7 @@ class DoorDurations(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
     ] = None
     max_hold_s: Annotated[
         Patience | None,
-        tells("how long RMF may hold it; then a fault is shown, and the hold stays."),
+        tells("how long RMF may hold the door; then a fault is shown, and the hold stays."),
     ] = None
     supervisor_lost_s: Annotated[
         Patience | None,
@@ -45,14 +47,14 @@ class DoorDurations(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
 
 
 class Pulse(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """For a door operator that closes by itself: pulses on the relay while RMF holds the door."""
+    """Pulses on the relay while RMF holds the door, for a door operator that closes by itself."""
 
     on_s: Annotated[PulseSeconds, tells("how long each pulse lasts.")]
     every_s: Annotated[PulseSeconds, tells("the time from one pulse's start to the next.")]
 
 
 class DoorSettings(DeviceSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """One door, apart from its wiring."""
+    """The settings of one door, except its wiring."""
 
     limits: Annotated[DoorDurations, tells("what differs from the defaults.")] = DoorDurations()
     feedback: Annotated[
@@ -70,11 +72,11 @@ class DoorSettings(DeviceSettings, frozen=True, kw_only=True, forbid_unknown_fie
     ] = None
 
     def stale_after(self) -> float:
-        """Return its limits' `stale_after_s`."""
+        """Return `stale_after_s` of the limits."""
         return self.limits.stale_after_s
 
     def problems(self) -> Remarks:
-        """Yield contradictory fields."""
+        """Yield the contradictions between fields."""
         if self.pulse and self.pulse.on_s >= self.pulse.every_s:
             yield (
                 ("pulse", "on_s"),

@@ -6,7 +6,7 @@ from bridges.kinds.shared.decision import Attended, IoFailed, OperatorReset, Riv
 
 
 class DoorSample(msgspec.Struct, frozen=True):
-    """Every input of one door, polarity resolved but not debounced; None if not wired.
+    """Every input of one door, with its polarity resolved and not debounced; None if not wired.
 
     `opened`, `closed`: the limit contacts of the fully open and the fully closed door.
     `obstruction`: somebody or something is in the doorway. `fire`: the fire alarm's contact.

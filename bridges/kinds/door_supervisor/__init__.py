@@ -1,4 +1,4 @@
-"""The door supervisor: replaces RMF's own, between the fleet adapters and any number of doors."""
+"""The door supervisor, in place of RMF's: it stands between the fleet adapters and all doors."""
 
 from bridges.kinds.door_supervisor import core, keep, memory, messages, report, signals
 from bridges.kinds.door_supervisor.memory import DoorSupervisorLimits, SupervisedDoor

@@ -1,22 +1,22 @@
 """The door supervisor's core, for one door: its holders, and the requests to the door's node.
 
-It replaces RMF's own (rmf_ros2, door_supervisor/Node.cpp). Fleet adapters and web users send their
-requests on `adapter_door_requests`; the supervisor sends its own on `door_requests`, as
-"door_supervisor". Rules:
-DOOR-SUPERVISOR-1. OPEN adds its requester to the holders, or renews its stamp. CLOSE removes the
-   requester. A stale request (`bridges/kinds/shared/freshness.py`) does neither.
+It replaces RMF's supervisor (rmf_ros2, door_supervisor/Node.cpp). Fleet adapters and web users send
+their requests on `adapter_door_requests`; the supervisor sends requests on `door_requests`, with the
+requester_id "door_supervisor". Rules:
+DOOR-SUPERVISOR-1. OPEN adds its requester to the holders, or renews the holder's stamp. CLOSE removes
+   the requester. A stale request (`bridges/kinds/shared/freshness.py`) has no effect.
 DOOR-SUPERVISOR-2. The first holder causes an OPEN to the door's node, and the departure of the last
    holder causes a CLOSE.
-   - The request is repeated when a requester repeats OPEN, and when the door's state contradicts it:
-     held, but CLOSED or MOVING; not held, but OPEN or MOVING.
-   - For INSIST_S after a holder has come, OPEN is repeated at every state. The first OPEN may have been
-     lost, and an earlier CLOSE may be about to close the door.
-   - The states OFFLINE and UNKNOWN cause nothing.
+   - The request is repeated when a requester repeats OPEN, and when the door's state contradicts it: a
+     held door is CLOSED or MOVING, or a door without holders is OPEN or MOVING.
+   - For INSIST_S after a holder has come, OPEN is repeated at every state, because the first OPEN may
+     have been lost, and an earlier CLOSE may be about to close the door.
+   - The states OFFLINE and UNKNOWN cause no request.
 DOOR-SUPERVISOR-3. Silence ends no hold: a robot in the doorway is silent. After `open_alarm_s` a fault
    is shown, and the door stays open.
-DOOR-SUPERVISOR-4. During the quiet start, and while another supervisor publishes, it only listens.
-   After that it sends OPEN for a door with holders at once. It sends CLOSE only when a new state of the
-   door calls for it. A door that was held before the restart, and is not seen CLOSED, is held from the
+DOOR-SUPERVISOR-4. During the quiet start, and while another supervisor publishes, ours only listens.
+   After that it sends OPEN at once for a door with holders, but CLOSE only when a new state of the door
+   contradicts CLOSE. A door that was held before the restart, and is not seen CLOSED, is held from the
    start unless another supervisor is there: the door's node may have died too, with a robot in the
    doorway.
 DOOR-SUPERVISOR-5. Two messages are at least GAP_S apart, and a message is repeated unchanged after
@@ -70,7 +70,7 @@ def urgent(memory: SupervisedDoor) -> bool:
 def decide(
     memory: SupervisedDoor, event: Event, now: float, limits: DoorSupervisorLimits
 ) -> Decided:
-    """Take the event in, and send the message that is due, if any. Never raises."""
+    """Apply the event, and publish the request that is due, if any. Never raises."""
     memory, refused = _take(memory, event, now)
     publish: tuple[Said, ...] = ()
     if now >= _due_at(memory):

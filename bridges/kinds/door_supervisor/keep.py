@@ -1,6 +1,6 @@
 """The doors' holders, saved across a restart.
 
-They are saved before the heartbeat lists them: a robot drives on as soon as it is listed.
+A holder is saved before the heartbeat lists it, because a listed robot drives on at once.
 """
 
 from collections.abc import Mapping
@@ -21,7 +21,7 @@ Stamp = Annotated[int, Meta(ge=0, lt=2**31 * SECOND_NS)]
 
 
 class KeptDoors(keep.Kept, frozen=True, forbid_unknown_fields=True):
-    """`doors`: door -> requester -> the stamp (ns) of the first OPEN of its present visit."""
+    """`doors`: door -> requester -> the stamp (ns) of the first OPEN of the requester's visit."""
 
     doors: dict[Text, dict[Text, Stamp]]
 

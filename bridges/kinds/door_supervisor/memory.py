@@ -31,10 +31,10 @@ class DoorSupervisorLimits(msgspec.Struct, frozen=True):
 
 
 class Holder(msgspec.Struct, frozen=True):
-    """A requester that holds the door open since `since` (our clock).
+    """A requester that has held the door open since `since` (our clock).
 
     `stamp`: the stamp of its latest OPEN, which came at `asked_at`. `visit`: the stamp of the first
-    OPEN of its present visit, unchanged by repeats. `restored`: it held the door before our restart.
+    OPEN of its present visit, unchanged by repeats. `restored`: it was a holder before our restart.
     """
 
     requester: str
@@ -51,12 +51,12 @@ class Holder(msgspec.Struct, frozen=True):
 
 
 class SupervisedDoor(msgspec.Struct, frozen=True):
-    """Everything that outlives an event.
+    """The memory of one door from event to event.
 
     `passive`: the reason why requesters wait while we may not publish. `holders`: in the order of
     arrival. `requesters`: the recent record of each. `mode`: the door's last mode, heard at `shown_at`.
     `at_once`: a restored hold may be sent before we may publish. `sent`: the last request to the door's
-    node since we may publish; `prompted`: it is to be repeated.
+    node, None since publishing was last allowed or forbidden; `prompted`: the request must be repeated.
     """
 
     door: str
@@ -78,8 +78,8 @@ class SupervisedDoor(msgspec.Struct, frozen=True):
 
     @property
     def may_send(self) -> bool:
-        """May we send to the door's node now? In the quiet start only for restored holders of a door
-        that is not closed: a robot may stand in its doorway."""
+        """May we send to the door's node now? During the quiet start only if restored holders hold a
+        door that is not closed, because a robot may stand in its doorway."""
         stands_open = self.mode not in (None, CLOSED)
         return self.may_speak or (self.at_once and stands_open and self.holds_restored)
 
@@ -100,7 +100,7 @@ class SupervisedDoor(msgspec.Struct, frozen=True):
 
     @property
     def silent_at(self) -> float:
-        """The time from which a held door is silent for too long; NEVER if nobody holds it."""
+        """The time when a held door has been silent for too long; NEVER if nobody holds the door."""
         if not self.holders:
             return NEVER
         return max(self.shown_at, self.holders[0].since) + SILENT_S

@@ -1,4 +1,4 @@
-"""DoorRequests and DoorStates in. Is a message well formed, and about a door that we serve?"""
+"""From DoorRequests and DoorStates to events: is a message well formed, and about a door of ours?"""
 
 from collections.abc import Mapping
 
@@ -23,8 +23,8 @@ from bridges.messages.definitions import (
 def accept_request(
     request: DoorRequest, settings: DoorSupervisorSettings, wall: float
 ) -> RequesterOpens | RequesterCloses:
-    """Turn an adapter's request into an event. Raises RequestRefused. `wall` is not used: stamps are
-    compared only with stamps of the same requester.
+    """Turn an adapter's request into an event. Raises RequestRefused. `wall` is not used, because
+    stamps are compared only with stamps of the same requester.
 
     A request without a requester_id is refused: its fields were not filled in, and its default mode,
     0, would mean CLOSE. A request with our own requester_id is our own request to a door, which came

@@ -2,16 +2,16 @@
 
 Rules, in the order in which they are applied:
 LIFT-1. While the lift is free, the first request gets a session, unless an obstacle (LIFT-4) is
-   present. Requests of the same session refresh it; those of other sessions are refused. Only its own
-   END ends a session: no hazard, fault or timeout does. A session in HUMAN mode has no outputs.
-LIFT-2. END ends the session at once, unless it is older than the session. AGV mode and the door's hold
-   may stay on for `release_grace_s`. During that time only the same session is granted, even in a fire.
-   The reason: a restarted supervisor sends END for a robot that is still inside and must get out. For
+   present. Requests of the same session refresh it; requests of other sessions are refused. Only its
+   own END ends a session; a hazard, fault or timeout does not. A session in HUMAN mode has no outputs.
+LIFT-2. END ends the session at once, unless the END is older than the session. AGV mode and the door's
+   hold may stay on for `release_grace_s`. During that time only the same session is granted, even in a
+   fire, because a restarted supervisor sends END for a robot that is still inside and must get out. For
    the same reason (`bridges/kinds/lift/forgotten.py`):
-   - An END on `lift_requests` does not end a session if the robot may be inside and goes on asking
-     itself. The session ends by the robot's own END, by a person's END, or by the robot's silence.
-   - If RMF's supervisor asks for another session than the holder's, or has ended the holder's, the
-     requests and END of the holder's own robot count as well.
+   - An END on `lift_requests` does not end a session if the robot may be inside and its own requests
+     go on. The robot's own END, a person's END or the robot's silence ends the session.
+   - If RMF's supervisor asks for another session than the holder's, or has ended the holder's session,
+     the requests and the END that the holder's robot itself sends count too.
    - After an END in mid-ride, as sent by a new fleet adapter, the lift waits longer for that robot:
      until IN_CAR_S after its last message. Nothing is energised after `release_grace_s`.
 LIFT-3. A request sets the destination and the mode. While the door is held, another destination may
@@ -25,7 +25,7 @@ LIFT-5. RMF is told OPEN when fresh inputs show that the car stands at a known f
    - Until OPEN has been published at a session's destination, its robot is outside. During that time
      OPEN also needs AGV mode and no fault: a robot looks only at session, floor and door, and must not
      board a lift in a fire.
-   - After that a robot may be inside. It needs the true door in any mode, to get out.
+   - After that a robot may be inside. It must see the door's true state in any mode, to get out.
    - A door is not shown OPEN while its hold is wanted but the relay must rest first: such a door may
      close by itself while a robot drives through.
    - A door that nobody holds is not shown OPEN at the floor for which the robot itself asks, if the
@@ -73,7 +73,7 @@ NOT_RMFS = frozenset(
         Hazard.MANUAL,
     }
 )
-"""Hazards that take the lift away; overload only delays it."""
+"""Hazards that take the lift away from RMF. An overload only delays the ride."""
 
 
 def initial(limits: LiftLimits, now: float) -> LiftMemory:
@@ -84,7 +84,7 @@ def initial(limits: LiftLimits, now: float) -> LiftMemory:
 def decide(
     memory: LiftMemory, event: Event, now: float, limits: LiftLimits
 ) -> Decision[LiftMemory, LiftOutputs, LiftReport]:
-    """Decide one scan: take in the event, judge the inputs, derive outputs and report afresh."""
+    """Decide one scan: apply the event, judge the inputs, derive the outputs and the report afresh."""
     alarmed_before = memory.alarmed
     memory, refused = _take(sessions.lapse(memory, now, limits), event, now, limits)
     view = look(memory.senses, now, limits)
@@ -181,7 +181,7 @@ def _take(
 
 
 def _read(memory: LiftMemory, sample: LiftSample, now: float, limits: LiftLimits) -> LiftMemory:
-    """Take in a reading. Without a failed write since the last reading the outputs were written."""
+    """Add a reading. If no write has failed since the last reading, the outputs were written."""
     return replace(
         memory,
         senses=take(memory.senses, sample, now, limits),
@@ -192,7 +192,7 @@ def _read(memory: LiftMemory, sample: LiftSample, now: float, limits: LiftLimits
 
 
 def _why_not(memory: LiftMemory, now: float, limits: LiftLimits) -> str:
-    """Explain why nobody gets a free lift; "" if the next request may get it."""
+    """Return the reason why a free lift must not be granted; "" if it may be granted."""
     view = look(memory.senses, now, limits)
     why_not = obstacles(memory, view, now, limits)
     if not why_not:
@@ -218,7 +218,7 @@ def _reset(memory: LiftMemory, now: float, limits: LiftLimits) -> LiftMemory:
 
 
 def _latch(memory: LiftMemory, view: BelievedLift, now: float, limits: LiftLimits) -> LiftMemory:
-    """Latch a fire as `fire_reset` says, and an alarm until an operator resets. Forget a rival once it
+    """Latch a fire if `fire_reset` says so, and an alarm until an operator's reset. Forget a rival that
     has been silent for RIVAL_QUIET_S."""
     burning = Hazard.FIRE in view.hazards
     manual = limits.fire_reset == "manual"

@@ -12,9 +12,9 @@ LIFT-DRIVE-3. A call is given only in AGV mode (except with `by_call`), away fro
    without overload. A door command is given only in AGV mode, while the car stands at the destination's
    landing. The two are never on together, and neither comes on before both have been off for
    `dead_time_s`.
-LIFT-DRIVE-4. A call is held until the car stands at its destination, or pulsed. It is given again after
-   every interruption, and when the car had arrived but is then seen at another floor. While the floor
-   code is changing no new call is given: the car may just be arriving.
+LIFT-DRIVE-4. A call is held until the car stands at its destination, or is a pulse. It is given again
+   after every interruption, and when the car had arrived but is then seen at another floor. While the
+   floor code is changing no new call is given, because the car may just be arriving.
 LIFT-DRIVE-5. AGV mode, the arrival and the open door each have a timeout. At its end the outputs go
    off and a fault is shown. Three more tries follow, 10, 30 and 60 s later; then the fault latches.
    Losing AGV mode during the ride is such a fault too. With `by_call` AGV mode may end between two
@@ -46,7 +46,7 @@ def agv_ok(view: BelievedLift) -> bool:
 
 
 def silent(session: LiftSession, now: float, limits: LiftLimits) -> bool:
-    """Has RMF not repeated its request for too long?"""
+    """Is RMF's last request for this session older than `request_timeout_s`?"""
     return now >= session.asked_at + limits.t.request_timeout_s
 
 
@@ -66,7 +66,7 @@ def advance(
 ) -> LiftSession:
     """Advance the session by this scan's inputs: arrivals, timeouts and retries.
 
-    `relays`: their state before this scan.
+    `relays`: the state of the relays before this scan.
     """
     if session.retry_at is not None:
         if now < session.retry_at:
@@ -108,7 +108,7 @@ def wanted(session: LiftSession, view: BelievedLift, now: float, limits: LiftLim
 def stays_on(
     grace: Grace, relays: Relays, view: BelievedLift, now: float, limits: LiftLimits
 ) -> LiftOutputs:
-    """Choose the outputs in the grace after END."""
+    """Choose the outputs during the grace after END."""
     if now >= grace.off_at:
         return LiftOutputs()
     standing = agv_ok(view) and at_destination(grace.session, view, limits)
@@ -117,7 +117,7 @@ def stays_on(
 
 
 def let_go_at(grace: Grace, limits: LiftLimits) -> float:
-    """Return the end of the door's hold."""
+    """Return the time when the door's hold ends during the grace."""
     return min(grace.off_at, grace.until) - limits.t.dead_time_s
 
 

@@ -18,7 +18,7 @@ Waiting = Literal["agv", "floor", "door"]
 
 
 class LiftLimits(msgspec.Struct, frozen=True, dict=True):
-    """The core's share of a lift's settings.
+    """The settings of a lift that its core needs.
 
     `stops`: RMF's floor name -> landing and door, from the lowest up. `t`: the durations.
     `debounce`: signal -> s. `alarm_on`: the hazards that are published on the topic `alarm`.
@@ -100,10 +100,10 @@ class LiftSenses(msgspec.Struct, frozen=True):
 
 
 class ForgottenSession(msgspec.Struct, frozen=True):
-    """The session without RMF's supervisor, `since` a time (`bridges/kinds/lift/forgotten.py`).
+    """A forgotten or disowned session (`bridges/kinds/lift/forgotten.py`), `since` a time.
 
-    `by`: the session for which the supervisor asks instead, "" for none. `disowned`: it has ended this
-    session while the robot goes on asking. `ended`: the robot's own END was heard once."""
+    `by`: the session for which the supervisor asks instead, "" for none. `disowned`: the supervisor has
+    ended this session while the robot goes on asking. `ended`: the robot's own END was heard once."""
 
     by: str
     since: float
@@ -114,9 +114,9 @@ class ForgottenSession(msgspec.Struct, frozen=True):
 class OwnWords(msgspec.Struct, frozen=True):
     """The messages of a robot's own adapter. `stamp`: the newest stamp (ns), by the adapter's clock.
 
-    `asked_at`: the time of its last request for the lift. `ended_at`: of its first END after that.
-    `floor`: its destination. `opened`: OPEN has been published there since. `told`: it has asked again
-    after OPEN."""
+    `asked_at`: the time of its last request for the lift. `ended_at`: the time of its first END after
+    that. `floor`: its destination. `opened`: OPEN has been published there since. `told`: the adapter
+    has asked again after OPEN."""
 
     stamp: int = 0
     asked_at: float = AGES_AGO
@@ -165,8 +165,8 @@ class LiftSession(msgspec.Struct, frozen=True):
 
 
 class Grace(msgspec.Struct, frozen=True):
-    """The time after END: only the ended session is granted again until `until`. Its outputs go off at
-    `off_at`. `in_car`: its robot may still be inside, and may resume by its own requests too."""
+    """The time after END. Until `until` only the ended session can be granted. Its outputs go off at
+    `off_at`. `in_car`: its robot may still be inside, and its own requests restore the session too."""
 
     session: LiftSession
     until: float
@@ -175,11 +175,11 @@ class Grace(msgspec.Struct, frozen=True):
 
 
 class LiftMemory(msgspec.Struct, frozen=True):
-    """Everything that outlives a scan.
+    """The memory of one lift from scan to scan.
 
-    `io_fault`: the error of the last read or write; "" if both succeeded. `unwritten_since`: the start
-    of failed writes in every scan. `write_failed`: the last scan's write failed. `own`: session -> the
-    destination last requested by the robot itself.
+    `io_fault`: the error of the last read or write; "" if both succeeded. `unwritten_since`: the time
+    since which no write has succeeded. `write_failed`: the last scan's write failed. `own`: session ->
+    the destination last requested by the robot itself.
     """
 
     senses: LiftSenses = LiftSenses()

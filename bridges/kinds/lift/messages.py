@@ -1,4 +1,4 @@
-"""LiftRequest in, LiftState out. Is a request well formed, and does this lift serve its floor?"""
+"""The messages of a lift: check a LiftRequest and turn it into an event; make a LiftState."""
 
 from collections.abc import Mapping
 

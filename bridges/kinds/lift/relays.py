@@ -1,4 +1,4 @@
-"""The lift's outputs from scan to scan: rest before switching on, limits per minute, and exclusions.
+"""The lift's relays from scan to scan: their rest, their cycles per minute, and their exclusions.
 Switching off never waits."""
 
 import math
@@ -27,8 +27,8 @@ class Channel(msgspec.Struct, Generic[T], frozen=True):
     ons: tuple[float, ...] = ()
 
     def step(self, wanted: T | None, now: float, ready_at: float, t: LiftDurations) -> "Channel[T]":
-        """Return the next state. Off comes at once; on, or a change, only after the rest and after
-        `ready_at`."""
+        """Return the next state. Switching off is immediate; switching on, or to another output of the
+        group, waits for the rest and for `ready_at`."""
         if self.on is not None:
             return self if wanted == self.on else replace(self, on=None, off_at=now)
         if wanted is None or now < self.may_switch_on_at(now, ready_at, t):
@@ -40,7 +40,7 @@ class Channel(msgspec.Struct, Generic[T], frozen=True):
         return tuple(at for at in self.ons if now - at < 60.0)
 
     def may_switch_on_at(self, now: float, ready_at: float, t: LiftDurations) -> float:
-        """Return the earliest time at which it may be energised."""
+        """Return the earliest time at which an output may be energised."""
         recent = self.recent(now)
         most = t.max_cycles_per_min
         rested_at = recent[-most] + 60.0 if len(recent) >= most else AGES_AGO
@@ -86,7 +86,8 @@ class Relays(msgspec.Struct, frozen=True):
     def _still_off(
         self, wanted: LiftOutputs, now: float, t: LiftDurations
     ) -> Iterator[tuple[str, Channel[Any], float]]:
-        """Yield each wanted output that is off, its name, and the time when the others allow it."""
+        """Yield the name and the channel of each wanted output that is off, and the time when the other
+        outputs allow it."""
         agv_at = now if self.agv.on else self.agv.may_switch_on_at(now, AGES_AGO, t)
         ready_at = max(agv_at, self._rested_at(t))
         if wanted.agv_request and not self.agv.on:

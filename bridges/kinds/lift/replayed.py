@@ -2,8 +2,8 @@
 
 A fleet adapter retains its last 100 requests. When RMF's supervisor restarts, or reaches a cut-off
 adapter again, it hears them all once more and passes each on with a new stamp (rmf_ros2,
-lift_supervisor/Node.cpp). Some belong to earlier rides: they would release the door before the present
-request is heard. The robot's own requests on `adapter_lift_requests` are heard here only when sent.
+lift_supervisor/Node.cpp). Requests of earlier rides would release the door before the present request
+is heard. Our node hears no replays on `adapter_lift_requests`, but each robot's own request when sent.
 Rules:
 LIFT-REPLAYED-1. While the door is held, a request for another destination is doubted if the robot's own
    last request was for the present destination, even if it came before the robot got the lift: the
@@ -23,7 +23,7 @@ from bridges.kinds.lift.signals import EndRequested, LiftRequested
 LASTS_S: Final = 3.0
 """A replay is over within a second, and the robot's own repeats come at 1 Hz."""
 MOST: Final = 100
-"""More robots than at any site. Beyond this number the robot heard first is forgotten."""
+"""No site has more robots. Beyond this number the robot heard first is forgotten."""
 
 
 def noted(own: Mapping[str, str], asked: LiftRequested | EndRequested) -> Mapping[str, str]:

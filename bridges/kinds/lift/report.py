@@ -81,7 +81,7 @@ def report(
 
 
 def _worn(relays: Relays, wanted: LiftOutputs, now: float, limits: LiftLimits) -> tuple[Fault, ...]:
-    """Return a fault if a relay was switched on too often and now rests. It hides no open door."""
+    """Return a fault if a relay was switched on too often and now rests."""
     output, worn = relays.resting(wanted, now, limits.t)
     most = f"its relay came on {limits.t.max_cycles_per_min} times within a minute"
     return (Fault("RELAY_RESTS", f"{output}: {most}"),) if worn else ()
@@ -124,11 +124,11 @@ def _may_enter(
 ) -> bool:
     """May an open door be shown as OPEN? A robot that sees OPEN drives through.
 
-    Not while the hold is wanted and its relay must rest: the door stands open only for its own dwell
-    time, and would then close on the robot. While the session is served, also not at the floor for
-    which the robot itself asks, if the car is about to leave: RMF's supervisor may be passing on an
-    earlier ride. A session that has not boarded must also be served, in AGV mode, and without a fault,
-    except that RMF's supervisor has forgotten it.
+    It may not while the hold is wanted and its relay must rest, because the door stands open only for
+    its own dwell time and would then close on the robot. It may not, for a served session, at the floor
+    for which the robot itself asks if the car is about to leave, because RMF's supervisor may be
+    passing on an earlier ride. Before a robot has boarded, its session must also be served, in AGV
+    mode, and without a fault; that RMF's supervisor has forgotten the session does not matter.
     """
     session, held = memory.session, memory.relays.hold.on is not None
     if wanted.hold_door is not None and not held:
@@ -160,7 +160,7 @@ def _mode(view: BelievedLift, faults: tuple[Fault, ...], relays: Relays) -> Lift
 def _door(
     session: LiftSession | None, view: BelievedLift, floor: str, limits: LiftLimits
 ) -> tuple[LiftDoor, bool]:
-    """Return the door's state by the inputs, and True if it is an estimate.
+    """Return the door's state from the inputs, and True if it is an estimate.
 
     With a session and a known floor, only the door at that floor counts.
     """

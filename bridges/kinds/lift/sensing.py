@@ -1,10 +1,10 @@
 """Judgement of a lift's inputs: debounce, age, and contradictions.
 
 Rules:
-LIFT-SENSING-1. A change counts once it has lasted for its signal's debounce. The end of a hazard counts
-   once it has lasted for `hazard_clear_s`. All inputs are unknown until every input has settled once,
-   and while any input has been changing for longer than `RESTLESS_S`. Settling after the start is no
-   fault.
+LIFT-SENSING-1. A change of an input counts once it has lasted for the signal's debounce; the end of a
+   hazard, once it has lasted for `hazard_clear_s`. All inputs are unknown until every input has settled
+   once, and while any input has been changing for longer than `RESTLESS_S`. Settling after the start is
+   no fault.
 LIFT-SENSING-2. After `stale_after_s` without a reading all inputs are unknown: the car may be anywhere.
    After a shorter gap the values stay, and a running debounce starts again.
 LIFT-SENSING-3. A floor code is believed only if the car can have reached that floor. It is rejected if
@@ -12,10 +12,10 @@ LIFT-SENSING-3. A floor code is believed only if the car can have reached that f
    Then the position is unknown until the code shows the last trusted floor or another reachable floor,
    or until an operator resets.
 LIFT-SENSING-4. While the floor code is invalid (`valid_when`) for longer than its debounce, the car
-   may go anywhere unseen. After that the next floor code is believed.
+   may go anywhere unseen. Therefore the next valid floor code is believed.
 LIFT-SENSING-5. A door is open when the contact for the open door says so. With only one contact the
    other end position is estimated from the door's travel time, and marked as an estimate.
-LIFT-SENSING-6. A car stands when the motion lines say so. Without motion lines it always counts as
+LIFT-SENSING-6. A car stands when the motion lines say so. Without motion lines the car always counts as
    standing.
 """
 
@@ -33,7 +33,7 @@ from bridges.kinds.shared.durations import AGES_AGO, NEVER
 HAZARDS = tuple(Hazard)
 
 MOTION_MEMORY_S = 2.0
-"""A new floor code is possible until this long after the car's last seen motion."""
+"""A new floor code is believed until this long after the car was last seen moving."""
 
 RESTLESS_S = 2.0
 """An input that takes longer to settle is restless: a loose wire, or interference."""
@@ -49,7 +49,7 @@ class DoorSeen(msgspec.Struct, frozen=True):
 
 
 class BelievedLift(msgspec.Struct, frozen=True):
-    """The inputs as they are believed at one instant.
+    """The judged inputs at one instant.
 
     `blind`: the reason why no input is believed, "" if all are. `settling`: the only reason is that
     inputs still settle after the start. `level`: the landing, None when unknown. `level_settles`: the
@@ -119,7 +119,7 @@ def gap(senses: LiftSenses, now: float) -> LiftSenses:
 
 
 def unsure(senses: LiftSenses, now: float) -> LiftSenses:
-    """Forget everything but the last landing, after a long time without a reading."""
+    """Forget everything except the last landing, after a long time without a reading."""
     return LiftSenses(position=replace(senses.position, moved_at=now))
 
 
@@ -238,7 +238,8 @@ def _door(seen: Settled[DoorReading | None] | None, now: float, limits: LiftLimi
 class Unsettled(msgspec.Struct, frozen=True):
     """An input that is changing, or has never settled (`new`).
 
-    `due_at`: the time when it settles without another change. `torn_at`: when it is restless. In s.
+    `due_at`: the time (s) when it settles if it does not change again. `torn_at`: the time (s) when it
+    counts as restless.
     """
 
     name: str
@@ -285,7 +286,7 @@ def _blind(
 
 
 def _settling(unsettled: Sequence[Unsettled], now: float) -> bool:
-    """Is an input still settling after the start, with none restless?"""
+    """Is an input still settling after the start, and is no input restless?"""
     first = any(wait.new for wait in unsettled)
     return first and not any(now >= wait.torn_at for wait in unsettled)
 

@@ -21,8 +21,8 @@ LEFT_IN_CAR: Final = "released in mid-ride"
 def ask(
     memory: LiftMemory, request: LiftRequested, now: float, why_not: Callable[[], str]
 ) -> tuple[LiftMemory, str]:
-    """Take a request from `lift_requests`; also return the reason for a refusal, "" for none.
-    `why_not`: the reason why nobody gets a free lift now."""
+    """Apply a request from `lift_requests`; also return the reason for a refusal, "" for none.
+    `why_not`: returns the reason why a free lift must not be granted now."""
     held, grace = memory.session, memory.grace
     if held and held.id != request.session_id:
         session = forgotten.overruled(held, request.session_id, now)
@@ -55,8 +55,8 @@ def _heed(
 def hear_adapter(
     memory: LiftMemory, asked: LiftRequested | EndRequested, now: float, limits: LiftLimits
 ) -> LiftMemory:
-    """Take a robot's own request. It counts for the session that has the lift, if the session is
-    forgotten or disowned or the request settles a doubt; and for a robot that was left in the car."""
+    """Apply a robot's own request. It counts if the robot has the lift and its session is forgotten or
+    disowned, if it settles a doubt about that session, or if the robot was left in the car."""
     held = memory.session
     memory = replace(memory, own=replayed.noted(memory.own, asked))
     if held is None:
@@ -86,7 +86,7 @@ def _come_back(memory: LiftMemory, asked: LiftRequested | EndRequested, now: flo
 
 
 def _refresh(session: LiftSession, request: LiftRequested, now: float) -> LiftSession:
-    """Refresh the session by a repeat; start anew for a different destination or mode."""
+    """Refresh the session if the request repeats; start anew for another destination or mode."""
     if (request.agv, request.destination) == (session.agv, session.destination):
         return replace(session, asked_at=now)
     fresh = replace(_anew(session, now), agv=request.agv, destination=request.destination)
@@ -109,7 +109,7 @@ def _anew(session: LiftSession, now: float) -> LiftSession:
 def end(
     memory: LiftMemory, ended: EndRequested, now: float, limits: LiftLimits
 ) -> tuple[LiftMemory, str]:
-    """Take an END from `lift_requests`; also return the reason for a refusal, "" for none."""
+    """Apply an END from `lift_requests`; also return the reason for a refusal, "" for none."""
     held, grace = memory.session, memory.grace
     if held is None and grace and ended.by_person and ended.session_id == grace.session.id:
         return replace(memory, grace=replace(grace, until=grace.off_at, in_car=False)), ""
@@ -127,7 +127,7 @@ def end(
 
 
 def lapse(memory: LiftMemory, now: float, limits: LiftLimits) -> LiftMemory:
-    """End a disowned session after its robot's silence."""
+    """End a disowned session whose robot has fallen silent."""
     held = memory.session
     if held is None or now < forgotten.lapses_at(held):
         return memory

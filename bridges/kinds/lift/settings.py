@@ -31,7 +31,7 @@ class Floor(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     """A floor that is served by the rear door, or whose landing has another name."""
 
     level: Annotated[
-        Name | None, tells("the landing's name in the floor code; the floor's own when absent.")
+        Name | None, tells("the landing's name in the floor code; when absent, the floor's name.")
     ] = None
     side: Annotated[Side, tells("which of the car's doors opens there.")] = Side.FRONT
 
@@ -49,11 +49,11 @@ class LiftDurations(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
     ] = 3.0
     agv_timeout_s: Annotated[
         Timeout,
-        tells("""how long AGV mode may take. Then the outputs go off and a fault is shown. Retries
-        follow after 10, 30 and 60 s; then the fault latches."""),
+        tells("""how long AGV mode may take to come on. Then the outputs go off and a fault is shown.
+        Retries follow after 10, 30 and 60 s; then the fault latches."""),
     ] = 600.0
     floor_timeout_s: Annotated[
-        Timeout, tells("how long a ride to its floor may take; then as with `agv_timeout_s`.")
+        Timeout, tells("how long the ride to a floor may take; then as with `agv_timeout_s`.")
     ] = 120.0
     door_timeout_s: Annotated[
         Timeout, tells("how long the door may take to open; then as with `agv_timeout_s`.")
@@ -73,7 +73,8 @@ class LiftDurations(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
         Brief, tells("the least time from floor to floor. A faster change is not believed.")
     ] = 0.5
     call_pulse_s: Annotated[
-        Pulse | None, tells("how long a call is pulsed; held until arrival when absent.")
+        Pulse | None,
+        tells("the length of a call's pulse; when absent, a call is held until the car arrives."),
     ] = None
     dead_time_s: Annotated[
         Brief,
@@ -81,12 +82,13 @@ class LiftDurations(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
         and a door command."""),
     ] = 0.3
     min_off_s: Annotated[
-        Brief, tells("how long a relay stays off at least, to spare it. Off is never delayed.")
+        Brief,
+        tells("the least time for which a relay stays off, to spare it. Off is never delayed."),
     ] = 0.5
     max_cycles_per_min: Annotated[
         int,
         Meta(ge=1, le=600),
-        tells("how often a relay may switch on in a minute; then it waits."),
+        tells("how often a relay may switch on in a minute; after that the relay waits."),
     ] = 20
 
     def problems(self) -> Remarks:
@@ -100,12 +102,12 @@ class LiftDurations(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
 
 
 class LiftSettings(DeviceSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """One lift, apart from its wiring."""
+    """The settings of one lift, except its wiring."""
 
     floors: Annotated[
         list[Name] | dict[Name, Floor],
-        tells("""their names on RMF's map, from the lowest up. Write a mapping if a floor's landing
-        has another name, or if the rear door serves it."""),
+        tells("""the floors' names on RMF's map, from the lowest up. Write a mapping if a floor's
+        landing has another name, or if the rear door serves a floor."""),
     ]
     agv_mode: Annotated[
         Literal["requested", "by_call"],
@@ -129,7 +131,7 @@ class LiftSettings(DeviceSettings, frozen=True, kw_only=True, forbid_unknown_fie
     ] = msgspec.field(default_factory=lambda: ["fire_alarm"])
 
     def stale_after(self) -> float:
-        """Return its limits' `stale_after_s`."""
+        """Return `stale_after_s` of the limits."""
         return self.limits.stale_after_s
 
     def on_map(self) -> list[Place]:

@@ -51,7 +51,7 @@ class LiftSample(msgspec.Struct, frozen=True):
 
     `level`: the landing that the floor code names, None for no code (between floors).
     `code_fault`: the reason why the code is illegal (not listed, two of one-hot, parity), "" if legal.
-    `floor_valid`: the code is valid now; without it the car may go anywhere unseen.
+    `floor_valid`: the code is valid now; while it is not, the car may go anywhere unseen.
     `motion`, `agv`, `rear_door`: None if not wired. `agv` is also None while its line is not valid.
     """
 

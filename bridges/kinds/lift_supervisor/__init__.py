@@ -1,4 +1,4 @@
-"""The lift supervisor: replaces RMF's own, between the fleet adapters and any number of lifts."""
+"""The lift supervisor, in place of RMF's: it stands between the fleet adapters and all lifts."""
 
 from bridges.kinds.lift_supervisor import core, memory, messages, report, signals
 from bridges.kinds.lift_supervisor.memory import LiftSupervisorLimits, SupervisedLift

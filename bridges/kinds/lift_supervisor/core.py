@@ -1,27 +1,27 @@
 """The lift supervisor's core, for one lift: the order of sessions, and the requests to the lift's node.
 
-It replaces RMF's own (rmf_ros2, lift_supervisor/Node.cpp). Fleet adapters send their requests on
+It replaces RMF's supervisor (rmf_ros2, lift_supervisor/Node.cpp). Fleet adapters send their requests on
 `adapter_lift_requests`. The supervisor passes on the requests of one session at a time to the lift's
 node, on `lift_requests`, until the lift's states show that they were obeyed.
 `bridges/kinds/shared/freshness.py` rejects stale requests. Rules:
 LIFT-SUPERVISOR-1. Sessions are served in the order of their first requests. A session leaves the queue
-   by END, or after `silent_after_s` without a request. While the lift is silent this time does not run,
-   as adapters repeat their requests only when the lift's states come.
+   at its END, or after `silent_after_s` without a request. This time does not run while the lift is
+   silent, because adapters repeat their requests only when the lift's states come.
 LIFT-SUPERVISOR-2. The lift's states name the session that has the lift. This session goes before the
    queue if its robot still requests it. After `orphan_after_s` without a request for this session the
    supervisor ends it.
 LIFT-SUPERVISOR-3. One session at a time has its turn. Its request is sent when it is new or has
    changed. The request is repeated when the lift's state does not fulfil it, and when the adapter has
-   repeated it (else the lift's node would consider RMF silent). It is never sent while the lift shows
-   another session.
-LIFT-SUPERVISOR-4. A turn ends by END. Usually the holder sends END, wherever the lift is and in any
-   mode. The supervisor sends END for a silent holder that the lift has never accepted, and, for any
-   silent holder, after `holder_ttl_s` if the site has set that. END is repeated until a later state
-   shows another session or none. Only after that is the next session served.
+   repeated it (else the lift's node would consider RMF silent). The request is never sent while the
+   lift shows another session.
+LIFT-SUPERVISOR-4. Only END ends a turn. Usually the holder sends END, wherever the lift is and in any
+   mode. For a silent holder the supervisor sends END: after `silent_after_s` if the lift never showed
+   the holder's session, else after `holder_ttl_s`, if the site has set that time. END is repeated until
+   a later state shows another session or none. Only after that is the next session served.
 LIFT-SUPERVISOR-5. While the lift is in fire, emergency or offline mode, no robot is sent to it and the
    queue waits. END is passed on, and so are requests for HUMAN mode, as they call no robot to the lift.
-LIFT-SUPERVISOR-6. During the quiet start, and while another supervisor publishes, it only listens. Then
-   it starts from the lift's states and from the requests it has heard, so a restart ends no ride.
+LIFT-SUPERVISOR-6. During the quiet start, and while another supervisor publishes, ours only listens.
+   Then it starts from the lift's states and the requests that it has heard, so a restart ends no ride.
 LIFT-SUPERVISOR-7. Two messages are at least GAP_S apart, and a message is repeated unchanged after
    REPEAT_S at the earliest.
 """
@@ -62,9 +62,9 @@ def initial(lift: str, started_at: float) -> SupervisedLift:
 def idle(memory: SupervisedLift, now: float) -> bool:
     """May this lift be forgotten? True after a long silence.
 
-    FORGOTTEN_S suffices without claims: if the lift comes back, its states show a session that is still
-    to be ended. Robots that only wait are forgotten after 10 times as long; they request again when the
-    lift is back. A lift with claims that shows a session is never forgotten.
+    Without claims FORGOTTEN_S is enough: the states of a lift that comes back show any session that
+    must still end. Robots that only wait are forgotten after 10 times as long; they request again when
+    the lift is back. A lift with claims that shows a session is never forgotten.
     """
     heard_at = max(memory.heard_at, memory.shown_at)
     has_it = memory.session_shown or (memory.turn and memory.turn.seen)
@@ -75,7 +75,7 @@ def idle(memory: SupervisedLift, now: float) -> bool:
 def decide(
     memory: SupervisedLift, event: Event, now: float, limits: LiftSupervisorLimits
 ) -> Decided:
-    """Take the event in, choose the session with the turn, and send the message that is due, if any."""
+    """Apply the event, choose the session with the turn, and publish a request that is due."""
     memory, refused = _take(memory, event, now, limits)
     memory = _forget_silent(memory, now, limits)
     memory = _take_turns(memory, now, limits)
@@ -179,7 +179,7 @@ def _without(memory: SupervisedLift, session: str) -> SupervisedLift:
 
 
 def _see(memory: SupervisedLift, shown: LiftStateHeard, now: float) -> SupervisedLift:
-    """Take a state in: it may confirm an END, call for a repeat, or show another session."""
+    """Apply a state, which may confirm an END, call for a repeat, or show another session."""
     flowed = now <= memory.shown_at + SILENT_S
     same = flowed and shown.session == memory.session_shown
     turn, prompted = memory.turn, memory.prompted
@@ -203,7 +203,7 @@ def _see(memory: SupervisedLift, shown: LiftStateHeard, now: float) -> Supervise
 
 
 def _speak(memory: SupervisedLift, yes: bool, passive: str) -> SupervisedLift:
-    """Take the turn away while we may not publish. Later the lift's states show the holder."""
+    """Forget the turn while we may not publish; later the lift's states show the holder again."""
     turn = memory.turn if yes else None
     return replace(memory, may_speak=yes, passive=passive, turn=turn)
 
@@ -214,7 +214,7 @@ def _speak(memory: SupervisedLift, yes: bool, passive: str) -> SupervisedLift:
 def _forget_silent(
     memory: SupervisedLift, now: float, limits: LiftSupervisorLimits
 ) -> SupervisedLift:
-    """Drop the claims of silent waiting sessions. A holder leaves by END only."""
+    """Drop the claims of silent waiting sessions. A holder's claim is dropped only at its END."""
     holder = memory.turn.session if memory.turn and not memory.turn.ends else ""
     staying = tuple(
         claim
@@ -244,7 +244,7 @@ def _take_turns(memory: SupervisedLift, now: float, limits: LiftSupervisorLimits
 def _obey_the_lift(
     memory: SupervisedLift, shown: str, now: float, limits: LiftSupervisorLimits
 ) -> SupervisedLift:
-    """Serve or end a session that the lift shows: one from before our restart, or of another node."""
+    """Serve or end a session that the lift shows, from before our restart or of another node."""
     if memory.claim(shown):
         return _begin(memory, Turn(shown, now, seen=True))
     if memory.shown_at >= memory.session_since + limits.orphan_after_s:
@@ -297,7 +297,7 @@ def _due_at(memory: SupervisedLift, message: LiftRequest | None) -> float:
     if message is None:
         return NEVER
     new = memory.sent is None or (message != memory.sent and message.request_type != END)
-    said = memory.sent is None and message == memory.last_sent  # the same, in an earlier turn
+    said = memory.sent is None and message == memory.last_sent  # sent in an earlier turn already
     return due_at(memory.sent_at, new=new and not said, again=memory.prompted or said)
 
 

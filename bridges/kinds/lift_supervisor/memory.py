@@ -16,7 +16,7 @@ NOBODY_IS_SENT: Final = (LiftMode.MODE_FIRE, LiftMode.MODE_EMERGENCY, LiftMode.M
 
 
 class LiftSupervisorLimits(msgspec.Struct, frozen=True):
-    """The durations (s) set by the site, and the agreement of its clocks."""
+    """The durations (s) set by the site. `clock_synchronised`: its clocks agree."""
 
     silent_after_s: float = 10.0
     orphan_after_s: float = 3.0
@@ -60,14 +60,14 @@ class Turn(msgspec.Struct, frozen=True):
 
 
 class SupervisedLift(msgspec.Struct, frozen=True):
-    """Everything that outlives an event.
+    """The memory of one lift from event to event.
 
     `passive`: the reason why requesters wait while we may not publish. `claims`: in the order of first
     requests, including the holder's claim. `heard_at`: the time of the last adapter request.
     `requesters`: the record of each. `shown`: the latest state, which came at `shown_at`;
-    `session_since`: the time since which states show this session. `flowing_since`: the start of states
-    without a gap. `sent`: the last request of this turn; `last_sent`: the last request of any turn, at
-    `sent_at`. `prompted`: the request is to be repeated.
+    `session_since`: the time since which states show this session. `flowing_since`: the time since
+    which states have come without a gap. `sent`: the last request of this turn; `last_sent`: the last
+    request of any turn, at `sent_at`. `prompted`: the request must be repeated.
     """
 
     lift: str
@@ -106,7 +106,8 @@ class SupervisedLift(msgspec.Struct, frozen=True):
         return self.shown is None or now <= self.shown_at + SILENT_S
 
     def gone_at(self, claim: SessionClaim, now: float, after_s: float) -> float:
-        """Return the end of `after_s` of this requester's silence; NEVER while the lift is silent."""
+        """Return the time when this requester has been silent for `after_s`; NEVER while the lift is
+        silent."""
         if not self.flows(now):
             return NEVER
         return max(claim.heard_at, self.flowing_since) + after_s

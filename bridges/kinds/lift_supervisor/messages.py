@@ -1,4 +1,4 @@
-"""LiftRequests and LiftStates in. Is a message well formed, and about a lift that we serve?"""
+"""From LiftRequests and LiftStates to events: is a message well formed, and about a lift of ours?"""
 
 from collections.abc import Mapping
 from typing import Final

@@ -12,15 +12,15 @@ from bridges.messages.definitions import LiftMode
 
 SILENT: Final = "LIFT_SILENT"
 OVERDUE_S: Final = 30.0
-"""After this long without obeying, a lift is at fault."""
+"""A lift that has not obeyed for this long is at fault."""
 
 
 class SupervisorReport(msgspec.Struct, frozen=True):
     """One lift, for the log and the status file. Times are monotonic seconds.
 
     `shown`: the session in the lift's state. `holder`: the session with the turn, begun at `since`.
-    `ending`: we send its END. `waiting`: the queue, as (session, time of its first request). `read_at`:
-    the time of the lift's last state. `waits`: the reason why the requesters are not served yet.
+    `ending`: we send the holder's END. `waiting`: the queue, as (session, time of its first request).
+    `read_at`: the time of the lift's last state. `waits`: the reason why the requesters still wait.
     """
 
     read_at: float | None

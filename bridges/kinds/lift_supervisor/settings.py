@@ -14,7 +14,7 @@ class LiftSupervisorSettings(GraphSettings, frozen=True, kw_only=True, forbid_un
     lifts: Annotated[
         list[Name] | None,
         tells("""the lifts that it serves; messages about others are refused. When absent, it serves
-        every lift that it hears of, as RMF's own does."""),
+        every lift that it hears of, as RMF's supervisor does."""),
     ] = None
     quiet_start_s: Annotated[
         QuietStart,
@@ -31,8 +31,8 @@ class LiftSupervisorSettings(GraphSettings, frozen=True, kw_only=True, forbid_un
     ] = 60.0
     holder_ttl_s: Annotated[
         Patience | None,
-        tells("""how long the holder may be silent before its session is ended. Never when absent,
-        as its robot may be in the car."""),
+        tells("""how long the holder may be silent before its session is ended. When absent, the
+        session is never ended, as its robot may be in the car."""),
     ] = None
     clock_synchronised: Annotated[
         bool,
@@ -40,7 +40,10 @@ class LiftSupervisorSettings(GraphSettings, frozen=True, kw_only=True, forbid_un
         can be judged. Otherwise only the stamps of one requester are compared."""),
     ] = False
     max_request_age_s: Annotated[
-        Seconds, tells("with `clock_synchronised`, an older request counts only if repeated.")
+        Seconds,
+        tells(
+            "with `clock_synchronised`, a request older than this counts only if it is repeated."
+        ),
     ] = 10.0
 
     def problems(self) -> Remarks:

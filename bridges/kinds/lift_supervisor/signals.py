@@ -15,7 +15,8 @@ class Target(msgspec.Struct, frozen=True):
 
 
 class RideRequested(msgspec.Struct, frozen=True):
-    """An adapter's request for AGV or HUMAN mode; `stamp` is by its clock (s), `age_s` by ours."""
+    """An adapter's request for AGV or HUMAN mode. `stamp`: by the adapter's clock (s). `age_s`: by
+    ours."""
 
     session: str
     target: Target

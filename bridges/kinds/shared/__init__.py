@@ -1,1 +1,1 @@
-"""Shared by all decision cores: decisions, debounce, kinds, and the fields of a device YAML."""
+"""Common parts of all kinds: decisions, debounce, the records of kinds, the fields of a YAML."""

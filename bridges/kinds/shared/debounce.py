@@ -1,7 +1,7 @@
-"""Debounce: a reading is believed after it has stayed unchanged for long enough.
+"""Debounce: a value counts after it has stayed unchanged for long enough.
 
-Pure: it works on samples, so one rule serves GPIO pins and polled Modbus inputs. gpiozero's own
-debounce drops edges, and its mock pins have none.
+The rule is pure and works on samples, so it serves GPIO pins and polled Modbus inputs. gpiozero's own
+debounce is not used, because it drops edges and its mock pins lack it.
 """
 
 from typing import Generic, TypeVar, cast
@@ -16,7 +16,7 @@ T_co = TypeVar("T_co", covariant=True)
 
 
 class Settled(msgspec.Struct, Generic[T_co], frozen=True):
-    """`value` is believed, and `candidate` has been seen since `since` (s).
+    """A debounced input. `value` counts, and `candidate` has been seen since `since` (s).
 
     `steady_at`: when `value` was last confirmed; None before the first time. `torn_since`: the start of
     unsteady readings; None while they are steady.
@@ -34,7 +34,7 @@ class Settled(msgspec.Struct, Generic[T_co], frozen=True):
 
 
 def settle(before: "Settled[T] | None", seen: T, now: float, hold_s: float) -> "Settled[T]":
-    """Take one sample. A value counts after it was seen for `hold_s` seconds; 0: at once."""
+    """Add one sample. A value counts after it was seen for `hold_s` seconds; 0: at once."""
     if before is None:
         before = Settled(None, seen, now, torn_since=now)
     elif seen != before.candidate:

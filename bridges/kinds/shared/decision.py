@@ -27,7 +27,7 @@ Said = tuple[Topic[Message], Message]
 
 
 class Fault(msgspec.Struct, frozen=True):
-    """One thing that is wrong. `code`: a fixed name. `detail`: which part, and why."""
+    """One present fault. `code`: its fixed name. `detail`: the faulty part, and the reason."""
 
     code: str
     detail: str = ""
@@ -49,7 +49,7 @@ class IoFailed(msgspec.Struct, frozen=True):
 
 
 class Suspended(IoFailed, frozen=True):
-    """The process was stopped, or the machine slept. Everything read before is stale."""
+    """The process was stopped, or the machine slept. All earlier readings are stale."""
 
 
 class WriteFailed(IoFailed, frozen=True):
@@ -67,7 +67,7 @@ class Attended(msgspec.Struct, frozen=True):
 
 
 class OperatorReset(msgspec.Struct, frozen=True):
-    """`rmf-bridge reset`: latched faults may clear if their cause is gone."""
+    """An operator has run `rmf-bridge reset`: a latched fault may clear if its cause is gone."""
 
 
 class Report(Protocol):
@@ -75,23 +75,23 @@ class Report(Protocol):
 
     @property
     def read_at(self) -> float | None:
-        """Monotonic time of the reading behind the report; None before the first."""
+        """The monotonic time of the reading behind the report; None before the first reading."""
 
     @property
     def faults(self) -> tuple[Fault, ...]:
-        """Everything that is wrong now, most serious first."""
+        """All present faults, most serious first."""
 
     def news(self) -> object:
-        """Return the part whose change is published at once: all but the age."""
+        """Return the part whose change is published at once: everything except the age."""
 
 
 class Decision(msgspec.Struct, Generic[M, O, R], frozen=True):
     """The result of one scan.
 
-    `outputs`: the whole set, to be written as it is. `wake_at`: decide again at this time at the
-    latest (monotonic seconds; `inf` when only an event can change anything). `refused`: the reason for
-    a refusal, as `kind` or `kind: detail`, where `kind` is a short fixed name to count by; "" for an
-    obeyed event. `publish`: messages beside the state, each sent once.
+    `outputs`: the levels of all outputs. `wake_at`: the latest time of the next decision (monotonic
+    seconds; `inf` when only an event can change anything). `refused`: the reason for a refusal, as
+    `kind` or `kind: detail`; `kind` is a short fixed name, by which refusals are counted; "" for an
+    obeyed event. `publish`: further messages beside the state, each sent once.
     """
 
     memory: M
@@ -105,7 +105,7 @@ class Decision(msgspec.Struct, Generic[M, O, R], frozen=True):
 RELEASED_LATELY = "released a moment ago"
 STARTING = "inputs settle after the start"
 EXPECTED = frozenset({RELEASED_LATELY, STARTING})
-"""Refusals at every normal handover and start: they are counted, and cause no warning."""
+"""Refusals that every normal handover or start causes: they are counted without a warning."""
 
 LONGEST_DETAIL = 300
 

@@ -7,19 +7,19 @@ NEVER: Final = math.inf
 AGES_AGO: Final = -math.inf
 
 RIVAL_QUIET_S: Final = 5.0
-"""After this long without another node's states a device is ours again. States come at 1 Hz."""
+"""Another node that has published no state for this long is no rival any more. States come at 1 Hz."""
 SILENT_S: Final = 3.0
 """A lift or door is silent after this long without a state. States come at 1 Hz."""
 FORGOTTEN_S: Final = 60.0
-"""After this long without a message a device or requester is forgotten, unless it holds something."""
+"""A device or requester without a message for this long is forgotten, unless it is in a session."""
 GAP_S: Final = 0.1
 """The least time between two requests that a supervisor sends for one device."""
 REPEAT_S: Final = 1.0
-"""A request that is not obeyed yet is repeated this often."""
+"""The time between repeats of a request that is not obeyed yet."""
 
 
 def due_at(sent_at: float, *, new: bool, again: bool) -> float:
-    """Return the time of the next request: GAP_S after the last if `new`, REPEAT_S if sent `again`.
+    """Return the time of the next request: GAP_S after the last if `new`, REPEAT_S if `again`.
 
     `sent_at`: the time of the last request (s; AGES_AGO: never).
     """

@@ -20,7 +20,7 @@ Name = Annotated[
         extra={"pattern": "text without control characters, or spaces at its ends"},
     ),
 ]
-"""A name in RMF: any text; quoted in YAML if YAML would otherwise read a number or another type."""
+"""A name in RMF: any text. A text that YAML would read as a number or another type needs quotes."""
 AbsolutePath = Annotated[
     str,
     Meta(
@@ -29,17 +29,17 @@ AbsolutePath = Annotated[
         extra={"pattern": "a file's whole path (/opt/ros/jazzy/setup.bash)"},
     ),
 ]
-"""A file by its path from the root."""
+"""The path of a file from the root."""
 Seconds = Annotated[float, Meta(ge=0, le=86400, extra={"unit": "s"})]
 """A duration that may be zero."""
 Timeout = Annotated[float, Meta(ge=1, le=86400, extra={"unit": "s"})]
-"""A time limit for an attempt. Zero is not allowed: nothing would ever be tried."""
+"""A time limit for an attempt. Zero is not allowed, because every attempt would fail at once."""
 Period = Annotated[float, Meta(ge=0.01, le=60, extra={"unit": "s"})]
 """A repetition period."""
 Brief = Annotated[float, Meta(ge=0, le=60, extra={"unit": "s"})]
 """A short duration that may be zero: a pause, a pulse, a bounce."""
 QuietStart = Annotated[float, Meta(ge=3, le=60, extra={"unit": "s"})]
-"""The time after its start in which a node without hardware only listens."""
+"""The time after the start in which a node without hardware only listens."""
 Patience = Annotated[
     float,
     Meta(
@@ -51,7 +51,7 @@ Patience = Annotated[
         },
     ),
 ]
-"""The longest silence or state on which the daemon does not act."""
+"""The time for which the daemon tolerates a silence or a state before it acts."""
 
 
 def tells(text: str) -> Meta:
@@ -64,7 +64,7 @@ class DeviceSettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_f
 
     bus: Annotated[Name | None, tells("its bus; not needed if the file has only one.")] = None
     driver: Annotated[
-        Name | None, tells("this device's own driver; the file's `driver` when absent.")
+        Name | None, tells("this device's driver; when absent, the `driver` of the file.")
     ] = None
     accept_unsafe: Annotated[
         dict[Name, Name],
@@ -72,13 +72,13 @@ class DeviceSettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_f
     ] = {}
 
     def off_after(self) -> tuple[float, tuple[str, ...]] | None:
-        """Return the time (s) without a command after which the outputs go off by themselves, and the
+        """Return the time (s) after which outputs without a new command switch themselves off, and the
         path of that setting; None for outputs that stay on."""
         return None
 
     def stale_after(self) -> float | None:
-        """Return the time (s) without a reading after which the device is out of service; None if no
-        time decides that."""
+        """Return the time (s) after which a device without a reading is out of service; None without
+        such a limit."""
         return None
 
 
@@ -87,7 +87,7 @@ class GraphSettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
 
     quiet_start_s: Annotated[
         QuietStart,
-        tells("how long it only listens at first, so that a restart interrupts nothing."),
+        tells("how long the node only listens at first, so that a restart interrupts nothing."),
     ] = 3.0
 
 

@@ -3,17 +3,19 @@
 A stamp comes from the requester's clock, which may disagree with ours. So a stamp is first compared
 with the earlier stamps of the same requester. Rules:
 FRESHNESS-1. A request counts if it is newer than every earlier request of its requester that counted.
-   An END is compared with earlier ENDs only: an operator may end a robot's session, by another clock.
+   An END is compared with earlier ENDs only, because an operator, whose clock may differ, may end a
+   robot's session.
 FRESHNESS-2. A retained topic (`adapter_lift_requests`) replays up to 100 old requests of every adapter
    to each new subscriber, and again when an adapter's network comes back. There an equal stamp is a
-   replay. A requester's first request counts only if it was sent after our own start; its later ones
-   are compared with its own stamps only. With `clock_synchronised` every request's age is judged too.
+   replay. A requester's first request counts only if it was sent after our own start; later requests
+   are compared only with the requester's own stamps. With `clock_synchronised` the age of every request
+   is judged too.
 FRESHNESS-3. On a topic that is not retained (`adapter_door_requests`) an old request was delayed or
    arrived twice. There an equal stamp counts, as a requester without a clock always sends 0. A
-   requester's first request counts. A requester that holds nothing is new again after a silence of
-   FORGOTTEN_S.
-FRESHNESS-4. During the quiet start on a retained topic a stamp from the future does not count: our
-   clock may not be set yet, and then every replayed request looks new.
+   requester's first request counts. A requester that holds no door is forgotten after a silence of
+   FORGOTTEN_S, so its next request counts as its first.
+FRESHNESS-4. During the quiet start on a retained topic a stamp from the future does not count: if our
+   clock is not set yet, every replayed request looks new.
 FRESHNESS-5. A rejected request may come from a live requester whose clock is wrong or was set back. It
    counts once it has been repeated for longer than a replay lasts (REPLAY_S, retained topics) or than
    a message can be late (LATE_S, other topics). The repeats' stamps must rise, or all be 0. A pause of
@@ -62,9 +64,9 @@ class Rules(msgspec.Struct, frozen=True):
 class Requester(msgspec.Struct, frozen=True):
     """The record of one requester. Its stamps are all in one unit, by its own clock.
 
-    `newest`, `newest_end`: the newest stamp that counted, of all requests and of ENDs. `heard_at`:
-    the time when a request last counted. `doubted`: the stamp of the last request that did not count;
-    `doubted_since`, `doubted_at`: the times of its first and its latest repeat.
+    `newest`: the newest stamp that counted. `newest_end`: the newest stamp of an END that counted.
+    `heard_at`: the time when a request last counted. `doubted`: the stamp of the last request that did
+    not count. `doubted_since`, `doubted_at`: the times of the first and the last such request in a row.
     Times ending in `_at` or `_since` are in s by our clock.
     """
 
@@ -78,7 +80,8 @@ class Requester(msgspec.Struct, frozen=True):
     def hears(
         self, stamp: float, age_s: float, now: float, rules: Rules, *, ends: bool = False
     ) -> tuple["Requester", bool]:
-        """Take one request, `age_s` old by our clock. Return the requester, and True if it counts."""
+        """Note one request, `age_s` old by our clock. Return the new record, and whether the request
+        counts."""
         if self._is_live(stamp, age_s, rules, ends=ends):
             newest = max(self.newest, stamp)
             newest_end = max(self.newest_end, stamp) if ends else self.newest_end
@@ -103,7 +106,7 @@ class Requester(msgspec.Struct, frozen=True):
 
 
 Requesters = Mapping[str, Requester]
-"""By name, in the order in which they were last heard."""
+"""Name -> record, in the order in which the requesters were last heard."""
 
 
 def hear(
@@ -117,11 +120,11 @@ def hear(
     ends: bool = False,
     holders: Collection[str] = (),
 ) -> tuple[Requesters, str]:
-    """Take one request into the table. Return the table, and the reason against the request ("" if it
-    counts).
+    """Note one request in the table. Return the new table, and the reason why the request does not
+    count ("" if it counts).
 
-    Anybody can invent names, so the table has a bound: the requester heard longest ago is dropped, but
-    never a holder.
+    Anybody can invent names, so the table has a bound. A full table drops the requester heard longest
+    ago, but never one of the `holders`.
     """
     known = {
         name: requester

@@ -1,4 +1,4 @@
-"""The record of a kind without hardware: topics in, topics out, and the core between them.
+"""The record of a kind without hardware: the topics that it hears and publishes, and its core.
 
 A supervisor or coordinator has no driver and no bus. It learns its subjects (lifts, doors) from
 messages, and keeps one core memory for each. `bridges/kinds/<kind>/__init__.py` holds the
@@ -21,7 +21,7 @@ LISTENS: Final = "for the end of the quiet start"
 
 
 class MaySpeak(Struct, frozen=True):
-    """May the core publish? It may not during the quiet start or while a rival publishes.
+    """The core may publish now, or may not: during the quiet start, and while a rival publishes.
 
     `waits`: the reason why requesters wait while the core may not publish.
     `at_once`: no rival is there, so messages that a restart must not interrupt may be sent even during
@@ -35,7 +35,7 @@ class MaySpeak(Struct, frozen=True):
 
 
 class Woken(Struct, frozen=True):
-    """The core's `wake_at` has come without a message."""
+    """The time `wake_at` of the core's last decision has come."""
 
 
 GraphEvent = Union[MaySpeak, Woken, OperatorReset, E]  # noqa: UP007
@@ -43,38 +43,39 @@ GraphEvent = Union[MaySpeak, Woken, OperatorReset, E]  # noqa: UP007
 
 
 class GraphKind(Struct, Generic[S, L, M, E, R], frozen=True):
-    """One kind that lives on RMF's graph alone: its settings, limits, memory, events and report.
+    """One kind without hardware: its settings, limits, memory, events and report.
 
-    `devices_key`: the YAML's section of its settings. `settings`: the struct that reads this section.
+    `devices_key`: the section of its settings in the YAML. `settings`: the struct for this section.
     `requests`: each topic heard, with `accept(message, settings, wall) -> event`, which raises
     RequestRefused; `wall` is our clock (s since the epoch).
-    `publishes`: the topics on which it publishes. `sole`: topics that allow one publisher; while
-    another node publishes there, ours only listens. `yields`: topics on which ours is silent while
-    another node publishes there; it goes on with the others.
+    `publishes`: the topics on which the node publishes. `sole`: topics with only one publisher; while
+    another node publishes there, our node only listens. `yields`: topics on which our node is silent
+    while another node publishes there; on its other topics our node continues.
     `device_name`: a message's subject. `shown_by`: the topic on which a subject publishes
     its own states, which proves that it exists (a request may name anything); None if there is only
     one subject. `reserved(settings)`: the subjects that the YAML names.
     `requester(event)`: the sender of a request; "" for a state. `requesters(memory)`: the requesters
     that the subject remembers. Anybody can invent them, so all subjects together have a bound.
-    `quiet_s(settings)`: the time in which it only listens after its start.
-    `limits(settings)`: the core's share of the settings.
+    `quiet_s(settings)`: the time after the start in which the node only listens.
+    `limits(settings)`: the settings that the core needs.
     `initial(subject, started_at)`: a subject's memory; `started_at` is the daemon's start.
     `decide`: the core. Its messages have no stamps: `stamped(message, time)` adds them when they are
     sent. `summary(report, now)`: key -> value for the status file and `watch`. `idle(memory, now)`:
     may this subject be forgotten?
-    `answer(request, reason)`: the published answer to a refused request; None for nothing.
-    `request`: the message if it was refused at once, else the event.
+    `answer(request, reason)`: the published answer to a refused request; None for no answer.
+    `request`: the message if `accept` refused it, the event if the core did.
     `on_map(settings)`: settings that name a place on RMF's map (`bridges/kinds/shared/kind.py`).
 
-    For a kind with one message about all its subjects: `together(memories)`, sent each second and
-    at every change. For a kind whose memory must survive a restart: `persist(memories)`, which
-    returns the same bytes until something worth keeping changes, and `restore(kept, settings, now)`,
-    which raises ValueError for any other bytes. The memory is saved before `together` is sent.
-    `urgent(memory)`: does it hold something that a restart must not interrupt (`MaySpeak.at_once`)?
+    `together(memories)`: one message about all subjects, sent each second and at every change, for a
+    kind with such a message. A kind whose memory must survive a restart has `persist(memories)`, which
+    returns other bytes only when something worth keeping has changed, and `restore(kept, settings,
+    now)`, which raises ValueError for bytes that `persist` did not make. The memory is saved before
+    `together` is sent. `urgent(memory)`: does the subject hold something that a restart must not
+    interrupt (`MaySpeak.at_once`)?
 
-    For a kind with more settings than a few numbers: `tables(settings)`, for `check`, and
-    `warnings(settings)`, (path, text) of legal settings that may be mistakes. `speaks_of(settings)`:
-    the devices that it names, as (path, kind, name); some file of the site must define each device.
+    `tables(settings)`: tables for `check`. `warnings(settings)`: legal settings that may be mistakes,
+    as (path, text). `speaks_of(settings)`: the devices that the settings name, as (path, kind, name);
+    some file of the site must define each device.
     """
 
     name: str
@@ -109,4 +110,4 @@ class GraphKind(Struct, Generic[S, L, M, E, R], frozen=True):
 
 AnyGraphKind = GraphKind[Any, Any, Any, Any, Any]
 AnyKind = AnyDeviceKind | AnyGraphKind
-"""A kind found by its name, its types unknown."""
+"""A kind that was found by its name; its types are unknown."""

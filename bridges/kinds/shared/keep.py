@@ -1,4 +1,4 @@
-"""A kind's memory across a restart: JSON with a version. It is read completely, or refused."""
+"""A kind's memory on disk, for a restart: JSON with a version. A damaged file is refused as a whole."""
 
 from typing import Annotated, TypeVar
 
@@ -18,7 +18,8 @@ R = TypeVar("R", bound=Kept)
 
 
 def read(kept: bytes, record: type[R], version: int, what: str) -> R:
-    """Decode the record. Raises ValueError if the bytes are not `what` in this version."""
+    """Decode the record. Raises ValueError, which names `what` was expected, for other bytes or another
+    version."""
     try:
         found = msgspec.json.decode(kept, type=record)
     except msgspec.MsgspecError as error:

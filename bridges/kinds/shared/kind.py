@@ -26,7 +26,7 @@ from bridges.messages.topics import Topic
 S = TypeVar("S")
 """The settings of one device, or of a kind without hardware."""
 L = TypeVar("L")
-"""The limits: the core's share of the settings."""
+"""The limits: the settings that the core needs."""
 E = TypeVar("E")
 """The events into which `accept` turns requests."""
 
@@ -37,7 +37,7 @@ FLOOR, LIFT, DOOR, CHARGER, WAYPOINT = "floor", "lift", "door", "charger", "wayp
 """Kinds of names on RMF's map."""
 
 Place = tuple[tuple[str, ...], str, str]
-"""A setting that names something on RMF's map: its path, the kind of name (`FLOOR`, …), the name."""
+"""A setting with a name on RMF's map: the setting's path, the kind of name (`FLOOR`, …), the name."""
 
 
 class RefusalAnswer(NamedTuple):
@@ -51,19 +51,19 @@ class RefusalAnswer(NamedTuple):
 class Kind(Struct, Generic[S, L, M, X, E, O, R], frozen=True):
     """One kind of device: its settings, limits, memory, sample, requests, outputs and report.
 
-    `devices_key`: the YAML's section of the devices. `states`: the topic of their state messages.
+    `devices_key`: the section of the devices in the YAML. `states`: the topic of their states.
     `requests`: each topic that it obeys, with `accept(message, settings) -> event`, which raises
     RequestRefused for a message that is malformed or impossible for this device.
     `device_name`: the device named in a message (request or state). `sender`: the requester behind a
     request. If several requests wait for the next scan, only the last of each sender counts.
-    `limits(settings, debounce_s)`: the core's durations, from the device's settings and the wiring
-    table's per-signal debounce. `initial(limits, now)`: the core's memory at start.
+    `limits(settings, debounce_s)`: the limits, from the device's settings and the debounce of each
+    signal in the wiring table. `initial(limits, now)`: the core's memory at start.
     `decide`: the core. `state_message(name, settings, report, stamp)`: the report as RMF's message.
     `summary(report)`: key -> value for the log line, the status file and `watch`.
     `published(memory, report)`: the memory after this report has gone out to RMF.
-    `publishes(settings)`: the topics of a device beside its states.
-    `answer(name, request, reason, report)`: the published answer to a refused request; None for
-    nothing. `request`: the message if it is malformed, else the event.
+    `publishes(settings)`: the topics on which a device publishes beside its states.
+    `answer(name, request, reason, report)`: the published answer to a refused request; None for no
+    answer. `request`: the message if it is malformed, else the event.
     `on_map(settings)`: settings that name a place on RMF's map, as `Place`s. The device's own name is
     checked for every kind.
     `attended_by`: a topic of requests; the core gets `Attended` when its publishers appear or vanish.
@@ -90,4 +90,4 @@ class Kind(Struct, Generic[S, L, M, X, E, O, R], frozen=True):
 
 
 AnyDeviceKind = Kind[Any, Any, Any, Any, Any, Any, Any]
-"""A kind found by its name, its types unknown."""
+"""A kind that was found by its name; its types are unknown."""

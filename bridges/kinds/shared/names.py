@@ -1,4 +1,4 @@
-"""Checks of names and texts from the graph: anybody can send them, and they are stored."""
+"""Checks of names and texts from the graph. The daemon stores them, and anybody can send them."""
 
 from collections.abc import Collection
 from typing import Final
@@ -20,7 +20,7 @@ def check_length(longest: int = LONGEST_NAME, /, **fields: str) -> None:
 def check_listed(what: str, name: str, listed: Collection[str] | None) -> None:
     """Raise RequestRefused for a name that is empty, too long or not listed in the YAML.
 
-    `what`: `lift` or `door`. `listed`: None if the YAML lists none, and so accepts all.
+    `what`: `lift` or `door`. `listed`: None if the YAML has no list and so accepts every name.
     """
     if not name:
         raise RequestRefused(f"empty {what}_name", f"a {what} needs a name")

@@ -19,10 +19,12 @@ class RecordingSettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknow
     keep: Annotated[
         Literal["nothing", "ring", "continuous"],
         tells("""`ring` keeps the last minutes in memory, and the recorder makes a file of them when
-        something goes wrong; `continuous` makes files of everything, and drops the oldest;
-        `nothing` keeps nothing."""),
+        something goes wrong; `continuous` writes everything into files, and deletes the oldest files;
+        `nothing` records nothing."""),
     ] = "ring"
-    ring_mb: Annotated[Megabytes, tells("its size. 1 MB is 10 minutes or more of a lift.")] = 1.0
+    ring_mb: Annotated[
+        Megabytes, tells("the ring's size. 1 MB holds at least 10 minutes of a lift.")
+    ] = 1.0
     files: Annotated[
         Files,
         tells("""how many files the recorder keeps, of all daemons of the machine together. If their

@@ -3,5 +3,5 @@
 from collections.abc import Iterable
 
 Remark = tuple[tuple[str, ...], str]
-"""A problem, warning or note: its path below the remarking struct, and the text with the fix."""
+"""A problem, warning or note: the path of its key inside the struct, and a text with the remedy."""
 Remarks = Iterable[Remark]

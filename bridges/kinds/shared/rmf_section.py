@@ -27,10 +27,12 @@ class ZenohTls(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
 
     ca: Annotated[
         AbsolutePath | None,
-        tells("the authority that signed the router's certificate; the public ones when absent."),
+        tells("""the authority that signed the router's certificate; when absent, the public
+        authorities count."""),
     ] = None
     certificate: Annotated[
-        AbsolutePath | None, tells("the daemon's own, if the router asks for one (mutual TLS).")
+        AbsolutePath | None,
+        tells("the daemon's certificate, if the router asks for one (mutual TLS)."),
     ] = None
     private_key: Annotated[
         AbsolutePath | None, tells("the certificate's key. Only the daemon's user may read it.")
@@ -53,7 +55,8 @@ class Zenoh(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     connect: Annotated[
         tuple[Endpoint, ...],
         Meta(min_length=1),
-        tells("the router (or the bridge). Of several, one is used and the others stand by."),
+        tells("""the router (or the bridge). If there are several, the daemon uses one, and the others
+        stand by."""),
     ] = ("tcp/localhost:7447",)
     mode: Annotated[
         Literal["auto", "peer", "client"],
@@ -63,12 +66,14 @@ class Zenoh(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     ] = "auto"
     listen: Annotated[
         tuple[Endpoint, ...],
-        tells("where other nodes reach this one as a peer; only from this machine when absent."),
+        tells("""where other nodes reach this node as a peer; when absent, only nodes of this machine
+        can."""),
     ] = ("tcp/127.0.0.1:0",)
     tls: Annotated[ZenohTls | None, tells("certificates, for `tls/…` and `quic/…`.")] = None
     user: Annotated[Name | None, tells("the daemon's user name at the routers.")] = None
     password_file: Annotated[
-        AbsolutePath | None, tells("a file with its password. Only the daemon's user may read it.")
+        AbsolutePath | None,
+        tells("a file with the password of `user`. Only the daemon's user may read the file."),
     ] = None
 
     def problems(self) -> Remarks:
@@ -91,7 +96,7 @@ class Rmf(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     transport: Annotated[
         Literal["auto", "ros2", "dds", "zenoh"],
         tells("""`ros2` (rclpy), `dds` or `zenoh` (both without ROS). `auto` takes ros2 if rclpy can
-        be imported, else dds if cyclonedds can be, else zenoh."""),
+        be imported, else dds if cyclonedds can be imported, else zenoh."""),
     ] = "auto"
     domain_id: Annotated[
         Annotated[int, Meta(ge=0, le=232)] | None,
@@ -103,11 +108,13 @@ class Rmf(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     ] = "subnet"
     ros_setup: Annotated[
         AbsolutePath | None,
-        tells("""ROS's setup file, sourced before the daemon starts, as a service starts without a
-        shell. Not for `dds` and `zenoh`. If `auto` does not find the file, it logs that."""),
+        tells("""ROS's setup file, which is sourced before the daemon starts, because a service has no
+        shell that would source it. Not for `dds` and `zenoh`. `auto` logs a missing file and
+        continues."""),
     ] = None
     diagnostics: Annotated[
-        bool, tells("publish the health of daemon and devices each second on `/diagnostics`.")
+        bool,
+        tells("publish the health of the daemon and its devices each second on `/diagnostics`."),
     ] = True
     topics: Annotated[dict[Name, Name], tells("RMF's name of a topic -> the site's.")] = {}
     zenoh: Annotated[Zenoh | None, tells("routers, keys and certificates of `zenoh`.")] = None
@@ -115,13 +122,13 @@ class Rmf(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
         Literal["auto", "jazzy", "kilted"],
         tells("""the release of RMF's messages: `jazzy` (Humble, Iron and Jazzy) or `kilted`
         (Kilted, Lyrical and newer). `auto` follows the fleet adapters on the graph, and is `jazzy`
-        without one. Transport `ros2` takes what is installed."""),
+        without a fleet adapter. Transport `ros2` uses the installed message packages."""),
     ] = "auto"
 
     def problems(self) -> Remarks:
         """Yield settings without effect."""
         if self.release != "auto" and self.transport == "ros2":
-            yield ("release",), "transport ros2 takes what is installed: leave it out"
+            yield ("release",), "transport ros2 uses the installed message packages: leave it out"
         if self.zenoh and self.transport in ("ros2", "dds"):
             yield ("zenoh",), f"transport {self.transport} does not read it: write transport: zenoh"
 

@@ -1,4 +1,4 @@
-"""A table for comparison with a controller: `check` prints it, with boxes to tick on its sheet."""
+"""A table to compare with a controller. `check` prints it, and its sheet adds boxes to tick."""
 
 from msgspec import Struct
 
