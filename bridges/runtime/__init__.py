@@ -1,1 +1,1 @@
-"""Runs one YAML: the daemon, its loops, and the devices and subjects that they serve."""
+"""Serves one YAML: the daemon, its loops, and the devices and subjects on these loops."""

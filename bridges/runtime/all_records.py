@@ -1,9 +1,9 @@
-"""`outputs-off --all-records`: switches off the outputs in the services' records before daemons start.
+"""`outputs-off --all-records`: switches off all outputs in the services' records, before daemons start.
 
-For the start after a power cut. One process loads the program and forks for each service: a wire that
-hangs delays no other service, and each record has its own profiles. This machine's pins come first, as
-they depend on no module. The time is bounded, because every daemon waits for this command; a daemon
-makes the remaining outputs safe when it starts.
+It runs at boot, after a power cut. One process loads the program and forks for each service, so a wire
+that hangs delays no other service, and each record has its own profiles. This machine's pins come
+first, because they depend on no other device. The time is bounded, because every daemon waits for this
+command; a daemon switches off the remaining outputs when it starts.
 """
 
 import argparse
@@ -25,10 +25,10 @@ from bridges.yaml.problems import SettingsError
 from drivers.profiles import texts
 
 OWN_S, OTHERS_S = 4.0, 2.0
-"""For this machine's own pins, then for all other outputs: as long as a daemon's start may take."""
+"""The time limits (s) for this machine's own pins, then for all other outputs: every daemon waits."""
 LOOK_EVERY_S = 0.01
 OWN_PINS = re.compile(rb"\btype: *[\"']?gpio\b")
-"""Found in a YAML whose outputs are this machine's pins; decides only the order."""
+"""Matches a YAML whose outputs are this machine's pins. It decides only the order."""
 
 
 def switch_off_all(
@@ -40,7 +40,7 @@ def switch_off_all(
     for path in sorted(state.glob(f"*/{PATTERN}")):
         if record := read(path):
             file = Path(record.file)
-            with suppress(SettingsError):  # logged where the record is used
+            with suppress(SettingsError):  # the child that uses the record logs the error
                 record.config()  # each child inherits the modules imported here
             (own if OWN_PINS.search(record.yaml) else others).append(file)
     texts.give({})

@@ -1,5 +1,5 @@
-"""Refused requests that wait for an answer; bounded, as a flood of requests must not cause a flood of
-answers."""
+"""Refused requests that wait for an answer. Their number is bounded, so that a flood of requests causes
+no flood of answers."""
 
 from collections import deque
 from collections.abc import Callable, Mapping
@@ -23,12 +23,12 @@ class RefusalAnswers:
         self._said_at = AGES_AGO
 
     def add(self, request: object, reason: str) -> None:
-        """Note a refused request: the message or the event, and the reason. From any thread."""
+        """Note a refused request (its message or event) and the reason; from any thread."""
         self._waiting.append((request, reason))
 
     @property
     def due_at(self) -> float:
-        """The time of the next answers (monotonic s); NEVER if none waits."""
+        """The time of the next answers (monotonic s); NEVER if no request waits."""
         return self._said_at + TELL_GAP_S if self._waiting else NEVER
 
     def say(

@@ -1,4 +1,4 @@
-"""The runtime's clocks, and the pace of publishing: each second, and at once after a change."""
+"""The clocks of a daemon, and the pace of publishing: each second, and at once after a change."""
 
 import time
 from collections.abc import Callable
@@ -15,7 +15,7 @@ TELL_GAP_S = 0.1
 
 
 class Clock(Struct, frozen=True):
-    """Monotonic seconds for durations, seconds since the epoch for stamps; tests bring their own."""
+    """Two clocks: `monotonic` (s) for durations, `wall` (s since the epoch) for stamps."""
 
     monotonic: Callable[[], float]
     wall: Callable[[], float]
@@ -23,8 +23,8 @@ class Clock(Struct, frozen=True):
     def stamp(self, read_at: float | None) -> Time:
         """Return the stamp of a reading taken at `read_at` (monotonic s); 0 for None, no reading.
 
-        The stamp is the current wall clock minus the monotonic age: a step of the wall clock distorts
-        neither age nor order. Raises ClockError for a clock past 2038.
+        The stamp is the current wall clock minus the reading's monotonic age, so a step of the wall
+        clock distorts neither age nor order. Raises ClockError for a clock past 2038.
         """
         if read_at is None:
             return Time()

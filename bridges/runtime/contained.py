@@ -1,8 +1,8 @@
-"""Contains a driver's unexpected exceptions: they affect one device, and no other.
+"""Contains a driver's unexpected exceptions, so that they affect no other device.
 
 The device's outputs are switched off, the traceback is logged once, and the device is opened again
 after a pause that grows from 0.5 to 30 s. If its outputs are not verified off within OFF_WITHIN_S, the
-daemon ends, and `outputs-off` tries from a new process.
+daemon ends, and `outputs-off` tries to switch them off from a new process.
 """
 
 import logging
@@ -25,7 +25,7 @@ T = TypeVar("T")
 
 
 class LeftOn(Exception):
-    """A device whose driver has a defect could not be switched off. Ends the daemon."""
+    """A device whose driver has a defect could not be switched off. This error ends the daemon."""
 
 
 class Contained(Generic[X, O]):
@@ -51,7 +51,7 @@ class Contained(Generic[X, O]):
         self._call(self._driver.open)
 
     def read(self) -> X:
-        """Read every input; after a defect, claim the device first."""
+        """Read every input. After a defect, claim the device before reading."""
         return self._call(self._read)
 
     def write(self, outputs: O) -> None:
@@ -101,7 +101,7 @@ class Contained(Generic[X, O]):
         raise failure
 
     def _broke(self, error: Exception) -> DriverError:
-        """Log a defect, once until the device works again; return it as a DriverError."""
+        """Return a defect as a DriverError; log the first defect since the device last worked."""
         self._failure = f"a defect of the driver: {type(error).__name__}: {error}"
         if not self._pause_s:
             log.error(pairs("defect", device=self._name, reason=self._failure), exc_info=error)
@@ -116,7 +116,8 @@ class Contained(Generic[X, O]):
             self._unsafe_since = now
 
     def _insist_on_off(self) -> None:
-        """Switch off outputs that may be on. Raises DriverError; after OFF_WITHIN_S, LeftOn."""
+        """Switch off outputs that may be on. Raises DriverError if that fails, and LeftOn if it still
+        fails after OFF_WITHIN_S."""
         if self._unsafe_since is None:
             return
         since = self._unsafe_since

@@ -1,6 +1,7 @@
 """The daemon that serves one YAML: opens the transport, starts the loops and feeds systemd's watchdog.
 
-On SIGTERM, or any other signal that would end it, it switches every output off and leaves RMF's graph.
+On SIGTERM, or any other signal that would end a process, the daemon switches every output off and
+leaves RMF's graph.
 """
 
 import logging
@@ -41,11 +42,11 @@ STOP_WITHIN_S = 5.0
 STATUS_EVERY_S = 1.0
 ALIVE = "WATCHDOG=1"
 STARTING = "WATCHDOG=1\nEXTEND_TIMEOUT_USEC=30000000"
-"""With many silent units a start takes long without being a hang."""
+"""A start with many silent devices takes long, so it asks systemd for 30 more seconds."""
 
 
 class Daemon:
-    """One `rmf-bridge run`. `simulated`: shown in status and diagnostics."""
+    """One `rmf-bridge run`. `simulated`: the status and the diagnostics show that no hardware moves."""
 
     def __init__(
         self,
@@ -116,7 +117,7 @@ class Daemon:
         return RingWriter(make, clock_of(self._transport), lambda: self._transport.release)
 
     def serve(self) -> int:
-        """Run until a signal; return the exit code, 0 if every output is verified off."""
+        """Run until a signal; return the exit code, which is 0 if every output is verified off."""
         signals.on_reset(self._service.reset)
         self._service.subscribe()
         log.info(pairs("serving", file=self._config.path, kind=self._config.kind, **self._about()))
@@ -132,7 +133,8 @@ class Daemon:
         return 0 if safe else 1
 
     def _watch(self) -> None:
-        """Tell systemd when the daemon is ready; feed its watchdog while every loop finishes scans."""
+        """Tell systemd when the daemon is ready, and feed systemd's watchdog while every loop makes
+        progress."""
         period_s = min(STATUS_EVERY_S, (watchdog_s() or 10.0) / 6)
         told_ready, tell_at = False, 0.0
         fed = [-1] * len(self._loops)
@@ -155,7 +157,7 @@ class Daemon:
                 self._convenience("status", self._tell)
 
     def _require_life(self) -> None:
-        """Raise SystemExit if the transport or a loop has died: systemd restarts the whole daemon."""
+        """Raise SystemExit if the transport or a loop has died, so that systemd restarts the daemon."""
         if not self._transport.lives:
             log.critical(pairs("died", transport=self._transport.name))
             self._writer.died(f"transport {self._transport.name}")
@@ -182,11 +184,11 @@ class Daemon:
         return safe
 
     def _left(self) -> list[str]:
-        """Records of dead daemons whose outputs are not verified off."""
+        """Return the names of dead daemons' records whose outputs are not verified off."""
         return self._predecessor.left() if self._predecessor else []
 
     def _convenience(self, what: str, do: Callable[[], None]) -> None:
-        """Call `do`; log a failure once and run on. The next call tries again."""
+        """Call `do`; log a failure once and continue. The next call tries again."""
         try:
             do()
         except Exception as error:  # noqa: BLE001 - logged by Once
@@ -227,10 +229,12 @@ class Daemon:
             found = diagnosis(self._transport.name, self._config.kind, daemon, devices, at)
             self._diagnostics.publish(found)
             self._told += 1
-            if self._told % max(1, len(devices)) == 0:  # their size grows with the devices
+            if (
+                self._told % max(1, len(devices)) == 0
+            ):  # more devices: longer messages, recorded less
                 self._writer.spoken(self._health_topic.name, found, sent=True)
         except (
             TransportError,
             ClockError,
-        ) as error:  # debug: unpublished states are logged as an error elsewhere
+        ) as error:  # only debug, because the outlet logs unpublished states as errors
             log.debug(pairs("not_published", topic=DIAGNOSTICS.name, reason=error))

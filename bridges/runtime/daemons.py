@@ -52,7 +52,7 @@ class DeviceStatus(msgspec.Struct):
 
 
 class StatusFile(msgspec.Struct):
-    """The keys of a status file that `status` relies on."""
+    """The keys of a status file that `rmf-bridge status` reads."""
 
     devices: dict[str, DeviceStatus] = {}
     faults: list[FaultStatus] = []
@@ -61,11 +61,11 @@ class StatusFile(msgspec.Struct):
 
 
 class DaemonStatus(msgspec.Struct, kw_only=True):
-    """One daemon, or a unit without one.
+    """One daemon, or a unit of systemd without a daemon.
 
-    `state`: `serving`; `old`: runs, but its status is not fresh; `died`: left a status file behind;
-    `left on`: died, and its outputs are not verified off; `failed`: systemd has given up; `stopped`;
-    `unknown`: this user may not see it. `unit`: the unit's state in systemd.
+    `state`: `serving`; `old`: it runs, but its status is not fresh; `died`: it left a status file
+    behind; `left on`: it died, and its outputs are not verified off; `failed`: systemd has given up;
+    `stopped`; `unknown`: this user may not see the daemon. `unit`: the unit's state in systemd.
     """
 
     name: str
@@ -92,7 +92,8 @@ class DaemonStatus(msgspec.Struct, kw_only=True):
 def daemons(
     folders: Iterable[Path], found_units: Mapping[str, str], wall: float
 ) -> Iterator[DaemonStatus]:
-    """Yield the daemon of each runtime directory, then systemd's units without one. `wall`: now."""
+    """Yield the daemon of each runtime directory, then systemd's units without a directory. `wall`:
+    now."""
     rest = dict(found_units)
     for folder in folders:
         service = folder.parent == SERVICE_RUN
@@ -126,7 +127,7 @@ def _daemon(folder: Path, by: str, unit: str, wall: float) -> DaemonStatus:
 
 
 def _unreleased(folder: Path) -> str:
-    """Return the remedy for a dead daemon's outputs not verified off; "" without a record."""
+    """Return the remedy for the outputs that a dead daemon may have left on; "" without a record."""
     state = SERVICE_STATE if folder.parent == SERVICE_RUN else state_base()
     for path in paths(Directories(folder, state / folder.name)):
         if record := read(path):
@@ -142,7 +143,7 @@ def _without_directory(unit: str) -> str:
 
 
 def _read(path: Path, wall: float) -> tuple[dict[str, Any], float | None]:
-    """Return the status and its age (s); empty and None if it is missing or invalid."""
+    """Return the status and its age (s); an empty status and None if the file is missing or invalid."""
     try:
         written_at = path.lstat().st_mtime
         text = files.read(path, holder.STATUS_MAX)

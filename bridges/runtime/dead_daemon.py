@@ -1,7 +1,7 @@
 """Switches off a dead daemon's outputs from a new process, for `rmf-bridge outputs-off`.
 
-The daemon's record, written before its first claim, takes precedence over the YAML, which may have been
-edited since. A directory that is full, missing or read-only does not delay switching off.
+The record that the daemon wrote before it claimed outputs takes precedence over the YAML, which may
+have been edited since. A directory that is full, missing or read-only does not delay switching off.
 """
 
 import argparse
@@ -51,9 +51,9 @@ def switch_off(args: argparse.Namespace) -> int:
         )
     except runtime.AlreadyRunning as error:
         if claimed:
-            logging.warning("%s. But this run's outputs are not off yet", error)
+            logging.warning("%s. But the outputs of the run that ended are not off yet", error)
             return _off_by_records(records, answered)
-        logging.error("%s. That switches its outputs off", error)
+        logging.error("%s. That program switches the outputs off", error)
         return os.EX_UNAVAILABLE
     try:
         if held.records.unreleased():
@@ -64,9 +64,10 @@ def switch_off(args: argparse.Namespace) -> int:
 
 
 def _places(file: Path, given: str | None) -> Directories | None:
-    """Return the daemon's directories; None if they are not trusted and systemd reports its death.
+    """Return the daemon's directories; None if they are not trusted and systemd reports that the daemon
+    is dead.
 
-    Raises PermissionError if a daemon may run there unseen.
+    Raises PermissionError if the directories may hide a running daemon.
     """
     try:
         places = runtime.find(file, given)
@@ -108,7 +109,7 @@ def _off_by_record(
     try:
         config = record.config()
     except SettingsError as error:
-        _say(error)  # a YAML of another version: only the current file is left to use
+        _say(error)  # another version wrote the record, so only the current YAML is left to use
         _off_by_yaml(Path(record.file), answered)
         return False
     unsafe = _unsafe(config, record.safe, answered, within_s)
@@ -137,8 +138,8 @@ class _StatusFile(msgspec.Struct):
 
 
 def ages(places: Directories) -> Mapping[str, float]:
-    """Return the age (s) of each device's last answer in the dead daemon's last status; empty without
-    a status. Devices without an answer are left out."""
+    """Return device -> age (s) of its last answer, from the dead daemon's last status; empty without a
+    status. Devices without an answer are left out."""
     try:
         shown = msgspec.json.decode(read(places.runtime / STATUS, STATUS_MAX), type=_StatusFile)
     except (OSError, msgspec.MsgspecError, UnicodeDecodeError, RecursionError):

@@ -1,7 +1,7 @@
-"""One device in service: scans its driver, and decides with its subject.
+"""One device in service: its node scans the driver, and decides with its subject.
 
 A scan is like a PLC's: read the inputs, decide, write every output, publish if due. The loop of the
-device's bus calls `scan`; nothing here waits or has a thread.
+device's bus calls `scan`. No function in this file waits or has a thread.
 """
 
 import logging
@@ -100,7 +100,7 @@ class Node(Generic[S, L, M, X, E, O, R]):
         self._answers.add(message, str(refusal))
 
     def was_suspended(self, for_s: float) -> None:
-        """Note a pause in scanning of `for_s` (s): earlier readings may be outdated."""
+        """Note that nothing was scanned for `for_s` (s), so earlier readings may be outdated."""
         self._decide(Suspended(f"nothing was read for {for_s:.1f} s"))
 
     def scan(self, events: Iterable[DeviceEvent[X, E]] = ()) -> None:
@@ -109,7 +109,7 @@ class Node(Generic[S, L, M, X, E, O, R]):
         self._bus_words.clear()
         self._decide(self._read())
         for event in events:
-            if isinstance(event, OperatorReset):  # claims a failed device again
+            if isinstance(event, OperatorReset):  # the next scan claims a failed device again
                 self._open = self._open and not self._io_fault
             self._decide(event)
         self._write()
@@ -137,7 +137,7 @@ class Node(Generic[S, L, M, X, E, O, R]):
         return self._refusals.counts()
 
     def status(self) -> Status:
-        """Return for the status file: the state shown to RMF, outputs, faults, input age, contacts."""
+        """Return the part of the status file: state, outputs, faults, age of the inputs, contacts."""
         decision = self.subject.decision
         if decision is None:
             return {}
@@ -158,7 +158,7 @@ class Node(Generic[S, L, M, X, E, O, R]):
         return Sampled(sample)
 
     def _write(self) -> None:
-        """Write all outputs, as levels, in each scan; none before the first reading."""
+        """Write all outputs, as levels, in each scan, but write nothing before the first reading."""
         if not self._has_read or self.subject.decision is None:
             return
         try:
@@ -174,7 +174,7 @@ class Node(Generic[S, L, M, X, E, O, R]):
         self._logged_outputs = outputs if self._logged_outputs is None else self._logged_outputs
 
     def _tell(self) -> None:
-        """Publish the state if it is due; a request alone does not cause it."""
+        """Publish the state if it is due. A request alone does not make it due."""
         subject, now = self.subject, self._clock.monotonic()
         assert subject.decision is not None
         report = subject.decision.report
@@ -206,7 +206,7 @@ class Node(Generic[S, L, M, X, E, O, R]):
         return self._publish(self._kind.states, state) is not False
 
     def _log(self) -> None:
-        """Log changes, as the last step of a scan: a log line takes as long as a scan."""
+        """Log changes. This is the last step of a scan, because a log line takes as long as a scan."""
         decision = self.subject.decision
         assert decision is not None
         if decision.outputs != self._logged_outputs:
@@ -232,4 +232,4 @@ class Node(Generic[S, L, M, X, E, O, R]):
 
 
 AnyNode = Node[Any, Any, Any, Any, Any, Any, Any]
-"""A node of a kind known only by its name."""
+"""A node whose kind was found by its name; its types are unknown."""

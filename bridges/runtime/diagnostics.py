@@ -2,13 +2,14 @@
 
 There is one status for the daemon and one for each device (for a supervisor: each lift or door).
 `name` is `<node>: <device>`, as ROS's aggregator expects; `hardware_id` is the device's name; `message`
-names the faults. The values come from the status file, each fault's detail under its code.
-LiftState, DoorState and ChargerState have no fields for this.
+names the faults. The values come from the status file; the detail of a fault is under the fault's code.
+LiftState, DoorState and ChargerState have no fields for faults.
 
     OK      the input is read, and there is no fault
     WARN    the daemon is a simulation, or still only listens in its quiet start
-    ERROR   the device or the daemon has faults: it cannot publish, or another node does its work
-    STALE   its input has not been read yet
+    ERROR   the device or the daemon has faults; the daemon has one if it cannot publish, or if another
+            node does its work
+    STALE   the device's input has not been read yet
 """
 
 from collections.abc import Iterator, Mapping
@@ -28,9 +29,9 @@ from bridges.runtime.subject import Status
 from bridges.system.log import plain
 
 MOST: Final = 100
-"""At most this many devices: a supervisor learns names from the network, which may flood it."""
+"""The most devices in a message, because the network may flood a supervisor with names."""
 CONTACTS: Final = "contacts"
-"""Left out here, and only in the status file: they would be most of the traffic on the graph."""
+"""This key is only in the status file, because contacts would be most of the traffic on the graph."""
 
 
 def diagnosis(
@@ -70,7 +71,7 @@ def _values(status: Status) -> tuple[KeyValue, ...]:
 
 
 def _pairs(status: Status) -> Iterator[tuple[str, str]]:
-    """Flatten a status: a fault becomes code and detail, a table one value for each entry."""
+    """Yield the status as (key, value): each fault as code and detail, each entry of a table alone."""
     for key, value in status.items():
         if key == CONTACTS:
             continue

@@ -1,7 +1,7 @@
 """A service's drop-in: the systemd settings for its YAML, beside the unit common to all services.
 
-`rmf-bridge enable` writes it. The unit alone permits no device, and `run` refuses a drop-in for other
-needs: a daemon that is not permitted to open its relay could only report this each second.
+`rmf-bridge enable` writes it. The unit alone permits no device. `run` refuses a drop-in for other
+needs, because a daemon that may not open its relay could only report this each second.
 """
 
 import hashlib
@@ -16,7 +16,8 @@ from bridges.transports.zenoh.config import mode
 from drivers.hal import Needs
 
 FITS: Final = "RMF_BRIDGE_FITS"
-"""The environment variable with the `fits` word of the drop-in; `nothing` in the unit alone."""
+"""The environment variable with the result of `fits` from the drop-in; the unit sets it to
+`nothing`."""
 ROUND_S: Final = 1.25
 LEAST_S: Final = 3.0
 WITHOUT_OUTPUTS_S: Final = 10.0
@@ -24,7 +25,8 @@ LOCAL: Final = ("localhost", "multicast")
 
 
 def text(config: Config, groups: Collection[str]) -> str:
-    """Return the drop-in's text. `groups`: the machine's; with an unknown group no unit starts."""
+    """Return the drop-in's text. `groups`: the machine's groups; a unit with an unknown group does not
+    start."""
     head = (
         f"# Written by `rmf-bridge enable` for {config.path.name}. After a change enable it again."
     )
@@ -48,17 +50,18 @@ def misfit(config: Config, environ: Mapping[str, str]) -> str:
 
 
 def watchdog_s(config: Config) -> float:
-    """Return the longest time (s) that a hung daemon keeps its relays.
+    """Return the longest time (s) for which a hung daemon keeps its relays on.
 
     A loop finishes a step each second, when its states are due, or one bus call later. A call may take
-    at most half of this time. Without outputs the time is longer, as disks may be slow.
+    at most half of this time. Without outputs the time is longer, because a slow disk may delay a step.
     """
     slowest = max((getattr(bus, "timeout_s", 0.0) for bus in config.buses.values()), default=0.0)
     return max(LEAST_S, 1.75 * slowest + ROUND_S) if config.buses else WITHOUT_OUTPUTS_S
 
 
 def _unit(config: Config) -> list[str]:
-    """Load the kernel modules before the unit starts: DeviceAllow needs known device classes."""
+    """Return the lines that load kernel modules before the unit starts, because DeviceAllow needs known
+    device classes."""
     units = " ".join(
         f"modprobe@{name}.service" for name in _each(n.modules for n in _needs(config))
     )
@@ -85,21 +88,21 @@ def _needs(config: Config) -> list[Needs]:
 
 
 def _each(found: Iterable[Iterable[str]]) -> list[str]:
-    """Return each word once, without empty ones."""
+    """Return each word once, without empty words."""
     return list(dict.fromkeys(word for words in found for word in words if word))
 
 
 def _hosts(rmf: Rmf, needs: Iterable[Needs]) -> list[str] | None:
     """Return the addresses that the daemon talks to; None if they are unknown before it runs.
 
-    Unknown are the nodes of a DDS site, the peers of a zenoh peer, and the addresses of host names.
+    The nodes of a DDS site, the peers of a zenoh peer, and the addresses of host names are unknown.
     """
     hosts = [*_graph_hosts(rmf), *_each([n.host] for n in needs)]
     return None if not all(map(_is_address, hosts)) else _each([LOCAL, hosts])
 
 
 def _graph_hosts(rmf: Rmf) -> list[str]:
-    """Return the hosts of the other nodes; a host name among them, or "*", stands for any address."""
+    """Return the hosts of the other nodes. A host name or "*" stands for any address."""
     if rmf.network == "localhost":
         return []
     zenoh = rmf.zenoh or Zenoh()

@@ -34,13 +34,14 @@ class Remedy(msgspec.Struct, frozen=True):
 
 
 def remedies() -> dict[str, Remedy]:
-    """Return each fault's remedy by its code."""
+    """Return fault code -> remedy."""
     text = Path(__file__).with_suffix(".yaml").read_text(encoding="utf-8")
     return msgspec.convert(yaml.safe_load(text), dict[str, Remedy])
 
 
 def values(file: str, device: str) -> dict[str, str]:
-    """Return a device's settings from the daemon's YAML, key -> value; empty if it cannot be read."""
+    """Return a device's settings, key -> value, from the daemon's YAML; empty if the YAML is
+    invalid."""
     from bridges.settings.load import SettingsError, load
 
     try:
@@ -72,7 +73,7 @@ def here(remedy: Remedy, file: str, device: str, known: Mapping[str, str]) -> Re
 
 @cache
 def for_explain() -> dict[str, tuple[str, str]]:
-    """Return each fault's (cause, remedy) by its code, for `workbench/explain/`."""
+    """Return fault code -> (cause, remedy), for `workbench/explain/`."""
     return {code: (one.cause, one.do) for code, one in remedies().items()}
 
 

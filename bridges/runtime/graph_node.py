@@ -1,4 +1,4 @@
-"""Serves a kind without hardware: a core memory for each subject, and its publishers on RMF's graph.
+"""Serves a kind without hardware, with a core memory for each subject and publishers on RMF's graph.
 
 A round takes the arrived messages, wakes the subjects that are due and publishes their messages.
 Tests call rounds in virtual time; the daemon has a thread for them (`bridges/runtime/serving.py`).
@@ -31,18 +31,19 @@ from bridges.transports.transport import Subscription, Transport
 log = logging.getLogger(__name__)
 
 MAX_SUBJECTS = 1000
-"""More lifts or doors than any site has: further names must be invented."""
+"""No site has more lifts or doors, so further names must be invented."""
 MAX_UNSHOWN = 100
-"""The limit of names known only from requests, without a state of such a lift or door."""
+"""The most lifts or doors that are known only from requests, without a published state."""
 MAX_REQUESTERS = 10_000
-"""The limit of requesters at lifts or doors missing in the YAML, in total: more than any site's robots.
-A holder is never forgotten, so invented ones would pile up.
+"""The most requesters of all lifts or doors that are not in the YAML: more than any site has robots.
+A holder is never forgotten, so invented requesters would accumulate.
 """
 DEFECT = "a defect"
 
 
 def _core(kind: GraphKind[S, L, M, E, R], limits: L) -> SubjectCore[M, GraphEvent[E], None, R]:
-    """Return the kind's core. Faults are identified by code and detail: the detail names the owner."""
+    """Return the kind's core. Code and detail identify a fault, because the detail names the
+    subject."""
 
     def itself(fault: Fault) -> Fault:
         return fault
@@ -60,7 +61,7 @@ def _same(topic: Topic[Message]) -> Topic[Message]:
 
 
 class GraphNode(Generic[S, L, M, E, R]):
-    """Serves one GraphKind. `named`: renames topics as the site's YAML says."""
+    """Serves one GraphKind. `named(topic)`: the topic under its name in the site's YAML."""
 
     def __init__(
         self,
@@ -119,12 +120,12 @@ class GraphNode(Generic[S, L, M, E, R]):
 
     @property
     def finished(self) -> int:
-        """Always 0: steps within a round are not counted."""
+        """Always 0, because steps within a round are not counted."""
         return 0
 
     @property
     def ready(self) -> bool:
-        """Always true: a passive node is ready too, as another node does its work."""
+        """Always true: a passive node is ready too, because another node does its work."""
         return True
 
     @property
@@ -155,7 +156,7 @@ class GraphNode(Generic[S, L, M, E, R]):
         self._writer.flush()
 
     def end(self) -> bool:
-        """Return True: there is nothing to switch off."""
+        """Return True, because there is no output to switch off."""
         return True
 
     @property
@@ -164,7 +165,7 @@ class GraphNode(Generic[S, L, M, E, R]):
         return self._refusals.counts()
 
     def status(self) -> Status:
-        """Return for the status file: passive or not, rivals, refusals, faults, connections."""
+        """Return the part of the status file: silence, rivals, refusals, faults, connections."""
         return {
             "passive": not self.presence.may_speak,
             "other_publishers": self.presence.rivals,
@@ -183,7 +184,7 @@ class GraphNode(Generic[S, L, M, E, R]):
         return {subject.name: subject.status() for subject in list(self.subjects.values())}
 
     def _to_inbox(self, topic: Topic[Message]) -> Callable[[Message], None]:
-        """Return a callback for the transport's thread; only accepted messages enter the inbox."""
+        """Return a callback for the transport's thread, which puts accepted messages into the inbox."""
 
         heard_on = self._named(topic).name
 
@@ -197,7 +198,8 @@ class GraphNode(Generic[S, L, M, E, R]):
 
     @contextmanager
     def _counting(self, about: str, message: object = None) -> Iterator[None]:
-        """Count refusals and failures by a defect of ours. A core that fails has changed nothing."""
+        """Count refusals, and failures that a defect of ours causes. A core that fails has changed
+        nothing."""
         try:
             yield
         except RequestRefused as refusal:
@@ -238,7 +240,7 @@ class GraphNode(Generic[S, L, M, E, R]):
         return any(self._kind.urgent(subject.memory) for subject in self.subjects.values())
 
     def _heard_by(self) -> dict[str, int]:
-        """Return the number of subscriptions that receive each topic, by its name."""
+        """Return topic's name -> number of subscriptions that receive it."""
         names = {topic.name for topic in self._kind.publishes}
         return {name: n for name, n in self._outlet.heard_by().items() if name in names}
 
@@ -260,7 +262,8 @@ class GraphNode(Generic[S, L, M, E, R]):
             self._decide(subject, event)
 
     def _subject(self, name: str, shows_itself: bool) -> Subject[M, GraphEvent[E], None, R]:
-        """Return the subject of this name, made if new. Raises RequestRefused for too many names."""
+        """Return the subject with this name; make it if it is new. Raises RequestRefused for too many
+        names."""
         if name not in self.subjects and not self._has_room(name, shows_itself):
             raise RequestRefused("too many names", name)
         if shows_itself:
@@ -269,7 +272,8 @@ class GraphNode(Generic[S, L, M, E, R]):
         return found or self._add(name, self._kind.initial(name, self._started_at))
 
     def _has_room(self, name: str, shows_itself: bool) -> bool:
-        """Is there room for this name? Invented ones must not displace names with a YAML or state."""
+        """Is there room for this name? Invented names must not displace names that the YAML or a state
+        proves."""
         if name in self._reserved:
             return True
         if shows_itself:
@@ -283,14 +287,15 @@ class GraphNode(Generic[S, L, M, E, R]):
             raise RequestRefused("too many requesters", f"{who} at {subject.name}")
 
     def _remembered(self, subject: Subject[M, GraphEvent[E], None, R]) -> int:
-        """Return the number of remembered requesters; 0 for a name in the YAML, bounded elsewhere."""
+        """Return the number of remembered requesters; 0 for a subject in the YAML, whose core bounds
+        the number."""
         if subject.name in self._reserved:
             return 0
         return len(self._kind.requesters(subject.memory))
 
     def _real(self, memories: Mapping[str, M]) -> Mapping[str, M]:
-        """Leave out names without a published state if they are a flood, which would otherwise be
-        back at the next start."""
+        """Leave out names without a published state if they are a flood, so that the flood does not
+        return at the next start."""
         if len(memories) - len(self._shown) < MAX_UNSHOWN:
             return memories
         real = self._shown | self._reserved
@@ -318,7 +323,7 @@ class GraphNode(Generic[S, L, M, E, R]):
             self._decide(subject, event)
 
     def _will_say(self, topic: Topic[Message], message: Message) -> None:
-        """Hold the message back until the round has written its memories to disk."""
+        """Defer the message until the round has written the memories to disk."""
         self._unsaid.append((topic, message))
 
     def _say(self) -> None:
@@ -337,4 +342,4 @@ class GraphNode(Generic[S, L, M, E, R]):
 
 
 AnyGraphNode = GraphNode[Any, Any, Any, Any, Any]
-"""A node of a kind known only by its name."""
+"""A node whose kind was found by its name; its types are unknown."""

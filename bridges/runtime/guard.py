@@ -1,8 +1,9 @@
 """The guard of a daemon started by hand: switches off the outputs that a kill -9 leaves on.
 
 The guard is a shell, because it only waits. It has its own session, which neither Ctrl-C nor a closed
-terminal reaches. It reads a pipe held only by the daemon: a word means that the outputs are off, the
-end of the pipe without a word that the daemon is dead. Under systemd, ExecStopPost does this.
+terminal reaches. It reads a pipe whose other end only the daemon has open. A word from the pipe means
+that the outputs are off; the end of the pipe without a word means that the daemon is dead. Under
+systemd, ExecStopPost takes the guard's place.
 """
 
 import logging
@@ -32,19 +33,19 @@ while [ $pause -le 60 ]; do
     esac
 done
 """
-"""Exit code 1: hardware does not answer. `outputs-off` is repeated for minutes with growing pauses, as
-nobody restarts this daemon. EX_UNAVAILABLE: the dead daemon's lock was not free yet, or another daemon
-serves now and switches the leftover outputs off; one more try."""
+"""After exit code 1 (hardware does not answer) `outputs-off` is repeated for minutes with growing
+pauses, because nobody restarts this daemon. After EX_UNAVAILABLE it is repeated once: either the dead
+daemon's lock was not free yet, or another daemon serves now and switches the outputs off."""
 
 
 def command(file: Path, runtime_dir: str | None) -> list[str]:
-    """Return the command that switches off outputs this process may leave on."""
+    """Return the command that switches off the outputs that this process may leave on."""
     given = ["--runtime-dir", os.path.abspath(runtime_dir)] if runtime_dir else []
     return [sys.executable, "-P", "-m", "bridges.cli", "outputs-off", str(file.absolute()), *given]
 
 
 class Guard:
-    """The running guard. `command`: switches every output off."""
+    """The running guard. `command`: the command that switches every output off."""
 
     def __init__(self, command: Sequence[str]) -> None:
         self._shell: subprocess.Popen[bytes] | None = None
@@ -68,7 +69,8 @@ class Guard:
 
 
 UNIT = ("NOTIFY_SOCKET", "RUNTIME_DIRECTORY", "RMF_BRIDGE_SERVICE")
-"""Variables that only a unit sets. (INVOCATION_ID is also set in a desktop's terminals.)"""
+"""Variables that only a unit sets. (INVOCATION_ID is missing here: a desktop's terminals have it
+too.)"""
 
 
 def needed(environ: Mapping[str, str] = os.environ) -> bool:

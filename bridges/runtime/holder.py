@@ -1,7 +1,7 @@
 """The holder of a daemon's directory: the process named in `holder.json`, while that process lives.
 
-Looking takes no lock and hinders nobody, but gives no right to the directory; only the lock does
-(`runtime_directory.py`).
+To look for the holder takes no lock and hinders no process, but gives no right to the directory; only
+the lock gives that right (`runtime_directory.py`).
 """
 
 import os
@@ -18,7 +18,7 @@ from bridges.system.files import read
 HOLDER: Final = "holder.json"
 STATUS: Final = "status.json"
 FRESH_S: Final = 5.0
-"""The status file is written each second."""
+"""A status file is fresh for this long. It is written each second."""
 LONGEST: Final = 65536
 STATUS_MAX: Final = 4 << 20
 BOOT: Final = Path("/proc/sys/kernel/random/boot_id")
@@ -28,7 +28,7 @@ class LockHolder(msgspec.Struct, frozen=True):
     """A process and its YAML's path. `serves`: it is a daemon that serves this YAML.
 
     `boot`: the id of the boot in which `pid` is valid; `started`: the process's start in ticks since
-    boot, 0 if unknown. They expose a `pid` that another process has taken over.
+    boot, 0 if unknown. Both show whether the kernel has given `pid` to another process.
     """
 
     pid: int
@@ -42,7 +42,8 @@ class LockHolder(msgspec.Struct, frozen=True):
 
     @property
     def lives(self) -> bool:
-        """Is the process still there? /proc may hide the start of another user's process."""
+        """Is the process still there? If /proc hides the start of another user's process, the start
+        does not count."""
         if self.boot != _boot() or not _is_there(self.pid):
             return False
         return _started(self.pid) in (self.started, 0)
@@ -61,9 +62,10 @@ def ourselves(file: Path, *, serves: bool) -> LockHolder:
 
 
 def look(places: Directories) -> LockHolder | None:
-    """Return the living holder of these directories, or None. Raises PermissionError.
+    """Return the living holder of these directories, or None without a holder. Raises PermissionError.
 
-    The runtime directory comes first, as on a read-only root the state directory has an old holder.
+    The runtime directory comes first, because on a read-only root the state directory names an old
+    holder.
     """
     found = (written(folder) for folder in reversed(places.folders))
     return next((one for one in found if one and one.lives), None) or shown(places)
@@ -83,8 +85,8 @@ def written(folder: Path) -> LockHolder | None:
 
 
 def shown(places: Directories) -> LockHolder | None:
-    """Return the living daemon of a fresh status file, or None: for daemons without `holder.json`,
-    because they could not write it or are of an older version."""
+    """Return the living daemon that a fresh status file names, or None. A daemon has no `holder.json`
+    if it could not write the file or is of an older version."""
     path = places.runtime / STATUS
     with suppress(OSError, msgspec.MsgspecError, UnicodeDecodeError), opened(places.runtime):
         fresh = abs(time.time() - path.lstat().st_mtime) < FRESH_S

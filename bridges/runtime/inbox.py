@@ -1,4 +1,4 @@
-"""Waiting events for the devices or subjects of one thread, and the bell that wakes the thread."""
+"""The inbox of one thread: waiting events for its devices or subjects, and a bell that wakes it."""
 
 import queue
 import threading
@@ -6,19 +6,19 @@ from collections.abc import Hashable
 from typing import Generic, TypeVar
 
 INBOX_SIZE = 512
-"""More events for one device between two scans are a flood: the oldest are dropped and counted."""
+"""The most events for one device between two scans. In a flood the oldest are dropped and counted."""
 
 MOST_NAMES = 2000
-"""More devices than any site has. Further names must be invented, and are dropped."""
+"""No site has more devices, so events for further names are dropped: such names must be invented."""
 
 T = TypeVar("T")
 
 
 class Inbox(Generic[T]):
-    """Every thread may put; the serving thread takes.
+    """An inbox: any thread puts events, and the serving thread takes them.
 
-    A request is a level, not a pulse: a new event replaces a waiting one with the same `key`, so a
-    flood of repeats costs a scan as much as one event. Events stay in order of arrival.
+    A new event replaces a waiting event with the same `key`, because a request is a level, not a pulse.
+    So a flood of repeats costs a scan no more than one event. Events stay in order of arrival.
     """
 
     def __init__(self) -> None:
@@ -30,7 +30,7 @@ class Inbox(Generic[T]):
         self.closed = False
 
     def put(self, name: str, item: T, key: Hashable = None) -> None:
-        """Add an event for a device and wake the thread. An event without a key replaces none."""
+        """Add an event for a device and wake the thread. An event without a key replaces no event."""
         with self._lock:
             if len(self._items) >= MOST_NAMES and name not in self._items:
                 self.dropped += 1
@@ -55,7 +55,7 @@ class Inbox(Generic[T]):
         self.wake()
 
     def wait(self, timeout_s: float) -> bool:
-        """Wait for the bell; False after `timeout_s`."""
+        """Wait for the bell; return False after `timeout_s`."""
         try:
             self._bell.get(timeout=max(0.0, timeout_s))
         except queue.Empty:

@@ -1,7 +1,7 @@
 """The memory on disk of a kind without hardware, and the message about all its subjects.
 
-The memory is written before messages are published, because others act on these. If writing fails, the
-kind goes on serving with the fault NOT_KEPT, and writing is retried each second.
+The memory is written before messages are published, because other nodes act on these messages. If
+writing fails, the kind continues to serve with the fault NOT_KEPT, and writing is retried each second.
 """
 
 import logging
@@ -47,7 +47,7 @@ class Keeper(Generic[S, L, M, E, R]):
         self._pace = PublishPace()
 
     def restore(self, settings: S, now: float) -> Mapping[str, M]:
-        """Return the memories on disk, by subject; log and ignore an invalid file."""
+        """Return subject -> memory, from disk; log and ignore an invalid file."""
         if self._kept is None or self._kind.restore is None:
             return {}
         try:
@@ -70,7 +70,7 @@ class Keeper(Generic[S, L, M, E, R]):
         return (self._fault,) if self._fault else ()
 
     def keep(self, memories: Mapping[str, M], now: float) -> None:
-        """Write the part of the memories that must survive a restart, if changed."""
+        """Write the part of the memories that must survive a restart, if this part has changed."""
         if (
             self._kept is None
             or self._kind.persist is None

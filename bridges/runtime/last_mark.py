@@ -1,8 +1,9 @@
-"""Two marks that a run of a service leaves for the `outputs-off` after it.
+"""Two marks that a run of a service leaves for the `outputs-off` that follows the run.
 
-`claimed`: the run was about to claim outputs: `outputs-off` switches them off whichever process has the
-lock. `all-off`, the last mark: every output was verified off, and nothing is left to do. A mark holds
-its run's INVOCATION_ID (systemd.exec(5)); marks of older runs and unreadable ones are ignored.
+The mark `claimed` says that the run was about to claim outputs; `outputs-off` switches these off
+whichever process has the lock. The last mark, `all-off`, says that every output was verified off, so
+`outputs-off` has nothing to do. A mark holds its run's INVOCATION_ID (systemd.exec(5)); marks of older
+runs and unreadable marks are ignored.
 """
 
 import os

@@ -1,11 +1,11 @@
 """The loop: one bus and the devices on it.
 
-RMF callbacks put events into the inbox, GPIO edges wake the loop. A round scans each device that is
-due, has events, or may have changed: first the devices that answered last time, then the others, the
-longest overdue first. A round ends after one silent device, so a live device's reading is never older
-than its period plus one silent device's timeout, even in the first rounds. A device that falls silent
-also costs its retries, once. At the end, for any cause, every output is made safe, first on the
-devices that answer.
+RMF callbacks put events into the inbox, and GPIO edges wake the loop. A round scans each device that is
+due, has events, or may have changed: first the devices that answered last time, then the other devices,
+the longest overdue first. A round ends after one silent device, so a live device's reading is never
+older than its period plus one silent device's timeout, even in the first rounds. A device that falls
+silent also costs its retries, once. When the loop ends, for any cause, it switches every output off,
+beginning with the devices that answer.
 """
 
 import logging
@@ -59,7 +59,7 @@ class Loop:
 
     @property
     def finished(self) -> int:
-        """The number of scans and finished bus calls so far, failed calls included."""
+        """The number of finished scans and bus calls so far, failed calls included."""
         return self._scans + self._bus.calls
 
     @property
@@ -79,7 +79,8 @@ class Loop:
         self._ran_at = self._clock.monotonic()
 
     def end(self) -> bool:
-        """Switch every output off and release the bus; return False if not all are verified off."""
+        """Switch every output off and release the bus; return False if an output is not verified
+        off."""
         self._bus.insist()
         safe = [node.make_safe() for node in self._in_turn()]
         for node in self.nodes:
@@ -97,7 +98,7 @@ class Loop:
                 node.was_suspended(late_s)
 
     def _scan_in_turn(self, asked: Collection[str]) -> None:
-        """Scan the devices that are due or in `asked`, up to the first silent one."""
+        """Scan the devices that are due or in `asked`, up to the first silent device."""
         for node in self._in_turn():
             if self.inbox.closed:
                 return
@@ -108,7 +109,8 @@ class Loop:
                     return
 
     def _in_turn(self) -> list[AnyNode]:
-        """Return the nodes that answer, in the YAML's order, then the others, longest overdue first."""
+        """Return first the nodes that answer, in the YAML's order, then the other nodes, longest
+        overdue first."""
         others = [node for node in self.nodes if not node.answers]
         others.sort(key=lambda node: self._due[node.name])
         return [node for node in self.nodes if node.answers] + others
@@ -128,7 +130,7 @@ class Loop:
         self.inbox.wake()
 
     def _take_edge(self) -> None:
-        """Make every device due after an edge. An edge during this round causes the next one."""
+        """Make every device due after an edge. An edge during a round causes the next round."""
         if self._edge:
             self._edge = False
             self._due = dict.fromkeys(self._due, AGES_AGO)

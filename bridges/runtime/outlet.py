@@ -16,14 +16,14 @@ from bridges.transports.transport import Publisher, Transport, TransportError
 log = logging.getLogger(__name__)
 
 Named = Callable[[Topic[Message]], Topic[Message]]
-"""Renames a topic as the site's YAML says."""
+"""Returns a topic under its name in the site's YAML."""
 
 
 class Outlet:
     """Publishers that are declared while their node may speak.
 
     `bridges/messages/fallbacks.py` has substitutes for messages that RMF's release lacks. An alarm and
-    its end go out in the same way, even if the release changes in between.
+    its end go out on the same topic, even if the release changes in between.
     """
 
     def __init__(self, transport: Transport, named: Named, writer: NoWriter = NOBODY) -> None:
@@ -42,7 +42,8 @@ class Outlet:
                 self._end(topic)
 
     def publish(self, topic: Topic[Message], message: Message) -> bool:
-        """Publish a message; return False if it was not sent, a fault until the next one is."""
+        """Publish a message; return False if it was not sent, which is a fault until the next
+        success."""
         way, wanted = self._way(topic, message)
         if wanted is None:
             if isinstance(message, Alert):
@@ -58,12 +59,12 @@ class Outlet:
         return True
 
     def failed(self, topic: Topic[Message], error: Exception) -> None:
-        """Note an unpublished message; log the first one."""
+        """Note that a message was not published, and log the first such message."""
         self._once.failed(topic.name, error)
 
     @property
     def faults(self) -> tuple[Fault, ...]:
-        """NOT_PUBLISHED for each topic whose last message was not sent; from any thread."""
+        """A fault NOT_PUBLISHED for each topic whose last message was not sent; from any thread."""
         failing = sorted(self._once.wrong.copy().items())
         return tuple(Fault("NOT_PUBLISHED", f"{topic}: {why}") for topic, why in failing)
 
@@ -84,7 +85,7 @@ class Outlet:
             return self._ends[topic.name]
 
     def heard_by(self) -> dict[str, int]:
-        """Return the number of subscriptions that receive each topic, by the topic's name."""
+        """Return topic's name -> number of subscriptions that receive it."""
         return {name: end.matched() for name, end in self._ends.copy().items()}
 
     def close(self, topics: Iterable[Topic[Message]] | None = None) -> None:

@@ -1,9 +1,10 @@
-"""Switches off the outputs that a dead daemon left on, before this daemon claims any.
+"""Switches off the outputs that a dead daemon left on, before this daemon claims outputs.
 
-A separate `outputs-off` process does it, as after every death: it can hang without hanging this daemon,
-and it uses the dead daemon's profiles. Devices that do not answer are reported and retried while we
-serve. Devices in our own record are not retried: `SafeFirst` makes each safe as soon as it answers. The
-start does not try them at all if a process has just done so, after the death or at boot.
+A separate `outputs-off` process does that, as after every death: it can hang without hanging this
+daemon, and it uses the dead daemon's profiles. Devices that do not answer are reported, and retried
+while we serve. Devices in our own record are not retried, because `SafeFirst` switches each off as soon
+as it answers. If another process has just tried these devices, after the death or at boot, the start
+does not try them.
 """
 
 import logging
@@ -20,7 +21,7 @@ from drivers import Driver
 log = logging.getLogger(__name__)
 
 PATIENCE_S = 15.0
-"""Enough on a slow machine for `outputs-off`, which gives up after 5 s."""
+"""The longest wait for `outputs-off`, which gives up after 5 s, on a slow machine."""
 PAUSE_FIRST_S, PAUSE_MOST_S = 5.0, 60.0
 
 
@@ -28,7 +29,8 @@ LOOK_EVERY_S = 0.02
 
 
 class Predecessor:
-    """`ours`: this daemon's own record. `command`: `outputs-off` for its file."""
+    """The dead daemons before this one. `ours`: this daemon's own record. `command`: `outputs-off` for
+    this daemon's file."""
 
     def __init__(self, records: Records, ours: ClaimRecord, command: Sequence[str]) -> None:
         self._records = records
@@ -39,10 +41,10 @@ class Predecessor:
         self._next_at = math.inf
 
     def make_safe(self, wait: Callable[[float], bool]) -> frozenset[str]:
-        """Switch off the leftover outputs, before anything is claimed.
+        """Switch off the outputs that dead daemons left on, before this daemon claims outputs.
 
-        Ends when `outputs-off` has ended, time is up, or `wait(s)` returns True to end the daemon.
-        Return the devices of our own record that are not verified off.
+        Returns the devices of our own record that are not verified off: when `outputs-off` has ended,
+        after PATIENCE_S, or when `wait(s)` returns True because the daemon must end.
         """
         found = self._records.unreleased()
         if found:
@@ -61,14 +63,14 @@ class Predecessor:
         return [r.name for r in self._records.unreleased() if r.name != self._ours.name]
 
     def tick(self, now: float) -> None:
-        """Retry the records not verified off, after a pause; called about once a second."""
+        """Retry, after a pause, the records not verified off; called about once a second."""
         if self._child is not None and not self._running():
             self._judge(now)
         elif self._child is None and now >= self._next_at:
             self._start(self.left())
 
     def close(self) -> None:
-        """Stop trying; the `outputs-off` that runs after us handles the rest."""
+        """Stop trying; the `outputs-off` that follows this daemon handles the rest."""
         if self._child is not None:
             self._child.kill()
             self._child.wait()
@@ -105,8 +107,8 @@ class Predecessor:
 
 
 class SafeFirst:
-    """Wraps the driver of a silent device that a dead daemon may have left on: makes the device safe
-    as soon as it answers, before anything else.
+    """Wraps the driver of a silent device that a dead daemon may have left on: as soon as the device
+    answers, its outputs are switched off, before anything else.
     """
 
     def __init__(self, name: str, driver: Driver[Any, Any]) -> None:

@@ -1,4 +1,4 @@
-"""Decides whether a node without hardware may publish: one node serves a graph, any other only listens.
+"""Decides whether a node without hardware may publish: one node serves a graph, all others only listen.
 
 A node may publish once it was alone on its topics for the kind's quiet time. Its publishers are
 declared only then, so a waiting node does not count as a rival.
@@ -24,12 +24,15 @@ LOOK_EVERY_S = 0.25
 """The pause between two looks for other nodes on the graph."""
 MOST_NAMED: Final = 3
 SPREAD_LEAST_S, SPREAD_MOST_S = 0.5, 3.0
-"""Extra listening time after meeting a rival: longer than discovery takes, and random."""
+"""The bounds (s) of the random time for which a node listens longer after it has met a rival; discovery
+takes less."""
 
 
 class Presence:
-    """Looks for rivals. `kind`: for the log. `rivals`: the number of others' publishers on our topics.
-    `rivals_do`: their names and topics, as in `/desk publishes lift_requests`; "" without rivals."""
+    """Looks for rivals. `kind`: for the log. `rivals`: the number of other nodes' publishers on our
+    topics.
+    `rivals_do`: the rivals and their topics, as in `/desk publishes lift_requests`; "" without
+    rivals."""
 
     def __init__(self, kind: str, quiet_s: float) -> None:
         self.may_speak = False
@@ -54,7 +57,7 @@ class Presence:
 
     @property
     def faults(self) -> tuple[Fault, ...]:
-        """PASSIVE while a rival keeps us silent: the rival may do nothing else."""
+        """The fault PASSIVE while a rival keeps us silent, because the rival may not do our work."""
         if not self.rivals:
             return ()
         return (Fault("PASSIVE", f"{self.rivals_do}, so this node only listens"),)
@@ -89,7 +92,7 @@ class Presence:
         return f"{who or 'another node'} publishes {' and '.join(heard)}"
 
     def _set(self, yes: bool) -> None:
-        """Start or stop speaking. Two nodes that began at once both stop, for a random time each."""
+        """Start or stop publishing. Two nodes that began together both stop, each for a random time."""
         if yes == self.may_speak:
             return
         self.may_speak = yes
@@ -100,4 +103,4 @@ class Presence:
 
 
 def _ignore(message: Message) -> None:
-    """Ignore a rival's message: rivals are only counted."""
+    """Ignore a rival's message, because rivals are only counted."""

@@ -1,12 +1,13 @@
-"""The record of a daemon's claim, written before claiming: all data needed to switch the outputs off.
+"""The record of a daemon, written before it claims outputs: all data needed to switch the outputs off.
 
-It holds the YAML and the validated settings. `outputs-off` uses the settings, and loads and checks the
-YAML only if they do not decode, as those of another version may. Keys that another version has added
-are ignored.
+It holds the YAML and the validated settings. `outputs-off` uses the settings. Only if the settings do
+not decode, because another version wrote them, does `outputs-off` load and check the YAML. Keys that
+another version has added are ignored.
 
 A record is a file named by a hash of its content, in the daemon's state directory, or in its runtime
-directory if the former cannot be written. So a daemon restarted on the same YAML finds its record, and
-a daemon on another YAML overwrites none. Records hold no tokens: these are read from their files.
+directory if the state directory cannot be written. So a daemon restarted on the same YAML finds its
+record, and a daemon on another YAML overwrites no record. Records hold no tokens, which are read from
+their files.
 """
 
 import hashlib
@@ -30,7 +31,7 @@ log = logging.getLogger(__name__)
 
 PATTERN = "claimed-*.json"
 SIZE_MAX = 64 << 20
-"""Larger than any YAML with its profiles and DBC files."""
+"""The largest record (bytes). No YAML with its profiles and DBC files is as large."""
 
 
 class ClaimedSettings(msgspec.Struct, frozen=True):
@@ -44,7 +45,8 @@ class ClaimedSettings(msgspec.Struct, frozen=True):
 
 
 class Claimed(msgspec.Struct, frozen=True):
-    """`file`: the YAML's path. `yaml`: its text. `texts`: profiles and DBC files, by name.
+    """A record without settings. `file`: the YAML's path. `yaml`: its text. `texts`: name -> profile or
+    DBC file.
 
     `safe`: the devices verified off so far. Every version can read the fields up to this one.
     `tried`: True once a process has finished a try to switch off the other devices.
@@ -58,7 +60,7 @@ class Claimed(msgspec.Struct, frozen=True):
 
 
 class ClaimRecord(Claimed, frozen=True):
-    """`claim`: the YAML as settings."""
+    """A record. `claim`: the settings that the YAML gave."""
 
     claim: ClaimedSettings | None = None
 
@@ -66,7 +68,7 @@ class ClaimRecord(Claimed, frozen=True):
     def name(self) -> str:
         """The name of the record's file, a hash of the claim."""
         claimed = msgspec.structs.asdict(self) | {"safe": ()}
-        del claimed["tried"]  # newer than the names: every version gives a record the same one
+        del claimed["tried"]  # added later; every version must give a record the same name
         return f"claimed-{hashlib.sha256(msgspec.json.encode(claimed)).hexdigest()[:16]}.json"
 
     def config(self) -> Config:
@@ -84,7 +86,7 @@ class ClaimRecord(Claimed, frozen=True):
 
 
 def of(config: Config) -> ClaimRecord:
-    """Return the record of this config, which must be the only one loaded in this process."""
+    """Return the record of this config, which must be the only config loaded in this process."""
     known = dict(sorted(texts.all_known().items()))
     return ClaimRecord(named(config.path), config.text, known, claim=_claim(config))
 
@@ -117,7 +119,7 @@ def _claimed(record: ClaimRecord, claim: ClaimedSettings) -> Config:
 
 
 def _device(claim: ClaimedSettings, text: bytes) -> msgspec.Struct:
-    """Return a device's settings, decoded for its own driver or else the file's."""
+    """Return a device's settings, decoded for the device's driver, or else for the file's driver."""
     own = msgspec.json.decode(text, type=_OwnDriver).driver or claim.driver
     device: msgspec.Struct = msgspec.json.decode(
         text, type=names.driver_called(claim.kind, own).settings
@@ -137,7 +139,7 @@ class Records:
         self._file = named(file)
 
     def unreleased(self) -> list[ClaimRecord]:
-        """Return this file's records not yet released; log and leave out unreadable ones."""
+        """Return this file's records not yet released; log and leave out unreadable records."""
         by_name = dict[str, ClaimRecord]()
         for path in paths(self._places):
             if (record := read(path)) is None:
@@ -164,7 +166,7 @@ class Records:
         raise refused
 
     def still_unsafe(self, record: ClaimRecord, devices: Collection[str], config: Config) -> None:
-        """Note that all devices but these are verified off. Raises OSError."""
+        """Note that all devices except these are verified off. Raises OSError."""
         safe = tuple(name for name in config.devices if name not in devices)
         self.write(msgspec.structs.replace(record, safe=safe, tried=True))
 
@@ -197,5 +199,5 @@ def _decoded(content: bytes) -> ClaimRecord:
     """Decode a record. Raises MsgspecError or UnicodeDecodeError."""
     try:
         return msgspec.json.decode(content, type=ClaimRecord)
-    except msgspec.ValidationError:  # another version's claim: the YAML beside it is enough
+    except msgspec.ValidationError:  # another version's settings; the YAML in the record is enough
         return ClaimRecord(**msgspec.structs.asdict(msgspec.json.decode(content, type=Claimed)))

@@ -26,14 +26,14 @@ from bridges.runtime.clock import Clock
 from bridges.runtime.runtime_directory import Once
 
 KNOWN_EVERY_S: Final = 60.0
-"""The period (s) of writing all known state again: a recording can begin at any such point."""
+"""All known state is written again after this time (s), so that a recording can begin there."""
 MOST_WAITING: Final = 20_000
 SAME_AT_ONCE: Final = 20
-"""The number of unchanged readings in one entry, and so the most that a kill loses."""
+"""The number of unchanged readings in one entry, which is also the most that a kill loses."""
 LONGEST_SAME: Final = 400
-"""The largest size of such an entry (bytes)."""
+"""The largest size (bytes) of an entry of unchanged readings."""
 MOST_SPOKEN_PER_S: Final = 200.0
-"""Messages beyond this rate are only counted: a flood must not delay a scan."""
+"""Messages beyond this rate are only counted, because a flood must not delay a scan."""
 STEP_S: Final = 0.05
 AGAIN_S: Final = 10.0
 """The pause (s) between a ring's failure and the next attempt to make one."""
@@ -45,7 +45,7 @@ class NoWriter:
     def decided(
         self, subject: str, before: object, event: object, now: float, decision: AnyDecision
     ) -> None:
-        """Note a core's decision. `before`: the subject's memory before it."""
+        """Note a core's decision. `before`: the subject's memory before the decision."""
 
     def published(self, subject: str, memory: object, now: float) -> None:
         """Note a published report. `memory`: the core's memory afterwards."""
@@ -153,7 +153,7 @@ class RingWriter(NoWriter):
         self._fresh()
         if ring is not None:
             with suppress(OSError):
-                ring.close(ended=True)  # the run goes on; only this ring ends
+                ring.close(ended=True)  # only this ring ends; the daemon continues
 
     def _fresh(self) -> None:
         """Reset the writer's state for an empty ring."""
@@ -176,7 +176,8 @@ class RingWriter(NoWriter):
         self._write()
 
     def _tell_time(self) -> None:
-        """Write the wall clock's time if it has stepped; every KNOWN_EVERY_S, all known state."""
+        """Write the wall clock's time if that clock has stepped, and all known state after each
+        KNOWN_EVERY_S."""
         now = self._clock.monotonic()
         offset_s = self._clock.wall() - now
         stepped = abs(offset_s - self._offset_s) > STEP_S
@@ -219,7 +220,7 @@ class RingWriter(NoWriter):
             self._say_same(name)
 
     def _say_same(self, name: str) -> None:
-        """Write the times at which the last reading was repeated. Room for this is reserved."""
+        """Write the times at which the last reading was repeated. The segment has reserved room."""
         subject = self._same.pop(name, None)
         if subject is not None:
             times, subject.times = subject.times, []
@@ -245,7 +246,7 @@ class RingWriter(NoWriter):
         self._put(Spoken(now, sent, topic, type_name(kind), release.name, sample))
 
     def _may_keep(self, now: float) -> bool:
-        """Is the rate of messages low enough to record one more?"""
+        """Is the rate of messages low enough to record another message?"""
         gained = MOST_SPOKEN_PER_S * (now - self._spoken_at)
         self._may_speak = min(MOST_SPOKEN_PER_S, self._may_speak + gained)
         self._spoken_at = now
@@ -267,7 +268,7 @@ class RingWriter(NoWriter):
             self._say_same(name)
 
     def _put(self, entry: AnyEntry) -> None:
-        """Append an entry; if the segment is full, begin the next one first."""
+        """Append an entry. If the segment is full, begin the next segment before that."""
         assert self._ring is not None
         content = entries.encode(entry)
         if len(content) > self._ring.room // 2:
@@ -290,7 +291,7 @@ class RingWriter(NoWriter):
         return self._ring.fits(len(self._out) + length + FRAME.size + reserved)
 
     def _know(self, now: float) -> None:
-        """Write all known state: in this segment if there is room, else in the next."""
+        """Write all known state, in this segment if there is room, else in the next segment."""
         self._say_all_same()
         known = self._all_known(now)
         if not self._fits(sum(len(content) + FRAME.size for content in known)):
@@ -301,7 +302,8 @@ class RingWriter(NoWriter):
             self._frame(content)
 
     def _next_segment(self, now: float) -> None:
-        """Begin the next segment with the known state; subjects beyond half its room are left out."""
+        """Begin the next segment with the known state, which may fill half of it; leave out further
+        subjects."""
         assert self._ring is not None
         self._say_all_same()
         self._write()

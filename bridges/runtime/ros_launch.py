@@ -2,7 +2,7 @@
 
 After any death of the daemon its guard runs `rmf-bridge outputs-off` (`bridges/runtime/guard.py`). Only
 the launch files in `ros/launch/`, one for each kind, import this module. `ros2` runs it with ROS's own
-Python, which has `launch` and yaml and none of the project's other packages.
+Python, which has `launch` and `yaml`, but no other package that the project needs.
 """
 
 from pathlib import Path

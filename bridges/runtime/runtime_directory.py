@@ -1,13 +1,13 @@
 """A daemon's files while it runs: its lock, its name, its status and its record.
 
-`holder.lock`   locked by the daemon, `outputs-off` or a walk; other users may not open it, because they
-                could lock it and so block `outputs-off`
+`holder.lock`   locked by the daemon, `outputs-off` or a walk; other users may not open it, because a
+                user who locks it blocks `outputs-off`
 `holder.json`   the name of the lock's holder, for other processes: see `bridges/runtime/holder.py`
 `status.json`   the state of every device, for people and scripts
 `claimed-….json`   see `bridges/runtime/record.py`
 
-The daemon serves without them too. A failed write is logged once and retried each second, even after
-its directory was removed.
+The daemon also serves without these files. A failed write is logged once and retried each second, even
+after the directory was removed.
 """
 
 import fcntl
@@ -85,8 +85,8 @@ def _in_use(folder: Path, found: LockHolder | None) -> str:
 
 
 def state_file(file: Path) -> Path:
-    """Return the path of the file that outlives a daemon and a reboot: in systemd's state directory,
-    else in the user's."""
+    """Return the path of the file that outlives a daemon and a reboot, in systemd's state directory or
+    else in the user's state directory."""
     given = os.environ.get("STATE_DIRECTORY", "").split(":")[0]
     return Path(given or state_base() / file.stem).absolute() / KEPT
 
@@ -94,7 +94,7 @@ def state_file(file: Path) -> Path:
 class MemoryFile:
     """A file that is replaced as a whole and is on disk when `write` returns.
 
-    `instead`: the path used while `path` cannot be written; a file there is the newer one.
+    `instead`: the path used while `path` cannot be written; if both files exist, this file is newer.
     """
 
     def __init__(self, path: Path, instead: Path | None = None) -> None:
@@ -130,10 +130,10 @@ def _replace(path: Path, content: bytes) -> None:
 
 
 class Once:
-    """Logs a repeated failure once, and once its end; the daemon runs on.
+    """Logs the first of repeated failures, and the first success after them; the daemon continues.
 
-    `fails`, `again`: the log's two events; `key`: its key for the failing thing; `level`: of the first
-    event; `wrong`: failing thing -> error."""
+    `fails`, `again`: the names of the two events in the log. `key`: the log's key for the failing
+    thing. `level`: the level of the first event. `wrong`: failing thing -> error."""
 
     def __init__(
         self,
@@ -158,7 +158,7 @@ class Once:
 
 
 class RuntimeDirectory:
-    """One process's lock, status and record.
+    """The lock, status and record of one process.
 
     `serves`: True if the process is a daemon, which accepts a reset.
     """
@@ -223,8 +223,8 @@ class RuntimeDirectory:
         self._locks.clear()
 
     def _lock_by(self, folder: Path, deadline: float) -> None:
-        """Take the lock; wait while `outputs-off` holds it. A daemon of an older version has another
-        lock, and is noticed by its status."""
+        """Take the lock; wait while `outputs-off` has it. A daemon of an older version has another
+        lock, so its fresh status counts as a lock."""
         while holder.shown(self.places) or not self._lock(folder):
             found = holder.look(self.places)
             if (found and found.serves) or time.monotonic() >= deadline:
@@ -233,7 +233,8 @@ class RuntimeDirectory:
             time.sleep(LOOK_EVERY_S)
 
     def _lock(self, folder: Path) -> bool:
-        """Take the folder's lock; return False only if another process has it. Raises Distrusted."""
+        """Take the folder's lock; return False only if another process has the lock. Raises
+        Distrusted."""
         try:
             return self._has(folder) or self._take(folder)
         except Distrusted:
@@ -243,7 +244,7 @@ class RuntimeDirectory:
             return True
 
     def _has(self, folder: Path) -> bool:
-        """Do we hold the lock file that is in the folder now?"""
+        """Do we have the lock on the lock file that is in the folder now?"""
         lock = self._locks.get(folder)
         try:
             return lock is not None and os.path.samestat(os.fstat(lock), os.lstat(folder / LOCK))
@@ -265,7 +266,7 @@ class RuntimeDirectory:
         return True
 
     def _sign(self, name: LockHolder) -> None:
-        """Write this name beside each lock that we hold, unless already written."""
+        """Write this name beside each lock that we have, unless the name is already there."""
         for folder in filter(self._has, self._locks):
             try:
                 if holder.written(folder) != name:
@@ -287,7 +288,7 @@ class RuntimeDirectory:
 
 
 def _lock_in(directory: int) -> int:
-    """Open the lock file for writing, else read-only: it can still be locked."""
+    """Open the lock file for writing, else for reading, which is enough to lock it."""
     flags = os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC
     try:
         return os.open(LOCK, flags | os.O_RDWR | os.O_CREAT, 0o600, dir_fd=directory)

@@ -1,6 +1,6 @@
-"""The services of a daemon: devices on buses, or a kind without hardware.
+"""The service of a daemon: devices on buses, or a kind without hardware.
 
-Either has threads, subscribes to RMF's topics, and reports a status.
+Both sorts of service have threads, subscribe to RMF's topics, and report a status.
 """
 
 import logging
@@ -41,7 +41,7 @@ class Service(Protocol):
 
     @property
     def loops(self) -> Sequence[Serving]:
-        """Its threads."""
+        """The service's threads."""
 
     def subscribe(self) -> None:
         """Subscribe to RMF's topics."""
@@ -60,12 +60,12 @@ class Service(Protocol):
 
 
 def named_by(config: Config, topic: Topic[M_co]) -> Topic[M_co]:
-    """Return the topic, with the YAML's name if it renames it."""
+    """Return the topic, under its name in the YAML if the YAML renames it."""
     return topic.named(config.rmf.topics.get(topic.name, topic.name))
 
 
 def clock_of(transport: Transport) -> Clock:
-    """Return a clock: durations from the machine's clock, stamps from RMF's."""
+    """Return a clock that takes durations from the machine's clock, and stamps from RMF's clock."""
     return Clock(machine_s, transport.wall)
 
 
@@ -102,7 +102,7 @@ class GraphService:
         self.devices = node.devices
 
     def look(self) -> None:
-        """Do nothing: the node looks by itself."""
+        """Do nothing, because the node itself looks for other nodes."""
 
 
 class Devices:
@@ -150,7 +150,8 @@ class Devices:
             loop.inbox.put(device, OperatorReset())
 
     def look(self) -> None:
-        """Tell each device if the first node that may send requests has come, or the last has gone."""
+        """Tell each device when a first node that may send requests appears, and when the last such
+        node disappears."""
         topic = self._kind.attended_by
         if topic is None:
             return
@@ -200,8 +201,8 @@ class Devices:
     def _to_inbox(
         self, topic: Topic[Message], accept: Callable[[Any, Any], object]
     ) -> Callable[[Message], None]:
-        """Return a callback for the transport's thread. It counts requests for others' devices, not
-        their states."""
+        """Return a callback for the transport's thread, which puts messages about our devices into the
+        inbox and counts requests for other devices."""
         states = topic == self._kind.states
         heard_on = self._named(topic).name
 

@@ -17,7 +17,7 @@ from bridges.system.files import replace
 
 CONFIG: Final = Path("etc/rmf-bridges")
 INSTANCE: Final = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]*")
-"""Names of a unit's instance that need no escapes."""
+"""Names of services that need no escapes as a unit's instance."""
 NO_INSTANCE: Final = "{!r} is not a service name: use only letters, digits and _ . -"
 LEFT_ON: Final = (
     "the outputs of {} are not verified off, and a new drop-in may block access to them: mend that"
@@ -85,7 +85,7 @@ def switch_off(name: str) -> SwitchOff:
 
 
 def carry_out(steps: Iterable[Step], args: argparse.Namespace, keeps: str = "") -> int:
-    """Take or print the steps in turn, up to the first failure; return the exit code.
+    """Carry out or print the steps in turn, up to the first failure; return the exit code.
 
     `keeps`: a unit to start again after a failed step, if it was running before.
     """
@@ -132,7 +132,7 @@ def _show(step: Step) -> None:
 
 
 def _take(step: Step, root: Path) -> int:
-    """Take one step; return its exit code, 0 for success."""
+    """Carry out one step; return its exit code, 0 for success."""
     try:
         return _taken(step, root)
     except OSError as error:  # a full disk

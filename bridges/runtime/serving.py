@@ -37,21 +37,22 @@ class Rounds(Protocol):
 
     @property
     def finished(self) -> int:
-        """The number of finished steps, counted within a round too."""
+        """The number of finished steps, which may grow within a round."""
 
     @property
     def ready(self) -> bool:
-        """Is it in service?"""
+        """Are the devices or the kind in service?"""
 
     def round(self) -> None:
         """Take the waiting events and do the due work."""
 
     def end(self) -> bool:
-        """Switch the outputs off and release everything; False if the outputs are not verified off."""
+        """Switch the outputs off and release everything; return False if the outputs are not verified
+        off."""
 
 
 def stop(loops: Sequence["Serving"], within_s: float) -> bool:
-    """End all loops at the same time; return False if one does not end, or not safely."""
+    """End all loops at the same time; return False if a loop does not end, or leaves outputs on."""
     for loop in loops:
         loop.close()
     deadline = time.monotonic() + within_s
@@ -60,7 +61,7 @@ def stop(loops: Sequence["Serving"], within_s: float) -> bool:
 
 
 class Serving:
-    """One thread of a service. `died`: the cause of its death; "" while it has none."""
+    """One thread of a service. `died`: the defect that ended the thread; "" without a defect."""
 
     def __init__(self, serves: Rounds, clock: Clock) -> None:
         self._rounds = 0
@@ -79,14 +80,15 @@ class Serving:
         self._serves.inbox.close()
 
     def ended(self, timeout_s: float) -> bool:
-        """Wait for the thread's end; return False if it does not end, or not safely."""
+        """Wait for the thread's end; return False if it does not end, or leaves outputs on."""
         if self._thread.ident is not None:  # else it was never started
             self._thread.join(timeout_s)
         return not self._thread.is_alive() and self._safe
 
     @property
     def alive(self) -> bool:
-        """Does the thread serve? False once stopped or, even while it switches off, after a defect."""
+        """Does the thread serve? False once it was stopped, and after a defect even while the thread
+        still switches outputs off."""
         return self._thread.is_alive() and not self.died
 
     @property
@@ -96,7 +98,7 @@ class Serving:
 
     @property
     def ready(self) -> bool:
-        """Has it finished its first round, and is it in service?"""
+        """Has the thread finished its first round, and is its service ready?"""
         return self._rounds > 0 and self._serves.ready
 
     def _run(self) -> None:

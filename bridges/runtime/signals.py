@@ -1,8 +1,9 @@
-"""Signals: those that by default end or suspend a process (signal(7)) shut a daemon down, outputs off.
+"""Signals: if a signal by default ends or suspends a process (signal(7)), it ends a daemon, outputs
+off.
 
-Not caught: crashes, and SIGABRT from the watchdog; such a process cannot be trusted any more, and
-`outputs-off` follows. SIGPIPE and SIGXFSZ stay ignored, as set by Python: an unread log or a full disk
-must only fail the write, not end a daemon. SIGKILL and SIGSTOP cannot be caught.
+Crashes, and SIGABRT from the watchdog, are not caught, because such a process cannot be trusted any
+more; `outputs-off` follows it. SIGPIPE and SIGXFSZ stay ignored, as Python has set them, because an
+unread log or a full disk must not end a daemon. SIGKILL and SIGSTOP cannot be caught.
 """
 
 import os
@@ -39,12 +40,12 @@ ENDING: Final = frozenset(signal.valid_signals()) - {
 
 
 class End:
-    """Set permanently by the first signal of ENDING. (Not a threading.Event: a signal that arrives
-    while its lock is held would wait forever.)
+    """A flag that the first signal of ENDING sets for ever. (A threading.Event would wait for ever if a
+    signal arrived while the event's lock is taken.)
     """
 
     def __init__(self) -> None:
-        """Catch the signals from now on; a SIGHUP ignored by the parent (nohup) stays ignored."""
+        """Catch the signals from now on. If the parent ignores SIGHUP (nohup), it stays ignored."""
         self._read, self._write = os.pipe2(os.O_NONBLOCK | os.O_CLOEXEC)
         for number in ENDING:
             if number != signal.SIGHUP or signal.getsignal(number) is not signal.SIG_IGN:
@@ -55,7 +56,7 @@ class End:
         return bool(select.select([self._read], [], [], timeout_s)[0])
 
     def _on_signal(self, number: int, frame: FrameType | None) -> None:
-        for each in TERMINAL:  # else the last log lines of a background job would raise them again
+        for each in TERMINAL:  # a background job's last log lines would raise these signals again
             signal.signal(each, signal.SIG_IGN)
         with suppress(BlockingIOError):  # the pipe is full of earlier signals
             os.write(self._write, b".")

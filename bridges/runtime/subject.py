@@ -1,5 +1,7 @@
-"""One lift, door or charger, or a coordinator's site: holds its core's memory, acts on each decision,
-publishes messages, counts refusals, and logs changes of states and faults."""
+"""One subject of a core: a lift, a door, a charger, or a coordinator's site.
+
+A `Subject` keeps the core's memory, acts on each decision, counts refusals and logs changes.
+"""
 
 import logging
 from collections.abc import Callable, Mapping
@@ -29,11 +31,11 @@ V = TypeVar("V")
 
 
 class SubjectCore(Struct, Generic[M, V, O, R], frozen=True):
-    """A kind's core, with its limits bound.
+    """A kind's core as the daemon calls it; its limits are already bound.
 
     `word`: the key of a subject's name in the log. `decide(memory, event, now)`: one step.
-    `summary(report, now)`: key -> value for the log and the status file. `identity(fault)`: equal for
-    two reports of the same fault, which is logged once.
+    `summary(report, now)`: key -> value for the log and the status file. `identity(fault)`: the same
+    value for every report of the same fault, so that the fault is logged once.
     """
 
     word: str

@@ -1,7 +1,7 @@
 """Switches off every output of a YAML or record, from a new process, with as few imports as possible.
 
-On each bus the devices that answered the dead daemon most recently come first: silent ones would use
-up the time. Each device gets a short try, then the failed ones are tried again.
+On each bus the devices that answered the dead daemon most recently come first, because silent devices
+would use up the time. After a short try for each device, the failed devices are tried again.
 """
 
 import logging
@@ -75,7 +75,7 @@ def _bus_off(
 def _device_off(
     config: Config, name: str, bus: Bus, results: dict[str, bool], last: bool = False
 ) -> bool:
-    """Try one device; a failure counts, and is logged, only if it is the `last` try."""
+    """Try to switch one device off; only a failure of the `last` try counts and is logged."""
     driver = config.driver_type(name).create(name, config.devices[name], bus)
     try:
         driver.open()
