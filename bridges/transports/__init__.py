@@ -1,1 +1,1 @@
-"""The ways to RMF's graph. The YAML selects one; all carry the same messages."""
+"""The transports to RMF's graph. The YAML selects a transport; all carry the same messages."""

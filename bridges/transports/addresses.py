@@ -1,11 +1,11 @@
-"""The addresses by which this machine can reach other machines; transports watch them for changes."""
+"""The addresses at which this machine can reach other machines; transports watch them for changes."""
 
 import fcntl
 import socket
 import struct
 
 Addresses = frozenset[tuple[int, str]]
-"""(number, IPv4 address) of each interface that could reach another machine."""
+"""(number of an interface, its IPv4 address), for each interface that could reach another machine."""
 
 GET_FLAGS, GET_ADDRESS = 0x8913, 0x8915
 UP, LOOPBACK, RUNNING = 0x1, 0x8, 0x40

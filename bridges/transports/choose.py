@@ -1,7 +1,7 @@
 """Chooses a daemon's transport, ROS domain and network.
 
-The YAML decides; for keys that it lacks, ROS's environment variables do, as for any ROS node. Each
-transport has a folder beside this file: `ros2/`, `dds/`, `zenoh/`.
+The YAML decides. For keys that the YAML lacks, ROS's environment variables decide, as for any ROS node.
+Each transport has a folder beside this file: `ros2/`, `dds/`, `zenoh/`.
 """
 
 import importlib
@@ -65,7 +65,7 @@ def open_transport(
 
 
 def domain_id(rmf: Rmf, environ: Mapping[str, str]) -> int:
-    """Return the ROS domain: the YAML's, else ROS_DOMAIN_ID, else 0. Raises TransportError."""
+    """Return the ROS domain of the YAML, else ROS_DOMAIN_ID, else 0. Raises TransportError."""
     if rmf.domain_id is not None:
         return rmf.domain_id
     text = environ.get("ROS_DOMAIN_ID", "") or "0"
@@ -109,7 +109,7 @@ def _choice(rmf: Rmf) -> tuple[str, str]:
 
 
 def _best_without(ros: str) -> tuple[str, str]:
-    """Return `auto`'s choice without ROS, with its reason. `ros`: the missing part of ROS."""
+    """Return the choice of `auto` without ROS, and its reason. `ros`: the missing part of ROS."""
     missing = missing_of_dds()
     return ("zenoh", f"{ros}; {missing}") if missing else ("dds", ros)
 

@@ -1,4 +1,4 @@
-"""Configurations of Cyclone DDS, for `dds` and for ROS on Cyclone: on the network, or only on this
+"""Configurations of Cyclone DDS, for `dds` and for ROS on Cyclone, to use the network or only this
 machine."""
 
 from collections.abc import Mapping
@@ -16,23 +16,24 @@ INTERNAL: Final = (
     "<PrimaryReorderMaxSamples>1</PrimaryReorderMaxSamples>"
     "<SecondaryReorderMaxSamples>1</SecondaryReorderMaxSamples></Internal>"
 )
-"""Lets a node leave at once, even without its address. By default Cyclone 0.10 ends its receive threads
-with a datagram to that address and waits for it, for minutes (q_receive.c, trigger_recv_threads), and
-every writer waits 1 s for acknowledgements that do not come. Meanwhile rclpy holds Python's lock, and
-the whole daemon stands still.
+"""Lets a node leave at once, even when its address has gone. By default Cyclone 0.10 ends its receive
+threads with a datagram to that address, and waits for this datagram, for minutes (q_receive.c,
+trigger_recv_threads); and every writer waits 1 s for acknowledgements that do not come. Meanwhile rclpy
+holds Python's lock, and the whole daemon stops.
 
-A sample longer than LONGEST is dropped at its first fragment. Memory holds for each writer at most one
-incomplete sample and one that came too early (by default 16 and 128); after a loss the writer is asked
-to repeat."""
+A sample longer than LONGEST is dropped at its first fragment. For each writer, memory holds at most one
+incomplete sample and one sample that came too early (by default 16 and 128); after a loss the writer is
+asked to send again."""
 FOUND_AGAIN: Final = "<SPDPInterval>2 s</SPDPInterval>"
-"""The period at which a node announces itself: short, to be found soon after a network failure
-longer than a lease (10 s). By default Cyclone 0.10 announces each 8 s, 11 each 30 s to a lost peer."""
+"""The period at which a node announces itself. It is short, so that other nodes soon find the node
+after a network failure longer than a lease (10 s). By default Cyclone 0.10 announces itself every 8 s,
+and Cyclone 11 every 30 s to a lost peer."""
 NEVER_FORGOTTEN: Final = (
     "<InitialLocatorPruneDelay>inf</InitialLocatorPruneDelay>"
     "<DiscoveredLocatorPruneDelay>inf</DiscoveredLocatorPruneDelay>"
 )
-"""By default Cyclone 11 gives up a peer not found for 30 s, or lost for 60 s. 0.10 never gives up, and
-refuses these names."""
+"""Lets Cyclone 11 never give up a peer; by default it does, after 30 s if it has not found the peer,
+and after 60 s if it has lost the peer. Cyclone 0.10 never gives up, and refuses these names."""
 LOOPBACK: Final = (
     "<CycloneDDS><Domain><General>"
     '<Interfaces><NetworkInterface name="lo" multicast="false"/></Interfaces>'
@@ -45,11 +46,11 @@ LOOPBACK: Final = (
 
 
 def configuration(environ: Mapping[str, str]) -> str:
-    """Return the configuration of a node on the network: ours, then CYCLONEDDS_URI's.
+    """Return the configuration of a node on the network: our settings, then those of CYCLONEDDS_URI.
 
-    As in rmw_cyclonedds (ROS 2 Jazzy, rmw_node.cpp): static peers by unicast beside multicast, and
-    participant indices that peers can guess. LOCALHOST: this machine and the static peers, without
-    multicast. SYSTEM_DEFAULT: discovery is left to Cyclone.
+    As in rmw_cyclonedds (ROS 2 Jazzy, rmw_node.cpp), the node reaches static peers by unicast beside
+    multicast, and its participant index is one that peers can guess. With LOCALHOST it reaches this
+    machine and the static peers, without multicast. With SYSTEM_DEFAULT Cyclone decides on discovery.
     """
     own = environ.get("CYCLONEDDS_URI", "")
     wanted = environ.get("ROS_AUTOMATIC_DISCOVERY_RANGE")
@@ -71,7 +72,7 @@ def configuration(environ: Mapping[str, str]) -> str:
 
 
 def for_ros(environ: Mapping[str, str]) -> str:
-    """Return CYCLONEDDS_URI for a ROS node on the network: our settings, then its present value."""
+    """Return CYCLONEDDS_URI for a ROS node on the network: our settings before its present value."""
     ours, own = (
         f"<CycloneDDS><Domain>{INTERNAL}<Discovery>{FOUND_AGAIN}</Discovery></Domain></CycloneDDS>",
         environ.get("CYCLONEDDS_URI", ""),

@@ -1,4 +1,5 @@
-"""The transports' log lines about samples and peers: the same on every wire, once for each cause."""
+"""The transports' log lines about samples and peers: the same for all transports, once for each
+cause."""
 
 import logging
 
@@ -11,20 +12,20 @@ from bridges.transports.transport import Receive
 log = logging.getLogger(__name__)
 
 FAILURES = 5
-"""The number of failed reads in a row after which a transport ends its thread, and so the daemon."""
+"""After this many failed reads in a row a transport ends its thread, and the daemon ends too."""
 NOT_HEARD = "a publisher is not heard"
 NOT_SERVED = "a subscription is not served"
 
 
 def drop(dropped: dict[str, int], topic: AnyTopic, error: CdrError) -> None:
-    """Count an invalid sample, and log the first of its topic."""
+    """Count an invalid sample, and log the first invalid sample of its topic."""
     dropped[topic.name] = dropped.get(topic.name, 0) + 1
     if dropped[topic.name] == 1:
         log.warning(pairs("sample_dropped", topic=topic.name, reason=error, further="only counted"))
 
 
 def hand_on(dropped: dict[str, int], topic: AnyTopic, received: Receive, message: Message) -> None:
-    """Deliver a message to its subscriber. The callback's exceptions lose only this message."""
+    """Deliver a message to its subscriber. An exception of the callback loses only this message."""
     try:
         received(message)
     except Exception as error:

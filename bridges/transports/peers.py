@@ -1,10 +1,10 @@
-"""The announced ends (publishers and subscriptions) of other nodes: show RMF's release, and types that
-do not fit ours.
+"""The announced ends (publishers and subscriptions) of other nodes. They show RMF's release, and types
+that do not fit our types.
 
-A fleet adapter shows the release: it publishes FleetState and, in newer releases, subscribes to
-EmergencySignal; our daemons do neither. With `auto` we speak the fleet adapters' release; without an
-adapter the default; with adapters of two releases, a fault, the present one. The transports report the
-ends.
+A fleet adapter shows the release, because it publishes FleetState and, in newer releases, subscribes to
+EmergencySignal, and our daemons do not. With `auto` we speak the release of the fleet adapters, or the
+default release if there is no fleet adapter. Adapters of two releases are a fault, and we keep our
+present release. The transports report the ends.
 """
 
 import logging
@@ -24,7 +24,7 @@ from bridges.transports import notices
 log = logging.getLogger(__name__)
 
 MOST: Final = 5000
-"""The limit of remembered ends: more than any site has."""
+"""The most ends that are remembered. No site has more."""
 WITNESSES: Final = {
     (type_name(FleetState), True),
     (type_name(EmergencySignal), False),
@@ -36,7 +36,8 @@ MIXED: Final = "TWO_RELEASES"
 
 
 class Announced(Struct, frozen=True):
-    """An end of any node. `topic`: without slash. `type`: package/msg/Name. `hash`: "" if unknown."""
+    """An end of any node. `topic`: its name, without slash. `type`: package/msg/Name. `hash`: the type
+    hash, "" if unknown."""
 
     topic: str
     type: str
@@ -69,11 +70,11 @@ class Peers:
         self._ends.pop(key, None)
 
     def clear(self) -> None:
-        """Forget all ends, as we join again."""
+        """Forget all ends, because we join again."""
         self._ends.clear()
 
     def settle(self) -> bool:
-        """Take over the release of RMF's nodes; return True if ours has changed."""
+        """Adopt the release of RMF's nodes; return True if our release has changed."""
         heard = self._heard()
         self._name_mixed(heard)
         if not self._auto or len(heard) != 1 or self.release in heard:
@@ -123,7 +124,7 @@ class Peers:
         return end.type != type_name(ours.type) or not fits
 
     def _name_mixed(self, heard: set[Release]) -> None:
-        """Log once that two releases are on the graph, when the second appears."""
+        """Log once, when the second release appears, that two releases are on the graph."""
         if len(heard) > 1 and not self._mixed:
             names = " ".join(sorted(release.name for release in heard))
             log.warning(pairs("two_releases", on_this_graph=names, we_speak=self.release.name))
@@ -135,6 +136,6 @@ def _hash_of(topic: AnyTopic, release: Release) -> str:
 
 
 def _only(hashed: str) -> Iterator[Release]:
-    """Return the release with this hash; none if several have it."""
+    """Yield the release with this hash; yield nothing if several releases have it."""
     found = releases_of(hashed)
     return iter(found if len(found) == 1 else ())

@@ -1,4 +1,4 @@
-"""The common base of the transports with a thread of their own: `dds`, `zenoh` and `ros2`."""
+"""The common base of the transports, each of which has a thread: `dds`, `zenoh` and `ros2`."""
 
 import logging
 import math
@@ -19,29 +19,30 @@ from bridges.transports.transport import TransportError
 log = logging.getLogger(__name__)
 
 LOOK_EVERY_S: Final = 1.0
-"""The period (s) of checks for changed addresses of the machine. No library checks: one that starts
-with only `lo` up stays there forever, and none notices a changed address."""
+"""The period (s) of checks for changed addresses of the machine. The libraries do not check: a library
+that starts while only `lo` is up stays on `lo` for ever, and no library notices a changed address."""
 SET_BACK_S: Final = 1.0
-"""A smaller step back (s) does no harm: Cyclone renews a lease of 10 s every 8 s."""
+"""A smaller step back (s) does no harm, because Cyclone renews a lease of 10 s every 8 s."""
 
 
 class WallClock:
-    """Notices that the wall clock was set back, as Cyclone DDS uses it to wait.
+    """Notices that the wall clock was set back, because Cyclone DDS waits by the wall clock.
 
-    Cyclone 0.10.5 (ROS 2 Jazzy) always does (github.com/eclipse-cyclonedds/cyclonedds, issue 1995),
-    11.0.1 in the wheel on PyPI, which is built without pthread_condattr_setclock. When the clock is set
-    back, Cyclone's threads sleep longer by the size of the step. Meanwhile a node renews no lease, and
-    others forget it after 10 s; it answers no new node, and requests no lost samples again. A node that
-    joins later waits by the new time. A step forward wakes the threads early, which does no harm.
+    Cyclone 0.10.5 (ROS 2 Jazzy) always waits by it (github.com/eclipse-cyclonedds/cyclonedds, issue
+    1995); 11.0.1 does in the wheel on PyPI, which is built without pthread_condattr_setclock. When the
+    clock is set back, Cyclone's threads sleep longer by the size of the step. Meanwhile a node renews
+    no lease, and other nodes forget it after 10 s; it answers no new node, and requests no lost samples
+    again. A node that joins later waits by the new time. A step forward wakes the threads early, which
+    does no harm.
 
-    `ahead_s`, here and below: the wall clock minus a clock that never steps (s).
+    `ahead_s`, in all functions of this file: the wall clock minus a clock that never steps (s).
     """
 
     def __init__(self, ahead_s: float) -> None:
         self._most_s = ahead_s
 
     def set_back_s(self, ahead_s: float) -> float:
-        """Return the step back (s) since the last one found; 0 for SET_BACK_S or less.
+        """Return the step back (s) since the last step found; 0 for SET_BACK_S or less.
 
         Small steps add up, because one sleep of a thread may include several.
         """
@@ -59,9 +60,9 @@ def ahead_s() -> float:
 
 
 class Threaded:
-    """A node on the graph, with one thread, on DDS a second for the clock.
+    """A node on the graph with one thread; on DDS a second thread watches the clock.
 
-    `refusals`: the library's exceptions. `release`: None to follow RMF's.
+    `refusals`: the library's exceptions. `release`: None to follow RMF's release.
     """
 
     refusals: ClassVar[tuple[type[Exception], ...]]
@@ -98,7 +99,7 @@ class Threaded:
 
     @property
     def lives(self) -> bool:
-        """Does its thread run? True also without a network, a router or a peer."""
+        """Does the transport's thread run? True also without a network, a router or a peer."""
         return not self._closed and self._thread.is_alive()
 
     def wall(self) -> float:
@@ -110,9 +111,9 @@ class Threaded:
         self._thread.start()
 
     def _watch_clock(self) -> None:
-        """Start a thread that sets `_set_back` and wakes ours when the wall clock is set back.
+        """Start a thread that sets `_set_back` and wakes our thread when the wall clock is set back.
 
-        Our own thread cannot do this, as it may itself wait by the wall clock.
+        Our thread cannot do this, because it may itself wait by the wall clock.
         """
         run, name = self._look_at_clock, f"{self.name}-clock"
         self._clock_thread = threading.Thread(target=run, name=name, daemon=True)
@@ -127,10 +128,10 @@ class Threaded:
                     self._wake()
 
     def _wake(self) -> None:
-        """End the wait of our thread if the node has joined; called with the lock held."""
+        """End the wait of our thread if the node has joined. The caller has the lock."""
 
     def _look_is_due(self) -> bool:
-        """Is it time to look at the network again? Plans the next look if so."""
+        """Is it time to look at the network again? If so, also plans the next look."""
         now = time.monotonic()
         if now < self._look_at:
             return False
@@ -138,7 +139,7 @@ class Threaded:
         return True
 
     def _network_changed(self) -> bool:
-        """Have the machine's addresses changed since the node joined? Logs the new ones."""
+        """Have the machine's addresses changed since the node joined? If so, logs the new addresses."""
         found = addresses.addresses()
         if found == self._addresses:
             return False
@@ -147,7 +148,7 @@ class Threaded:
         return True
 
     def _join_thread(self) -> None:
-        """Wait for the threads' end; not for our thread if it is the caller."""
+        """Wait for the end of the threads, except the thread that calls this."""
         if self._clock_thread is not None:
             self._clock_thread.join()
         if threading.current_thread() is not self._thread:
@@ -155,7 +156,7 @@ class Threaded:
 
     @contextmanager
     def _reporting(self, text: str) -> Iterator[None]:
-        """Raise the library's exceptions as TransportError. `text`: the failure, for the error."""
+        """Raise the library's exceptions as TransportError. `text`: names the failure."""
         if self._closed:
             raise TransportError(f"{text}: {self.name} has left the graph")
         try:

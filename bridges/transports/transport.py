@@ -22,27 +22,27 @@ Receive = Callable[[Message], None]
 def any_type(received: Callable[[M], None]) -> Receive:
     """Return a subscription's callback with the type that transports store for every topic.
 
-    Safe, because a transport decodes each message as the type of the subscription's topic.
+    The cast is safe, because a transport decodes each message as the type of the subscription's topic.
     """
     return cast(Receive, received)
 
 
 class TransportError(Exception):
-    """The transport cannot be opened, or has been lost: no network, no library, no such domain."""
+    """The transport cannot be opened, or has been lost: the network, library or domain is missing."""
 
 
 class Publisher(Protocol[M_contra]):
     """The sending end of one topic."""
 
     def publish(self, message: M_contra) -> None:
-        """Send; block for at most 20 ms. Raises TransportError if the wire is gone."""
+        """Send a message; block for at most 20 ms. Raises TransportError without a connection."""
 
     def matched(self) -> int:
         """Return the number of subscriptions that receive our messages, in any process; 0 after
         close."""
 
     def close(self) -> None:
-        """Take this publisher off the graph at once; the node stays. May be called twice."""
+        """Take this publisher, but not its node, off the graph at once. May be called twice."""
 
 
 class Subscription(Protocol):
@@ -52,8 +52,8 @@ class Subscription(Protocol):
         """Return the number of publishers that are heard here, in any process; 0 after close."""
 
     def senders(self) -> list[str]:
-        """Return the nodes of these publishers, as `/namespace/name`, as far as the wire tells; from
-        any thread. Names can be forged."""
+        """Return the known nodes of these publishers, as `/namespace/name`; from any thread. Anybody
+        can forge a name."""
 
 
 class Transport(Protocol):
@@ -61,7 +61,7 @@ class Transport(Protocol):
 
     `received` is called on the transport's own thread. A callback must only append to an inbox and
     must not raise. Samples that do not decode, or whose callback raises, are dropped, counted in
-    `dropped` by topic name, and logged once for each topic.
+    `dropped` (topic name -> number), and logged once for each topic.
     """
 
     name: str
@@ -94,7 +94,7 @@ class Transport(Protocol):
 
     @property
     def lives(self) -> bool:
-        """Does its thread run? True also without a network, a router or a peer."""
+        """Does the transport's thread run? True also without a network, a router or a peer."""
 
     def wall(self) -> float:
         """Return RMF's time for stamps (s since the epoch): the wall clock, or ROS's simulated time."""

@@ -1,1 +1,1 @@
-"""ROS 2's wire without ROS, with cyclonedds."""
+"""The transport `dds`: speaks as a ROS 2 node without ROS, through cyclonedds."""

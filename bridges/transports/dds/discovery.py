@@ -1,8 +1,8 @@
 """Makes our endpoints a named node on the ROS graph, by the topic `ros_discovery_info`.
 
 DDS has participants, readers and writers, but no nodes. On this topic each ROS participant publishes
-the owning node of each of its readers and writers, retained for late joiners. Without this topic
-`ros2 node list` shows our endpoints under `_CREATED_BY_BARE_DDS_APP_`.
+the node of each of its readers and writers, and the message is retained for late joiners. Without this
+topic `ros2 node list` shows our endpoints under `_CREATED_BY_BARE_DDS_APP_`.
 Source: ros2/rmw_dds_common, msg/*.msg, as rmw_cyclonedds and rmw_fastrtps publish them.
 """
 
@@ -83,7 +83,7 @@ class NodeOnGraph:
         return self.reader
 
     def owners(self, writers: Iterable[bytes]) -> list[str]:
-        """Return the nodes that own these writers (guids), as far as heard."""
+        """Return the nodes of these writers (guids), if the nodes have been heard."""
         assert self.reader is not None
         for info in self.reader.take(MOST_PARTICIPANTS):
             for node in info.node_entities_info_seq:

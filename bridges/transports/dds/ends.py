@@ -1,6 +1,7 @@
 """The ends of the `dds` transport: its publishers and subscriptions.
 
-An end outlives its writer or reader: it gets a new one when the transport joins again.
+An end outlives its writer or reader, because it gets a new writer or reader when the transport joins
+again.
 """
 
 import threading
@@ -28,9 +29,10 @@ from bridges.transports.senders import Senders
 from bridges.transports.transport import Receive, TransportError
 
 WRITE_BLOCKS_NS: Final = 20_000_000
-"""A writer that waits for a peer holds Python's lock: keep this shorter than a scan."""
+"""The longest wait of a writer for a peer. Shorter than a scan, because the writer holds Python's
+lock."""
 AT_ONCE: Final = 100
-"""The most samples taken from one subscription before the others have their turn."""
+"""The most samples taken from one subscription before other subscriptions have their turn."""
 POLICIES: Final = {2: "durability", 11: "reliability", 23: "data representation", 24: "type"}
 
 
@@ -72,10 +74,10 @@ class DdsPublisher:
             self._write(message)
 
     def publish(self, message: Message) -> None:
-        """Send; block for at most 20 ms. Raises TransportError if the message was not sent."""
+        """Send a message; block for at most 20 ms. Raises TransportError if it was not sent."""
         if not self._reader_thread.is_alive():
             raise TransportError(f"topic {self.topic.name}: closed, or the reader has died")
-        self._retained.append(message)  # goes out when the node joins again
+        self._retained.append(message)  # sent again when the node joins again
         if self._writer is None:
             why = "there is no network, or RMF's release lacks the message"
             raise TransportError(f"topic {self.topic.name}: not sent: {why}")
@@ -109,7 +111,7 @@ class DdsPublisher:
 
 
 class DdsSubscription:
-    """The subscription of one topic. `dropped`: counts invalid samples, by topic name.
+    """The subscription of one topic. `dropped`: topic name -> number of invalid samples.
     `owners(guids)`: the nodes of these writers."""
 
     def __init__(
@@ -154,7 +156,7 @@ class DdsSubscription:
             return 0
 
     def senders(self) -> list[str]:
-        """Return the nodes of these publishers; none until other nodes' announcements have arrived."""
+        """Return the nodes of the matched publishers; empty until their announcements have arrived."""
         reader = self._reader
         try:
             handles = reader.get_matched_publications() if reader else []
@@ -175,7 +177,7 @@ class DdsSubscription:
         return next(iter(self._nodes([handle])), "")  # type: ignore[list-item]
 
     def take(self) -> bool:
-        """Deliver the arrived samples; return False if there were none."""
+        """Deliver the arrived samples; return False if no sample has arrived."""
         if self._reader is None:
             return False
         senders = self._senders
@@ -203,7 +205,7 @@ class DdsSubscription:
 
 
 class _Misfits(Protocol):
-    """Cyclone's status of an end with peers whose QoS does not fit."""
+    """Cyclone's status of an end that has peers with a QoS that does not fit."""
 
     last_policy_id: int
 
@@ -219,7 +221,7 @@ def _log_misfit(topic: AnyTopic, text: str, status: _Misfits, peers: Peers) -> N
 def _writer_qos(qos: topics.Qos, hashed: str) -> Qos:
     if qos.durability == "volatile":
         return Qos(Policy.Durability.Volatile, *_policies(qos, hashed))
-    # A late joiner gets the durability service's history, which is 1 deep by default.
+    # A late joiner gets the history of the durability service, by default only the last message.
     retained = Policy.DurabilityService(0, Policy.History.KeepLast(qos.depth), -1, -1, -1)
     return Qos(Policy.Durability.TransientLocal, retained, *_policies(qos, hashed))
 

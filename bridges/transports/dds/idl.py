@@ -1,8 +1,8 @@
 """The types of `definitions.py` for cyclonedds: a class for each, with its name and fields.
 
 cyclonedds announces these names and types to other nodes, and its C library refuses samples that do
-not fit them. It also calls these classes to encode and decode samples. The classes use `cdr.py`,
-because it is five times faster than converting each message to another Python object.
+not fit them. cyclonedds also calls these classes to encode and decode samples. The classes use
+`cdr.py`, which is five times faster than a conversion of each message to another Python object.
 """
 
 import types
@@ -27,11 +27,11 @@ class IdlSample(Protocol):
 
 
 _made: dict[str, type[IdlSample]] = {}
-"""Type hash -> class: releases with the same message share its class."""
+"""Type hash -> class. Releases in which a message is the same share the message's class."""
 
 
 def sample_type(message_type: type, release: Release = NEWEST) -> type[IdlSample]:
-    """Return the one class for a message type in cyclonedds, named as in ROS's DDS.
+    """Return the class of a message type for cyclonedds, with the type's name in ROS's DDS.
 
     cyclonedds sets `sample_info` on the instances that it reads.
     """
@@ -51,12 +51,13 @@ def _make(message_type: type, release: Release) -> type[IdlSample]:
     # In cyclonedds a dot stands for the `::` of IDL.
     typename = f"{PACKAGES[message_type]}.msg.dds_.{message_type.__name__}_"
     made = types.new_class(typename, (IdlStruct,), {"typename": typename}, body)
-    final: type[IdlSample] = annotations.final(made)  # ROS's types are final, and match only such
+    final: type[IdlSample] = annotations.final(made)  # as ROS's types, which match only final types
     return final
 
 
 def _calls(message_type: type, release: Release) -> dict[str, object]:
-    """Return the methods for cyclonedds. `options`: the encoding, which each sample states too."""
+    """Return the methods that cyclonedds calls. `options`: the encoding, which each sample states
+    too."""
 
     def __init__(self: IdlSample, message: Message) -> None:
         self.message = message

@@ -1,4 +1,4 @@
-"""Announcements of the ends on a DDS graph: topic, type, and the type hash in their user data."""
+"""The announcements of ends on a DDS graph: topic, type, and the type hash from the user data."""
 
 import re
 import threading
@@ -37,8 +37,9 @@ class _End(Protocol):
 class BuiltinReader(builtin.BuiltinDataReader):  # type: ignore[misc] # noqa: TID251
     """Reads the announcements of participants and their ends, in one thread of the process at a time.
 
-    cyclonedds reads each announced QoS into the same variables (11.0.1, qos._CQos._gc_*): if two
-    threads read at once, an end gets another end's user data. A process may have several nodes.
+    cyclonedds reads each announced QoS into the same variables (11.0.1, qos._CQos._gc_*), so if two
+    threads read at once, an end gets another end's user data. A process may have several nodes, each
+    with its thread.
     """
 
     def take(self, count: int) -> list[Any]:
@@ -49,7 +50,7 @@ class BuiltinReader(builtin.BuiltinDataReader):  # type: ignore[misc] # noqa: TI
 
 
 class DdsPeers:
-    """Reads DDS's own topics with the announcements of ends, and reports the ends to `peers`."""
+    """Reads the topics on which DDS announces ends, and reports the ends to `peers`."""
 
     def __init__(self, peers: Peers) -> None:
         self._peers = peers
@@ -86,7 +87,7 @@ class DdsPeers:
 
 
 def _hash(qos: Qos) -> str:
-    """Return the type hash in an end's user data; "" without one."""
+    """Return the type hash in an end's user data; "" without a hash."""
     if Policy.Userdata not in qos:
         return ""
     found = HASH.search(bytes(qos[Policy.Userdata].data).decode(errors="replace"))

@@ -1,4 +1,4 @@
-"""The `dds` transport: ROS 2's wire without ROS, with cyclonedds 11.0.1.
+"""The `dds` transport: speaks as a ROS 2 node without ROS, through cyclonedds 11.0.1.
 
 Names, types and QoS are those of rmw_cyclonedds and rmw_fastrtps: topic `rt/<name>`, type
 `<package>::msg::dds_::<Type>_`, plain CDR, the type hash in the endpoint's user data.
@@ -42,13 +42,13 @@ log = logging.getLogger(__name__)
 E = TypeVar("E", bound=core.Entity)
 
 CANNOT_JOIN: Final = (
-    "is a network interface up, and does CYCLONEDDS_URI, if set, name one that exists? "
-    "`network: localhost` needs none. Is the clock after 1970? Cannot join DDS domain"
+    "is a network interface up, and does CYCLONEDDS_URI, if set, name an interface that exists? "
+    "`network: localhost` needs no network. Is the clock after 1970? Cannot join DDS domain"
 )
 LOOK_EVERY_NS: Final = int(LOOK_EVERY_S * 1e9)
 ANY_SAMPLE: Final = core.SampleState.Any | core.ViewState.Any | core.InstanceState.Any
 ERRORS: Final = 1 | 2
-"""Lets Cyclone log only errors, also fatal ones. It would log a warning for each malformed datagram,
+"""Lets Cyclone log only errors and fatal errors. It would log a warning for each malformed datagram,
 which anybody can send. Neither its Python binding nor its configuration can turn warnings off."""
 
 _domains: WeakValueDictionary[tuple[int, str], Domain] = WeakValueDictionary()
@@ -60,8 +60,8 @@ class DdsTransport(Threaded):
 
     `loopback`: stay on this machine, whatever CYCLONEDDS_URI says. When the wall clock is set back or,
     without `loopback`, the machine's addresses change, the node leaves the graph and joins again with
-    the same ends, and publishers repeat their retained messages. `release`: None to follow RMF's.
-    Raises TransportError if the domain cannot be joined.
+    the same ends, and publishers repeat their retained messages. `release`: None to follow RMF's
+    release. Raises TransportError if the domain cannot be joined.
     """
 
     speaks = "dds"
@@ -220,7 +220,7 @@ class DdsTransport(Threaded):
                 end.log_misfits(self._peers)
 
     def _follow_release(self) -> None:
-        """Take over RMF's release; join again if a message of ours differs in it."""
+        """Adopt RMF's release; join again if a message of ours differs in this release."""
         before = self.release
         if self._peers.settle() and any(self._peers.differs(e.topic, before) for e in self._ends):
             self._join_anew()
@@ -246,7 +246,7 @@ class DdsTransport(Threaded):
             return self._node.owners(writers)
 
     def _withdraw(self, publisher: DdsPublisher, writer: DataWriter) -> None:
-        """Take one writer off the graph; do nothing after close, which has removed it."""
+        """Take one writer off the graph. After `close`, which has removed all writers, do nothing."""
         with self._lock:
             if self._closed or publisher not in self._ends:
                 return
@@ -269,8 +269,8 @@ class DdsTransport(Threaded):
 
 
 def _shared_domain(domain_id: int, configuration: str) -> Domain:
-    """Return this process's domain with this configuration. Participants share it, as Cyclone allows
-    only one."""
+    """Return this process's domain with this configuration. Participants share the domain, because a
+    process can open it only once."""
     key = domain_id, configuration
     with _domains_lock:
         domain = _domains.get(key)

@@ -1,1 +1,1 @@
-"""A ROS 2 node, with rclpy."""
+"""The transport `ros2`: a ROS 2 node, through rclpy."""

@@ -1,7 +1,7 @@
 """The ends of the `ros2` transport: its publishers and subscriptions.
 
-An end outlives rclpy's publisher or subscription, and gets a new one when the transport joins again.
-rclpy's callbacks run in the transport's thread; they only deliver the message.
+An end outlives rclpy's publisher or subscription, and gets a new rclpy object when the transport joins
+again. rclpy's callbacks run in the transport's thread; they only deliver the message.
 """
 
 import threading
@@ -31,14 +31,14 @@ from bridges.transports.ros2.types import ros_type
 from bridges.transports.transport import Receive, TransportError
 
 UNHEARD: Final = 256
-"""The limit of own messages not yet heard back: over twice any topic's depth."""
+"""The most messages of our own that have not come back yet: over twice any topic's depth."""
 YIELD_S: Final = 50e-6
-"""A pause (s) after a callback. It lets the thread woken by the message run first, as rclpy's executor
-holds Python's lock for a while afterwards."""
+"""A pause (s) after a callback. The thread that the message wakes can run then; after the pause rclpy's
+executor holds Python's lock for a while."""
 
 
 class Ends:
-    """The ends of one node, and the pairs that must not hear each other."""
+    """The ends of one node, with the pairs of ends that must not hear each other."""
 
     def __init__(self, release: Release) -> None:
         self.release = release
@@ -50,7 +50,7 @@ class Ends:
         yield from self.subscriptions
 
     def heard_back(self, topic: AnyTopic) -> "list[Ros2Subscription]":
-        """Return the subscriptions that must not hear this node's messages on the topic."""
+        """Return the subscriptions that would hear this node's messages on the topic, but must not."""
         return [end for end in self.subscriptions if end.others_only and end.would_hear(topic)]
 
     def unheard_publishers(self, subscription: "Ros2Subscription") -> int:
@@ -81,7 +81,7 @@ class Ros2Publisher:
         self._retained: deque[Message] = deque(maxlen=depth)
 
     def create(self, node: Node) -> None:
-        """Make rclpy's publisher, and repeat the messages retained for late joiners."""
+        """Make rclpy's publisher, and send again the messages that are retained for late joiners."""
         made = node.create_publisher(
             ros_type(self.topic.type, self._ends.release),
             self.topic.name,
@@ -115,7 +115,8 @@ class Ros2Publisher:
         self._write(message)
 
     def matched(self) -> int:
-        """Return the number of subscriptions reached, without own `others_only` ones; 0 after close."""
+        """Return the number of subscriptions reached, without `others_only` subscriptions of this node;
+        0 after close."""
         with self._using:
             try:
                 count = int(self._end.get_subscription_count()) if self._end else 0
@@ -141,10 +142,10 @@ class Ros2Publisher:
 
 
 class Ros2Subscription:
-    """The subscription of one topic. `dropped`: counts invalid samples, by topic name.
+    """The subscription of one topic. `dropped`: topic name -> number of invalid samples.
 
-    `said`: with `others_only`, this node's own messages that it has not heard back yet, and will skip.
-    rclpy (Jazzy) has no such option, and does not tell a sample's sender.
+    `said`: with `others_only`, this node's own messages that have not come back yet; they are skipped
+    when they come. rclpy (Jazzy) has no such option, and does not tell a sample's sender.
     """
 
     def __init__(
@@ -204,7 +205,7 @@ class Ros2Subscription:
         return max(0, count - self._ends.unheard_publishers(self))
 
     def senders(self) -> list[str]:
-        """Return the nodes of these publishers."""
+        """Return the nodes of the publishers heard."""
         with self._using:
             node = self._node
             try:
@@ -242,7 +243,7 @@ def _profile(qos: topics.Qos) -> QoSProfile:
 
 
 class _Misfit(Protocol):
-    """rclpy's event for a peer whose QoS does not fit an end."""
+    """rclpy's event for a peer with a QoS that does not fit an end."""
 
     last_policy_kind: object
 

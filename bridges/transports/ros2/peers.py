@@ -1,4 +1,4 @@
-"""Types and type hashes of the other ends on our topics, from rclpy."""
+"""The types and type hashes of other nodes' ends on our topics, as rclpy reports them."""
 
 from collections.abc import Iterable, Sequence
 from typing import Protocol

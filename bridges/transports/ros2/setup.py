@@ -1,8 +1,8 @@
 """Sources ROS's setup file before the daemon starts: `ros_setup:` in the YAML.
 
-Without the paths that it sets, rclpy cannot be imported, and `transport: auto` would choose another
-transport under systemd than in a shell. The daemon's process becomes a shell, which sources the file
-and becomes the daemon. So the process id, known to systemd, stays the same.
+Without the paths that this file sets, rclpy cannot be imported, and `transport: auto` would choose
+another transport under systemd than in a shell. The daemon's process becomes a shell, which sources the
+file and becomes the daemon. So the process id, which systemd knows, stays the same.
 """
 
 import logging
@@ -40,5 +40,5 @@ def sourcing(rmf: Rmf, environ: Mapping[str, str], argv: Sequence[str]) -> list[
 
 
 def sourced(rmf: Rmf, environ: Mapping[str, str]) -> dict[str, str]:
-    """Return that command's environment, which marks the file as sourced."""
+    """Return the environment for the command of `sourcing`, which marks the file as sourced."""
     return {**environ, SOURCED: rmf.ros_setup or ""}

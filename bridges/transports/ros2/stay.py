@@ -1,4 +1,4 @@
-"""One stay of a node on ROS 2's graph: rclpy's context, node and executor, from joining to leaving.
+"""One stay of a node on ROS 2's graph: rclpy's context, node and executor until the node leaves.
 
 An RMW reads the machine's network only when a context's node joins. So after a change of address the
 transport leaves, and joins again with a new stay.
@@ -22,14 +22,14 @@ ON_LOOPBACK: Final = {
     "ROS_STATIC_PEERS": None,
     "CYCLONEDDS_URI": LOOPBACK,
 }
-"""The variables that an RMW reads when it joins. With these values it finds only this machine's nodes,
-and Cyclone stays on the loopback interface."""
+"""Values for the variables that an RMW reads when it joins: with them it finds only this machine's
+nodes, and Cyclone stays on the loopback interface."""
 FAST_DDS_SPEAKS: Final = "FASTDDS_BUILTIN_TRANSPORTS"
-"""Fast DDS's variable for its transports. UDPv4 excludes shared memory, over which nodes of two users
-or containers find but do not hear each other. `LOCALHOST` brings shared memory back (rmw_fastrtps,
-participant.cpp), and a profile with transports of its own prevails."""
+"""Fast DDS's variable for its transports. UDPv4 excludes shared memory, because over shared memory
+nodes of two users or containers find each other but do not hear each other. `LOCALHOST` brings shared
+memory back (rmw_fastrtps, participant.cpp), and a profile that names transports takes precedence."""
 REFUSALS: Final = (RuntimeError, NameValidationException)
-"""rclpy's exceptions for a refusal: RCLError and InvalidHandle are RuntimeErrors."""
+"""rclpy's exceptions for a refusal. RCLError and InvalidHandle are RuntimeErrors too."""
 
 
 class Stay:
@@ -48,11 +48,11 @@ class Stay:
 
     @property
     def lasts(self) -> bool:
-        """Is rclpy's context still valid? False after its shutdown, by anybody."""
+        """Is rclpy's context still valid? It is not once any code has shut it down."""
         return bool(self._context.ok())
 
     def spin(self, timeout_s: float | None) -> None:
-        """Run one callback; return without one after `leave_soon` or `timeout_s` (s)."""
+        """Wait for a callback and run it; stop waiting after `leave_soon` or `timeout_s` (s)."""
         self._executor.spin_once(timeout_sec=timeout_s)
 
     def leave_soon(self) -> None:
@@ -66,13 +66,13 @@ class Stay:
         self._context.try_shutdown()
 
     def _join(self, name: str, domain_id: int, ros_args: Sequence[str]) -> None:
-        # Without rclpy's logging, which opens a file below $HOME: a service has no home.
+        # rclpy's logging stays off, because it opens a file below $HOME, and a service has no home.
         self._context.init(args=list(ros_args), initialize_logging=False, domain_id=domain_id)
         self.node = Node(
             name,
             context=self._context,
             enable_rosout=False,
-            start_parameter_services=False,  # nobody changes the clock of a running daemon
+            start_parameter_services=False,  # the clock of a running daemon must not change
         )
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self.node)

@@ -1,9 +1,10 @@
 """The `ros2` transport: an ordinary ROS 2 node, with rclpy, on any installed RMW.
 
-Samples pass through rclpy as bytes; `cdr.py` encodes and decodes them. Invalid samples are dropped and
-counted. Both as on `dds`. rclpy's executor runs in a thread of this transport. When the machine's
+As on `dds`, samples pass through the library as bytes, `cdr.py` encodes and decodes them, and invalid
+samples are dropped and counted. rclpy's executor runs in a thread of this transport. When the machine's
 addresses change or its wall clock is set back, this thread leaves the graph and joins again, with the
-same ends. (After a step of the clock only Cyclone needs this; it briefly interrupts other RMWs.)
+same ends. (After a step of the clock only Cyclone needs to join again; with another RMW it does no harm
+but a short interruption.)
 
 Source: rclpy 7.1 (ROS 2 Jazzy), its public API. Only this file, `stay.py` and `ends.py` import rclpy,
 only `types.py` imports the message packages, and only `choose.py` imports this file.
@@ -70,8 +71,8 @@ class Ros2Transport(Threaded):
 
     @property
     def node(self) -> Node:
-        """rclpy's node; a new one each time the transport joins again. Raises TransportError without a
-        network."""
+        """rclpy's node, which is new each time the transport joins again. Raises TransportError without
+        a network."""
         if self._stay is None:
             raise TransportError(f"{self.name} has no network")
         return self._stay.node
@@ -100,7 +101,8 @@ class Ros2Transport(Threaded):
         return subscription
 
     def faults(self) -> list[tuple[str, str]]:
-        """Return (code, detail) of each fault that keeps nodes from hearing each other; any thread."""
+        """Return (code, detail) of each fault that keeps nodes from hearing each other; from any
+        thread."""
         with self._lock:
             if not self.lives or self._stay is None:
                 return []
@@ -160,8 +162,8 @@ class Ros2Transport(Threaded):
                     log.warning(pairs("not_joined", node=self.name, reason=error))
 
     def _spin(self) -> None:
-        """Run the executor. Exceptions of rclpy end the thread only if repeated, or after the context
-        was shut down."""
+        """Run the executor. The thread ends only after repeated exceptions of rclpy, or after a
+        shutdown of the context."""
         failures = 0
         while not self._closed and self._lasts() and failures < notices.FAILURES:
             try:
@@ -191,7 +193,7 @@ class Ros2Transport(Threaded):
             self._join_anew()
 
     def _withdraw(self, publisher: Ros2Publisher) -> None:
-        """Take one publisher off the graph; do nothing after close, which has removed it."""
+        """Take one publisher off the graph. After `close`, which has removed all, do nothing."""
         with self._lock:
             if self._closed or publisher not in self._ends.publishers:
                 return

@@ -1,7 +1,7 @@
 """The types of `definitions.py` for rclpy: the classes of the installed ROS packages.
 
-Samples pass through rclpy as bytes (`transport.py`); these classes only name their types. Their fields
-are compared with `definitions.py`, because bytes of another definition would be misread.
+Samples pass through rclpy as bytes (`transport.py`), so these classes only name the types. The classes'
+fields are compared with `definitions.py`, because bytes of another definition would be misread.
 """
 
 import importlib
@@ -30,11 +30,12 @@ def installed() -> Release:
 
 
 def _fits(message_type: type, release: Release) -> bool:
-    """Does the installed message match this release's, or lack it if the release lacks it?"""
+    """Does the installed package define this message as the release does, or lack it as the release
+    does?"""
     try:
         module = importlib.import_module(f"{PACKAGES[message_type]}.msg")
     except ImportError:
-        return True  # reported when the message is used
+        return True  # `ros_type` reports the missing package when the message is used
     found: type[RosMessage] | None = getattr(module, message_type.__name__, None)
     if found is None or not release.has(message_type):
         return found is None and not release.has(message_type)

@@ -1,1 +1,1 @@
-"""ROS 2's wire without ROS, with zenoh."""
+"""The transport `zenoh`: speaks as a ROS 2 node without ROS, through zenoh."""

@@ -1,5 +1,5 @@
-"""Keeps a node that must stay on this machine off the graph while a router, which would forward its
-messages, is linked to it, and for a while afterwards."""
+"""Keeps a node that must stay on this machine off the graph while a router is linked to it, because the
+router would forward its messages, and for a while afterwards."""
 
 import math
 from typing import Final
@@ -10,12 +10,12 @@ WHY_AWAY: Final = (
     " until the router has gone, this node neither speaks nor hears"
 )
 GONE_AFTER_S: Final = 10.0
-"""A router that lost its link tries to connect every 4 s (zenoh's default for `connect/retry`); a
-restart takes it a few seconds more."""
+"""A router that has lost its link tries to connect every 4 s (zenoh's default for `connect/retry`); its
+restart takes a few seconds more."""
 
 
 class Alone:
-    """Decides for one node when it is off the graph. `now`: monotonic seconds."""
+    """Decides when one node must be off the graph. `now`: monotonic seconds."""
 
     def __init__(self) -> None:
         self._met_at = -math.inf

@@ -1,4 +1,4 @@
-"""The configuration of a zenoh session: as in rmw_zenoh, with the YAML's settings, or for a node that
+"""The configuration of a zenoh session: rmw_zenoh's with the YAML's settings, or that of a node which
 stays on this machine.
 
 Source: ros2/rmw_zenoh, jazzy, DEFAULT_RMW_ZENOH_SESSION_CONFIG.json5; zenoh's DEFAULT_CONFIG.json5.
@@ -15,18 +15,18 @@ Configuration = dict[str, object]
 """A key of zenoh's configuration -> its JSON value."""
 
 LOOPBACK_PORT: Final = 17400
-"""The port on which nodes of domain 0 on this machine meet; domain N uses the Nth port after it. It
-differs from routers' (7447) and from those that Linux assigns by itself (from 32768)."""
+"""The port on which nodes of domain 0 on this machine meet; domain N uses the Nth port after this port.
+Routers use another port (7447), and Linux assigns other ports by itself (from 32768)."""
 RETRY: Final = {"period_init_ms": 100, "period_max_ms": 1000, "period_increase_factor": 2}
 
 COMMON: Final[Configuration] = {
     "scouting/multicast/enabled": False,
     "scouting/delay": 1,  # ms: scouting is off, so there is nothing to wait for
-    # zenoh's own clock panics before 1970, and zenoh then sends and hears nothing more. Retained
+    # zenoh's own clock panics before 1970, and then zenoh neither sends nor hears messages. Retained
     # messages are ordered by their numbers and need no time.
     "timestamping/enabled": False,
-    # New messages wait during the query for retained ones. A hung node must not delay a fire alarm
-    # for longer than this (ms); rmw_zenoh would wait forever.
+    # New messages wait during the query for retained messages. A hung node must not delay a fire alarm
+    # for longer than this (ms); rmw_zenoh would wait for ever.
     "queries_default_timeout": 3000,
     "transport/shared_memory/enabled": False,
     "connect/timeout_ms": -1,
@@ -79,8 +79,8 @@ def mode(zenoh: Zenoh) -> str:
     """Return the node's mode: `peer` or `client`.
 
     A router forwards no messages between peers, because peers connect directly. So a node that peers
-    cannot reach must be a client. A node with several routers must be a client too: a peer connects to
-    all routers, and would receive each message once from each.
+    cannot reach must be a client. A node with several routers must be a client too, because a peer
+    connects to all routers, and would receive each message from every router.
     """
     if zenoh.mode != "auto":
         return zenoh.mode

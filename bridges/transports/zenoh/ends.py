@@ -2,8 +2,8 @@
 
 They are made as in rmw_zenoh (jazzy: rmw_publisher_data.cpp, rmw_subscription_data.cpp). A publisher
 that retains messages is an advanced publisher, with a cache as deep as its history. A subscription
-that wants retained messages is an advanced subscriber: it queries a publisher's cache when either end
-is new, and again for missed samples.
+that wants retained messages is an advanced subscriber: it queries a publisher's cache when the
+publisher or the subscription is new, and again for missed samples.
 
 An end outlives its session: when the transport joins again, the end gets a place in the new session.
 Callbacks on zenoh's threads only queue work for the transport's thread.
@@ -35,17 +35,17 @@ from bridges.transports.zenoh.place import Place, Tell
 from bridges.transports.zenoh.session import contained
 
 HEARTBEAT_S: Final = 0.5
-"""The delay (s) after a retained message until its number is sent again, for subscribers to notice a
-loss; as in rmw_zenoh."""
+"""The delay (s) after a retained message until its number is sent again, which shows a loss to
+subscribers; as in rmw_zenoh."""
 AT_ONCE: Final = 100
-"""The most samples taken from one subscription before the others have their turn."""
+"""The most samples taken from one subscription before other subscriptions have their turn."""
 
 
 class Declared(Protocol):
     """A publisher or subscriber in a zenoh session."""
 
     def undeclare(self) -> object:
-        """Take it off the graph."""
+        """Take this publisher or subscriber off the graph."""
 
 
 class ZenohEnd(ABC):
@@ -120,7 +120,7 @@ class ZenohPublisher(ZenohEnd):
         self._retained: deque[bytes] = deque(maxlen=depth)
 
     def create(self, session: zenoh.Session, keys: Keys, number: int) -> None:
-        """Take a place in a session, and repeat the messages retained for late joiners."""
+        """Take a place in a session, and send again the messages that are retained for late joiners."""
         place = self._placed(session, keys, "MP", number)
         self._release = keys.release
         self._end = end = self._declared(session, place.key)
@@ -185,7 +185,7 @@ class ZenohPublisher(ZenohEnd):
 class ZenohSubscription(ZenohEnd):
     """The subscription of one topic.
 
-    `dropped`: counts invalid samples, by topic name. `others_only`: skip this node's own publishers.
+    `dropped`: topic name -> number of invalid samples. `others_only`: skip this node's own publishers.
     `attached`: only samples with the attachment of a ROS node are valid.
     """
 
@@ -239,7 +239,7 @@ class ZenohSubscription(ZenohEnd):
         return len(self.senders())
 
     def senders(self) -> list[str]:
-        """Return the nodes of these publishers."""
+        """Return the nodes of the publishers heard."""
         place = self.place
         peers = list(place.peers.values()) if place else []
         ours = self._own_session if self.others_only else ""
@@ -264,7 +264,8 @@ class ZenohSubscription(ZenohEnd):
             self._ring()
 
     def _arrived(self, sample: Sample) -> None:
-        """Queue a sample; called on zenoh's thread. A full queue drops its oldest sample: KEEP_LAST."""
+        """Queue a sample; called on zenoh's thread. A full queue drops its oldest sample, as KEEP_LAST
+        demands."""
         size = len(sample.payload)
         long = size > cdr.longest(self.topic.type)
         self._waiting.append(CdrError(f"{size} bytes long") if long else sample)

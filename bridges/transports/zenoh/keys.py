@@ -1,6 +1,7 @@
-"""Names of ROS's topics and nodes on zenoh: data keys, liveliness tokens, attachments. Pure.
+"""Names of ROS's topics and nodes on zenoh: data keys, liveliness tokens, attachments.
 
-There are two naming schemes; nodes with different schemes do not hear each other:
+The functions are pure. There are two naming schemes; nodes with different schemes do not hear each
+other:
 - rmw_zenoh's, where each ROS context is a zenoh session. Source: ros2/rmw_zenoh, jazzy:
   its design.md; rmw_zenoh_cpp/src/detail/liveliness_utils.cpp and attachment_helpers.cpp.
 - zenoh-bridge-ros2dds's, which routes a DDS domain. Source: eclipse-zenoh/zenoh-plugin-ros2dds,
@@ -29,16 +30,16 @@ NODE_ID: Final = 0
 _HEAD: Final = struct.Struct("<qqB")
 GID_LENGTH: Final = 16
 LONGEST: Final = 2000
-"""The greatest length of a ROS node's token (characters): ROS limits each name in it to 255."""
+"""The greatest length of a ROS node's token (characters), because ROS limits each name to 255."""
 HASH: Final = re.compile(r"typehash=(RIHS01_[0-9a-f]{64});")
 
 
 class Peer(Struct, frozen=True):
-    """An end, from its token.
+    """An end that its token has announced.
 
     `type`: the message type, with the hash if the token has one. `transient_local`: a publisher
-    retains its messages; a subscription wants retained ones. `announced`: the end's topic, type and
-    hash. `node`: the end's node, as `/namespace/name`.
+    retains its messages, or a subscription wants retained messages. `announced`: the end's topic, type
+    and hash. `node`: the end's node, as `/namespace/name`.
     """
 
     session: str
@@ -73,7 +74,7 @@ class Keys(Protocol):
         """Return key expressions for the tokens that show RMF's release (`peers.py`)."""
 
     def peer(self, token: str) -> Peer | None:
-        """Return a token's end; None if the token is not of an end."""
+        """Return the end that a token announces; None if the token announces no end."""
 
 
 class RmwZenoh:
@@ -151,7 +152,7 @@ class Ros2Dds:
     def token(self, kind: Kind, topic: AnyTopic, number: int) -> str:
         qos = _qos(topic, kind)
         retained = int(qos.durability == "transient_local")
-        # No key fields; reliable; durability; keep last; user data of the bridge's DDS end.
+        # The parts: no key fields; reliable; durability; keep last; user data of the bridge's DDS end.
         text = f":1:{retained}:0,{qos.depth}:typehash={type_hash(topic.type, self.release)};"
         return f"@/{self.session}/@ros2_lv/{kind}/{_name(topic, '§')[1:]}/{self.type(topic)}/{text}"
 

@@ -1,7 +1,7 @@
-"""Announcements of the ends on a zenoh graph, by their tokens.
+"""The tokens by which ends announce themselves on a zenoh graph.
 
-Each of our ends watches the tokens on its own topic (`place.py`). The tokens that show RMF's release
-are watched here, for any topics of ours.
+Each of our ends watches the tokens on its own topic (`place.py`). `ZenohPeers` watches the tokens that
+show RMF's release, whatever topics we have.
 """
 
 import logging
@@ -20,7 +20,7 @@ from bridges.transports.zenoh.keys import Keys, Peer
 log = logging.getLogger(__name__)
 
 MOST: Final = 1000
-"""The limit of tokens: more ends than any site has on one topic."""
+"""The most tokens that are kept. No site has more ends on one topic."""
 
 Order = Callable[[], None]
 """Work for the transport's thread."""
@@ -48,8 +48,9 @@ class Tokens:
     """The tokens that match some key expressions, while the session is open or until `leave`.
 
     `came(token, peer)`, `gone(token)`: called on zenoh's thread. At most MOST tokens are kept; further
-    ones are left out, logged once. When half of the kept ones have gone, all tokens are queried again,
-    so none is missing after a flood. `do(order)` runs an order on the transport's thread.
+    tokens are left out, and this is logged once. When half of the kept tokens have gone, all tokens are
+    queried again, so that no token is missing after a flood. `do(order)` runs an order on the
+    transport's thread.
     """
 
     def __init__(
@@ -77,7 +78,7 @@ class Tokens:
             _undeclare(watching)
 
     def _watch(self) -> None:
-        """Watch for all present tokens, and for each that comes or goes."""
+        """Watch for all present tokens, and for each token that comes or goes."""
         on_token = Callback(self._look, indirect=False)
         self._watching = [
             self._live.declare_subscriber(expression, on_token, history=True)
@@ -85,7 +86,7 @@ class Tokens:
         ]
 
     def _watch_again(self) -> None:
-        with self._lock, suppress(zenoh.ZError):  # its session may have been closed meanwhile
+        with self._lock, suppress(zenoh.ZError):  # the session may have been closed meanwhile
             if self._left:
                 return
             _undeclare(self._watching)
@@ -131,12 +132,13 @@ class ZenohPeers:
         self._do = do
 
     def watch(self, session: zenoh.Session, keys: Keys) -> Tokens:
-        """Start again in this session; the caller must keep the returned Tokens while it is open."""
+        """Watch in this session from the beginning. The caller must keep the returned Tokens while the
+        session is open."""
         self._peers.clear()
         return Tokens(session, keys, keys.witnesses(), self._came, self._gone, self._do)
 
     def tell(self, token: str, end: Announced | None) -> None:
-        """Note an end that has come; or, with None, gone."""
+        """Note an end that has come; None: the end has gone."""
         if end is None:
             self._peers.gone(token)
         else:

@@ -1,4 +1,4 @@
-"""An end's place in one zenoh session: the peers that it reaches, and those that do not fit."""
+"""An end's place in one zenoh session: the peers that it reaches, and the peers that do not fit."""
 
 from collections.abc import Callable
 
@@ -12,7 +12,7 @@ from bridges.transports.zenoh.keys import Keys, Kind
 from bridges.transports.zenoh.peers import Order, Tokens
 
 Tell = Callable[[str, Announced | None], None]
-"""Takes a token and its end; the end is None once it has gone."""
+"""Accepts a token and its end; the end is None once it has gone."""
 
 
 class Place:
@@ -53,7 +53,7 @@ class Place:
         self._alive: zenoh.LivelinessToken | None = None
 
     def appear(self) -> None:
-        """Declare the token, as the end now sends or hears."""
+        """Declare the token, because the end sends or hears from now on."""
         self._alive = self._live.declare_token(self.token)
 
     def leave(self) -> None:

@@ -1,9 +1,9 @@
 """The `zenoh` transport: a session that looks like a ROS node on rmw_zenoh, or like a
 zenoh-bridge-ros2dds with one node behind it.
 
-zenoh reconnects by itself: it keeps looking for its routers, and declares everything again when one
-answers. This transport opens a new session only when the machine's addresses have changed, as the old
-session would notice this only by its links' timeouts.
+zenoh reconnects by itself: it keeps looking for its routers, and declares everything again when a
+router answers. This transport opens a new session only when the machine's addresses have changed,
+because the old session would notice the change only when its links time out.
 
 Source: eclipse-zenoh 1.10 (Python API), and the sources named in `keys.py` and `ends.py`. Only this
 folder imports zenoh, and only `choose.py` imports this file.
@@ -48,7 +48,7 @@ class ZenohTransport(Threaded):
     """One node: a session, its publishers and subscriptions, and the thread that delivers messages.
 
     `loopback`: stay on this machine, without a router, whatever `settings` say. Raises TransportError
-    if no session can be opened. Missing answers of other nodes are not an error.
+    if no session can be opened. If no other node answers, that is no error.
     """
 
     speaks = "zenoh"
@@ -153,7 +153,7 @@ class ZenohTransport(Threaded):
     # --- the session ---------------------------------------------------------------------------
 
     def _join(self) -> None:
-        """Open a session if possible. A client has no session before its router answers."""
+        """Open a session if possible. A client has no session before a router answers."""
         self._addresses = addresses.addresses()
         if self._loopback:
             ways = zenoh_config.on_loopback(self.domain_id)
@@ -185,7 +185,8 @@ class ZenohTransport(Threaded):
             self._attach(end)
 
     def _vanish(self) -> None:
-        """Take the node and every end off the graph; keep the session, to notice the router's leave."""
+        """Take the node and every end off the graph, but keep the session, which shows when the router
+        leaves."""
         for end in self._ends:
             end.leave()
         self._deaf.clear()
@@ -225,9 +226,10 @@ class ZenohTransport(Threaded):
                 publisher.leave()
 
     def _leave(self) -> None:
-        """Leave the session, and close it in another thread: on a dead link this takes 10 s.
+        """Leave the session, and close it in another thread, because on a dead link this takes 10 s.
 
-        Objects declared in the session are kept until then: dropping them sooner may block this thread.
+        Objects declared in the session are kept until it is closed; to drop them earlier may block this
+        thread.
         """
         session, self._session = self._session, None
         held: list[object] = [end.give_up() for end in self._ends]
@@ -247,12 +249,12 @@ class ZenohTransport(Threaded):
             self._closing = [closing for closing in self._closing if closing.is_alive()]
             try:
                 self._join()
-            except (TransportError, zenoh.ZError) as error:  # for example, a secret is missing now
+            except (TransportError, zenoh.ZError) as error:  # for example, a secret's file is gone
                 self._why_unlinked = str(error)
                 self._leave()
 
     def _follow_release(self) -> None:
-        """Take over RMF's release; give a new place to each end whose message differs in it."""
+        """Adopt RMF's release; give a new place to each end whose message differs in this release."""
         before = self.release
         if not self._peers.settle():
             self._peers.name_misfits()
@@ -312,8 +314,8 @@ class ZenohTransport(Threaded):
         return not all(map(zenoh_config.is_local, endpoints))
 
     def _look(self) -> None:
-        """Log once if no router or peer answers, and once if one answers again. On loopback, leave the
-        graph while a router is linked."""
+        """Log once that no router or peer answers, and once that a router or peer answers again. On
+        loopback, leave the graph while a router is linked."""
         neighbours = list(self._neighbours.values())
         routers = zenoh.WhatAmI.ROUTER in neighbours
         if self._loopback:
@@ -332,7 +334,7 @@ class ZenohTransport(Threaded):
             log.warning(pairs("not_linked", node=self.name, connect=where, reason=reason))
 
     def _keep_apart(self, away: bool) -> None:
-        """Leave the graph if `away`, because of a router; else return to it."""
+        """Leave the graph if `away` (a router is linked), else return to the graph."""
         with self._lock:
             before, session = self._away, self._session
             if self._closed or session is None or not (before or away):
@@ -350,4 +352,4 @@ class ZenohTransport(Threaded):
 
 
 def _nothing() -> None:
-    """An order that only wakes our thread."""
+    """Do nothing; this order only wakes our thread."""
