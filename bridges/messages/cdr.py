@@ -1,9 +1,10 @@
 """Messages as bytes: plain CDR (XCDR1), the encoding that ROS 2 uses on the wire.
 
-Four bytes of header (`00 01 00 00` little endian, `00 00 00 00` big endian), then the fields in
-their order. A number is aligned to its own size, counted from the end of the header; a string is its
-length with the closing NUL as uint32, the UTF-8 bytes and the NUL; a sequence is its length as uint32
-and its elements. Source: OMG DDS-XTypes 1.3, 7.4.3, and samples of rmw_cyclonedds and rmw_fastrtps.
+A sample has four bytes of header (`00 01 00 00` little endian, `00 00 00 00` big endian), then the
+fields in their order. A number is aligned to its own size, counted from the end of the header. A string
+is its length with the closing NUL (as uint32), then the UTF-8 bytes and the NUL. A sequence is its
+length (as uint32), then its elements. Source: OMG DDS-XTypes 1.3, 7.4.3, and samples of rmw_cyclonedds
+and rmw_fastrtps.
 
 The encoder and decoder of each type and release are built once, from the annotations in
 `definitions.py`. Fields that a release lacks are not sent, and are read as their defaults.
@@ -28,10 +29,11 @@ LITTLE_ENDIAN = b"\x00\x01\x00\x00"
 BIG_ENDIAN = b"\x00\x00\x00\x00"
 HEADER = 4
 LONGEST: Final = 1 << 20
-"""The longest sample (bytes) accepted from the network. A FleetState of 200 robots takes 46 kB, and
-0.7 MB with 50 places ahead of each robot."""
+"""The longest sample (bytes) accepted from the network. A FleetState of 200 robots takes 46 kB, or 0.7
+MB if the path of each robot has 50 places."""
 LONGEST_FLAT: Final = 1 << 16
-"""The longest sample (bytes) of a type without lists of messages: a hundred of these may wait."""
+"""The longest sample (bytes) of a type without lists of messages, because a hundred samples may
+wait."""
 CODES = {"int32": "i", "uint32": "I", "uint64": "Q", "float32": "f"}
 BYTES = ("uint8", "byte")
 
@@ -43,9 +45,9 @@ class CdrError(ValueError):
 def encode(message_type: type, message: object, release: Release = NEWEST) -> bytes:
     """Encode the message as little endian CDR with its header.
 
-    Characters that are impossible on the wire (a NUL, half a surrogate pair) become `?`: a strange
-    text from a device must not block the device's state message. Raises CdrError for a number out of
-    range, or a value of another type.
+    Characters that are impossible on the wire (a NUL, half a surrogate pair) become `?`, because a
+    strange text from a device must not block the device's state message. Raises CdrError for a number
+    out of range, or a value of another type.
     """
     out = bytearray(LITTLE_ENDIAN)
     try:
@@ -161,7 +163,7 @@ def _putting_struct(members: list[tuple[str, Put]]) -> Put:
 
 @cache
 def _get(kind: type, order: str, release: Release) -> Get:
-    """Make the function that reads a value of this type at a position: it returns value and end."""
+    """Make the function that reads a value of this type at a position and returns (value, its end)."""
     if typing.get_origin(kind) is typing.Annotated:
         name = typing.get_args(kind)[1]
         return _get_byte if name in BYTES else _getting_number(order + CODES[name])

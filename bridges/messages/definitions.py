@@ -41,7 +41,7 @@ class Time(Struct, frozen=True, gc=False):
 
 
 class Duration(Struct, frozen=True, gc=False):
-    """builtin_interfaces/Duration: sec may be negative, nanosec is added to it."""
+    """builtin_interfaces/Duration: `sec` may be negative, and `nanosec` is added to `sec`."""
 
     sec: int32 = 0
     nanosec: uint32 = 0
@@ -196,7 +196,7 @@ class AlertParameter(Struct, frozen=True, gc=False):
 
 
 class Alert(Struct, frozen=True, gc=False):
-    """A notice to a person on RMF's dashboard; its `id` is used once."""
+    """A notice to a person on RMF's dashboard; each notice needs a new `id`."""
 
     id: str = ""
     title: str = ""
@@ -290,5 +290,5 @@ PACKAGES: Final[dict[type, str]] = {
 
 
 def field_types(message_type: type) -> dict[str, type]:
-    """Map field -> type, in the message's order: as annotated, so a number is an `Annotated`."""
+    """Map field -> annotation, in the message's order; the annotation of a number is an `Annotated`."""
     return dict(message_type.__annotations__)

@@ -1,7 +1,9 @@
 """Substitutes for messages that RMF's release lacks: the nearest message of that release.
 
-- EmergencySignal to all fleets: `fire_alarm_trigger`, which every release's fleet adapters hear.
-- Alert: the log. Its cause is also among the daemon's faults, and so in its diagnostics.
+- In place of an EmergencySignal to all fleets: `fire_alarm_trigger`, which the fleet adapters of every
+  release hear.
+- In place of an Alert: a line in the log. The alert's cause is also a fault of the daemon, and so in
+  its diagnostics.
 """
 
 from typing import Final
@@ -20,7 +22,8 @@ def converted(message: Message) -> Message | None:
 
 
 def remarks(topic: AnyTopic, wanted: str) -> list[str]:
-    """Write remarks for `check` on a topic whose message a release lacks (`wanted`: the YAML's)."""
+    """Write remarks for `check` on a topic whose message a release lacks. `wanted`: the YAML's
+    `release`."""
     names = RELEASES if wanted == "auto" else [wanted]
     way = (
         f"goes out on {INSTEAD[topic.name].name}" if topic.name in INSTEAD else "goes into the log"

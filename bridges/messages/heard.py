@@ -1,7 +1,7 @@
-"""One message of RMF's graph, the same from a live graph and from every kind of recording.
+"""One message of RMF's graph, in the same form from a live graph and from every kind of recording.
 
-Both yield the same values in the same order, so code that judges, explains or draws needs not know the
-source.
+A graph and a recording yield the same values in the same order, so code that judges, explains or draws
+need not know the source.
 """
 
 from operator import is_
@@ -16,7 +16,7 @@ from bridges.messages.words import LONGEST_NAME
 FREE_TEXTS: Final = frozenset(
     {"error_message", "message", "title", "subtitle", "value", "performing_action", "model"}
 )
-"""Fields of messages with sentences instead of names."""
+"""The fields of messages that hold sentences instead of names."""
 LONGEST_SENTENCE: Final = 1000
 MOST_PARTS: Final = 500
 """The most elements of a sequence; a legal FleetState has 200 robots."""
@@ -47,9 +47,9 @@ class Heard(Struct, frozen=True):
 
 
 class Own(Struct, frozen=True):
-    """A text of our recorder beside the messages: a daemon's note in JSON.
+    """A text that our recorder puts beside the messages: a daemon's note in JSON.
 
-    `topic`: such as `rmf_bridge/outputs`. Times as in `Heard`.
+    `topic`: such as `rmf_bridge/outputs`. The times are as in `Heard`.
     """
 
     at: float
@@ -59,7 +59,8 @@ class Own(Struct, frozen=True):
 
 
 def bounded(part: Any, longest: int = LONGEST_NAME) -> Any:
-    """Shorten a message, or a part of it, for memory and display: anybody can send megabytes of name.
+    """Shorten a message, or a part of it, for memory and display, as anybody can send a name of
+    megabytes.
 
     A name of more than LONGEST_NAME characters, or a sentence of more than LONGEST_SENTENCE, is cut and
     ends with its length; a sequence is cut to MOST_PARTS elements. Parts within limits are not copied.

@@ -1,13 +1,14 @@
-"""The releases of RMF's message packages, and the parts of `definitions.py` that each lacks.
+"""The releases of RMF's message packages, and the parts of `definitions.py` that each release lacks.
 
-Read in open-rmf/rmf_internal_msgs, every line of the messages in `definitions.py`:
+The sources are in open-rmf/rmf_internal_msgs; every line of the messages was compared:
 - jazzy: 3.3.1 (a351d51602383eb09a8138d302827a76241630a5), branch jazzy at
   04585f0e2b0da9f11327fb403d38bc547d648fa6. Humble's 3.0.4 and Iron's 3.1.3 are the same.
 - kilted: 3.5.0 (branch kilted at c0f72ce5e2129411d2868414b25f6fab1460fcdb). Lyrical's 4.1.0
   (3d4df023bacaf7a091564e98f4aff0776f72a612) is the same.
 
-Two nodes of different releases do not hear each other's messages of a type that differs. Each node
-announces the type hash of every endpoint, so the hashes on a graph reveal RMF's release.
+If a type differs between two releases, nodes of these releases do not hear each other's messages of
+this type. Each node announces the type hash of every endpoint, so the hashes on a graph show RMF's
+release.
 """
 
 from typing import Final
@@ -56,7 +57,7 @@ JAZZY: Final = Release(
 KILTED: Final = Release("kilted")
 RELEASES: Final = {release.name: release for release in (JAZZY, KILTED)}
 DEFAULT: Final = JAZZY
-"""The release used until a fleet adapter shows another: the release of most sites."""
+"""The release of most sites, which is used until a fleet adapter shows another release."""
 DIFFERING: Final = frozenset[type]().union(
     *(release.lacks | {message for message, _ in release.without} for release in RELEASES.values())
 )

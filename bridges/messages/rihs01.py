@@ -1,9 +1,9 @@
 """The RIHS01 type hash (ROS REP-2016) of each message, computed from `definitions.py`.
 
 A ROS 2 node announces the hash of its message definition with each endpoint, and warns about a peer
-without a hash or with another one. The hash is the SHA-256 of the type's description as JSON: its
-fields, then the descriptions of all nested types, sorted by name. It covers the names and types of
-fields, but neither constants nor comments.
+without a hash or with another hash. The hash is the SHA-256 of the type's description as JSON: its
+fields, then the descriptions of all nested types, sorted by name. The hash covers the names and types
+of fields, but not constants and comments.
 Source: ros2/rosidl, rosidl_generator_type_description, and type_description_interfaces/FieldType.
 """
 
@@ -69,7 +69,7 @@ def type_name(message_type: type) -> str:
 MESSAGES: Final[dict[str, type[Message]]] = {
     type_name(message_type): message_type for message_type in typing.get_args(Message)
 }
-"""By the type's name in ROS, such as `rmf_lift_msgs/msg/LiftState`."""
+"""Type's name in ROS (`rmf_lift_msgs/msg/LiftState`) -> type."""
 
 
 def _description(message_type: type, release: Release) -> dict[str, object]:
@@ -95,7 +95,8 @@ def _field_type(kind: type) -> dict[str, object]:
 
 
 def _element(kind: type) -> type:
-    """Return the type of a sequence's elements, or the type itself; a number type as its ROS name."""
+    """Return the type of a sequence's elements, or the type itself; for numbers, the type's ROS
+    name."""
     if typing.get_origin(kind) is tuple:
         kind = typing.get_args(kind)[0]
     return typing.get_args(kind)[1] if typing.get_origin(kind) is typing.Annotated else kind

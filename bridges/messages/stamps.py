@@ -14,7 +14,8 @@ class ClockError(Exception):
 
 
 def stamp(wall: float) -> Time:
-    """Convert seconds since the epoch to RMF's Time, at least 0 (never). Raises ClockError."""
+    """Convert seconds since the epoch to RMF's Time; before the epoch, to 0 (never). Raises
+    ClockError."""
     if not wall < ENDS:
         raise ClockError(
             "the clock is past 2038-01-19, the last day that RMF's stamps can hold: set the clock"
@@ -30,5 +31,5 @@ def duration(seconds: float) -> Duration:
 
 
 def in_seconds(value: Time | Duration) -> float:
-    """Convert to seconds; a Time to seconds since the epoch."""
+    """Convert a Duration to seconds, and a Time to seconds since the epoch."""
     return value.sec + value.nanosec * 1e-9

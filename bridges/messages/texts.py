@@ -1,6 +1,6 @@
-"""Texts of message definitions, as in ROS recordings: written from our table, and matched with it.
+"""Message definitions as texts, as in ROS recordings: written from our table, and compared with it.
 
-A text has the message's fields, a line each, then for each nested type a line of `=`, a line
+A text has a line for each field of the message, then for each nested type a line of `=`, a line
 `MSG: package/Name`, and the type's fields (the `ros2msg` schema of MCAP, as rosbag2 concatenates it).
 """
 
@@ -16,10 +16,11 @@ from bridges.messages.rihs01 import type_name
 RULE: Final = "=" * 80
 LONGEST: Final = 1 << 20
 DEEPEST: Final = 8
-"""The greatest depth of nested types; a definition that names itself would never end."""
+"""The greatest depth of nested types. Without it, a definition that contains itself would never end."""
 
 Shape = tuple[tuple[str, object], ...]
-"""Pairs (field, type's name or Shape); a sequence's type ends with `[]`, or is a tuple of one Shape."""
+"""Pairs (field, its type's name or Shape). A sequence has a type's name with `[]`, or a tuple of one
+Shape."""
 
 
 class UnknownDefinition(ValueError):
@@ -35,7 +36,7 @@ def text(message_type: type, release: Release) -> str:
 
 
 def releases_of(message_type: type, definition: str) -> list[Release]:
-    """List the releases with this definition of the message, the newest first; empty for none."""
+    """List the releases with this definition of the message, the newest first."""
     try:
         found = _read(_short(message_type), definition)
     except UnknownDefinition:
@@ -94,7 +95,8 @@ def _shape_of(kind: type, release: Release) -> object:
 
 
 FIELD: Final = re.compile(r"([A-Za-z][\w/]*)(?:<=\d+)?(\[(?:<=)?\d*\])?\s+([a-z]\w*)\b(?!\s*=)")
-"""A field: type, `[]`, name. A constant has a `=` after its name; a field with a default has none."""
+"""A field: type, `[]`, name. Only a constant has a `=` after its name; a field's default follows the
+name directly."""
 
 
 def _read(name: str, definition: str) -> Shape:

@@ -1,4 +1,4 @@
-"""Every topic that we publish or subscribe, with its type and QoS.
+"""The topics that we publish or subscribe, with their types and QoS.
 
 The QoS matches RMF's own endpoints (rmf_ros2 9dedd0f; agv/Node.cpp, lift_supervisor/Node.cpp,
 door_supervisor/Node.cpp). All endpoints are RELIABLE with KEEP_LAST history; only durability and depth
@@ -16,7 +16,7 @@ M_co = TypeVar("M_co", bound=d.Message, covariant=True)
 
 
 class Qos(Struct, frozen=True):
-    """RELIABLE, KEEP_LAST(depth), with this durability."""
+    """The QoS of an endpoint: RELIABLE, KEEP_LAST(depth), with this durability."""
 
     durability: Literal["volatile", "transient_local"]
     depth: int
@@ -48,7 +48,8 @@ AnyTopic = Topic[d.Message]
 
 
 LIFT_STATES = Topic("lift_states", d.LiftState)
-# Subscribed VOLATILE: TRANSIENT_LOCAL would replay up to 100 old requests at our restart.
+# The subscription is VOLATILE, because TRANSIENT_LOCAL would replay up to 100 old requests at our
+# restart.
 LIFT_REQUESTS = Topic("lift_requests", d.LiftRequest, publish=RETAINED, subscribe=VOLATILE)
 ADAPTER_LIFT_REQUESTS = Topic(
     "adapter_lift_requests", d.LiftRequest, publish=RETAINED, subscribe=RETAINED
@@ -60,21 +61,21 @@ DOOR_SUPERVISOR_HEARTBEAT = Topic("door_supervisor_heartbeat", d.SupervisorHeart
 CHARGER_STATES = Topic("charger_states", d.ChargerState)
 CHARGER_REQUESTS = Topic("charger_requests", d.ChargerRequest)
 CHARGER_CANCELS = Topic("charger_cancels", d.ChargerCancel)
-# Ours: RMF has no message to answer a request.
+# This topic is ours, because RMF has no message to answer a request.
 CHARGER_REFUSALS = Topic("charger_refusals", d.DiagnosticStatus)
-# Requests to the charger coordinator; RMF has no such topics.
+# These topics of ours carry requests to the charger coordinator; RMF has no such topics.
 ADAPTER_CHARGER_REQUESTS = Topic("adapter_charger_requests", d.ChargerRequest)
 ADAPTER_CHARGER_CANCELS = Topic("adapter_charger_cancels", d.ChargerCancel)
-# A topic without messages. Its publisher shows that a coordinator serves the graph: a second one waits.
+# A topic without messages. Its publisher shows that a coordinator serves the graph, so another waits.
 CHARGER_COORDINATOR = Topic("charger_coordinator", d.Bool)
 FLEET_STATES = Topic("fleet_states", d.FleetState)
-# rmf_charging_schedule retains it, for fleet adapters that start later.
+# Retained, as by rmf_charging_schedule, for fleet adapters that start later.
 CHARGING_ASSIGNMENTS = Topic(
     "charging_assignments", d.ChargingAssignments, publish=RETAINED, subscribe=RETAINED
 )
-# rmf-web's api-server hears it transient-local (rmf_io/alerts, QoS of depth 10).
+# Retained, because rmf-web's api-server subscribes transient-local (rmf_io/alerts, QoS of depth 10).
 ALERT = Topic("alert", d.Alert, publish=RETAINED, subscribe=RETAINED)
-# A volatile publisher of these two never matches a fleet adapter (rmf_ros2#341).
+# The next two are retained, because a volatile publisher never matches a fleet adapter (rmf_ros2#341).
 FIRE_ALARM_TRIGGER = Topic("fire_alarm_trigger", d.Bool, publish=RETAINED, subscribe=RETAINED)
 EMERGENCY_SIGNAL = Topic(
     "emergency_signal", d.EmergencySignal, publish=RETAINED, subscribe=RETAINED

@@ -14,13 +14,15 @@ from bridges.messages.stamps import in_seconds
 Stated = d.LiftState | d.DoorState | d.ChargerState
 Requested = d.LiftRequest | d.DoorRequest | d.ChargerRequest | d.ChargerCancel
 LONGEST_NAME: Final = 256
-"""The longest part of a name (characters) that is kept and shown: anybody can send a megabyte."""
+"""The longest part of a name (characters) that is kept and shown, as anybody can send a name of 1
+MB."""
 Kind = Literal["lift", "door", "charger"]
 KINDS: Final[tuple[Kind, ...]] = ("lift", "door", "charger")
 
 
 def printable(text: str) -> str:
-    """Return the text on one line, with control characters escaped: no name may move the cursor."""
+    """Return the text on one line, with control characters escaped, so that no name moves the
+    cursor."""
     if text.isprintable():
         return text
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
@@ -35,7 +37,7 @@ def word(enum: type[IntEnum], value: int) -> str:
 
 
 def device(message: Stated | Requested) -> str:
-    """Return RMF's name of the device of a state or request."""
+    """Return the device that a state or request names."""
     match message:
         case d.LiftState() | d.LiftRequest():
             return message.lift_name

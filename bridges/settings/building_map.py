@@ -1,13 +1,14 @@
-"""The names on RMF's map of a building: levels, lifts, doors, waypoints. Our files must use the same.
+"""The names on RMF's map of a building: levels, lifts, doors, waypoints. Our files must use these
+names.
 
-Two kinds of file hold it, and either is accepted:
+Two sorts of file hold the map, and both are accepted:
 
     *.building.yaml   traffic-editor's: `levels: {L1: {vertices: [[x, y, z, name, {is_charger: [4,
                       true]}]], doors: [[from, to, {name: [1, D1]}]]}}`, where a parameter is [its
                       type's number, its value]; `lifts: {Lift1: {level_doors: {L1: [door]}}}`
-    a nav graph       generated from it: `levels: {L1: {vertices: [[x, y, {name: A, lift: Lift1,
+    a nav graph       generated from the first: `levels: {L1: {vertices: [[x, y, {name: A, lift: Lift1,
                       is_charger: true}]], lanes: [[from, to, {door_name: D1}]]}}`, `lifts: {Lift1:
-                      …}`, `doors: {D1: …}`; older ones lack the last two
+                      …}`, `doors: {D1: …}`; older graphs lack `lifts` and `doors`
 
 Source: open-rmf/rmf_traffic_editor 65437ea, rmf_building_map_tools/building_map (vertex.py, edge.py,
 lift.py, building.py), and rmf_ros2's parse_graph.cpp, which reads the graph.
@@ -24,18 +25,20 @@ from bridges.kinds.shared.kind import CHARGER, DOOR, FLOOR, LIFT, WAYPOINT
 from bridges.yaml.parsing import Sort, YamlFile, compose, read
 
 MAP = Sort("building map or navigation graph", "levels: ...", 1024 * 1024, 100_000)
-"""A file of this size takes some seconds to read; longer ones are refused at once."""
+"""The limits of such a file. A file of this size takes some seconds to read; larger files are
+refused."""
 
 Lines = dict[str, int]
 """Name -> the line of its first occurrence."""
 Place = tuple[str, float, float]
-"""Level, x, y."""
+"""A place: its level, x and y."""
 
 
 class BuildingMap(Struct, frozen=True):
     """The names of one file. `named`: sort -> name -> line. `stops`: lift -> its floors.
 
-    `places`: waypoint -> level, x, y (m), of a navigation graph; traffic-editor's file has pixels.
+    `places`: waypoint -> level, x, y (m); only from a navigation graph, as traffic-editor's file has
+    pixels.
     """
 
     file: str
@@ -56,7 +59,7 @@ def load_map(file: str) -> BuildingMap:
 
 
 class _MapReading:
-    """Collects the names of one file; deviations from RMF's format go to the page."""
+    """Collects the names of one file, and notes deviations from RMF's format on the page."""
 
     def __init__(self, page: YamlFile) -> None:
         self.named: dict[str, Lines] = {w: {} for w in (FLOOR, LIFT, DOOR, CHARGER, WAYPOINT)}
@@ -65,7 +68,7 @@ class _MapReading:
         self._page = page
 
     def all(self, root: MappingNode) -> None:
-        """Read levels, lifts and doors, in either form."""
+        """Read levels, lifts and doors from either sort of file."""
         if _below(root, "levels") is None:
             self._page.note(root, f"this is not a {MAP.name}: it has no 'levels:'")
         for level, node in self._entries(root, "levels"):
@@ -110,7 +113,7 @@ class _MapReading:
         self.stops.setdefault(lift.value, {}).setdefault(level.value, _line(level))
 
     def _entries(self, node: Node, key: str) -> Iterator[tuple[ScalarNode, Node]]:
-        """Yield the entries of the mapping below `key`; none if it is missing or empty."""
+        """Yield the entries of the mapping below `key`; yield nothing if it is missing or empty."""
         for name, value in self._section(node, key, MappingNode, "a mapping (name: ...)"):
             if isinstance(name, ScalarNode):
                 yield name, value
@@ -118,7 +121,7 @@ class _MapReading:
                 self._page.note(name, f"a name in '{key}' must be text")
 
     def _items(self, node: Node, key: str, what: str) -> Iterator[SequenceNode]:
-        """Yield the lists in the list below `key`; none if it is missing or empty."""
+        """Yield the lists in the list below `key`; yield nothing if it is missing or empty."""
         for item in self._section(node, key, SequenceNode, "a list"):
             if isinstance(item, SequenceNode):
                 yield item
@@ -145,7 +148,7 @@ def _below(node: Node, key: str) -> Node | None:
 
 
 def _param(item: SequenceNode, key: str) -> ScalarNode | None:
-    """Return a parameter of a vertex or an edge, from its last item: `V`, or `[type, V]`."""
+    """Return a parameter of a vertex or an edge. Its last item has the value `V` or `[type, V]`."""
     found = _below(item.value[-1], key) if item.value else None
     if isinstance(found, SequenceNode) and len(found.value) == 2:
         found = found.value[1]

@@ -14,9 +14,9 @@ from drivers.hal import AnyBus
 
 
 class BusRead(Struct, frozen=True):
-    """A bus as far as it could be read.
+    """A bus, as far as it could be read.
 
-    `type` and `hal`: None where the type is missing or wrong. `settings`: BROKEN where they are wrong.
+    `type` and `hal`: None if the type is missing or wrong. `settings`: BROKEN if they are wrong.
     """
 
     entry: MappingEntry
@@ -25,14 +25,15 @@ class BusRead(Struct, frozen=True):
     settings: object = BROKEN
 
     def remarks(self) -> Remarks:
-        """Yield its settings that are legal but may be a mistake."""
+        """Yield the settings of the bus that are legal but may be a mistake."""
         return self.hal.warnings(self.settings) if self.hal and self.settings is not BROKEN else ()
 
 
 def read_bus(
     entry: MappingEntry, allowed: list[str], driver: str, values: Values, page: YamlFile
 ) -> BusRead:
-    """Read a bus; problems go to the page. `allowed`: the bus types that the file's drivers can use."""
+    """Read a bus, and note problems on the page. `allowed`: the bus types that the file's drivers can
+    use."""
     if not isinstance(entry.value, MappingNode):
         values.entries(entry.spot())
         return BusRead(entry)
@@ -52,7 +53,8 @@ def read_bus(
 
 
 def _note_untyped(bus: MappingEntry, allowed: list[str], values: Values, page: YamlFile) -> None:
-    """Note that a bus has no `type`, or misspells the key; its other keys mean nothing yet."""
+    """Note that a bus has no `type`, or misspells this key. Without a type its other keys have no
+    meaning."""
     entries = {e.name: e for e in values.entries(bus.spot())}
     near = nearest("type", entries)
     if near is None:
@@ -62,6 +64,6 @@ def _note_untyped(bus: MappingEntry, allowed: list[str], values: Values, page: Y
 
 
 def _is_other_type(kind: MappingEntry, allowed: list[str]) -> bool:
-    """Does this bus type exist, though none of the file's drivers can use it?"""
+    """Does this bus type exist, although no driver of the file can use it?"""
     others = set(named.bus_types()).difference(allowed)
     return isinstance(kind.value, ScalarNode) and kind.value.value in others

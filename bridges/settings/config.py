@@ -18,9 +18,9 @@ from drivers.hal.points import Wire
 class Config(Struct, frozen=True):
     """A valid file.
 
-    `text`: its bytes as they were read. `buses` and `devices`: name -> the `settings` of the bus's
-    or driver's record, whose type only that record knows. `bus_types`: name -> `type:`. `warnings`:
-    legal settings that may be a mistake. `notes`: intended settings with effects to know about.
+    `text`: its bytes as they were read. `buses` and `devices`: name -> settings, of a type that only
+    the record of the bus type or driver knows. `bus_types`: name -> `type:`. `warnings`: legal settings
+    that may be a mistake. `notes`: intended settings whose effects the user should know.
     `section`: the settings of a kind without devices (`bridges/kinds/shared/graph_kind.py`), which
     has no driver and no buses.
     """
@@ -53,18 +53,18 @@ class Config(Struct, frozen=True):
         return named.driver_called(self.kind, own or self.driver)
 
     def wires(self, device_name: str) -> list[Wire]:
-        """Return a device's wiring table; empty where its driver has none."""
+        """Return a device's wiring table; empty if its driver has no wires."""
         return list(self.driver_type(device_name).wires(self.devices[device_name]))
 
     def bus_type(self, name: str) -> AnyBus:
-        """Return the type of the bus of this name."""
+        """Return the type of the bus with this name."""
         return named.bus_called(self.bus_types[name])
 
     def open_bus(self, name: str) -> Bus:
-        """Return the real bus of this name. Raises HalError."""
+        """Open the real bus with this name. Raises HalError."""
         return self.bus_type(name).open_bus(self.buses[name])
 
     def open_to_switch_off(self, name: str) -> Bus:
-        """Open the real bus for a process that only switches off. Raises HalError."""
+        """Open the real bus for a process that only switches outputs off. Raises HalError."""
         hal = self.bus_type(name)
         return (hal.open_to_switch_off or hal.open_bus)(self.buses[name])

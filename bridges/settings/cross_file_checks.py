@@ -27,7 +27,8 @@ class Found(Struct, frozen=True):
 
 
 class ExclusiveUse(Struct, frozen=True):
-    """The use of something by a file, exclusive to one file. `what`: its name. `path`: in the YAML."""
+    """A use of a thing that only one file may use. `what`: the thing's name. `path`: the key of the
+    use."""
 
     config: Config
     what: str
@@ -41,7 +42,7 @@ class ExclusiveUse(Struct, frozen=True):
 
 
 def across(configs: Sequence[Config], one_machine: bool = True) -> Found:
-    """Return errors and warnings about these files together."""
+    """Return the errors and warnings that arise between these files."""
     claims = [claim for config in configs for claim in _claims(config, one_machine)]
     errors = [*_domains(configs), *taken(configs, one_machine), *_nowhere(configs)]
     gateways = [claim for config in configs for claim in _gateways(config)]
@@ -50,7 +51,8 @@ def across(configs: Sequence[Config], one_machine: bool = True) -> Found:
 
 
 def taken(configs: Sequence[Config], one_machine: bool = True) -> Iterator[Problem]:
-    """Yield each exclusive port, pin, point of a unit or RMF name that an earlier file uses too."""
+    """Yield each port, pin, point of a unit or RMF name that only one file may use but two files
+    use."""
     lines = list(_twice(c for config in configs for c in _lines(config, one_machine)))
     busy = {claim.what for claim, _ in lines}
     claims = (c for config in configs for c in _claims(config, one_machine))
@@ -59,7 +61,8 @@ def taken(configs: Sequence[Config], one_machine: bool = True) -> Iterator[Probl
 
 
 def _twice(claims: Iterable[ExclusiveUse]) -> Iterator[tuple[ExclusiveUse, ExclusiveUse]]:
-    """Yield (later, first) for each double claim by two files; the loader has checked each file."""
+    """Yield (later use, first use) for each thing that two files use. The loader has checked single
+    files."""
     first: dict[str, ExclusiveUse] = {}
     for claim in claims:
         other = first.setdefault(claim.what, claim)
@@ -93,7 +96,7 @@ def _lines(config: Config, one_machine: bool) -> Iterator[ExclusiveUse]:
 
 
 def _gateways(config: Config) -> Iterator[ExclusiveUse]:
-    """Yield the addresses of gateways; their make decides how many clients may connect."""
+    """Yield the addresses of gateways. The make of a gateway decides how many clients may connect."""
     for name, where in _buses(config):
         if where.clients is None:
             yield ExclusiveUse(config, where.text, ("buses", name))
@@ -116,7 +119,7 @@ def _claims(config: Config, one_machine: bool) -> Iterator[ExclusiveUse]:
 
 
 def _places(config: Config, bus: str, device: str) -> Iterator[tuple[str, Path]]:
-    """Yield every point and claim of a device, in its bus's canonical spelling."""
+    """Yield every point and exclusive place of a device, in the canonical spelling of its bus."""
     canonical = config.bus_type(bus).canonical
     for wire in config.wires(device):
         yield canonical(wire.point), (*wire.path, "point")
@@ -126,7 +129,7 @@ def _places(config: Config, bus: str, device: str) -> Iterator[tuple[str, Path]]
 
 
 def _shared(pair: tuple[ExclusiveUse, ExclusiveUse], claims: Sequence[ExclusiveUse]) -> Problem:
-    """Return the warning for one gateway in two files, with the units that both files ask."""
+    """Return the warning for a gateway in two files; it names the units that both files ask."""
     claim, other = pair
     both = _units(claim.config, claim.what, claims) & _units(other.config, claim.what, claims)
     units = f" for unit {', '.join(sorted(both))}" if both else ""
@@ -157,7 +160,7 @@ def _devices(configs: Sequence[Config], kind: str) -> dict[str, Config]:
 
 
 def _nowhere(configs: Sequence[Config]) -> Iterator[Problem]:
-    """Yield devices that a kind without hardware names, but no file of their kind has."""
+    """Yield devices that the file of a kind without hardware names, but no other file defines."""
     for claim, kind, name in _spoken(configs):
         known = _devices(configs, kind)
         if known and name not in known:
@@ -165,7 +168,8 @@ def _nowhere(configs: Sequence[Config]) -> Iterator[Problem]:
 
 
 def _unspoken(configs: Sequence[Config]) -> Iterator[Problem]:
-    """Yield devices missing from a kind without hardware that names others of the same kind."""
+    """Yield devices that the file of a kind without hardware leaves out, although it names other
+    devices of their kind."""
     spoken = [(kind, name, claim) for claim, kind, name in _spoken(configs)]
     for kind in sorted({kind for kind, _, _ in spoken}):
         names = {name for k, name, _ in spoken if k == kind}

@@ -36,19 +36,19 @@ Path = tuple[str, ...]
 
 
 class Charger(msgspec.Struct, frozen=True):
-    """`waypoint`: by its name in the navigation graph."""
+    """A robot's charger. `waypoint`: its name in the navigation graph."""
 
     waypoint: str | None = None
 
 
 class OlderRobot(msgspec.Struct, frozen=True):
-    """A robot's settings for RMF."""
+    """A robot's settings for RMF in an older file."""
 
     charger: Charger | None = None
 
 
 class RobotConfig(msgspec.Struct, frozen=True):
-    """One robot: its charger's waypoint, in either form."""
+    """One robot with its charger's waypoint, in the new or the older form."""
 
     charger: str | Charger | None = None
     rmf_config: OlderRobot | None = None
@@ -64,7 +64,7 @@ class RobotConfig(msgspec.Struct, frozen=True):
 
 
 class RmfFleet(msgspec.Struct, frozen=True):
-    """The fleet; percentages are fractions of 1 here."""
+    """The fleet. Percentages are fractions of 1 in this file."""
 
     name: str
     recharge_threshold: Soc | None = None
@@ -77,7 +77,7 @@ class RmfFleet(msgspec.Struct, frozen=True):
 
 
 class Pairs(msgspec.Struct, frozen=True):
-    """The same points on RMF's map and on the robot's."""
+    """The same points on RMF's map and on the robot's map."""
 
     rmf: list[Point]
     robot: list[Point]
@@ -92,7 +92,7 @@ class Contents(msgspec.Struct, frozen=True):
 
 
 class FleetFile(msgspec.Struct, frozen=True):
-    """One file and its places."""
+    """One file: its name, its YAML nodes, and its contents."""
 
     file: str
     root: MappingNode
@@ -113,7 +113,7 @@ class FleetFile(msgspec.Struct, frozen=True):
                 yield (*top, name), name, robot or RobotConfig()
 
     def references(self) -> Mapping[str, Pairs]:
-        """Return level -> pairs; the level is EVERY_LEVEL where the file has one list for all."""
+        """Return level -> pairs; the level is EVERY_LEVEL if the file has one list for all levels."""
         return self.contents.reference_coordinates or {}
 
     def problem(self, path: Path, text: str) -> Problem:

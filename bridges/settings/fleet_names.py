@@ -1,7 +1,7 @@
 """Compares a coordinator's YAML with the configuration of a fleet's adapter, and with RMF's map.
 
-Different people write these files, and RMF reports no mismatch: a robot waits for ever, or stays on
-a pad. Each mismatch is reported with its file, its line and the fix.
+Different people write these files, and RMF reports no mismatch: a robot just waits for ever, or stays
+on a pad. Here each mismatch is reported with its file, its line and the remedy.
 """
 
 import math
@@ -37,7 +37,8 @@ class Compared(Struct):
 
 
 def compared(config: Config, fleet: FleetFile, building: BuildingMap | None) -> Compared:
-    """Compare a coordinator's file with one fleet's. `building`: compare positions too."""
+    """Compare a coordinator's file with one fleet's configuration. With `building`, compare positions
+    too."""
     found = _Comparing(config, fleet)
     found.names()
     found.percentages()

@@ -1,7 +1,7 @@
 """Turns a device YAML into a Config, or raises a SettingsError with every problem and its place.
 
     kind: lift              a folder of bridges/kinds/ that holds a KIND
-    driver: dry_contact     a file of drivers/<kind>/; a device may name another as its own `driver:`
+    driver: dry_contact     a file of drivers/<kind>/; a device may name another driver with `driver:`
     rmf: {...}              bridges.kinds.shared.rmf_section.Rmf
     buses: {name: {type: a file of drivers/hal/, ...}}
     recording: {...}        bridges.kinds.shared.recording_section.RecordingSettings
@@ -47,7 +47,7 @@ OF_RMF: Final = {
     "rmf_fleet": ("a fleet adapter's configuration", "--fleet-config"),
     "levels": ("RMF's building map or navigation graph", "--building-map"),
 }
-"""Top key of a file of RMF's -> the file's name, and the option of `check` for it."""
+"""Top key of a file of RMF -> (the sort of file, the option of `check` for such a file)."""
 
 
 def load(path: Path | str) -> Config:
@@ -67,7 +67,7 @@ def understood(path: Path | str, text: bytes) -> Config:
 
 
 def _note_rmfs(page: YamlFile, root: MappingNode) -> None:
-    """Refuse a file of RMF's as a whole, instead of an error for each of its keys."""
+    """Refuse a file of RMF as a whole, instead of an error for each of its keys."""
     for key, (what, option) in OF_RMF.items():
         entry = below(root, key)
         if entry and not below(root, "kind"):
@@ -77,7 +77,7 @@ def _note_rmfs(page: YamlFile, root: MappingNode) -> None:
 
 
 class _DeviceReading:
-    """Reads one file section by section; problems go to its page."""
+    """Reads one file section by section, and notes problems on its page."""
 
     def __init__(self, page: YamlFile, root: MappingNode) -> None:
         self._page = page
@@ -116,7 +116,7 @@ class _DeviceReading:
         )
 
     def all(self) -> None:
-        """Read every section, as far as the earlier ones allow."""
+        """Read every section, as far as the earlier sections allow."""
         entries = self._values.entries(self._top)
         self._read_kind(below(self._top.node, "kind"))
         if not isinstance(self._kind, GraphKind):
@@ -179,7 +179,8 @@ class _DeviceReading:
             self._warn(locate(spot, path).where(), text)
 
     def _read_section(self, entry: MappingEntry | None, kind: AnyGraphKind) -> None:
-        """Read the settings of a kind without devices; the section may be optional."""
+        """Read the settings of a kind without devices, whose section may be missing if all its keys are
+        optional."""
         if entry:
             self._section = self._values.make(kind.settings, entry.spot())
             spot = Spot(entry.value, entry.key, entry.spot().label)
@@ -242,7 +243,7 @@ class _DeviceReading:
         return devices or entries
 
     def _can_stand(self, device: MappingEntry, bus: str | None, driver: AnyDriver) -> bool:
-        """Can the device's own driver use its bus? The file's driver was checked with the bus."""
+        """Can the device's driver use the device's bus? The file's driver was checked with the bus."""
         kind = self._buses[bus].type if bus else None
         if kind is None or kind in driver.buses:
             return True
@@ -323,7 +324,8 @@ class _DeviceReading:
             self._notes.append(self._page.problem(node, f"note: {spot.label}: {text}"))
 
     def _collect_unwatched(self) -> None:
-        """Collect remarks about outputs that stay on without this machine, once for each bus."""
+        """Collect, once for each bus, the remarks about outputs that stay on when this machine
+        fails."""
         for name, bus in () if self._page.problems else self._buses.items():
             assert bus.hal
             unwatched = bus.hal.unwatched(bus.settings, self._written.get(name, ()))

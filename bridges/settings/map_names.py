@@ -1,7 +1,7 @@
-"""Compares the names in a device YAML with those on RMF's map of the building.
+"""Compares the names in a device YAML with the names on RMF's map of the building.
 
 RMF finds a lift, floor, door or charger only by its name. A wrong name causes no error: a robot just
-waits forever.
+waits for ever.
 """
 
 from collections.abc import Iterator

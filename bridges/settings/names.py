@@ -1,7 +1,7 @@
 """Finds drivers and bus types: files with the names that a YAML uses.
 
-Only names of existing files are imported. There is no table to edit, and no other file imports a driver
-or a bus by its name.
+Only existing files are imported. There is no table to edit, and no other file imports a driver or a bus
+by its name.
 """
 
 import importlib

@@ -10,9 +10,9 @@ from bridges.kinds.shared.remarks import Remarks
 from bridges.yaml.values import described
 
 RENEWED: Final = 3
-"""The time after which an output switches off by itself, in scans, at least."""
+"""The least number of scans after which an output may switch off by itself."""
 LONG_S: Final = 1000.0
-"""A duration (s) of this length or more is often a mistake for milliseconds."""
+"""A duration (s) from this length on is often meant in milliseconds."""
 
 
 def milliseconds(structs: Iterable[tuple[tuple[str, ...], object]]) -> Remarks:
@@ -39,7 +39,7 @@ def _clock(seconds: float) -> str:
 
 
 def out_of_step(device: DeviceSettings, bus: object) -> Remarks:
-    """Yield problems with a bus that is too slow for its device: late readings and commands."""
+    """Yield the problems of a device whose bus is too slow: late readings and late commands."""
     scan_s = getattr(bus, "scan_s", 0.0)
     yield from _stale_readings(device, scan_s)
     if renewed := device.off_after():
@@ -54,7 +54,7 @@ def out_of_step(device: DeviceSettings, bus: object) -> Remarks:
 
 
 def _stale_readings(device: DeviceSettings, scan_s: float) -> Remarks:
-    """Yield a problem if a reading becomes stale before the next one."""
+    """Yield a problem if a reading becomes stale before the next reading."""
     stale_s = device.stale_after()
     if stale_s is not None and scan_s >= stale_s:
         text = f"stale_after_s is {stale_s:g}, but its bus is read every {scan_s:g} s (scan_s)"

@@ -1,6 +1,8 @@
-"""Shows a struct's plain settings as text: numbers with units, and defaults that were changed.
+"""Shows a struct's plain settings as text: numbers with their units, and the defaults of changed
+values.
 
-Wires, maps and code tables are left out: their drivers describe them (`drivers/driver_type.py`).
+Wires, maps and code tables are left out, because their drivers describe them
+(`drivers/driver_type.py`).
 """
 
 from collections.abc import Iterator
@@ -9,18 +11,18 @@ import msgspec
 from msgspec import inspect as mi
 
 Row = tuple[str, str, str]
-"""(key with dots, value with its unit, the default if the value differs from it)."""
+"""(key with dots, value with its unit, the default if the value is another)."""
 
 _LEAVES = (str, int, float, bool, type(None))
 
 
 def plain(struct: object) -> list[Row]:
-    """Return every setting that is a number, a word or a list of them, at any depth."""
+    """Return every setting, at any depth, that is a number, a word or a list of numbers or words."""
     return list(_rows(struct, (), deep=True))
 
 
 def choices_of(device: object) -> list[Row]:
-    """Return the plain settings of a device, and of its sections without sections of their own."""
+    """Return the plain settings of a device, and of each section that has no sections inside."""
     return list(_rows(device, (), deep=False))
 
 
@@ -65,7 +67,7 @@ def _is_plain(value: object) -> bool:
 
 
 def _unit(info: mi.Type) -> str:
-    """Return the unit of a number; "" if it has none."""
+    """Return the unit of a number; "" without a unit."""
     if isinstance(info, mi.Metadata):
         return (info.extra or {}).get("unit", "") or _unit(info.type)
     if isinstance(info, mi.UnionType):
@@ -89,7 +91,7 @@ def _text(value: object, unit: str) -> str:
 
 
 def _instead(field: mi.Field, value: object, unit: str) -> str:
-    """Return the default if the value differs from it; else ""."""
+    """Return the default if the value is another; else ""."""
     if field.required or field.default in (msgspec.NODEFAULT, None, value):
         return ""
     return f"default: {_text(field.default, unit)}"

@@ -14,7 +14,8 @@ Point = tuple[float, float]
 
 
 class Similarity(Struct, frozen=True):
-    """`to = turn · from + shift`. `mse`: the mean squared error of its pairs, in units of `to`."""
+    """The transform `to = turn · from + shift`. `mse`: the mean squared error of the pairs from which
+    it was estimated, in units of `to`."""
 
     turn: complex
     shift: complex
@@ -22,12 +23,12 @@ class Similarity(Struct, frozen=True):
 
     @property
     def rotation(self) -> float:
-        """Return the rotation, counterclockwise, in radians."""
+        """The rotation, counterclockwise, in radians."""
         return cmath.phase(self.turn)
 
     @property
     def scale(self) -> float:
-        """Return the length of one unit of `from`, in units of `to`."""
+        """The length of one unit of `from`, in units of `to`."""
         return abs(self.turn)
 
     @property

@@ -19,7 +19,7 @@ MAPPING: Final = "a mapping (key: value)"
 
 
 def top_keys(kind: AnyKind | None) -> dict[str, str | None]:
-    """Return key -> form of its value, or None if the key is optional. `kind`: None if unknown."""
+    """Return key -> the form of its value; None for an optional key. `kind`: None if unknown."""
     first = {"kind": either(kind_names())}
     if isinstance(kind, GraphKind):
         return {**first, "rmf": None, "recording": None, kind.devices_key: None}
@@ -40,7 +40,7 @@ def top_keys(kind: AnyKind | None) -> dict[str, str | None]:
 
 
 def word(values: Values, entry: MappingEntry | None, words: list[str]) -> str | None:
-    """Return the entry's word; None if the entry is missing or none of `words`."""
+    """Return the entry's word; None if the entry is missing or its word is not in `words`."""
     if entry is None:
         return None
     found = values.make(LiteralType(tuple(words)), entry.spot())
@@ -48,7 +48,7 @@ def word(values: Values, entry: MappingEntry | None, words: list[str]) -> str | 
 
 
 def keys_below(kind: AnyKind | None, driver: AnyDriver | None) -> dict[str, str]:
-    """Return the keys that belong below the top: key -> its section."""
+    """Return key -> its section, for the keys that belong into a section."""
     below_top = {field.encode_name: "rmf" for field in fields(Rmf)}
     below_top |= {field.encode_name: "recording" for field in fields(RecordingSettings)}
     if isinstance(kind, GraphKind):

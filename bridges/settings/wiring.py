@@ -1,7 +1,7 @@
 """Checks the wires of a file against each other: invalid points, points used twice, unsafe wires.
 
-The bus type knows how its points are spelled and which wires are impossible (`canonical` and
-`wire_problems` of its `BUS` in `drivers/hal/`).
+The bus type knows the spelling of its points and the impossible wires (`canonical` and `wire_problems`
+of its `BUS` in `drivers/hal/`).
 """
 
 from collections.abc import Iterable
@@ -18,7 +18,7 @@ from drivers.hal.points import Input, Output, Wire
 
 
 class Use(Struct, frozen=True):
-    """A point of a bus that a device uses: `point` in its canonical spelling, and as `written`."""
+    """A point of a bus that a device uses, in its canonical spelling (`point`) and as `written`."""
 
     bus: str
     point: str
@@ -28,7 +28,7 @@ class Use(Struct, frozen=True):
 
 
 class WiringCheck:
-    """Collects and checks a device's points: first while its settings are read, then as wires.
+    """Collects and checks a device's points, first while its settings are read, and again as wires.
 
     `written`: the points that the daemon itself must switch off again.
     """
@@ -56,7 +56,7 @@ class WiringCheck:
         return None
 
     def wires(self, wires: Iterable[Wire], spot: Spot) -> None:
-        """Check a driver's wires; they replace the points collected while reading the settings."""
+        """Check a driver's wires, which replace the points collected while the settings were read."""
         self.uses.clear()
         for wire in wires:
             places = [("point", wire.point)]
@@ -79,7 +79,7 @@ class WiringCheck:
         return reason is None
 
     def warnings(self, wires: Iterable[Wire], spot: Spot) -> Iterable[tuple[Node, str]]:
-        """Yield (node to point to, text) for wires that are legal but may be a mistake."""
+        """Yield (node, text) for wires that are legal but may be a mistake."""
         for wire in wires:
             for text in self._hal.wire_warnings(wire) if self._hal else ():
                 yield locate(spot, wire.path).where(), f"'{wire.signal}': {text}"
@@ -92,14 +92,15 @@ class WiringCheck:
             self.written.append(text)
 
     def reach(self, bus: object) -> None:
-        """Note points that a bus with these settings (BROKEN: unknown) cannot have."""
+        """Note the points that a bus with these settings does not have. `bus`: BROKEN if unknown."""
         for use in self.uses if self._hal and bus is not BROKEN else ():
             assert self._hal
             if reason := self._hal.unreachable(bus, use.point):
                 self._page.note(use.node, reason)
 
     def parts(self, structs: Iterable[tuple[tuple[str, ...], object]], spot: Spot) -> None:
-        """Check the wires of a device that has no table because other settings are invalid."""
+        """Check the wires of a device whose other settings are invalid, so that it has no wiring
+        table."""
         for path, struct in structs:
             if isinstance(struct, Input):
                 pull, debounce_s = struct.pull, struct.debounce_s
@@ -116,7 +117,7 @@ class WiringCheck:
 
 
 def note_conflicts(page: YamlFile, uses: Iterable[Use]) -> None:
-    """Note each point with a second signal, at the later place in the file."""
+    """Note each point that two signals use, at the later place in the file."""
     first: dict[tuple[str, str], Use] = {}
     for use in sorted(uses, key=lambda u: (u.node.start_mark.line, u.node.start_mark.column)):
         other = first.setdefault((use.bus, use.point), use)
@@ -130,7 +131,7 @@ def note_conflicts(page: YamlFile, uses: Iterable[Use]) -> None:
 def note_unknown_signals(
     page: YamlFile, accepted: Iterable[str], signals: list[str], s: Spot
 ) -> None:
-    """`accept_unsafe` may only name existing signals."""
+    """Note names in `accept_unsafe` that are no signals of the device."""
     for signal in accepted:
         if signal not in signals:
             page.note(locate(s, ("accept_unsafe", signal)).key, unknown("signal", signal, signals))

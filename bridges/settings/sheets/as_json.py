@@ -9,7 +9,7 @@ from bridges.settings.sheets.findings import Findings
 
 
 def document(files: Sequence[Findings], errors: int, warnings: int) -> str:
-    """`{"ok": true, "errors": 0, "warnings": 0, "files": [...]}`, with a newline at its end."""
+    """Return `{"ok": true, "errors": 0, "warnings": 0, "files": [...]}`, with a newline at its end."""
     found = {
         "ok": not errors,
         "errors": errors,

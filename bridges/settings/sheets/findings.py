@@ -1,4 +1,4 @@
-"""The findings of `check` about one file, as tables; text, JSON and sheet are made from them."""
+"""The findings of `check` about one file, as tables, from which text, JSON and sheet are made."""
 
 import hashlib
 from collections.abc import Sequence
@@ -19,15 +19,15 @@ from drivers.hal.points import Wire
 HEADINGS = ("signal", "point", "direction", "active", "pull", "debounce", "at rest", "wire broken")
 BROKEN = {True: "asserted", False: "not asserted", None: "floats"}
 WIRES, MEANINGS = "wires", "meanings"
-"""The titles of the tables with a device's wires, or its messages on the bus."""
+"""The title of the table with a device's wires, and of the table with its messages on the bus."""
 SETTINGS = ("setting", "value", "not the default")
 
 
 class Part(msgspec.Struct, frozen=True, kw_only=True):
     """One controller: its name, its bus and its tables.
 
-    `device`: its name, or the kind's if the kind has no devices. `bus`: its bus's name, or "".
-    `tables`: its wires, or its commands and readings, come first.
+    `device`: its name, or the kind's name if the kind has no devices. `bus`: the name of its bus, or
+    "". `tables`: first the wires, or the commands and readings; then the other tables.
     """
 
     device: str
@@ -70,7 +70,7 @@ def wrong(file: str, errors: Sequence[Problem]) -> Findings:
 
 
 def findings(config: Config, errors: Sequence[Problem] = (), notes: Sequence[str] = ()) -> Findings:
-    """Return the findings about a valid file. `errors`: from comparing it with RMF's map."""
+    """Return the findings about a valid file. `errors`: from a comparison with RMF's map."""
     return Findings(
         file=str(config.path),
         kind=config.kind,
@@ -123,7 +123,7 @@ def _bus(config: Config, name: str) -> BusShown:
 
 
 def _graph(config: Config) -> Part:
-    """Describe a kind without devices: its own tables, and its settings."""
+    """Describe a kind without devices by its own tables and its settings."""
     kind = kind_called(config.kind)
     assert isinstance(kind, GraphKind)
     tables = [*kind.tables(config.section), _settings(config.section)]
@@ -149,13 +149,15 @@ def _device(config: Config, name: str) -> Part:
 
 
 def _settings(settings: object) -> Table:
-    """Return durations and choices, without the bus and accepted wires, which are shown elsewhere."""
+    """Return durations and choices, but not the bus and the accepted wires, which are shown
+    elsewhere."""
     rows = (row for row in choices_of(settings) if row[0] not in ("bus", "driver", "accept_unsafe"))
     return Table("settings", SETTINGS, tuple(rows))
 
 
 def _row(wire: Wire, point: str) -> tuple[str, ...]:
-    """Return a wire's row. `point`: the bus's description; the YAML's spelling is added to it."""
+    """Return a wire's row. `point`: the bus's description of the point; the row adds the YAML's
+    spelling."""
     spelled = point if f" {wire.point} " in f" {point} " else f"{wire.point} = {point}"
     if wire.flash is not None:
         spelled += f", {wire.flash.on_s:g} s by the module at {wire.flash.point}"

@@ -1,6 +1,6 @@
 """The commissioning sheet: an HTML file to print, tick and sign, with a page for each controller.
 
-It needs no other file. Texts from a YAML are escaped, never markup.
+It needs no other file. Texts from a YAML are escaped, so they cannot be markup.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -91,14 +91,15 @@ def _letters(row: Sequence[str]) -> int:
 
 
 def _remarks(findings: Findings) -> Iterator[str]:
-    """Yield all the file's warnings and notes: each controller's page is signed by itself."""
+    """Yield all warnings and notes of the file, for each controller, as each page is signed by
+    itself."""
     warnings = (f"line {w.line}: {w.text.removeprefix('warning: ')}" for w in findings.warnings)
     for text in (*warnings, *(note.removeprefix(f"{findings.file}:") for note in findings.notes)):
         yield f'<p class="warning">&#9744; {escape(text)}</p>'
 
 
 def _table(table: Table, seen: bool = False) -> Iterator[str]:
-    """Yield each row with a box; `seen`: with a column for observations."""
+    """Yield a table with a box in each row; with `seen`, also with a column for observations."""
     shown = table.filled()
     headings = "".join(f"<th>{escape(heading)}</th>" for heading in shown.headings)
     more = '<th class="seen">seen</th>' if seen else ""
