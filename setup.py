@@ -18,7 +18,7 @@ FACE = "bridges/__init__.py"
 
 
 def build() -> str:
-    """The commit's number and short hash; "" if this folder is no checkout of its own."""
+    """Return the commit's number and short hash; "" if this folder is no checkout of its own."""
     if not (HERE / ".git").exists():
         return ""
     try:
@@ -30,7 +30,7 @@ def build() -> str:
 
 
 def _last_change(files: list[str]) -> str:
-    """Return the time of the last change to these files; a deleted one counts as its checkout."""
+    """Return the time of the last change to these files; for a deleted file, the checkout's time."""
     there = [path if path.exists() else HERE for path in map(HERE.joinpath, files)]
     at = time.gmtime(max(path.stat().st_mtime for path in there))
     return time.strftime(".m%Y%m%d%H%M%S", at)
@@ -51,9 +51,9 @@ class BuildPy(build_py):
     def run(self) -> None:
         super().run()
         built = Path(self.build_lib) / FACE
-        if built.exists():  # none for an editable installation, whose sources change
+        if built.exists():  # an editable installation has no copy, as its sources change
             text = (HERE / FACE).read_text()
-            built.unlink()  # it may be a hard link to ours
+            built.unlink()  # the copy may be a hard link to our source
             built.write_text(text.replace('BUILD = ""', f'BUILD = "{BUILD}"'))
 
 

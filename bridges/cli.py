@@ -15,7 +15,7 @@ from bridges import VERSION, exit_codes
 from bridges.system.installed import NotInstalled, is_there, of_workbench
 
 EX_PIPE = 141
-"""The exit code when the reader of our output has gone, as a shell shows after SIGPIPE."""
+"""The exit code when the reader of our output has gone. A shell shows the same code after SIGPIPE."""
 
 COMMANDS = {
     "init": (
@@ -31,10 +31,10 @@ COMMANDS = {
         "check my_lift.yaml --building-map hospital.building.yaml",
     ),
     "enable": (
-        "make a service of a device YAML, or update it after a change",
+        "make a service of a device YAML, or update the service after a change",
         "enable my_lift.yaml --dry-run",
     ),
-    "disable": ("end a service, outputs off; its YAML stays", "disable my_lift"),
+    "disable": ("end a service, with its outputs off; its YAML stays", "disable my_lift"),
     "schema": ("print the JSON Schema of a device YAML", "schema > rmf-bridge.json"),
     "watch": ("show lifts, doors and chargers live, as RMF sees them", "watch --localhost"),
     "page": (
@@ -72,11 +72,11 @@ COMMANDS = {
         "walk my_lift.yaml --device Lift1",
     ),
     "press": (
-        "in a simulation: a person or the building acts",
+        "in a simulation, act as a person or the building",
         "press my_lift.yaml fire_alarm on",
     ),
     "fail": (
-        "in a simulation: a wire or a part fails; ok mends it",
+        "in a simulation, let a wire or a part fail; `ok` mends it",
         "fail my_lift.yaml door_opened stuck",
     ),
     "log": ("show the log of a device's service", "log my_lift.yaml --follow --event fault"),
@@ -111,7 +111,8 @@ WORKBENCH = frozenset(
 
 def main(argv: list[str] | None = None) -> int:
     """Run one subcommand and return its exit code."""
-    # Else Python collects garbage at the end of a process: a fifth of a short process's CPU time.
+    # This spares Python's garbage collection at exit, which takes a fifth of a short process's CPU
+    # time.
     atexit.register(gc.freeze)
     if "_ARGCOMPLETE" in os.environ:  # set by the shell's completion; ends the process
         import argcomplete
@@ -142,7 +143,7 @@ def main(argv: list[str] | None = None) -> int:
 
 class _Parser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
-        """Report the error, with the choice nearest to an invalid one."""
+        """Report the error; after an invalid choice, suggest the nearest choice."""
         wrong = re.search(r"invalid choice: '(.*)' \(choose from (.*)\)", message)
         if wrong and (near := _nearest(wrong[1], wrong[2])):
             message = f"{message[: wrong.start()]}there is no '{wrong[1]}'; did you mean '{near}'?"
@@ -157,9 +158,10 @@ def _nearest(typed: str, listed: str) -> str:
 
 
 def parser(arguments: Sequence[str]) -> argparse.ArgumentParser:
-    """Return the parser of the arguments' subcommand; without one, of all subcommands, without options.
+    """Return the parser of the subcommand in the arguments; without a subcommand, the parser of all
+    subcommands, without their options.
 
-    `outputs-off` is short of time, so no other subcommand is imported, or even described.
+    The other subcommands are neither imported nor described, because `outputs-off` is short of time.
     """
     if arguments and arguments[0] in COMMANDS:
         return _parser(arguments[:1], whole=True)

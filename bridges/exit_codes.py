@@ -8,9 +8,9 @@ from typing import Final
 ALWAYS: Final = {
     2: "wrong command line",
     69: "the package that has this command is not installed",
-    141: "the reader of its output has gone",
+    141: "the reader of the output has gone",
 }
-"""Exit codes of every subcommand, besides its own."""
+"""The exit codes that every subcommand has."""
 YAML: Final = {78: "the YAML has an error"}
 ROOT: Final = {
     66: "the folder of `--root` is missing",
@@ -21,7 +21,7 @@ GRAPH: Final = "nothing was heard, or the graph cannot be joined"
 RECORDING: Final = {66: "the recording cannot be read"}
 SIMULATION: Final = {
     0: "done",
-    1: "the simulation refused it",
+    1: "the simulation refused the order",
     64: "no such device",
     69: "no simulation of this file runs",
     **YAML,
@@ -57,7 +57,7 @@ EXIT_CODES: Final[dict[str, dict[int, str]]] = {
         0: "the service runs",
         69: "an output is not verified off",
         **ROOT,
-        78: "the YAML has an error, or contradicts another service's",
+        78: "the YAML has an error, or contradicts another service's YAML",
     },
     "disable": {
         0: "the service has ended",
@@ -69,7 +69,7 @@ EXIT_CODES: Final[dict[str, dict[int, str]]] = {
     "watch": {0: "Ctrl-C, or `--once` heard something", 1: GRAPH},
     "page": {
         0: "Ctrl-C or SIGTERM",
-        64: "it would show the site to strangers; or the password was not repeated",
+        64: "the page would show the site to strangers, or the password was not repeated",
         **RECORDING,
         69: "the port is taken, or NiceGUI is not installed",
         78: "the password file has an error",
@@ -97,14 +97,14 @@ EXIT_CODES: Final[dict[str, dict[int, str]]] = {
         0: "every law that was seen is kept",
         1: "a law is broken",
         **RECORDING,
-        69: f"{GRAPH}; or not all was played",
+        69: f"{GRAPH}, or the play was not performed",
         73: "the JUnit file cannot be written",
     },
     "release": SENT,
     "reset": {
         0: "the reset was sent",
         1: "no daemon runs",
-        69: "this user may not see or signal it",
+        69: "this user may not see or signal the daemon",
     },
     "walk": {
         0: "every output is off",
@@ -116,10 +116,13 @@ EXIT_CODES: Final[dict[str, dict[int, str]]] = {
     },
     "press": SIMULATION,
     "fail": SIMULATION,
-    "log": {0: "journalctl's own codes", 69: "no journal, or the daemon does not log to it"},
+    "log": {
+        0: "journalctl's own codes",
+        69: "there is no journal, or the daemon does not log to the journal",
+    },
     "incident": {
         0: "the recording is written",
-        65: "its YAML cannot be made anonymous",
+        65: "the recording's YAML cannot be made anonymous",
         69: "no ring can be read, or the library is missing",
         73: "the recording cannot be written",
     },
@@ -135,7 +138,7 @@ EXIT_CODES: Final[dict[str, dict[int, str]]] = {
     "outputs-off": {
         0: "every output is verified off",
         1: "an output is not verified off",
-        69: "the daemon still runs, or may",
+        69: "the daemon runs, or may run",
         **YAML,
     },
 }

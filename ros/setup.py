@@ -1,6 +1,6 @@
-"""The ROS package, for colcon: the packages of the folder above, the marker, launch files, examples.
+"""The ROS package for colcon: the Python packages of the folder above, launch files and examples.
 
-pip does not read this file, but pyproject.toml above, which lists packages and data for both.
+Only colcon reads this file. pip reads pyproject.toml above, which lists packages and data for both.
 """
 
 import os

@@ -1,1 +1,1 @@
-"""Record a daemon's messages, events and decisions: a ring keeps them, the recorder writes files."""
+"""Recordings of a daemon's messages, events and decisions: rings, and the recorder's files."""

@@ -17,10 +17,11 @@ from bridges.messages.releases import RELEASES
 from bridges.messages.rihs01 import MESSAGES
 
 LATEST_S: Final = 4e9
-"""Within this time, before and after zero, every sum of three is a date, and fits into an MCAP file."""
+"""The greatest time, before or after zero. The sum of three such times is a date, and fits into an MCAP
+file."""
 Seconds = Annotated[float, Meta(ge=-LATEST_S, le=LATEST_S)]
 DEEPEST: Final = 60
-"""The maximum depth of a tree; a core's memory has a tenth of it."""
+"""The greatest depth of a tree. A core's memory is a tenth as deep."""
 E = TypeVar("E")
 
 
@@ -69,8 +70,8 @@ class Spoken(RingEntry, frozen=True, tag_field="is", tag=1):
 
 
 class Known(RingEntry, frozen=True, tag_field="is", tag=2):
-    """All that a replay needs to start here: a subject's memory, its last reading and its last
-    decision (None before the first). `anew`: the memory does not come from that decision."""
+    """The data from which a replay can start: a subject's memory, its last reading and its last
+    decision (None before the first decision). `anew`: the memory does not come from that decision."""
 
     subject: str
     memory: Tree
@@ -81,7 +82,7 @@ class Known(RingEntry, frozen=True, tag_field="is", tag=2):
 
 
 class Decided(RingEntry, frozen=True, tag_field="is", tag=3):
-    """An event and the core's decision. `outputs`, `news`, `faults`: only those that have changed."""
+    """An event and the core's decision. `outputs`, `news`, `faults`: empty if unchanged."""
 
     subject: str
     event: Tree
@@ -156,7 +157,7 @@ def encode(entry: AnyEntry | Head) -> bytes:
 
 
 def decode(content: bytes) -> AnyEntry:
-    """Raises Invalid."""
+    """Decode an entry. Raises Invalid."""
     return _known(_decoded(_DECODER.decode, content))
 
 
@@ -166,17 +167,17 @@ def as_json(entry: AnyEntry | Head) -> str:
 
 
 def of_json(content: str) -> AnyEntry:
-    """Raises Invalid."""
+    """Decode an entry from JSON text. Raises Invalid."""
     return _known(_decoded(_JSON.decode, content))
 
 
 def head_of_json(content: str) -> Head:
-    """Raises Invalid."""
+    """Decode a head from JSON text. Raises Invalid."""
     return _decoded(_JSON_HEADS.decode, content)
 
 
 def decode_head(content: bytes) -> Head:
-    """Raises Invalid."""
+    """Decode a head. Raises Invalid."""
     return _decoded(_HEADS.decode, content)
 
 
@@ -203,7 +204,7 @@ def _known(entry: AnyEntry) -> AnyEntry:
 
 
 def _require_shallow(tree: Tree, deeper: int) -> None:
-    """Raises Invalid."""
+    """Raise Invalid if the tree has more than `deeper` levels."""
     if isinstance(tree, dict | list):
         if deeper == 0:
             raise Invalid(f"a value is nested more than {DEEPEST} deep")

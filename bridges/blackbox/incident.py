@@ -1,4 +1,4 @@
-"""One incident: the daemon's entries that belong to it, and the reasons for recording it. Pure."""
+"""One incident: the daemon's entries of that time, and the reasons for recording them. Pure."""
 
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
@@ -34,7 +34,8 @@ class Incident(msgspec.Struct, frozen=True):
 
 
 def part(entries: Sequence[AnyEntry], begin_at: float, end_at: float) -> Sequence[AnyEntry]:
-    """Return the entries from `begin_at` to `end_at` (monotonic s), and earlier ones a replay needs."""
+    """Return the entries from `begin_at` to `end_at` (monotonic s), and the earlier entries that a
+    replay needs."""
     first = 0
     for place, (entry, following) in enumerate(pairwise(entries)):
         if entry.at > begin_at:

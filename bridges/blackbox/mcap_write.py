@@ -38,7 +38,7 @@ QOS: Final = """\
   liveliness_lease_duration: {{sec: 9223372036, nsec: 854775807}}
   avoid_ros_namespace_conventions: false
 """
-"""The form up to version 8 of rosbag2's metadata, which every later release reads too."""
+"""The form of a QoS in rosbag2's metadata up to version 8, which every later release reads too."""
 BAG: Final = """\
 version: 8
 storage_identifier: mcap
@@ -53,7 +53,7 @@ files: []
 custom_data: ~
 ros_distro: {distro}
 """
-"""Gives rosbag2 the version; rosbag2 takes the rest from the file's own index."""
+"""rosbag2's metadata. Only the version counts, because rosbag2 reads the rest from the file's index."""
 KNOWN_QOS: Final = {topic.name: topic.publish for topic in topics.every()}
 
 
@@ -65,7 +65,7 @@ class String:
 
 
 def write(path: Path, incident: Incident) -> None:
-    """Write a file, under a temporary name until it is complete. Raises OSError."""
+    """Write a file, which has a temporary name until it is complete. Raises OSError."""
     new = path.with_name(f".{path.name}.part")
     try:
         with new.open("wb") as out:

@@ -1,8 +1,8 @@
 """The recorder: one process beside all daemons of a machine, which turns their rings into files.
 
 It has no devices, and no daemon waits for it. Each second it reads the new entries of each ring. An
-entry that triggers a recording (`triggers.py`) leads to a file, once the time after it is in the
-ring too. Nothing is written while all is well, unless a YAML asks for `keep: continuous`.
+entry that triggers a recording (`triggers.py`) leads to a file, once the ring also has the entries of
+the time after it. Nothing is written while all is well, unless a YAML asks for `keep: continuous`.
 """
 
 import logging
@@ -23,11 +23,11 @@ from bridges.system.log import pairs
 log = logging.getLogger(__name__)
 
 LATE_S: Final = 60.0
-"""Entries older than this at the first look at a ring were handled by an earlier recorder."""
+"""Entries older than this at the first look at a ring are left to the recorder that ran before."""
 GRACE_S: Final = 2.0
-"""The extra wait until the ring certainly has all entries of a recording."""
+"""The extra wait (s) after which the ring certainly has all entries of a recording."""
 PART_S: Final = 300.0
-"""The length of one file of `keep: continuous`."""
+"""The length (s) of one file of `keep: continuous`."""
 
 
 class Recorder:
@@ -90,8 +90,8 @@ class Recorder:
             self._put(*due)
 
     def _take_died(self, path: Path) -> None:
-        """Record the ring of a run that did not shut down cleanly, once. A failed start is not
-        recorded: it is in the log."""
+        """Record, once, the ring of a run that did not shut down cleanly. A failed start is not
+        recorded, because the log has it."""
         try:
             identity = _identity(path)
             if identity in self._seen_dead:
@@ -108,7 +108,7 @@ class Recorder:
             self._put(Incident(read.head, part(entries, at - BEFORE_S, at), (note,)), DEATH)
 
     def _is_first(self, head: Head) -> bool:
-        """Is this death still unrecorded, and not one of many in a row?"""
+        """Is this death still unrecorded, and has no other death been recorded in the last AGAIN_S?"""
         last = self._died_at.get(head.file, AGES_AGO)
         if self._recordings.has_death(head) or self._now() < last + AGAIN_S:
             return False
@@ -116,7 +116,7 @@ class Recorder:
         return True
 
     def _put(self, incident: Incident, why: str) -> None:
-        """Write a file. A failure is logged once, and the recording is lost."""
+        """Write a file. After a failure the recording is lost; repeated failures are logged once."""
         others = [followed.head.recording for followed in self._followed.values()]
         try:
             path = self._recordings.put(incident, wall_of(incident.entries), why, others)
@@ -135,7 +135,7 @@ class _Followed:
     """One ring, and the recordings of it that have begun."""
 
     def __init__(self, path: Path, now: float) -> None:
-        """Raises RingError."""
+        """Open the ring. Raises RingError."""
         self._tail = Tail(path)
         self.head = self._tail.head
         self._identity = _identity(path)
@@ -180,7 +180,7 @@ class _Followed:
         return Incident(read.head, entries, notes), reason(first.code, first.text)
 
     def _read(self) -> RingContent:
-        """Read the ring; if it is gone, return its first content."""
+        """Read the ring again; if it is gone, return the content from the recording's beginning."""
         try:
             read = RingContent(self._tail.path)
             if read.head.run == self.head.run:
@@ -191,8 +191,8 @@ class _Followed:
         return self._kept
 
     def _continuous(self, *, whole: bool) -> list[tuple[Incident, str]]:
-        """Return the entries since the last file, up to a place where a replay can start: each file
-        stands alone."""
+        """Return the entries since the last file, up to a place where a replay can start, so that the
+        next file needs no other file."""
         known = [at for at in range(1, len(self._part)) if begins(self._part, at)]
         end = len(self._part) if whole or not known else known[-1]
         entries, self._part = self._part[:end], self._part[end:]
@@ -200,7 +200,7 @@ class _Followed:
 
 
 def _last_words(entries: Sequence[AnyEntry]) -> str:
-    """Return the cause of a run's death, as far as the entries tell it."""
+    """Return the cause of a run's death that the entries show."""
     for entry in entries:
         if isinstance(entry, DaemonDied):
             return entry.reason
@@ -233,7 +233,7 @@ def wall_of(entries: Sequence[AnyEntry]) -> float:
 
 
 def _identity(path: Path) -> tuple[int, int]:
-    """Raises RingError if there is no file."""
+    """Return the file's device and inode. Raises RingError if there is no file."""
     try:
         found = os.stat(path)
     except OSError as error:

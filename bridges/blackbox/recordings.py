@@ -56,19 +56,20 @@ class Recordings:
                 begun.unlink()
 
     def name(self, head: Head, wall: float, why: str) -> str:
-        """Return `<file>_<day>_<time>_<why>_<run>.mcap`, in the machine's own time."""
+        """Return `<file>_<day>_<time>_<why>_<run>.mcap`; day and time are in the machine's time
+        zone."""
         when = datetime.fromtimestamp(wall).strftime(_TIME)
         return f"{Path(head.file).stem}_{when}_{why}_{head.run[:8]}{SUFFIX}"
 
     def has_death(self, head: Head) -> bool:
-        """Is there a recording of this run's death already?"""
+        """Does a recording of this run's death already exist?"""
         return any(self.folder.glob(f"*_{DEATH}_{head.run[:8]}{SUFFIX}"))
 
     def put(
         self, incident: Incident, wall: float, why: str, others: Iterable[RecordingSettings] = ()
     ) -> Path:
-        """Write a recording, and remove files of little value beyond the machine's bound: the largest
-        of this daemon's and of the `others`. Raises OSError."""
+        """Write a recording, and remove files of little value beyond the machine's bound: the
+        largest bound among this daemon's and the `others`. Raises OSError."""
         from bridges.blackbox import mcap_write
 
         self.folder.mkdir(mode=0o750, parents=True, exist_ok=True)
@@ -118,7 +119,7 @@ def reason(code: str, text: str = "") -> str:
 
 
 def _stored(path: Path) -> Stored | None:
-    """Return the file's name read; None for the name of a person's file."""
+    """Return what the file's name says; None for a file that a person has named."""
     named = _NAME.fullmatch(path.stem)
     with suppress(OSError, ValueError, OverflowError):
         if named:

@@ -1,10 +1,10 @@
-"""The ring: a file of fixed size on tmpfs with a daemon's last minutes. It outlives a kill.
+"""The ring: a file of fixed size on tmpfs with a daemon's last minutes. The file outlives a kill.
 
-It has a head, then SEGMENTS of equal size, used in turn. Each begins with its number and the state of
-every subject; entries follow, each with its length and a checksum. The checksum also covers the
-segment's number, so an entry from an earlier turn, or an entry cut short by a kill, is never valid.
-The file is written with `pwrite`, not mapped: truncating a mapped file would kill the daemon by a
-signal.
+It has a head, then SEGMENTS of equal size, used in turn. Each segment begins with its number and the
+state of every subject; entries follow, each with its length and a checksum. The checksum also covers
+the segment's number, so an entry from an earlier turn, or an entry that a kill has cut short, is never
+valid. The file is written with `pwrite` and not mapped, because a signal would kill the daemon if
+somebody truncated a mapped file.
 """
 
 import os
@@ -21,10 +21,11 @@ from bridges.system import user_files
 MAGIC: Final = b"RMFRING1"
 SEGMENTS: Final = 8
 TOP: Final = struct.Struct("<8sBxxxII")
-"""Magic, clean shutdown (a flag), the size of a segment, the length of the head."""
+"""The file begins with: magic, the flag of a clean shutdown, the size of a segment, the head's
+length."""
 ENDED_AT: Final = 8
 MARK: Final = struct.Struct("<QI")
-"""A segment begins with its number, and the checksum of that."""
+"""A segment begins with its number, and the checksum of the number."""
 FRAME: Final = struct.Struct("<II")
 """An entry begins with its length and its checksum."""
 PAGE: Final = 4096
@@ -39,10 +40,11 @@ class RingError(Exception):
 
 
 class Ring:
-    """The writing end. Each method may raise OSError; then a new ring must be made."""
+    """The writing end. If a method raises OSError, the caller must make a new ring."""
 
     def __init__(self, folder: Path, head: Head, size: int) -> None:
-        """Make the file and reserve all its space. The ring of a run that died stays beside it."""
+        """Make the file and reserve all its space. The ring of an earlier run that died is kept beside
+        it."""
         self.path = folder / NAME
         self._segment_size = max(size // SEGMENTS, PAGE)
         told = entries.encode(head)
@@ -74,11 +76,11 @@ class Ring:
 
     @property
     def room(self) -> int:
-        """Return the maximum size of an entry (bytes)."""
+        """The greatest size of an entry (bytes)."""
         return self._segment_size - MARK.size - 2 * FRAME.size
 
     def fits(self, length: int) -> bool:
-        """Do this many bytes of entries (with `frame`) still fit into this segment?"""
+        """Do this many bytes of framed entries still fit into this segment?"""
         return self._offset + length + FRAME.size <= self._segment_size
 
     def begin_segment(self) -> None:
@@ -90,7 +92,7 @@ class Ring:
         self._offset = MARK.size
 
     def frame(self, content: bytes) -> bytes:
-        """Return an entry with its length, and its checksum in this segment."""
+        """Return an entry framed for this segment: its length, its checksum, its content."""
         return FRAME.pack(len(content), zlib.crc32(content, self._number)) + content
 
     def write(self, frames: bytes) -> None:
@@ -121,13 +123,13 @@ def _died(path: Path) -> bool:
 
 
 class RingContent:
-    """A ring's content at one time. `head`: the run's. `ended`: the run shut down cleanly.
+    """A ring's content at one time. `head`: the head of the run. `ended`: the run shut down cleanly.
 
     `segments`: each segment's number and entries, in order, without incomplete entries.
     """
 
     def __init__(self, path: Path) -> None:
-        """Raises RingError."""
+        """Read the ring. Raises RingError."""
         self.head, first, size = _top(path)
         try:
             content = user_files.read(path, LARGEST).content
@@ -156,7 +158,7 @@ class RingContent:
 class Tail:
     """Follows a ring that is being written, and reads its new entries.
 
-    `head`: the run's. The constructor and `new` raise RingError if the file cannot be read.
+    `head`: the head of the run. The constructor and `new` raise RingError if the file cannot be read.
     """
 
     def __init__(self, path: Path) -> None:
@@ -166,8 +168,8 @@ class Tail:
         self._offset = MARK.size
 
     def new(self) -> list[AnyEntry]:
-        """Return the entries written since the last call (the first call: all). Entries that the
-        ring has overwritten meanwhile are missing."""
+        """Return the entries written since the last call, or all entries at the first call. Entries
+        that the ring has overwritten meanwhile are missing."""
         try:
             with self.path.open("rb") as ring:
                 return self._new(ring)
@@ -191,7 +193,7 @@ class Tail:
         return found
 
     def _start(self, ring: IO[bytes], turn: int) -> int:
-        """Return the number of the segment at a place; 0 for none."""
+        """Return the number of the segment at a place; 0 if there is no valid segment."""
         ring.seek(self._first + turn * self._size)
         start = ring.read(MARK.size)
         if len(start) < MARK.size:
@@ -222,7 +224,8 @@ def _entries(segment: bytes, number: int) -> list[AnyEntry]:
 
 
 def frames(segment: bytes, number: int, at: int) -> Iterator[tuple[bytes, int]]:
-    """Yield a segment's entries from offset `at`, each with its end, up to the first torn entry."""
+    """Yield (entry, offset of its end) for a segment's entries from offset `at` to the first torn
+    entry."""
     while at + FRAME.size <= len(segment):
         length, checksum = FRAME.unpack_from(segment, at)
         content = segment[at + FRAME.size : at + FRAME.size + length]

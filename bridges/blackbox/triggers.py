@@ -1,10 +1,10 @@
 """Finds the reasons for a recording in a daemon's entries. Pure.
 
-- a fault appears (a hazard is one: it keeps the device from RMF);
-- a request is refused, except for the refusals of every handover and start;
+- a fault appears (a hazard is a fault too, because it keeps the device from RMF);
+- a request is refused, unless every normal handover or start causes such a refusal;
 - a request has waited longer than `waiting_s`;
 - the daemon reports a defect that ends it.
-The same cause at the same subject counts once in AGAIN_S.
+The same reason for the same subject counts once in AGAIN_S.
 """
 
 from collections.abc import Iterator
@@ -28,7 +28,7 @@ FAULT, REFUSED, WAITING, DIED = "FAULT", "REFUSED", "WAITING", "DIED"
 
 
 class Triggers:
-    """Finds the reasons to record one run of a daemon. `waiting_s`: a wait this long (s) is one."""
+    """Finds the reasons to record one run of a daemon. `waiting_s`: the wait (s) that is a reason."""
 
     def __init__(self, waiting_s: float) -> None:
         self._faults: dict[str, set[str]] = {}
@@ -37,7 +37,7 @@ class Triggers:
         self._graph = PlainGraph()
 
     def take(self, entry: AnyEntry) -> list[Note]:
-        """Return new reasons for a recording; empty if there are none."""
+        """Return the new reasons for a recording that this entry gives."""
         return [note for note in self._all(entry) if self._is_new(note)]
 
     def _all(self, entry: AnyEntry) -> Iterator[Note]:
@@ -66,7 +66,7 @@ class Triggers:
             yield Note(step.at, REFUSED, step.refused, step.subject)
 
     def _spoken(self, spoken: Spoken) -> Iterator[Note]:
-        """Yield notes for overlong waits, by the messages alone."""
+        """Yield a note for each overlong wait, which the messages alone show."""
         kind, release = MESSAGES.get(spoken.type), RELEASES.get(spoken.release)
         if kind is None or release is None:
             return

@@ -1,9 +1,10 @@
 """Converts a core's values (events, memories, outputs, reports) to trees of plain values, and back.
 
 A tree holds None, bool, int, float, str, lists and mappings with text as keys. A tuple becomes a
-list; any other value a mapping whose key `""` names its type (`lift.memory.Session`), with its fields
-beside it, or its content under `=`. Only types with a name (in `bridges/kinds/shared/recorded.py`,
-and in `RECORDED` of each kind) are written and created: no recording can call anything else.
+list. Any other value becomes a mapping whose key `""` names its type (`lift.memory.Session`); the
+mapping also has the value's fields, or its content under `=`. Only types with a name (in
+`bridges/kinds/shared/recorded.py`, and in `RECORDED` of each kind) are written and created, so no
+recording can call any other code.
 """
 
 import math
@@ -20,7 +21,7 @@ from bridges.kinds.shared.recorded import SHARED
 
 if TYPE_CHECKING:
     Tree = None | bool | int | float | str | list["Tree"] | dict[str, "Tree"]
-else:  # msgspec has no recursive types; it decodes nothing but these
+else:  # msgspec has no recursive types; without types it decodes only plain values
     Tree = Any
 
 TYPE: Final = ""
@@ -36,8 +37,8 @@ class UnknownValue(ValueError):
 
 
 class Struct(NamedTuple):
-    """A type with fields: its name in a tree, and each field's name in code and in trees, which differ
-    if the field was renamed (`msgspec.field(name=…)`)."""
+    """A type with fields. `name`: its name in a tree. `fields`: (name in code, name in trees); the
+    names differ if the field was renamed (`msgspec.field(name=…)`)."""
 
     name: str
     fields: tuple[tuple[str, str], ...]
@@ -116,8 +117,8 @@ _structs: dict[type[Any], Struct | None] = {}
 
 
 def first_difference(one: Tree, other: Tree, path: str = "") -> tuple[str, Tree, Tree] | None:
-    """Return the first difference as (path, one, other); None if there is none. A field that only
-    one tree has does not count: another version of the program may have more or fewer fields."""
+    """Return the first difference as (path, one, other); None for equal trees. A field that only one
+    tree has does not count, because another version of the program may have more or fewer fields."""
     if isinstance(one, dict) and isinstance(other, dict) and one.get(TYPE) == other.get(TYPE):
         names = [name for name in one if name in other]
         below = ((f"{path}.{name}".strip("."), one[name], other[name]) for name in names)
@@ -131,7 +132,7 @@ def first_difference(one: Tree, other: Tree, path: str = "") -> tuple[str, Tree,
 
 
 def _struct(kind: type[Any]) -> Struct | None:
-    """Return the fields of a type; None if it has none."""
+    """Return a type's name and fields; None for a type without fields."""
     if kind not in _structs:
         _structs[kind] = _found(kind)
     return _structs[kind]
@@ -146,7 +147,7 @@ def _found(kind: type[Any]) -> Struct | None:
 
 @cache
 def name_of(kind: type) -> str:
-    """Return the name of a type in recordings. Raises TypeError if it has none."""
+    """Return the name of a type in recordings. Raises TypeError for a type without a name."""
     package = sys.modules[kind.__module__.rpartition(".")[0] or kind.__module__]
     for name, named in (*SHARED.items(), *getattr(package, "RECORDED", {}).items()):
         if named is kind:
@@ -156,7 +157,7 @@ def name_of(kind: type) -> str:
 
 @cache
 def _type(name: str) -> type[Any]:
-    """Return the type of this name. Only the kind at the beginning of the name is loaded. Raises
+    """Return the type with this name. Only the kind at the name's beginning is loaded. Raises
     UnknownValue."""
     kind = name.partition(".")[0]
     known = recorded(kind) if kind in kind_names() else SHARED

@@ -1,1 +1,1 @@
-"""The subcommands of `rmf-bridge`, a file each: `add_arguments(parser)` and `run(args) -> int`."""
+"""The subcommands of `rmf-bridge`: each file has `add_arguments(parser)` and `run(args) -> int`."""

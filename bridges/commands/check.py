@@ -35,7 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--building-map",
         metavar="MAP",
-        help="compare the names with RMF's: a *.building.yaml, or a navigation graph",
+        help="compare the names with RMF's map: a *.building.yaml, or a navigation graph",
     )
     parser.add_argument(
         "--fleet-config",
@@ -48,13 +48,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--several-machines",
         action="store_true",
-        help="the files run on several machines: the same pin or port in two of them is no mistake",
+        help="the files run on several machines, so the same pin or port in two files is no mistake",
     )
     parser.add_argument(
-        "--json", action="store_true", help="print the same as JSON, and nothing else"
+        "--json", action="store_true", help="print the findings as JSON, and nothing else"
     )
     parser.add_argument(
-        "--sheet", metavar="FILE.html", help="write the commissioning sheet: a page per controller"
+        "--sheet",
+        metavar="FILE.html",
+        help="write the commissioning sheet, with a page for each controller",
     )
 
 
@@ -98,7 +100,7 @@ def _read(
 
 
 def _against(config: Config, building: "BuildingMap | None") -> tuple[list[Problem], list[str]]:
-    """Compare a file's names with the map's; return (problems, notes)."""
+    """Compare a file's names with the names on the map; return (problems, notes)."""
     if building is None:
         return [], []
     from bridges.settings.map_names import mismatches, places
@@ -154,7 +156,7 @@ def _more(
 
 
 def _with(file: Findings, together: Found) -> Findings:
-    """Return a file's findings, extended by those of the comparison with the other files."""
+    """Return a file's findings, with the results of its comparison with the other files."""
     return _more(
         file,
         [p for p in together.errors if p.file == file.file],
@@ -209,7 +211,7 @@ def _many(number: int, what: str) -> str:
 
 
 def _complain(lines: Iterable[str]) -> None:
-    """Write to stderr, after flushing stdout: both often go to one log."""
+    """Write to stderr. Flush stdout before that, because both often go to one log."""
     sys.stdout.flush()
     sys.stderr.writelines(f"{line}\n" for line in lines)
 

@@ -1,5 +1,5 @@
-"""`rmf-bridge completion SHELL`: prints the script by which a shell completes our commands and options,
-a file's device names, and this machine's service names."""
+"""`rmf-bridge completion SHELL`: prints a script for a shell, which then completes our commands and
+options, a file's device names, and this machine's service names."""
 
 import argparse
 from typing import Final

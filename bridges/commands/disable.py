@@ -1,4 +1,4 @@
-"""`rmf-bridge disable NAME`: stops a service, outputs off, and disables it. Its YAML stays."""
+"""`rmf-bridge disable NAME`: stops a service, with its outputs off, and disables it. Its YAML stays."""
 
 import argparse
 import os
@@ -27,7 +27,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Return 0 if the service has stopped, outputs off; 77 without root."""
+    """Return 0 if the service has stopped with its outputs off; 77 without root."""
     name = Path(args.name).name.removesuffix(".yaml")
     if not INSTANCE.fullmatch(name):
         print(NO_INSTANCE.format(name), file=sys.stderr)

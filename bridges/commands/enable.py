@@ -1,9 +1,9 @@
 """`rmf-bridge enable FILE`: from a YAML to a running service.
 
-It validates the file together with those of this machine's other services; stops a running instance,
-to switch its outputs off while it still has access to the old relay; copies the file to
-/etc/rmf-bridges; writes the instance's drop-in (`bridges/runtime/drop_in.py`); and starts it. If a step
-fails, an instance that ran before is started again, with the steps taken so far.
+It validates the file together with the files of this machine's other services. It stops a running
+instance, which switches its outputs off while it still has access to the old relay. Then it copies the
+file to /etc/rmf-bridges, writes the instance's drop-in (`bridges/runtime/drop_in.py`), and starts the
+instance. If a step fails, an instance that ran before is started again; the earlier steps stay.
 """
 
 import argparse
@@ -79,7 +79,7 @@ def steps(config: Config, root: Path, present: Collection[str]) -> Iterator[Step
 
 
 def groups(root: Path) -> set[str]:
-    """Return this system's groups that a service may get."""
+    """Return the groups of this system that a service may get."""
     with suppress(OSError):
         lines = (root / "etc/group").read_text("utf-8", "replace").splitlines()
         return {line.partition(":")[0] for line in lines} & set(GROUPS)

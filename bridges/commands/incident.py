@@ -1,4 +1,5 @@
-"""`rmf-bridge incident FILE`: writes a recording of a daemon's last minutes on a person's request."""
+"""`rmf-bridge incident FILE`: writes a recording of a daemon's last minutes when a person asks for
+it."""
 
 import argparse
 import os
@@ -22,7 +23,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("file", type=Path, metavar="FILE", help="the device YAML of the daemon")
     parser.add_argument("--note", default="", metavar="TEXT", help="what you saw")
     parser.add_argument(
-        "-o", "--output", type=Path, metavar="MCAP", help="default: NAME_TIME.mcap, here"
+        "-o", "--output", type=Path, metavar="MCAP", help="default: NAME_TIME.mcap, in this folder"
     )
     parser.add_argument(
         "--after",
@@ -32,15 +33,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help=f"wait this long to record later events too (default: {AFTER_S:g} s)",
     )
     parser.add_argument(
-        "--died", action="store_true", help="the previous run, which did not shut down cleanly"
+        "--died",
+        action="store_true",
+        help="record the previous run, which did not shut down cleanly",
     )
-    parser.add_argument("--anonymous", action="store_true", help="without the site's names")
+    parser.add_argument("--anonymous", action="store_true", help="leave out the site's names")
     parser.add_argument("--runtime-dir", metavar="DIR", help="the daemon's runtime directory")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Return 0 if the file is written; 65 if its YAML cannot be made anonymous; 69 without a readable
-    ring; 73 if the file cannot be written. Raises NotInstalled if `--anonymous` lacks the workbench."""
+    """Return 0 if the recording is written; 65 if its YAML cannot be made anonymous; 69 without a
+    readable ring; 73 if the recording cannot be written. Raises NotInstalled if `--anonymous` needs the
+    workbench, which is not installed."""
     try:
         from bridges.blackbox import mcap_write
     except ImportError as error:
@@ -84,8 +88,8 @@ def _hint(*, died: bool) -> str:
 
 
 def _incident(ring: Path, args: argparse.Namespace, follows: bool) -> Incident:
-    """Return the last 120 s; if `follows`, also wait for later events of the running daemon. `--died`:
-    the last 120 s of the ring. Raises RingError."""
+    """Return the last 120 s; if `follows`, wait for later events of the running daemon too. With
+    `--died`, return the last 120 s of the dead run. Raises RingError."""
     before = RingContent(ring)
     if args.died:
         entries = list(before.entries())
@@ -109,7 +113,7 @@ def _notes(at: float, text: str) -> tuple[Note, ...]:
 
 
 def _wait(seconds: float) -> None:
-    """Wait; Ctrl-C ends only the wait, not the command."""
+    """Wait. Ctrl-C ends only the wait, and the command continues."""
     try:
         if seconds > 0:
             print(f"waiting {seconds:g} s for later events; Ctrl-C ends the wait")

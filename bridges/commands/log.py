@@ -29,11 +29,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     device = parser.add_argument("--device", metavar="NAME", help="only lines about this device")
     completed_by(device, device_names)
     parser.add_argument("--event", metavar="WORD", help="only this event: state, fault, refused …")
-    parser.add_argument("--json", action="store_true", help="the journal's JSON, a line each")
+    parser.add_argument("--json", action="store_true", help="print each line as the journal's JSON")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Become journalctl; return 69 without a journal, or if the daemon does not log to it."""
+    """Become journalctl; return 69 without a journal, or if the daemon does not log to the journal."""
     name = args.file.stem
     known = services()
     if name not in known and _runs_by_hand(name):
@@ -59,7 +59,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def services() -> set[str]:
-    """Return this machine's services: those with a YAML in /etc/rmf-bridges, or a unit."""
+    """Return this machine's services, which have a YAML in /etc/rmf-bridges or a unit."""
     return {file.stem for file in ETC.glob("*.yaml")} | set(units())
 
 

@@ -1,7 +1,7 @@
 """`rmf-bridge outputs-off FILE`: switches every output off, from a new process, after a daemon's death.
 
-systemd runs it as ExecStopPost, the guard for a daemon started by hand. After a clean stop of a
-service, whose last mark says that all outputs are off, it ends without loading any driver.
+systemd runs it as ExecStopPost; for a daemon started by hand, the guard runs it. After a clean stop a
+service leaves the mark that all outputs are off, and then `outputs-off` ends without loading a driver.
 """
 
 import argparse
@@ -18,14 +18,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--all-records",
         action="store_true",
-        help="the outputs of every service whose record a power cut or death left; 6 s at most",
+        help="switch off the outputs of every service that a power cut or death has left a record of;"
+        " takes 6 s at most",
     )
     parser.add_argument("--runtime-dir", metavar="DIR", help="the dead daemon's runtime directory")
     parser.add_argument("--record", action="append", default=[], help=argparse.SUPPRESS)
 
 
 def run(args: argparse.Namespace) -> int:
-    """Return 0 if every output is verified off, 1 if not, 69 while the daemon lives or may live."""
+    """Return 0 if every output is verified off; 1 if an output is not; 69 while the daemon may live."""
     if last_mark.says_off(os.environ):
         print('nothing_to_switch_off reason="the daemon verified it"', file=sys.stderr)
         return 0

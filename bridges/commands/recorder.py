@@ -1,4 +1,4 @@
-"""`rmf-bridge recorder`: turns the rings of this machine's daemons into recordings, as files."""
+"""`rmf-bridge recorder`: writes recordings, as files, from the rings of this machine's daemons."""
 
 import argparse
 import os
@@ -20,7 +20,11 @@ EVERY_S = 1.0
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options of `recorder`."""
     parser.add_argument(
-        "-o", "--output", type=Path, metavar="DIR", help="default: the unit's, else the user's"
+        "-o",
+        "--output",
+        type=Path,
+        metavar="DIR",
+        help="default: the unit's state directory, else a folder in the user's state directory",
     )
 
 
@@ -47,7 +51,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _folder() -> Path:
-    """Return the folder of recordings: in the unit's state directory, else in the user's."""
+    """Return the folder of recordings: the unit's state directory, else a folder in the user's."""
     given = os.environ.get("STATE_DIRECTORY", "").split(":")[0]
     return Path(given) if given else directories.state_base() / "recordings"
 

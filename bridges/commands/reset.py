@@ -1,4 +1,4 @@
-"""`rmf-bridge reset FILE`: an operator lets latched faults clear if their cause is gone."""
+"""`rmf-bridge reset FILE`: lets an operator clear latched faults whose cause is gone."""
 
 import argparse
 import os
@@ -18,7 +18,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Return 0 if the reset was sent, 1 if no daemon runs, 69 if this user may not see or signal it."""
+    """Return 0 if the reset was sent; 1 if no daemon runs; 69 if this user may not see or signal the
+    daemon."""
     try:
         if not args.runtime_dir and not args.file.exists():
             print(f"{args.file} does not exist", file=sys.stderr)
@@ -33,7 +34,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _reset(file: Path, places: Directories) -> int:
     found = holder.look(places)
-    if found is None or not found.serves or not found.started:  # its pid may be another's
+    if found is None or not found.serves or not found.started:  # another process may have its pid
         why = f"{found}, which is not a daemon of this version" if found else "no process holds it"
         print(f"no daemon serves {file}: {places.runtime}: {why}", file=sys.stderr)
         return 1

@@ -26,7 +26,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--simulate",
         action="store_true",
-        help="fake hardware behind the same daemon; loopback only",
+        help="serve fake hardware with the same daemon, on loopback only",
     )
     parser.add_argument(
         "--expose", action="store_true", help="with --simulate: let the network see the fake device"
@@ -40,16 +40,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--log-format",
         choices=("text", "json"),
         default="text",
-        help="json: a line each, for programs",
+        help="json: each event as a line of JSON, for programs",
     )
     parser.add_argument(
-        "--runtime-dir", metavar="DIR", help="default: systemd's, else one of the user's"
+        "--runtime-dir",
+        metavar="DIR",
+        help="default: systemd's runtime directory, else a folder in the user's",
     )
 
 
 def run(args: argparse.Namespace) -> int:
-    """Validate, claim, serve; return the exit code, 78 for an invalid configuration. Raises
-    NotInstalled if `--simulate` lacks the fakes, which are not part of the daemons."""
+    """Validate, claim, serve; return the exit code, which is 78 for an invalid configuration. Raises
+    NotInstalled if `--simulate` needs the fakes, which are not installed."""
     log.start(args.log_level.upper(), json=args.log_format == "json")
     if args.simulate and os.environ.get("RMF_BRIDGE_SERVICE") == "1":
         logging.error("a service never simulates: --simulate is refused where RMF_BRIDGE_SERVICE=1")
@@ -67,7 +69,7 @@ def run(args: argparse.Namespace) -> int:
     if wrong := drop_in.misfit(config, os.environ) or too_slow(config, watchdog_s()):
         logging.error(wrong)
         return os.EX_CONFIG
-    end = signals.End()  # before other processes learn our pid from the lock, and signal it
+    end = signals.End()  # before other processes can find our pid beside the lock and signal it
     signals.ignore_reset()
     try:
         held = runtime.held(args.file, args.runtime_dir, serves=True, simulated=args.simulate)
@@ -84,7 +86,8 @@ def run(args: argparse.Namespace) -> int:
 
 
 def too_slow(config: Config, watchdog: float | None) -> str:
-    """Return the error for a bus whose call may take over half of systemd's watchdog (s); else ""."""
+    """Return the error for a bus whose call may take more than half of systemd's watchdog time; else
+    ""."""
     for name, bus in config.buses.items():
         timeout_s: float = getattr(bus, "timeout_s", 0.0)
         if watchdog is not None and timeout_s > watchdog / 2:

@@ -1,4 +1,4 @@
-"""`rmf-bridge status`: prints every daemon on this machine: its state for RMF, its faults and remedies.
+"""`rmf-bridge status`: prints, for each daemon on this machine, its state for RMF, faults and remedies.
 
 It reads the daemons' status files and asks systemd; it opens no bus and joins no graph.
 """
@@ -29,12 +29,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "name", nargs="?", metavar="NAME", help="only this daemon: a device YAML, or its name"
     )
-    parser.add_argument("--json", action="store_true", help="for programs")
+    parser.add_argument("--json", action="store_true", help="print JSON, for programs")
     parser.add_argument("--runtime-dir", metavar="DIR", help="only the daemon of this directory")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Return 0: all serve; 1: there are faults; 2: a daemon died or is silent; 3: no daemon visible."""
+    """Return 0 if all daemons serve; 1 for faults; 2 if a daemon died or is silent; 3 without a visible
+    daemon."""
     folders = [Path(args.runtime_dir)] if args.runtime_dir else list(runtimes())
     found = list(daemons(folders, {} if args.runtime_dir else units(), time.time()))
     if args.name:
@@ -129,7 +130,7 @@ def _told(device: Status) -> str:
 
 
 def _age(device: Status, snapshot_s: float) -> str:
-    """Return the input's age from now: the status file itself is up to a second old."""
+    """Return the age of the input now, because the status file itself is up to a second old."""
     age_s = device.get("input_age_s")
     return "never read" if age_s is None else f"read {age_s + snapshot_s:.1f} s ago"
 

@@ -1,11 +1,11 @@
 """A daemon's directories, found by one rule for every command.
 
-The order: the directory given on the command line; else systemd's, in a unit; else the service's, if
-its lock or record names this file; else those of a daemon started by hand, for root also the sudo
-user's.
+The order: the directory given on the command line; else, in a unit, systemd's directories; else the
+service's directories, if its lock or record names this file; else the directories of a daemon started
+by hand, for root also by the user who called sudo.
 
 `runtime`, with lock and status, is lost at a reboot. `state`, with the record of claimed outputs,
-survives it, because a Modbus relay outlives a power cut of the Pi. A given directory is used as both.
+survives a reboot, because a Modbus relay outlives a power cut of the Pi. A given directory is both.
 """
 
 import grp
@@ -45,7 +45,7 @@ def named(file: Path) -> str:
 
 
 def as_given(given: str | None) -> Directories | None:
-    """Return the directories given by the command line or systemd's unit; None if neither does."""
+    """Return the directories that the command line or systemd's unit gives; None without both."""
     if given:
         return Directories(Path(given).absolute(), Path(given).absolute())
     runtime = os.environ.get("RUNTIME_DIRECTORY", "").split(":")[0]
@@ -65,15 +65,15 @@ def by_hand(file: Path) -> Directories:
 
 
 def state_base() -> Path:
-    """Return this user's state directory; one below /tmp without a home."""
+    """Return this user's state directory; without a home, a directory below /tmp."""
     home = os.path.expanduser("~")
     default = Path(home) / ".local/state" if os.path.isabs(home) else TMP / f"rmf-{os.getuid()}"
     return Path(os.environ.get("XDG_STATE_HOME") or default) / "rmf-bridge"
 
 
 def everywhere(file: Path) -> Iterator[Directories]:
-    """Yield the possible directories of this file's daemon: the service's; for root those of the user
-    who called sudo; those of a daemon started by hand.
+    """Yield the possible directories of this file's daemon, if it is a service, if (for root) the user
+    who called sudo has started it, or if this user has started it by hand.
     """
     yield of_service(file)
     if os.geteuid() == 0 and (uid := os.environ.get("SUDO_UID", "")).isdecimal():
@@ -95,7 +95,8 @@ def _of_user(uid: int, file: Path) -> Iterator[Directories]:
 
 
 def runtimes() -> Iterator[Path]:
-    """Yield this machine's runtime directories: the services' and this user's; for root, all users'."""
+    """Yield the runtime directories of this machine's services and of this user; for root, of all
+    users."""
     bases = [SERVICE_RUN, by_hand(Path("any")).runtime.parent]
     if os.geteuid() == 0:
         bases += [*USERS_RUN.glob("*/rmf-bridge"), *TMP.glob("rmf-bridge-*/rmf-bridge")]
@@ -120,9 +121,9 @@ def cannot_be_seen(folder: Path, error: OSError) -> PermissionError:
 def opened(folder: Path, *, ours: bool = False, make: bool = False) -> Iterator[int]:
     """Yield a descriptor of a daemon's directory; make a missing directory if `make`.
 
-    Only its owner (`ours`: must be this user) or root can have made it, and nobody else can write into
-    it; the same is checked, from the top down, for each directory above it. So the caller may use its
-    path. Raises Distrusted, and other OSErrors.
+    Only the directory's owner or root can have made it, and no other user can write into it; with
+    `ours` the owner must be this user. Each directory above is checked in the same way, from the top
+    down. So the caller may use the directory's path. Raises Distrusted, and other OSErrors.
     """
     folder = folder.absolute()
     owner = _owner(folder, ours=ours or make)
@@ -156,7 +157,7 @@ def _owner(folder: Path, *, ours: bool) -> int:
 
 def _distrusted(place: Path, owner: int, *, last: bool) -> str:
     """Return the reason why a user other than root or the owner may have made this directory or link;
-    "" if none could."""
+    "" without a reason."""
     found = place.lstat()
     if found.st_uid not in (Path("/").stat().st_uid, owner):
         return "belongs to another user"
@@ -171,8 +172,8 @@ def _distrusted(place: Path, owner: int, *, last: bool) -> str:
 def act_as_owner(places: Directories) -> None:
     """Change permanently from root to the directories' owner, with the unit's groups.
 
-    Files in them then have no more power than their owner. Raises PermissionError if another user
-    could have made the directories, or if we are not root and they are not ours.
+    Then files in the directories have no more power than their owner. Raises PermissionError if another
+    user could have made the directories, or if they belong to another user and we are not root.
     """
     for folder in places.folders:
         with suppress(FileNotFoundError, NotADirectoryError):
@@ -189,7 +190,7 @@ def _become(uid: int, gid: int) -> None:
 
 
 def _groups(uid: int, gid: int) -> list[int]:
-    """Return the user's groups; for the service's user also the unit's."""
+    """Return the user's groups, and for the service's user also the groups that a unit may get."""
     try:
         user = pwd.getpwuid(uid)
     except KeyError:
@@ -209,7 +210,8 @@ def owner_of(path: Path) -> str:
 
 
 def work_somewhere(places: Directories) -> None:
-    """Change to a directory where lgpio can make its FIFO: one of these, or a temporary one."""
+    """Change to a directory where lgpio can make its FIFO: one of `places`, else a temporary
+    directory."""
     for folder in (places.runtime, places.state, TMP, Path("/dev/shm"), Path("/var/tmp")):
         probe = folder / f".rmf-bridge-{os.getpid()}"
         try:

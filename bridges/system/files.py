@@ -1,11 +1,12 @@
-"""A daemon's own files. Each is replaced as a whole: a reader sees either the old or the new file."""
+"""A daemon's own files. Each is replaced as a whole, so a reader sees either the old or the new
+file."""
 
 import os
 from pathlib import Path
 
 
 def replace(path: Path, content: bytes) -> None:
-    """Replace a file, syncing it and its folder to disk; make the folder if needed.
+    """Replace a file, and sync the file and its folder to disk; make the folder if needed.
 
     Raises OSError; the old file then remains.
     """

@@ -1,8 +1,9 @@
 """Imports the optional packages: the workbench, the fakes and the page's library. No daemon needs them,
-and `bridges` imports them only by this module.
+and `bridges` imports them only through this module.
 
-Each of our Debian packages has a folder for its version, and the daemons' tree has a `.pth` with the
-folder of the tree's own version (deb/scripts/rmf-bridges.postinst). For pip all are one distribution.
+Each optional Debian package has a folder for its version, and the daemons' tree has a `.pth` file with
+the folder of the tree's own version (deb/scripts/rmf-bridges.postinst). For pip all packages are one
+distribution.
 """
 
 import importlib

@@ -1,4 +1,4 @@
-"""Logs: one line `event key=value …` for each event, with journald's priority."""
+"""The log: one line `event key=value …` for each event, with journald's priority."""
 
 import codecs
 import logging
@@ -13,7 +13,7 @@ from enum import Enum
 import msgspec
 
 ESCAPED = "unicode_escape"
-codecs.lookup(ESCAPED)  # loaded now, as loading later could fail for lack of a file descriptor
+codecs.lookup(ESCAPED)  # loads the codec now; later a file descriptor could be lacking
 _PRIORITY = {"DEBUG": 7, "INFO": 6, "WARNING": 4, "ERROR": 3, "CRITICAL": 2}
 
 
@@ -34,7 +34,7 @@ def pairs(event: str, **values: object) -> LogLine:
 
 
 def plain(value: object) -> str:
-    """Return a value for people, not in Python's notation: `agv_request yes, call L3`.
+    """Return a value as text for people: `agv_request yes, call L3`.
 
     Unset fields of a record are left out. None, or a record without set fields, is `-`.
     """
@@ -115,8 +115,8 @@ def _as_json(value: object) -> object:
 
 
 class _OthersOnce(logging.Filter):
-    """Passes each log call of a library once: with bad frames or datagrams anybody could trigger it
-    endlessly. Our own code already logs each event once."""
+    """Passes each log call of a library once, because anybody could trigger the call endlessly with bad
+    frames or datagrams. Our own code already logs each event once."""
 
     OURS = ("root", "bridges", "drivers", "hal_fakes", "workbench")
 
@@ -138,11 +138,11 @@ class _OthersOnce(logging.Filter):
 
 
 class Seldom(logging.Filter):
-    """Limits repeated lines: passes the first OFTEN of a series, then one in AGAIN_S (s), with the
-    number of lines left out. A pause longer than PAUSE_S (s) ends the series.
+    """Limits repeated lines: passes the first OFTEN lines of a series, then one line in AGAIN_S (s),
+    with the number of lines left out. A pause longer than PAUSE_S (s) ends the series.
 
-    Else a device that is lost and found each second would fill the disk. Lines that differ only in
-    seconds count as equal. `now`: monotonic s.
+    Without this limit a device that is lost and found each second would fill the disk. Lines that
+    differ only in seconds count as equal. `now`: monotonic s.
     """
 
     OFTEN, PAUSE_S, AGAIN_S, MOST = 6, 10.0, 600.0, 1000

@@ -1,4 +1,5 @@
-"""Colours, only on a terminal and without NO_COLOR (https://no-color.org); lines drawn in place."""
+"""Colours, used only on a terminal and without NO_COLOR (https://no-color.org); lines drawn in
+place."""
 
 import os
 from collections.abc import Iterable
@@ -11,7 +12,8 @@ def coloured(out: TextIO) -> bool:
 
 
 def styled(text: str, style: str) -> str:
-    """Return the text in a style: numbers of ECMA-48's SGR, such as `1;31`; "" for plain text."""
+    """Return the text in a style. `style`: numbers of ECMA-48's SGR, such as `1;31`; "" for no
+    style."""
     return f"\x1b[{style}m{text}\x1b[0m" if style else text
 
 

@@ -1,6 +1,6 @@
-"""Files named by a user: only regular files are read, and as a whole. Secrets have stricter rules.
+"""Files that a user names: only regular files are read, and as a whole. Secrets have stricter rules.
 
-A daemon would wait forever for a FIFO in a file's place, and a device might never end. A secret comes
+A daemon would wait for ever for a FIFO in a file's place, and a device might never end. A secret comes
 from a file that only the daemon's user can read, never from a YAML.
 """
 

@@ -1,7 +1,7 @@
-"""Parses YAML text to nodes with line and column; refuses invalid YAML and some valid features.
+"""Parses YAML text to nodes with line and column; refuses invalid YAML and some features of valid YAML.
 
-Uses PyYAML's pure Python loader: its messages say more, and libyaml's composer recurses in C without
-a limit, so a deeply nested file would crash the interpreter instead of raising.
+PyYAML's pure Python loader is used, because its messages say more, and because libyaml's composer
+recurses in C without a limit: a deeply nested file would crash the interpreter.
 """
 
 import re
@@ -52,11 +52,11 @@ class YamlFile:
         return Problem(self.file, mark.line + 1, mark.column + 1, printable(text))
 
     def note(self, where: Node | Mark, text: str) -> None:
-        """Record a problem and go on."""
+        """Record a problem and continue."""
         self.problems.append(self.problem(where, text))
 
     def check(self) -> None:
-        """Raise SettingsError if anything was recorded."""
+        """Raise SettingsError if a problem was recorded."""
         if self.problems:
             raise SettingsError(self.problems)
 
@@ -173,7 +173,7 @@ def _root(page: YamlFile, text: str, sort: Sort) -> Node | None:
         told = str(error.problem) if isinstance(error, _Refused) else typo_hints.reason(error, text)
         raise SettingsError([*page.problems, page.problem(mark, told)]) from None
     except (ValueError, OverflowError):
-        # PyYAML raises these for numbers that no character or version has, as in "\U00110000".
+        # PyYAML raises these for a number that no character or YAML version has, as in "\U00110000".
         assert composer is not None
         reason = "not YAML: a number too large, in an escape ('\\U...') or a directive ('%YAML')"
         raise SettingsError([page.problem(composer.get_mark(), reason)]) from None

@@ -1,4 +1,4 @@
-"""Places in a YAML file: the positions of values and of errors about them."""
+"""Places in a YAML file, for values and for errors about the values."""
 
 from collections.abc import Iterable
 
@@ -35,7 +35,7 @@ class MappingEntry(Struct, frozen=True):
         return Spot(self.value, self.key, f"'{short(self.name)}'", (*path, self.name))
 
     def where(self) -> Node:
-        """Return the place of errors about the value: a scalar itself, else the key."""
+        """Return the place for errors about the value: the scalar, or the key of another value."""
         node = self.value
         if isinstance(node, ScalarNode) and (node.value or not is_plain(node)):
             return node
@@ -54,7 +54,7 @@ def below(node: Node, part: str) -> MappingEntry | None:
 
 
 def locate(spot: Spot, path: Iterable[object]) -> MappingEntry:
-    """Return the entry at `path` below a value, or its nearest existing parent."""
+    """Return the entry at `path` below a value; if it does not exist, its nearest existing parent."""
     found = MappingEntry("", spot.at, spot.node)
     for part in path:
         entry = below(found.value, str(part))
@@ -65,5 +65,5 @@ def locate(spot: Spot, path: Iterable[object]) -> MappingEntry:
 
 
 def is_none(node: Node) -> bool:
-    """Is the value `null` or `~`? An empty value does not count: it was probably forgotten."""
+    """Is the value `null` or `~`? An empty value does not count, because it was probably forgotten."""
     return isinstance(node, ScalarNode) and is_plain(node) and is_null_word(node.value)

@@ -1,4 +1,5 @@
-"""Problems in a file, with their places. Loads no YAML library, for code that only reports problems."""
+"""Problems in a file, with their places. This module loads no YAML library, which code that only
+reports problems does not need."""
 
 from collections.abc import Iterable
 

@@ -1,4 +1,4 @@
-"""Converts one YAML scalar to a text, number, boolean or choice, or raises with the reason.
+"""Converts one YAML scalar to a text, number, boolean or choice, or raises an error with the reason.
 
 msgspec decides whether the type allows the value. A text must be a text in every version of YAML, and
 a number must be written unambiguously (`scalars.py`).
@@ -37,7 +37,8 @@ Extra = Mapping[str, str]
 
 
 class WrongScalar(Exception):
-    """A scalar of the wrong kind. The text continues after the value's name: "is ...", no full stop."""
+    """A scalar of the wrong sort. The error's text follows the value's name ("is …"), without full
+    stop."""
 
 
 def looks(node: Node) -> str:
@@ -100,7 +101,7 @@ def leaf(types: list[Type], node: ScalarNode, extra: Extra) -> object:
 
 
 def _rank(wanted: Type) -> int:
-    """Return a sort key that puts text last: text fits nearly everything."""
+    """Return a sort key that puts text last, because nearly every scalar fits text."""
     return isinstance(wanted.type if isinstance(wanted, Metadata) else wanted, StrType)
 
 
@@ -118,7 +119,7 @@ _PLAIN: dict[type[Type], type] = {StrType: str, IntType: int, FloatType: float, 
 
 def _read(wanted: Type, node: ScalarNode, extra: Extra) -> object:
     """Return the value if it is unambiguous. Raises WrongScalar."""
-    if isinstance(wanted, LiteralType | EnumType):  # as written, whatever YAML makes of it
+    if isinstance(wanted, LiteralType | EnumType):  # the text counts, not YAML's reading of it
         return choices(wanted).get(node.value, node.value)
     if isinstance(wanted, StrType):
         _check_text(node, extra)
@@ -137,7 +138,7 @@ _READINGS: dict[type[Type], Callable[[str], object]] = {
 
 
 def _reason(wanted: Type, node: ScalarNode, extra: Extra, length: bool) -> str:
-    """Return the reason for `convert`'s refusal; `length`: the reason is the text's length."""
+    """Return the reason why `convert` refused; `length`: the reason is the text's length."""
     written = short(node.value)
     if isinstance(wanted, LiteralType | EnumType):
         near = nearest(node.value, choices(wanted))

@@ -1,7 +1,7 @@
 """Finds texts without quotes that YAML reads as other values; accepts only unambiguous numbers.
 
-YAML 1.1 (PyYAML), YAML 1.2 and people read `017`, `1:30`, `no` or `1e3` differently. A name must be
-quoted unless all three read it as that text. A number must mean the same to all three.
+YAML 1.1 (PyYAML), YAML 1.2 and people read `017`, `1:30`, `no` or `1e3` differently. A name without
+quotes must be the same text for all three. A number must mean the same for all three.
 """
 
 import math
@@ -49,7 +49,7 @@ def is_null_word(text: str) -> bool:
 
 
 def reads_as(text: str) -> str | None:
-    """Describe YAML 1.1's or 1.2's reading of a plain text; None if both read the text itself.
+    """Describe how YAML 1.1 or 1.2 reads a plain text; None if both read it as this text.
 
     >>> reads_as("017"), reads_as("no"), reads_as("L1")
     ('the number 15', 'false', None)
@@ -71,7 +71,7 @@ def _reads_as_number(text: str) -> str | None:
             try:
                 value = reading(text)
                 return value if isinstance(value, str) else f"the number {_short(value)}"
-            except ValueError:  # only underscores, or more digits than Python converts
+            except ValueError:  # it has only underscores, or more digits than Python converts
                 return "a number"
     return None
 
@@ -84,14 +84,16 @@ def _short(value: object) -> str:
 
 
 def whole_number(text: str) -> int | None:
-    """Return the number of `12`, `-3` or `0x2000`; None for an ambiguous spelling."""
+    """Return the whole number that `12`, `-3` or `0x2000` stands for; None for an ambiguous
+    spelling."""
     if not _INT.fullmatch(text) or len(text) > 20:
         return None
     return int(text, 16 if "x" in text else 10)
 
 
 def number(text: str) -> float | None:
-    """Return the number of `5`, `0.05` or `1e3`; None for an ambiguous spelling or infinity."""
+    """Return the number that `5`, `0.05` or `1e3` stands for; None for an ambiguous spelling or
+    infinity."""
     if not _FLOAT.fullmatch(text):
         return None
     value = float(text)

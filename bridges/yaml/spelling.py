@@ -1,4 +1,4 @@
-"""Formats names for error texts: shortened, listed, and with the most similar known name."""
+"""Formats names for error texts: shortens them, lists them, and finds the most similar known name."""
 
 from collections.abc import Iterable
 
@@ -22,7 +22,7 @@ def nearest(name: str, known: Iterable[str]) -> str | None:
 
 
 def unknown(what: str, name: str, known: Iterable[str]) -> str:
-    """Return the error text for an unknown name, with the nearest known name and all of them."""
+    """Return the error text for an unknown name, with the nearest known name and all known names."""
     names = list(dict.fromkeys(known))
     near = nearest(name, names)
     meant = f"did you mean '{short(near)}'? " if near else ""

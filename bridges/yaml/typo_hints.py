@@ -1,6 +1,6 @@
-"""Typing slips that PyYAML does not name: indents, commas, invisible spaces.
+"""Hints at typing slips that PyYAML does not name: indents, commas, invisible spaces.
 
-`reason` rephrases PyYAML's error for a file that is not YAML; the other functions look at one scalar.
+`reason` rephrases PyYAML's error for a file that is not YAML; the other functions judge one scalar.
 """
 
 import re
@@ -70,7 +70,7 @@ def reason(error: MarkedYAMLError, text: str) -> str:
 
 
 def _odd_in(lines: list[str], first: int, last: int) -> str:
-    """Describe the first unusual space in these lines; "" if there is none."""
+    """Describe the first unusual space in these lines; "" without an unusual space."""
     for number, line in enumerate(lines[first : last + 1], first + 1):
         if found := _ODD.search(line.partition(" #")[0]):
             where = f"line {number}, column {found.start() + 1}"
@@ -103,7 +103,7 @@ def _spaces(line: str) -> int:
 
 
 def _follows_no_key(lines: list[str], where: Mark) -> bool:
-    """Does the line above have the same indent, without being a key?"""
+    """Does the line above have the same indent, but no key?"""
     above, line = lines[max(where.line - 1, 0)], lines[where.line]
     return _spaces(above) == _spaces(line) and ": " not in f"{above} " and where.line > 0
 
@@ -116,7 +116,7 @@ def named(character: str) -> str:
 
 
 def odd_space(text: str) -> str:
-    """Describe an unusual space or quote that misleads in a text without quotes; "" for none."""
+    """Describe an unusual space or quotation mark in a text without quotes; "" if there is none."""
     if found := _ODD.search(text):
         return (
             f"{named(found[0])}: write an ordinary space, or put the text in quotes if it is meant"

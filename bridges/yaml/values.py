@@ -1,8 +1,8 @@
 """Converts YAML nodes to msgspec structs; reports all independent problems, such as unknown and
 duplicate keys, with line and column.
 
-`msgspec.convert` stops at the first problem and knows no lines, so this module walks the nodes itself.
-The structs, with their bounds and units, are the only description of a file's contents.
+This module walks the nodes itself, because `msgspec.convert` stops at the first problem and knows no
+lines. The structs, with their bounds and units, are the only description of a file's contents.
 """
 
 from collections.abc import Callable, Hashable, Mapping
@@ -32,14 +32,14 @@ from bridges.yaml.scalars import is_null
 from bridges.yaml.spelling import either, nearest, short, unknown
 
 VERBS = ("is", "has", "needs", "must", "says")
-"""First words of problems that need their key as the subject."""
+"""The first words of problem texts that need their key as the subject."""
 
 T = TypeVar("T")
 
 
 @cache
 def described(cls: Hashable) -> Type:
-    """Return msgspec's description of a type, cached: making one takes a millisecond."""
+    """Return msgspec's description of a type, from a cache, because making it takes a millisecond."""
     return inspect.type_info(cls)
 
 
@@ -82,9 +82,9 @@ Check = Callable[[str, Spot], str | None]
 class Values:
     """Converts one file's nodes to values, and notes problems on its page.
 
-    `checks`: for texts whose type has `Meta(extra={"check": name})`. Such a text is taken as written,
-    and only its check accepts or refuses it. `structs`: every struct made so far. `owner(key)`: says
-    where a key of the outermost struct belongs that the struct does not have; "" if nobody knows it.
+    `checks`: for texts whose type has `Meta(extra={"check": name})`. Only its check
+    accepts or refuses such a text. `structs`: every struct made so far, with its path. `owner(key)`:
+    the place where a key belongs that the outermost struct does not have; "" if nobody knows the key.
     """
 
     def __init__(
@@ -141,8 +141,8 @@ class Values:
     ) -> dict[str, MappingEntry]:
         """Return the entries of `fields`: key -> form of its value, or None if the key is optional.
 
-        An unknown key that resembles a missing key is read as the missing key: one slip is one
-        problem. `elsewhere`: keys of other places -> the section that each belongs below.
+        A key that is missing is not reported if an unknown key resembles it, so that one slip is one
+        problem. `elsewhere`: key of another place -> the section to which it belongs.
         """
         found = {e.name: e for e in entries}
         near = {nearest(name, fields) for name in found if name not in fields}
@@ -186,7 +186,8 @@ class Values:
         return self._leaf([wanted], spot, extra or {})
 
     def _union(self, wanted: UnionType, spot: Spot, extra: Extra | None) -> object:
-        """Convert to the member for this kind of node: of several scalar types, the first that fits."""
+        """Convert to the member that fits this kind of node; of several scalar types, to the first that
+        fits."""
         members = [t for t in wanted.types if not isinstance(t, NoneType)]
         if len(members) < len(wanted.types) and is_none(spot.node):
             return None
@@ -309,7 +310,7 @@ def _missing(spot: Spot, name: str, wanted: str) -> str:
 
 
 def _of_subject(path: tuple[str, ...], name: str, label: str, text: str) -> str:
-    """Return the text with its key as the subject, unless the text names its subject itself."""
+    """Return the text with its key as the subject, unless the text already names its subject."""
     if text.partition(" ")[0] in VERBS:
         return f"'{short(name)}' {text}" if name else f"{label} {text}"
     key = name
