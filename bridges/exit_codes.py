@@ -28,7 +28,7 @@ SIMULATION: Final = {
 }
 SENT: Final = {
     0: "the effect was seen",
-    1: "no effect was seen (the reason is told), or the graph cannot be joined",
+    1: "no effect was seen (the reason is printed), or the graph cannot be joined",
     130: "Ctrl-C",
 }
 
@@ -94,7 +94,7 @@ EXIT_CODES: Final[dict[str, dict[int, str]]] = {
     "plot": {0: "drawn", 1: "nothing to draw, or the picture cannot be written"} | RECORDING,
     "send": SENT,
     "judge": {
-        0: "every law that was seen is kept",
+        0: "every observed law is kept",
         1: "a law is broken",
         **RECORDING,
         69: f"{GRAPH}, or the play was not performed",

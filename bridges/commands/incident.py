@@ -67,7 +67,9 @@ def run(args: argparse.Namespace) -> int:
             incident = _anonymous(incident)
         mcap_write.write(path, incident)
     except SettingsError as error:
-        print(f"its YAML cannot be made anonymous: {error.problems[0]}", file=sys.stderr)
+        print(
+            f"the recording's YAML cannot be made anonymous: {error.problems[0]}", file=sys.stderr
+        )
         return os.EX_DATAERR
     except OSError as error:
         return not_written(path, error.strerror)
@@ -84,7 +86,7 @@ def _anonymous(incident: Incident) -> Incident:
 def _hint(*, died: bool) -> str:
     if died:
         return "--died asks for the run before the last; leave it out for the last run"
-    return "Does its daemon run, and does its YAML keep a ring?"
+    return "Does the daemon run, and does the YAML keep a ring?"
 
 
 def _incident(ring: Path, args: argparse.Namespace, follows: bool) -> Incident:

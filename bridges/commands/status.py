@@ -111,7 +111,7 @@ def _state(one: DaemonStatus) -> str:
             return "has died"
         case "died":
             file = one.status.get("file") or "FILE"
-            return f"has died; its next start tidies up, or `rmf-bridge outputs-off {file}`"
+            return f"has died; its next start, or `rmf-bridge outputs-off {file}`, tidies up"
         case "left on":
             return "has died, and its outputs were not verified off"
         case "unknown":

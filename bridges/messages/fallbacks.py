@@ -29,7 +29,7 @@ def remarks(topic: AnyTopic, wanted: str) -> list[str]:
         f"goes out on {INSTEAD[topic.name].name}" if topic.name in INSTEAD else "goes into the log"
     )
     return [
-        f"RMF's {name} has no {topic.type.__name__}: on it {topic.name} {way}"
+        f"RMF's {name} has no {topic.type.__name__}: {topic.name} {way}"
         for name in names
         if not RELEASES[name].has(topic.type)
     ]

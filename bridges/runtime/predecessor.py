@@ -29,8 +29,8 @@ LOOK_EVERY_S = 0.02
 
 
 class Predecessor:
-    """The dead daemons before this one. `ours`: this daemon's own record. `command`: `outputs-off` for
-    this daemon's file."""
+    """Handles the records of dead daemons. `ours`: this daemon's own record. `command`: `outputs-off`
+    for this daemon's file."""
 
     def __init__(self, records: Records, ours: ClaimRecord, command: Sequence[str]) -> None:
         self._records = records

@@ -68,7 +68,7 @@ class ClaimRecord(Claimed, frozen=True):
     def name(self) -> str:
         """The name of the record's file, a hash of the claim."""
         claimed = msgspec.structs.asdict(self) | {"safe": ()}
-        del claimed["tried"]  # added later; every version must give a record the same name
+        del claimed["tried"]  # a later field: every version must give a record the same name
         return f"claimed-{hashlib.sha256(msgspec.json.encode(claimed)).hexdigest()[:16]}.json"
 
     def config(self) -> Config:

@@ -20,15 +20,15 @@ INSTANCE: Final = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]*")
 """Names of services that need no escapes as a unit's instance."""
 NO_INSTANCE: Final = "{!r} is not a service name: use only letters, digits and _ . -"
 LEFT_ON: Final = (
-    "the outputs of {} are not verified off, and a new drop-in may block access to them: mend that"
-    " and try again. If that hardware is gone, cut its supply, then: rm {}"
+    "the outputs of {} are not verified off, and a new drop-in may block access to them: mend the"
+    " device and try again. If that hardware is gone, cut its supply, then: rm {}"
 )
 
 
 def add_root(parser: argparse.ArgumentParser) -> None:
     """Add the options of `enable` and `disable`."""
     parser.add_argument(
-        "--root", type=Path, default=Path("/"), metavar="DIR", help="a mounted system, not running"
+        "--root", type=Path, default=Path("/"), metavar="DIR", help="the folder of a mounted system"
     )
     parser.add_argument("--dry-run", action="store_true", help="only print the steps")
 
@@ -91,7 +91,7 @@ def carry_out(steps: Iterable[Step], args: argparse.Namespace, keeps: str = "") 
     """
     live = args.root == Path("/")
     if live and not args.dry_run and os.geteuid() != 0:
-        print("only root may do that: use sudo, or --dry-run to see it", file=sys.stderr)
+        print("only root may do that: use sudo, or --dry-run to see the steps", file=sys.stderr)
         return os.EX_NOPERM
     if not args.root.is_dir():
         print(f"{args.root} is not a folder: is the card mounted?", file=sys.stderr)

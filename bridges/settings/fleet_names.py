@@ -97,12 +97,12 @@ class _Comparing:
             path, robot = theirs[name]
             below, waypoint = robot.waypoint()
             if waypoint is None:
-                text = f"'{name}' has no charger: a robot without one never goes to charge"
+                text = f"'{name}' has no charger: RMF never sends this robot to charge"
                 self._theirs("errors", path, text)
                 continue
             owner = chargers.setdefault(waypoint, name)
             if owner != name:
-                text = f"'{waypoint}' is the charger of '{owner}' too: RMF would send both there"
+                text = f"'{waypoint}' is the charger of '{owner}' too: RMF would send both robots there"
                 self._theirs("errors", (*path, *below), text)
             self._charger(fleet, name, (*path, *below), waypoint)
 
@@ -116,7 +116,7 @@ class _Comparing:
             self._theirs("errors", path, text)
         elif waypoint not in (*places, robot.waits_at):
             known = ", ".join((*places, robot.waits_at))
-            text = f"'{name}' charges or waits at {known} here: RMF's first way leads elsewhere"
+            text = f"'{name}' charges or waits at {known}, but RMF drives it elsewhere at first"
             self._theirs("warnings", path, text)
 
     def percentages(self) -> None:
@@ -125,7 +125,7 @@ class _Comparing:
         full, again = self._settings.full_percent, self._settings.again_percent
         if soc is not None and full < 100 * soc:
             text = (
-                f"a station lets a robot go at full_percent {full:g} %, and RMF has it wait there for"
+                f"a station releases a robot at full_percent {full:g} %, but the robot waits there for"
                 f" recharge_soc {100 * soc:g} %: write recharge_soc: {full / 100:g}, or less"
             )
             self._theirs("errors", ("rmf_fleet", "recharge_soc"), text)
@@ -137,8 +137,8 @@ class _Comparing:
             self._theirs("warnings", ("rmf_fleet", "recharge_soc"), text)
         if threshold is not None and again <= 100 * threshold:
             text = (
-                f"below recharge_threshold {100 * threshold:g} % RMF gives a robot no task, and"
-                f" here only below again_percent {again:g} % it is charged again:"
+                f"below recharge_threshold {100 * threshold:g} % RMF gives a robot no task, but the"
+                f" coordinator charges it again only below again_percent {again:g} %:"
                 f" write again_percent above {100 * threshold:g}"
             )
             self._theirs("errors", ("rmf_fleet", "recharge_threshold"), text)
@@ -222,7 +222,9 @@ class _Comparing:
         text = f"{where} has '{name}' at x {x:g}, y {y:g}: {off_m:.2f} m away, near_m is {near_m:g}"
         found = transforms.get(level, transforms.get(EVERY_LEVEL))
         if found is not None and math.dist(found.back((at.x, at.y)), (x, y)) <= near_m:
-            text = f"this is on the robot's map; on RMF's it is x: {x:g}, y: {y:g} ({where})"
+            text = (
+                f"this place is on the robot's map; on RMF's map write x: {x:g}, y: {y:g} ({where})"
+            )
         self._ours(path, text)
 
     def _file(self) -> str:

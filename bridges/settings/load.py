@@ -229,7 +229,7 @@ class _DeviceReading:
                     self._devices[entry.name] = settings
         for name in self._buses:
             if entries and name not in buses and None not in buses:
-                text = f"no device uses the bus '{name}': delete it, or name it in a 'bus:'"
+                text = f"no device uses the bus '{name}': delete it, or name it in a device's 'bus:'"
                 self._page.note(self._buses[name].entry.key, text)
 
     def _without_sections(self, entries: list[MappingEntry]) -> list[MappingEntry]:

@@ -28,9 +28,9 @@ NO_CYCLONEDDS = (
 )
 NO_ROS = (
     "transport ros2 needs ROS 2 with RMF's messages, and {}. On Ubuntu 24.04 `sudo apt install"
-    " ros-jazzy-rclpy {}`; the virtual environment needs --system-site-packages and ROS's own"
-    " Python, and the shell ROS's setup file (`. /opt/ros/jazzy/setup.bash`; for a service"
-    " `ros_setup:` below `rmf:`). `transport: dds` needs none of this and reaches the same nodes"
+    " ros-jazzy-rclpy {}` installs them. The virtual environment needs --system-site-packages and"
+    " ROS's own Python. The shell must source ROS's setup file (`. /opt/ros/jazzy/setup.bash`; for"
+    " a service: `ros_setup:` below `rmf:`). `transport: dds` reaches the same nodes without ROS"
 )
 
 
@@ -86,7 +86,7 @@ def stays_on_loopback(rmf: Rmf, environ: Mapping[str, str], peers: Sequence[str]
     if text not in ("SUBNET", "SYSTEM_DEFAULT", "LOCALHOST"):
         raise TransportError(
             f"ROS_AUTOMATIC_DISCOVERY_RANGE is {text!r}: use SUBNET or LOCALHOST. With OFF"
-            " this node would find no other; other values are unknown"
+            " this node would find no other node; further values are unknown"
         )
     return text == "LOCALHOST" and not peers
 

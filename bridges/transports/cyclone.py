@@ -49,7 +49,7 @@ def configuration(environ: Mapping[str, str]) -> str:
     """Return the configuration of a node on the network: our settings, then those of CYCLONEDDS_URI.
 
     As in rmw_cyclonedds (ROS 2 Jazzy, rmw_node.cpp), the node reaches static peers by unicast beside
-    multicast, and its participant index is one that peers can guess. With LOCALHOST it reaches this
+    multicast, and peers can guess its participant index. With LOCALHOST the node reaches this
     machine and the static peers, without multicast. With SYSTEM_DEFAULT Cyclone decides on discovery.
     """
     own = environ.get("CYCLONEDDS_URI", "")

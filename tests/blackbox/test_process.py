@@ -124,7 +124,7 @@ def test_a_command_without_a_ring_or_a_recording_says_what_to_do(
     assert (nothing.returncode, nothing.stdout) == (69, "")
     assert nothing.stderr == (
         f"{none}/ring cannot be read: No such file or directory."
-        " Does its daemon run, and does its YAML keep a ring?\n"
+        " Does the daemon run, and does the YAML keep a ring?\n"
     )
     assert died.stderr == (
         f"{none}/ring.died cannot be read: No such file or directory."

@@ -117,18 +117,20 @@ def test_two_files_that_agree_are_right_and_the_transforms_error_is_reported(sit
         (
             "AMR02: {charger: dock_b}",
             "AMR02: {charger: charger_a}",
-            "config.yaml:8:13: 'charger_a' is the charger of 'AMR01' too: RMF would send both there",
+            "config.yaml:8:13: 'charger_a' is the charger of 'AMR01' too: RMF would send both robots"
+            " there",
         ),
         (
             "AMR02: {charger: dock_b}",
             "AMR02: {}",
-            "config.yaml:8:5: 'AMR02' has no charger: a robot without one never goes to charge",
+            "config.yaml:8:5: 'AMR02' has no charger: RMF never sends this robot to charge",
         ),
         (
             "recharge_threshold: 0.2",
             "recharge_threshold: 0.9",
-            "config.yaml:3:3: below recharge_threshold 90 % RMF gives a robot no task, and here only"
-            " below again_percent 90 % it is charged again: write again_percent above 90",
+            "config.yaml:3:3: below recharge_threshold 90 % RMF gives a robot no task, but the"
+            " coordinator charges it again only below again_percent 90 %: write again_percent above"
+            " 90",
         ),
         (
             "finishing_request: park",
@@ -248,8 +250,8 @@ def test_a_station_that_releases_a_robot_before_rmfs_recharge_soc_is_a_mismatch(
         (
             "AMR02: {charger: dock_b}",
             "AMR02: {charger: wait_1}",
-            "config.yaml:8:13: warning: 'AMR02' charges or waits at dock_b, charger_a, wait_2 here:"
-            " RMF's first way leads elsewhere",
+            "config.yaml:8:13: warning: 'AMR02' charges or waits at dock_b, charger_a, wait_2, but"
+            " RMF drives it elsewhere at first",
         ),
         (
             "  L1:\n",
@@ -293,7 +295,7 @@ def test_waypoints_are_compared_with_the_navigation_graph(site: Site) -> None:
 
 def test_a_waypoint_in_the_robots_coordinates_is_named_with_rmfs(site: Site) -> None:
     code, found = site.check(OURS.replace("x: 10, y: 5", "x: 4, y: -5"), THEIRS, GRAPH)
-    text = "this is on the robot's map; on RMF's it is x: 10, y: 5 (graph.yaml:6)"
+    text = "this place is on the robot's map; on RMF's map write x: 10, y: 5 (graph.yaml:6)"
     assert (code, found) == (os.EX_CONFIG, [f"ours.yaml:8:9: {text}"])
 
 

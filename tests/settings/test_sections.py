@@ -118,7 +118,7 @@ def test_a_device_says_its_bus_where_there_are_several(file: Path) -> None:
 def test_a_bus_that_no_device_stands_on_is_named(file: Path) -> None:
     text = changed("    lanes:", "    bus: header\n    lanes:", TWO_BUSES)
     assert problems_of(file, text) == [
-        "6:3: no device uses the bus 'box': delete it, or name it in a 'bus:'"
+        "6:3: no device uses the bus 'box': delete it, or name it in a device's 'bus:'"
     ]
 
 

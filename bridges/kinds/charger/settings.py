@@ -50,7 +50,7 @@ class ChargerDurations(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown
         many failed commands in a row, as a charger that takes no commands."""),
     ] = 3
     start_timeout_s: Annotated[
-        StartTimeout, tells("how long charging may take to start, if the request does not say.")
+        StartTimeout, tells("how long charging may take to start, if the request gives no time.")
     ] = 300.0
     stop_timeout_s: Annotated[
         StopTimeout,
@@ -58,13 +58,13 @@ class ChargerDurations(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown
         out of service."""),
     ] = 30.0
     released_s: Annotated[
-        Released, tells("how long RELEASED is shown at least. States go out at 1 Hz.")
+        Released, tells("the least time for which RELEASED is shown. States go out at 1 Hz.")
     ] = 2.0
     full_percent: Annotated[
         Percent, tells("the charge at which a robot is released, if the station knows the charge.")
     ] = 100.0
     clear_errors_per_h: Annotated[
-        PerHour, tells("how often the daemon may clear the station's errors by itself; 0 is never.")
+        PerHour, tells("how often the daemon may clear the station's errors by itself; 0: never.")
     ] = 0
     peer_internal_timeout_s: Annotated[
         Seconds | None,
@@ -76,7 +76,7 @@ class ChargerDurations(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown
 class ChargerSettings(DeviceSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Settings of every charger with any driver."""
 
-    limits: Annotated[ChargerDurations, tells("what differs from the defaults.")] = (
+    limits: Annotated[ChargerDurations, tells("the limits that differ from their defaults.")] = (
         ChargerDurations()
     )
     receivers: Annotated[

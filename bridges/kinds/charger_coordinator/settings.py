@@ -49,12 +49,14 @@ class StationSettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_
 class RobotSettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """One robot."""
 
-    stations: Annotated[Stations, tells("its suitable stations, best first.")]
+    stations: Annotated[Stations, tells("the robot's suitable stations, best first.")]
     waits_at: Annotated[
         Name,
-        tells("its own waypoint, where it waits for a station and stays when it needs no charge."),
+        tells(
+            "the robot's own waypoint, where it waits for a station and stays when it needs no charge."
+        ),
     ]
-    receivers: Annotated[list[ReceiverId], tells("the ids of its receivers.")] = []
+    receivers: Annotated[list[ReceiverId], tells("the ids of the robot's receivers.")] = []
     rcu: Annotated[
         Name | None,
         tells("""the name under which the daemon of the robot's receiver publishes, if the receiver

@@ -41,8 +41,8 @@ class DoorDurations(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
     ] = None
     supervisor_lost_s: Annotated[
         Patience | None,
-        tells("""how long no node may publish door requests; after that the hold is released. When
-        absent the door stays held, as a robot may stand in the doorway."""),
+        tells("""how long door requests may have no publisher; after that the hold is released. When
+        absent, the door stays held, as a robot may stand in the doorway."""),
     ] = None
 
 
@@ -56,7 +56,9 @@ class Pulse(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
 class DoorSettings(DeviceSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """The settings of one door, except its wiring."""
 
-    limits: Annotated[DoorDurations, tells("what differs from the defaults.")] = DoorDurations()
+    limits: Annotated[DoorDurations, tells("the durations that differ from their defaults.")] = (
+        DoorDurations()
+    )
     feedback: Annotated[
         Literal["sensors", "estimated"],
         tells("""`estimated` if a limit contact is missing; the door's state is then estimated by
@@ -91,7 +93,7 @@ class DoorSettings(DeviceSettings, frozen=True, kw_only=True, forbid_unknown_fie
         if self.feedback == "sensors" and delay_s is not None:
             yield (
                 ("limits", "open_delay_s"),
-                "is for feedback: estimated; contacts say when it is open",
+                "is for feedback: estimated; otherwise contacts show when the door is open",
             )
         if delay_s is not None and delay_s > self.limits.travel_s:
             yield ("limits", "open_delay_s"), "must not be longer than travel_s"

@@ -13,8 +13,8 @@ class DoorSupervisorSettings(GraphSettings, frozen=True, kw_only=True, forbid_un
 
     doors: Annotated[
         list[Name] | None,
-        tells("""the doors that it serves; messages about others are refused. When absent, it serves
-        every door that it hears of, as RMF's supervisor does."""),
+        tells("""the doors that the supervisor serves; messages about other doors are refused. When
+        absent, it serves every door that it hears of, as RMF's supervisor does."""),
     ] = None
     open_alarm_s: Annotated[
         Patience,

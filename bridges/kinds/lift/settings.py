@@ -33,7 +33,9 @@ class Floor(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     level: Annotated[
         Name | None, tells("the landing's name in the floor code; when absent, the floor's name.")
     ] = None
-    side: Annotated[Side, tells("which of the car's doors opens there.")] = Side.FRONT
+    side: Annotated[Side, tells("the side of the car's door that opens at this floor.")] = (
+        Side.FRONT
+    )
 
 
 class LiftDurations(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -112,9 +114,11 @@ class LiftSettings(DeviceSettings, frozen=True, kw_only=True, forbid_unknown_fie
     agv_mode: Annotated[
         Literal["requested", "by_call"],
         tells("""how AGV mode is switched on. `requested`: by an output that is held. `by_call`: by
-        a call; it stays on while the call is served and the door is held."""),
+        a call; AGV mode stays on while the call is served and the door is held."""),
     ] = "requested"
-    limits: Annotated[LiftDurations, tells("what differs from the defaults.")] = LiftDurations()
+    limits: Annotated[LiftDurations, tells("the limits that differ from their defaults.")] = (
+        LiftDurations()
+    )
     fire_reset: Annotated[
         Literal["auto", "manual"],
         tells("""RMF may use the lift again when the alarm clears (`auto`), or only after
@@ -122,7 +126,9 @@ class LiftSettings(DeviceSettings, frozen=True, kw_only=True, forbid_unknown_fie
     ] = "auto"
     alarm: Annotated[
         Literal["none", "fire_alarm_trigger", "emergency_signal"],
-        tells("the topic that tells the fleets of an alarm; `none` if the site does not want it."),
+        tells(
+            "the topic that tells the fleets of an alarm; `none` if the site wants no such topic."
+        ),
     ] = "none"
     alarm_on: Annotated[
         AlarmOn,

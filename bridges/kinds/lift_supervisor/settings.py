@@ -13,13 +13,14 @@ class LiftSupervisorSettings(GraphSettings, frozen=True, kw_only=True, forbid_un
 
     lifts: Annotated[
         list[Name] | None,
-        tells("""the lifts that it serves; messages about others are refused. When absent, it serves
-        every lift that it hears of, as RMF's supervisor does."""),
+        tells("""the lifts that the supervisor serves; messages about other lifts are refused. When
+        absent, it serves every lift that it hears of, as RMF's supervisor does."""),
     ] = None
     quiet_start_s: Annotated[
         QuietStart,
-        tells("""how long it only listens after its start, so that a restart ends no ride. Also how
-        long a lift may show a session that nobody requests, before that session is ended."""),
+        tells("""how long the supervisor only listens after its start, so that a restart ends no
+        ride. This is also how long a lift may show a session that no robot requests, before that
+        session is ended."""),
     ] = 3.0
     silent_after_s: Annotated[
         Patience,

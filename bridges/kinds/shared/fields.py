@@ -62,13 +62,15 @@ def tells(text: str) -> Meta:
 class DeviceSettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Settings of every lift, door and charger with any driver."""
 
-    bus: Annotated[Name | None, tells("its bus; not needed if the file has only one.")] = None
+    bus: Annotated[
+        Name | None, tells("the device's bus; not needed if the file has only one bus.")
+    ] = None
     driver: Annotated[
         Name | None, tells("this device's driver; when absent, the `driver` of the file.")
     ] = None
     accept_unsafe: Annotated[
         dict[Name, Name],
-        tells("signal -> why its unsafe wiring is accepted, as `check` prints it."),
+        tells("signal -> the reason why its unsafe wiring is accepted, which `check` prints."),
     ] = {}
 
     def off_after(self) -> tuple[float, tuple[str, ...]] | None:

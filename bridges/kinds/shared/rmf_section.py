@@ -61,8 +61,8 @@ class Zenoh(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     mode: Annotated[
         Literal["auto", "peer", "client"],
         tells("""`peer` also speaks to other nodes directly, `client` to a router alone. `auto` is
-        `peer` with one router, if it is on this machine or `listen` is open to others; else
-        `client`."""),
+        `peer` if there is one router, and it is on this machine or `listen` is open to other
+        machines; else `client`."""),
     ] = "auto"
     listen: Annotated[
         tuple[Endpoint, ...],
@@ -116,7 +116,7 @@ class Rmf(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
         bool,
         tells("publish the health of the daemon and its devices each second on `/diagnostics`."),
     ] = True
-    topics: Annotated[dict[Name, Name], tells("RMF's name of a topic -> the site's.")] = {}
+    topics: Annotated[dict[Name, Name], tells("RMF's name of a topic -> the site's name.")] = {}
     zenoh: Annotated[Zenoh | None, tells("routers, keys and certificates of `zenoh`.")] = None
     release: Annotated[
         Literal["auto", "jazzy", "kilted"],
@@ -128,9 +128,15 @@ class Rmf(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     def problems(self) -> Remarks:
         """Yield settings without effect."""
         if self.release != "auto" and self.transport == "ros2":
-            yield ("release",), "transport ros2 uses the installed message packages: leave it out"
+            yield (
+                ("release",),
+                "transport ros2 uses the installed message packages: leave the key out",
+            )
         if self.zenoh and self.transport in ("ros2", "dds"):
-            yield ("zenoh",), f"transport {self.transport} does not read it: write transport: zenoh"
+            yield (
+                ("zenoh",),
+                f"transport {self.transport} does not read this section: write transport: zenoh",
+            )
 
 
 def warnings(rmf: Rmf) -> Remarks:

@@ -57,7 +57,7 @@ def ros_type(message_type: type, release: Release = NEWEST) -> type[RosMessage]:
         ) from error
     if found is None:
         raise TransportError(
-            f"the installed {package} has no {name}: install a newer one, or use `transport: dds`"
+            f"the installed {package} has no {name}: install a newer version, or use `transport: dds`"
         )
     for nested in sorted(_nested_in(message_type), key=lambda kind: kind.__name__):
         ros_type(nested, release)

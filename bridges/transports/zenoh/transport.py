@@ -40,7 +40,8 @@ log = logging.getLogger(__name__)
 
 UNLINKED: Final = "NO_ROUTER"
 NO_ROUTER: Final = (
-    "no router answers, or it refuses this node: RMF hears nothing until one accepts it"
+    "no router answers, or the router refuses this node: RMF hears nothing until a router accepts"
+    " this node"
 )
 
 

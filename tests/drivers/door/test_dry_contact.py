@@ -71,7 +71,7 @@ def test_the_shipped_door_is_sound() -> None:
         (
             {"limits": {"open_delay_s": 3.0}},
             "limits.open_delay_s",
-            "is for feedback: estimated; contacts say when it is open",
+            "is for feedback: estimated; otherwise contacts show when the door is open",
         ),
         (
             {"feedback": "estimated", "limits": {"open_delay_s": 3.0}},
