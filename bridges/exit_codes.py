@@ -1,6 +1,6 @@
 """The exit codes of each subcommand: for `--help`, the manual page and docs/reference/exit-codes.md.
 
-Codes from 64 on are those of sysexits.h.
+Codes from 64 on have their meaning from sysexits.h.
 """
 
 from typing import Final

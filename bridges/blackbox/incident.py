@@ -1,4 +1,5 @@
-"""One incident: the daemon's entries of that time, and the reasons for recording them. Pure."""
+"""One incident: the daemon's entries of that time, and the reasons for recording them. The module is
+pure."""
 
 from collections.abc import Iterator, Sequence
 from itertools import pairwise

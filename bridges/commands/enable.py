@@ -1,4 +1,4 @@
-"""`rmf-bridge enable FILE`: from a YAML to a running service.
+"""`rmf-bridge enable FILE`: make a running service of a YAML.
 
 It validates the file together with the files of this machine's other services. It stops a running
 instance, which switches its outputs off while it still has access to the old relay. Then it copies the

@@ -51,7 +51,7 @@ def run(args: argparse.Namespace) -> int:
         print(f"to write a recording, {error.name} is needed: {INSTALL}", file=sys.stderr)
         return os.EX_UNAVAILABLE
     if args.anonymous:
-        of_workbench("workbench.replay.anonymous")  # before the wait
+        of_workbench("workbench.replay.anonymous")  # fails before the wait, not after it
     path = args.output or Path(f"{args.file.stem}_{datetime.now():%Y-%m-%d_%H-%M-%S}.mcap")
     if why := no_folder(path):
         return not_written(path, why)

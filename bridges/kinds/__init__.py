@@ -45,7 +45,7 @@ def kind_called(name: str) -> "AnyKind":
 
 
 def recorded(kind: str) -> "Recorded":
-    """Return the recorded names of a kind's values; none if it uses the values of another kind."""
+    """Return the recorded names of a kind's values; empty if it uses the values of another kind."""
     found: Recorded = getattr(_package(kind), "RECORDED", {})
     return found
 

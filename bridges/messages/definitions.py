@@ -2,7 +2,8 @@
 
 This is the only table of messages, with the constants of `constants.py`. The transports make their own
 types from this table (field by field, from the annotations), and the RIHS01 type hashes are computed
-from it. It holds the messages of all releases of RMF; `releases.py` lists those that a release lacks.
+from it. It holds the messages of all releases of RMF; `releases.py` lists the messages and fields that
+a release lacks.
 
 Source: rmf_internal_msgs 3d4df02 (4.1.0), builtin_interfaces, std_msgs and diagnostic_msgs of ROS 2
 Jazzy.

@@ -25,7 +25,8 @@ from bridges.yaml.problems import SettingsError
 from drivers.profiles import texts
 
 OWN_S, OTHERS_S = 4.0, 2.0
-"""The time limits (s) for this machine's own pins, then for all other outputs: every daemon waits."""
+"""The time limits (s) for this machine's own pins, then for all other outputs, while every daemon
+waits."""
 LOOK_EVERY_S = 0.01
 OWN_PINS = re.compile(rb"\btype: *[\"']?gpio\b")
 """Matches a YAML whose outputs are this machine's pins. It decides only the order."""
@@ -51,7 +52,8 @@ def switch_off_all(
 
 
 def _off(files: Collection[Path], within_s: float) -> set[Path]:
-    """Switch these services' outputs off in parallel; return the files not verified off in time."""
+    """Switch these services' outputs off in parallel; return the files whose outputs stayed
+    unverified."""
     give_up_at = time.monotonic() + within_s
     running = {_forked(file): file for file in dict.fromkeys(files)}
     left = set(running.values())

@@ -229,9 +229,7 @@ class Daemon:
             found = diagnosis(self._transport.name, self._config.kind, daemon, devices, at)
             self._diagnostics.publish(found)
             self._told += 1
-            if (
-                self._told % max(1, len(devices)) == 0
-            ):  # more devices: longer messages, recorded less
+            if self._told % max(1, len(devices)) == 0:  # a message grows with the devices
                 self._writer.spoken(self._health_topic.name, found, sent=True)
         except (
             TransportError,

@@ -53,7 +53,7 @@ def switch_off(args: argparse.Namespace) -> int:
         if claimed:
             logging.warning("%s. But the outputs of the run that ended are not off yet", error)
             return _off_by_records(records, answered)
-        logging.error("%s. That program switches the outputs off", error)
+        logging.error("%s. The running program switches the outputs off", error)
         return os.EX_UNAVAILABLE
     try:
         if held.records.unreleased():
@@ -73,7 +73,7 @@ def _places(file: Path, given: str | None) -> Directories | None:
         places = runtime.find(file, given)
         act_as_owner(places)
     except PermissionError as error:
-        if "SERVICE_RESULT" not in os.environ:  # set for ExecStopPost: systemd.exec(5)
+        if "SERVICE_RESULT" not in os.environ:  # systemd sets it for ExecStopPost
             raise
         logging.error("%s; switching off the outputs of %s", error, file)
         return None
@@ -99,7 +99,9 @@ def _off_by_records(
 ) -> int:
     """Switch off the outputs of the records in `names`; of all records by default."""
     found = [r for r in records.unreleased() if names is None or r.name in names]
-    each_s = TIMEOUT_S / max(1, len(found))  # a record with a dead bus leaves time for the others
+    each_s = TIMEOUT_S / max(
+        1, len(found)
+    )  # a record with a dead bus must leave time for other records
     return _told(not [r for r in found if not _off_by_record(records, r, answered, each_s)])
 
 

@@ -186,7 +186,7 @@ class Node(Generic[S, L, M, X, E, O, R]):
         self.wake_at = min(subject.wake_at, self._pace.due_at(news))
 
     def _answer(self) -> None:
-        """Publish answers to refused requests: the reason, and the device's holder."""
+        """Publish the answers to refused requests, which give the reason and the device's holder."""
         self._answers.say(self._clock.monotonic(), self._answered, self._publish)
         self.wake_at = min(self.wake_at, self._answers.due_at)
 

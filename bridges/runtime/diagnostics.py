@@ -7,8 +7,8 @@ LiftState, DoorState and ChargerState have no fields for faults.
 
     OK      the input is read, and there is no fault
     WARN    the daemon is a simulation, or still only listens in its quiet start
-    ERROR   the device or the daemon has faults; the daemon has one if it cannot publish, or if another
-            node does its work
+    ERROR   the device or the daemon has faults; it is a fault of the daemon if it cannot publish, or if
+            another node does its work
     STALE   the device's input has not been read yet
 """
 
@@ -71,7 +71,8 @@ def _values(status: Status) -> tuple[KeyValue, ...]:
 
 
 def _pairs(status: Status) -> Iterator[tuple[str, str]]:
-    """Yield the status as (key, value): each fault as code and detail, each entry of a table alone."""
+    """Yield the status as (key, value), with a pair for each fault (code, detail) and each table
+    entry."""
     for key, value in status.items():
         if key == CONTACTS:
             continue

@@ -43,7 +43,7 @@ def fits(config: Config) -> str:
 def misfit(config: Config, environ: Mapping[str, str]) -> str:
     """Return the error if our unit has no drop-in for this file's needs; "" if it fits."""
     met = environ.get(FITS, "")
-    if met in ("", fits(config)):  # "": not started by a unit of ours
+    if met in ("", fits(config)):  # "": no unit of ours started this process
         return ""
     why = "has no drop-in" if met == "nothing" else "has a drop-in for other buses or durations"
     return f"{config.path}: the unit {why}: run `sudo rmf-bridge enable {config.path}`"
@@ -93,7 +93,8 @@ def _each(found: Iterable[Iterable[str]]) -> list[str]:
 
 
 def _hosts(rmf: Rmf, needs: Iterable[Needs]) -> list[str] | None:
-    """Return the addresses that the daemon talks to; None if they are unknown before it runs.
+    """Return the addresses that the daemon talks to; None if an address is unknown before the daemon
+    runs.
 
     The nodes of a DDS site, the peers of a zenoh peer, and the addresses of host names are unknown.
     """

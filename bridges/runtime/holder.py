@@ -42,8 +42,8 @@ class LockHolder(msgspec.Struct, frozen=True):
 
     @property
     def lives(self) -> bool:
-        """Is the process still there? If /proc hides the start of another user's process, the start
-        does not count."""
+        """Is the process still there? Its start must be the same, unless /proc hides it because the
+        process is another user's."""
         if self.boot != _boot() or not _is_there(self.pid):
             return False
         return _started(self.pid) in (self.started, 0)

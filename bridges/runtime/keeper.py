@@ -32,7 +32,7 @@ class MemoryStore(Protocol):
 
 
 class Keeper(Generic[S, L, M, E, R]):
-    """The keeper of one node. `kept`: None to store nothing. `tell_at`: the next time to publish."""
+    """The keeper of one node. `kept`: the store, or None. `tell_at`: the next time to publish."""
 
     def __init__(
         self, kind: GraphKind[S, L, M, E, R], kept: MemoryStore | None, publish: Publish

@@ -16,7 +16,7 @@ from bridges.transports.transport import Publisher, Transport, TransportError
 log = logging.getLogger(__name__)
 
 Named = Callable[[Topic[Message]], Topic[Message]]
-"""Returns a topic under its name in the site's YAML."""
+"""A function that returns a topic under its name in the site's YAML."""
 
 
 class Outlet:

@@ -21,7 +21,8 @@ from drivers import Driver
 log = logging.getLogger(__name__)
 
 PATIENCE_S = 15.0
-"""The longest wait for `outputs-off`, which gives up after 5 s, on a slow machine."""
+"""The longest wait (s) for `outputs-off`, which gives up after 5 s but starts late on a slow
+machine."""
 PAUSE_FIRST_S, PAUSE_MOST_S = 5.0, 60.0
 
 
@@ -43,8 +44,8 @@ class Predecessor:
     def make_safe(self, wait: Callable[[float], bool]) -> frozenset[str]:
         """Switch off the outputs that dead daemons left on, before this daemon claims outputs.
 
-        Returns the devices of our own record that are not verified off: when `outputs-off` has ended,
-        after PATIENCE_S, or when `wait(s)` returns True because the daemon must end.
+        Waits until `outputs-off` has ended, but at most PATIENCE_S, and only until `wait(s)` returns
+        True because the daemon must end. Returns the devices of our own record not verified off.
         """
         found = self._records.unreleased()
         if found:

@@ -1,4 +1,4 @@
-"""Decides whether a node without hardware may publish: one node serves a graph, all others only listen.
+"""Decides whether a node without hardware may publish, because only one node may serve a graph.
 
 A node may publish once it was alone on its topics for the kind's quiet time. Its publishers are
 declared only then, so a waiting node does not count as a rival.

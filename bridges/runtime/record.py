@@ -48,7 +48,7 @@ class Claimed(msgspec.Struct, frozen=True):
     """A record without settings. `file`: the YAML's path. `yaml`: its text. `texts`: name -> profile or
     DBC file.
 
-    `safe`: the devices verified off so far. Every version can read the fields up to this one.
+    `safe`: the devices verified off so far. Every version can read the fields `file` to `safe`.
     `tried`: True once a process has finished a try to switch off the other devices.
     """
 

@@ -36,7 +36,7 @@ MOST_SPOKEN_PER_S: Final = 200.0
 """Messages beyond this rate are only counted, because a flood must not delay a scan."""
 STEP_S: Final = 0.05
 AGAIN_S: Final = 10.0
-"""The pause (s) between a ring's failure and the next attempt to make one."""
+"""The pause (s) between a ring's failure and the next attempt to make a ring."""
 
 
 class NoWriter:

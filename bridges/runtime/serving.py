@@ -1,4 +1,4 @@
-"""A thread that runs rounds, one after the other, until it is stopped."""
+"""A thread that runs round after round until it is stopped."""
 
 import logging
 import threading
@@ -81,7 +81,7 @@ class Serving:
 
     def ended(self, timeout_s: float) -> bool:
         """Wait for the thread's end; return False if it does not end, or leaves outputs on."""
-        if self._thread.ident is not None:  # else it was never started
+        if self._thread.ident is not None:  # the thread was started
             self._thread.join(timeout_s)
         return not self._thread.is_alive() and self._safe
 

@@ -1,5 +1,4 @@
-"""Signals: if a signal by default ends or suspends a process (signal(7)), it ends a daemon, outputs
-off.
+"""Signals: a daemon shuts down, outputs off, at each signal that by default ends or suspends a process.
 
 Crashes, and SIGABRT from the watchdog, are not caught, because such a process cannot be trusted any
 more; `outputs-off` follows it. SIGPIPE and SIGXFSZ stay ignored, as Python has set them, because an

@@ -24,7 +24,7 @@ Status = Mapping[str, Any]
 """A part of the status file, as JSON values."""
 
 Publish = Callable[[Topic[Message], Message], bool | None]
-"""Sends to RMF without raising. False: the message was not sent."""
+"""A function that sends a message to RMF, never raises, and returns False if that failed."""
 
 V = TypeVar("V")
 """The events of a core."""

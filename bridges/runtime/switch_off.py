@@ -24,7 +24,7 @@ def outputs_off(
     but: Collection[str] = (),
     ages: Mapping[str, float] | None = None,
 ) -> set[str]:
-    """Switch off every output of a file, except those of the devices in `but`.
+    """Switch off every output of a file, except the outputs of the devices in `but`.
 
     `ages`: the age (s) of each device's last answer to the dead daemon; missing without an answer.
     Return the devices verified off. Give up after `timeout_s` in total.

@@ -99,7 +99,7 @@ class _DeviceReading:
         self._notes: list[Problem] = []
 
     def config(self, path: Path, text: bytes) -> Config:
-        """Read the file and return its Config. Raises SettingsError if a problem was noted."""
+        """Return the Config of the sections that `all` has read."""
         return Config(
             path=path,
             text=text,
@@ -229,7 +229,9 @@ class _DeviceReading:
                     self._devices[entry.name] = settings
         for name in self._buses:
             if entries and name not in buses and None not in buses:
-                text = f"no device uses the bus '{name}': delete it, or name it in a device's 'bus:'"
+                text = (
+                    f"no device uses the bus '{name}': delete it, or name it in a device's 'bus:'"
+                )
                 self._page.note(self._buses[name].entry.key, text)
 
     def _without_sections(self, entries: list[MappingEntry]) -> list[MappingEntry]:

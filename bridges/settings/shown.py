@@ -11,7 +11,7 @@ import msgspec
 from msgspec import inspect as mi
 
 Row = tuple[str, str, str]
-"""(key with dots, value with its unit, the default if the value is another)."""
+"""(key with dots, value with its unit, the default if the value differs from it)."""
 
 _LEAVES = (str, int, float, bool, type(None))
 
@@ -91,7 +91,7 @@ def _text(value: object, unit: str) -> str:
 
 
 def _instead(field: mi.Field, value: object, unit: str) -> str:
-    """Return the default if the value is another; else ""."""
+    """Return the default if the value differs from it; else ""."""
     if field.required or field.default in (msgspec.NODEFAULT, None, value):
         return ""
     return f"default: {_text(field.default, unit)}"

@@ -13,7 +13,7 @@ from enum import Enum
 import msgspec
 
 ESCAPED = "unicode_escape"
-codecs.lookup(ESCAPED)  # loads the codec now; later a file descriptor could be lacking
+codecs.lookup(ESCAPED)  # loads the codec now; later no file descriptor may be left
 _PRIORITY = {"DEBUG": 7, "INFO": 6, "WARNING": 4, "ERROR": 3, "CRITICAL": 2}
 
 

@@ -28,8 +28,8 @@ SET_BACK_S: Final = 1.0
 class WallClock:
     """Notices that the wall clock was set back, because Cyclone DDS waits by the wall clock.
 
-    Cyclone 0.10.5 (ROS 2 Jazzy) always waits by it (github.com/eclipse-cyclonedds/cyclonedds, issue
-    1995); 11.0.1 does in the wheel on PyPI, which is built without pthread_condattr_setclock. When the
+    Cyclone 0.10.5 (ROS 2 Jazzy) always does (github.com/eclipse-cyclonedds/cyclonedds, issue 1995).
+    Cyclone 11.0.1 does in the wheel on PyPI, built without pthread_condattr_setclock. When the
     clock is set back, Cyclone's threads sleep longer by the size of the step. Meanwhile a node renews
     no lease, and other nodes forget it after 10 s; it answers no new node, and requests no lost samples
     again. A node that joins later waits by the new time. A step forward wakes the threads early, which

@@ -16,7 +16,7 @@ M_contra = TypeVar("M_contra", bound=Message, contravariant=True)
 
 
 Receive = Callable[[Message], None]
-"""Takes a message of any type."""
+"""A callback for a message of any type."""
 
 
 def any_type(received: Callable[[M], None]) -> Receive:

@@ -1,5 +1,5 @@
-"""Problems in a file, with their places. This module loads no YAML library, which code that only
-reports problems does not need."""
+"""Problems in a file, with their places. No YAML library is loaded here, because some code only
+reports problems."""
 
 from collections.abc import Iterable
 

@@ -15,7 +15,7 @@ def either(names: Iterable[str]) -> str:
 
 
 def nearest(name: str, known: Iterable[str]) -> str | None:
-    """Return the most similar known name; None if none is similar."""
+    """Return the most similar known name; None if no name is similar."""
     from difflib import get_close_matches  # only misspelt names need it
 
     return next(iter(get_close_matches(name, list(known), n=1)), None)

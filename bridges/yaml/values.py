@@ -76,7 +76,7 @@ class _Around(NamedTuple):
 
 
 Check = Callable[[str, Spot], str | None]
-"""Checks a text at its place; returns None or the problem."""
+"""A function that checks a text at its place and returns None or the problem."""
 
 
 class Values:

@@ -278,7 +278,7 @@ def _clear(memory: ChargerMemory, now: float) -> ChargerMemory:
 
 
 def _power(memory: ChargerMemory, now: float, limits: ChargerLimits) -> bool | None:
-    """May the station energise? None: change nothing."""
+    """May the station energise? None: give no order."""
     holder = memory.holder
     if rivalled(memory, now) or memory.protection or (holder and holder.over):
         return False

@@ -1,4 +1,4 @@
-"""The messages of a charger: check requests and cancels and turn them into events; make a state."""
+"""Turns requests and cancels into events, refuses invalid messages, and makes ChargerStates."""
 
 from collections.abc import Mapping
 

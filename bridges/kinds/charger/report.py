@@ -97,7 +97,7 @@ class ChargerReport(msgspec.Struct, frozen=True):
     waits: str = ""
 
     def news(self) -> object:
-        """Return all but the age, the measurements and `waits`, which change without news for RMF."""
+        """Return everything except the age, the measurements and `waits`, which are no news for RMF."""
         measured = Measured(receiver_id=self.measured.receiver_id)
         return replace(self, read_at=None, measured=measured, waits="")
 

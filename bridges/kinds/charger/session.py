@@ -24,7 +24,7 @@ def granted(request: ChargeRequested, now: float, limits: ChargerLimits) -> Char
 def taken_over(
     holder: ChargeSession, request: ChargeRequested, now: float, limits: ChargerLimits
 ) -> ChargeSession:
-    """Continue the session of a robot that was served without a request, by its new request."""
+    """Continue the session of a robot served without a request, now for the robot's new request."""
     return replace(holder, request=request, start_by=now + _patience_s(request, limits))
 
 
@@ -86,7 +86,7 @@ def _flowing(holder: ChargeSession, sample: ChargerSample, limits: ChargerLimits
 
 
 def _sought_again(holder: ChargeSession, now: float, limits: ChargerLimits) -> ChargeSession:
-    """Wait for the start again: the station has lost the receiver and looks for it."""
+    """Wait for the start again, because the station has lost the receiver and looks for it."""
     by = now + _patience_s(holder.request, limits)
     return replace(holder, started=False, start_by=by, checked_at=None)
 

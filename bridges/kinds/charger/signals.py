@@ -33,11 +33,11 @@ CURRENT_FLOWS = frozenset({Activity.CHARGING, Activity.STOPPING})
 AT_FAULT = frozenset({Activity.ERROR, Activity.UNKNOWN})
 
 FaultSide = Literal["", "station", "robot"]
-"""The side at fault by the controller's own diagnosis; "" if unknown."""
+"""The side at fault, as the controller itself diagnoses; "" if unknown."""
 
 
 class Measured(msgspec.Struct, frozen=True):
-    """A controller's reports beside its state; None if it does not report a value.
+    """A controller's reports beside its state. A value is None if the controller does not report it.
 
     `receiver_id`: the receiver on the pad, "" for none. `in_range`: a range check has shown the robot's
     coil in range for charging; False before the check. `range_ok`: the same for stations that report

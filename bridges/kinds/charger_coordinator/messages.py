@@ -1,4 +1,4 @@
-"""From messages of fleets, stations, schedules and operators to events, with checks of each message."""
+"""Turns messages of fleets, stations, schedules and operators into events, and refuses invalid ones."""
 
 import math
 from collections.abc import Mapping

@@ -61,8 +61,8 @@ def _granted(
 
 
 def suiting(memory: SiteMemory, wish: Wish, site: SiteLimits) -> list[str]:
-    """List the stations to try, best first: the operator's, the present place, the dedicated station,
-    then the YAML's order."""
+    """List the stations to try, best first: the operator's choice, the station at the robot's place,
+    the dedicated station, then the other suitable stations in the YAML's order."""
     here = memory.stands_at(wish.robot, site)
     dedicated = memory.preferred.get(wish.robot)
     if not memory.alone:

@@ -23,7 +23,7 @@ def is_dispatched(task_id: str) -> bool:
 
 class Sighting(msgspec.Struct, frozen=True):
     """One robot of a FleetState. `charges`: its mode is CHARGING or DOCKING, and its task did not come
-    from RMF's dispatcher. `place`: the waypoint of our YAML where it stands; None for none."""
+    from RMF's dispatcher. `place`: the waypoint of our YAML where it stands; None elsewhere."""
 
     who: RobotName
     charges: bool

@@ -9,7 +9,7 @@ COORDINATOR-STATIONS-1. A station shows the end of a request. If it releases the
    charge that ends within PROVEN_S of the restart was cut short.
 COORDINATOR-STATIONS-2. After an error of the station, the robot gets another station and keeps its
    place in the queue. If the robot is at fault, or the side at fault is unclear, the error also counts
-   as a failure of the robot. After the second failure (at a second station if one suits) the robot is
+   as a failure of the robot. After the second failure (at a second station if two suit) the robot is
    not tried again, and a technician is told.
 COORDINATOR-STATIONS-3. A failure is forgotten when the robot has been charged for PROVEN_S, or fully.
    It is also forgotten when the station proves to be at fault, because its error names the station, or

@@ -40,7 +40,7 @@ from bridges.kinds.charger_coordinator.memory import (
 from bridges.kinds.charger_coordinator.signals import ChargeWanted, Sighting, is_dispatched
 
 SETTLES_S: Final = 2.0
-"""A robot that passes by on another task may still show the mode CHARGING."""
+"""A robot must stay for this long (s), as a passing robot may still show the mode CHARGING."""
 LINGERS_S: Final = 300.0
 """No traffic jam lasts this long: a robot that stays on its pad longer wants to be charged."""
 COMES_S: Final = 60.0

@@ -106,7 +106,8 @@ def _strayed(memory: SiteMemory, now: float, site: SiteLimits) -> Iterator[OnWro
 def _stands(
     memory: SiteMemory, who: RobotName, site: SiteLimits
 ) -> tuple[str | None, float, float]:
-    """Return the station where the robot stands, its arrival, and the time when its stay counts."""
+    """Return the station where the robot stands, the time of its arrival, and the time from which its
+    stay counts."""
     for name, seen in memory.stations.items():
         if seen.diagnosis is FaultCause.PAD and on_pad(seen.error, site) == who:
             return name, seen.since, seen.since
@@ -132,7 +133,7 @@ def _blocking(memory: SiteMemory, now: float, site: SiteLimits) -> Iterator[OnWr
 
 
 def _idle_at(memory: SiteMemory, station: str, here: Here) -> RobotName | None:
-    """Find a robot without a station that stands at this free station."""
+    """Find a robot that stands at this free station, but to which no station is allotted."""
     grant, seen = memory.grants.get(station), memory.stations.get(station)
     if seen is None or seen.state is CHARGING or (grant is not None and not grant.over):
         return None

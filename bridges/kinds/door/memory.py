@@ -60,9 +60,9 @@ class DoorMemory(msgspec.Struct, frozen=True):
 
     `latched_at`: the time since which RMF wants the door open. `close_at`: the time when a CLOSE
     releases the hold. `held`: the hold is on. `held_since`: the time when the hold was last switched.
-    `closing`: the hold has ended, and the door has not been seen closed since. The last three are times
-    since which the door has been between its end positions (`between_since`), has not been fully open
-    (`shut_since`), and has had no publisher of requests (`unattended_since`).
+    `closing`: the hold has ended, and the door has not been seen closed since. `between_since`,
+    `shut_since`, `unattended_since`: the times since which the door has been between its end positions,
+    has not been fully open, and has had no publisher of requests.
     """
 
     latched_at: float | None = None

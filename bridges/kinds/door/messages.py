@@ -1,4 +1,4 @@
-"""The messages of a door: check a DoorRequest and turn it into an event; make a DoorState."""
+"""Turns DoorRequests into events, refuses invalid requests, and makes DoorStates of reports."""
 
 from collections.abc import Mapping
 

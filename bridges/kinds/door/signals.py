@@ -10,7 +10,7 @@ class DoorSample(msgspec.Struct, frozen=True):
 
     `opened`, `closed`: the limit contacts of the fully open and the fully closed door.
     `obstruction`: somebody or something is in the doorway. `fire`: the fire alarm's contact.
-    `lost`: the reason why the controller gave no position; "" if it gave one.
+    `lost`: the reason why the controller gave no position; "" if it gave a position.
     `errors`: the faults that the controller itself reports.
     """
 

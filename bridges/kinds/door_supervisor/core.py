@@ -14,7 +14,7 @@ DOOR-SUPERVISOR-2. The first holder causes an OPEN to the door's node, and the d
    - The states OFFLINE and UNKNOWN cause no request.
 DOOR-SUPERVISOR-3. Silence ends no hold: a robot in the doorway is silent. After `open_alarm_s` a fault
    is shown, and the door stays open.
-DOOR-SUPERVISOR-4. During the quiet start, and while another supervisor publishes, ours only listens.
+DOOR-SUPERVISOR-4. During the quiet start, and while another publishes, our supervisor only listens.
    After that it sends OPEN at once for a door with holders, but CLOSE only when a new state of the door
    contradicts CLOSE. A door that was held before the restart, and is not seen CLOSED, is held from the
    start unless another supervisor is there: the door's node may have died too, with a robot in the

@@ -54,7 +54,7 @@ class SupervisedDoor(msgspec.Struct, frozen=True):
     """The memory of one door from event to event.
 
     `passive`: the reason why requesters wait while we may not publish. `holders`: in the order of
-    arrival. `requesters`: the recent record of each. `mode`: the door's last mode, heard at `shown_at`.
+    arrival. `requesters`: name -> record. `mode`: the door's last mode, heard at `shown_at`.
     `at_once`: a restored hold may be sent before we may publish. `sent`: the last request to the door's
     node, None since publishing was last allowed or forbidden; `prompted`: the request must be repeated.
     """

@@ -1,4 +1,4 @@
-"""From DoorRequests and DoorStates to events: is a message well formed, and about a door of ours?"""
+"""Turns DoorRequests and DoorStates into events, and refuses invalid messages and unknown doors."""
 
 from collections.abc import Mapping
 

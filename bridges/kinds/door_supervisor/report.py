@@ -1,10 +1,10 @@
 """Doors and their holders, as reported by the heartbeat, the log and the status file.
 
 Fleet adapters rely on the heartbeat. Their phase DoorOpen ends only when the heartbeat lists the robot,
-and DoorClose when it no longer does. A robot listed for a door that it does not hold sends CLOSE
-(rmf_ros2, RobotContext.cpp _check_door_supervisor). RMF's own supervisor sends the heartbeat only after
-adapter requests, so the sessions of a restarted fleet adapter stay for ever. Our supervisor also sends
-the heartbeat each second.
+and DoorClose when the heartbeat no longer lists it. A robot listed for a door that it does not hold
+sends CLOSE (rmf_ros2, RobotContext.cpp _check_door_supervisor). RMF's own supervisor sends the
+heartbeat only after adapter requests, so the sessions of a restarted fleet adapter stay for ever. Our
+supervisor also sends the heartbeat each second.
 """
 
 from collections.abc import Iterator, Mapping

@@ -10,15 +10,15 @@ LIFT-DRIVE-2. The order is: AGV mode, then the call to the destination, then, on
    stands there.
 LIFT-DRIVE-3. A call is given only in AGV mode (except with `by_call`), away from the destination, and
    without overload. A door command is given only in AGV mode, while the car stands at the destination's
-   landing. The two are never on together, and neither comes on before both have been off for
-   `dead_time_s`.
+   landing. Calls and door commands are never on together, and a call or door command comes on only
+   after all calls and door commands have been off for `dead_time_s`.
 LIFT-DRIVE-4. A call is held until the car stands at its destination, or is a pulse. It is given again
    after every interruption, and when the car had arrived but is then seen at another floor. While the
    floor code is changing no new call is given, because the car may just be arriving.
 LIFT-DRIVE-5. AGV mode, the arrival and the open door each have a timeout. At its end the outputs go
    off and a fault is shown. Three more tries follow, 10, 30 and 60 s later; then the fault latches.
    Losing AGV mode during the ride is such a fault too. With `by_call` AGV mode may end between two
-   destinations, while neither a call nor the hold is on. During an overload no timeout runs.
+   destinations, while the call and the hold are off. During an overload no timeout runs.
 LIFT-DRIVE-6. Switching off is immediate. Switching on waits until the relay has been off for
    `min_off_s`, and is limited to `max_cycles_per_min` (`Channel` in `relays.py`).
 """

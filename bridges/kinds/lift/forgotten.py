@@ -8,15 +8,15 @@ asking. Rules:
 1. A session is forgotten while the last request on `lift_requests` was for another session. It is no
    longer forgotten once `lift_requests` has a request for it, or the END of that other session.
 2. A session whose robot may be inside is not ended by an END on `lift_requests` while that robot itself
-   goes on asking. A robot goes on asking if its last request is at most ASKS_S old and its last END is
-   neither later nor younger than FORWARDED_S (the supervisor may still be passing on that END). The
-   session is disowned until `lift_requests` has a request for it. It ends when its robot sends END, or
-   is silent for ASKS_S. A person's END always ends it.
+   goes on asking. A robot goes on asking if its last request is at most ASKS_S old, it has sent no END
+   since, and its last END is older than FORWARDED_S (the supervisor may be passing on a younger END).
+   The session is disowned until `lift_requests` has a request for it. It ends when its robot sends END,
+   or is silent for ASKS_S. A person's END always ends it.
 3. Only while a session is forgotten or disowned, its own robot's requests on `adapter_lift_requests`
    count as if the supervisor had passed them on: they set mode and destination, and show that RMF is
    alive. That topic grants no session; during the grace it restores the session of a robot that may be
    inside.
-4. A request counts if its stamp is newer than the requester's last one. The END of a forgotten robot
+4. A request counts if its stamp is newer than the requester's last stamp. The END of a forgotten robot
    counts only when it is heard twice, with no newer request between. An END without a stamp, as
    Jazzy's fleet adapters send it, is never too old.
 5. A robot may have been left in the car if its session ended before OPEN was shown at its destination,
@@ -44,16 +44,17 @@ ASKS_S: Final = 5.0
 """After this silence five repeats are missing: states go out each second, and a fleet adapter repeats
 its request at each LiftState (RobotContext.cpp, _check_lift_state)."""
 IN_CAR_S: Final = 60.0
-"""A killed fleet adapter has its robot on a task again after 20 s (docs/how-to/ros.md)."""
+"""The longest wait (s) for a robot in the car. A killed fleet adapter has its robot on a task again
+after 20 s (docs/how-to/ros.md)."""
 FORWARDED_S: Final = 3.0
 """The greatest delay between the two topics: a supervisor passes END on at once."""
 CLOSE_S: Final = 1e-6
-"""The least difference of present stamps that a float resolves."""
+"""The least difference (s) between two stamps of our time that a float can hold."""
 CODE: Final = "FORGOTTEN_BY_SUPERVISOR"
 
 
 def overruled(session: LiftSession, other: str, now: float) -> LiftSession:
-    """Mark the session as forgotten: `lift_requests` asks for another one."""
+    """Mark the session as forgotten, because `lift_requests` asks for another session."""
     before = session.forgotten or ForgottenSession(other, now)
     return replace(session, forgotten=replace(before, by=other))
 
@@ -81,7 +82,7 @@ def goes_on(session: LiftSession, now: float) -> bool:
 
 
 def lapses_at(session: LiftSession) -> float:
-    """Return the time when a disowned session ends if its robot stays silent; NEVER for others."""
+    """Return the time when a disowned session ends if its robot stays silent, else NEVER."""
     disowned = session.forgotten is not None and session.forgotten.disowned
     return session.robot.asked_at + ASKS_S if disowned else NEVER
 

@@ -1,4 +1,4 @@
-"""The messages of a lift: check a LiftRequest and turn it into an event; make a LiftState."""
+"""Turns LiftRequests into events, refuses invalid requests, and makes LiftStates of reports."""
 
 from collections.abc import Mapping
 

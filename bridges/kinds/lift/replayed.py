@@ -39,7 +39,7 @@ def noted(own: Mapping[str, str], asked: LiftRequested | EndRequested) -> Mappin
 def doubt(
     session: LiftSession, request: LiftRequested, own: str, held_open: bool, now: float
 ) -> Doubted | None:
-    """Return the doubt about a request of this session; None if it counts. `own`: session -> the
+    """Return the doubt about a request of this session; None if it counts. `own`: the
     destination last requested by the robot itself."""
     other = request.destination != session.destination
     if not (held_open and other and request.agv and own == session.destination):

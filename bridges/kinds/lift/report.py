@@ -42,7 +42,7 @@ class LiftReport(msgspec.Struct, frozen=True):
         return self.floor if self.door is LiftDoor.DOOR_OPEN else ""
 
     def news(self) -> object:
-        """Return all but the age and the faults' details, which may change with each reading."""
+        """Return everything except the age and the faults' details, which each reading may change."""
         shown = (self.floor, self.destination, self.door, self.motion, self.mode, self.session)
         return *shown, self.estimated, tuple(fault.code for fault in self.faults)
 

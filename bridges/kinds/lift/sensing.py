@@ -36,11 +36,12 @@ MOTION_MEMORY_S = 2.0
 """A new floor code is believed until this long after the car was last seen moving."""
 
 RESTLESS_S = 2.0
-"""An input that takes longer to settle is restless: a loose wire, or interference."""
+"""An input that takes longer (s) to settle is restless, by a loose wire or by interference."""
 
 
 class DoorSeen(msgspec.Struct, frozen=True):
-    """One door: open, closed or moving (neither). `settles_at`: the time of the next estimate (s)."""
+    """One door: open, closed, or moving (not `open` and not `closed`). `settles_at`: the time of the
+    next estimate (s)."""
 
     open: bool
     closed: bool

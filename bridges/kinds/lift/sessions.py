@@ -1,7 +1,7 @@
 """The lift's sessions: grants, refusals, END, and the grace after END.
 
-The rules are LIFT-1 and LIFT-2 of `core.py`, those of `forgotten.py` for robots that RMF's supervisor
-forgets, and those of `replayed.py` for replayed requests.
+The rules are LIFT-1 and LIFT-2 of `core.py`, the rules of `forgotten.py` for robots that RMF's
+supervisor forgets, and the rules of `replayed.py` for replayed requests.
 """
 
 from collections.abc import Callable

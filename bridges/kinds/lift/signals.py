@@ -10,7 +10,7 @@ from bridges.kinds.shared.decision import IoFailed, OperatorReset, RivalSeen, Sa
 class DoorReading(Enum):
     """The reading of the door contacts at one instant.
 
-    With two contacts: OPEN, CLOSED, BETWEEN (neither) or BOTH (a fault). With a contact for open only:
+    With two contacts: OPEN, CLOSED, BETWEEN or BOTH (a fault). With a contact for open only:
     OPEN or NOT_OPEN. With a contact for closed only: CLOSED or NOT_CLOSED. For a door read as a number:
     UNKNOWN (a fault) if the YAML does not list the number.
     """
@@ -93,7 +93,7 @@ class LiftOutputs(msgspec.Struct, frozen=True):
 class LiftRequested(msgspec.Struct, frozen=True):
     """A well-formed LiftRequest for AGV or HUMAN mode, for this lift and one of its floors.
 
-    `stamp`: its request_time (ns), by its sender's clock; 0 without one.
+    `stamp`: its request_time (ns), by its sender's clock; 0 without a time.
     """
 
     session_id: str

@@ -20,8 +20,9 @@ LIFT-SUPERVISOR-4. Only END ends a turn. Usually the holder sends END, wherever 
    a later state shows another session or none. Only after that is the next session served.
 LIFT-SUPERVISOR-5. While the lift is in fire, emergency or offline mode, no robot is sent to it and the
    queue waits. END is passed on, and so are requests for HUMAN mode, as they call no robot to the lift.
-LIFT-SUPERVISOR-6. During the quiet start, and while another supervisor publishes, ours only listens.
-   Then it starts from the lift's states and the requests that it has heard, so a restart ends no ride.
+LIFT-SUPERVISOR-6. During the quiet start, and while another publishes, our supervisor only listens.
+   After that it begins with the lift's states and the requests that it has heard, so that a restart
+   ends no ride.
 LIFT-SUPERVISOR-7. Two messages are at least GAP_S apart, and a message is repeated unchanged after
    REPEAT_S at the earliest.
 """

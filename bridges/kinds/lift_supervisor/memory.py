@@ -16,7 +16,7 @@ NOBODY_IS_SENT: Final = (LiftMode.MODE_FIRE, LiftMode.MODE_EMERGENCY, LiftMode.M
 
 
 class LiftSupervisorLimits(msgspec.Struct, frozen=True):
-    """The durations (s) set by the site. `clock_synchronised`: its clocks agree."""
+    """The durations (s) set by the site. `clock_synchronised`: the site's clocks agree."""
 
     silent_after_s: float = 10.0
     orphan_after_s: float = 3.0
@@ -64,7 +64,7 @@ class SupervisedLift(msgspec.Struct, frozen=True):
 
     `passive`: the reason why requesters wait while we may not publish. `claims`: in the order of first
     requests, including the holder's claim. `heard_at`: the time of the last adapter request.
-    `requesters`: the record of each. `shown`: the latest state, which came at `shown_at`;
+    `requesters`: name -> record. `shown`: the latest state, which came at `shown_at`;
     `session_since`: the time since which states show this session. `flowing_since`: the time since
     which states have come without a gap. `sent`: the last request of this turn; `last_sent`: the last
     request of any turn, at `sent_at`. `prompted`: the request must be repeated.
@@ -88,7 +88,7 @@ class SupervisedLift(msgspec.Struct, frozen=True):
     prompted: bool = False
 
     def claim(self, session: str) -> SessionClaim | None:
-        """Find the claim of this session; None if it has none."""
+        """Find the claim of this session; None without a claim."""
         return next((claim for claim in self.claims if claim.session == session), None)
 
     @property

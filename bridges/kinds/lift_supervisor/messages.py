@@ -1,4 +1,4 @@
-"""From LiftRequests and LiftStates to events: is a message well formed, and about a lift of ours?"""
+"""Turns LiftRequests and LiftStates into events, and refuses invalid messages and unknown lifts."""
 
 from collections.abc import Mapping
 from typing import Final

@@ -15,8 +15,8 @@ class Target(msgspec.Struct, frozen=True):
 
 
 class RideRequested(msgspec.Struct, frozen=True):
-    """An adapter's request for AGV or HUMAN mode. `stamp`: by the adapter's clock (s). `age_s`: by
-    ours."""
+    """An adapter's request for AGV or HUMAN mode. `stamp`: its time (s) by the adapter's clock.
+    `age_s`: its age by our clock."""
 
     session: str
     target: Target
@@ -45,7 +45,7 @@ class LiftStateHeard(msgspec.Struct, frozen=True):
     floors: tuple[str, ...] = ()
 
     def satisfies(self, session: str, target: Target) -> bool:
-        """Does the state fulfil the request? The rule is rmf_lift_supervisor's."""
+        """Does the state fulfil the request? The rule is that of rmf_lift_supervisor."""
         there = target.floor == self.floor and not self.destination
         return (
             (target.floor == self.destination or there)

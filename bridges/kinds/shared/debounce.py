@@ -18,7 +18,7 @@ T_co = TypeVar("T_co", covariant=True)
 class Settled(msgspec.Struct, Generic[T_co], frozen=True):
     """A debounced input. `value` counts, and `candidate` has been seen since `since` (s).
 
-    `steady_at`: when `value` was last confirmed; None before the first time. `torn_since`: the start of
+    `steady_at`: the time when `value` was last confirmed; None before that. `torn_since`: the start of
     unsteady readings; None while they are steady.
     """
 

@@ -11,7 +11,8 @@ RIVAL_QUIET_S: Final = 5.0
 SILENT_S: Final = 3.0
 """A lift or door is silent after this long without a state. States come at 1 Hz."""
 FORGOTTEN_S: Final = 60.0
-"""A device or requester without a message for this long is forgotten, unless it is in a session."""
+"""A device or requester without a message for this long is forgotten, unless it belongs to a
+session."""
 GAP_S: Final = 0.1
 """The least time between two requests that a supervisor sends for one device."""
 REPEAT_S: Final = 1.0

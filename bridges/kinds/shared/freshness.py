@@ -1,7 +1,7 @@
-"""Does an adapter's request count, or is it a replay of an old one?
+"""Does an adapter's request count, or is it a replay of an old request?
 
-A stamp comes from the requester's clock, which may disagree with ours. So a stamp is first compared
-with the earlier stamps of the same requester. Rules:
+A stamp comes from the requester's clock, which may disagree with our clock. So a stamp is first
+compared with the earlier stamps of the same requester. Rules:
 FRESHNESS-1. A request counts if it is newer than every earlier request of its requester that counted.
    An END is compared with earlier ENDs only, because an operator, whose clock may differ, may end a
    robot's session.
@@ -35,7 +35,7 @@ from bridges.messages.definitions import Time
 REPLAY_S: Final = 1.0
 """A replay comes in a burst; a live requester repeats itself at 1 Hz."""
 LATE_S: Final = 10.0
-"""No message arrives later than this."""
+"""The greatest delay (s) of a message on a topic that is not retained."""
 BROKEN_OFF_S: Final = 3.0
 FUTURE_S: Final = 2.0
 MAX_REQUESTERS: Final = 200

@@ -23,7 +23,7 @@ Endpoint = Annotated[
 
 
 class ZenohTls(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Encryption of `tls/…` and `quic/…` endpoints, from PEM files."""
+    """Encryption of `tls/…` and `quic/…` endpoints, with certificates and keys in PEM files."""
 
     ca: Annotated[
         AbsolutePath | None,

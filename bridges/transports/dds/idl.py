@@ -51,7 +51,9 @@ def _make(message_type: type, release: Release) -> type[IdlSample]:
     # In cyclonedds a dot stands for the `::` of IDL.
     typename = f"{PACKAGES[message_type]}.msg.dds_.{message_type.__name__}_"
     made = types.new_class(typename, (IdlStruct,), {"typename": typename}, body)
-    final: type[IdlSample] = annotations.final(made)  # as ROS's types, which match only final types
+    final: type[IdlSample] = annotations.final(
+        made
+    )  # ROS's types are final, and match only final types
     return final
 
 
@@ -69,7 +71,7 @@ def _calls(message_type: type, release: Release) -> dict[str, object]:
         return cls(cdr.decode(message_type, sample, release))
 
     def deserialize_key(cls: type[IdlSample], sample: bytes, /, **options: object) -> None:
-        """Called when a writer is gone, never for a message. RMF's types have no keys."""
+        """Do nothing when a writer is gone, because RMF's types have no keys."""
 
     return {
         "__init__": __init__,

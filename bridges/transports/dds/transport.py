@@ -3,8 +3,8 @@
 Names, types and QoS are those of rmw_cyclonedds and rmw_fastrtps: topic `rt/<name>`, type
 `<package>::msg::dds_::<Type>_`, plain CDR, the type hash in the endpoint's user data.
 
-One thread reads for all subscriptions. It drops and counts invalid samples, and logs the first one of
-each topic. (Cyclone's C library itself refuses samples that do not fit their type, and logs them on
+One thread reads for all subscriptions. It drops and counts invalid samples, and logs the first of each
+topic. (Cyclone's C library itself refuses samples that do not fit their type, and logs them on
 stderr.) If reading fails, the node joins again.
 
 Only this folder imports cyclonedds, and only `choose.py` imports this file.

@@ -33,8 +33,8 @@ from bridges.transports.transport import Receive, TransportError
 UNHEARD: Final = 256
 """The most messages of our own that have not come back yet: over twice any topic's depth."""
 YIELD_S: Final = 50e-6
-"""A pause (s) after a callback. The thread that the message wakes can run then; after the pause rclpy's
-executor holds Python's lock for a while."""
+"""A pause (s) after a callback, in which the thread that the message wakes can run. After the pause
+rclpy's executor holds Python's lock for a while."""
 
 
 class Ends:

@@ -48,7 +48,7 @@ class Stay:
 
     @property
     def lasts(self) -> bool:
-        """Is rclpy's context still valid? It is not once any code has shut it down."""
+        """Is rclpy's context still valid? False once any code has shut the context down."""
         return bool(self._context.ok())
 
     def spin(self, timeout_s: float | None) -> None:

@@ -3,8 +3,8 @@
 As on `dds`, samples pass through the library as bytes, `cdr.py` encodes and decodes them, and invalid
 samples are dropped and counted. rclpy's executor runs in a thread of this transport. When the machine's
 addresses change or its wall clock is set back, this thread leaves the graph and joins again, with the
-same ends. (After a step of the clock only Cyclone needs to join again; with another RMW it does no harm
-but a short interruption.)
+same ends. (After a step of the clock only Cyclone needs to join again; another RMW is only
+interrupted for a moment.)
 
 Source: rclpy 7.1 (ROS 2 Jazzy), its public API. Only this file, `stay.py` and `ends.py` import rclpy,
 only `types.py` imports the message packages, and only `choose.py` imports this file.

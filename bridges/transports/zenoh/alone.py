@@ -10,8 +10,8 @@ WHY_AWAY: Final = (
     " until the router has gone, this node neither speaks nor hears"
 )
 GONE_AFTER_S: Final = 10.0
-"""A router that has lost its link tries to connect every 4 s (zenoh's default for `connect/retry`); its
-restart takes a few seconds more."""
+"""The node returns to the graph after this long (s) without a router. A router that has lost its link
+tries to connect every 4 s (zenoh's default for `connect/retry`), and restarts in a few seconds more."""
 
 
 class Alone:

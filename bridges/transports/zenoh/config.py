@@ -1,4 +1,4 @@
-"""The configuration of a zenoh session: rmw_zenoh's with the YAML's settings, or that of a node which
+"""Configurations of a zenoh session: as in rmw_zenoh, with the YAML's settings; and for a node that
 stays on this machine.
 
 Source: ros2/rmw_zenoh, jazzy, DEFAULT_RMW_ZENOH_SESSION_CONFIG.json5; zenoh's DEFAULT_CONFIG.json5.
@@ -46,7 +46,7 @@ def on_loopback(domain_id: int) -> list[Configuration]:
     its domain, and no router.
 
     The first node listens on the domain's port, and introduces later nodes to each other. Later nodes
-    keep trying to connect to that port, and so find a successor that takes it over.
+    keep trying to connect to that port, and so find a node that takes the port over later.
     """
     meeting = f"tcp/127.0.0.1:{LOOPBACK_PORT + domain_id}"
     common = COMMON | {

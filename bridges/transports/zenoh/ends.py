@@ -35,8 +35,8 @@ from bridges.transports.zenoh.place import Place, Tell
 from bridges.transports.zenoh.session import contained
 
 HEARTBEAT_S: Final = 0.5
-"""The delay (s) after a retained message until its number is sent again, which shows a loss to
-subscribers; as in rmw_zenoh."""
+"""The number of a retained message is sent again after this time (s), so that subscribers notice a
+loss; as in rmw_zenoh."""
 AT_ONCE: Final = 100
 """The most samples taken from one subscription before other subscriptions have their turn."""
 

@@ -12,7 +12,7 @@ from bridges.transports.zenoh.keys import Keys, Kind
 from bridges.transports.zenoh.peers import Order, Tokens
 
 Tell = Callable[[str, Announced | None], None]
-"""Accepts a token and its end; the end is None once it has gone."""
+"""A callback for a token and its end; the end is None once it has gone."""
 
 
 class Place:
