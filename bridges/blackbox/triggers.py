@@ -1,4 +1,4 @@
-"""Finds the reasons for a recording in a daemon's entries. Pure.
+"""Finds the reasons for a recording in a daemon's entries. The module is pure.
 
 - a fault appears (a hazard is a fault too, because it keeps the device from RMF);
 - a request is refused, unless every normal handover or start causes such a refusal;

@@ -51,7 +51,8 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _folder() -> Path:
-    """Return the folder of recordings: the unit's state directory, else a folder in the user's."""
+    """Return the folder of recordings: the unit's state directory, or without a unit a folder in
+    the user's state directory."""
     given = os.environ.get("STATE_DIRECTORY", "").split(":")[0]
     return Path(given) if given else directories.state_base() / "recordings"
 

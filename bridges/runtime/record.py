@@ -49,7 +49,7 @@ class Claimed(msgspec.Struct, frozen=True):
     DBC file.
 
     `safe`: the devices verified off so far. Every version can read the fields `file` to `safe`.
-    `tried`: True once a process has finished a try to switch off the other devices.
+    `tried`: True when a process has tried once to switch off all other devices.
     """
 
     file: str

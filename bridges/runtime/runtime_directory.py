@@ -94,7 +94,8 @@ def state_file(file: Path) -> Path:
 class MemoryFile:
     """A file that is replaced as a whole and is on disk when `write` returns.
 
-    `instead`: the path used while `path` cannot be written; if both files exist, this file is newer.
+    `instead`: the path used while `path` cannot be written; if files exist at both paths, the file at
+    `instead` is newer.
     """
 
     def __init__(self, path: Path, instead: Path | None = None) -> None:

@@ -42,9 +42,10 @@ class WallClock:
         self._most_s = ahead_s
 
     def set_back_s(self, ahead_s: float) -> float:
-        """Return the step back (s) since the last step found; 0 for SET_BACK_S or less.
+        """Return how far (s) the clock was set back; 0 for SET_BACK_S or less.
 
-        Small steps add up, because one sleep of a thread may include several.
+        Small steps add up until they exceed SET_BACK_S, because one sleep of a thread may include
+        several.
         """
         self._most_s = max(self._most_s, ahead_s)
         back_s = self._most_s - ahead_s

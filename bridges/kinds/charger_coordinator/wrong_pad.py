@@ -50,7 +50,7 @@ class OnWrongPad(NamedTuple):
 
 def found(memory: SiteMemory, now: float, site: SiteLimits) -> dict[RobotName, OnWrongPad]:
     """Find every robot at the wrong station or in another robot's way. If `now` is NEVER, also find
-    the robots that will be in this position later unless a robot moves."""
+    the robots that would be there later if no robot moved."""
     astray: dict[RobotName, OnWrongPad] = {}
     for one in (*_strayed(memory, now, site), *_blocking(memory, now, site)):
         astray.setdefault(one.who, one)

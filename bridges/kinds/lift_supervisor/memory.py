@@ -49,8 +49,8 @@ class SessionClaim(msgspec.Struct, frozen=True):
 
 
 class Turn(msgspec.Struct, frozen=True):
-    """The session whose requests we pass on. `ends`: we send its END, which came from a person if
-    `by_person`. `seen`: the lift's states have shown this session."""
+    """The session whose requests we pass on. `ends`: we send the session's END. `by_person`: this END
+    came from a person. `seen`: the lift's states have shown this session."""
 
     session: str
     since: float

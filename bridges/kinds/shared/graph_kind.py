@@ -52,8 +52,8 @@ class GraphKind(Struct, Generic[S, L, M, E, R], frozen=True):
     another node publishes there, our node only listens. `yields`: topics on which our node is silent
     while another node publishes there; on its other topics our node continues.
     `device_name`: a message's subject. `shown_by`: the topic on which a subject publishes
-    its own states, which proves that it exists (a request may name anything); None if there is only
-    one subject. `reserved(settings)`: the subjects that the YAML names.
+    its own states (they prove that the subject exists, while a request may name anything); None if
+    there is only one subject. `reserved(settings)`: the subjects that the YAML names.
     `requester(event)`: the sender of a request; "" for a state. `requesters(memory)`: the requesters
     that the subject remembers. Anybody can invent them, so all subjects together have a bound.
     `quiet_s(settings)`: the time after the start in which the node only listens.

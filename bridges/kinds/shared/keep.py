@@ -18,8 +18,8 @@ R = TypeVar("R", bound=Kept)
 
 
 def read(kept: bytes, record: type[R], version: int, what: str) -> R:
-    """Decode the record. Raises ValueError, which names `what` was expected, for other bytes or another
-    version."""
+    """Decode the record. Raises ValueError for other bytes or another version; its text names `what`,
+    the expected content."""
     try:
         found = msgspec.json.decode(kept, type=record)
     except msgspec.MsgspecError as error:
