@@ -33,7 +33,7 @@ def sections_of(wanted: StructType) -> dict[str, str]:
 def misplaced(
     entry: MappingEntry, before: MappingEntry | None, elsewhere: Mapping[str, str]
 ) -> str:
-    """Describe the typing slip behind an unknown key; "" if none is found."""
+    """Describe the typing slip behind an unknown key; "" if no slip is found."""
     empty = before is not None and _is_empty(before.value)
     if before is not None and empty and not _is_empty(entry.value):
         return (

@@ -82,9 +82,10 @@ Check = Callable[[str, Spot], str | None]
 class Values:
     """Converts one file's nodes to values, and notes problems on its page.
 
-    `checks`: for texts whose type has `Meta(extra={"check": name})`. Only its check
-    accepts or refuses such a text. `structs`: every struct made so far, with its path. `owner(key)`:
-    the place where a key belongs that the outermost struct does not have; "" if nobody knows the key.
+    `checks`: for texts whose type has `Meta(extra={"check": name})`. Such a text is
+    taken as written, and only its check accepts or refuses it. `structs`: every struct made so far,
+    with its path. `owner(key)`: the place where a key belongs that the outermost struct does not have;
+    "" if nobody knows the key.
     """
 
     def __init__(
@@ -148,7 +149,7 @@ class Values:
         near = {nearest(name, fields) for name in found if name not in fields}
         for before, entry in zip([None, *entries], entries, strict=False):
             if entry.name not in fields:
-                if before and is_decimals(entry, before):  # the value before it is not meant
+                if before and is_decimals(entry, before):  # the value before the comma is not meant
                     found.pop(before.name)
                 text = misplaced(entry, before, elsewhere or {}) or self._too_deep(entry)
                 text = text or (

@@ -32,7 +32,7 @@ class RecordingSettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknow
     ] = 400
     files_mb: Annotated[
         Space,
-        tells("how large these files may be together. The largest number counts here too."),
+        tells("how large these files may be together. Here too the largest number counts."),
     ] = 200.0
     waiting_s: Annotated[
         Patience, tells("a file is made when a requester has waited this long.")
