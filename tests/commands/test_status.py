@@ -98,8 +98,8 @@ def test_a_remedy_names_the_device_its_file_and_what_the_file_sets() -> None:
     )
     held = faults.here(told["HOLDER_SILENT"], "/x/lift a.yaml", "Lift 1", {})
     assert held.do == (
-        "look into the car; then `rmf-bridge release 'Lift 1'`, or set `holder_ttl_s` to have this"
-        " done automatically"
+        "look into the car; then `rmf-bridge release 'Lift 1'`. With `holder_ttl_s` the supervisor"
+        " releases such a lift by itself"
     )
     assert faults.values("/no/such.yaml", "Lift1") == faults.values(file, "Lift9") == {}
 
