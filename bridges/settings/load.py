@@ -31,7 +31,7 @@ from bridges.settings import names as named
 from bridges.settings.buses import BusRead, read_bus
 from bridges.settings.config import Config
 from bridges.settings.plausible import milliseconds, out_of_step
-from bridges.settings.top import MAPPING, keys_below, top_keys, word
+from bridges.settings.top import MAPPING, keys_below, owner, top_keys, word
 from bridges.settings.wiring import Use, WiringCheck, note_conflicts, note_unknown_signals
 from bridges.yaml.parsing import Problem, SettingsError, YamlFile, compose, read
 from bridges.yaml.positions import MappingEntry, Spot, below, is_none, locate
@@ -275,7 +275,7 @@ class _DeviceReading:
         spot = Spot(entry.value, entry.key, entry.spot().label)
         hal = self._buses[bus].hal if bus else None
         wiring = WiringCheck(self._page, entry.name, bus or "", hal)
-        values = Values(self._page, wiring.checks, partial(named.owner, self._kind_name))
+        values = Values(self._page, wiring.checks, partial(owner, self._kind_name))
         before = len(self._page.problems)
         settings = values.make(driver.settings, spot)
         if settings is BROKEN:

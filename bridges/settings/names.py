@@ -10,8 +10,6 @@ from types import ModuleType
 import drivers
 import drivers.hal
 from bridges.kinds import holding
-from bridges.yaml.spelling import either
-from bridges.yaml.values import field_names
 from drivers.driver_type import AnyDriver
 from drivers.hal import AnyBus
 
@@ -37,16 +35,6 @@ def driver_called(kind: str, name: str) -> AnyDriver:
 def driver_module(kind: str, name: str) -> ModuleType:
     """Import the file of a driver; `name` is one of `driver_names(kind)`."""
     return importlib.import_module(f"drivers.{kind}.{name}")
-
-
-def owner(kind: str, key: str) -> str:
-    """Say which other drivers of the kind have this key; "" if none has it."""
-    found = [
-        name
-        for name in driver_names(kind)
-        if key in field_names(driver_called(kind, name).settings)
-    ]
-    return f"unknown key '{key}': it is a key of driver {either(found)}" if found else ""
 
 
 def bus_called(name: str) -> AnyBus:

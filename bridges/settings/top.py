@@ -12,7 +12,7 @@ from bridges.kinds.shared.rmf_section import Rmf
 from bridges.settings import names as named
 from bridges.yaml.positions import MappingEntry
 from bridges.yaml.spelling import either
-from bridges.yaml.values import BROKEN, Values
+from bridges.yaml.values import BROKEN, Values, field_names
 from drivers.driver_type import AnyDriver
 
 MAPPING: Final = "a mapping (key: value)"
@@ -57,3 +57,13 @@ def keys_below(kind: AnyKind | None, driver: AnyDriver | None) -> dict[str, str]
         place = f"{kind.devices_key}: <name>"
         below_top |= {field.encode_name: place for field in fields(driver.settings)}
     return below_top
+
+
+def owner(kind: str, key: str) -> str:
+    """Say which other drivers of the kind have this key; "" if none has it."""
+    found = [
+        name
+        for name in named.driver_names(kind)
+        if key in field_names(named.driver_called(kind, name).settings)
+    ]
+    return f"unknown key '{key}': it is a key of driver {either(found)}" if found else ""

@@ -86,9 +86,8 @@ class Site:
 
     def check(self) -> list[str]:
         """Return the door's rows in the output of `check`."""
-        done = subprocess.run(
-            command("check", self.file), env=environment(), capture_output=True, text=True
-        )
+        env = {**environment(), "COLUMNS": "200"}
+        done = subprocess.run(command("check", self.file), env=env, capture_output=True, text=True)
         assert (done.returncode, done.stderr) == (0, "")
         rows = [" ".join(line.split()) for line in done.stdout.splitlines()]
         return [row for row in rows if row.startswith("ward_door ")]

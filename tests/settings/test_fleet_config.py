@@ -215,8 +215,8 @@ def test_a_station_that_releases_a_robot_before_rmfs_recharge_soc_is_a_mismatch(
     assert (code, found) == (
         78,
         [
-            "config.yaml:4:3: a station releases a robot at full_percent 95 %, and RMF has it wait"
-            " there for recharge_soc 100 %: write recharge_soc: 0.95, or less"
+            "config.yaml:4:3: a station releases a robot at full_percent 95 %, but the robot"
+            " waits there for recharge_soc 100 %: write recharge_soc: 0.95, or less"
         ],
     )
 
