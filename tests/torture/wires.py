@@ -126,7 +126,11 @@ def _routers(directory: Path, table: Table) -> None:
         for _ in range(3):
             router = Router(connect__endpoints=[meeting(module.domain)])
             router.start()
-            wait_until(lambda: _status(run)["faults"], "the router is a fault", PATIENCE_S)
+            wait_until(
+                lambda: _status(run)["faults"],
+                "status shows the missing router as a fault",
+                PATIENCE_S,
+            )
             asked = command("status", "--runtime-dir", run)
             code = subprocess.run(asked, capture_output=True).returncode
             router.leave()

@@ -168,7 +168,7 @@ def test_a_listener_may_ask_who_published_a_message_of_two_that_say_the_same(joi
         for voice in voices * 2:
             count = len(heard)
             voice.publish(numbered(1))
-            wait_until(lambda count=count: len(heard) > count, "it arrives")  # type: ignore[misc]
+            wait_until(lambda count=count: len(heard) > count, "the message arrives")  # type: ignore[misc]
         return ours.speaks == "ros2" or all(sender and sender.node for sender in heard)
 
     wait_until(named, "discovery has told the nodes")

@@ -49,7 +49,7 @@ def test_forged_samples_are_dropped_and_counted_and_the_good_ones_after_them_arr
 
 
 def test_nothing_forged_is_taken_for_a_message(domain: int) -> None:
-    """Another hash in a key makes another key, and a wildcard is no key of ours."""
+    """A key with a wrong hash, or with a wildcard, is not one of our keys."""
     received: list[d.LiftRequest] = []
     node = ZenohTransport("listener", domain, loopback=True)
     liar = ZenohTransport("liar", domain, loopback=True)

@@ -4,6 +4,7 @@ import logging
 import os
 from collections.abc import Iterator
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -293,9 +294,8 @@ def test_with_its_password_a_node_comes_in_and_with_another_does_not(
     site.node("liar", router.endpoint, password_file=wrong, **known)
     site.node("stranger", router.endpoint, mode="client")
     for name in ("liar", "stranger"):
-        wait_until(
-            lambda name=name: linked(caplog, name), f"the log tells the {name} of the missing link"
-        )  # type: ignore[misc]
+        logged = partial(linked, caplog, name)
+        wait_until(logged, f"the log tells the {name} of the missing link")
         assert linked(caplog, name) == ["not_linked"]
 
 

@@ -33,7 +33,7 @@ class Arch:
 
 
 FAST: Final = "mitigations=off"
-"""For the kernel: its protections against leaks of a processor that is not there cost TCG much time.
+"""A word for the kernel: protection against leaks of real processors costs TCG much time.
 
 Five levels of pages and the kernel's protection from a program's pages (SMAP) cost time too, so amd64's
 processor has neither.

@@ -118,9 +118,9 @@ class LiftContract(Contract[Bench]):
             bench.plant.press("fire_alarm", burns, time.monotonic())
             hazards = {Hazard.FIRE} if burns else set()
             wait_until(
-                lambda hazards=hazards: bench.read().hazards == hazards,
+                lambda hazards=hazards: bench.read().hazards == hazards,  # type: ignore[misc]
                 f"the driver reads hazards {hazards}",
-            )  # type: ignore[misc]
+            )
 
     @pytest.mark.parametrize(
         ("wire", "safe"),

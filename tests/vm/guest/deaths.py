@@ -105,7 +105,7 @@ def _group() -> Path:
 
 
 def hang() -> str:
-    """SIGSTOP, two relays on: the watchdog ends it; off, and the service is back."""
+    """Stop the daemon with two relays on. The watchdog kills it, the relays go off, the service restarts."""
     return f"off after {_dies(lambda: kill(SERVICE, 'STOP'), STOPPED_S):.2f} s"
 
 

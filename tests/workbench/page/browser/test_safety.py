@@ -179,4 +179,4 @@ def test_a_second_page_on_a_port_says_what_to_do(address: str) -> None:
     command = [sys.executable, "-m", "bridges.cli", "page", "--listen", urlsplit(address).netloc]
     ended = subprocess.run(command, capture_output=True, text=True, timeout=60)
     assert ended.returncode == os.EX_UNAVAILABLE
-    assert "Address already in use; another port: --listen" in ended.stderr
+    assert "Address already in use; for a free port: --listen" in ended.stderr
