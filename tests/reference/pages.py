@@ -1,6 +1,6 @@
 """`python -m tests.reference.pages` writes the generated pages of docs/.
 
-These are docs/reference/ and the index of decisions; `test_pages.py` compares each page with its file.
+These are docs/reference/, the index of decisions and the table of hazards; `test_pages.py` compares each page with its file.
 """
 
 import argparse
@@ -16,6 +16,7 @@ from bridges.messages import topics
 from bridges.runtime import faults
 from bridges.settings.config import Config
 from bridges.settings.load import load
+from tests.reference import hazards
 from workbench.commissioning import reference
 from workbench.commissioning.examples import device_yamls
 from workbench.judge.judge import KINDS
@@ -204,6 +205,7 @@ PAGES: Final[dict[str, Callable[[], str]]] = {
     "reference/laws.md": laws,
     "reference/topics.md": every_topic,
     "explanation/decisions/index.md": decisions,
+    "explanation/hazards.md": hazards.page,
 }
 
 if __name__ == "__main__":

@@ -1,0 +1,100 @@
+"""The unsafe control actions of `hazards.toml`.
+
+`python -m tests.reference.hazards [ID …]` takes each guard out in a copy of the tree, and runs the test
+of that row, which must fail.
+"""
+
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+import tomllib
+from pathlib import Path
+from typing import Final
+
+import msgspec
+
+ROOT: Final = Path(__file__).parents[2]
+PAGE: Final = ROOT / "docs" / "explanation" / "hazards.md"
+BEGIN: Final = "<!-- the table of tests/reference/hazards.toml -->\n"
+END: Final = "<!-- end of the table -->\n"
+
+
+class UnsafeAction(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """One row: an action with its guard and its test, or with `gap`, the reason why it has neither."""
+
+    id: str
+    action: str
+    leads_to: str
+    rule: str = ""
+    guard: str = ""
+    cut: str = ""
+    put: str = ""
+    test: str = ""
+    gap: str = ""
+
+    @property
+    def file(self) -> Path:
+        """The guard's file, relative to the tree."""
+        return Path(self.guard.partition("::")[0])
+
+
+def actions() -> list[UnsafeAction]:
+    """Read every row."""
+    rows = tomllib.loads(Path(__file__).with_suffix(".toml").read_text())["action"]
+    return msgspec.convert(rows, list[UnsafeAction])
+
+
+def page() -> str:
+    """Return the page of hazards, with its table made of the rows."""
+    before, _, rest = PAGE.read_text().partition(BEGIN)
+    head = "| action | may lead to | prevented by | proved by |\n|---|---|---|---|\n"
+    rows = "".join(_row(action) for action in actions())
+    return f"{before}{BEGIN}\n{head}{rows}\n{END}{rest.partition(END)[2]}"
+
+
+def _row(row: UnsafeAction) -> str:
+    first = f"| `{row.id}` {row.action} | {row.leads_to} |"
+    if row.gap:
+        return f"{first} **gap:** {row.gap} | – |\n"
+    function = row.guard.partition("::")[2]
+    file, _, test = row.test.partition("::")
+    told = re.sub(r"_", " ", test.removeprefix("test_"))
+    return f"{first} {row.rule}: `{function}` in `{row.file}` | {told} (`{file}`) |\n"
+
+
+def fails_without(row: UnsafeAction, tree: Path) -> bool:
+    """Does the row's test pass in this tree, and fail there without the guard?"""
+    file = tree / row.file
+    whole = file.read_text()
+    passes = _exit_code(row.test, tree) == 0
+    file.write_text(whole.replace(row.cut, row.put))
+    try:
+        return passes and _exit_code(row.test, tree) == 1
+    finally:
+        file.write_text(whole)
+
+
+def _exit_code(test: str, tree: Path) -> int:
+    command = [sys.executable, "-B", "-m", "pytest", "-q", "-x", "-n0", "-p", "no:cacheprovider"]
+    return subprocess.run([*command, test], cwd=tree, stdout=subprocess.DEVNULL).returncode
+
+
+def _tried(ids: list[str]) -> int:
+    with tempfile.TemporaryDirectory() as scratch:
+        tree = Path(scratch) / "tree"
+        left = shutil.ignore_patterns(".git", ".venv*", "__pycache__", "build", "*.so")
+        shutil.copytree(ROOT, tree, ignore=left)
+        survived = 0
+        for row in actions():
+            if row.gap or (ids and row.id not in ids):
+                continue
+            fails = fails_without(row, tree)
+            print(row.id, "fails" if fails else "SURVIVES", flush=True)
+            survived += not fails
+    return survived
+
+
+if __name__ == "__main__":
+    sys.exit(min(_tried(sys.argv[1:]), 1))

@@ -1,0 +1,45 @@
+"""Every output has its rows in `hazards.toml`, and each row names a guard and a test that exist."""
+
+import re
+
+import pytest
+
+from bridges.kinds.charger.signals import ChargerOutputs
+from bridges.kinds.door.signals import DoorOutputs
+from bridges.kinds.lift.signals import LiftOutputs
+from tests.reference.hazards import PAGE, ROOT, UnsafeAction, actions, page
+
+ROWS = actions()
+WAYS = ("given", "not_given", "timing", "duration")
+NO_COMMANDS = {"door.between_pulses"}
+"""Tells the driver why the hold is off, and drives nothing."""
+
+
+def test_the_page_has_the_table() -> None:
+    """`make reference` brings the page up to date."""
+    assert PAGE.read_text() == page()
+
+
+def test_every_output_of_every_kind_has_its_four_rows() -> None:
+    kinds = {"lift": LiftOutputs, "door": DoorOutputs, "charger": ChargerOutputs}
+    outputs = {f"{kind}.{field}" for kind, of in kinds.items() for field in of.__struct_fields__}
+    wanted = {f"{output}.{way}" for output in outputs - NO_COMMANDS for way in WAYS}
+    assert wanted - {row.id for row in ROWS} == set()
+
+
+def test_each_row_has_its_own_id() -> None:
+    assert len({row.id for row in ROWS}) == len(ROWS)
+
+
+@pytest.mark.parametrize("row", ROWS, ids=lambda row: row.id)
+def test_a_row_names_a_guard_and_a_test_that_exist_or_says_that_there_is_a_gap(
+    row: UnsafeAction,
+) -> None:
+    if row.gap:
+        assert not (row.guard or row.test)
+        return
+    file, _, test = row.test.partition("::")
+    assert re.search(rf"^def {test}\(", (ROOT / file).read_text(), re.M)
+    source = (ROOT / row.file).read_text()
+    assert f"def {row.guard.partition('::')[2]}(" in source
+    assert source.count(row.cut) == 1
