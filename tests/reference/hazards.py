@@ -91,7 +91,8 @@ def _tried(ids: list[str]) -> int:
             if row.gap or (ids and row.id not in ids):
                 continue
             fails = fails_without(row, tree)
-            print(row.id, "fails" if fails else "SURVIVES", flush=True)
+            sys.stdout.write(f"{row.id} {'fails' if fails else 'SURVIVES'}\n")
+            sys.stdout.flush()
             survived += not fails
     return survived
 

@@ -1,6 +1,7 @@
 """`python -m tests.reference.pages` writes the generated pages of docs/.
 
-These are docs/reference/, the index of decisions and the table of hazards; `test_pages.py` compares each page with its file.
+These are docs/reference/, the index of decisions and the table of hazards; `test_pages.py`
+compares each page with its file.
 """
 
 import argparse
