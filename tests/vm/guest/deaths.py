@@ -105,7 +105,7 @@ def _group() -> Path:
 
 
 def hang() -> str:
-    """Stop the daemon with two relays on. The watchdog kills it, the relays go off, the service restarts."""
+    """Stop the daemon with two relays on. The watchdog kills it, and the relays go off."""
     return f"off after {_dies(lambda: kill(SERVICE, 'STOP'), STOPPED_S):.2f} s"
 
 
