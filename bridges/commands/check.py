@@ -23,7 +23,9 @@ if TYPE_CHECKING:
     from bridges.settings.building_map import BuildingMap
 
 COORDINATOR = "charger_coordinator"
-NOTHING_BESIDE = "no FILE is a charger coordinator's or a lift's YAML, to compare this with"
+NOTHING_BESIDE = (
+    "no YAML of a charger coordinator or a lift is given, with which this file could be compared"
+)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -43,7 +45,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         help="compare a charger coordinator and lifts with a fleet adapter's config.yaml; with a"
-        " navigation graph as --building-map the positions too. Once for each fleet",
+        " navigation graph as --building-map, compare the positions too. Give this option once for each"
+        " fleet",
     )
     parser.add_argument(
         "--several-machines",
@@ -120,7 +123,8 @@ def _beside_fleet(
     found: Mapping[str, Findings],
     building: "BuildingMap | None",
 ) -> dict[str, Findings]:
-    """Return the findings on coordinators and lifts, extended by the comparison with this fleet."""
+    """Return the findings on coordinators and lifts, with the results of the comparison with this
+    fleet's file."""
     from bridges.settings.fleet_config import load_fleet
     from bridges.settings.fleet_names import compared, emergency_levels
 

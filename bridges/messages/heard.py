@@ -34,9 +34,9 @@ class Sender(Struct, eq=False):
 class Heard(Struct, frozen=True):
     """A message, its topic's ROS name, and the time of its arrival.
 
-    `at`: s on a clock that never steps, from any zero. `wall`: s since the epoch, by the clock of the
-    listening machine, for comparison with stamps. `sender`: None where the wire or the recording does
-    not tell.
+    `at`: s on a clock that never steps and has any zero. `wall`: s since the epoch, by the clock of the
+    listening machine, for comparison with stamps. `sender`: None if the wire or the recording does not
+    name it.
     """
 
     at: float

@@ -23,7 +23,7 @@ from bridges.yaml.positions import Spot, locate
 from bridges.yaml.spelling import unknown
 
 Transforms = Mapping[str, Similarity]
-"""Level -> transform from RMF's map to the robot's; EVERY_LEVEL for all."""
+"""Level -> transform from RMF's map to the robot's map; EVERY_LEVEL for all levels."""
 LEAST_HZ = 1.0
 FINISHING = ("charge", "park", "nothing")
 

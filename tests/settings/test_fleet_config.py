@@ -329,7 +329,7 @@ def test_a_fleet_configuration_without_a_coordinator_is_compared_with_nothing(
         main(["check", "-q", "config/door_modbus.yaml", "--fleet-config", str(theirs)])
         == os.EX_CONFIG
     )
-    assert "no FILE is a charger coordinator's or a lift's YAML" in capsys.readouterr().err
+    assert "no YAML of a charger coordinator or a lift is given" in capsys.readouterr().err
 
 
 def test_the_shipped_fleet_agrees_with_the_shipped_coordinator(

@@ -47,9 +47,8 @@ class BusShown(msgspec.Struct, frozen=True, kw_only=True):
 class Findings(msgspec.Struct, frozen=True, kw_only=True):
     """One file: its contents if it is valid, and its errors and warnings.
 
-    `sha256`: of its bytes, so that a signed sheet identifies the file. `rmf`: the domain, transport and
-    release, and the names of its topics. `notes`: further facts for the
-    user.
+    `sha256`: the hash of the file's bytes, so that a signed sheet identifies the file. `rmf`: the
+    domain, transport and release, and the names of the topics. `notes`: further facts for the user.
     """
 
     file: str

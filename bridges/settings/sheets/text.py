@@ -43,7 +43,8 @@ def _sentence(text: str, columns: int) -> list[str]:
 
 
 def _wiring(parts: Sequence[Part], columns: int) -> Iterator[str]:
-    """Yield the wires of all devices of a bus in one table; then the meanings for other devices."""
+    """Yield the wires of all devices of a bus in one table, then the messages of devices without
+    wires."""
     for title in (WIRES, MEANINGS):
         found = [(p.device, table) for p in parts for table in p.tables if table.title == title]
         headings = [("device", *table.headings) for _, table in found[:1]]
