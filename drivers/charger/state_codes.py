@@ -63,7 +63,7 @@ class Codes(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
         return "station" if told_apart and code in self.error else ""
 
     def lists(self) -> Mapping[Activity, list[Code]]:
-        """Return meaning -> its states, without the errors of a known side."""
+        """Return the states of each meaning, without `station_error` and `robot_error`."""
         return {
             Activity.IDLE: self.idle,
             Activity.HANDSHAKE: self.handshake,

@@ -211,7 +211,7 @@ def _address(text: str) -> int:
     try:
         return place(text)[1]
     except ValueError:
-        return 0  # the map reports the misspelt place itself
+        return 0  # the map's own check reports a misspelt place
 
 
 def _meanings(status: Status) -> list[tuple[int, str]]:

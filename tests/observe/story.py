@@ -66,7 +66,7 @@ class Story:
     def asks(
         self, who: str, floor: str = "L2", kind: int = AGV, *, passed: bool = False
     ) -> "Story":
-        """Let a fleet adapter's LiftRequest arrive or, if `passed`, the supervisor's LiftRequest."""
+        """Let a LiftRequest arrive: from a fleet adapter or, if `passed`, from the supervisor."""
         topic = "lift_requests" if passed else "adapter_lift_requests"
         floor = "" if kind == END else floor
         return self.hear(topic, d.LiftRequest("Lift1", stamp(WALL + self.now), who, kind, floor))

@@ -20,7 +20,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("--seed", type=int, help="seed of the day; by default random")
     parser.add_argument("--hours", type=float, default=24.0, help="simulated hours, at least 0.3")
     parser.add_argument(
-        "--rmf", choices=SUPERVISORS, help="whose supervisors; the seed decides by default"
+        "--rmf",
+        choices=SUPERVISORS,
+        help="whose supervisors run, ours or RMF's of a release; the seed decides by default",
     )
     parser.add_argument(
         "--kill-every",

@@ -32,7 +32,7 @@ from tests.site.trouble import BY_RESET_S, Ill, Ills, Mortal, Trouble, breakable
 
 ROBOTS = ("red", "green", "blue", "white", "black")
 WIND_DOWN_S = BOUND_S + 90.0
-"""Before the end (s). From then on nothing more goes wrong, and every robot ends its tour."""
+"""The wind-down's length (s). In it nothing more goes wrong, and every robot ends its tour."""
 ADOPTS_S = 5.0
 """RMF's restarted supervisor ends the shown session and then takes the next requester.
 

@@ -141,7 +141,7 @@ def interruptible() -> AbstractContextManager[None]:
 
 @contextmanager
 def ended_by(action: Callable[[int, FrameType | None], object]) -> Iterator[None]:
-    """Let SIGINT, SIGTERM and SIGHUP do this until the end of the block."""
+    """Call `action` on SIGINT, SIGTERM and SIGHUP until the end of the block."""
     signals = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
     before = {number: signal.signal(number, action) for number in signals}
     try:

@@ -206,7 +206,8 @@ def _reset(memory: LiftMemory, now: float, limits: LiftLimits) -> LiftMemory:
     session = memory.session
     if session and session.fault:
         session = replace(drive.paused(session), tries=0, retry_at=None, fault=None)
-    # A fire in fresh inputs latches again in this decision. Stale inputs may hide a fire.
+    # With fresh inputs a latch may clear: a fire that is still there latches again in this
+    # decision. With stale inputs the latch stays, because they may hide a fire.
     unseen = not look(memory.senses, now, limits).fresh
     return replace(
         memory,

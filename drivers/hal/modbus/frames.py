@@ -66,7 +66,7 @@ class Coils(ReadCoilsResponse):
 
 
 class DiscreteInputs(Coils):
-    """Bits, as `Coils`, of another table."""
+    """The same as `Coils`, for discrete inputs."""
 
     function_code = 2
 

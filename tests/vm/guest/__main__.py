@@ -1,4 +1,4 @@
-"""Runs each check that the host names in its own process, and tells the host the results."""
+"""Runs the checks that the host names, each in a separate process, and tells the host the results."""
 
 import io
 import json

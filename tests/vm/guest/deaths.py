@@ -76,7 +76,7 @@ def _killed(old: int, relays: set[int]) -> float:
 def _dies_at_start() -> float:
     """Kill -9 a starting daemon while its `outputs-off` runs and the relays are still on.
 
-    The `outputs-off` of the death before was killed too.
+    Kill a daemon and the `outputs-off` after its death; then kill the next daemon while it starts.
     """
     old, running = pid(SERVICE), _group() / "cgroup.procs"
     _on(MODE, HOLD)

@@ -29,7 +29,7 @@ def memory() -> str:
 
 
 def ratios() -> str:
-    """Each service compared with an empty Python service: start to ready, memory, kill -9 to off."""
+    """Lift, door and charger compared with an empty Python service: start, memory, off after a kill."""
     Path("/run/systemd/system/empty.service").write_text(EMPTY)
     sh("systemctl", "daemon-reload")
     sh("systemctl", "start", "empty.service")

@@ -151,7 +151,7 @@ class QueuedCharge(RobotCharge):
         return Fulfilled(f"{answer.charger_name} is {state} for {self.who}")
 
     def unheard(self, seen: RequestProgress) -> Obstacle:
-        """Explain that no charger shows the robot yet, which probably waits in the queue."""
+        """Explain why no charger shows the robot yet: it waits in the queue, or was refused."""
         if not seen.names(self.kind):
             return super(QueuedCharge, self).unheard(seen)
         cancel = ("send", "charger", ANY, "--queue", "--cancel", self.request_id)

@@ -30,7 +30,7 @@ RIGHT = """() => Math.max(...[...document.querySelectorAll('article')].map(
 
 @pytest.fixture
 def overloaded(graph: Graph) -> Iterator[str]:
-    """A lift with a fault beside one without; the fault's remedy."""
+    """Overload Lift1, leave Lift2 without a fault, and yield the remedy's text for OVERLOAD."""
     graph.lift("Lift1")
     graph.lift("Lift2")
     graph.faults["Lift1"] = {"OVERLOAD": "for 9 s"}
