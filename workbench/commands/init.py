@@ -9,6 +9,7 @@ import os
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any, Final, get_args
 
@@ -17,7 +18,7 @@ from bridges.settings.building_map import BuildingMap, load_map
 from bridges.settings.load import understood
 from bridges.system.written import no_folder, not_written
 from bridges.yaml.parsing import SettingsError
-from workbench.commissioning.init import ADDRESSES, WIRINGS, draft
+from workbench.commissioning.init import ADDRESSES, WIRINGS, draft, gateway
 from workbench.commissioning.init.answers import (
     LIFT_INPUTS,
     OFFERED,
@@ -30,6 +31,7 @@ from workbench.commissioning.init.answers import (
 )
 
 EX_USAGE, EX_NOINPUT, EX_CANTCREAT, EX_INTERRUPTED = 64, 66, 73, 130
+TABLE: Final = (*gateway.PLACES, *gateway.NUMBERS)
 Given = dict[str, Any]
 """Answers so far, by their names in DraftAnswers."""
 
@@ -51,6 +53,36 @@ class Question:
 
 def _is_lift(given: Given) -> bool:
     return bool(given["kind"] == "lift")
+
+
+def _is_lift_on_contacts(given: Given) -> bool:
+    return _is_lift(given) and given["wiring"] != "gateway"
+
+
+def _in_table(name: str, given: Given) -> bool:
+    """Is this part of the register table needed?"""
+    if given["wiring"] != "gateway":
+        return False
+    if name == "motion_numbers":
+        return bool(given.get("motion_at", gateway.ABSENT) != gateway.ABSENT)
+    return _is_lift(given) or name in (*gateway.DOOR_PLACES, "door_numbers")
+
+
+def _offered(name: str, given: Given) -> str:
+    if name in gateway.PLACES:
+        return gateway.PLACES[name][1]
+    if name != "floor_numbers":
+        return "0,1,2"
+    floors = [floor for floor in given["floors"].split(",") if floor.strip()]
+    return ",".join(str(i) for i, _ in enumerate(floors, start=1))
+
+
+def _places() -> tuple[Question, ...]:
+    """Return the questions about a gateway's register table."""
+    return tuple(
+        Question(name, text, partial(_offered, name), needed=partial(_in_table, name))
+        for name, text in gateway.questions().items()
+    )
 
 
 def _on_the_header(given: Given) -> bool:
@@ -78,7 +110,7 @@ QUESTIONS: Final = (
         "unit",
         "The module's unit id?",
         lambda given: "1",
-        needed=lambda given: given["wiring"] in ("modbus", "rs485"),
+        needed=lambda given: given["wiring"] in ("modbus", "rs485", "gateway"),
     ),
     Question(
         "floors",
@@ -92,7 +124,7 @@ QUESTIONS: Final = (
         "Which inputs are wired?",
         lambda given: ",".join(OFFERED),
         lambda given: LIFT_INPUTS,
-        needed=_is_lift,
+        needed=_is_lift_on_contacts,
         several=True,
     ),
     Question(
@@ -100,7 +132,7 @@ QUESTIONS: Final = (
         "How do the lines show the floor?",
         lambda given: "binary",
         lambda given: get_args(Encoding),
-        needed=_is_lift,
+        needed=_is_lift_on_contacts,
     ),
     Question(
         "contacts",
@@ -116,6 +148,7 @@ QUESTIONS: Final = (
         lambda given: get_args(Level),
         needed=_on_the_header,
     ),
+    *_places(),
     Question("domain_id", "RMF's ROS_DOMAIN_ID?", lambda given: "0"),
 )
 
@@ -125,7 +158,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("file", type=Path, metavar="FILE", help="the YAML to write")
     parser.add_argument("--kind", choices=get_args(Kind))
     parser.add_argument("--name", help="as on RMF's map")
-    parser.add_argument("--wiring", choices=get_args(Wiring), help="modbus is Modbus TCP")
+    parser.add_argument(
+        "--wiring",
+        choices=get_args(Wiring),
+        help="modbus is contacts on Modbus TCP; gateway is registers",
+    )
     parser.add_argument("--address", help="host, serial port or CAN interface")
     parser.add_argument("--unit", help="unit id of a Modbus module")
     parser.add_argument("--floors", help="such as L1,L2,L3, from below")
@@ -135,6 +172,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--contacts", choices=get_args(Level), help="level of a closed contact")
     parser.add_argument("--relays", choices=get_args(Level), help="level that switches a relay on")
+    for name, (part, offered) in gateway.PLACES.items():
+        text = f"a gateway's place of {part}, such as {offered}"
+        parser.add_argument(f"--{name.replace('_', '-')}", metavar="PLACE", help=text)
+    for name, meanings in gateway.NUMBERS.items():
+        text = f"a gateway's numbers of {meanings}, such as 0,1,2"
+        parser.add_argument(f"--{name.replace('_', '-')}", metavar="N,N", help=text)
     parser.add_argument("--domain-id", help="RMF's ROS_DOMAIN_ID")
     parser.add_argument(
         "--from",
@@ -214,7 +257,8 @@ def _needed(question: Question, given: Given, args: argparse.Namespace) -> bool:
         return True
     if getattr(args, question.name) is not None:
         raise Impossible(
-            f"--{question.name} does not apply to a {given['kind']} on {given['wiring']}"
+            f"--{question.name.replace('_', '-')} does not apply"
+            f" to a {given['kind']} on {given['wiring']}"
         )
     return False
 
@@ -270,7 +314,8 @@ def answers(given: Given) -> DraftAnswers:
         raise Impossible(
             f"a lift has no input {', '.join(unknown)}; there are {', '.join(LIFT_INPUTS)}"
         )
-    return DraftAnswers(**told)
+    places = {name: told.pop(name) for name in TABLE if name in told}
+    return DraftAnswers(**told, places=places)
 
 
 def _number(name: str, text: str, most: int) -> int:

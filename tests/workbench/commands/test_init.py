@@ -33,7 +33,9 @@ def data(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def combinations() -> Iterator[tuple[str, ...]]:
     for kind, wirings in WIRINGS.items():
         for wiring in wirings:
-            for encoding in ("binary", "gray", "one_hot") if kind == "lift" else ("",):
+            for encoding in (
+                ("binary", "gray", "one_hot") if kind == "lift" and wiring != "gateway" else ("",)
+            ):
                 yield (kind, wiring, encoding)
 
 
@@ -71,6 +73,26 @@ def test_options_are_the_answers(tmp_path: Path) -> None:
         "door": {"point": "unit 3 discrete input 2", "active": "high", "proves": "open"},
     }
     assert list(load(file).devices) == ["no"]
+
+
+def test_a_gateway_is_drafted_from_its_register_table(tmp_path: Path) -> None:
+    file = tmp_path / "device.yaml"
+    words = ["init", str(file), "--kind", "lift", "--wiring", "gateway", "--yes"]
+    words += ["--floors", "G,1", "--address", "/dev/ttyS1", "--unit", "9", "--motion-at", "none"]
+    words += ["--floor-at", "holding register 7", "--floor-numbers", "0,5"]
+    words += ["--fire-alarm-at", "discrete input 4", "--request-at", "coil 2"]
+    assert cli.main(words) == 0
+    assert list(load(file).devices) == ["Lift1"]
+    written = safe_load(file.read_text())
+    assert written["driver"] == "register"
+    assert written["buses"]["line"]["serial"]["port"] == "/dev/ttyS1"
+    found = written["lifts"]["Lift1"]["map"]
+    assert found["floor"] == {"at": "holding register 7", "codes": {0: "G", 5: "1"}}
+    assert found["fire_alarm"] == {"at": "discrete input 4", "active": "high"}
+    assert found["agv_mode"] == {"at": "input register 3", "bit": 0, "active": "high"}
+    assert found["commands"]["agv_mode_request"]["at"] == "coil 2"
+    assert found["commands"]["call"]["none"] == 1  # 0 is a floor here
+    assert "motion" not in found
 
 
 @pytest.mark.parametrize("contacts", ["high", "low"])
@@ -123,6 +145,11 @@ def test_a_missing_folder_is_reported_before_any_question_is_asked(
         ("--kind door --unit 0 --yes", "unit is '0': write a whole number from 1 to 247"),
         ("--kind door --domain-id x --yes", "domain_id is 'x': write a whole number from 0 to 232"),
         ("--kind charger --wiring http --address x_y!:z --yes", "with these answers check would"),
+        ("--kind door --wiring gateway --door-numbers 0,1 --yes", "door_numbers is '0,1': write"),
+        ("--kind door --wiring gateway --door-numbers 0,0,1 --yes", "door_numbers is '0,0,1'"),
+        ("--kind door --wiring gateway --floor-at x --yes", "--floor-at does not apply"),
+        ("--kind lift --wiring gateway --encoding gray --yes", "--encoding does not apply"),
+        ("--kind door --wiring gateway --hold-at 40001 --yes", "with these answers check would"),
         ("--kind door --name= --yes", "'' is not a name for a door"),
     ],
 )

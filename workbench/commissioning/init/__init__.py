@@ -12,15 +12,16 @@ import msgspec
 from drivers.charger import dry_contact as charger
 from drivers.door import dry_contact as door
 from drivers.lift import wiring
+from workbench.commissioning.init import gateway
 from workbench.commissioning.init.answers import LIFT_INPUTS, DraftAnswers, Impossible
 from workbench.commissioning.init.points import FreePoints, points_for
 from workbench.commissioning.reference import meaning
 
-DRIVERS: Final = {"http": "http", "can": "canopen"}
+DRIVERS: Final = {"http": "http", "can": "canopen", "gateway": "register"}
 """The driver for each wiring; `dry_contact` for wirings not listed."""
 WIRINGS: Final = {
-    "lift": ("gpio", "modbus", "rs485"),
-    "door": ("modbus", "rs485", "gpio", "http"),
+    "lift": ("gpio", "modbus", "rs485", "gateway"),
+    "door": ("modbus", "rs485", "gpio", "http", "gateway"),
     "charger": ("http", "can", "modbus", "rs485", "gpio"),
 }
 BUSES: Final = {
@@ -36,6 +37,7 @@ ADDRESSES: Final = {
     "rs485": "/dev/ttyUSB0",
     "http": "192.168.1.60",
     "can": "can0",
+    "gateway": "192.168.1.60",
 }
 """The address offered for each wiring; a GPIO header has no address."""
 HAZARDS: Final = LIFT_INPUTS[:7]
@@ -86,7 +88,7 @@ def draft(answers: DraftAnswers) -> str:
         f"  domain_id: {answers.domain_id}           # RMF's ROS_DOMAIN_ID",
         "",
         "buses:",
-        BUSES[answers.wiring].format(address=quoted(address)),
+        BUSES[_bus(answers.wiring, address)].format(address=quoted(address)),
         "",
         f"{answers.kind}s:",
         f"  {quoted(answers.name)}:",
@@ -95,11 +97,21 @@ def draft(answers: DraftAnswers) -> str:
     return "\n".join(lines) + "\n"
 
 
+def _bus(wiring: str, address: str) -> str:
+    """Return the key in BUSES; a gateway is on a serial line if its address is a device file."""
+    if wiring != "gateway":
+        return wiring
+    return "rs485" if address.startswith("/") else "modbus"
+
+
 def _lift(answers: DraftAnswers, points: FreePoints) -> Iterator[str]:
-    """Return the lines below the name of a lift on contacts."""
+    """Return the lines below the name of a lift, on contacts or on a gateway."""
     floors = [quoted(floor) for floor in answers.floors]
     if len(floors) < 2 or len(set(floors)) < len(floors):
         raise Impossible(f"a lift has at least two floors, each name once, not {', '.join(floors)}")
+    if answers.wiring == "gateway":
+        yield from gateway.lift(answers, floors)
+        return
     calls = [
         f"      {floor}: {{{points.relay()}}}" for floor in floors
     ]  # floors first, because they need most pins
@@ -146,9 +158,12 @@ def _floor_code(answers: DraftAnswers, floors: list[str], points: FreePoints) ->
 
 
 def _door(answers: DraftAnswers, points: FreePoints) -> Iterator[str]:
-    """Return the lines below the name of a door, on contacts or on an HTTP relay."""
+    """Return the lines below the name of a door, on contacts, an HTTP relay or registers."""
     if answers.wiring == "http":
         yield from SHELLY.splitlines()
+        return
+    if answers.wiring == "gateway":
+        yield from gateway.door(answers)
         return
     yield "    inputs:"
     for end in ("opened", "closed"):

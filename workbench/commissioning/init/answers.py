@@ -1,11 +1,12 @@
 """The answers from which a draft is made."""
 
+from collections.abc import Mapping
 from typing import Final, Literal
 
 import msgspec
 
 Kind = Literal["lift", "door", "charger"]
-Wiring = Literal["gpio", "modbus", "rs485", "http", "can"]
+Wiring = Literal["gpio", "modbus", "rs485", "http", "can", "gateway"]
 Encoding = Literal["binary", "gray", "one_hot"]
 Level = Literal["high", "low"]
 
@@ -26,7 +27,8 @@ class DraftAnswers(msgspec.Struct, frozen=True, kw_only=True):
 
     `address`: host, serial port or CAN interface; "" for the usual address. `floors`: RMF's names, from
     below. `signals`: a lift's inputs. `contacts`: the level of a closed contact on the header: high
-    if wired to 3.3 V, low if wired to ground. `relays`: the level that switches relays on.
+    if wired to 3.3 V, low if wired to ground. `relays`: the level that switches relays on. `places`: a
+    gateway's answers, by the names in `gateway.py`.
     """
 
     kind: Kind
@@ -40,3 +42,4 @@ class DraftAnswers(msgspec.Struct, frozen=True, kw_only=True):
     encoding: Encoding = "binary"
     contacts: Level = "high"
     relays: Level = "high"
+    places: Mapping[str, str] = {}
