@@ -104,15 +104,22 @@ def exit_codes() -> str:
 
 def laws() -> str:
     """Return the page of the laws of `rmf-bridge judge`."""
-    return LAWS_HEAD + "".join(f"\n## Of a {kind}\n\n{markdown(kind)}\n" for kind in KINDS)
+    return LAWS_HEAD + "".join(f"\n## Of {OF[kind]}\n\n{markdown(kind)}\n" for kind in KINDS)
 
 
+OF: Final = {
+    "lift": "a lift",
+    "door": "a door",
+    "charger": "a charger",
+    "adapter": "a fleet's adapter",
+}
 LAWS_HEAD: Final = """\
 # Laws
 
-What RMF's supervisors and fleet adapters need of any node for a lift, door or charger. `rmf-bridge
-judge` holds a node against them ([how](../how-to/judge.md)); `rmf-bridge judge KIND --laws` prints
-them. A stuck or noisy wire below a right node can break a law marked with \\* too.
+What RMF's supervisors and fleet adapters need of any node for a lift, door or charger, and what lifts
+and doors need of a fleet's adapter. `rmf-bridge judge` holds a node against them
+([how](../how-to/judge.md)); `rmf-bridge judge KIND --laws` prints them. A stuck or noisy wire below a
+right node can break a law marked with \\* too.
 
 No part of RMF sends ChargerRequest, and RMF has no names for its topics: `charger_states`,
 `charger_requests` and `charger_cancels` are ours (`topics:` in a YAML given by `--config` renames

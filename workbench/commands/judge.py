@@ -1,4 +1,4 @@
-"""`rmf-bridge judge`: check any lift, door or charger node against RMF's contract.
+"""`rmf-bridge judge`: check any lift, door or charger node, or a fleet adapter, against RMF's contract.
 
 `workbench/judge/` has the laws and the plays; here are the options, the graph, the clock and the
 verdict. Exit code 0: every observed law is kept. 1: a law is broken. 2: a wrong command line. 66: the
@@ -46,6 +46,7 @@ STATES = {
     "lift": topics.LIFT_STATES.name,
     "door": topics.DOOR_STATES.name,
     "charger": topics.CHARGER_STATES.name,
+    "adapter": topics.ADAPTER_LIFT_REQUESTS.name,
 }
 WIDTH = 120
 BESIDE: dict[str, tuple[str, ...]] = {
@@ -63,7 +64,12 @@ BESIDE: dict[str, tuple[str, ...]] = {
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options: device, time, and play."""
     parser.add_argument("kind", choices=KINDS)
-    parser.add_argument("name", metavar="NAME", nargs="?", help="the device, as RMF names it")
+    parser.add_argument(
+        "name",
+        metavar="NAME",
+        nargs="?",
+        help="the device as RMF names it; an adapter: FLEET, or FLEET/ROBOT",
+    )
     add_graph_arguments(parser)
     parser.add_argument(
         "--for",
@@ -144,7 +150,10 @@ def performance_of(args: argparse.Namespace) -> Scenario | None:
     if not wanted and not args.active:
         return None
     if wanted != [args.kind]:
-        args.usage("a lift is played by --ride A B, a door by --passages N, a charger by --charge")
+        args.usage(
+            "a lift is played by --ride A B, a door by --passages N, a charger by --charge; an"
+            " adapter is only listened to"
+        )
     if not args.active:
         args.usage(f"the play moves {words_of(args)}: add --active")
     if args.restarts and not args.localhost:
@@ -250,7 +259,9 @@ class Live:
     ) -> None:
         self._transport = transport
         self._publishers: dict[str, Publisher[Message]] = {}
-        self._ear = Ear(transport, (*OF_DEVICES, FIRE.live()), others_only=True)
+        self._ear = Ear(
+            transport, (*OF_DEVICES, FIRE.live(), topics.FLEET_STATES), others_only=True
+        )
         self._retained = transport.subscribe(FIRE, lambda message: None)
         allowed = {topic for name in beside for topic in BESIDE[name]}
         speaks = {topic.name for topic in performance.speaks} if performance else set()

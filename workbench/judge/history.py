@@ -52,34 +52,82 @@ def keep(known: dict[str, V], key: str, value: V, most: int = REMEMBERED) -> Non
         del known[next(iter(known))]
 
 
-class History(ABC, Generic[T]):
-    """One device. Times are those of the messages (s).
+class AnyHistory(ABC):
+    """The common part of all histories. Times are those of the messages (s).
 
-    `news`: the message taken last, None when only time has passed; `own`: the judge sent it. `seen`:
-    the device's observations. `before`: the state before the latest, None at the first one, and after a
-    pause, because the node may have restarted; `since`: time of that. `frozen_s`: time for which the
-    states have shown the same stamp; `claimed_s`: time for which each `claims` what a robot acts on.
-    `burst_s`: time taken by the latest BURST unchanged states. `asked_last`: the latest request.
-    `senders`: the publishers on the states' topic; none in a recording. `network_s`: the part of the
-    time since the state before in which the network was silent: nobody was heard, though other devices
-    had been. `silences`: the beginnings (wall clock) and lengths (s) of the first SILENCES of these.
+    `news`: the message taken last, None when only time has passed; `own`: the judge sent it. `states`:
+    the number of states, or of an adapter's requests. `senders`: the publishers on their topic; none in
+    a recording. `others`: others of the kind. `network_s`: the part of the time since the state before
+    in which the network was silent: nobody was heard, though other devices had been. `silences`: the
+    beginnings (wall clock) and lengths (s) of the first SILENCES of these.
+    `burst_s`: time taken by the latest BURST unchanged states.
+    """
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+        self.now = NOT_YET
+        self.news: d.Message | None = None
+        self.own = False
+        self.states = 0
+        self.senders: tuple[str, ...] = ()
+        self.others: set[str] = set()
+        self.network_s = 0.0
+        self.silences: list[tuple[float, float]] = []
+        self.burst_s = float("inf")
+        self._any_at = self._other_at = NOT_YET
+
+    @abstractmethod
+    def take(self, heard: Heard, own: bool = False) -> bool:
+        """Take a message; `own`: the judge's. False if no law need be checked."""
+
+    @property
+    def state(self) -> words.Stated | None:
+        """The latest state, if a device is judged."""
+        return None
+
+    @abstractmethod
+    def checked(self) -> None:
+        """Note that the laws have read the latest message."""
+
+    def pass_time(self, now: float, wall: float) -> None:
+        """Note that time has passed without a message."""
+        self.now, self.news = now, None
+        self._end_silence(now, wall)
+        self._any_at = now
+
+    def _begin(self, heard: Heard, own: bool) -> None:
+        """Note a message's time."""
+        self.now, self.news, self.own = heard.at, heard.message, own
+        if not own:
+            self._end_silence(heard.at, heard.wall)
+            self._any_at = heard.at
+
+    def _end_silence(self, now: float, wall: float) -> None:
+        """Note a silence of the network: nothing came, though other devices had been heard too."""
+        silent_s = now - self._any_at
+        if silent_s > PAUSE_S and self._any_at - self._other_at <= SLOWEST_S:
+            self.network_s += silent_s - PAUSE_S  # the slowest node may be silent for so long
+            if silent_s > SLOWEST_S:
+                self.silences = [*self.silences, (wall - silent_s, silent_s)][:SILENCES]
+
+
+class History(AnyHistory, Generic[T]):
+    """One device.
+
+    `seen`: the device's observations. `before`: the state before the latest, None at the first one, and
+    after a pause, because the node may have restarted; `since`: time of that. `frozen_s`: time for
+    which the states have shown the same stamp; `claimed_s`: time for which each `claims` what a robot
+    acts on. `asked_last`: the latest request.
     """
 
     observes: ClassVar[type[AnyDevice]]
 
     def __init__(self, name: str) -> None:
-        self.name = name
+        super().__init__(name)
         self.seen: AnyDevice = self.observes(name, Moment(0.0, 0.0))
-        self.now = self.since = NOT_YET
-        self.news: d.Message | None = None
+        self.since = NOT_YET
         self.before: T | None = None
-        self.frozen_s = self.claimed_s = self.network_s = 0.0
-        self.burst_s = float("inf")
-        self.senders: tuple[str, ...] = ()
-        self.silences: list[tuple[float, float]] = []
-        self.states = 0
-        self.own = False
-        self.others: set[str] = set()
+        self.frozen_s = self.claimed_s = 0.0
         self._unchanged: deque[float] = deque(maxlen=BURST)
         self._stamp = self._moved_at = self._claims_since = NOT_YET
         self.asked_last = self._quiet_since = NOT_YET
@@ -87,16 +135,12 @@ class History(ABC, Generic[T]):
         self._quiet: deque[float] = deque(maxlen=15)
         self._usual_s = self._catches_up_s = 0.0
         self._gaps: deque[float] = deque(maxlen=RHYTHM)
-        self._any_at = self._other_at = NOT_YET
 
     def take(self, heard: Heard, own: bool = False) -> bool:
         """Take a message; `own`: the judge's. False if no law need be checked, because it is not about
         this device."""
-        self.now, self.news, self.own = heard.at, heard.message, own
+        self._begin(heard, own)
         message = heard.message
-        if not own:
-            self._end_silence(heard.at, heard.wall)
-            self._any_at = heard.at
         if not isinstance(message, words.Stated | words.Requested):
             return self.take_other(heard)
         if (words.kind(message), words.device(message)) == (self.seen.kind, self.name):
@@ -111,20 +155,6 @@ class History(ABC, Generic[T]):
                 self.others.add(words.device(message))
             return False
         return self.take_other(heard)
-
-    def pass_time(self, now: float, wall: float) -> None:
-        """Note that time has passed without a message."""
-        self.now, self.news = now, None
-        self._end_silence(now, wall)
-        self._any_at = now
-
-    def _end_silence(self, now: float, wall: float) -> None:
-        """Note a silence of the network: nothing came, though other devices had been heard too."""
-        silent_s = now - self._any_at
-        if silent_s > PAUSE_S and self._any_at - self._other_at <= SLOWEST_S:
-            self.network_s += silent_s - PAUSE_S  # the slowest node may be silent for so long
-            if silent_s > SLOWEST_S:
-                self.silences = [*self.silences, (wall - silent_s, silent_s)][:SILENCES]
 
     @abstractmethod
     def take_other(self, heard: Heard) -> bool:

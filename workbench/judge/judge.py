@@ -1,28 +1,33 @@
-"""Check one device's messages against the laws of its kind."""
+"""Check the messages of one device, or of one fleet's adapter, against the laws of its kind."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import Any, Final
+from typing import Any, Final, Literal
 
+from bridges.messages import words
 from bridges.messages.heard import Heard
-from bridges.messages.words import KINDS as KINDS
-from bridges.messages.words import Kind as Kind
-from workbench.judge import charger_laws, door_laws, lift_laws
+from workbench.judge import adapter_laws, charger_laws, door_laws, lift_laws
+from workbench.judge.adapter_history import AdapterHistory
 from workbench.judge.charger_history import ChargerHistory
 from workbench.judge.door_history import DoorHistory
-from workbench.judge.history import History
+from workbench.judge.history import AnyHistory
 from workbench.judge.law import Doubt, Evidence, JudgedLaw, Law, Verdict
 from workbench.judge.lift_history import LiftHistory
 
+Kind = words.Kind | Literal["adapter"]
+KINDS: Final[tuple[Kind, ...]] = (*words.KINDS, "adapter")
 LAWS: Final[Mapping[Kind, tuple[Law[Any], ...]]] = MappingProxyType(
-    {"lift": lift_laws.LAWS, "door": door_laws.LAWS, "charger": charger_laws.LAWS}
+    {
+        "lift": lift_laws.LAWS,
+        "door": door_laws.LAWS,
+        "charger": charger_laws.LAWS,
+        "adapter": adapter_laws.LAWS,
+    }
 )
-SCENES: Final[Mapping[Kind, type[History[Any]]]] = MappingProxyType(
-    {"lift": LiftHistory, "door": DoorHistory, "charger": ChargerHistory}
+SCENES: Final[Mapping[Kind, Callable[[str], AnyHistory]]] = MappingProxyType(
+    {"lift": LiftHistory, "door": DoorHistory, "charger": ChargerHistory, "adapter": AdapterHistory}
 )
-LEEWAY_S: Final = 1.0
-"""Greatest difference (s) in the arrival of two topics."""
 MUTE_S: Final = 10.0
 """A publisher that sends no state in this time (s) would not send one to RMF."""
 SHOWN: Final = 3
@@ -130,6 +135,6 @@ class Judge:
             doubt, evidence = tally.doubt
             if doubt.excused():
                 tally.doubt = None
-            elif now - evidence.at > LEEWAY_S:
+            elif now - evidence.at > doubt.leeway_s:
                 tally.doubt = None
                 self._breaks(tally, evidence)

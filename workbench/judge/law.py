@@ -9,6 +9,8 @@ from bridges.messages import words
 
 S_contra = TypeVar("S_contra", contravariant=True)
 
+LEEWAY_S: Final = 1.0
+"""Greatest difference (s) in the arrival of two topics."""
 LONGEST: Final = 60
 """Limit of a network name's length when shown."""
 
@@ -26,11 +28,12 @@ class Doubt:
     """A law looks broken, unless a message still on its way explains it.
 
     Topics have no common order on a wire: a lift's state may be heard before the END that caused it.
-    `excused()` is called again at each message, for `LEEWAY_S`.
+    `excused()` is called again at each message, for `leeway_s`.
     """
 
     text: str
     excused: Callable[[], bool]
+    leeway_s: float = LEEWAY_S
 
 
 Finding = str | Doubt | None

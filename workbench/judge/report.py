@@ -19,7 +19,8 @@ NARROWEST: Final = 60
 @dataclass(frozen=True, slots=True)
 class Judgement:
     """One judgement. `wall`: its beginning (s since the epoch). `heard_s`: time of listening.
-    `states`: number heard. `others`: other devices of its kind. `notes`: the listener's remarks.
+    `states`: number heard; of an adapter, requests. `others`: others of its kind. `notes`: the
+    listener's remarks.
     `silences` of the whole network: beginning (s since the epoch) and length (s)."""
 
     kind: Kind
@@ -49,10 +50,12 @@ def text(report: Judgement, width: int) -> str:
     """Format one screen: broken laws first, with their evidence; a line for each other one."""
     name = words.printable(report.name)
     if not report.states and not report.of(Verdict.BROKEN):
-        lines = [f"{report.kind} {name}: no state heard in {report.heard_s:.0f} s{_others(report)}"]
+        heard = f"no {_counted(report)} heard in {report.heard_s:.0f} s"
+        lines = [f"{report.kind} {name}: {heard}{_others(report)}"]
         return "\n".join([*lines, *report.notes])
     counts = ", ".join(f"{len(report.of(verdict))} {verdict}" for verdict in ORDER)
-    head = f"{report.kind} {name}: {counts}; {report.states} states in {report.heard_s:.0f} s"
+    head = f"{report.kind} {name}: {counts}; {report.states} {_counted(report)}s"
+    head += f" in {report.heard_s:.0f} s"
     lines = [head, ""]
     for verdict in ORDER:
         for judged in report.of(verdict):
@@ -62,6 +65,10 @@ def text(report: Judgement, width: int) -> str:
         for wall, silent_s in report.silences
     ]
     return "\n".join([*lines, *(f"\n{note}" for note in (*quiet, *report.notes))])
+
+
+def _counted(report: Judgement) -> str:
+    return "request" if report.kind == "adapter" else "state"
 
 
 def _lines(judged: JudgedLaw, width: int) -> list[str]:

@@ -14,8 +14,10 @@ from bridges.messages.releases import JAZZY
 from bridges.messages.stamps import stamp
 from tests.site.timeline import EPOCH
 from tests.workbench.judge.script import lift
+from tests.workbench.judge.test_adapter_occasions import STORIES
 from tests.workbench.replay.written import MCAP, SQLITE, write
 
+CALLED_BACK = STORIES["A7.rides"][2]
 CORPUS = Path(__file__).parents[1] / "replay" / "corpus"
 
 
@@ -98,6 +100,21 @@ def test_a_recording_of_rosbag2_shows_the_law_the_message_and_the_time(
     assert [suite.get(key) for key in ("tests", "failures")] == [str(len(told["laws"])), "1"]
     [failure] = suite.iter("failure")
     assert failure.get("message", "").endswith(text)
+
+
+def test_a_fleet_adapter_is_judged_from_a_recording(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    told = [Heard(at, EPOCH + at, topic.name, message) for at, topic, message in CALLED_BACK]
+    bag = write(tmp_path / "bag", sorted(told, key=lambda one: one.at), JAZZY)
+    assert main(["judge", "adapter", "fleet", "--recording", str(bag)]) == 1
+    out = capsys.readouterr().out
+    assert "adapter fleet: 2 broken, " in out
+    assert "BROKEN    A7.floor" in out
+    assert "BROKEN    A7.rides" in out
+    assert "'fleet/red' asks for 'L2' on its ride to 'L3'" in out
+    assert main(["judge", "adapter", "nobody", "--recording", str(bag)]) == 69
+    assert "adapter nobody: no request heard in 21 s; heard: 'fleet'" in capsys.readouterr().out
 
 
 def test_a_recording_is_judged_from_a_time_to_a_time(

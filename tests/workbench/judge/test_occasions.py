@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 from msgspec.structs import replace
 
-from bridges.messages import topics
+from bridges.messages import topics, words
 from bridges.messages.definitions import Bool
 from bridges.messages.heard import Heard
 from tests.workbench.judge.test_limits import (
@@ -41,7 +41,7 @@ from tests.workbench.judge.test_limits import (
     stays_shut,
     to_door,
 )
-from workbench.judge.judge import KINDS, LAWS, Judge, Kind
+from workbench.judge.judge import LAWS, Judge, Kind
 
 ERROR, RELEASED = 200, 4
 HUMAN, OFFLINE = 1, 4
@@ -312,7 +312,7 @@ def test_a_law_needs_its_occasion(kind: Kind, law: str) -> None:
 
 
 def test_every_law_has_its_stories() -> None:
-    assert list(STORIES) == [(kind, law.id) for kind in KINDS for law in LAWS[kind]]
+    assert list(STORIES) == [(kind, law.id) for kind in words.KINDS for law in LAWS[kind]]
 
 
 def test_a_charge_may_be_taken_over_only_after_its_end() -> None:

@@ -23,12 +23,13 @@ HEARD: tuple[AnyTopic, ...] = (
     *(topics.DOOR_STATES, topics.DOOR_REQUESTS, topics.ADAPTER_DOOR_REQUESTS),
     *(topics.DOOR_SUPERVISOR_HEARTBEAT, topics.FIRE_ALARM_TRIGGER.live()),
     *(topics.CHARGER_STATES, topics.CHARGER_REQUESTS, topics.CHARGER_CANCELS),
-    topics.CHARGER_REFUSALS,
+    *(topics.CHARGER_REFUSALS, topics.FLEET_STATES),
 )
 STATES: dict[Kind, AnyTopic] = {
     "lift": topics.LIFT_STATES,
     "door": topics.DOOR_STATES,
     "charger": topics.CHARGER_STATES,
+    "adapter": topics.ADAPTER_LIFT_REQUESTS,
 }
 Verdicts = dict[str, set[str]]
 

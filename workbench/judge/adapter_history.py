@@ -1,0 +1,269 @@
+"""The history of a fleet's adapter: what its robots asked of lifts and doors, and what these showed."""
+
+from collections import deque
+from copy import copy
+from dataclasses import dataclass
+from typing import Final
+
+from bridges.messages import definitions as d
+from bridges.messages import topics, words
+from bridges.messages.heard import Heard
+from bridges.messages.stamps import in_seconds
+from bridges.observe.all_devices import AnyDevice, PlainGraph
+from bridges.observe.door import ObservedDoor
+from bridges.observe.lift import END, HAZARDS, ObservedLift
+from bridges.observe.limits import GIVEN_UP_S, REQUESTER_SILENT_S, SLOWEST_S
+from bridges.observe.requesters import DeviceRequester, Moment
+from workbench.judge.history import NOT_YET, REMEMBERED, AnyHistory, keep
+
+IGNORED: Final = 5
+"""So many states without a word are no loss of the network's, if the fleet was heard meanwhile."""
+ALARMS_S: Final = 60.0
+"""For this long (s) after an alarm's news robots may change their way."""
+BACK_S: Final = 0.5
+ADAPTERS: Final = (topics.ADAPTER_LIFT_REQUESTS.name, topics.ADAPTER_DOOR_REQUESTS.name)
+
+
+@dataclass(slots=True)
+class Wish(DeviceRequester):
+    """One robot's visit to one device. `met`: since its latest wish, the device has once shown all that
+    RMF's phase waits for. `whole`: heard from its beginning. `inside`: it has asked for another floor
+    after a wish was met, so the robot is in the car. `came_from`: the floor before. `held_at`: when a
+    state last showed its session. `ignored`: states in a row without its word, while its fleet was
+    heard, from `ignored_since`; `lapsed`: a first request was left alone for so long. `spare`: ENDs
+    since a state last showed its session. `passed`: a later passage has begun without its CLOSE.
+    `visits`: the kind of device, and the visitor."""
+
+    whole: bool = False
+    inside: bool = False
+    came_from: str = ""
+    held_at: float = NOT_YET
+    ignored: int = 0
+    ignored_since: float = NOT_YET
+    lapsed: bool = False
+    spare: int = 0
+    passed: bool = False
+
+    visits: str = ""
+
+    def ignored_s(self, now: float) -> float:
+        """Return for how long (s) states have been ignored; 0 before IGNORED of them."""
+        return now - self.ignored_since if self.ignored >= IGNORED else 0.0
+
+
+class AdapterHistory(AnyHistory):
+    """`name`: a fleet, or fleet/robot. `device`, `wish`, `was`: of the latest request, with the visit
+    before it. `stated`: the visits to the device of the latest state. `listed`: the robots in the
+    fleet's states, of which `lists` were heard. `back`: steps back of the stamps, by robot and topic.
+    `lapses`: in a row, by `Wish.visits`: waits with one request. `unclosed`: by robot: passages
+    without CLOSE."""
+
+    def __init__(self, name: str) -> None:
+        super().__init__(name)
+        self.fleet = name.partition("/")[0]
+        self.graph = PlainGraph()
+        self.device: AnyDevice | None = None
+        self.wish: Wish | None = None
+        self.was: Wish | None = None
+        self.stated: list[Wish] = []
+        self.listed: set[str] = set()
+        self.lists = 0
+        self.stamped = self.stepped = False
+        self.back: dict[str, int] = {}
+        self.lapses: dict[str, int] = {}
+        self.unclosed: dict[str, int] = {}
+        self._wishes: dict[str, Wish] = {}
+        self._tasks: dict[str, tuple[str, float]] = {}
+        self._stamps: dict[str, tuple[float, deque[d.Message]]] = {}
+        self._alarm: d.Message = d.Bool(False)
+        self._began = self._alive_at = self._alarm_at = NOT_YET
+
+    def take(self, heard: Heard, own: bool = False) -> bool:
+        """Take a message of any device or fleet."""
+        if heard.at - self._any_at > SLOWEST_S:
+            self._forget(heard.at)
+        self._begin(heard, own)
+        self.wish = self.was = None
+        self.stated = []
+        message, moment = heard.message, Moment(heard.at, heard.wall)
+        if isinstance(message, d.LiftRequest | d.DoorRequest):
+            if heard.topic in ADAPTERS and self._is_replayed(message):
+                return False
+        elif not isinstance(message, d.FleetState):
+            self._other_at = heard.at
+        found = [device for device, _ in self.graph.hear(heard)]
+        match message:
+            case d.FleetState():
+                self._list(message)
+            case d.EmergencySignal() | d.Bool() if message != self._alarm:
+                self._alarm, self._alarm_at = message, heard.at
+            case d.LiftRequest() | d.DoorRequest() if found and heard.topic in ADAPTERS:
+                return self._ask(found[0], message, moment)
+            case d.LiftState() | d.DoorState() if found:
+                return self._show(found[0], moment)
+            case d.SupervisorHeartbeat():
+                for device in found:
+                    self._meet(device, moment)
+        return False
+
+    def checked(self) -> None:
+        """Note that the laws have read the latest message."""
+        self.network_s = 0.0
+
+    def is_ours(self, who: str) -> bool:
+        """Is this requester the judged robot, or one of the judged fleet?"""
+        return who == self.name or who.startswith(f"{self.name}/")
+
+    def excused(self, wish: Wish) -> bool:
+        """May the robot change its way: a hazard or an alarm, or another task since its wish?"""
+        state = self.device.state if self.device else None
+        hazard = isinstance(state, d.LiftState) and state.current_mode in HAZARDS
+        task_at = self._tasks.get(wish.who, ("", NOT_YET))[1]
+        return hazard or self.now - self._alarm_at < ALARMS_S or task_at >= wish.since.at
+
+    def _forget(self, now: float) -> None:
+        """Begin anew after a silence of everybody: anything may have been missed."""
+        self._began = now
+        self._wishes.clear()
+
+    def _list(self, fleet: d.FleetState) -> None:
+        if fleet.name != self.fleet:
+            return
+        self.lists, self._alive_at = self.lists + 1, self.now
+        for robot in fleet.robots:
+            who = f"{fleet.name}/{robot.name}"
+            if len(self.listed) < REMEMBERED:
+                self.listed.add(who)
+            if self._tasks.get(who, ("",))[0] != robot.task_id:
+                keep(self._tasks, who, (robot.task_id, self.now))
+
+    # ---- requests
+
+    def _is_replayed(self, message: d.LiftRequest | d.DoorRequest) -> bool:
+        """Note the stamp. Is this an old message, retained for a late listener?"""
+        who = message.session_id if isinstance(message, d.LiftRequest) else message.requester_id
+        key, at = f"{words.kind(message)} {who}", in_seconds(message.request_time)
+        newest, recent = self._stamps.get(key, (0.0, deque(maxlen=100)))
+        older = 0.0 < at < newest - BACK_S
+        again = 0.0 < at < newest and message in recent
+        if again or (older and self.now - self._began < GIVEN_UP_S):
+            return True
+        recent.append(message)
+        self.stamped, self.stepped = at > 0.0, older
+        if at > 0.0:
+            keep(self._stamps, key, (at, recent))
+        if older:
+            keep(self.back, who, self.back.get(who, 0) + 1)
+        return False
+
+    def _ask(self, device: AnyDevice, message: d.LiftRequest | d.DoorRequest, now: Moment) -> bool:
+        if isinstance(message, d.LiftRequest):
+            who, wants = message.session_id, message.destination_floor
+            ends = message.request_type == END
+        else:
+            who, wants = (
+                message.requester_id,
+                words.plain(d.DoorModeValue, message.requested_mode.value),
+            )
+            ends = wants == "closed"
+        if not self.is_ours(who):
+            fleet = who.partition("/")[0]
+            if fleet != self.fleet and len(self.others) < REMEMBERED:
+                self.others.add(fleet)
+            return False
+        self.states, self._alive_at, self.device = self.states + 1, self.now, device
+        key = f"{device.kind} {device.id} {who}"
+        old = self._wishes.get(key)
+        self.was = copy(old)
+        if old is None or (not ends and self._is_new_visit(device, old)):
+            heard_long = now.at - self._began > REQUESTER_SILENT_S
+            old = Wish(
+                who,
+                wants,
+                now,
+                now,
+                now,
+                now,
+                whole=heard_long and not _holds(device, who),
+                visits=f"{device.kind} {who}",
+            )
+            self._begin_passage(old, device)
+            keep(self._wishes, key, old)
+        self.wish = old
+        self._say(old, "" if ends else wants, now)
+        return True
+
+    def _say(self, wish: Wish, wants: str, now: Moment) -> None:
+        """Take its word; `wants` is empty for END and CLOSE."""
+        if not wants:
+            wish.ended = wish.ended or now
+            wish.spare += 1
+            if isinstance(self.device, ObservedDoor):
+                self.unclosed[wish.who] = 0
+        elif wants != wish.wants:
+            wish.inside = wish.inside or wish.met is not None
+            wish.came_from, wish.wants, wish.since, wish.times = wish.wants, wants, now, 0
+            wish.met, wish.lapsed = None, False
+        elif wish.times and wish.ignored < IGNORED:
+            self.lapses[wish.visits] = 0
+        wish.times += bool(wants)
+        wish.last, wish.ignored = now, 0
+
+    def _is_new_visit(self, device: AnyDevice, wish: Wish) -> bool:
+        silent_s = self.now - wish.last.at
+        if wish.ended or not isinstance(device, ObservedLift):
+            return wish.ended is not None or silent_s > REQUESTER_SILENT_S
+        return silent_s > GIVEN_UP_S and not _holds(device, wish.who)
+
+    def _begin_passage(self, begun: Wish, device: AnyDevice) -> None:
+        """Count the robot's earlier passages of doors that lack a CLOSE."""
+        if not isinstance(device, ObservedDoor) or begun.wants != "open":
+            return
+        for key, wish in self._wishes.items():
+            if key.startswith("door ") and wish.who == begun.who and not wish.ended:
+                if wish.met and not wish.passed:
+                    keep(self.unclosed, wish.who, self.unclosed.get(wish.who, 0) + 1)
+                wish.passed = True
+
+    # ---- states
+
+    def _of(self, device: AnyDevice) -> list[Wish]:
+        begin = f"{device.kind} {device.id} "
+        return [wish for key, wish in self._wishes.items() if key == begin + wish.who]
+
+    def _show(self, device: AnyDevice, now: Moment) -> bool:
+        holder = device.session.value if isinstance(device, ObservedLift) else ""
+        key = f"{device.kind} {device.id} {holder}"
+        if self.is_ours(holder) and key not in self._wishes:
+            keep(self._wishes, key, Wish(holder, "", now, now, now, now))
+        self.stated = self._of(device)
+        before = now.at - device.gap_s
+        for wish in self.stated:
+            self._count(wish, before)
+            if _holds(device, wish.who):
+                wish.held_at, wish.spare = self.now, 0
+            elif wish.held_at > NOT_YET and self.now - wish.last.at > REQUESTER_SILENT_S:
+                wish.ended = wish.ended or now  # its END was not heard
+        self._meet(device, now)
+        return bool(self.stated)
+
+    def _count(self, wish: Wish, before: float) -> None:
+        """Count the state, if the wish was not spoken of since the state before."""
+        if wish.last.at >= before:
+            wish.ignored = 0
+        elif self._alive_at > before:
+            wish.ignored_since = wish.ignored_since if wish.ignored else before
+            wish.ignored += 1
+        lapses = wish.times == 1 and not wish.met and not wish.ended
+        if lapses and wish.ignored_s(self.now) > SLOWEST_S and not wish.lapsed:
+            wish.lapsed = True
+            keep(self.lapses, wish.visits, self.lapses.get(wish.visits, 0) + 1)
+
+    def _meet(self, device: AnyDevice, now: Moment) -> None:
+        for wish in self._of(device):
+            if wish.met is None and not wish.ended and device.matches(wish):
+                wish.met = now
+
+
+def _holds(device: AnyDevice, who: str) -> bool:
+    return isinstance(device, ObservedLift) and device.session.value == who

@@ -1,0 +1,310 @@
+"""The laws of a fleet's adapter, beside any lift and door.
+
+The place of the robot is not on the graph: a request for another floor stands for its entry, and END
+for its exit. The states that were shown tell what its adapter could know.
+"""
+
+from collections.abc import Callable
+from typing import Final
+
+from bridges.messages import definitions as d
+from bridges.observe.lift import ObservedLift
+from bridges.observe.limits import REQUESTER_SILENT_S, SLOWEST_S
+from workbench.judge.adapter_history import AdapterHistory, Wish
+from workbench.judge.history import NOT_YET
+from workbench.judge.law import KEPT, Doubt, Finding, Law, shown
+
+CONTEXT: Final = "rmf_ros2 agv/RobotContext.cpp:1700-1735"
+REQUEST_LIFT: Final = "rmf_ros2 phases/RequestLift.cpp:322-326"
+DOOR_OPEN: Final = "rmf_ros2 phases/DoorOpen.cpp"
+NEVER_ENDS_S: Final = 60.0
+"""No robot takes longer to drive out, in silence."""
+FOR_EVER_S: Final = 60.0
+AGAIN: Final = 2
+"""A restart explains one breach, not two in a row."""
+SPAM: Final = 5
+LISTS: Final = 5
+TASKS_S: Final = 3.0
+"""A fleet's state tells of a new task this much later, at most."""
+GOES: Final = (d.LiftRequestType.REQUEST_END_SESSION, d.LiftRequestType.REQUEST_AGV_MODE)
+
+
+def _numbers(history: AdapterHistory) -> Finding:
+    match history.wish and history.news:
+        case d.LiftRequest() as request:
+            if request.request_type not in GOES:
+                return f"request_type {request.request_type}: AGV_MODE is 1, END_SESSION 0"
+            if request.request_type and request.door_state != d.LiftRequestDoor.DOOR_OPEN:
+                return f"door_state {request.door_state} in a request: DOOR_OPEN is 2"
+        case d.DoorRequest() as request:
+            if request.requested_mode.value not in (0, 2):
+                return f"requested_mode {request.requested_mode.value}: OPEN is 2, CLOSED 0"
+        case _:
+            return None
+    return KEPT
+
+
+def _one_id(history: AdapterHistory) -> Finding:
+    if history.wish is None or history.lists < LISTS:
+        return None
+    who = history.wish.who
+    return KEPT if who in history.listed else f"{shown(who)} is no robot in fleet_states"
+
+
+def _stamps(history: AdapterHistory) -> Finding:
+    if history.wish is None or history.was is None or not history.stamped:
+        return None
+    if not history.stepped:
+        return KEPT
+    back = history.back[history.wish.who]
+    return f"its stamps went back {back} times" if back >= AGAIN else None
+
+
+def _floors(history: AdapterHistory) -> Finding:
+    wish, lift = history.wish, history.device
+    if wish is None or wish.ended or not isinstance(lift, ObservedLift) or lift.state is None:
+        return None
+    served = lift.state.available_floors
+    if wish.wants in served:
+        return KEPT
+    return f"asks for {shown(wish.wants)}, a floor not served" if served else None
+
+
+def _repeats(kind: str) -> Callable[[AdapterHistory], Finding]:
+    """Check the requests of a wait, for a lift or for a door."""
+
+    def check(history: AdapterHistory) -> Finding:
+        wish, was = history.wish, history.was
+        if wish is not None and was is not None and history.device is not None:
+            same = wish.wants == was.wants and not (wish.ended or was.met)
+            repeats = same and wish.times > AGAIN and history.device.kind == kind
+            return KEPT if repeats else None
+        for one in history.stated:
+            if not isinstance(history.news, STATES[kind]):
+                return None
+            if one.lapsed and one.ignored and history.lapses.get(one.visits, 0) >= AGAIN:
+                return f"{shown(one.who)} asked for {shown(one.wants)} once, and waits"
+        return None
+
+    return check
+
+
+STATES: Final = {"lift": d.LiftState, "door": d.DoorState}
+
+
+def _changes(history: AdapterHistory) -> Wish | None:
+    """Return the visit before this request, if the request is for another floor."""
+    wish, was = history.wish, history.was
+    if wish is None or was is None or wish.ended or not isinstance(history.device, ObservedLift):
+        return None
+    goes_on = wish.first is was.first and was.wants
+    return was if goes_on and wish.wants != was.wants else None
+
+
+def _explained(history: AdapterHistory, was: Wish, text: str) -> Finding:
+    """Return a breach, unless the state that allows it, an alarm or a new task is heard late."""
+    lift = history.device
+    assert lift is not None
+    return Doubt(text, lambda: lift.matches(was) or history.excused(was), TASKS_S)
+
+
+def _enters(history: AdapterHistory) -> Finding:
+    was = _changes(history)
+    if was is None or history.wish is None or was.inside or not was.whole:
+        return None
+    if was.met:
+        return KEPT
+    text = (
+        f"{shown(was.who)} asks for {shown(history.wish.wants)} before the car was shown OPEN at"
+        f" {shown(was.wants)} in its session (RMF's own: rmf_ros2#389, or Jazzy's replan)"
+    )
+    return _explained(history, was, text)
+
+
+def _rides(history: AdapterHistory) -> Finding:
+    for one in history.stated:
+        if one.inside and one.met and one.met.at == history.now:
+            return KEPT
+    was, wish = _changes(history), history.wish
+    if was is None or wish is None or not was.inside or was.met:
+        return None
+    text = f"{shown(was.who)} asks for {shown(wish.wants)} on its ride to {shown(was.wants)}"
+    known = ", where it came from (RMF's own: rmf_ros2#555)"
+    return _explained(history, was, text + (known if wish.wants == was.came_from else ""))
+
+
+def _ends(history: AdapterHistory) -> Finding:
+    wish, was = history.wish, history.was
+    if wish is not None and isinstance(history.device, ObservedLift):
+        holds = history.device.session.value == wish.who
+        first = wish.ended is not None and (was is None or was.ended is None)
+        return KEPT if first and holds else None
+    for one in _holders(history):
+        silent_s = one.ignored_s(history.now)
+        if silent_s > NEVER_ENDS_S and not one.ended and (one.met or not one.wants):
+            return f"{shown(one.who)} has the lift, and sends neither request nor END: {silent_s:.0f} s"
+    return None
+
+
+def _ends_again(history: AdapterHistory) -> Finding:
+    wish, was = history.wish, history.was
+    if wish is not None and isinstance(history.device, ObservedLift):
+        again = was is not None and was.ended is not None and wish.ended is was.ended
+        return KEPT if again and wish.spare == 1 else None
+    for one in _holders(history):
+        silent_s = one.ignored_s(history.now)
+        if one.ended and silent_s > SLOWEST_S:
+            return f"{shown(one.who)} still has the lift, {silent_s:.1f} s after its last END"
+    return None
+
+
+def _holders(history: AdapterHistory) -> list[Wish]:
+    """List the visit whose session the latest message shows."""
+    news = history.news
+    holder = news.session_id if isinstance(news, d.LiftState) else None
+    return [one for one in history.stated if one.who == holder]
+
+
+def _stops_ending(history: AdapterHistory) -> Finding:
+    wish = history.wish
+    if wish is not None and wish.ended and isinstance(history.device, ObservedLift):
+        late_s = history.now - max(wish.ended.at, wish.held_at)
+        if wish.spare < SPAM or late_s < SLOWEST_S or history.device.state is None:
+            return None
+        return f"{wish.spare} ENDs without its session in a state (RMF's own: rmf_ros2#382, #415)"
+    for one in history.stated:
+        silent = history.now - one.last.at > REQUESTER_SILENT_S
+        if silent and one.ended and one.held_at > NOT_YET and one not in _holders(history):
+            return KEPT
+    return None
+
+
+def _closes(history: AdapterHistory) -> Finding:
+    wish, was = history.wish, history.was
+    if wish is None or not isinstance(history.news, d.DoorRequest):
+        return None
+    if wish.ended:
+        return KEPT if was is not None and was.met and not was.ended else None
+    passages = history.unclosed.get(wish.who, 0)
+    begins = wish.times == 1 and passages >= AGAIN
+    return f"OPEN again, and no CLOSE in its last {passages} passages" if begins else None
+
+
+def _stops_opening(history: AdapterHistory) -> Finding:
+    wish, was = history.wish, history.was
+    if wish is None or was is None or not was.met or not isinstance(history.news, d.DoorRequest):
+        return None
+    if wish.ended:
+        return KEPT
+    open_s = history.now - was.met.at
+    goes_on = wish.met is was.met and open_s > FOR_EVER_S
+    return f"still asks for OPEN, {open_s:.0f} s after it was open for it" if goes_on else None
+
+
+LAWS: Final[tuple[Law[AdapterHistory], ...]] = (
+    Law(
+        "T1.numbers",
+        "Requests are AGV_MODE with DOOR_OPEN, or END; doors are asked for OPEN or CLOSED",
+        "a request",
+        "Numbers differ between requests and states: AGV is 1 in a request and 2 in a state",
+        "LiftRequest.msg, DoorMode.msg",
+        _numbers,
+    ),
+    Law(
+        "A7.id",
+        "Each robot has one id, fleet/robot, for lifts and doors",
+        "a request after 5 fleet_states of the fleet",
+        "A lift grants a session by its name: for a second name the same robot is a stranger",
+        "rmf_ros2 agv/RobotContext.cpp:1425",
+        _one_id,
+    ),
+    Law(
+        "A7.stamp",
+        "The stamps of a robot's requests do not go back",
+        "two requests with stamps",
+        "RMF's door supervisor ignores a CLOSE that is older than the OPEN: the door stays open",
+        "rmf_ros2 door_supervisor/Node.cpp",
+        _stamps,
+    ),
+    Law(
+        "A7.floor",
+        "The requested floor is one of available_floors",
+        "a request to a lift that lists its floors",
+        "RMF compares the names letter by letter: the robot would wait for ever",
+        "LiftRequest.msg, destination_floor",
+        _floors,
+    ),
+    Law(
+        "A7.repeats",
+        "While a robot waits for the lift, its request is repeated at each state",
+        "a wait of three requests, or of 5 states without a request; fleet_states in between",
+        "A request may be lost, and a supervisor that restarts has forgotten it",
+        CONTEXT,
+        _repeats("lift"),
+    ),
+    Law(
+        "A7.enters",
+        "The ride is asked for after a state showed the session, the floor and OPEN",
+        "a robot asks for its second floor",
+        "The next floor is asked for in the car: without the three the robot drove at a closed door"
+        " or took another robot's car",
+        REQUEST_LIFT,
+        _enters,
+    ),
+    Law(
+        "A7.rides",
+        "On the ride no other floor is asked for, but in an alarm or for a new task",
+        "a ride to its end",
+        "The car turns round with the robot inside",
+        "rmf_ros2#555, PR#556",
+        _rides,
+    ),
+    Law(
+        "A7.ends",
+        "A robot that is out of the car sends END: in its session it is never silent for 60 s",
+        "END in its session; or 60 s of silence, with fleet_states",
+        "A session ends only by END: the lift is lost to everybody else",
+        CONTEXT,
+        _ends,
+    ),
+    Law(
+        "A7.again",
+        "END is repeated until a state no longer shows the session",
+        "a state that still shows the session after END",
+        "One END may be lost, and nobody else would send another",
+        CONTEXT,
+        _ends_again,
+    ),
+    Law(
+        "A7.stops",
+        "END is not sent on and on once the session has ended",
+        "3.5 s after the end of its session",
+        "An END without a session ends the requests of a person or of the same robot's next ride",
+        "rmf_ros2#382, #415",
+        _stops_ending,
+    ),
+    Law(
+        "A8.repeats",
+        "While a robot waits for the door, OPEN is repeated each second",
+        "a wait of three requests, or of 5 states without a request; fleet_states in between",
+        "door_requests are not retained, and a supervisor that restarts has forgotten the robot",
+        DOOR_OPEN,
+        _repeats("door"),
+    ),
+    Law(
+        "A8.closes",
+        "After the passage CLOSE is sent",
+        "CLOSE after an OPEN that was fulfilled; or two passages without",
+        "The supervisor has no timeout: it keeps the door open for a robot that has gone",
+        "rmf_ros2 door_supervisor/Node.cpp, phases/DoorClose.cpp",
+        _closes,
+    ),
+    Law(
+        "A8.stops",
+        "OPEN is not requested for ever: the door is open, and the heartbeat lists the robot",
+        "CLOSE after an OPEN that was fulfilled; or OPEN 60 s later",
+        "RMF's DoorOpen ends there; each further OPEN renews the robot's hold",
+        DOOR_OPEN,
+        _stops_opening,
+    ),
+)
