@@ -14,7 +14,7 @@ PATIENCE_S = 120.0
 """Long enough for a very busy machine; no passing test waits so long."""
 
 TOO_LATE = re.compile(
-    r" within [\d.]+ s\b|what came first is not the echo|echo came late|is half a frame"
+    r" within [\d.]+ s\b|first bytes are not the echo|echo came late|is half a frame"
     r"|is not a frame: a collision"
 )
 """A bus's words for an answer that is late, or that collides with the next answer on a serial line."""
