@@ -147,19 +147,28 @@ class Values:
         """
         found = {e.name: e for e in entries}
         near = {nearest(name, fields) for name in found if name not in fields}
+        cut: set[str] = set()
         for before, entry in zip([None, *entries], entries, strict=False):
             if entry.name not in fields:
-                if before and is_decimals(entry, before):  # the value before the comma is not meant
-                    found.pop(before.name)
-                text = misplaced(entry, before, elsewhere or {}) or self._too_deep(entry)
-                text = text or (
-                    "" if spot.path or nearest(entry.name, fields) else self._owner(entry.name)
+                if before and is_decimals(entry, before):
+                    cut.add(before.name)  # a comma has cut this number: its value is not meant
+                self._page.note(
+                    entry.key,
+                    misplaced(entry, before, elsewhere or {})
+                    or self._too_deep(entry)
+                    or self._owned(entry, spot, fields)
+                    or unknown("key", entry.name, fields),
                 )
-                self._page.note(entry.key, text or unknown("key", entry.name, fields))
         for name, wanted in fields.items():
             if isinstance(spot.node, MappingNode) and wanted and name not in {*found, *near}:
                 self._page.note(spot.at, _missing(spot, name, wanted))
-        return {name: entry for name, entry in found.items() if name in fields}
+        return {name: entry for name, entry in found.items() if name in fields and name not in cut}
+
+    def _owned(self, entry: MappingEntry, spot: Spot, fields: Mapping[str, str | None]) -> str:
+        """Say whose key this is, if it belongs to nothing here and resembles no key; "" if unknown."""
+        if spot.path or nearest(entry.name, fields):
+            return ""
+        return self._owner(entry.name)
 
     def _too_deep(self, entry: MappingEntry) -> str:
         """Describe a key that belongs to a section around this one; the section then lacks no key."""
