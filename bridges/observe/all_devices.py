@@ -82,7 +82,9 @@ class ObservedGraph(Generic[D]):
             case _:
                 return
         self.spoke.pop(who, None)
-        self.spoke[who.rpartition("/")[0] if ends else who] = moment
+        said = who.rpartition("/")[0] if ends else who
+        self.spoke[said] = moment
+        self.spoke.move_to_end(said)
         if len(self.spoke) > MOST_SPEAKERS:
             self.spoke.popitem(last=False)
 
