@@ -25,7 +25,7 @@ SUFFIX: Final = ".mcap"
 CONTINUOUS: Final = "all"
 """The word in the names of `keep: continuous` files; other files have their cause there."""
 DEATH: Final = "died"
-_NAME: Final = re.compile(r"(.+_)(\d+-\d+-\d+_\d+-\d+-\d+)_([^_]+)_[^_]+")
+_NAME: Final = re.compile(r"(.+)_(\d+-\d+-\d+_\d+-\d+-\d+)_([^_]+)_[^_]+")
 _TIME: Final = "%Y-%m-%d_%H-%M-%S"
 
 
@@ -33,13 +33,24 @@ class DiskFull(OSError):
     """The disk has too little room for a recording."""
 
 
+class Named(NamedTuple):
+    """The parts of a file's name: its time (s since the epoch), the daemon's YAML, and the reason."""
+
+    at: float
+    daemon: str
+    why: str
+
+    @property
+    def cause(self) -> tuple[str, str]:
+        """Return daemon and reason; files of one cause are repeats of the first."""
+        return self.daemon, self.why
+
+
 class Stored(NamedTuple):
-    """A file of the store. `at`: the time in its name (s since the epoch). `cause`: daemon and reason.
-    `size`: bytes."""
+    """A file of the store. `size`: bytes."""
 
     path: Path
-    at: float
-    cause: tuple[str, str]
+    name: Named
     size: int
 
 
@@ -87,7 +98,11 @@ class Recordings:
 
     def _prune(self, newest: Path, most_files: int, most_bytes: float) -> None:
         """Remove files beyond these limits, but never the newest."""
-        stored = [found for path in self.folder.glob(f"*{SUFFIX}") if (found := _stored(path))]
+        stored = [
+            Stored(path, found, path.stat().st_size)
+            for path in self.folder.glob(f"*{SUFFIX}")
+            if (found := named(path))
+        ]
         files, size = len(stored), sum(one.size for one in stored)
         for one in least_valuable_first(stored, time.time()):
             if files <= most_files and size <= most_bytes:
@@ -100,14 +115,13 @@ class Recordings:
 def least_valuable_first(stored: Sequence[Stored], now: float) -> list[Stored]:
     """Return the files in the order of their removal. `now`: s since the epoch; a file from the future
     was written before the clock was set back, so that it counts as the oldest."""
-    by_age = sorted(stored, key=lambda one: (one.at <= now, one.at))
-    first = {one.cause: one for one in reversed(by_age)}
+    by_age = sorted(stored, key=lambda one: (one.name.at <= now, one.name.at))
+    first = {one.name.cause: one for one in reversed(by_age)}
 
     def value(one: Stored) -> tuple[bool, bool, bool]:
-        why = one.cause[1]
-        if why == CONTINUOUS:
+        if one.name.why == CONTINUOUS:
             return False, False, False
-        return True, first[one.cause] is one, why == DEATH
+        return True, first[one.name.cause] is one, one.name.why == DEATH
 
     return sorted(by_age, key=value)
 
@@ -118,11 +132,11 @@ def reason(code: str, text: str = "") -> str:
     return re.sub(r"[^a-z0-9]+", "-", f"{code} {cause}".lower()).strip("-")[:60]
 
 
-def _stored(path: Path) -> Stored | None:
-    """Return what the file's name says; None for a file that a person has named."""
-    named = _NAME.fullmatch(path.stem)
-    with suppress(OSError, ValueError, OverflowError):
-        if named:
-            at = datetime.strptime(named[2], _TIME).timestamp()
-            return Stored(path, at, (named[1], named[3]), path.stat().st_size)
+def named(path: Path) -> Named | None:
+    """Return the parts of a file's name; None for a file that a person has named."""
+    parts = _NAME.fullmatch(path.stem)
+    with suppress(ValueError, OverflowError):
+        if parts:
+            at = datetime.strptime(parts[2], _TIME).timestamp()
+            return Named(at, parts[1], parts[3])
     return None

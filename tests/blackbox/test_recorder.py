@@ -12,7 +12,7 @@ from msgspec.structs import replace
 from bridges.blackbox import recordings as stored
 from bridges.blackbox.entries import Decided, Head
 from bridges.blackbox.recorder import Recorder
-from bridges.blackbox.recordings import Recordings, Stored, least_valuable_first, reason
+from bridges.blackbox.recordings import Named, Recordings, Stored, least_valuable_first, reason
 from bridges.blackbox.ring import DIED, Ring, RingContent
 from bridges.kinds.lift.report import LiftReport
 from bridges.kinds.lift.signals import DoorReading, LiftOutputs, LiftRequested, LiftSample
@@ -300,7 +300,7 @@ def test_all_daemons_of_a_machine_share_one_bound_and_the_largest_in_a_yaml_coun
 def file(name: str, at: float, size: int = 1) -> Stored:
     """Return a stored file with the name `<daemon> <reason>`."""
     daemon, why = name.split(" ")
-    return Stored(Path(f"{daemon}_{why}_{at:.0f}"), at, (daemon, why), size)
+    return Stored(Path(f"{daemon}_{why}_{at:.0f}"), Named(at, daemon, why), size)
 
 
 def removed(*files: Stored, now: float = 1000.0) -> list[str]:

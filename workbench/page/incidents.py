@@ -16,22 +16,20 @@ from typing import Final
 
 import msgspec
 
-from bridges.blackbox.incident import OWN_TOPICS, Note
+from bridges.blackbox.recordings import SUFFIX, named
 from bridges.messages.heard import Heard, Own
 from bridges.runtime import faults
 from workbench.explain import heard_devices
 from workbench.explain.answer import Remedies
 from workbench.explain.device_timeline import Drawing
 from workbench.explain.explanation import Explanation
+from workbench.explain.noted import noted
 from workbench.explain.rows import label
 from workbench.explain.timeline import Mark, Timeline
 from workbench.page.zone import zone_of
 from workbench.replay.bags import all_in
 from workbench.replay.sources import BagError, Notes
 
-SUFFIX: Final = ".mcap"
-NOTES: Final = f"{OWN_TOPICS}notes"
-"""The topic of our recorder's notes."""
 MOST_LISTED: Final = 500
 MOST_REASONS: Final = 20
 MOST_DEVICES: Final = 50
@@ -87,17 +85,7 @@ def _files(folder: Path) -> Iterator[File]:
     for path in folder.iterdir():
         if path.suffix == SUFFIX and path.is_file() and not path.is_symlink():
             found = path.stat()
-            yield File(path.name, found.st_size, *_named(path.stem, found.st_mtime))
-
-
-def _named(stem: str, written: float) -> tuple[float, str, str]:
-    """Return time, device and reason by the name `<device file>_<day>_<time>_<why>_<run>`."""
-    device, *rest = stem.rsplit("_", 4)
-    try:
-        day, clock, why, _ = rest
-        return time.mktime(time.strptime(f"{day}_{clock}", "%Y-%m-%d_%H-%M-%S")), device, why
-    except (ValueError, OverflowError):
-        return written, "", ""
+            yield File(path.name, found.st_size, *(named(path) or (found.st_mtime,)))
 
 
 def path_in(folder: Path, name: str) -> Path | None:
@@ -168,13 +156,10 @@ def read(path: Path, remedies: Remedies, zone: tzinfo | None = None) -> Explaine
 
 def _reason(own: Own) -> Iterator[tuple[float, str]]:
     """Yield the time and text of a note of our recorder; nothing for its other texts."""
-    if not own.topic.endswith(NOTES):
-        return
-    try:
-        note = msgspec.json.decode(own.text, type=Note)
-    except msgspec.MsgspecError:
-        return
-    yield own.at, label(": ".join(filter(None, (note.code, note.subject, note.text))))
+    note = noted(own.topic.rpartition("/")[2], own.text)
+    if note is not None and note.kept_for is not None:
+        code, text = note.kept_for
+        yield own.at, label(": ".join(filter(None, (code, note.subject, text))))
 
 
 def _marked(timeline: Timeline, reasons: Sequence[tuple[float, str]]) -> Timeline:
