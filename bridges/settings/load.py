@@ -138,7 +138,7 @@ class _DeviceReading:
         elif self._kind and self._kind.devices_key in sections:
             self._read_devices(sections[self._kind.devices_key].spot())
         note_conflicts(self._page, self._uses)
-        self._collect_unwatched()
+        self._collect_bus_remarks()
 
     def _read_kind(self, entry: MappingEntry | None) -> None:
         name = word(self._values, entry, kind_names())
@@ -325,27 +325,20 @@ class _DeviceReading:
             node = locate(spot, path).where()
             self._notes.append(self._page.problem(node, f"note: {spot.label}: {text}"))
 
-    def _collect_unwatched(self) -> None:
-        """Collect, once for each bus, the remarks about outputs that stay on when this machine
-        fails."""
+    def _collect_bus_remarks(self) -> None:
+        """Collect, once for each bus, remarks about outputs that stay on when this machine fails, and
+        about a pace that is too slow."""
         for name, bus in () if self._page.problems else self._buses.items():
             assert bus.hal
             unwatched = bus.hal.unwatched(bus.settings, self._written.get(name, ()))
-            paced = bus.hal.paced(bus.settings, self._on_bus(name), self._points(name))
+            devices = [one for one in self._devices.values() if one.bus in (name, None)]
+            points = [use.point for use in self._uses if use.bus == name]
+            paced = bus.hal.paced(bus.settings, devices, points)
             for path, text in (*unwatched.warnings, *paced):
                 self._warn(locate(bus.entry.spot(), path).where(), f"bus '{name}': {text}")
             for path, text in unwatched.notes:
                 node = locate(bus.entry.spot(), path).where()
                 self._notes.append(self._page.problem(node, f"note: bus '{name}': {text}"))
-
-    def _on_bus(self, bus: str) -> list[DeviceSettings]:
-        """Return the devices on this bus."""
-        found = self._devices.values()
-        return [device for device in found if device.bus in (bus, None)]
-
-    def _points(self, bus: str) -> list[str]:
-        """Return the canonical points in use on this bus."""
-        return [use.point for use in self._uses if use.bus == bus]
 
     def _warn(self, node: Node, text: str) -> None:
         self._warnings.append(self._page.problem(node, f"warning: {text}"))

@@ -170,11 +170,10 @@ def floors(wiring: LiftSettings) -> Remarks:
 
 def counts_down(settings: LiftSettings, codes: Mapping[int, str], path: tuple[str, ...]) -> Remarks:
     """Yield a warning if the floors' numbers fall from the lowest floor to the highest."""
-    numbers = [
-        min((n for n, at in codes.items() if at == level), default=0) for level in settings.levels()
-    ]
+    levels = settings.levels()
+    numbers = [min((n for n, at in codes.items() if at == level), default=0) for level in levels]
     if len(numbers) > 2 and all(above < below for below, above in pairwise(numbers)):
-        lowest, highest = settings.levels()[0], settings.levels()[-1]
+        lowest, highest = levels[0], levels[-1]
         yield (
             path,
             f"these numbers count down from {lowest} to {highest}, and floors has {lowest} as the"

@@ -116,14 +116,11 @@ class HeardDevices(ObservedGraph[Device]):
         """Explain the device at the last message. `zone`: of the times; None: this machine's."""
         began = self.began or self.now
         last = self.known.get((kind, name)) or self.make(kind, name)
-        now, device, spoke = self._then.get((kind, name), (self.now, last, self.spoke))
+        at_end = self.now, last, self.spoke
+        now, device, spoke = self._then.get((kind, name), at_end)
         reason = self._reason.get(name) or self._reason.get("")
         if reason and reason.fault in first_causes.OFFLINE and len(last.flaps(self.now)) >= FLAPS:
-            now, device, spoke = (
-                self.now,
-                last,
-                self.spoke,
-            )  # only time shows that it comes and goes
+            now, device, spoke = at_end  # only time shows that the device comes and goes
         clock = TimePhrases(now, zone)
         around = self._around(spoke, reason, remedies or {})
         answer = self._answer(device, clock, around)

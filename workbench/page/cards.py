@@ -104,7 +104,7 @@ class Cards:
         return drawing.attention(wrong, self._remedies)
 
     def status(self) -> str:
-        """Return the numbers of heard devices and of those that need attention, as one line."""
+        """Return one line: how many devices were heard, and how many of them need attention."""
         told = " · ".join(self._told())
         return f'<p class="status" role="status">{told}</p>'
 
