@@ -25,7 +25,7 @@ from hal_fakes.plants.plant import Edge
 from tests.site.daemons import DeviceDaemon
 from tests.site.timeline import EPOCH, NEVER, Timeline
 from tests.site.trouble import Ills
-from workbench.judge.judge import LAWS, Judge, Kind
+from workbench.judge.judge import LAWS, Judge, JudgedKind
 from workbench.judge.law import Verdict
 
 AT_ONCE_S = 0.3
@@ -83,7 +83,7 @@ class Judges:
     """The judges of one daemon. Laws on sensors are judged only while the device is well."""
 
     def __init__(self, daemon: DeviceDaemon) -> None:
-        kind = cast(Kind, daemon.device.kind.name)
+        kind = cast(JudgedKind, daemon.device.kind.name)
         self._name = daemon.name
         self._kind = kind
         self._always = Judge(kind, daemon.name, (law.id for law in LAWS[kind] if not law.sensed))

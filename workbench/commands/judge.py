@@ -30,7 +30,7 @@ from workbench.graph.join import (
 )
 from workbench.graph.live import OF_DEVICES, Ear
 from workbench.judge.charge_scenario import ChargeScenario
-from workbench.judge.judge import KINDS, Judge, Kind
+from workbench.judge.judge import KINDS, Judge, JudgedKind
 from workbench.judge.judge_run import JudgeRun
 from workbench.judge.law import Verdict, shown
 from workbench.judge.report import Judgement, as_json, junit, markdown, report, text, verdict
@@ -141,7 +141,7 @@ def _add_plays(parser: argparse.ArgumentParser) -> None:
 
 def performance_of(args: argparse.Namespace) -> Scenario | None:
     """Return the play; None to listen only. Contradictory options end with exit code 2."""
-    kinds: dict[Kind, bool] = {
+    kinds: dict[JudgedKind, bool] = {
         "lift": args.ride is not None,
         "door": args.passages is not None,
         "charger": args.charge,
@@ -255,7 +255,11 @@ class Live:
     """The live graph: messages heard, in order of arrival, and messages published."""
 
     def __init__(
-        self, transport: Transport, kind: Kind, beside: list[str], performance: Scenario | None
+        self,
+        transport: Transport,
+        kind: JudgedKind,
+        beside: list[str],
+        performance: Scenario | None,
     ) -> None:
         self._transport = transport
         self._publishers: dict[str, Publisher[Message]] = {}

@@ -15,9 +15,9 @@ from workbench.judge.history import AnyHistory
 from workbench.judge.law import Doubt, Evidence, JudgedLaw, Law, Verdict
 from workbench.judge.lift_history import LiftHistory
 
-Kind = words.Kind | Literal["adapter"]
-KINDS: Final[tuple[Kind, ...]] = (*words.KINDS, "adapter")
-LAWS: Final[Mapping[Kind, tuple[Law[Any], ...]]] = MappingProxyType(
+JudgedKind = words.Kind | Literal["adapter"]
+KINDS: Final[tuple[JudgedKind, ...]] = (*words.KINDS, "adapter")
+LAWS: Final[Mapping[JudgedKind, tuple[Law[Any], ...]]] = MappingProxyType(
     {
         "lift": lift_laws.LAWS,
         "door": door_laws.LAWS,
@@ -25,7 +25,7 @@ LAWS: Final[Mapping[Kind, tuple[Law[Any], ...]]] = MappingProxyType(
         "adapter": adapter_laws.LAWS,
     }
 )
-SCENES: Final[Mapping[Kind, Callable[[str], AnyHistory]]] = MappingProxyType(
+SCENES: Final[Mapping[JudgedKind, Callable[[str], AnyHistory]]] = MappingProxyType(
     {"lift": LiftHistory, "door": DoorHistory, "charger": ChargerHistory, "adapter": AdapterHistory}
 )
 MUTE_S: Final = 10.0
@@ -63,9 +63,9 @@ class Judge:
     `only`: the ids of the laws to judge by; all of the kind without it. `broken`: is any of them?
     """
 
-    def __init__(self, kind: Kind, name: str, only: Iterable[str] | None = None) -> None:
+    def __init__(self, kind: JudgedKind, name: str, only: Iterable[str] | None = None) -> None:
         ids = {law.id for law in LAWS[kind]} if only is None else set(only)
-        self.kind: Kind = kind
+        self.kind: JudgedKind = kind
         self.name = name
         self.history = SCENES[kind](name)
         self.first: Heard | None = None

@@ -8,7 +8,7 @@ from xml.etree import ElementTree
 import msgspec
 
 from bridges.messages import words
-from workbench.judge.judge import LAWS, Judge, Kind
+from workbench.judge.judge import LAWS, Judge, JudgedKind
 from workbench.judge.law import JudgedLaw, Verdict, shown
 
 ORDER: Final = (Verdict.BROKEN, Verdict.KEPT, Verdict.NOT_SEEN)
@@ -23,7 +23,7 @@ class Judgement:
     listener's remarks.
     `silences` of the whole network: beginning (s since the epoch) and length (s)."""
 
-    kind: Kind
+    kind: JudgedKind
     name: str
     wall: float
     heard_s: float
@@ -159,7 +159,7 @@ def _case(suite: ElementTree.Element, report: Judgement, judged: JudgedLaw) -> N
         ElementTree.SubElement(case, "skipped", message=f"not seen; needs: {law.occasion}")
 
 
-def markdown(kind: Kind) -> str:
+def markdown(kind: JudgedKind) -> str:
     """Return a kind's laws as a table for docs/reference/laws.md; *: a wire can break it too."""
     rows = [
         f"| `{law.id}`{'*' if law.sensed else ''} | {law.sentence} | {law.occasion} | {law.reason}"

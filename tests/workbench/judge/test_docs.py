@@ -3,13 +3,13 @@
 import pytest
 
 from bridges.cli import main
-from workbench.judge.judge import KINDS, LAWS, Kind
+from workbench.judge.judge import KINDS, LAWS, JudgedKind
 from workbench.judge.report import markdown
 
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_each_law_is_a_sentence_with_a_reason_and_a_source(
-    kind: Kind, capsys: pytest.CaptureFixture[str]
+    kind: JudgedKind, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["judge", kind, "--laws"]) == 0
     assert capsys.readouterr().out == markdown(kind) + "\n"

@@ -12,19 +12,19 @@ from bridges.messages.stamps import stamp
 from bridges.messages.topics import AnyTopic
 from tests.workbench.judge.script import door as door_request
 from tests.workbench.judge.script import lift as lift_request
-from workbench.judge.judge import Judge, Kind
+from workbench.judge.judge import Judge, JudgedKind
 from workbench.judge.law import Verdict
 
 RED, BLUE = "fleet/red", "fleet/blue"
 OPEN, CLOSED = 2, 0
 AGV, FIRE = 2, 3
 IDLE, ASSIGNED, CHARGING = 1, 2, 3
-NAMES: dict[Kind, str] = {"lift": "Lift1", "door": "ward", "charger": "bay1"}
+NAMES: dict[JudgedKind, str] = {"lift": "Lift1", "door": "ward", "charger": "bay1"}
 Line = tuple[float, AnyTopic, d.Message]
 Story = Callable[[float], list[Line]]
 
 
-def is_broken(kind: Kind, law: str, lines: list[Line]) -> bool:
+def is_broken(kind: JudgedKind, law: str, lines: list[Line]) -> bool:
     """What the judge says of these, heard in the order of their times, and 2 s later."""
     judge = Judge(kind, NAMES[kind])
     lines.sort(key=lambda line: line[0])

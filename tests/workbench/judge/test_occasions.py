@@ -41,7 +41,7 @@ from tests.workbench.judge.test_limits import (
     stays_shut,
     to_door,
 )
-from workbench.judge.judge import LAWS, Judge, Kind
+from workbench.judge.judge import LAWS, Judge, JudgedKind
 
 ERROR, RELEASED = 200, 4
 HUMAN, OFFLINE = 1, 4
@@ -69,7 +69,7 @@ def fire_publisher(retaining: int) -> Look:
     return look
 
 
-def verdict(kind: Kind, law: str, lines: Lines) -> str:
+def verdict(kind: JudgedKind, law: str, lines: Lines) -> str:
     judge = Judge(kind, NAMES[kind], only=[law])
     told = sorted((line for line in lines if isinstance(line, tuple)), key=lambda line: line[0])
     for look in lines:
@@ -135,7 +135,7 @@ ELSEWHERE = changed(charge(0.5), charger_name="bay2")
 ASKED = [asks(8.5 + n) for n in range(8)]
 TO_FIRE: Lines = [*seconds(0.0, 8.0, lambda s: car(s, mode=FIRE))]
 
-STORIES: dict[tuple[Kind, str], tuple[Lines, Lines, Lines]] = {
+STORIES: dict[tuple[JudgedKind, str], tuple[Lines, Lines, Lines]] = {
     ("lift", "L2.rate"): ([car(0.0)], cars(2.0), [car(0.0), car(6.0)]),
     ("lift", "L2.answer"): (
         cars(20.0),
@@ -306,7 +306,7 @@ STORIES: dict[tuple[Kind, str], tuple[Lines, Lines, Lines]] = {
 
 
 @pytest.mark.parametrize(("kind", "law"), STORIES)
-def test_a_law_needs_its_occasion(kind: Kind, law: str) -> None:
+def test_a_law_needs_its_occasion(kind: JudgedKind, law: str) -> None:
     found = [verdict(kind, law, story) for story in STORIES[kind, law]]
     assert found == ["not seen", "kept", "broken"]
 

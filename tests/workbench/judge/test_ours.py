@@ -6,10 +6,10 @@ from tests.site.building import CHARGERS, DOORS, LIFTS, devices
 from tests.site.daemons import DeviceDaemon
 from tests.workbench.judge.world import World, told
 from workbench.judge.charge_scenario import ChargeScenario
-from workbench.judge.judge import Kind
+from workbench.judge.judge import JudgedKind
 from workbench.judge.scenarios import PassageScenario, RideScenario, Scenario
 
-CASES: list[tuple[Kind, str, Scenario]] = [
+CASES: list[tuple[JudgedKind, str, Scenario]] = [
     *(
         ("lift", name, RideScenario(name, ("L1", "L3"), robots, 90.0, restarts=restarts))
         for name in LIFTS
@@ -26,7 +26,7 @@ CASES: list[tuple[Kind, str, Scenario]] = [
 
 
 @pytest.mark.parametrize(("kind", "name", "scenario"), CASES)
-def test_ours_keep_every_law(kind: Kind, name: str, scenario: Scenario) -> None:
+def test_ours_keep_every_law(kind: JudgedKind, name: str, scenario: Scenario) -> None:
     world = World()
     daemon = DeviceDaemon(world.timeline, world.air, devices(world.timeline)[name])
     daemon.start()

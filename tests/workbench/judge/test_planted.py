@@ -28,7 +28,7 @@ from tests.workbench.judge.nodes.right_lift import RightLift
 from tests.workbench.judge.test_limits import Line, is_broken, leaf, to_door
 from tests.workbench.judge.world import Seat, World, told
 from workbench.judge.charge_scenario import ChargeScenario
-from workbench.judge.judge import Kind
+from workbench.judge.judge import JudgedKind
 from workbench.judge.scenarios import PassageScenario, RideScenario, Scenario
 from workbench.rmf_model import Party
 
@@ -41,7 +41,7 @@ class NextLift(RightLift):
     name = "Lift9"
 
 
-def play_for(node: Party, restarts: bool) -> tuple[Kind, str, Scenario]:
+def play_for(node: Party, restarts: bool) -> tuple[JudgedKind, str, Scenario]:
     if isinstance(node, RightLift):
         ride = RideScenario("Lift1", ("L1", "L3"), 1, 60.0, restarts=restarts)
         return "lift", "Lift1", ride

@@ -12,7 +12,7 @@ from bridges.transports.transport import Publisher
 from tests.site.network import CLEAR, Air, Place
 from tests.site.timeline import EPOCH, NEVER, Alarm, Timeline
 from workbench.judge.charge_scenario import ChargeScenario
-from workbench.judge.judge import Judge, Kind
+from workbench.judge.judge import Judge, JudgedKind
 from workbench.judge.judge_run import JudgeRun
 from workbench.judge.law import Verdict
 from workbench.judge.scenarios import PassageScenario, RideScenario, Scenario
@@ -25,7 +25,7 @@ HEARD: tuple[AnyTopic, ...] = (
     *(topics.CHARGER_STATES, topics.CHARGER_REQUESTS, topics.CHARGER_CANCELS),
     *(topics.CHARGER_REFUSALS, topics.FLEET_STATES),
 )
-STATES: dict[Kind, AnyTopic] = {
+STATES: dict[JudgedKind, AnyTopic] = {
     "lift": topics.LIFT_STATES,
     "door": topics.DOOR_STATES,
     "charger": topics.CHARGER_STATES,
@@ -88,7 +88,7 @@ class World:
 
     def judge(
         self,
-        kind: Kind,
+        kind: JudgedKind,
         name: str,
         scenario: Scenario | None = None,
         for_s: float = NEVER,
@@ -174,7 +174,7 @@ def charges(*nodes: Party) -> tuple[Verdicts, str]:
     return told(judging, world.timeline.now), judging.note
 
 
-def watched(kind: Kind, name: str, *parties: Party, for_s: float = 60.0) -> Verdicts:
+def watched(kind: JudgedKind, name: str, *parties: Party, for_s: float = 60.0) -> Verdicts:
     """The verdict on a device that the judge only listens to."""
     world = World()
     world.add(*parties)
