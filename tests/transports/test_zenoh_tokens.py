@@ -13,7 +13,8 @@ from bridges.messages import definitions as d
 from bridges.messages.topics import FIRE_ALARM_TRIGGER, LIFT_REQUESTS, LIFT_STATES
 from bridges.transports.transport import TransportError
 from bridges.transports.zenoh import peers as zenoh_peers
-from bridges.transports.zenoh.peers import Merged
+from bridges.transports.zenoh.keys import Peer, RmwZenoh
+from bridges.transports.zenoh.peers import Merged, Tokens
 from bridges.transports.zenoh.transport import ZenohTransport
 from tests.transports import peer
 from tests.transports.zenoh_programs import meeting
@@ -225,3 +226,51 @@ def test_samples_bear_no_time_of_zenohs_clock_which_panics_before_1970(
         publisher = node.publisher(LIFT_STATES)
         wait_until(lambda: stamps or peer.sent(publisher, d.LiftState()), "the sample arrives")
     assert set(stamps) == {None}
+
+
+class BusyThread(RmwZenoh):
+    """Keys that hold the thread on which zenoh hands over present tokens, until `go_on` is set."""
+
+    def __init__(self, domain: int) -> None:
+        super().__init__(domain, "", "lift")
+        self.go_on = threading.Event()
+        self.held = threading.Event()
+
+    def peer(self, token: str) -> Peer | None:
+        self.held.set()
+        self.go_on.wait()
+        return super().peer(token)
+
+
+def test_a_token_is_counted_if_the_graph_has_it_although_its_departure_came_first(
+    node: ZenohTransport, domain: int
+) -> None:
+    hears = node.subscribe(LIFT_REQUESTS, lambda request: None)
+    keys, counted, gone = BusyThread(domain), set[str](), list[str]()
+    assert node._session is not None
+    with stranger(domain) as leaver:
+        leaver.claims("MP", "lift_requests", type_text(node), range(5))
+        wait_until(lambda: hears.matched() == 5, "the session knows the tokens")
+
+        def part(token: str) -> None:
+            counted.discard(token)
+            gone.append(token)
+
+        tokens = Tokens(
+            node._session,
+            keys,
+            [keys.others("MP", LIFT_REQUESTS)],
+            lambda token, peer: counted.add(token),
+            part,
+            node._orders.put,
+        )
+        wait_until(keys.held.is_set, "the first token has come")
+        leaver.drops(5)
+        wait_until(lambda: len(gone) == 5, "all tokens have gone before they came")
+        leaver.claims("MP", "lift_requests", type_text(node), range(4, 6))
+        keys.go_on.set()
+        wait_until(lambda: len(counted) == 2, "the two tokens that the graph has are counted")
+        wait_until(lambda: not tokens._doubtful, "the graph was asked for each doubtful token")
+        assert {token.split("/")[4] for token in counted} == {"4", "5"}
+        assert {token.split("/")[4] for token in gone} == {"0", "1", "2", "3", "4"}
+        tokens.leave()

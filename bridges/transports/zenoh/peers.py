@@ -8,6 +8,7 @@ import logging
 import threading
 from collections.abc import Callable, Iterable
 from contextlib import suppress
+from functools import partial
 from typing import Final
 
 import zenoh
@@ -47,10 +48,14 @@ class Merged:
 class Tokens:
     """The tokens that match some key expressions, while the session is open or until `leave`.
 
-    `came(token, peer)`, `gone(token)`: called on zenoh's thread. At most MOST tokens are kept; further
-    tokens are left out, and this is logged once. When half of the kept tokens have gone, all tokens are
-    queried again, so that no token is missing after a flood. `do(order)` runs an order on the
-    transport's thread.
+    `came(token, peer)`, `gone(token)`: called on zenoh's threads, one call at a time. At most MOST
+    tokens are kept; further tokens are left out, and this is logged once. When half of the kept tokens
+    have gone, all tokens are queried again, so that no token is missing after a flood. `do(order)` runs
+    an order on the transport's thread.
+
+    zenoh hands over the present tokens on another thread than the changes, so a token's departure can
+    overtake its arrival. A token that comes after it has gone is therefore counted only if the graph,
+    asked for it, still has it.
     """
 
     def __init__(
@@ -65,8 +70,16 @@ class Tokens:
         self._live, self._keys, self._expressions = session.liveliness(), keys, list(expressions)
         self._came, self._gone, self._do = came, gone, do
         self._known: set[str] = set()
+        self._gone_before: dict[str, None] = {}
+        """The last MOST tokens that went while they were not known, the oldest first."""
+        self._doubtful: dict[str, Peer] = {}
+        """Tokens that came after they had gone. The graph will be asked for them."""
+        self._asked: dict[str, Peer] = {}
+        self._ask = Merged(do, self._ask_all)
         self._crowded = self._named = self._left = False
         self._lock = threading.Lock()
+        self._changing = threading.Lock()
+        self._watch_number = 0
         self._watching: list[zenoh.Subscriber[None]] = []
         self._watch()
 
@@ -79,7 +92,7 @@ class Tokens:
 
     def _watch(self) -> None:
         """Watch for all present tokens, and for each token that comes or goes."""
-        on_token = Callback(self._look, indirect=False)
+        on_token = Callback(partial(self._look, self._watch_number), indirect=False)
         self._watching = [
             self._live.declare_subscriber(expression, on_token, history=True)
             for expression in self._expressions
@@ -90,26 +103,78 @@ class Tokens:
             if self._left:
                 return
             _undeclare(self._watching)
-            for token in list(self._known):
-                self._known.discard(token)
-                self._gone(token)
+            with self._changing:
+                self._watch_number += 1
+                for token in self._known:
+                    self._gone(token)
+                for tokens in (self._known, self._gone_before, self._doubtful, self._asked):
+                    tokens.clear()
             self._watch()
 
-    def _look(self, sample: zenoh.Sample) -> None:
-        """Note a token that has come or gone; called on zenoh's thread."""
+    def _look(self, watch: int, sample: zenoh.Sample) -> None:
+        """Note a token that has come or gone; called on zenoh's threads.
+
+        Changes from an earlier watch are ignored: they may come when that watch has ended.
+        """
         token = str(sample.key_expr)
-        if sample.kind == zenoh.SampleKind.DELETE:
-            self._known.discard(token)
-            self._gone(token)
-            if self._crowded and len(self._known) < MOST / 2:
-                self._crowded = False
-                self._do(self._watch_again)
-        elif (peer := self._keys.peer(token)) is not None:
-            if token not in self._known and len(self._known) >= MOST:
-                self._crowd()
+        goes = sample.kind == zenoh.SampleKind.DELETE
+        peer = None if goes else self._keys.peer(token)
+        with self._changing:
+            if watch != self._watch_number:
                 return
-            self._known.add(token)
-            self._came(token, peer)
+            if goes:
+                self._part(token)
+            elif peer is not None and token in self._gone_before:
+                self._doubtful[token] = peer
+                self._ask()
+            elif peer is not None:
+                self._meet(token, peer)
+
+    def _meet(self, token: str, peer: Peer) -> None:
+        if token not in self._known and len(self._known) >= MOST:
+            self._crowd()
+            return
+        self._known.add(token)
+        self._came(token, peer)
+
+    def _part(self, token: str) -> None:
+        self._doubt_no_more(token)
+        if token in self._known:
+            self._known.remove(token)
+        else:
+            self._gone_before[token] = None
+            if len(self._gone_before) > MOST:
+                oldest = next(iter(self._gone_before))
+                del self._gone_before[oldest]
+                self._doubt_no_more(oldest)
+        self._gone(token)
+        if self._crowded and len(self._known) < MOST / 2:
+            self._crowded = False
+            self._do(self._watch_again)
+
+    def _doubt_no_more(self, token: str) -> None:
+        self._doubtful.pop(token, None)
+        self._asked.pop(token, None)
+
+    def _ask_all(self) -> None:
+        """Ask the graph for the doubtful tokens; on the transport's thread."""
+        with self._changing:
+            asked, self._doubtful = self._doubtful, {}
+            self._asked.update(asked)
+            on_reply = Callback(partial(self._answered, self._watch_number), indirect=False)
+        with suppress(zenoh.ZError):  # the session may have been closed meanwhile
+            for token in asked:
+                self._live.get(token, on_reply)
+
+    def _answered(self, watch: int, reply: zenoh.Reply) -> None:
+        """Note that the graph still has a token, unless the token has gone since the question."""
+        if (sample := reply.ok) is None:
+            return
+        token = str(sample.key_expr)
+        with self._changing:
+            if watch == self._watch_number and (peer := self._asked.pop(token, None)):
+                self._gone_before.pop(token, None)
+                self._meet(token, peer)
 
     def _crowd(self) -> None:
         self._crowded = True
