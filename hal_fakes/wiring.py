@@ -10,12 +10,20 @@ from hal_fakes.plants.plant import Plant
 
 
 class PlantWiring:
-    """The wires between one plant and one bus. `canonical` is the bus's spelling of a point."""
+    """The wires between one plant and one bus. `canonical` is the bus's spelling of a point.
+
+    `clears_s`: how soon a module clears the coil of a call that its controller has taken; None: never.
+    """
 
     def __init__(
-        self, plant: Plant, wires: Iterable[Wire], canonical: Callable[[str], str]
+        self,
+        plant: Plant,
+        wires: Iterable[Wire],
+        canonical: Callable[[str], str],
+        clears_s: float | None = None,
     ) -> None:
         self.plant = plant
+        self.clears_s = clears_s
         wires = list(wires)
         self.inputs = {canonical(w.point): w for w in wires if w.direction == "in"}
         self.outputs = {canonical(w.point): w for w in wires if w.direction == "out"}

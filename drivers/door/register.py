@@ -136,7 +136,7 @@ def create(name: str, settings: RegisterDoorSettings, bus: ModbusBus) -> "Regist
     found = points(settings)
     command, outputs = door_map(settings).command, {"command": found.pop("command")}
     safe = {"command": command.release}
-    lines = ModbusLines(bus, found, outputs, safe, command.read_back)
+    lines = ModbusLines(bus, found, outputs, safe, () if command.read_back else outputs)
     return RegisterDoor(door_map(settings), lines)
 
 

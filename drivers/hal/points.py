@@ -6,7 +6,8 @@ inputs of a Modbus I/O module are treated alike.
 """
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from types import MappingProxyType
 from typing import Annotated, Literal, Protocol, runtime_checkable
 
 import msgspec
@@ -49,10 +50,30 @@ class Output(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         Point, tells("the address: `BCM18` or `J8:12` on GPIO, `unit 1 coil 0` on Modbus.")
     ]
     active: Annotated[Active, tells("the level of an asserted output.")]
+    read_back: Annotated[
+        bool,
+        tells("""`false` for a coil that can only be written, or that the controller clears by itself;
+        then every scan writes the coil, and nothing proves its level. Refused on GPIO."""),
+    ] = True
 
-    def wire(self, signal: str, path: tuple[str, ...], flash: "Flash | None" = None) -> "Wire":
+    def wire(
+        self,
+        signal: str,
+        path: tuple[str, ...],
+        flash: "Flash | None" = None,
+        clearing: "Clearing | None" = None,
+    ) -> "Wire":
         """Return the output's row of the wiring table."""
-        return Wire(signal, "out", self.point, self.active, path=path, flash=flash)
+        return Wire(
+            signal,
+            "out",
+            self.point,
+            self.active,
+            path=path,
+            flash=flash,
+            read_back=self.read_back,
+            clearing=clearing,
+        )
 
 
 def input_wires(inputs: msgspec.Struct, debounce_s: float | None = None) -> list["Wire"]:
@@ -68,6 +89,16 @@ class Flash(msgspec.Struct, frozen=True):
     on_s: float
 
 
+class Clearing(msgspec.Struct, frozen=True):
+    """A controller may take the commands in these bits of a place, and clear the bits by itself.
+
+    `pulse`: the command is a pulse, so nobody needs to hear that the controller ends it earlier.
+    """
+
+    bits: int = 1
+    pulse: bool = False
+
+
 class Wire(msgspec.Struct, frozen=True):
     """One row of the wiring table: a signal, its point, and the meaning of its level."""
 
@@ -80,6 +111,9 @@ class Wire(msgspec.Struct, frozen=True):
     path: tuple[str, ...] = ()
     """The wire's path in the YAML, from the device downwards, for error messages."""
     flash: Flash | None = None
+    read_back: bool = True
+    clearing: Clearing | None = None
+    """An output that the controller may clear by itself."""
 
     def level(self, asserted: bool) -> bool:
         """Return the electrical level (True is high) for this meaning."""
@@ -114,7 +148,10 @@ class Lines(Protocol):
         """Take every output at its safe level in one step, and every input. Raises HalError."""
 
     def read(self) -> Mapping[str, int]:
-        """Read every input's level now, by its canonical point. Raises HalError."""
+        """Read every input's level now, by its canonical point. Raises HalError.
+
+        An output among the points has lost its level, and must be written again.
+        """
 
     def write(self, levels: Mapping[str, bool]) -> None:
         """Drive these outputs. Raises HalError; then their levels are unknown.
@@ -123,7 +160,7 @@ class Lines(Protocol):
         """
 
     def outputs(self) -> Mapping[str, int] | None:
-        """Read the outputs' levels back from the bus; None where they cannot be read."""
+        """Read back the levels of the outputs that can be read; None where none can."""
 
     def close(self) -> None:
         """Set the outputs to their safe level and release every line. Does not raise."""
@@ -146,8 +183,17 @@ class PointsBus(Protocol):
     def canonical(self, point: str) -> str:
         """Return the canonical spelling of a point. Raises ValueError with the right spelling."""
 
-    def lines(self, inputs: Mapping[str, Pull | None], outputs: Mapping[str, bool]) -> Lines:
-        """Return the lines of one device: canonical points; outputs with their safe levels."""
+    def lines(
+        self,
+        inputs: Mapping[str, Pull | None],
+        outputs: Mapping[str, bool],
+        unread: Collection[str] = (),
+        clearing: Mapping[str, Clearing] = MappingProxyType({}),
+    ) -> Lines:
+        """Return the lines of one device: canonical points; outputs with their safe levels.
+
+        `unread`: outputs that are never read back. `clearing`: outputs that the controller may clear.
+        """
 
 
 class HalError(DriverError):
@@ -163,6 +209,8 @@ class Points:
         self._lines = bus.lines(
             {point: w.pull for w, point in self._in.values()},
             {point: w.level(False) for w, point in self._out.values()},
+            {point for w, point in self._out.values() if not w.read_back},
+            {point: w.clearing for w, point in self._out.values() if w.clearing},
         )
         self._read: dict[str, bool] = {}
         self._written: dict[str, bool] | None = None
@@ -176,7 +224,8 @@ class Points:
         """Read signal -> asserted for each input. After a failure the outputs are written again."""
         written, self._written = self._written, None
         levels = self._lines.read()
-        self._written = written
+        kept = (written or {}).items()
+        self._written = {s: on for s, on in kept if self._out[s][1] not in levels}
         self._read = {s: w.asserted(levels[point]) for s, (w, point) in self._in.items()}
         return self._read
 
@@ -188,7 +237,8 @@ class Points:
         """Set every output, off first: exclusive outputs never overlap."""
         wanted = {signal: asserted.get(signal, False) for signal in self._out}
         known = self._written or {}
-        changed = [s for s in wanted if known.get(s) != wanted[s]]
+        unread = {s for s, (wire, _) in self._out.items() if not wire.read_back}
+        changed = [s for s in wanted if known.get(s) != wanted[s] or s in unread]
         for turning_on in (False, True):
             levels = {
                 self._out[s][1]: self._out[s][0].level(wanted[s])
@@ -219,7 +269,7 @@ class Points:
         stuck = [
             signal
             for signal, (w, point) in self._out.items()
-            if levels is not None and w.asserted(levels[point])
+            if levels is not None and point in levels and w.asserted(levels[point])
         ]
         if stuck:
             raise DriverError(f"still on after being switched off: {', '.join(stuck)}")

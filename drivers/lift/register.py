@@ -16,6 +16,7 @@ from drivers.driver_type import DriverType
 from drivers.hal.modbus import ModbusBus
 from drivers.hal.modbus.lines import ModbusLines
 from drivers.hal.modbus.registers import WRITABLE, Unit, at, misplaced
+from drivers.hal.points import Clearing
 from drivers.lift import checks
 from drivers.lift.register_map import DoorField, FloorField, LiftFlag, LiftMap, MotionField, Number
 from drivers.lift.table import DEBOUNCE_S, HAZARD_DEBOUNCE_S
@@ -88,6 +89,10 @@ def warnings(settings: RegisterLiftSettings) -> Remarks:
     if not commands.read_back:
         text = "commands cannot be read back: switching off is not verified"
         yield ("map", "commands", "read_back"), text
+    for signal, path, command in commands.singles():
+        if command.read_back is False and not signal.startswith("call_"):
+            text = f"{signal} cannot be read back: switching it off is not verified"
+            yield ("map", "commands", *path, "read_back"), text
 
 
 def notes(settings: RegisterLiftSettings) -> Remarks:
@@ -118,8 +123,8 @@ def describe(settings: RegisterLiftSettings, bus: object) -> Iterator[tuple[str,
         yield signal, f"{at(settings.unit, command.at)} is written"
     if commands.call:
         yield "call", f"{at(settings.unit, commands.call.at)} is written"
-    if not commands.read_back:
-        yield "commands", "written in every scan, and never read back"
+    for where in sorted(commands.unread()):
+        yield f"{at(settings.unit, where)}", "written in every scan, and never read back"
 
 
 def tables(settings: RegisterLiftSettings) -> Iterator[Table]:
@@ -180,7 +185,9 @@ def create(name: str, settings: RegisterLiftSettings, bus: ModbusBus) -> "Regist
     inputs = {part: at(settings.unit, p.at) for part, p in settings.map.parts().items()}
     safe = encode(settings.map, LiftOutputs())
     outputs = {where: at(settings.unit, where) for where in safe}
-    lines = ModbusLines(bus, inputs, outputs, safe, settings.map.commands.read_back)
+    commands, pulse = settings.map.commands, settings.limits.call_pulse_s is not None
+    clearing = {where: Clearing(bits, pulse) for where, bits in commands.calling().items()}
+    lines = ModbusLines(bus, inputs, outputs, safe, commands.unread(), clearing)
     return RegisterLift(settings.map, lines)
 
 

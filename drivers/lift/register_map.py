@@ -3,7 +3,7 @@
 import functools
 import operator
 from collections.abc import Collection, Iterator
-from typing import Annotated, Literal, TypeAlias
+from typing import Annotated, Final, Literal, TypeAlias
 
 import msgspec
 
@@ -142,6 +142,10 @@ class LiftFlag(Placed, frozen=True, kw_only=True, forbid_unknown_fields=True):
             yield ("bit",), "is for registers: a coil or discrete input is one bit already"
 
 
+READ_BACK: Final = tells("""`read_back` for this command alone. `false` also suits a gateway that takes
+    a call and then clears the call's place by itself.""")
+
+
 class LiftCommand(WrittenLevels, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """One request to the lift."""
 
@@ -155,6 +159,7 @@ class LiftCommand(WrittenLevels, frozen=True, kw_only=True, forbid_unknown_field
     ]
     ask: Annotated[Word, tells("the value of the request.")] = 1
     release: Annotated[Word, tells("the value for no request, its safe value.")] = 0
+    read_back: Annotated[bool | None, READ_BACK] = None
 
 
 class CallCommand(WrittenPlace, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -165,6 +170,7 @@ class CallCommand(WrittenPlace, frozen=True, kw_only=True, forbid_unknown_fields
     at: Annotated[Place, tells("`holding register N`.")]
     codes: Annotated[dict[Word, Name], tells("number -> landing.")]
     none: Annotated[Word, tells("the value for no call.")] = 0
+    read_back: Annotated[bool | None, READ_BACK] = None
 
     def problems(self) -> Remarks:
         """Yield problems: a place that cannot be written; a landing with the number of no call."""
@@ -212,6 +218,27 @@ class Commands(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
             bits = functools.reduce(operator.or_, self.call.codes, self.call.none)
             yield ("call",), self.call.at, bits
 
+    def calling(self) -> dict[str, int]:
+        """Return place -> the bits of calls there."""
+        found: dict[str, int] = {}
+        for path, where, bits in self.places():
+            if path[0] in ("calls", "call"):
+                found[where] = found.get(where, 0) | bits
+        return found
+
+    def unread(self) -> set[str]:
+        """Return the places that are never read back."""
+        return {where for where, read_back in self._read_back().items() if False in read_back}
+
+    def _read_back(self) -> dict[str, dict[bool, tuple[str, ...]]]:
+        """Return place -> `read_back` of its commands -> the path of the last such command."""
+        found: dict[str, dict[bool, tuple[str, ...]]] = {}
+        every = [(path, command) for _, path, command in self.singles()]
+        for path, command in [*every, *([(("call",), self.call)] if self.call else [])]:
+            own = self.read_back if command.read_back is None else command.read_back
+            found.setdefault(command.at, {})[own] = path
+        return found
+
     def words(self, asserted: Collection[str], call: str | None) -> dict[str, int]:
         """Return place -> value for these asserted signals and this landing's call (None: no call)."""
         found: dict[str, int] = {}
@@ -227,6 +254,12 @@ class Commands(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
         """Yield problems: both `calls` and `call`; commands that use the same bit of a register."""
         if self.calls and self.call:
             yield ("calls",), "calls and call are two ways of calling: delete one of the two"
+        for where, told in self._read_back().items():
+            if len(told) > 1:
+                text = (
+                    f"is another than for the other commands at {where}, which is read as a whole"
+                )
+                yield (*told[False], "read_back"), text
         taken: dict[str, int] = {}
         owners: dict[str, list[str]] = {}
         values = [(p, c.at, {"ask": c.ask, "release": c.release}) for _, p, c in self.singles()]

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 
 from bridges.kinds.lift.signals import Hazard
-from drivers.hal.points import Output, Wire
+from drivers.hal.points import Clearing, Output, Wire
 from drivers.lift.wiring import LiftInput, LiftWiring
 
 DEBOUNCE_S = {"floor": 0.08, "door": 0.1, "rear_door": 0.1, "motion": 0.05, "agv_mode": 0.05}
@@ -48,8 +48,14 @@ def wires(wiring: LiftWiring) -> list[Wire]:
     """Return the wiring table, inputs first, with default debounces filled in."""
     return [
         *(line.wire(s, path, _debounce_s(s, line)) for s, path, line in input_rows(wiring)),
-        *(line.wire(signal, path) for signal, path, line in output_rows(wiring)),
+        *(line.wire(s, path, clearing=_call(wiring, s)) for s, path, line in output_rows(wiring)),
     ]
+
+
+def _call(wiring: LiftWiring, signal: str) -> Clearing | None:
+    """Return how a controller may clear this line; None for a line that is no call."""
+    pulse = wiring.limits.call_pulse_s is not None
+    return Clearing(pulse=pulse) if signal.startswith("call_") else None
 
 
 def group(signal: str) -> str:

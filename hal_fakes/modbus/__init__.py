@@ -60,11 +60,11 @@ def serve(settings: ModbusSettings, stations: Sequence[FarSide]) -> "ModbusServe
 class ModbusServer:
     """A running server, with an asyncio loop in its own thread.
 
-    `replace`: replacements for the bus's settings.
+    `replace`: replacements for the bus's settings. `devices`: may be the units of another way to them.
     """
 
-    def __init__(self, devices: Iterable[FarSide], slow_s: float) -> None:
-        self._units = FakeUnits(devices, slow_s)
+    def __init__(self, devices: Iterable[FarSide] | FakeUnits, slow_s: float) -> None:
+        self.units = devices if isinstance(devices, FakeUnits) else FakeUnits(devices, slow_s)
         self._noise = random.Random("modbus")
         self._kinds = itertools.cycle((0, 1))
         self._port = 0
@@ -99,7 +99,7 @@ class ModbusServer:
             custom_pdu=[TimedCoilRequest],
             trace_packet=self._send,
         )
-        self._server.context = self._units
+        self._server.context = self.units
         await self._server.serve_forever(background=True)
         self._port = self._server.transport.sockets[0].getsockname()[1]
 
@@ -112,8 +112,8 @@ class ModbusServer:
     async def _look(self) -> None:
         """Stop or start the server as ordered, and let watchdogs trip."""
         while True:
-            self._units.tick()
-            off = self._units.failure("server") == "off"
+            self.units.tick()
+            off = self.units.failure("server") == "off"
             if off and self._server is not None:
                 await self._hang_up()
             elif not off and self._server is None:
@@ -124,8 +124,8 @@ class ModbusServer:
         """Return the bytes to put onto the wire."""
         if not sending:
             return packet
-        server = self._units.failure("server")
-        if "garbage" in (server, self._units.failure("unit", packet[6])):
+        server = self.units.failure("server")
+        if "garbage" in (server, self.units.failure("unit", packet[6])):
             noise = self._noise.randbytes(self._noise.randrange(1, 30))
             return packet[: len(packet) // 2] if next(self._kinds) else noise
         if server == "wrong":

@@ -4,6 +4,7 @@ Behind the gateway is a lift on contacts: one for each floor, two for a door, on
 contacts can be cut, as our wires can.
 """
 
+import math
 from collections.abc import Iterator
 from itertools import count
 
@@ -66,9 +67,16 @@ def contacts(settings: RegisterLiftSettings) -> dry_contact.DryContactLiftSettin
 
 
 class FakeRegisterLift:
-    """The cells of one gateway, at `unit`. `points`: all cells, including `outputs`."""
+    """The cells of one gateway, at `unit`. `points`: all cells, including `outputs`.
 
-    def __init__(self, plant: Plant, settings: RegisterLiftSettings) -> None:
+    `clears_s`: how soon the gateway clears the place of a call that it has taken; None: never.
+    """
+
+    def __init__(
+        self, plant: Plant, settings: RegisterLiftSettings, clears_s: float | None = None
+    ) -> None:
+        self._clears_s = clears_s
+        self._clear_at: dict[Point, float] = {}
         self.plant = plant
         self.unit = settings.unit
         self._map: LiftMap = settings.map
@@ -76,12 +84,18 @@ class FakeRegisterLift:
         self._parts = {n: at(self.unit, p.at) for n, p in self._map.parts().items()}
         off = self._map.commands.words((), None)
         self._written = {at(self.unit, where): value for where, value in off.items()}
+        self._none = dict(self._written)
+        calls = self._map.commands.calling()
+        self._calling = {at(self.unit, where): bits for where, bits in calls.items()}
         self.points = frozenset([*self._parts.values(), *self._written])
         self.outputs = frozenset(self._written)
 
     def get(self, point: Point, now: float) -> int:
         """Return this point's value at `now` (monotonic s)."""
         self.plant.advance(now)
+        if now >= self._clear_at.get(point, math.inf):  # the lift keeps the call until our release
+            bits = self._calling[point]
+            self._written[point] = self._written[point] & ~bits | self._none[point] & bits
         value = self._written.get(point, 0)
         for name, where in self._parts.items():
             if where == point:
@@ -93,6 +107,8 @@ class FakeRegisterLift:
         if point not in self._written:
             return False
         self._written[point] = value
+        if self._clears_s is not None and point in self._calling:
+            self._clear_at[point] = now + self._clears_s
         relays = sorted(self._relays(point, value), key=lambda relay: relay[1])
         for signal, on in relays:
             self.plant.drive(signal, on, now)

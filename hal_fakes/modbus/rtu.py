@@ -87,7 +87,7 @@ class RtuLine:
     ) -> None:
         self._settings = settings
         self._slow_s = slow_s
-        self._units = FakeUnits(devices, slow_s=0.0)
+        self.units = FakeUnits(devices, slow_s=0.0)
         self._directory = tempfile.TemporaryDirectory(prefix="rmf-rs485-", dir=directory)
         self.adapter = SerialAdapter(Path(self._directory.name) / "adapter")
         self.adapter.plug()
@@ -130,8 +130,8 @@ class RtuLine:
 
     def _look(self) -> None:
         """Pull or plug the adapter as told, and let watchdogs trip."""
-        self._units.tick()
-        pulled = self._units.failure("server") == "off"
+        self.units.tick()
+        pulled = self.units.failure("server") == "off"
         if pulled != (self.adapter.wire is None):
             self._due, self._frame = [], b""
             (self.adapter.pull if pulled else self.adapter.plug)()
@@ -174,8 +174,8 @@ class RtuLine:
         """Handle a complete request. Its reply, if any, begins now, or later if the unit is slow."""
         self.requests.append(frame)
         unit = frame[0]
-        modes = {self._units.failure("server"), self._units.failure("unit", unit)} - {None}
-        reply = self._reply(frame) if self._units.has(unit) else b""
+        modes = {self.units.failure("server"), self.units.failure("unit", unit)} - {None}
+        reply = self._reply(frame) if self.units.has(unit) else b""
         if not reply:
             return
         for mode in modes:
@@ -192,7 +192,7 @@ class RtuLine:
         if request is None:
             return b""
         try:
-            answer = request.datastore_update(self._units, frame[0])  # type: ignore[arg-type]
+            answer = request.datastore_update(self.units, frame[0])  # type: ignore[arg-type]
             response = self._loop.run_until_complete(answer)
         except NoSuchIdException:
             return b""
@@ -214,7 +214,7 @@ class RtuLine:
             bytes((unit, function | 0x80, ExcCodes.DEVICE_FAILURE)),
         )
         kind = next(self._kinds)
-        if kind == len(bodies) and self._units.failure("server") == "wrong":
+        if kind == len(bodies) and self.units.failure("server") == "wrong":
             return self.requests[-1] + reply
         body = bodies[kind % len(bodies)]
         return body + FramerRTU.compute_CRC(body).to_bytes(2, "big")

@@ -70,6 +70,7 @@ class FakeUnits:
         self._coils: dict[Point, bool] = {}
         self._flashes: dict[Point, Point] = {}
         self._off_at: dict[Point, float] = {}
+        self._clear_at: dict[Point, float] = {}
         self._before: dict[Point, int] = {}
         for device in devices:
             if isinstance(device, PlantWiring):
@@ -101,6 +102,9 @@ class FakeUnits:
         now = time.monotonic()
         for coil in [coil for coil, at in self._off_at.items() if at <= now]:
             self._set(coil, False)
+        for coil in [coil for coil, at in self._clear_at.items() if at <= now]:
+            del self._clear_at[coil]
+            self._coils[coil] = False  # the controller keeps the call until our release
         for dead_man in self._dead_men:
             if dead_man.trips(now):
                 for point, (wiring, name) in self._at.items():
@@ -164,6 +168,8 @@ class FakeUnits:
         self._coils[point] = bool(value)
         if name in wiring.outputs:
             wiring.drive(name, bool(value), now)
+            if value and wiring.clears_s is not None and wiring.outputs[name].clearing:
+                self._clear_at[point] = now + wiring.clears_s
         return None
 
     async def _points(

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable, Mapping
 from typing import Any, Protocol
 
 from drivers.hal import HalError, points
-from drivers.hal.modbus.points import Point
+from drivers.hal.modbus.points import Point, RefusedRanges
 from drivers.hal.points import Pull, Wire
 from hal_fakes.http_charger import FakeHttpCharger
 from hal_fakes.plants.charger import ChargerPlant
@@ -54,7 +54,7 @@ class PointsFar:
         return point
 
     def lines(
-        self, inputs: Mapping[str, Pull | None], outputs: Mapping[str, bool]
+        self, inputs: Mapping[str, Pull | None], outputs: Mapping[str, bool], *of_modbus: Any
     ) -> "points.Lines":
         self._safe = dict(outputs)
         return _Lines(self, dict(outputs))
@@ -112,6 +112,8 @@ class RegisterFar:
 
     def __init__(self, clock: Clocked, cells: Cells) -> None:
         self.down = ""
+        self.scan_s = 0.1
+        self.refused = RefusedRanges()
         self.now: Callable[[], float] = lambda: clock.now
         self._cells = cells
         self._first = {p: cells.get(p, 0.0) for p in cells.outputs}

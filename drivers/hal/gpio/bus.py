@@ -2,8 +2,9 @@
 
 import logging
 import sys
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager
+from types import MappingProxyType
 from typing import Protocol
 
 from bridges.system.log import pairs
@@ -11,7 +12,7 @@ from drivers.hal import Bus, HalError
 from drivers.hal.every import Every
 from drivers.hal.gpio.dead_man import AFTER_S, GpioDeadMan
 from drivers.hal.gpio.header import canonical, describe
-from drivers.hal.points import Pull
+from drivers.hal.points import Clearing, Pull
 
 log = logging.getLogger(__name__)
 
@@ -65,8 +66,15 @@ class GpioBus(Bus):
         self._devices: list[GpioLines] = []
         self._dead_man = GpioDeadMan(self._drop, clock)
 
-    def lines(self, inputs: Mapping[str, Pull | None], outputs: Mapping[str, bool]) -> "GpioLines":
-        """Return these lines: canonical inputs with their pull, outputs with their safe level."""
+    def lines(
+        self,
+        inputs: Mapping[str, Pull | None],
+        outputs: Mapping[str, bool],
+        unread: Collection[str] = (),
+        clearing: Mapping[str, Clearing] = MappingProxyType({}),
+    ) -> "GpioLines":
+        """Return these lines: canonical inputs with their pull, outputs with their safe level. The last
+        two parameters are for modules."""
         self._devices.append(GpioLines(self, dict(inputs), dict(outputs)))
         return self._devices[-1]
 

@@ -85,6 +85,8 @@ def wire_problems(wire: Wire) -> Iterable[str]:
             yield f"{name} has a fixed 1.8 kΩ pull-up: write pull: up, or use another pin"
     elif wire.pull is not None:
         yield "an output has no pull"
+    elif not wire.read_back:
+        yield "read_back is for the coils of a module; a pin keeps its level: delete read_back"
     elif wire.flash is not None:
         yield "flash is for modules that time pulses; the daemon times a pin's pulses: leave flash out"
     elif name in HAT_EEPROM:

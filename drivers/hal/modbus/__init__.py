@@ -5,6 +5,7 @@
     bus.py        the units of one connection or line: retries, pauses
     lines.py      one device's coils and registers: claim, read, write, read back, release; a second
                   master on one output is a fault, and makes no relay chatter
+    clearing.py   calls that the controller takes and clears by itself
     dead_man.py   arms and refreshes the modules' watchdogs
     wire.py       a request and its answer; tcp.py and rtu.py carry them, frames.py makes the frames
 
@@ -13,7 +14,7 @@ Only frames.py (pymodbus) and rtu.py (pyserial) import a library. They are impor
 
 from drivers.hal import BusType
 from drivers.hal.modbus.bus import ModbusBus
-from drivers.hal.modbus.points import canonical, describe, wire_problems
+from drivers.hal.modbus.points import canonical, describe, wire_problems, wire_warnings
 from drivers.hal.modbus.settings import (
     ModbusSettings,
     needs,
@@ -49,6 +50,7 @@ BUS = BusType(
     canonical=canonical,
     describe=describe,
     wire_problems=wire_problems,
+    wire_warnings=wire_warnings,
     unreachable=unreachable,
     unwatched=unwatched,
     paced=paced,

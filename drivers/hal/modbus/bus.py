@@ -20,14 +20,15 @@ import functools
 import math
 import random
 import time
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
+from types import MappingProxyType
 from typing import Final
 
 from drivers.hal import Bus, HalError
 from drivers.hal.backoff import Backoff
 from drivers.hal.modbus.dead_man import DeviceWatchdogs, Watchdogs
 from drivers.hal.modbus.lines import Image, ModbusLines
-from drivers.hal.modbus.points import Point, Range, canonical, parse
+from drivers.hal.modbus.points import Point, Range, RefusedRanges, canonical, parse
 from drivers.hal.modbus.settings import ModbusSettings
 from drivers.hal.modbus.wire import (
     COIL_ON,
@@ -42,7 +43,7 @@ from drivers.hal.modbus.wire import (
     UnitWire,
     Unreachable,
 )
-from drivers.hal.points import Pull
+from drivers.hal.points import Clearing, Pull
 
 TURN_S: Final = 0.05
 """The pause after a failed try before another failed unit is tried: longer than the rest of a scan, and
@@ -53,7 +54,8 @@ shorter than a scan's period.
 class ModbusBus(Bus):
     """One TCP connection or serial line, and the units there (also a `drivers.hal.points.PointsBus`).
 
-    Tests replace `clock` and `jitter`; `now` is the clock.
+    Tests replace `clock` and `jitter`; `now` is the clock. `scan_s`: the period of readings (s).
+    `refused`: the gaps that units lack, so that no further reading asks for them.
     """
 
     canonical = staticmethod(canonical)
@@ -65,6 +67,8 @@ class ModbusBus(Bus):
         jitter: Callable[[], float] = random.random,
     ) -> None:
         self.now = clock
+        self.scan_s = settings.scan_s
+        self.refused = RefusedRanges()
         self._settings = settings
         self._wire, self._where = _way(settings)
         self._backoff = functools.partial(Backoff, clock, jitter)
@@ -73,11 +77,16 @@ class ModbusBus(Bus):
         self._turn_at = -math.inf
         self._watchdogs = Watchdogs(self, settings.module_watchdog, clock)
 
-    def lines(self, inputs: Mapping[str, Pull | None], outputs: Mapping[str, bool]) -> ModbusLines:
+    def lines(
+        self,
+        inputs: Mapping[str, Pull | None],
+        outputs: Mapping[str, bool],
+        unread: Collection[str] = (),
+        clearing: Mapping[str, Clearing] = MappingProxyType({}),
+    ) -> ModbusLines:
         """Return these lines: canonical inputs, and coils with their safe level (True is 1)."""
-        return ModbusLines(
-            self, {n: parse(n) for n in inputs}, {n: parse(n) for n in outputs}, dict(outputs)
-        )
+        read, driven = ({n: parse(n) for n in names} for names in (inputs, outputs))
+        return ModbusLines(self, read, driven, dict(outputs), unread, clearing)
 
     def read(self, asked: Range, safe: bool = False) -> dict[Point, int]:
         """Read these bits (0 or 1) or registers by one request. Raises HalError."""

@@ -7,15 +7,17 @@ watchdog fails.
 """
 
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from contextlib import AbstractContextManager, nullcontext
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Final
 
 from drivers.hal import HalError
 from drivers.hal.every import Every
+from drivers.hal.modbus.clearing import ClearedCalls
 from drivers.hal.modbus.points import Point, Range, parse, pieces, ranges
 from drivers.hal.modbus.wire import ILLEGAL_ADDRESS, UnitException
-from drivers.hal.points import Flash
+from drivers.hal.points import Clearing, Flash
 
 if TYPE_CHECKING:
     from drivers.hal.modbus.bus import ModbusBus
@@ -49,12 +51,14 @@ class Image:
 
     def _part(self, part: Range, asked: list[Range], safe: bool) -> dict[Point, int]:
         """Make one request. If the module lacks addresses in a gap, later requests skip the gap."""
-        try:
-            return self._units.read(part, safe)
-        except UnitException as refusal:
-            parts = pieces(part, self._points)
-            if refusal.code != ILLEGAL_ADDRESS or len(parts) == 1:
-                raise
+        parts = pieces(part, self._points)
+        if len(parts) == 1 or not self._units.refused.within(part):
+            try:
+                return self._units.read(part, safe)
+            except UnitException as refusal:
+                if refusal.code != ILLEGAL_ADDRESS or len(parts) == 1:
+                    raise
+            self._units.refused.add(part)
         asked[:0] = parts
         at = self._ranges.index(part)
         self._ranges[at : at + 1] = parts
@@ -97,8 +101,8 @@ class Rivals:
 class ModbusLines:
     """One device's inputs and outputs by name (`drivers.hal.points.Lines`).
 
-    `safe`: each output's safe value. `readable`: outputs can be read back. If not, every scan writes
-    them, because the controller may have restarted.
+    `safe`: each output's safe value. `unread`: outputs that cannot be read back. Every scan writes
+    them, because the controller may have restarted. `clearing`: outputs that the controller may clear.
     """
 
     def __init__(
@@ -107,16 +111,18 @@ class ModbusLines:
         inputs: Mapping[str, Point],
         outputs: Mapping[str, Point],
         safe: Mapping[str, int],
-        readable: bool = True,
+        unread: Collection[str] = (),
+        clearing: Mapping[str, Clearing] = MappingProxyType({}),
     ) -> None:
         self._units = units
         self._inputs = dict(inputs)
         self._outputs = dict(outputs)
         self._safe = dict(safe)
-        self._readable = readable
-        self._back = Image(units, outputs.values() if readable else ())
-        read = [point.cell for point in inputs.values()]
-        self._all = Image(units, [*read, *(outputs.values() if readable else ())])
+        self._unread = frozenset(unread)
+        back = [point for name, point in outputs.items() if name not in self._unread]
+        self._back = Image(units, back)
+        self._all = Image(units, [*(point.cell for point in inputs.values()), *back])
+        self._calls = ClearedCalls(units.now, units.scan_s, safe, clearing)
         self._set: dict[str, int] = {}
         self._touched = False
         self._claimed = False
@@ -135,15 +141,16 @@ class ModbusLines:
             self._guard.check()
         found = self._back.read(every=every)
         if not self._claimed:
-            names = (n for n, p in self._outputs.items() if p in found or not self._readable)
+            names = (n for n, p in self._outputs.items() if p in found or n in self._unread)
             self._write({name: self._safe[name] for name in names}, every)
         every.check()
-        if not self._readable:
+        if self._unread:
             self._all.read()
         self._claimed = True
 
     def read(self) -> dict[str, int]:
-        """Read every input. Raises HalError, also if an output contradicts its written value.
+        """Read every input, and each output whose lost call must be written again. Raises HalError,
+        also if an output contradicts its written value.
 
         After a failure the outputs count as unknown.
         """
@@ -151,16 +158,17 @@ class ModbusLines:
         self._guard.check()
         image = self._all.read()
         self._verify(known, image)
-        self._set = known
-        return {name: p.of(image[p.cell]) for name, p in self._inputs.items()}
+        lost = self._lost(known, image)
+        self._set = {name: value for name, value in known.items() if name not in lost}
+        return {**lost, **{name: p.of(image[p.cell]) for name, p in self._inputs.items()}}
 
     def bring(self, values: Mapping[str, int]) -> None:
         """Set these outputs, except outputs known to have the value already. Raises HalError.
 
         Also raises while another master writes one of the device's outputs.
         """
-        changed = {n: value for n, value in values.items() if self._set.get(n) != value}
-        self.write(changed if self._readable else values)
+        changed = {n for n, value in values.items() if self._set.get(n) != value}
+        self.write({n: values[n] for n in values if n in changed | self._unread})
         self._rivals.check(map(str, self._outputs.values()))
 
     def write(self, values: Mapping[str, int]) -> None:
@@ -176,9 +184,9 @@ class ModbusLines:
         self._units.flash(parse(flash.point), flash.on_s)
 
     def outputs(self) -> dict[str, int] | None:
-        """Read the outputs now; None where they cannot be read."""
+        """Read the outputs now; None where none can be read."""
         image = self._back.read()
-        return {n: image[p] for n, p in self._outputs.items()} if self._readable else None
+        return {n: image[p] for n, p in self._outputs.items() if p in image} or None
 
     def make_safe(self) -> None:
         """Set every output to its safe value, even outputs believed safe. Raises HalError."""
@@ -205,12 +213,13 @@ class ModbusLines:
                 with every.one():
                     if name not in safe:
                         self._rivals.check([str(self._outputs[name])])
+                    self._calls.wrote(name)
                     self._units.write(self._outputs[name], values[name], safe=name in safe)
                     written[name] = values[name]
         self._read_back(written, safe=len(safe) == len(values), every=every)
 
     def _read_back(self, written: Mapping[str, int], safe: bool, every: Every) -> None:
-        points = [self._outputs[name] for name in written] if self._readable else []
+        points = [self._outputs[name] for name in written if name not in self._unread]
         with every.one():
             self._verify(written, Image(self._units, points).read(safe))
             self._set |= written
@@ -218,13 +227,23 @@ class ModbusLines:
     def _verify(self, written: Mapping[str, int], image: Mapping[Point, int]) -> None:
         for name, value in written.items():
             point = self._outputs[name]
-            if image.get(point, value) != value:
+            if not self._calls.may_read(name, value, image.get(point, value)):
                 self._rivals.contradicted(str(point))
                 self._rivals.check([str(point)])
                 raise HalError(
                     f"{point} reads {image[point]} after {value:d} was written: the module has"
                     " restarted, its watchdog has tripped, or another master writes the output"
                 )
+
+    def _lost(self, known: Mapping[str, int], image: Mapping[Point, int]) -> dict[str, int]:
+        """Return the outputs that have lost their call, which must be written again."""
+        lost: dict[str, int] = {}
+        for name, value in known.items():
+            point = self._outputs[name]
+            if not self._calls.keeps(name, value, image.get(point, value)):
+                lost[name] = image[point]
+            self._calls.tell(name, str(point))
+        return lost
 
 
 def _tried(every: Every | None) -> AbstractContextManager[None]:

@@ -149,6 +149,12 @@ def wire_problems(wire: Wire) -> Iterable[str]:
         )
 
 
+def wire_warnings(wire: Wire) -> Iterable[str]:
+    """Yield a warning for a relay whose release nobody can verify; a call needs no such proof."""
+    if wire.direction == "out" and not (wire.read_back or wire.clearing):
+        yield "the coil is not read back: switching it off is not verified"
+
+
 def _flash_problems(wire: Wire, output: Point) -> Iterable[str]:
     if wire.flash is None:
         return
@@ -177,6 +183,27 @@ def ranges(points: Iterable[Point], gap: int | None = None) -> list[Range]:
 def pieces(whole: Range, points: Iterable[Point]) -> Sequence[Range]:
     """Return parts of a range that contain these points and no others."""
     return ranges(set(points).intersection(whole.points()), gap=0)
+
+
+class RefusedRanges:
+    """Ranges that a unit has refused, because it lacks an address between the points in use."""
+
+    def __init__(self) -> None:
+        self._found: set[Range] = set()
+
+    def add(self, refused: Range) -> None:
+        """Remember a range."""
+        self._found.add(refused)
+
+    def within(self, asked: Range) -> bool:
+        """Does this range contain a refused range?"""
+        end = asked.start + asked.count
+        return any(
+            (one.unit, one.table) == (asked.unit, asked.table)
+            and asked.start <= one.start
+            and one.start + one.count <= end
+            for one in self._found
+        )
 
 
 def _joins(last: Range, point: Point, gap: int | None) -> bool:

@@ -26,7 +26,9 @@ class Recorded:
     def canonical(self, point: str) -> str:
         return f"P{point}"
 
-    def lines(self, inputs: Mapping[str, Pull | None], outputs: Mapping[str, bool]) -> "Recorded":
+    def lines(
+        self, inputs: Mapping[str, Pull | None], outputs: Mapping[str, bool], *of_modbus: object
+    ) -> "Recorded":
         self.claims.append((inputs, outputs))
         return self
 

@@ -4,6 +4,7 @@ Only the wire is missing, with its timeouts and its backoff (`drivers/hal/modbus
 """
 
 from collections.abc import Mapping
+from typing import Any
 
 from drivers.hal.modbus.lines import ModbusLines
 from drivers.hal.modbus.points import Point, parse
@@ -17,11 +18,13 @@ class ModuleFar(PointsFar):
 
     dead: frozenset[Point] = frozenset()
 
-    def lines(self, inputs: Mapping[str, Pull | None], outputs: Mapping[str, bool]) -> ModbusLines:
+    def lines(
+        self, inputs: Mapping[str, Pull | None], outputs: Mapping[str, bool], *of_modbus: Any
+    ) -> ModbusLines:
         units = RegisterFar(self._clock, _Cells(self, self._wiring))
         self.units = units
         found = {name: parse(name) for name in inputs}, {name: parse(name) for name in outputs}
-        return ModbusLines(units, *found, dict(outputs))  # type: ignore[arg-type]
+        return ModbusLines(units, *found, dict(outputs), *of_modbus)  # type: ignore[arg-type]
 
     def silent(self, why: str) -> None:
         """It does not answer from now on, for this reason; "": it does."""
