@@ -22,7 +22,7 @@ from bridges.runtime.service import service
 from bridges.runtime.serving import stop
 from bridges.settings.load import Config, load
 from drivers.hal.modbus import ModbusBus, ModbusSettings, Serial, canonical
-from drivers.hal.modbus.points import parse
+from drivers.hal.modbus.points import Point, parse
 from drivers.hal.modbus.registers import at
 from drivers.lift.dry_contact import wires
 from hal_fakes.modbus import ModbusServer, register_lift
@@ -67,9 +67,7 @@ class Site:
         rmf = MemoryTransport(network, "rmf")
         rmf.subscribe(LIFT_STATES, self.states.append)
         self._requests = rmf.publisher(LIFT_REQUESTS)
-        self._served = served = service(
-            config, MemoryTransport(network, "lift"), lambda name: self.bus
-        )
+        served = service(config, MemoryTransport(network, "lift"), lambda name: self.bus)
         served.subscribe()
         (loop,) = served.loops
         for close in (world.close, self.server.close, beside.close, self.another.close):
@@ -114,10 +112,6 @@ class Site:
         self.request("L3")
         return bool(self.relay("call_L3"))
 
-    def faults(self) -> str:
-        """Return the device's status, with its faults."""
-        return str(self._served.devices())
-
     def relay(self, signal: str) -> list[object]:
         """Return each change of one of the lift's relays."""
         edges = list(self.plant.edges)
@@ -154,7 +148,16 @@ def spoken(caplog: pytest.LogCaptureFixture) -> list[str]:
     return [r.getMessage() for r in caplog.records if r.levelno >= logging.WARNING]
 
 
-PLACE: Final = {GATEWAY: "unit 1 holding register 11", CONTACTS: "unit 1 coil 4"}
+def is_told(point: Point, caplog: pytest.LogCaptureFixture) -> bool:
+    """Is another master named as a cause, although the place has not cleared itself?"""
+    lost = [text for text in spoken(caplog) if text.startswith("device_lost")]
+    return any("another master writes" in text and str(point) in text for text in lost)
+
+
+PLACES: Final = {
+    GATEWAY: ["unit 1 holding register 11"],
+    CONTACTS: ["unit 1 coil 4", "unit 1 coil 2"],
+}
 READ_BACK: Final = {
     GATEWAY: ("          none: 0", "          none: 0\n          read_back: false"),
     CONTACTS: (
@@ -165,7 +168,7 @@ READ_BACK: Final = {
 
 
 @pytest.mark.long(6)
-@pytest.mark.parametrize("clears_s", [0.0, 0.05])
+@pytest.mark.parametrize("clears_s", [0.01, 0.05])
 @pytest.mark.parametrize("example", [GATEWAY, CONTACTS])
 def test_a_lift_that_clears_its_calls_is_ridden_without_a_fault_and_the_place_is_named_with_the_key(
     example: str,
@@ -180,9 +183,11 @@ def test_a_lift_that_clears_its_calls_is_ridden_without_a_fault_and_the_place_is
     site.rides("L1")
     assert site.modes() == [LiftMode.MODE_HUMAN, LiftMode.MODE_AGV]
     assert site.relay("agv_mode_request") == [True]
-    (told,) = spoken(caplog)
-    assert told.startswith(f'call_cleared place="{PLACE[example]}"')
-    assert "so write read_back: false at this command; or another master" in told
+    told = spoken(caplog)
+    assert [text.split(" reason")[0] for text in told] == [
+        f'call_cleared place="{place}"' for place in PLACES[example]
+    ]
+    assert all("so write read_back: false at this command; or another" in text for text in told)
 
 
 @pytest.mark.long(4)
@@ -238,8 +243,9 @@ def test_another_master_that_switches_our_command_off_is_told(
 
     def named() -> bool:
         pace.wait(0.5)
+        site.called()
         site.another.write(point, 0)
-        return f"another master writes {point} too" in site.faults()
+        return is_told(point, caplog)
 
     wait_until(named, "the other master is named")
 
@@ -247,7 +253,7 @@ def test_another_master_that_switches_our_command_off_is_told(
 @pytest.mark.long(8)
 @pytest.mark.parametrize("example", [GATEWAY, CONTACTS])
 def test_another_masters_call_in_a_place_that_clears_itself_is_told(
-    example: str, rtu: bool, tmp_path: Path, held: ExitStack
+    example: str, rtu: bool, tmp_path: Path, held: ExitStack, caplog: pytest.LogCaptureFixture
 ) -> None:
     site = Site(configured(example, tmp_path), 0.05, rtu, held)
     site.rides("L3")
@@ -257,6 +263,6 @@ def test_another_masters_call_in_a_place_that_clears_itself_is_told(
     def named() -> bool:
         pace.wait(0.5)
         site.another.write(point, value)
-        return f"another master writes {point} too" in site.faults()
+        return is_told(point, caplog)
 
     wait_until(named, "the other master is named")

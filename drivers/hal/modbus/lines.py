@@ -186,7 +186,7 @@ class ModbusLines:
     def outputs(self) -> dict[str, int] | None:
         """Read the outputs now; None where none can be read."""
         image = self._back.read()
-        return {n: image[p] for n, p in self._outputs.items() if p in image} or None
+        return {n: image[p] for n, p in self._outputs.items() if n not in self._unread} or None
 
     def make_safe(self) -> None:
         """Set every output to its safe value, even outputs believed safe. Raises HalError."""
@@ -227,7 +227,7 @@ class ModbusLines:
     def _verify(self, written: Mapping[str, int], image: Mapping[Point, int]) -> None:
         for name, value in written.items():
             point = self._outputs[name]
-            if not self._calls.may_read(name, value, image.get(point, value)):
+            if not self._calls.may_read(name, value, self._reading(name, value, image)):
                 self._rivals.contradicted(str(point))
                 self._rivals.check([str(point)])
                 raise HalError(
@@ -235,12 +235,16 @@ class ModbusLines:
                     " restarted, its watchdog has tripped, or another master writes the output"
                 )
 
+    def _reading(self, name: str, value: int, image: Mapping[Point, int]) -> int:
+        """Return an output's reading; its written value if the reading was not made, or counts not."""
+        return value if name in self._unread else image.get(self._outputs[name], value)
+
     def _lost(self, known: Mapping[str, int], image: Mapping[Point, int]) -> dict[str, int]:
         """Return the outputs that have lost their call, which must be written again."""
         lost: dict[str, int] = {}
         for name, value in known.items():
             point = self._outputs[name]
-            if not self._calls.keeps(name, value, image.get(point, value)):
+            if not self._calls.keeps(name, value, self._reading(name, value, image)):
                 lost[name] = image[point]
             self._calls.tell(name, str(point))
         return lost
