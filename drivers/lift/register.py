@@ -4,7 +4,7 @@ Floor, door, motion and service state are numbers, hazards are bits, commands ar
 unlisted number is a fault; it never means a floor, an open door or a standing car.
 """
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping, Set
 from typing import Annotated, Final
 
 from bridges.kinds.lift.settings import LiftSettings
@@ -15,11 +15,22 @@ from bridges.kinds.shared.table import Table
 from drivers.driver_type import DriverType
 from drivers.hal.modbus import ModbusBus
 from drivers.hal.modbus.lines import ModbusLines
-from drivers.hal.modbus.registers import WRITABLE, Unit, at, misplaced
+from drivers.hal.modbus.registers import Unit
 from drivers.hal.points import Clearing
 from drivers.lift import checks
-from drivers.lift.register_map import DoorField, FloorField, LiftFlag, LiftMap, MotionField, Number
-from drivers.lift.table import DEBOUNCE_S, HAZARD_DEBOUNCE_S
+from drivers.lift.dry_contact import DOOR as BY_CONTACTS
+from drivers.lift.dry_contact import UP_DOWN
+from drivers.lift.register_map import LiftMap
+from drivers.lift.register_parts import (
+    DoorField,
+    FloorField,
+    LiftFlag,
+    MotionField,
+    Number,
+    place_of,
+    point_at,
+)
+from drivers.lift.table import DEBOUNCE_S, HAZARD_DEBOUNCE_S, MOTION
 from drivers.lift.tables import BETWEEN, FAULT, floors, how_long
 
 DOOR: Final = {
@@ -70,10 +81,12 @@ class RegisterLiftSettings(LiftSettings, frozen=True, kw_only=True, forbid_unkno
 def _rear_door(settings: RegisterLiftSettings) -> Remarks:
     rear = any(stop.side is Side.REAR for stop in settings.stops().values())
     found = settings.map
-    if rear and not found.rear_door:
+    has_rear = bool(found.rear_door or found.rear_door_opened)
+    if rear and not has_rear:
         yield ("map",), "no rear_door, and some floors have side: rear"
-    if found.rear_door and not rear:
-        yield ("map", "rear_door"), "no floor has side: rear"
+    if has_rear and not rear:
+        path = "rear_door" if found.rear_door else "rear_door_opened"
+        yield ("map", path), "no floor has side: rear"
     if rear and found.commands.door_open and not found.commands.rear_door_open:
         yield ("map", "commands"), "no rear_door_open, and some floors have side: rear"
 
@@ -86,6 +99,13 @@ def warnings(settings: RegisterLiftSettings) -> Remarks:
     yield from checks.missing(settings, ("map",), told, asks, fire, holds)
     yield from checks.unseen(settings, found.shows)
     yield from checks.counts_down(settings, found.floor.codes, ("map", "floor", "codes"))
+    for hazard in checks.ALARMED:
+        flag = found.flag(hazard)
+        if flag and flag.is_in("discrete input") and flag.active == "high":
+            text = (
+                f"if this input has a wire, its cut reads as no {hazard}: use a contact that opens"
+            )
+            yield ("map", hazard), f"{text} at the alarm, and active: low"
     if not commands.read_back:
         text = "commands cannot be read back: switching off is not verified"
         yield ("map", "commands", "read_back"), text
@@ -108,23 +128,24 @@ def debounce(settings: RegisterLiftSettings) -> Mapping[str, float]:
 def claims(settings: RegisterLiftSettings) -> Iterator[tuple[str, tuple[str, ...]]]:
     """Yield (place, path) of each command; no other device may write there."""
     seen: set[str] = set()
-    for path, where, _ in settings.map.commands.places():
-        if where not in seen and misplaced(where, WRITABLE) is None:
-            seen.add(where)
-            yield str(at(settings.unit, where)), ("map", "commands", *path, "at")
+    for path, place, _ in settings.map.commands.places():
+        if place not in seen:
+            seen.add(place)
+            yield str(point_at(settings.unit, place)), ("map", "commands", *path, "at")
 
 
 def describe(settings: RegisterLiftSettings, bus: object) -> Iterator[tuple[str, str]]:
     """Yield rows for `check`: the place of each part of the map, and of each command."""
     for name, part in settings.map.parts().items():
-        yield name, f"{at(settings.unit, part.at)}{_meaning(part)}"
+        yield name, f"{point_at(settings.unit, place_of(part))}{_meaning(part)}"
     commands = settings.map.commands
     for signal, _, command in commands.singles():
-        yield signal, f"{at(settings.unit, command.at)} is written"
+        yield signal, f"{point_at(settings.unit, place_of(command))} is written"
     if commands.call:
-        yield "call", f"{at(settings.unit, commands.call.at)} is written"
-    for where in sorted(commands.unread()):
-        yield f"{at(settings.unit, where)}", "written in every scan, and never read back"
+        yield "call", f"{point_at(settings.unit, place_of(commands.call))} is written"
+    for place in sorted(commands.unread()):
+        text = "written in every scan, and never read back"
+        yield str(point_at(settings.unit, place)), text
 
 
 def tables(settings: RegisterLiftSettings) -> Iterator[Table]:
@@ -161,13 +182,14 @@ def _outputs(settings: RegisterLiftSettings) -> Table:
     rows = []
     for signal, _, command in commands.singles():
         if not signal.startswith("call_"):
-            rows.append((signal, command.at, commands.words([signal], None)[command.at]))
+            place = place_of(command)
+            rows.append((signal, place, commands.words([signal], None)[place]))
     for level in levels:
-        at = commands.call.at if commands.call else commands.calls[level].at
-        rows.append((f"call {level}", at, commands.words([f"call_{level}"], level)[at]))
+        place = place_of(commands.call or commands.calls[level])
+        rows.append((f"call {level}", place, commands.words([f"call_{level}"], level)[place]))
     told = tuple(
-        (output, f"{at}: {value}", str(off[at]), how_long(settings, output))
-        for output, at, value in rows
+        (output, f"{place}: {value}", str(off[place]), how_long(settings, output))
+        for output, place, value in rows
     )
     return Table("outputs", ("output", "writes", "off", "how long"), told)
 
@@ -182,11 +204,11 @@ def _meaning(part: Number | LiftFlag) -> str:
 
 def create(name: str, settings: RegisterLiftSettings, bus: ModbusBus) -> "RegisterLift":
     """Make the lift's driver on its bus; it sends nothing before `open`."""
-    inputs = {part: at(settings.unit, p.at) for part, p in settings.map.parts().items()}
+    inputs = {n: point_at(settings.unit, place_of(p)) for n, p in settings.map.parts().items()}
     safe = encode(settings.map, LiftOutputs())
-    outputs = {where: at(settings.unit, where) for where in safe}
+    outputs = {place: point_at(settings.unit, place) for place in safe}
     commands, pulse = settings.map.commands, settings.limits.call_pulse_s is not None
-    clearing = {where: Clearing(bits, pulse) for where, bits in commands.calling().items()}
+    clearing = {place: Clearing(bits, pulse) for place, bits in commands.calling().items()}
     lines = ModbusLines(bus, inputs, outputs, safe, commands.unread(), clearing)
     return RegisterLift(settings.map, lines)
 
@@ -241,7 +263,7 @@ def decode(found: LiftMap, words: Mapping[str, int]) -> LiftSample:
         door=_door(found, "door", words, unknown) or DoorReading.BETWEEN,
         code_fault=code_fault,
         rear_door=_door(found, "rear_door", words, unknown),
-        motion=None if "motion" in unknown else _motion(found, words),
+        motion=None if unknown.intersection(MOTION) else _motion(found, words),
         agv=agv,
         hazards=frozenset(
             h for h in Hazard if h == service or (h not in unknown and flags.get(h, False))
@@ -269,18 +291,30 @@ def _floor(found: LiftMap, words: Mapping[str, int]) -> tuple[str | None, str]:
 
 
 def _door(
-    found: LiftMap, name: str, words: Mapping[str, int], unknown: Iterable[str]
+    found: LiftMap, name: str, words: Mapping[str, int], unknown: Set[str]
 ) -> DoorReading | None:
-    part = found.rear_door if name == "rear_door" else found.door
+    part: DoorField | None = getattr(found, name)
+    if not unknown.isdisjoint((name, f"{name}_opened", f"{name}_closed")):
+        return DoorReading.BETWEEN
+    opened: LiftFlag | None = getattr(found, f"{name}_opened")
+    closed: LiftFlag | None = getattr(found, f"{name}_closed")
+    if opened and closed:
+        ends = words[f"{name}_opened"], words[f"{name}_closed"]
+        return BY_CONTACTS[opened.asserted(ends[0]), closed.asserted(ends[1])]
     if part is None:
         return None
-    if name in unknown:
-        return DoorReading.BETWEEN
     state = part.codes.get(part.number(words[name]))
     return DOOR[state] if state else DoorReading.UNKNOWN
 
 
 def _motion(found: LiftMap, words: Mapping[str, int]) -> Motion | None:
+    shown = {n: f.asserted(words[n]) for n in MOTION if (f := found.flag(n))}
+    if "moving" in shown:
+        return Motion.MOVING if shown["moving"] else Motion.STOPPED
+    if "stopped" in shown:
+        return Motion.STOPPED if shown["stopped"] else Motion.MOVING
+    if "up" in shown:
+        return UP_DOWN[shown["up"], shown["down"]]
     if found.motion is None:
         return None
     state = found.motion.codes.get(found.motion.number(words["motion"]))

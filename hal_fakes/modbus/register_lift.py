@@ -13,17 +13,19 @@ import msgspec
 from bridges.kinds.lift.settings import LiftSettings
 from bridges.kinds.lift.signals import Hazard
 from drivers.hal.modbus.points import Point
-from drivers.hal.modbus.registers import at
 from drivers.lift import dry_contact
 from drivers.lift.register import RegisterLiftSettings
-from drivers.lift.register_map import (
+from drivers.lift.register_map import LiftMap
+from drivers.lift.register_parts import (
     DoorField,
     LiftFlag,
-    LiftMap,
     MotionField,
     NumberField,
     ServiceField,
+    place_of,
+    point_at,
 )
+from drivers.lift.table import MOTION
 from hal_fakes.fake import Fake
 from hal_fakes.plants.lift import LiftPace, LiftPlant
 from hal_fakes.plants.plant import Plant
@@ -50,6 +52,9 @@ def contacts(settings: RegisterLiftSettings) -> dry_contact.DryContactLiftSettin
     for door in ("door", "rear_door"):
         if part := getattr(found, door):
             wired |= {f"{door}_{end}": line(part) for end in ("opened", "closed")}
+        ends = [f"{door}_{end}" for end in ("opened", "closed")]
+        wired |= {name: line(flag) for name in ends if (flag := found.flag(name))}
+    wired |= {name: line(flag) for name in MOTION if (flag := found.flag(name))}
     if found.motion:
         moves = ("moving",) if "moving" in found.motion.codes.values() else ("up", "down")
         wired |= {name: line(found.motion) for name in moves}
@@ -81,12 +86,12 @@ class FakeRegisterLift:
         self.unit = settings.unit
         self._map: LiftMap = settings.map
         self._levels = settings.levels()
-        self._parts = {n: at(self.unit, p.at) for n, p in self._map.parts().items()}
+        self._parts = {n: point_at(self.unit, place_of(p)) for n, p in self._map.parts().items()}
         off = self._map.commands.words((), None)
-        self._written = {at(self.unit, where): value for where, value in off.items()}
+        self._written = {point_at(self.unit, place): value for place, value in off.items()}
         self._none = dict(self._written)
         calls = self._map.commands.calling()
-        self._calling = {at(self.unit, where): bits for where, bits in calls.items()}
+        self._calling = {point_at(self.unit, place): bits for place, bits in calls.items()}
         self.points = frozenset([*self._parts.values(), *self._written])
         self.outputs = frozenset(self._written)
 
@@ -97,8 +102,8 @@ class FakeRegisterLift:
             bits = self._calling[point]
             self._written[point] = self._written[point] & ~bits | self._none[point] & bits
         value = self._written.get(point, 0)
-        for name, where in self._parts.items():
-            if where == point:
+        for name, place in self._parts.items():
+            if place == point:
                 value |= self._word(name)
         return value
 
@@ -118,9 +123,9 @@ class FakeRegisterLift:
         """Return the relays that this value switches on or off."""
         commands = self._map.commands
         for signal, _, command in commands.singles():
-            if at(self.unit, command.at) == point:
+            if point_at(self.unit, place_of(command)) == point:
                 yield signal, value & (command.ask | command.release) == command.ask
-        if commands.call and at(self.unit, commands.call.at) == point:
+        if commands.call and point_at(self.unit, place_of(commands.call)) == point:
             [bits] = [bits for path, _, bits in commands.places() if path == ("call",)]
             for number, level in commands.call.codes.items():
                 yield f"call_{level}", value & bits == number

@@ -90,11 +90,13 @@ class FakeUnits:
 
     def _add_cells(self, device: UnitCells) -> None:
         self._cells.update(dict.fromkeys(device.points, device))
-        self._plants.setdefault(device.unit, [])
+        units = {device.unit, *(point.unit for point in device.points)}
+        for unit in units:
+            self._plants.setdefault(unit, [])
         if isinstance(device, ModuleWatchdog):
             self._dead_men.append(device)
         if device.plant:
-            for unit in (None, device.unit):
+            for unit in (None, *units):
                 self._plants[unit].append(device.plant)
 
     def tick(self) -> None:

@@ -132,3 +132,40 @@ class TestDryContactsOnGpio(LiftContract):
         plant = world.plants["lift"]
         with on_pins(world, plant, wires(settings)) as bus:
             yield Bench(create("lift", settings, bus), plant)
+
+
+def contact(number: int, active: str = "high") -> dict[str, Any]:
+    return {"at": f"discrete input {number}", "unit": 4, "active": active}
+
+
+class TestRegistersBesideContacts(TestRegistersWithCallsAsNumbers):
+    """The floor is a number in the gateway, unit 3; the rest is wired to a module, unit 4."""
+
+    serial: ClassVar[modbus.Serial | None] = None
+
+    @contextmanager
+    def benches(self) -> Iterator[Bench]:
+        found = {
+            "floor": NUMBERS["floor"],
+            "agv_mode": NUMBERS["agv_mode"],
+            "moving": contact(0),
+            "door_opened": contact(1),
+            "door_closed": contact(2),
+            "fire_alarm": contact(3, "low"),
+        }
+        coils = {name: {**coil, "unit": 4} for name, coil in COILS.items()}
+        plain = {
+            "floors": FLOORS,
+            "unit": 3,
+            "map": {**found, "commands": {**coils, "call": CALLS}},
+        }
+        settings = msgspec.convert(plain, register.RegisterLiftSettings)
+        assert list(settings.problems()) == []
+        world = RealTime({"lift": register_lift.build("lift", settings, QUICK)})
+        far_side = register_lift.FakeRegisterLift(world.plants["lift"], settings)
+        with on_modbus(world, [far_side], self.serial) as (bus, clock):
+            yield Bench(register.create("lift", settings, bus), far_side.plant, clock)
+
+
+class TestRegistersBesideContactsOnRs485(TestRegistersBesideContacts):
+    serial: ClassVar = RS485
