@@ -6,7 +6,6 @@ findings about a file (`bridges/settings/sheets/findings.py`) are printed as tex
 
 import argparse
 import os
-import shutil
 import sys
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
@@ -17,6 +16,7 @@ from bridges.settings.cross_file_checks import Found, across
 from bridges.settings.load import Config, Problem, SettingsError, load
 from bridges.settings.sheets import text
 from bridges.settings.sheets.findings import Findings, findings, wrong
+from bridges.system.columns import columns_of, hanging
 from bridges.system.written import not_written
 
 if TYPE_CHECKING:
@@ -191,13 +191,8 @@ def _print(file: Findings, quiet: bool) -> None:
     if not quiet:
         _complain(map(str, file.warnings))
         if file.kind:
-            sys.stdout.write("\n".join(text.lines(file, _columns())) + "\n")
+            sys.stdout.write("\n".join(text.lines(file, columns_of(sys.stdout, 200))) + "\n")
     _complain(map(str, file.errors))
-
-
-def _columns() -> int:
-    """Return the terminal's width; for a pipe or file COLUMNS, or 200."""
-    return shutil.get_terminal_size((200, 24)).columns
 
 
 def _verdict(files: Sequence[Findings], quiet: bool) -> None:
@@ -215,9 +210,13 @@ def _many(number: int, what: str) -> str:
 
 
 def _complain(lines: Iterable[str]) -> None:
-    """Write to stderr. Flush stdout before that, because both often go to one log."""
+    """Write to stderr, for a program each problem in one line. Flush stdout before that, because both
+    often go to one log."""
     sys.stdout.flush()
-    sys.stderr.writelines(f"{line}\n" for line in lines)
+    columns = columns_of(sys.stderr, 0)
+    for line in lines:
+        shown = hanging(line, columns) if columns else [line]
+        sys.stderr.writelines(f"{one}\n" for one in shown)
 
 
 def _write_sheet(files: Sequence[Findings], path: str) -> int:

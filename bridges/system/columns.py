@@ -1,41 +1,49 @@
 """Tables for a terminal."""
 
+import os
 import textwrap
 import unicodedata
 from collections.abc import Iterator, Sequence
 from itertools import zip_longest
+from typing import TextIO
 
 
 def aligned(rows: Sequence[Sequence[str]], columns: int | None = None) -> list[str]:
     """Return rows of equal length as lines, with two spaces between columns. If lines would be longer
-    than `columns`, cells of the widest columns are wrapped between words."""
+    than `columns`, cells of the widest columns are wrapped between words. If that is not enough, one
+    space stands between columns, and long words are cut."""
     columned = [*zip(*rows, strict=True)]
-    widths = [max(map(width, column)) for column in columned]
+    widths, gap = [max(map(width, column)) for column in columned], 2
     if columns is not None:
         words = [
             max(width(w) for cell in column for w in cell.split() or [""]) for column in columned
         ]
-        widths = _fitted(widths, words, columns - 2 * (len(widths) - 1))
-    return [line for row in rows for line in _row(row, widths)]
+        between = len(widths) - 1
+        if sum(map(min, widths, words)) + gap * between > columns:
+            gap = 1
+        widths = _fitted(widths, words, columns - gap * between)
+    return [line for row in rows for line in _row(row, widths, " " * gap)]
 
 
 def _fitted(widths: Sequence[int], words: Sequence[int], columns: int) -> list[int]:
-    """Return the widths, the widest cut back until all fit into `columns`, but no word is cut."""
-    for most in range(max(widths), 0, -1):
-        fitted = [min(w, max(most, word)) for w, word in zip(widths, words, strict=True)]
-        if sum(fitted) <= columns:
-            break
+    """Return the widths, the widest cut back until all fit into `columns`. A word is cut only if all
+    fit in no other way."""
+    for least in (words, [1] * len(words)):
+        for most in range(max(widths), 0, -1):
+            fitted = [min(w, max(most, one)) for w, one in zip(widths, least, strict=True)]
+            if sum(fitted) <= columns:
+                return fitted
     return fitted
 
 
-def _row(row: Sequence[str], widths: Sequence[int]) -> Iterator[str]:
+def _row(row: Sequence[str], widths: Sequence[int], gap: str) -> Iterator[str]:
     cells = [
         [cell] if width(cell) <= columns else wrapped(cell, columns + 1)
         for cell, columns in zip(row, widths, strict=True)
     ]
     for line in zip_longest(*cells, fillvalue=""):
         padded = (c + " " * (w - width(c)) for c, w in zip(line, widths, strict=True))
-        yield "  ".join(padded).rstrip()
+        yield gap.join(padded).rstrip()
 
 
 def width(text: str) -> int:
@@ -54,3 +62,17 @@ def wrapped(text: str, columns: int) -> list[str]:
     """Return the text in lines that fit into `columns`."""
     counted = "".join(f"{c}\0" if width(c) == 2 else c for c in text)  # textwrap counts characters
     return [line.replace("\0", "") for line in textwrap.wrap(counted, columns - 1)] or [""]
+
+
+def hanging(text: str, columns: int, indent: int = 2) -> list[str]:
+    """Return the text in lines of at most `columns`, the later ones indented."""
+    first, *more = wrapped(text, columns + 1)
+    rest = wrapped(" ".join(more), columns + 1 - indent) if more else []
+    return [first, *(" " * indent + line for line in rest)]
+
+
+def columns_of(out: TextIO, otherwise: int) -> int:
+    """Return the width of a stream's terminal; for a pipe or file COLUMNS, or `otherwise`."""
+    if out.isatty() and "COLUMNS" not in os.environ:
+        return os.get_terminal_size(out.fileno()).columns or otherwise
+    return int(os.environ.get("COLUMNS") or otherwise)

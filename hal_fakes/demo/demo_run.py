@@ -18,6 +18,7 @@ from typing import Final
 from bridges.messages import words
 from bridges.messages.topics import AnyTopic
 from bridges.settings.load import load
+from bridges.system.columns import columns_of, hanging
 from bridges.transports.transport import Transport, TransportError
 from hal_fakes.demo.daemons import DaemonProcess, DemoFailed, PageProcess, stop_all
 from hal_fakes.demo.journal import Journal
@@ -65,7 +66,9 @@ class DemoRun:
         self.failures = failures
         self._patience = patience
         self.daemons: dict[str, DaemonProcess] = {}
-        self.journal = Journal(time.monotonic(), sys.stdout.write, colour=sys.stdout.isatty())
+        self.journal = Journal(
+            time.monotonic(), sys.stdout.write, colour=sys.stdout.isatty(), columns=_columns
+        )
         self.page: PageProcess | None = None
         self._page_says = ""
         self._interrupted = False
@@ -97,7 +100,7 @@ class DemoRun:
         if problems := self.demo.problems(self.journal):
             self._fail(problems)
             return 1, True
-        sys.stdout.write(summary(self.demo, self.journal))
+        _write(summary(self.demo, self.journal))
         return 0, False
 
     def _live(self, transport: Transport) -> None:
@@ -165,8 +168,22 @@ class DemoRun:
         for device in self.daemons:
             state = self.journal.latest(device)
             if state is not None:
-                sys.stdout.write(f"last state of {device}: {words.described(state)}\n")
-        sys.stdout.write("\nWRONG: " + "\n       ".join(problems) + "\n")
+                _write(f"last state of {device}: {words.described(state)}\n")
+        _write("\nWRONG: " + "\n       ".join(problems) + "\n")
+
+
+def _columns() -> int:
+    """Return the terminal's width; 0 for a pipe or file."""
+    return columns_of(sys.stdout, 0)
+
+
+def _write(text: str) -> None:
+    """Write lines that fit into the terminal."""
+    columns = _columns()
+    for line in text.splitlines():
+        start = line[: len(line) - len(line.lstrip())]
+        told = hanging(line.lstrip(), columns - len(start), 7 - len(start)) if columns else [line]
+        sys.stdout.write("\n".join(f"{start}{one}" if columns else one for one in told) + "\n")
 
 
 def summary(demo: Demo, journal: Journal) -> str:

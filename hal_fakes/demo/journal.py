@@ -7,6 +7,7 @@ from typing import Literal
 
 from bridges.messages import words
 from bridges.messages.words import Requested, Stated
+from bridges.system.columns import hanging
 from hal_fakes.plants.plant import Edge
 
 What = Literal["robot", "request", "relay", "sensor", "state", "place", "alert", "demo"]
@@ -32,10 +33,13 @@ class JournalLine:
     device: str
     text: str
 
-    def render(self, began_at: float, *, colour: bool) -> str:
-        """`   1.234 s  state    Lift1       car at L1, door open, mode AGV`."""
+    def render(self, began_at: float, *, colour: bool, columns: int = 0) -> str:
+        """`   1.234 s  state    Lift1       car at L1, door open, mode AGV`. `columns`: the terminal's
+        width; 0 for one line of any length."""
         start = f"{self.at - began_at:8.3f} s  "
         body = f"{self.what:<7}  {self.device:<10}  {self.text}"
+        if columns:
+            body = ("\n" + " " * len(start)).join(hanging(body, columns - len(start)))
         code = COLOURS.get(self.what)
         return f"{start}\x1b[{code}m{body}\x1b[0m" if colour and code else start + body
 
@@ -43,7 +47,14 @@ class JournalLine:
 class Journal:
     """All events. Repeats are kept and counted, but not printed."""
 
-    def __init__(self, began_at: float, write: Callable[[str], object], *, colour: bool) -> None:
+    def __init__(
+        self,
+        began_at: float,
+        write: Callable[[str], object],
+        *,
+        colour: bool,
+        columns: Callable[[], int] = lambda: 0,
+    ) -> None:
         self.began_at = began_at
         self.edges: list[Edge] = []
         self.states: list[Stated] = []
@@ -51,6 +62,7 @@ class Journal:
         self.legs: dict[str, float] = {}
         self._write = write
         self._colour = colour
+        self._columns = columns
         self._waiting: list[JournalLine] = []
         self._told: dict[tuple[str, str], str] = {}
 
@@ -86,7 +98,8 @@ class Journal:
         due = sorted((line for line in self._waiting if line.at <= until), key=lambda x: x.at)
         self._waiting = [line for line in self._waiting if line.at > until]
         for line in due:
-            self._write(line.render(self.began_at, colour=self._colour) + "\n")
+            shown = line.render(self.began_at, colour=self._colour, columns=self._columns())
+            self._write(shown + "\n")
 
     def begin_day(self) -> None:
         """Start the counts: keep only the last state of each device."""

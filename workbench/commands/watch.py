@@ -16,9 +16,19 @@ from typing import TextIO
 from msgspec.structs import asdict
 
 from bridges.messages import topics
+from bridges.system.columns import columns_of
 from bridges.system.paint import coloured
 from bridges.transports.transport import Transport, TransportError
-from workbench.graph.board import Board, BoardRow, change_line, changes, json_line, repaint, table
+from workbench.graph.board import (
+    Board,
+    BoardRow,
+    change_line,
+    changes,
+    fitting,
+    json_line,
+    repaint,
+    table,
+)
 from workbench.graph.join import add_graph_arguments, complain, interruptible, open_graph
 from workbench.graph.live import Ear
 
@@ -84,7 +94,9 @@ def show_once(ear: Ear, seconds: float, out: TextIO, *, as_json: bool = False) -
     if not rows:
         complain("watch", "no lift, door or charger state heard: check the domain and network")
         return 1
-    told = json.dumps([asdict(row) for row in rows]) if as_json else "\n".join(table(rows))
+    columns = columns_of(out, 0)
+    lines = [line for line, _ in fitting(rows, columns)] if columns else table(rows)
+    told = json.dumps([asdict(row) for row in rows]) if as_json else "\n".join(lines)
     out.write(told + "\n")
     out.flush()
     return 0

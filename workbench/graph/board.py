@@ -11,7 +11,7 @@ from collections.abc import Iterable, Iterator
 from typing import Any, Final
 
 from msgspec import Struct
-from msgspec.structs import asdict
+from msgspec.structs import asdict, replace
 
 from bridges.messages import definitions as d
 from bridges.messages import words
@@ -20,7 +20,7 @@ from bridges.observe.all_devices import AnyDevice, ObservedGraph, PlainGraph
 from bridges.observe.diagnosis import COORDINATOR, PASSIVE, SIMULATED, Diagnosis
 from bridges.observe.door import ObservedDoor
 from bridges.observe.limits import SILENT_S
-from bridges.system.columns import aligned, clipped, width
+from bridges.system.columns import aligned, clipped, hanging, width
 from bridges.system.paint import repainted
 
 SETTLES_S: Final = 1.5
@@ -250,7 +250,7 @@ def repaint(
     """Return the text that redraws a terminal showing `lines_before` lines of the table, and the new
     number of lines. No line wraps and nothing scrolls away.
     """
-    shown = list(_fitting(rows, columns - 1))
+    shown = list(fitting(rows, columns - 1))
     if len(shown) >= lines:
         more = len(shown) - lines + 2
         shown = [*shown[: lines - 2], (f"… and {more} more", False)]
@@ -260,13 +260,17 @@ def repaint(
     return repainted(drawn, lines_before), len(shown)
 
 
-def _fitting(rows: list[BoardRow], columns: int) -> Iterator[tuple[str, bool]]:
-    """Return each line of the table, and whether it needs attention. Marks and faults of a row too
-    long for the terminal follow on a separate line."""
+def fitting(rows: list[BoardRow], columns: int) -> Iterator[tuple[str, bool]]:
+    """Return each line of the table, and whether it needs attention. If a line is too long for the
+    terminal, marks and faults follow on lines of their own."""
     heading, *lines = table(rows)
-    yield heading, False
+    wide = any(width(line) > columns for line in (heading, *lines))
+    if wide and rows:
+        plain = [replace(row, mark="", simulated=False, faults="") for row in rows]
+        heading, *lines = aligned([row[:6] for row in (HEADINGS, *(r.cells() for r in plain))])
+    yield clipped(heading, columns), False
     for row, line in zip(rows, lines, strict=True):
-        yield line, row.wrong
+        yield clipped(line, columns), row.wrong
         told = " ".join(filter(None, row.cells()[-2:]))
-        if told and width(line) > columns:
-            yield f"  {told}", row.wrong
+        for part in hanging(told, columns - 2) if told and wide else ():
+            yield f"  {part}", row.wrong

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 from bridges.kinds.shared.table import Table
 from bridges.settings.sheets.findings import MEANINGS, WIRES, Findings, Part
-from bridges.system.columns import aligned, wrapped
+from bridges.system.columns import aligned, hanging
 
 
 def lines(findings: Findings, columns: int) -> list[str]:
@@ -13,7 +13,7 @@ def lines(findings: Findings, columns: int) -> list[str]:
     driver = f", driver {findings.driver}" if findings.driver else ""
     return [
         f"{findings.file}: {findings.kind}{driver}",
-        *_sentence(f"RMF: {_pairs(findings.rmf, '; ')}", columns),
+        *hanging(f"RMF: {_pairs(findings.rmf, '; ')}", columns),
         "",
         *_body(findings, columns),
         *_notes(findings, columns),
@@ -23,7 +23,7 @@ def lines(findings: Findings, columns: int) -> list[str]:
 def _body(findings: Findings, columns: int) -> Iterator[str]:
     for bus in findings.buses:
         settings = f": {_pairs(bus.settings)}" if bus.settings else ""
-        yield from _sentence(f"bus {bus.name} ({bus.type}){settings}", columns)
+        yield from hanging(f"bus {bus.name} ({bus.type}){settings}", columns)
         yield from _wiring([part for part in findings.parts if part.bus == bus.name], columns)
         yield ""
         for table in bus.tables:
@@ -34,12 +34,6 @@ def _body(findings: Findings, columns: int) -> Iterator[str]:
 
 def _pairs(settings: Mapping[str, str], between: str = ", ") -> str:
     return between.join(f"{key} {text}" for key, text in settings.items())
-
-
-def _sentence(text: str, columns: int) -> list[str]:
-    """Return the text in lines, the later ones indented."""
-    first, *more = wrapped(text, columns)
-    return [first, *(f"  {line}" for line in wrapped(" ".join(more), columns - 2) if line)]
 
 
 def _wiring(parts: Sequence[Part], columns: int) -> Iterator[str]:
@@ -60,7 +54,7 @@ def _tables(parts: Sequence[Part], columns: int) -> Iterator[str]:
             if table.title not in (WIRES, MEANINGS):
                 alike.setdefault(table, []).append(part.device)
     for table, devices in alike.items():
-        yield from _sentence(f"{', '.join(devices)}: {table.title}", columns)
+        yield from hanging(f"{', '.join(devices)}: {table.title}", columns)
         yield from _table(table, columns)
         yield ""
 
@@ -76,5 +70,5 @@ def _indented(rows: Sequence[Sequence[str]], columns: int) -> list[str]:
 
 
 def _notes(findings: Findings, columns: int) -> list[str]:
-    found = [line for note in findings.notes for line in _sentence(note, columns)]
+    found = [line for note in findings.notes for line in hanging(note, columns)]
     return [*found, ""] if found else []
