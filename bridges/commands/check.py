@@ -6,6 +6,7 @@ findings about a file (`bridges/settings/sheets/findings.py`) are printed as tex
 
 import argparse
 import os
+import shutil
 import sys
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
@@ -191,7 +192,9 @@ def _print(file: Findings, quiet: bool) -> None:
     if not quiet:
         _complain(map(str, file.warnings))
         if file.kind:
-            sys.stdout.write("\n".join(text.lines(file, columns_of(sys.stdout, 200))) + "\n")
+            sys.stdout.write(
+                "\n".join(text.lines(file, shutil.get_terminal_size((200, 24)).columns)) + "\n"
+            )
     _complain(map(str, file.errors))
 
 
@@ -213,7 +216,7 @@ def _complain(lines: Iterable[str]) -> None:
     """Write to stderr, for a program each problem in one line. Flush stdout before that, because both
     often go to one log."""
     sys.stdout.flush()
-    columns = columns_of(sys.stderr, 0)
+    columns = columns_of(sys.stderr)
     for line in lines:
         shown = hanging(line, columns) if columns else [line]
         sys.stderr.writelines(f"{one}\n" for one in shown)

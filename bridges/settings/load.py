@@ -242,7 +242,11 @@ class _DeviceReading:
             if entry.name in keys:
                 text = f"'{entry.name}' stands beside '{devices[0].name}': indent it below"
                 self._page.note(entry.key, f"{text} '{devices[0].name}'")
-        return devices or entries
+        if entries and not devices:
+            one = f"'{entries[0].name}' belongs to one {self._kind_name}"
+            text = f"{one}: write its name in a line above, and indent what belongs to it"
+            self._page.note(entries[0].key, text)
+        return devices
 
     def _can_stand(self, device: MappingEntry, bus: str | None, driver: AnyDriver) -> bool:
         """Can the device's driver use the device's bus? The file's driver was checked with the bus."""

@@ -1,6 +1,6 @@
 """Tables for a terminal."""
 
-import os
+import shutil
 import textwrap
 import unicodedata
 from collections.abc import Iterator, Sequence
@@ -71,8 +71,6 @@ def hanging(text: str, columns: int, indent: int = 2) -> list[str]:
     return [first, *(" " * indent + line for line in rest)]
 
 
-def columns_of(out: TextIO, otherwise: int) -> int:
-    """Return the width of a stream's terminal; for a pipe or file COLUMNS, or `otherwise`."""
-    if out.isatty() and "COLUMNS" not in os.environ:
-        return os.get_terminal_size(out.fileno()).columns or otherwise
-    return int(os.environ.get("COLUMNS") or otherwise)
+def columns_of(out: TextIO) -> int:
+    """Return the width of a stream's terminal; 0 for a pipe or file, whose lines have any length."""
+    return shutil.get_terminal_size().columns if out.isatty() else 0

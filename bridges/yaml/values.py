@@ -203,7 +203,10 @@ class Values:
             return None
         fitting = [t for t in members if isinstance(spot.node, _node_of(t))]
         if not fitting:
-            self._mismatch(spot, wanted_text(wanted))
+            structs = [t for t in members if isinstance(t, StructType)]
+            keys = [f.encode_name for t in structs for f in t.fields if f.required]
+            shown = f": {{{', '.join(f'{key}: …' for key in keys)}}}" if keys else ""
+            self._mismatch(spot, wanted_text(wanted) + shown)
             return BROKEN
         if len(fitting) == 1:
             return self._value(fitting[0], spot, extra)

@@ -174,7 +174,7 @@ class DemoRun:
 
 def _columns() -> int:
     """Return the terminal's width; 0 for a pipe or file."""
-    return columns_of(sys.stdout, 0)
+    return columns_of(sys.stdout)
 
 
 def _write(text: str) -> None:

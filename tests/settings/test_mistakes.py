@@ -16,6 +16,7 @@ OTHERWISE: Final = {
     "makers addresses": "refused: the text gives both spellings, and 0x2711 is accepted",
     "timeout too long for line": "refused: no call may take more than 5 s",
     "right yes": "refused with its spelling: YAML 1.2 reads yes as a text",
+    "pin twice in and out": "wrong: the pin's level at boot is named before its second use",
     "host name": "accepted: a module may have a name, and doctor resolves it",
 }
 """Mistakes that `check` treats otherwise than their author expected -> the reason."""

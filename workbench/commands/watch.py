@@ -94,7 +94,7 @@ def show_once(ear: Ear, seconds: float, out: TextIO, *, as_json: bool = False) -
     if not rows:
         complain("watch", "no lift, door or charger state heard: check the domain and network")
         return 1
-    columns = columns_of(out, 0)
+    columns = columns_of(out)
     lines = [line for line, _ in fitting(rows, columns)] if columns else table(rows)
     told = json.dumps([asdict(row) for row in rows]) if as_json else "\n".join(lines)
     out.write(told + "\n")

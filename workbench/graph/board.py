@@ -267,7 +267,7 @@ def fitting(rows: list[BoardRow], columns: int) -> Iterator[tuple[str, bool]]:
     wide = any(width(line) > columns for line in (heading, *lines))
     if wide and rows:
         plain = [replace(row, mark="", simulated=False, faults="") for row in rows]
-        heading, *lines = aligned([row[:6] for row in (HEADINGS, *(r.cells() for r in plain))])
+        heading, *lines = table(plain)
     yield clipped(heading, columns), False
     for row, line in zip(rows, lines, strict=True):
         yield clipped(line, columns), row.wrong

@@ -8,7 +8,7 @@ import pytest
 
 from bridges.kinds.lift.signals import DoorReading, Hazard, LiftOutputs, LiftSample, Motion, Side
 from bridges.settings.load import load
-from drivers.lift.register import RegisterLiftSettings, decode, encode, tables, warnings
+from drivers.lift.register import RegisterLiftSettings, decode, describe, encode, tables, warnings
 from tests.settings.reading import problems_of
 
 CONFIG = Path(__file__).parents[3] / "config" / "lift_gateway.yaml"
@@ -206,3 +206,57 @@ def test_the_table_shows_floors_that_are_the_wrong_way_round() -> None:
         ("3", "L2"),
         ("highest", "L1"),
     ]
+
+
+CONTACTS = CONFIG.with_name("lift_gateway_contacts.yaml")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "problem"),
+    [
+        ("      door_closed: {at: discrete input 2, unit: 2, active: high}\n", "",
+         "33:7: 'door_opened' needs both door_opened and door_closed"),
+        ("      stopped: {", "      up: {", "35:7: 'up': up and down belong together: write both"),
+        ("      stopped: {at", "      moving: {at: coil 9, active: high}\n      stopped: {at",
+         "36:7: 'stopped': moving and stopped are several ways of motion: keep one"),
+        ("      stopped: {at", "      door: {at: input register 5, codes: {0: open, 1: closed}}\n      stopped: {at",
+         "33:7: 'door_opened': door and its contacts are two ways: delete one of the two"),
+        ("at: discrete input 2, unit: 2", "at: discrete input 2, unit: 256",
+         "34:51: 'unit' is 256: write a whole number from 0 to 255"),
+        ("at: coil 1, unit: 2}", "at: coil 0, unit: 2}",
+         "38:9: 'door_open': door_open shares bits of unit 2 coil 0 with agv_mode_request: give each"
+         " command bits of its own"),
+    ],
+)  # fmt: skip
+def test_contacts_beside_a_gateway_are_checked_where_they_stand(
+    old: str, new: str, problem: str, tmp_path: Path
+) -> None:
+    text = CONTACTS.read_text()
+    assert text.count(old) == 1
+    found = problems_of(text.replace(old, new), tmp_path)
+    assert problem in [str(one).split(":", 1)[1] if "yaml:" in str(one) else one for one in found]
+
+
+def test_commands_of_one_register_are_read_back_together_or_not_at_all(tmp_path: Path) -> None:
+    text = CONFIG.read_text().replace(
+        "ask: 1, release: 0}", "ask: 1, release: 0, read_back: false}"
+    )
+    found = problems_of(text, tmp_path)
+    assert "which is read as a whole" in str(found)
+
+
+def test_a_cut_wire_of_an_alarm_at_a_module_is_warned_of(tmp_path: Path) -> None:
+    (tmp_path / "lift.yaml").write_text(
+        CONTACTS.read_text().replace("unit: 2, active: low}", "unit: 2, active: high}")
+    )
+    told = [warning.text for warning in load(tmp_path / "lift.yaml").warnings]
+    assert any("its cut reads as no fire_alarm" in text for text in told)
+
+
+def test_the_units_of_a_map_are_its_own_or_the_lifts() -> None:
+    settings = load(CONTACTS).devices["Lift1"]
+    rows = dict(describe(settings, None))
+    assert rows["floor"] == "unit 1 input register 0"
+    assert rows["door_closed"] == "unit 2 discrete input 2: asserted at 1"
+    assert rows["door_open"] == "unit 2 coil 1 is written"
+    assert rows["unit 1 holding register 11"] == "written in every scan, and never read back"

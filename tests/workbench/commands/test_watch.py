@@ -18,6 +18,7 @@ from workbench.graph.board import (
     BoardRow,
     change_line,
     changes,
+    fitting,
     json_line,
     repaint,
     table,
@@ -161,6 +162,20 @@ def test_text_that_a_narrow_terminal_would_cut_off_follows_on_its_own_line() -> 
             "  DOOR_SILENT",
         ],
     )
+
+
+def test_at_80_columns_no_line_is_wider_and_simulated_is_not_torn() -> None:
+    faults = "RUNTIME_LIMIT_EXCEEDED (not at L3 after 120 s)", "INPUTS_FAILED (no reply in 0.3 s)"
+    (row,) = board(LIFT).rows(100.0, WALL)
+    long = replace(row, simulated=True, mark="STALE", faults="; ".join(faults))
+    lines = [line for line, _ in fitting([long], 79)]
+    assert max(map(width, lines)) <= 79
+    assert lines == [
+        "kind  name   state                           held by      age",
+        "lift  Lift1  car at L1, door open, mode AGV  fleet/robot  0.0 s",
+        "  SIMULATED STALE RUNTIME_LIMIT_EXCEEDED (not at L3 after 120 s);",
+        "    INPUTS_FAILED (no reply in 0.3 s)",
+    ]
 
 
 def test_a_pipe_gets_a_line_for_each_change_and_none_for_an_age() -> None:

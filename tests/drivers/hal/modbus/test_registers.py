@@ -121,3 +121,16 @@ def test_a_base_moves_every_address() -> None:
     assert at(3, "input register 2", 100) == Point(3, "input register", 102)
     assert {*REGISTERS, *WRITABLE} <= {*TABLES}
     assert (set(READS), set(WRITES)) == (set(TABLES), set(WRITABLE))
+
+
+def test_a_gap_that_a_unit_lacks_is_asked_for_once(module: Module) -> None:
+    """Coils 0 and 5 exist, those between them do not; each write is read back."""
+    module.coils.update({(1, 0): False, (1, 5): False})
+    zero, five = "unit 1 coil 0", "unit 1 coil 5"
+    lines = bus_to(module.port).lines({}, {zero: False, five: False})
+    lines.claim()
+    for on in (True, False, True):
+        lines.write({zero: on, five: on})
+        lines.read()
+    merged = [request for request in module.asked if request[7] == 1 and request[11] == 6]
+    assert len(merged) == 1
