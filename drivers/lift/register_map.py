@@ -115,8 +115,12 @@ class Commands(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     def _read_back(self) -> dict[str, dict[bool, tuple[str, ...]]]:
         """Return place -> `read_back` of its commands -> the path of the last such command."""
         found: dict[str, dict[bool, tuple[str, ...]]] = {}
-        every = [(path, command) for _, path, command in self.singles()]
-        for path, command in [*every, *([(("call",), self.call)] if self.call else [])]:
+        every: list[tuple[tuple[str, ...], LiftCommand | CallCommand]] = [
+            (path, command) for _, path, command in self.singles()
+        ]
+        if self.call:
+            every.append((("call",), self.call))
+        for path, command in every:
             own = self.read_back if command.read_back is None else command.read_back
             found.setdefault(place_of(command), {})[own] = path
         return found

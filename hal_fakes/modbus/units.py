@@ -91,8 +91,7 @@ class FakeUnits:
     def _add_cells(self, device: UnitCells) -> None:
         self._cells.update(dict.fromkeys(device.points, device))
         units = {device.unit, *(point.unit for point in device.points)}
-        for unit in units:
-            self._plants.setdefault(unit, [])
+        self._plants.update({unit: self._plants.get(unit, []) for unit in units})
         if isinstance(device, ModuleWatchdog):
             self._dead_men.append(device)
         if device.plant:
