@@ -41,6 +41,8 @@ class Tap:
         """Pass on everything else to the bus."""
         return getattr(self._bus, name)
 
-    def lines(self, inputs: Mapping[str, Pull | None], outputs: Mapping[str, bool]) -> TappedLines:
+    def lines(
+        self, inputs: Mapping[str, Pull | None], outputs: Mapping[str, bool], *of_modbus: Any
+    ) -> TappedLines:
         """Return one device's points, whose readings are remembered here."""
-        return TappedLines(self._bus.lines(inputs, outputs), self.levels)
+        return TappedLines(self._bus.lines(inputs, outputs, *of_modbus), self.levels)
