@@ -60,13 +60,15 @@ class Clocks(RingEntry, frozen=True, tag_field="is", tag=0):
 
 
 class Spoken(RingEntry, frozen=True, tag_field="is", tag=1):
-    """A message heard from RMF's graph, or sent. `cdr`: its bytes on the wire in `release`."""
+    """A message heard from RMF's graph, or sent. `cdr`: its bytes on the wire in `release`. `node`: the
+    publisher's node, `/namespace/name`; "" if the wire does not name it."""
 
     sent: bool
     topic: str
     type: str
     release: str
     cdr: bytes
+    node: str = ""
 
 
 class Known(RingEntry, frozen=True, tag_field="is", tag=2):

@@ -27,6 +27,8 @@ ENTRIES: Final = f"{OWN_TOPICS}entries"
 NOTES: Final = f"{OWN_TOPICS}notes"
 HEAD: Final = "rmf_bridge"
 CHUNK: Final = 256 * 1024
+MOST_CHANNELS: Final = 500
+"""After this many channels the file names no further publishers."""
 QOS: Final = """\
 - history: 1
   depth: {depth}
@@ -119,9 +121,12 @@ class _Channels:
 
     def spoken(self, spoken: Spoken, steady: float, wall: float) -> None:
         """Write a message of RMF, with its bytes on the wire."""
-        key = (spoken.topic, spoken.type, spoken.release, "sent" if spoken.sent else "heard")
+        way = "sent" if spoken.sent else "heard"
+        key = (spoken.topic, spoken.type, spoken.release, way, spoken.node)
+        if key not in self._channels and len(self._channels) >= MOST_CHANNELS:
+            key = (*key[:-1], "")  # made-up nodes
         if key not in self._channels:
-            self._channels[key] = self._declare(spoken, key[-1])
+            self._channels[key] = self._declare(spoken, way, key[-1])
         self._add(self._channels[key], spoken.cdr, steady, wall)
 
     def say(self, topic: str, told: Tree, steady: float, wall: float) -> None:
@@ -138,7 +143,7 @@ class _Channels:
             )
         self._add(self._channels[(topic,)], cdr.encode(String, String(told)), steady, wall)
 
-    def _declare(self, spoken: Spoken, way: str) -> int:
+    def _declare(self, spoken: Spoken, way: str, node: str) -> int:
         kind, release = MESSAGES[spoken.type], RELEASES[spoken.release]
         schema = self._schema(spoken.type, spoken.release, text(kind, release))
         qos = KNOWN_QOS.get(spoken.topic, topics.VOLATILE)
@@ -147,6 +152,7 @@ class _Channels:
             "offered_qos_profiles": QOS.format(depth=qos.depth, durability=durability),
             "topic_type_hash": type_hash(kind, release),
             "way": way,
+            "node": node,
         }
         return self._writer.register_channel(f"/{spoken.topic}", "cdr", schema, told)
 

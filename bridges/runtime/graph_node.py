@@ -189,7 +189,8 @@ class GraphNode(Generic[S, L, M, E, R]):
         heard_on = self._named(topic).name
 
         def put(message: Message) -> None:
-            self._writer.spoken(heard_on, message, sent=False)
+            sender = self._transport.sender()
+            self._writer.spoken(heard_on, message, sent=False, sender=sender)
             with self._counting(topic.name, message):
                 event = self._kind.requests[topic](message, self._settings, self._clock.wall())
                 self.inbox.put(self._kind.device_name(message), (topic, event))

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable
 from bridges.kinds.shared.decision import Fault
 from bridges.messages.definitions import Alert, Message
 from bridges.messages.fallbacks import INSTEAD, converted
+from bridges.messages.heard import Sender
 from bridges.messages.topics import Topic
 from bridges.runtime.ring_writer import NOBODY, NoWriter
 from bridges.runtime.runtime_directory import Once
@@ -30,6 +31,7 @@ class Outlet:
         self._transport = transport
         self._named = named
         self._writer = writer
+        self._own = Sender(f"/{transport.name}")
         self._ends: dict[str, Publisher[Message]] = {}
         self._instead: set[str] = set()
         self._once = Once("not_published", "published_again", "topic", logging.ERROR)
@@ -55,7 +57,7 @@ class Outlet:
             self.failed(topic, error)
             return False
         self._once.works(topic.name)
-        self._writer.spoken(self._named(way).name, wanted, sent=True)
+        self._writer.spoken(self._named(way).name, wanted, sent=True, sender=self._own)
         return True
 
     def failed(self, topic: Topic[Message], error: Exception) -> None:

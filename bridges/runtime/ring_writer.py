@@ -20,8 +20,10 @@ from bridges.kinds.shared.decision import IoFailed, Sampled
 from bridges.kinds.shared.durations import AGES_AGO, NEVER
 from bridges.messages import cdr
 from bridges.messages.definitions import Message
+from bridges.messages.heard import Sender
 from bridges.messages.releases import Release
 from bridges.messages.rihs01 import type_name
+from bridges.messages.words import LONGEST_NAME
 from bridges.runtime.clock import Clock
 from bridges.runtime.runtime_directory import Once
 
@@ -53,8 +55,10 @@ class NoWriter:
     def forgotten(self, subject: str, now: float) -> None:
         """Note that the daemon no longer remembers a subject."""
 
-    def spoken(self, topic: str, message: Message, *, sent: bool) -> None:
-        """Note a message that was heard or sent on this topic."""
+    def spoken(
+        self, topic: str, message: Message, *, sent: bool, sender: Sender | None = None
+    ) -> None:
+        """Note a message that was heard or sent on this topic. `sender`: its publisher, if known."""
 
     def flush(self) -> None:
         """Write the noted events; called when nothing is urgent."""
@@ -102,8 +106,10 @@ class RingWriter(NoWriter):
     def forgotten(self, subject: str, now: float) -> None:
         self._waiting.append((self._forgotten, subject, now))
 
-    def spoken(self, topic: str, message: Message, *, sent: bool) -> None:
-        self._waiting.append((self._spoken, self._clock.monotonic(), topic, message, sent))
+    def spoken(
+        self, topic: str, message: Message, *, sent: bool, sender: Sender | None = None
+    ) -> None:
+        self._waiting.append((self._spoken, self._clock.monotonic(), topic, message, sent, sender))
 
     def died(self, reason: str) -> None:
         self._dead = True
@@ -237,13 +243,16 @@ class RingWriter(NoWriter):
         if self._subjects.pop(name, None) is not None:
             self._put(SubjectForgotten(now, name))
 
-    def _spoken(self, now: float, topic: str, message: Message, sent: bool) -> None:
+    def _spoken(
+        self, now: float, topic: str, message: Message, sent: bool, sender: Sender | None
+    ) -> None:
         if not self._may_keep(now):
             self._lost += 1
             return
         release, kind = self._release(), type(message)
         sample = cdr.encode(kind, message, release)
-        self._put(Spoken(now, sent, topic, type_name(kind), release.name, sample))
+        node = sender.node[:LONGEST_NAME] if sender else ""
+        self._put(Spoken(now, sent, topic, type_name(kind), release.name, sample, node))
 
     def _may_keep(self, now: float) -> bool:
         """Is the rate of messages low enough to record another message?"""

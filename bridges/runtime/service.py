@@ -136,10 +136,13 @@ class Devices:
         self._placed = {node.name: (node, loop) for loop in self._loops for node in loop.nodes}
 
     def subscribe(self) -> None:
-        """Subscribe to requests, and to states of our devices that other nodes publish."""
+        """Subscribe to requests, to topics that are only recorded, and to states of our devices that
+        other nodes publish."""
         for topic, accept in self._kind.requests.items():
             hear = self._to_inbox(topic, accept)
             self._hears[topic.name] = self._transport.subscribe(self._named(topic), hear)
+        for topic in self._kind.recorded:
+            self._transport.subscribe(self._named(topic), partial(self._record, self._named(topic)))
         states = self._kind.states
         hear = self._to_inbox(states, lambda state, settings: RivalSeen())
         self._transport.subscribe(self._named(states), hear, others_only=True)
@@ -204,12 +207,12 @@ class Devices:
         """Return a callback for the transport's thread, which puts messages about our devices into the
         inbox and counts requests for other devices."""
         states = topic == self._kind.states
-        heard_on = self._named(topic).name
+        heard_on = self._named(topic)
 
         def put(message: Message) -> None:
             device = self._kind.device_name(message)
             if device in self._placed:
-                self._writer.spoken(heard_on, message, sent=False)
+                self._record(heard_on, message)
                 node, loop = self._placed[device]
                 try:
                     event = accept(message, self._config.devices[device])
@@ -222,6 +225,12 @@ class Devices:
                 self._count_stranger(device)
 
         return put
+
+    def _record(self, topic: Topic[Message], message: Message) -> None:
+        """Note a message about one of our devices; only in the transport's callback."""
+        if self._kind.device_name(message) in self._placed:
+            sender = self._transport.sender()
+            self._writer.spoken(topic.name, message, sent=False, sender=sender)
 
     def _count_stranger(self, device: str) -> None:
         if not self._strangers:

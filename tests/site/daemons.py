@@ -90,7 +90,7 @@ class DeviceDaemon:
             self.writer,
         )
         self.alive = True
-        for topic in kind.requests:
+        for topic in (*kind.requests, *kind.recorded):
             self._place.subscribe(topic, partial(self._hear, topic))
         self._place.subscribe(kind.states, partial(self._hear, kind.states), others_only=True)
         self.scan()
@@ -161,7 +161,10 @@ class DeviceDaemon:
         self.hears(self, topic, message)
         if self.device.kind.device_name(message) != self.name:
             return
-        self.writer.spoken(topic.name, message, sent=False)
+        sender = self._place.sender()
+        self.writer.spoken(topic.name, message, sent=False, sender=sender)
+        if topic in self.device.kind.recorded:
+            return
         kind, settings = self.device.kind, self.device.settings
         if topic == kind.states:
             self.scan(RivalSeen())

@@ -83,8 +83,9 @@ def _swap(names: list[str]) -> Swap:
 
 def _spoken_names(incident: Incident) -> Iterator[str]:
     for entry in incident.entries:
-        if isinstance(entry, Spoken) and (message := _decoded(entry)) is not None:
-            yield from _names_in(message)
+        if isinstance(entry, Spoken):
+            yield entry.node
+            yield from _names_in(_decoded(entry))
 
 
 def _decoded(spoken: Spoken) -> Message | None:
@@ -240,9 +241,9 @@ def _entry(entry: AnyEntry, swap: Swap) -> AnyEntry:
 def _said(spoken: Spoken, swap: Swap) -> Spoken:
     message = _decoded(spoken)
     if message is None:
-        return replace(spoken, cdr=b"", topic=swap(spoken.topic))
+        return replace(spoken, cdr=b"", topic=swap(spoken.topic), node=swap(spoken.node))
     told = cdr.encode(MESSAGES[spoken.type], _message(message, swap), RELEASES[spoken.release])
-    return replace(spoken, cdr=told)
+    return replace(spoken, cdr=told, node=swap(spoken.node))
 
 
 def _message(value: Any, swap: Swap) -> Any:

@@ -21,7 +21,7 @@ from bridges.messages import cdr
 from bridges.messages.heard import Heard, Own, bounded
 from bridges.system import user_files
 from bridges.system.log import pairs
-from workbench.replay.sources import BagError, Notes, Raw, releases, source
+from workbench.replay.sources import BagError, Notes, Raw, Senders, releases, source
 
 __all__ = ["BagError", "Keep", "Notes", "all_in", "heard_in"]
 
@@ -63,7 +63,7 @@ def all_in(
             if raw.decode is None:
                 yield Own(at, wall, raw.topic, cdr.decode_text(raw.sample))
             else:
-                yield Heard(at, wall, raw.topic, bounded(raw.decode(raw.sample)))
+                yield Heard(at, wall, raw.topic, bounded(raw.decode(raw.sample)), raw.sender)
         except cdr.CdrError:
             noted.skipped[f"{raw.topic}: cannot be decoded"] += 1
     if noted.damage and notes is None:
@@ -142,12 +142,14 @@ def _of_ring(path: Path) -> Iterator[Raw]:
         entries = list(RingContent(path).entries())
     except RingError as error:
         raise BagError(str(error)) from None
+    senders = Senders()
     for entry, steady, wall in timed(entries):
         if isinstance(entry, Spoken):
             found = source(entry.topic, entry.type, releases(entry.type, ""))
             if found.decode is not None:
                 at, told = round(steady / NS), round(wall / NS)
-                yield Raw(at, told, found.topic, entry.cdr, found.decode)
+                sender = senders.of(str(entry.sent), entry.node)
+                yield Raw(at, told, found.topic, entry.cdr, found.decode, sender)
 
 
 def _beginning(path: Path) -> bytes:

@@ -7,9 +7,10 @@ from typing import Final
 from mcap.records import Channel, Header, McapRecord, Message, Schema
 
 from bridges.blackbox.incident import LIBRARY, OWN_TOPICS
+from bridges.messages.heard import Sender
 from bridges.messages.releases import Release
 from workbench.replay.mcap_read import Damaged, records
-from workbench.replay.sources import Notes, Raw, Source, releases, source
+from workbench.replay.sources import Notes, Raw, Senders, Source, releases, source
 
 NO_CHANNEL: Final = Source("", None, "of no channel")
 
@@ -25,7 +26,8 @@ def raw_in(path: Path, notes: Notes) -> Iterator[Raw]:
                     notes.skipped[found.why] += 1
                     continue
                 wall = record.publish_time if declared.ours else record.log_time
-                yield Raw(record.log_time, wall, found.topic, record.data, found.decode)
+                sender = declared.senders.get(record.channel_id)
+                yield Raw(record.log_time, wall, found.topic, record.data, found.decode, sender)
             else:
                 declared.take(record)
     except (Damaged, OSError) as error:
@@ -33,11 +35,14 @@ def raw_in(path: Path, notes: Notes) -> Iterator[Raw]:
 
 
 class _Declared:
-    """A file's declarations so far. `ours`: is it our recorder's? `sources`: channel -> source."""
+    """A file's declarations so far. `ours`: is it our recorder's? `sources`, `senders`: channel ->
+    source, publisher."""
 
     def __init__(self) -> None:
         self.ours = False
         self.sources: dict[int, Source] = {}
+        self.senders: dict[int, Sender | None] = {}
+        self._known = Senders()
         self._types: dict[int, tuple[str, list[Release]]] = {}
 
     def is_ours(self, found: Source) -> bool:
@@ -58,3 +63,6 @@ class _Declared:
             name, found = self._types.get(record.schema_id, ("", []))
             is_cdr = record.message_encoding == "cdr"
             self.sources[record.id] = source(record.topic, name if is_cdr else "", found)
+            if self.ours:
+                told = (record.metadata.get(key, "") for key in ("way", "node"))
+                self.senders[record.id] = self._known.of(*told)

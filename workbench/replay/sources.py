@@ -7,6 +7,7 @@ from typing import Final, NamedTuple
 
 from bridges.messages import cdr, topics
 from bridges.messages.definitions import Message
+from bridges.messages.heard import Sender
 from bridges.messages.releases import NEWEST, RELEASES, Release
 from bridges.messages.rihs01 import MESSAGES
 from bridges.messages.rihs01 import releases_of as releases_of_hash
@@ -40,7 +41,7 @@ class Notes:
 class Raw(NamedTuple):
     """A recorded message, undecoded. `at`, `wall`: ns by the recorder's and by the wall clock.
 
-    `decode`: None for our own recorder's texts.
+    `decode`: None for our own recorder's texts. `sender`: the publisher that our recorder has noted.
     """
 
     at: int
@@ -48,6 +49,21 @@ class Raw(NamedTuple):
     topic: str
     sample: bytes
     decode: Callable[[bytes], Message] | None
+    sender: Sender | None = None
+
+
+class Senders:
+    """The publishers that our recorder has noted in one recording, each the same object for all its
+    messages."""
+
+    def __init__(self) -> None:
+        self._known: dict[tuple[str, str], Sender] = {}
+
+    def of(self, way: str, node: str) -> Sender | None:
+        """Return the publisher on this node; None without a name. `way`: sent by the recording daemon,
+        or heard by it, because another node may have that daemon's name."""
+        node = node[:LONGEST_NAME]
+        return self._known.setdefault((way, node), Sender(node)) if node else None
 
 
 class Source(NamedTuple):

@@ -30,6 +30,7 @@ KIND: Kind[
     decide=core.decide,
     state_message=messages.state_message,
     attended_by=topics.DOOR_REQUESTS,
+    recorded=(topics.ADAPTER_DOOR_REQUESTS,),
     summary=messages.summary,
 )
 

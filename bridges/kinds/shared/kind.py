@@ -67,6 +67,7 @@ class Kind(Struct, Generic[S, L, M, X, E, O, R], frozen=True):
     `on_map(settings)`: settings that name a place on RMF's map, as `Place`s. The device's own name is
     checked for every kind.
     `attended_by`: a topic of requests; the core gets `Attended` when its publishers appear or vanish.
+    `recorded`: topics with messages about the device that are recorded, and that no core gets.
     """
 
     name: str
@@ -87,6 +88,7 @@ class Kind(Struct, Generic[S, L, M, X, E, O, R], frozen=True):
     )
     on_map: Callable[[S], Iterable[Place]] = lambda settings: ()
     attended_by: Topic[Message] | None = None
+    recorded: tuple[Topic[Message], ...] = ()
 
 
 AnyDeviceKind = Kind[Any, Any, Any, Any, Any, Any, Any]
