@@ -269,7 +269,7 @@ def write_file(told: Plain, path: Path) -> None:
 def is_message(entry: list[Any]) -> bool:
     """Is the entry a message of a known type?"""
     match entry:
-        case [1, _, _, str(), str() as kind, _, bytes()]:
+        case [1, _, _, str(), str() as kind, _, bytes(), *_]:
             return kind in MESSAGES
     return False
 

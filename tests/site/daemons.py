@@ -14,6 +14,7 @@ from typing import Any
 from bridges.kinds.shared.decision import OperatorReset, RivalSeen
 from bridges.kinds.shared.graph_kind import AnyGraphKind
 from bridges.messages.definitions import Message
+from bridges.messages.heard import Sender
 from bridges.messages.topics import DOOR_REQUESTS, DOOR_SUPERVISOR_HEARTBEAT, LIFT_REQUESTS, Topic
 from bridges.runtime.clock import Clock
 from bridges.runtime.device import AnyNode, Node
@@ -174,7 +175,7 @@ class DeviceDaemon:
 
     def _publish(self, topic: Topic[Any], message: Message) -> None:
         self._publishers[topic.name].publish(message)
-        self.writer.spoken(topic.name, message, sent=True)
+        self.writer.spoken(topic.name, message, sent=True, sender=Sender(f"/{self.node}"))
 
 
 RIVAL = "rmf_lift_supervisor"

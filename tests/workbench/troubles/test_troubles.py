@@ -4,27 +4,12 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import pytest
-from msgspec.structs import replace
 
 from tests.workbench.troubles import asked
 from tests.workbench.troubles.site import KINDS, Site
 from tests.workbench.troubles.stories import TROUBLES, Trouble
 from tests.workbench.troubles.verdicts import VERDICTS, Verdict, wrong
 
-ROBOT = ["fleet/red"]
-NO_ROBOT_AT_A_DOOR = (
-    "a door's daemon hears door_requests alone, and there every supervisor's requests are"
-    " door_supervisor's"
-)
-IMPOSSIBLE: Mapping[tuple[str, str, str], tuple[list[str], str]] = {
-    ("door_end_contact_cut", "file", "door"): (ROBOT, NO_ROBOT_AT_A_DOOR),
-    ("daemon_killed", "file", "door"): (ROBOT, NO_ROBOT_AT_A_DOOR),
-    ("two_daemons_one_name", "file", "lift"): (
-        ["{node_b}"],
-        "a daemon notes that another node publishes its states, and not the node's name",
-    ),
-}
-"""Phrases of `says` for which the file has no source, and why."""
 OTHERWISE: Mapping[str, str] = {
     "robot_clock_hour_off": "our supervisor believes a requester that repeats itself (FRESHNESS-5), so"
     " requests are dropped by another maker's",
@@ -57,7 +42,5 @@ def told(trouble: Trouble, verdict: Verdict, folder: Path) -> tuple[str, Mapping
 def test_a_trouble_is_explained_as_expected(verdict: Verdict, tmp_path: Path) -> None:
     assert verdict.key in TROUBLES, "it has no story"
     screen, names = told(TROUBLES[verdict.key], verdict, tmp_path)
-    no_source, _ = IMPOSSIBLE.get(verdict.key, (None, ""))
-    says = [phrases for phrases in verdict.says if phrases != no_source]
-    found = wrong(replace(verdict, says=says), screen, names)
+    found = wrong(verdict, screen, names)
     assert not found, "\n".join([*found, "", screen, "", verdict.story])
