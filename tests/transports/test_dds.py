@@ -2,7 +2,9 @@
 
 import random
 import socket
+import threading
 from collections.abc import Iterator
+from contextlib import closing
 from typing import Any
 
 import pytest
@@ -12,11 +14,15 @@ from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic as DdsTopic
 
 from bridges.messages import definitions as d
-from bridges.messages.topics import LIFT_REQUESTS, LIFT_STATES, Topic
+from bridges.messages.releases import DEFAULT, NEWEST
+from bridges.messages.rihs01 import type_hash, type_name
+from bridges.messages.topics import FLEET_STATES, LIFT_REQUESTS, LIFT_STATES, Topic
 from bridges.transports.cyclone import LOOPBACK
 from bridges.transports.dds import discovery
+from bridges.transports.dds.ends import DdsSubscription
 from bridges.transports.dds.peers import BuiltinReader
 from bridges.transports.dds.transport import DdsTransport
+from bridges.transports.peers import Announced
 from bridges.transports.transport import TransportError
 from tests.transports import peer
 from tests.transports.domains import domain_of_this_run
@@ -64,6 +70,32 @@ def test_a_peer_with_another_type_is_named_once(
         'misfit topic=door_states reason="a subscription is not served:'
         ' its type does not fit ours"',
     ]
+
+
+def test_an_end_that_is_declared_while_rmfs_release_changes_has_the_new_release(
+    domain: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A fleet adapter of another release than our default is found just then."""
+    create, heard = DdsSubscription.create, Announced(
+        "fleet_states", type_name(d.FleetState), type_hash(d.FleetState, NEWEST), publishes=True
+    )
+    assert type_hash(d.FleetState, DEFAULT) != heard.hash
+    adapter = DdsTransport("fleet_adapter", domain, loopback=True, release=NEWEST)
+    node = DdsTransport("coordinator", domain, loopback=True)
+    with closing(adapter), closing(node):
+
+        def found_meanwhile(*given: Any) -> Any:
+            monkeypatch.undo()
+            node._peers.seen("an adapter", heard)
+            thread = threading.Thread(target=node._follow_release)
+            thread.start()
+            thread.join(timeout=0.2)  # it ends before us only if it need not wait for us
+            return create(*given)
+
+        monkeypatch.setattr(DdsSubscription, "create", found_meanwhile)
+        subscription = node.subscribe(FLEET_STATES, lambda state: None)
+        adapter.publisher(FLEET_STATES)
+        wait_until(lambda: subscription.matched() == 1, "the adapter is heard")
 
 
 # --- our node as others see it ------------------------------------------------------------------

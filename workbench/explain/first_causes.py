@@ -62,6 +62,7 @@ for the words of `bridges/runtime/faults.yaml`."""
 READINGS: Final = ("INPUTS_NOT_FRESH", "COMMUNICATION_LOST")
 OFFLINE: Final = (*READINGS, "OUTPUTS_NOT_WRITTEN", "MANUAL", "OUT_OF_SERVICE")
 """Faults that show a device as OFFLINE."""
+UNSTEADY: Final = "not steady:"
 STALLS_S: Final = 0.5
 """A reading that is older than another one by this time (s) shows that no new one came."""
 
@@ -88,14 +89,22 @@ def two_nodes(
 
 
 def comes_and_goes(found: Answer, device: Device, clock: TimePhrases) -> bool:
-    """Explain a device that goes OFFLINE and comes back. True if it does. Old readings show that no new
-    ones came; if all readings are fresh, an input flickers."""
+    """Explain a device that goes OFFLINE and comes back. True if it does.
+
+    A listener of a few seconds may hear few changes. Its daemon's present word counts too: readings are
+    lost, or inputs are not steady. Old readings, and several inputs that are not steady, show that no
+    new readings came; else an input flickers.
+    """
     ages = device.flaps(clock.now)
-    if len(ages) < FLAPS:
+    _, unsteady, inputs = device.waits_said(clock.now).get(device.kind, "").partition(UNSTEADY)
+    lost = any(code in READINGS for code in device.faults(clock.now))
+    if len(ages) < (1 if unsteady else 2 if lost else FLAPS):
         return False
     heard_s = lasted(min(FLAPS_WITHIN_S, clock.now.at - device.began.at))
     on, often = common.relays(device, clock), f"{len(ages)} changes in {heard_s}"
-    flickers = max(ages) - min(ages) < STALLS_S
+    if len(ages) == 1:
+        often = f"1 change in {heard_s}; its inputs are unsteady still:{inputs}"
+    flickers = "," not in inputs and max(ages) - min(ages) < STALLS_S
     found.because = () if flickers else READINGS
     why = (
         "though its readings are fresh: an input flickers, as a contact for manual mode may"
@@ -104,8 +113,9 @@ def comes_and_goes(found: Answer, device: Device, clock: TimePhrases) -> bool:
         " proves nothing"
     )
     bus = f" The last error on its bus: {device.bus_error}." if device.bus_error else ""
+    again = " again and again" if len(ages) > 1 else ""
     found.say(
-        f"{device.name} goes OFFLINE and comes back again and again ({often}), {why}{on}.{bus}",
+        f"{device.name} goes OFFLINE and comes back{again} ({often}), {why}{on}.{bus}",
         "a person",
         FLICKERS if flickers else BUS,
     )

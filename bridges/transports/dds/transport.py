@@ -220,9 +220,12 @@ class DdsTransport(Threaded):
                 end.log_misfits(self._peers)
 
     def _follow_release(self) -> None:
-        """Adopt RMF's release; join again if a message of ours differs in this release."""
-        before = self.release
-        if self._peers.settle() and any(self._peers.differs(e.topic, before) for e in self._ends):
+        """Adopt RMF's release; join again if a message of ours differs in this release. The lock keeps
+        out another thread that declares an end: a type of the release before would stay for ever."""
+        with self._lock:
+            before, changed = self.release, self._peers.settle()
+            stale = changed and any(self._peers.differs(e.topic, before) for e in self._ends)
+        if stale:
             self._join_anew()
         else:
             self._peers.name_misfits()

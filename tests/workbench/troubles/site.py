@@ -68,7 +68,8 @@ PLACES: Final = {
 
 
 class Site(Scene):
-    """`folder`: for rings and recordings. `mortal`: a daemon that will be killed as a process is."""
+    """`folder`: for rings and recordings. `mortal`: a daemon that will be killed as a process is.
+    `latest_s`, `slow_s`: the latest reply of a slow unit, and its pace (s)."""
 
     def __init__(self, folder: Path, mortal: str = "") -> None:
         super().__init__(rmf=True, diagnoses=False)
@@ -77,7 +78,8 @@ class Site(Scene):
         self._before: set[str] = set()
         self.process = subprocess.Popen(["sleep", "600"]) if mortal else None
         self._mortal = mortal
-        self._random = Random(31)
+        self.random = Random(31)
+        self.latest_s, self.slow_s = 4.0, TIMEOUT_S
         self._folder = folder
         self._rings: dict[str, Path] = {}
         self._recorder = Recorder(
@@ -134,12 +136,13 @@ class Site(Scene):
         daemon.writer.ended(safe=True)
 
     def slow(self, name: str) -> None:
-        """The device's unit answers after 0.1 to 4 s from now on, so that most replies are too late."""
-        far, late_s = self.devices[name].far, self._random.uniform(0.1, 4.0)
+        """The device's unit answers after 0.1 to `latest_s` from now on, so that most replies are too
+        late."""
+        far = self.devices[name].far
         assert isinstance(far, ModuleFar)
-        far.silent(TOO_LATE if late_s > TIMEOUT_S else "")
+        far.silent(TOO_LATE if self.random.uniform(0.1, self.latest_s) > TIMEOUT_S else "")
         self.daemons[name].scan()
-        self.timeline.after(TIMEOUT_S, lambda: self.slow(name))
+        self.timeline.after(self.slow_s, lambda: self.slow(name))
 
     def close(self) -> None:
         """The end."""
