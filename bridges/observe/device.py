@@ -92,11 +92,15 @@ class ObservedDevice(ABC, Generic[T]):
         said = report(self.diagnoses, MOST_NODES, status, moment)
         if said is None:
             return []
-        return list(said.take(moment, status, self.text))
+        return list(said.take(moment, status, self.text, self.sentence))
 
     def text(self, name: str) -> str:
         """Return the remembered form of a name from the network; in `explain` the printable form."""
         return name
+
+    def sentence(self, text: str) -> str:
+        """Return the remembered form of a sentence from the network; in `explain` a bounded one."""
+        return text
 
     def is_silent(self, now: Moment, after_s: float = SILENT_S) -> bool:
         """Have its states stopped? False before the first state."""

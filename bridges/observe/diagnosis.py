@@ -63,13 +63,18 @@ class Diagnosis:
         return "" if found == "-" else found
 
     def take(
-        self, moment: Moment, status: DiagnosticStatus, text: Callable[[str], str] = str
+        self,
+        moment: Moment,
+        status: DiagnosticStatus,
+        text: Callable[[str], str] = str,
+        sentence: Callable[[str], str] = str,
     ) -> Iterator[News]:
-        """Take the next status. `text`: converts a name from the network to its remembered form."""
+        """Take the next status. `text`, `sentence`: convert a name and a fault's detail from the
+        network to their remembered form."""
         self.kind, self.last, self.message = kind_in(status), moment, status.message
         self.values = {pair.key: pair.value for pair in status.values[:MOST_VALUES]}
         codes = faults(status)[:MOST_CODES]
-        yield from self.has(moment, {text(code): text(self.value(code)) for code in codes})
+        yield from self.has(moment, {text(code): sentence(self.value(code)) for code in codes})
         for key, value in self.values.items():
             if key.startswith(REFUSED) and value.isdecimal() and len(value) <= 18:
                 yield from self.refuses(moment, text(key.removeprefix(REFUSED)), int(value))

@@ -76,8 +76,11 @@ def test_an_end_that_is_declared_while_rmfs_release_changes_has_the_new_release(
     domain: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A fleet adapter of another release than our default is found just then."""
-    create, heard = DdsSubscription.create, Announced(
-        "fleet_states", type_name(d.FleetState), type_hash(d.FleetState, NEWEST), publishes=True
+    create, heard = (
+        DdsSubscription.create,
+        Announced(
+            "fleet_states", type_name(d.FleetState), type_hash(d.FleetState, NEWEST), publishes=True
+        ),
     )
     assert type_hash(d.FleetState, DEFAULT) != heard.hash
     adapter = DdsTransport("fleet_adapter", domain, loopback=True, release=NEWEST)

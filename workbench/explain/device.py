@@ -18,6 +18,8 @@ from workbench.explain.phrases import lasted
 from workbench.explain.rows import label
 
 MOST_LINES: Final = 600
+LONGEST_DETAIL: Final = 300
+"""Limit of characters of a fault's detail: an HTTP driver's has an address and a reason."""
 BACK_S: Final = 0.2
 BACK_TIMES: Final = 3
 BACK_WITHIN_S: Final = 15.0
@@ -56,6 +58,10 @@ class Device(ObservedDevice[Any]):
     def text(self, name: str) -> str:
         """Return a name from the network in a printable form."""
         return label(name)
+
+    def sentence(self, text: str) -> str:
+        """Return a sentence from the network in a printable form."""
+        return label(text, LONGEST_DETAIL)
 
     @abstractmethod
     def says(self, one: News) -> str:
@@ -115,7 +121,8 @@ class Device(ObservedDevice[Any]):
             on = [f"{label(name)} {label(value)}" for name, value in note.outputs.items() if value]
             known.values = {"outputs": ", ".join(on).replace(" on", " yes") or "-"}
         if note.faults is not None:
-            told = ((label(c), "" if text == c else label(text)) for c, text in note.faults.items())
+            found = note.faults.items()
+            told = ((label(c), "" if text == c else self.sentence(text)) for c, text in found)
             self._tell_all(known.has(moment, dict(told)))
             self.notes_faults = True
         self.bus_error = label(note.bus_error, 200) or self.bus_error

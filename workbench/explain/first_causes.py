@@ -12,8 +12,8 @@ from workbench.explain.phrases import TimePhrases, lasted, listed
 
 TWO_NODES: Final = "TWO_NODES_FOR_ONE_DEVICE"
 BUS: Final = (
-    "check the bus: the module at its end, its supply and its cable, and whether a second master is on"
-    " the line; `rmf-bridge log` shows each lost reply"
+    "check the bus or network: the module at its end, its supply, cable and address, and whether a"
+    " second master is on the line; `rmf-bridge log` shows each lost reply"
 )
 FLICKERS: Final = (
     "find what kept changing: an input that flickers (check its wire and contact), or a relay module"
@@ -143,7 +143,7 @@ def own_fault(
     cause, do = around.remedies.get(code, (f"its daemon reports {code}", f"mend {code}"))
     why, look = OWN[code]
     names = {"end": end, "contact": {"open": "'opened'", "shut": "'closed'"}[end]}
-    detail = f": {present[code]}" if present[code] else ""
+    detail = f": {present[code].rstrip('.?')}" if present[code] else ""
     found.because = ()
     found.say(
         f"{device.name} has a fault of its own, {code}{detail}."

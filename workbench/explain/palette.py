@@ -37,17 +37,17 @@ LIGHT: Final[dict[Tone, ToneStyle]] = {
     "open": ToneStyle("#4fc3a1", "#0c1a15"),
     "held": ToneStyle("#f3bf4a", "#1d1604"),
     "asks": ToneStyle("#f7f0b0", "#1d1b04", "#a89a1c"),
-    "wrong": ToneStyle("#e8854a", "#1d0d04", "#7a2f00"),
-    "unknown": ToneStyle("#ffffff", "#44484f", "#b4b9c1"),
+    "wrong": ToneStyle("#e8854a", "#1d0d04", "#f7c3a1"),
+    "unknown": ToneStyle("#ffffff", "#3a3e45", "#b4b9c1"),
 }
 DARK: Final[dict[Tone, ToneStyle]] = {
     "calm": ToneStyle("#474c55", "#f2f4f7"),
     "works": ToneStyle("#236f9d", "#ffffff"),
     "open": ToneStyle("#0a8463", "#ffffff"),
     "held": ToneStyle("#c68a12", "#140e00"),
-    "asks": ToneStyle("#5c5614", "#fffbd1", "#c9bb2e"),
-    "wrong": ToneStyle("#d8641c", "#140700", "#4a1c00"),
-    "unknown": ToneStyle("#17191d", "#c3c8d0", "#5a606a"),
+    "asks": ToneStyle("#4a450f", "#fffbd1", "#77701c"),
+    "wrong": ToneStyle("#7c3206", "#ffffff", "#b4500f"),
+    "unknown": ToneStyle("#17191d", "#dfe3e9", "#5a606a"),
 }
 LOOKS: Final[dict[Theme, dict[Tone, ToneStyle]]] = {"light": LIGHT, "dark": DARK}
 PAPER: Final[dict[Theme, tuple[str, str, str, str]]] = {
@@ -55,6 +55,8 @@ PAPER: Final[dict[Theme, tuple[str, str, str, str]]] = {
     "dark": ("#17191d", "#eceff3", "#a7adb8", "#363b44"),
 }
 """Background, text, weaker text, grid."""
+STEP: Final[dict[Theme, str]] = {"light": "#b54a12", "dark": "#e8854a"}
+"""The line of a clock's step, or of a file's reason."""
 
 
 def css(theme: Theme) -> str:
@@ -66,7 +68,7 @@ def css(theme: Theme) -> str:
         f".weak{{fill:{weak}}}",
         f".grid{{stroke:{grid};stroke-width:1}}",
         f".edge{{stroke:{weak}}}",
-        f".step{{stroke:{LOOKS[theme]['wrong'].fill};stroke-width:1.5;stroke-dasharray:4 3}}",
+        f".step{{stroke:{STEP[theme]};stroke-width:1.5;stroke-dasharray:4 3}}",
     ]
     for tone, look in LOOKS[theme].items():
         halo = f";stroke:{look.fill};stroke-width:4;paint-order:stroke" if look.pattern else ""

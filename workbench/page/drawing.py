@@ -29,7 +29,8 @@ ROBOT_SILENT_S: Final = 10.0
 HALF: Final[Mapping[int, float]] = {d.LiftMotion.MOTION_UP: -0.5, d.LiftMotion.MOTION_DOWN: 0.5}
 """Half a floor, in the direction of each motion."""
 LONGEST: Final = 160
-"""Limit of characters of a text on a card; the device's own page has the whole text."""
+"""Limit of characters of a text on a card; the list of what is wrong has LONGEST_FAULT."""
+LONGEST_FAULT: Final = 400
 MOST_FLOORS: Final = 40
 """Limit of landings of a drawn shaft; beyond it, words alone give the car's place."""
 FLOOR_PX, SHAFT_PX, LABEL_PX = 22, 44, 46
@@ -83,7 +84,7 @@ def _trouble(view: DeviceView, remedies: Remedies) -> str:
     if row.mark and not row.faults:
         does.append(SILENT_DO if row.mark.startswith("SILENT") else STALE_DO)
     for fault in filter(None, row.faults.split("; ")):
-        told.append(_told(fault))
+        told.append(_told(fault, LONGEST_FAULT))
         does += [do for do in remedies.get(fault.partition(" (")[0], ())[1:] if do not in does]
     steps = "".join(f"<p><b>Do:</b> {escape(do)}</p>" for do in does)
     return f'<li class="panel">{link} <span class="wrong">✖ {"; ".join(told)}</span>{steps}</li>'
@@ -145,9 +146,9 @@ def _fact(name: str, value: str) -> str:
     return f"<dt>{name}</dt><dd>{_told(value)}</dd>"
 
 
-def _told(text: str) -> str:
+def _told(text: str, longest: int = LONGEST) -> str:
     """Format a text as HTML; a long text is cut."""
-    return escape(text if len(text) <= LONGEST else f"{text[:LONGEST]}…")
+    return escape(text if len(text) <= longest else f"{text[:longest]}…")
 
 
 def _picture(view: DeviceView, left: float | None) -> str:

@@ -5,7 +5,7 @@ from datetime import tzinfo
 from html import escape
 
 from bridges.observe.requesters import Moment
-from workbench.explain.explanation import Explanation, FaultTold
+from workbench.explain.explanation import CheckedField, Explanation, FaultTold
 from workbench.explain.phrases import TimePhrases
 from workbench.page.tables import table
 
@@ -30,10 +30,10 @@ def _parts(found: Explanation) -> Iterator[str]:
         steps = "".join(f"<li>{escape(f'{step.who}: {step.what}')}</li>" for step in found.next)
         yield f"<p>Next:</p><ul>{steps}</ul>"
     if found.faults:
-        yield f"<h3>Faults, and what to do</h3><ul>{''.join(map(_fault, found.faults))}</ul>"
+        yield f"<h3>Faults</h3><ul>{''.join(map(_fault, found.faults))}</ul>"
     if found.fields:
         rows = [
-            (one.name, one.shown, one.wanted, "✔ yes" if one.met else "✖ no", one.since)
+            (one.name, one.shown, one.wanted, _met(one), one.since.removeprefix("since "))
             for one in found.fields
         ]
         headings = ("field", "shows", "wanted", "met", "since")
@@ -41,13 +41,15 @@ def _parts(found: Explanation) -> Iterator[str]:
     yield "".join(f"<p>Note: {escape(note)}</p>" for note in found.notes)
 
 
+def _met(one: CheckedField) -> str:
+    return "✔ yes" if one.met else "✖ no"
+
+
 def _fault(one: FaultTold) -> str:
     told = ": ".join(filter(None, (f"{one.code} {one.since}", one.detail)))
     cause = f"<p>Likely cause: {escape(one.cause)}</p>" if one.cause else ""
-    do = one.do or "see the log of its daemon"
-    return (
-        f'<li><span class="wrong">✖ {escape(told)}</span>{cause}<p><b>Do:</b> {escape(do)}</p></li>'
-    )
+    do = f"<p><b>Do:</b> {escape(one.do)}</p>" if one.do else ""
+    return f'<li><span class="wrong">✖ {escape(told)}</span>{cause}{do}</li>'
 
 
 def story(found: Explanation, zone: tzinfo | None = None) -> str:

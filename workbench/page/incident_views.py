@@ -55,13 +55,13 @@ class IncidentViews:
 
     async def one(self, name: str, request: Request, client: Client) -> Response | None:
         """Show a recording of the folder."""
-        head(name, self._login, request)
-        path = self._path(name)
-        if path is None:
+        found = self._file(name)
+        head(found.title if found else name, self._login, request)
+        if found is None:
             with main():
                 part("<p>There is no incident of that name.</p>")
             return client.build_response(request, 404)
-        await self._view(path, client, _download(name))
+        await self._view(self._folder / name, client, _about(found) + _download(name))
         return None
 
     async def alone(self, request: Request, client: Client) -> None:
@@ -72,14 +72,14 @@ class IncidentViews:
 
     def download(self, name: str) -> Response:
         """Send the file."""
-        path = self._path(name)
-        if path is None:
+        if self._file(name) is None:
             return Response("there is no incident of that name", status_code=404)
+        path = self._folder / name
         return FileResponse(path, filename=name, media_type="application/octet-stream")
 
-    def _path(self, name: str) -> Path | None:
+    def _file(self, name: str) -> incidents.File | None:
         try:
-            return incidents.path_in(self._folder, name)
+            return incidents.file_in(self._folder, name)
         except OSError:
             return None
 
@@ -116,17 +116,21 @@ def _address(name: str) -> str:
 
 
 def _item(one: incidents.File) -> str:
-    link = f'<a href="{_address(one.name)}">{escape(one.name)}</a>'
+    file = printable(one.name)
+    link = f'<a href="{_address(one.name)}">{escape(one.title)}</a>'
     if not one.name.isprintable():
-        link = (
-            f"<span>{escape(printable(one.name))}: a strange name; rename it to see it here</span>"
-        )
-    told = escape(f"{one.device}: {one.reason.replace('-', ' ')}") if one.device else ""
-    size, wanted = f"{one.size / 1024:.0f} KiB", escape(printable(f"{one.name} {told}").lower())
-    return (
-        f'<li class="panel" data-find="{wanted}"><span class="when">{when(one.wall)}</span>'
-        f"<b>{told}</b>{link}<span>{size}</span></li>"
-    )
+        link = f"<span>{escape(file)}: a strange name; rename it to see it here</span>"
+    wanted = escape(f"{one.title if one.device else file}".lower())
+    return f'<li class="panel" data-find="{wanted}">{when(one.wall)}{link}{_file_of(one)}</li>'
+
+
+def _file_of(one: incidents.File) -> str:
+    return f'<span class="file">{escape(printable(one.name))}, {one.size / 1024:.0f} KiB</span>'
+
+
+def _about(one: incidents.File) -> str:
+    """Tell the time and the file of an incident."""
+    return f'<p class="about">{when(one.wall)} {_file_of(one)}</p>'
 
 
 def _download(name: str) -> str:

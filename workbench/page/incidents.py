@@ -56,6 +56,11 @@ class File:
     device: str = ""
     reason: str = ""
 
+    @property
+    def title(self) -> str:
+        """Return device and reason; the file's name if a person has named the file."""
+        return f"{self.device}: {self.reason.replace('-', ' ')}" if self.device else self.name
+
 
 @dataclass(frozen=True, slots=True)
 class ExplainedRecording:
@@ -88,9 +93,9 @@ def _files(folder: Path) -> Iterator[File]:
             yield File(path.name, found.st_size, *(named(path) or (found.st_mtime,)))
 
 
-def path_in(folder: Path, name: str) -> Path | None:
-    """Return the path of the recording of this name; None if the folder has no such recording."""
-    return next((folder / one.name for one in _files(folder) if one.name == name), None)
+def file_in(folder: Path, name: str) -> File | None:
+    """Find the recording of this name; None if the folder has no such recording. Raises OSError."""
+    return next((one for one in _files(folder) if one.name == name), None)
 
 
 async def read_apart(path: Path, zone: str = "") -> ExplainedRecording:
@@ -189,7 +194,7 @@ def _notes(notes: Notes, devices: int, *, cut: bool) -> Iterator[str]:
 
 _RECORDING: Final = msgspec.msgpack.Decoder(ExplainedRecording)
 
-__all__ = ["BagError", "ExplainedRecording", "File", "listed", "path_in", "read", "read_apart"]
+__all__ = ["BagError", "ExplainedRecording", "File", "file_in", "listed", "read", "read_apart"]
 
 if __name__ == "__main__":
     sys.exit(main(Path(sys.argv[1]), sys.argv[2]))

@@ -33,7 +33,7 @@ from workbench.graph.board import Board, BoardRow
 
 KEPT_S: Final = 600.0
 """The past that a device's page shows."""
-STEP_S: Final = 60.0
+STEP_S: Final = 10.0
 """The timeline moves on in steps of this length (s)."""
 MOST_LINES: Final = 100
 """Limit of story lines of one device. Its view shows forty. With six hundred each a large site takes
@@ -161,7 +161,7 @@ class LiveSite:
     def timeline(self, kind: str, name: str, now: float) -> Timeline | None:
         """Return the last ten minutes of a device; `name`: as shown.
 
-        The timeline ends at the next whole minute: so the parts already drawn move only once a minute.
+        The timeline ends up to STEP_S later: so the parts already drawn move only once in that time.
         """
         device = self._found(kind, name)
         drawing = self._drawings.get((device.kind, device.id)) if device else None

@@ -39,7 +39,10 @@ function look() {
 }
 function filter() {
   const wanted = (document.getElementById("find")?.value || "").toLowerCase();
-  for (const one of document.querySelectorAll("[data-find]")) one.hidden = !one.dataset.find.includes(wanted);
+  for (const one of document.querySelectorAll("[data-find]")) {
+    const told = `${one.dataset.find} ${one.querySelector("time")?.title ?? ""}`; /* the shown day too */
+    one.hidden = !told.includes(wanted);
+  }
 }
 /* A timeline opens at `data-open`, a share of its width; without one, at its newest end. */
 function open_at(scrolls) {
@@ -51,12 +54,17 @@ function tell_time(place) {
   const at = new Date(1000 * parseFloat(place.dataset.at)), today = new Date().toDateString();
   const parts = at.toDateString() === today ? CLOCK : { ...DAY, ...CLOCK };
   place.textContent = at.toLocaleString("sv-SE", parts);
+  place.title = at.toLocaleString("sv-SE", { ...DAY, ...CLOCK });
   place.dateTime = at.toISOString();
 }
 function fill() {
   document.querySelectorAll("time[data-at]:empty").forEach(tell_time);
   document.querySelectorAll(".zone:empty").forEach(place => { place.textContent = `Times: ${ZONE}`; });
   document.querySelectorAll(".timeline:not([data-opened]):has(svg)").forEach(open_at);
+  for (const one of document.querySelectorAll("details.wiring:not([data-unfolded])")) {
+    one.open = innerWidth >= 768; /* on a phone it is long */
+    one.dataset.unfolded = "";
+  }
   filter();
 }
 document.addEventListener("DOMContentLoaded", () => {

@@ -173,8 +173,8 @@ class SiteViews:
             with ui.element("div").classes("timeline") as scrolls:
                 scrolls.props('tabindex=0 role=region aria-label="Timeline"')
                 place("timeline", lambda: self._timeline(key, tab.zone))
-        with ui.element("section").classes(WIDE):
-            part("<h2>Wiring and limits</h2>")
+        with ui.element("details").classes(f"{WIDE} wiring"):
+            part("<h2>Wiring and limits</h2>").props("tag=summary")
             with ui.element("div").classes("columns"):
                 place("levels", lambda: self._levels(key))
                 place("wiring", lambda: self._wiring(key))

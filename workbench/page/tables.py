@@ -15,17 +15,20 @@ NO_RING = "Its daemon keeps no ring, or the page's user may not read it: no live
 def table(headings: Sequence[str], rows: Iterable[Sequence[str]], caption: str) -> str:
     """Return a table; every cell is text."""
     heads = "".join(f'<th scope="col">{escape(text)}</th>' for text in headings)
-    named = [f'<td data-head="{escape(text)}">' for text in headings]
     body = "".join(
-        "<tr>"
-        + "".join(f"{td}{escape(cell)}</td>" for td, cell in zip(named, row, strict=True))
-        + "</tr>"
+        f"<tr>{''.join(_cell(*pair) for pair in zip(headings, row, strict=True))}</tr>"
         for row in rows
     )
     return (
         f"<table><caption>{escape(caption)}</caption>"
         f"<thead><tr>{heads}</tr></thead><tbody>{body}</tbody></table>"
     )
+
+
+def _cell(heading: str, cell: str) -> str:
+    """Format a cell with its heading, for narrow screens; an empty one is left out there."""
+    none = ' class="none"' if cell in ("-", "") else ""
+    return f'<td data-head="{escape(heading)}"{none}>{escape(cell)}</td>'
 
 
 def wiring(file: str, device: str, contacts: Mapping[str, bool]) -> str:

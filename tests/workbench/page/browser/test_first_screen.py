@@ -137,3 +137,40 @@ def test_a_tab_gets_what_has_changed(
     assert sorted(later)[len(later) // 2] < first / 4
     settled = json.loads(tab.evaluate("JSON.stringify(pieces.timeline.join('').length)"))
     assert settled > 4 * sorted(later)[len(later) // 2]
+
+
+def test_a_phone_shows_the_wiring_when_it_is_asked_for(
+    tab: Page, address: str, overloaded: str, until: Until
+) -> None:
+    """The tables of a lift are longer than six screens."""
+    for width, unfolded in ((390, False), (1200, True)):
+        tab.set_viewport_size({"width": width, "height": 844})
+        tab.goto(address)
+        until(lambda: tab.locator("#wrong a").count() >= 1, "the lift")
+        tab.goto(f"{address}lift/Lift1")
+        until(lambda: tab.locator("details[data-unfolded]").count() == 1, "the view")
+        assert tab.locator("#wiring").is_visible() is unfolded
+
+
+def test_an_old_card_with_a_fault_looks_as_strong_as_a_fault(
+    tab: Page, address: str, graph: Graph, overloaded: str, until: Until
+) -> None:
+    tab.goto(address)
+    until(lambda: "OVERLOAD" in card(tab, "Lift1"), "the fault")
+    look = """() => { const one = getComputedStyle(document.querySelector('.card.faulty'));
+      return [one.borderLeftStyle, one.borderLeftColor, one.backgroundColor]; }"""
+    now = tab.evaluate(look)
+    state = graph.lifts.pop("Lift1")
+    until(lambda: "OLD: silent" in card(tab, "Lift1"), "the silence")
+    assert tab.evaluate(look) == now
+    graph.lifts["Lift1"] = state
+
+
+def test_a_long_fault_is_told_whole_with_an_action(
+    tab: Page, address: str, graph: Graph, overloaded: str, until: Until
+) -> None:
+    why = "http://192.168.1.70/rpc/Shelly.GetStatus: no whole HTTP answer: is it an HTTP server?"
+    graph.faults["Lift1"] = {"INPUTS_NOT_FRESH": f"{why * 3} END"}
+    tab.goto(address)
+    until(lambda: "END" in tab.locator("#wrong").inner_text(), "the whole detail")
+    assert "Do: check the module's power" in tab.locator("#wrong").inner_text()

@@ -18,7 +18,8 @@ from workbench.replay.bags import heard_in
 from workbench.replay.mcap_read import LONGEST_RECORD, MAGIC
 
 pytestmark = pytest.mark.browser
-KEPT = "lift_north_2026-11-18_03-04-05_fault-overload_0a1b2c3d.mcap"
+KEPT = "lift_north_2026-11-18_13-04-05_fault-overload_0a1b2c3d.mcap"
+TITLE = "lift_north: fault overload"
 MIDDLE = """() => { const one = document.querySelector('.timeline');
   return (one.scrollLeft + one.clientWidth / 2) / one.scrollWidth; }"""
 HOSTILE = "<img src=x onerror=alert(1)>.mcap"
@@ -55,7 +56,7 @@ def test_the_list_has_the_recordings_and_nothing_else(tab: Page, address: str, s
         "bomb.mcap",
         "cut.mcap",
         "hostile.mcap",
-        KEPT,
+        TITLE,
         "ride.mcap",
         "rosbag2.mcap",
     ]
@@ -81,18 +82,35 @@ def test_an_incident_opens_with_its_sentences_and_its_timeline(
 
 
 def test_the_list_shows_device_reason_and_the_browsers_time_and_has_a_filter(
-    tab: Page, address: str
+    browser: Browser, address: str
 ) -> None:
-    tab.goto(f"{address}incidents")
-    kept = tab.locator(".incidents li", has_text="lift_north")
-    at = datetime.strptime("2026-11-18 03:04:05", "%Y-%m-%d %H:%M:%S").timestamp()
-    zone = ZoneInfo(tab.evaluate("Intl.DateTimeFormat().resolvedOptions().timeZone"))
-    assert kept.locator("b").inner_text() == "lift_north: fault overload"
-    when = kept.locator("time")
-    assert when.inner_text() == f"{datetime.fromtimestamp(at, zone):%Y-%m-%d %H:%M:%S}"
-    assert tab.locator(".zone").inner_text() == f"Times: {zone.key}"
-    tab.get_by_label("Find a device, reason or day").fill("Overload")
-    assert tab.locator(".incidents a:visible").all_inner_texts() == [KEPT]
+    """The filter finds the shown day, which in this zone is not the day in the file's name."""
+    zone = ZoneInfo("Pacific/Kiritimati")
+    with browser.new_context(timezone_id=zone.key) as context:
+        tab = context.new_page()
+        tab.goto(f"{address}incidents")
+        kept = tab.locator(".incidents li", has_text="lift_north")
+        at = datetime.strptime("2026-11-18 13:04:05", "%Y-%m-%d %H:%M:%S").timestamp()
+        day = f"{datetime.fromtimestamp(at, zone):%Y-%m-%d}"
+        assert kept.locator("a").inner_text() == TITLE
+        assert KEPT in kept.locator(".file").inner_text()
+        when = kept.locator("time")
+        assert when.inner_text() == f"{datetime.fromtimestamp(at, zone):%Y-%m-%d %H:%M:%S}"
+        assert tab.locator(".zone").inner_text() == f"Times: {zone.key}"
+        for typed in ("Overload", day):
+            tab.get_by_label("Find a device, reason or day").fill(typed)
+            assert tab.locator(".incidents a:visible").all_inner_texts() == [TITLE]
+        tab.get_by_label("Find a device, reason or day").fill("2026-11-18")
+        found = [] if day != "2026-11-18" else [TITLE]
+        assert tab.locator(".incidents a:visible").all_inner_texts() == found
+
+
+def test_an_incidents_title_is_its_device_and_reason(tab: Page, address: str) -> None:
+    tab.goto(f"{address}incidents/{KEPT}")
+    tab.locator(".timeline svg").wait_for()
+    assert tab.locator("h1").inner_text() == TITLE
+    assert tab.title() == f"{TITLE} · RMF bridges"
+    assert KEPT in tab.locator(".about").inner_text()
 
 
 def test_an_incident_opens_at_its_reason_and_in_the_browsers_zone(

@@ -18,6 +18,8 @@ from tests.workbench.page.browser.test_page import card
 
 pytestmark = pytest.mark.browser
 WITHIN_MS = 3000
+MORE = [f"door{number}" for number in range(20)]
+"""So many that the view is longer than the screen."""
 LEFT = "window.loadedOnce = true"
 
 
@@ -82,14 +84,18 @@ def all_is_old(tab: Page) -> bool:
 def seen_as_old(tab: Page, graph: Graph, until: Until, address: str) -> Iterator[None]:
     """Three seconds of the browser's own clock after what happens inside, every card is old."""
     graph.lift("Lift1", "L1", 2, "fleet/robot")
-    graph.doors["ward"] = d.DoorState(door_name="ward")
+    graph.doors |= {name: d.DoorState(door_name=name) for name in ("ward", *MORE)}
     tab.clock.install()
     tab.goto(address)
     until(lambda: all_is_now(tab), "all to be now")
     yield
     tab.clock.run_for(WITHIN_MS)
     assert all_is_old(tab)
-    assert "OLD: for" in tab.get_by_role("alert").inner_text()
+    tab.evaluate("scrollTo(0, document.body.scrollHeight)")
+    alert = tab.get_by_role("alert")
+    assert "OLD: for" in alert.inner_text()
+    box, view = alert.bounding_box(), tab.viewport_size
+    assert box and view and box["y"] >= 0 and box["y"] + box["height"] <= view["height"]
     assert tab.title().startswith("OLD ")
 
 
