@@ -1,6 +1,5 @@
 """The laws of a door's node."""
 
-from collections.abc import Callable
 from typing import Final
 
 from bridges.messages import definitions as d
@@ -17,6 +16,7 @@ SHUT: Final = 3
 BYPASS_S: Final = 5.0
 FLICKERS_S: Final = 0.9
 """Time (s) in which no door can close and open again."""
+LATE_S: Final = FLICKERS_S + 1.0
 
 
 def _numbers(history: DoorHistory) -> Finding:
@@ -55,18 +55,19 @@ def _stays(history: DoorHistory) -> Finding:
     if not _left_open(history) or _bypass(history):
         tested = history.mode == OPEN and history.now - history.asked_last > SILENCE_S
         return KEPT if tested else None
-    return Doubt("no longer open, though the last request was OPEN", _comes_back(history))
+    return _left("no longer open, though the last request was OPEN", history)
 
 
-def _comes_back(history: DoorHistory) -> Callable[[], bool]:
-    """Excused if a CLOSE was on its way, or if the contact only flickered: another law judges that."""
-    left_at = history.now
+def _left(text: str, history: DoorHistory) -> Doubt:
+    """Excused if a CLOSE was on its way, or if the contact only flickered: another law judges that.
+    By the stamps too, because a busy network delivers the next state late."""
+    left_at, read_at = history.now, history.seen.stamped_at
 
     def excused() -> bool:
-        flickered = history.mode == OPEN and history.now - left_at < FLICKERS_S
-        return flickered or not history.latched
+        shut_s = min(history.now - left_at, history.seen.stamped_at - read_at)
+        return (history.mode == OPEN and shut_s < FLICKERS_S) or not history.latched
 
-    return excused
+    return Doubt(text, excused, LATE_S)
 
 
 def _bypassed(history: DoorHistory) -> Finding:
@@ -76,7 +77,7 @@ def _bypassed(history: DoorHistory) -> Finding:
     if not _left_open(history):
         return KEPT if history.mode == OPEN else None
     text = "no longer open after a fleet adapter's CLOSE, though the supervisor holds it open"
-    return Doubt(text, _comes_back(history))
+    return _left(text, history)
 
 
 def _holds(history: DoorHistory) -> Finding:

@@ -13,7 +13,7 @@ from msgspec.structs import replace
 
 from bridges.messages import definitions as d
 from bridges.messages import words
-from bridges.messages.heard import Heard
+from bridges.messages.heard import Heard, Sender
 from bridges.observe.all_devices import AnyDevice
 from bridges.observe.limits import SLOWEST_S
 from bridges.observe.requesters import Moment
@@ -31,6 +31,8 @@ PAUSE: Final = 1.4
 """A pause of so many usual gaps, and of PAUSE_S, may be a restart."""
 KNOWN: Final = 3
 RHYTHM: Final = 10
+TURNS: Final = 4
+"""Two publishers that take so many turns in OFTEN_S are no restarted node."""
 STEADY_S: Final = 0.05
 UNEVEN_S: Final = 0.1
 CROSSED_S: Final = 1.0
@@ -117,7 +119,7 @@ class History(AnyHistory, Generic[T]):
     `seen`: the device's observations. `before`: the state before the latest, None at the first one, and
     after a pause, because the node may have restarted; `since`: time of that. `frozen_s`: time for
     which the states have shown the same stamp; `claimed_s`: time for which each `claims` what a robot
-    acts on. `asked_last`: the latest request.
+    acts on. `asked_last`: the latest request. `turns`: times at which two publishers took turns.
     """
 
     observes: ClassVar[type[AnyDevice]]
@@ -135,6 +137,8 @@ class History(AnyHistory, Generic[T]):
         self._quiet: deque[float] = deque(maxlen=15)
         self._usual_s = self._catches_up_s = 0.0
         self._gaps: deque[float] = deque(maxlen=RHYTHM)
+        self._sender: Sender | None = None
+        self.turns: deque[float] = deque(maxlen=TURNS)
 
     def take(self, heard: Heard, own: bool = False) -> bool:
         """Take a message; `own`: the judge's. False if no law need be checked, because it is not about
@@ -147,7 +151,7 @@ class History(AnyHistory, Generic[T]):
             earlier = self.heard_at
             self.seen.hear(Moment(heard.at, heard.wall), heard.topic, message)
             if isinstance(message, words.Stated):
-                self.seen.published_by(heard.sender, Moment(heard.at, heard.wall))
+                self._published_by(heard)
                 return self._take_state(message, earlier)  # type: ignore[arg-type]
         elif isinstance(message, words.Stated):
             self._other_at = self.now
@@ -155,6 +159,14 @@ class History(AnyHistory, Generic[T]):
                 self.others.add(words.device(message))
             return False
         return self.take_other(heard)
+
+    def _published_by(self, heard: Heard) -> None:
+        """Note the state's publisher, and each time when two publishers have taken turns."""
+        moment, before = Moment(heard.at, heard.wall), self._sender
+        self.seen.published_by(heard.sender, moment)
+        self._sender = heard.sender
+        if before is not self._sender and len(self.seen.publishers(moment)) > 1:
+            self.turns.append(heard.at)
 
     @abstractmethod
     def take_other(self, heard: Heard) -> bool:

@@ -130,6 +130,8 @@ def ended_unasked(history: LiftHistory) -> Finding:
         tested = history.travelled or hazard or history.was_tested(history.rival_at)
         return KEPT if tested else None
     ask = history.asks.get(old)
+    if ask is None and since > history.since + SETTLED_S:
+        return None  # given to nobody who asked: that breaks L4.own
     if history.has_ended(old, since) or (ask and ask.human) or _foreign_end(history, old, since):
         return None
     what = f"session {shown(old)} became {shown(new)}" if new else f"session {shown(old)} ended"

@@ -6,6 +6,7 @@ from typing import Any, Final
 
 from bridges.messages import words
 from bridges.observe.limits import SLOWEST_S
+from bridges.observe.requesters import Moment
 from workbench.judge.history import BURST, History
 from workbench.judge.law import KEPT, Finding, Law
 
@@ -38,7 +39,7 @@ def rate(history: AnyScene) -> Finding:
 
 def answers(history: AnyScene) -> Finding:
     """No state is caused by a request alone."""
-    if history.new is None:
+    if history.new is None or history.often(history.turns):
         return None
     if history.burst_s < BURST_WITHIN_S:
         return f"{BURST} unchanged states in {history.burst_s:.2f} s"
@@ -53,6 +54,9 @@ def one_node(history: AnyScene) -> Finding:
         return None
     if history.seen.steps_back(history.now, BACK_S, STEPS_WITHIN_S) >= STEPS_BACK:
         return f"stamps go back and forth: {STEPS_BACK} times in 30 s"
+    if history.often(history.turns):
+        both = history.seen.publishers(Moment(history.now, 0.0))
+        return f"two publishers take turns: {', '.join(one.node or '?' for one in both)}"
     if len(history.senders) > 1 and history.two_rhythms:
         return f"states come in two rhythms; their publishers: {', '.join(history.senders[:4])}"
     return KEPT if len(history.senders) == 1 and history.has_rhythm else None

@@ -39,9 +39,11 @@ def judged(
     seed: int = 1,
     cut: tuple[str, float, float] | None = None,
     again: Again | None = None,
+    begins_at: float = 0.0,
 ) -> Verdicts:
     """The verdict after LONG_S. `cut`: a party loses the network, when, and for how long. `again`: a
-    party dies, when, and comes back so much later."""
+    party dies, when, and comes back so much later. `begins_at`: the judge comes
+    later than the others."""
     world = World(Random(seed))
     world.air.weather = weather
     world.air.best_effort = {"RightAdapter", "JazzyAdapter"}
@@ -58,6 +60,7 @@ def judged(
         fresh = kind(jazzy) if kind is LiftSupervisor else kind()
         world.timeline.at(at, seat.leave)
         world.timeline.at(at + for_s, lambda: returned.extend(world.add(fresh)))
+    world.timeline.run(begins_at)
     judging = world.judge("adapter", name, for_s=LONG_S, most_s=LONG_S + 1.0)
     return told(judging, world.timeline.now)
 
@@ -117,6 +120,12 @@ def test_a_restart_convicts_nobody(
     kind = make if isinstance(who, str) else who
     for at in range(5, 75, 7):
         assert judged(make(), again=(kind, float(at), for_s))["broken"] == set(), at
+
+
+@pytest.mark.parametrize("make", RIGHT)
+def test_a_judge_that_is_started_again_in_a_ride_convicts_nobody(make: Make) -> None:
+    for at in range(3, 75, 3):
+        assert judged(make(), begins_at=float(at))["broken"] == set(), at
 
 
 PLANTED: list[tuple[str, Make, set[str]]] = [

@@ -77,6 +77,7 @@ def convicted(
     return told(judging, world.timeline.now)["broken"]
 
 
+LOADED = Weather(lost=0.0, states_lost=0.0, late=0.3, twice=0.0, latest_s=0.8)
 PLANTED: list[tuple[str, Sequence[Make], set[str]]] = [
     ("L END is refused without a floor", [wrong_lift.EndNeedsAFloor], {"L5.ends"}),
     ("L END of anybody ends the session", [wrong_lift.AnyEndEnds], {"L5.foreign"}),
@@ -136,12 +137,25 @@ def test_a_planted_defect_is_convicted_by_its_law_alone(
     assert found == laws
 
 
+ACQUITTED = {"D OPEN is shown before the door is open"}
+"""A busy network may hide the 0.3 s by which this defect is known."""
+
+
+@pytest.mark.parametrize(("defect", "nodes", "laws"), PLANTED, ids=[one[0] for one in PLANTED])
+def test_under_load_a_planted_defect_is_convicted_by_no_other_law(
+    defect: str, nodes: Sequence[Make], laws: set[str]
+) -> None:
+    """Messages are up to 0.8 s late, and then come together."""
+    found = [convicted(*nodes, weather=LOADED, seed=seed) for seed in range(4)]
+    assert set().union(*found) <= laws
+    assert sum(map(bool, found)) >= (0 if defect in ACQUITTED else 3)
+
+
 RIGHT: list[Make] = [
     *(RightLift, SimulatedLift, SlowLift, EagerLift, LiftWithoutModes, LiftInFire),
     *(RightDoor, DoorOnChange, LeasedDoor),
     *(RightCharger, lambda: RightCharger(2.0), ChargerInError),
 ]
-LOADED = Weather(lost=0.0, states_lost=0.0, late=0.3, twice=0.0, latest_s=0.8)
 NAMES = [make().__class__.__name__ for make in RIGHT]
 
 
@@ -165,6 +179,21 @@ def test_no_right_node_is_convicted_for_the_silence_of_the_network(
 @pytest.mark.parametrize("make", RIGHT, ids=NAMES)
 def test_no_right_node_is_convicted_for_a_restart(make: Make, at: float) -> None:
     assert convicted(make, restarts=at) == set()
+
+
+@pytest.mark.parametrize("at", [4.5, 9.0, 14.0, 21.0, 29.0])
+@pytest.mark.parametrize("make", RIGHT, ids=NAMES)
+def test_no_right_node_is_convicted_by_a_judge_that_is_killed_and_started_again(
+    make: Make, at: float
+) -> None:
+    """The first judge leaves its session or its hold behind; the second listens, then plays."""
+    world = World()
+    seats = world.add(NextLift(), make())
+    kind, name, scenario = play_for(seats[1].party, False)
+    world.judge(kind, name, scenario, most_s=at)
+    for again in (None, play_for(seats[1].party, False)[2]):
+        judging = world.judge(kind, name, again, for_s=20.0)
+        assert told(judging, world.timeline.now)["broken"] == set()
 
 
 @pytest.mark.parametrize("jitter_s", [0.1, 0.2, 0.4])

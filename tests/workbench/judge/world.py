@@ -110,7 +110,7 @@ class World:
         def hear(topic: AnyTopic, message: Message) -> None:
             if not judging.done:
                 now = self.timeline.now
-                say(judging.hear(Heard(now, EPOCH + now, topic.name, message)))
+                say(judging.hear(Heard(now, EPOCH + now, topic.name, message, place.sender())))
 
         def turn() -> None:
             if not judging.done:
@@ -135,6 +135,7 @@ class World:
             now = self.timeline.now
             judging.judge.fire_ends(publishing, retaining, supervisors, now, EPOCH + now)
             judging.judge.history.senders = tuple(states.senders())
+        alarm.set(NEVER)
         place.close()
         return judging
 

@@ -149,7 +149,9 @@ def test_a_phone_shows_the_wiring_when_it_is_asked_for(
         until(lambda: tab.locator("#wrong a").count() >= 1, "the lift")
         tab.goto(f"{address}lift/Lift1")
         until(lambda: tab.locator("details[data-unfolded]").count() == 1, "the view")
-        assert tab.locator("#wiring").is_visible() is unfolded
+        shown = "document.querySelector('details.wiring').open"
+        assert tab.evaluate(shown) is unfolded
+        assert tab.locator("#wiring p").is_visible() is unfolded
 
 
 def test_an_old_card_with_a_fault_looks_as_strong_as_a_fault(

@@ -95,7 +95,9 @@ def seen_as_old(tab: Page, graph: Graph, until: Until, address: str) -> Iterator
     alert = tab.get_by_role("alert")
     assert "OLD: for" in alert.inner_text()
     box, view = alert.bounding_box(), tab.viewport_size
-    assert box and view and box["y"] >= 0 and box["y"] + box["height"] <= view["height"]
+    assert box is not None
+    assert view is not None
+    assert 0 <= box["y"] <= view["height"] - box["height"]
     assert tab.title().startswith("OLD ")
 
 
