@@ -137,7 +137,7 @@ def every_topic() -> str:
     for name in kind_names():
         kind = kind_called(name)
         shown = name.replace("_", " ")
-        for topic in kind.requests:
+        for topic in (*kind.requests, *(kind.recorded if isinstance(kind, Kind) else ())):
             heard.setdefault(topic.name, set()).add(shown)
         for topic in _published(name, examples):
             sent.setdefault(topic.name, set()).add(shown)

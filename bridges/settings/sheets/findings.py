@@ -88,16 +88,15 @@ def _rmf(config: Config) -> dict[str, str]:
     """Return the settings to compare with RMF's, and the topics by their names on this site."""
     rmf, kind = config.rmf, kind_called(config.kind)
     spoken = [*([] if isinstance(kind, GraphKind) else [kind.states]), *_published(config)]
-    names = {
-        topic.name: rmf.topics.get(topic.name, topic.name) for topic in (*spoken, *kind.requests)
-    }
+    heard = [*kind.requests, *(() if isinstance(kind, GraphKind) else kind.recorded)]
+    names = {topic.name: rmf.topics.get(topic.name, topic.name) for topic in (*spoken, *heard)}
     return {
         "domain": "ROS_DOMAIN_ID or 0" if rmf.domain_id is None else str(rmf.domain_id),
         "transport": rmf.transport,
         "network": rmf.network,
         "release": rmf.release,
         "publishes": ", ".join(dict.fromkeys(names[topic.name] for topic in spoken)),
-        "hears": ", ".join(names[topic.name] for topic in kind.requests) or "-",
+        "hears": ", ".join(names[topic.name] for topic in heard) or "-",
     }
 
 
