@@ -47,10 +47,10 @@ def answer(
         found.asks, found.fields = claim.who, _fields(door, claim, clock)
         found.notes += common.clock_of(claim)
     holders = [f"{who} {clock.since(since)}" for who, since in [*door.holders.items()][:4]]
-    held = f"It has been held by {', '.join(holders)}." if holders else "Nobody holds it."
+    held = f" It has been held by {', '.join(holders)}." if holders else " Nobody holds it."
     if door.last_heartbeat is None:
-        held = "No heartbeat of its supervisor was heard."
-    found.say(f"{door.name} has been {door.mode.value} {clock.since(door.mode.since)}. {held}")
+        held = " No heartbeat of its supervisor was heard." if door.hears_lists else ""
+    found.say(f"{door.name} has been {door.mode.value} {clock.since(door.mode.since)}.{held}")
     if len(door.flaps(clock.now)) < FLAPS and (old := common.old_reading(door, clock)):
         found.say(old)
     held_open = door.holders or claim or (door.asked and door.asked.value == OPEN)
@@ -120,11 +120,11 @@ def _away(found: Answer, door: DoorFacts, clock: TimePhrases) -> None:
 
 def _opens(found: Answer, door: DoorFacts, claim: DeviceRequester, clock: TimePhrases) -> None:
     """Explain a wait for the door to open."""
-    if claim.who not in door.holders:
-        _not_listed(found, door, claim, clock)
-        return
     asked = door.asked
     passed = asked is not None and asked.value == OPEN
+    if claim.who not in door.holders and (door.hears_lists or not passed):
+        _not_listed(found, door, claim, clock)
+        return
     if not passed:
         what = "asks for CLOSE" if asked is not None else "has not asked the door to open"
         found.say(
@@ -147,6 +147,13 @@ def _opens(found: Answer, door: DoorFacts, claim: DeviceRequester, clock: TimePh
 def _not_listed(found: Answer, door: DoorFacts, claim: DeviceRequester, clock: TimePhrases) -> None:
     if clock.now.at - claim.since.at < SETTLES_S and claim.since.seen:
         found.say("It was asked for a moment ago.", "the supervisor", f"list {claim.who}")
+    elif not door.hears_lists:
+        found.say(
+            "Nothing asks for OPEN on `door_requests`: the door supervisor does not pass the request"
+            " on, or is not running.",
+            "a person",
+            f"see whether the door supervisor runs, and what its log says of {claim.who}",
+        )
     elif door.last_heartbeat is None:
         found.say(
             "Nobody takes the request: no door supervisor was heard on `door_supervisor_heartbeat`.",

@@ -1,8 +1,9 @@
 """One door's facts from its messages, and its story."""
 
+from bridges.observe.device import Check
 from bridges.observe.door import OPEN, SUPERVISOR, ObservedDoor
 from bridges.observe.news import News
-from bridges.observe.requesters import Moment
+from bridges.observe.requesters import DeviceRequester, Moment
 from workbench.explain.device import Device
 from workbench.explain.lift_facts import moves
 from workbench.explain.phrases import lasted
@@ -20,6 +21,16 @@ class DoorFacts(Device, ObservedDoor):
         """The last requester on `door_requests`."""
         return "the supervisor" if self.sender == SUPERVISOR else self.sender
 
+    @property
+    def hears_lists(self) -> bool:
+        """Would the supervisor's heartbeat be heard? A door's own daemon does not record it."""
+        return self.last_heartbeat is not None or self.noted is None
+
+    def checks(self, one: DeviceRequester) -> tuple[Check, ...]:
+        """List the conditions of this requester's DoorOpen or DoorClose that can be known."""
+        found = super().checks(one)
+        return tuple(check for check in found if check.name == "door" or self.hears_lists)
+
     def says(self, one: News) -> str:
         """Return a line of the story; "" for none."""
         who, by = one.who, one.requester
@@ -35,7 +46,8 @@ class DoorFacts(Device, ObservedDoor):
             case "changed":
                 return f"the door {moves(self.changed['mode'], self.mode.value)}"
             case "met":
-                return f"RMF sees what {who} waits for: the door open, and its hold"
+                hold = ", and its hold" if self.hears_lists else ""
+                return f"RMF sees what {who} waits for: the door open{hold}"
         return ""
 
     def notice(self, one: News) -> None:

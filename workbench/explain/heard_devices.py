@@ -130,7 +130,8 @@ class HeardDevices(ObservedGraph[Device]):
         if answer.because is None:
             common.say_waits(answer, device, clock)
         if device is not last and last.state is not None:
-            later = f"{words.condition(last.state)}; held by {words.holder(last.state) or 'nobody'}"
+            held = "" if kind == "door" else f"; held by {words.holder(last.state) or 'nobody'}"
+            later = f"{words.condition(last.state)}{held}"
             answer.say(f"At the end of the file, at {clock.time(self.now.wall)}: {label(later)}.")
         story = self._story(device, answer)
         for_s = lasted(self.now.at - began.at)

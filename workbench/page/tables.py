@@ -27,7 +27,7 @@ def table(headings: Sequence[str], rows: Iterable[Sequence[str]], caption: str) 
 
 def _cell(heading: str, cell: str) -> str:
     """Format a cell with its heading, for narrow screens; an empty one is left out there."""
-    none = ' class="none"' if cell in ("-", "") else ""
+    none = ' class="none"' if cell in ("-", "") and heading != "now" else ""
     return f'<td data-head="{escape(heading)}"{none}>{escape(cell)}</td>'
 
 

@@ -74,6 +74,24 @@ def supervisor_dead_doorway(site: Site) -> None:
     site.run(30.0)
 
 
+def supervisor_dead(site: Site) -> None:
+    """The door supervisor has been killed; a robot asks for OPEN."""
+    _three_passages(site)
+    site.supervisors[SUPERVISOR].kill()
+    site.trouble_begins()
+    site.red.opens(DOOR)
+    site.run(20.0)
+
+
+def operator_dead(site: Site) -> None:
+    """The operator does not move the leaf."""
+    _three_passages(site)
+    site.fail(DOOR, "operator", "off")
+    site.trouble_begins()
+    site.red.opens(DOOR)
+    site.run(20.0)
+
+
 def _three_passages(site: Site) -> None:
     for _ in range(3):
         site.passes(site.red, DOOR)

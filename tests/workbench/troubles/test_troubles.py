@@ -6,8 +6,8 @@ from random import Random
 
 import pytest
 
-from tests.workbench.troubles import asked
-from tests.workbench.troubles.site import KINDS, Site
+from tests.workbench.troubles import asked, doors
+from tests.workbench.troubles.site import DOOR, KINDS, Site
 from tests.workbench.troubles.stories import TROUBLES, Trouble
 from tests.workbench.troubles.verdicts import VERDICTS, Verdict, wrong
 
@@ -67,3 +67,26 @@ def test_a_unit_that_is_slow_at_another_pace_is_explained_as_expected(
     screen, names = told(TROUBLES[SLOW.key], SLOW, tmp_path, slower)
     found = wrong(SLOW, screen, names)
     assert not found, "\n".join([*found, "", screen])
+
+
+@pytest.mark.parametrize(
+    ("stage", "says", "acts"),
+    [
+        (doors.open_contact_cut, "has a fault of its own", "a person"),
+        (doors.operator_dead, "The supervisor asks for OPEN, and the door has", "the controller"),
+        (doors.supervisor_dead, "Nothing asks for OPEN on `door_requests`", "a person"),
+    ],
+)
+def test_a_doors_own_file_names_the_robot_and_claims_nothing_of_a_heartbeat(
+    stage: Callable[[Site], None], says: str, acts: str, tmp_path: Path
+) -> None:
+    """A door's daemon records what robots ask, and not the supervisor's heartbeat."""
+    site = Site(tmp_path)
+    try:
+        stage(site)
+        screen = asked.file_screen(site, DOOR)
+    finally:
+        site.close()
+    assert "fleet/red has waited for ward_door to be open" in screen
+    assert not [word for word in ("heartbeat", "held by") if word in screen]
+    assert (says in screen, f"Next, {acts}:" in screen) == (True, True), screen
