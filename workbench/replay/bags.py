@@ -18,10 +18,11 @@ from bridges.blackbox.incident import INSTALL, timed
 from bridges.blackbox.recordings import CONTINUOUS
 from bridges.blackbox.ring import MAGIC, RingContent, RingError
 from bridges.messages import cdr
-from bridges.messages.heard import Heard, Own, bounded
+from bridges.messages.heard import Heard, Own, Sender, bounded
+from bridges.messages.words import LONGEST_NAME
 from bridges.system import user_files
 from bridges.system.log import pairs
-from workbench.replay.sources import BagError, Notes, Raw, Senders, releases, source
+from workbench.replay.sources import BagError, Notes, Raw, releases, source
 
 __all__ = ["BagError", "Keep", "Notes", "all_in", "heard_in"]
 
@@ -142,13 +143,14 @@ def _of_ring(path: Path) -> Iterator[Raw]:
         entries = list(RingContent(path).entries())
     except RingError as error:
         raise BagError(str(error)) from None
-    senders = Senders()
+    senders: dict[tuple[bool, str], Sender] = {}
     for entry, steady, wall in timed(entries):
         if isinstance(entry, Spoken):
             found = source(entry.topic, entry.type, releases(entry.type, ""))
             if found.decode is not None:
                 at, told = round(steady / NS), round(wall / NS)
-                sender = senders.of(str(entry.sent), entry.node)
+                new = Sender(entry.node[:LONGEST_NAME]) if entry.node else None
+                sender = new and senders.setdefault((entry.sent, new.node), new)
                 yield Raw(at, told, found.topic, entry.cdr, found.decode, sender)
 
 

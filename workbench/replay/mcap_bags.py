@@ -9,8 +9,9 @@ from mcap.records import Channel, Header, McapRecord, Message, Schema
 from bridges.blackbox.incident import LIBRARY, OWN_TOPICS
 from bridges.messages.heard import Sender
 from bridges.messages.releases import Release
+from bridges.messages.words import LONGEST_NAME
 from workbench.replay.mcap_read import Damaged, records
-from workbench.replay.sources import Notes, Raw, Senders, Source, releases, source
+from workbench.replay.sources import Notes, Raw, Source, releases, source
 
 NO_CHANNEL: Final = Source("", None, "of no channel")
 
@@ -41,8 +42,7 @@ class _Declared:
     def __init__(self) -> None:
         self.ours = False
         self.sources: dict[int, Source] = {}
-        self.senders: dict[int, Sender | None] = {}
-        self._known = Senders()
+        self.senders: dict[int, Sender] = {}
         self._types: dict[int, tuple[str, list[Release]]] = {}
 
     def is_ours(self, found: Source) -> bool:
@@ -63,6 +63,5 @@ class _Declared:
             name, found = self._types.get(record.schema_id, ("", []))
             is_cdr = record.message_encoding == "cdr"
             self.sources[record.id] = source(record.topic, name if is_cdr else "", found)
-            if self.ours:
-                told = (record.metadata.get(key, "") for key in ("way", "node"))
-                self.senders[record.id] = self._known.of(*told)
+            if self.ours and (node := record.metadata.get("node")):
+                self.senders[record.id] = Sender(node[:LONGEST_NAME])

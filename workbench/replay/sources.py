@@ -52,20 +52,6 @@ class Raw(NamedTuple):
     sender: Sender | None = None
 
 
-class Senders:
-    """The publishers that our recorder has noted in one recording, each the same object for all its
-    messages."""
-
-    def __init__(self) -> None:
-        self._known: dict[tuple[str, str], Sender] = {}
-
-    def of(self, way: str, node: str) -> Sender | None:
-        """Return the publisher on this node; None without a name. `way`: sent by the recording daemon,
-        or heard by it, because another node may have that daemon's name."""
-        node = node[:LONGEST_NAME]
-        return self._known.setdefault((way, node), Sender(node)) if node else None
-
-
 class Source(NamedTuple):
     """A recorded topic. `decode`: None if the topic cannot be used; `why` gives the reason."""
 
