@@ -77,13 +77,17 @@ def own_name(history: LiftHistory) -> Finding:
 
 
 def grants(history: LiftHistory) -> Finding:
-    """The first request on a free lift in service is granted."""
+    """The first request on a free lift in service is granted.
+
+    After a ride the node may keep the lift for GRACE_S, because the robot may still be in the car.
+    """
     if history.new is None or history.before is None:
         return None
     if history.session:
         granted = history.session != history.session_before and history.session in history.asks
         return KEPT if granted else None
-    free_s = history.now - history.free_since
+    may_be_inside = bool(history.last) and history.offered
+    free_s = history.now - history.free_since - (GRACE_S if may_be_inside else 0.0)
     for session, ask in list(history.asks.items()):
         asked = ask.direct and ask.times >= GRANT_ASKED and history.now - ask.direct_at < 3.0
         served = ask.floor in history.new.available_floors or not history.new.available_floors

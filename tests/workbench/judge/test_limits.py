@@ -190,6 +190,18 @@ def asked_so_often(times: int) -> list[Line]:
     ]
 
 
+def asked_after_a_ride(free_s: float) -> list[Line]:
+    """RED is let in and ends its session; BLUE asks each second for so long, and gets nothing."""
+    over_at = 4.0 + free_s
+    return [
+        *(car(0.0), asks(0.5, floor="L1"), held(1.0, to="L1", door=OPEN), ends(3.5)),
+        held(3.9, to="L1"),
+        *seconds(4.0, over_at, car),
+        *seconds(3.6, over_at, lambda at: asks(at, BLUE)),
+        car(over_at),
+    ]
+
+
 def rides_with_bare_ends(times: int, waits_s: float = 0.5, goes_s: float = 0.2) -> list[Line]:
     """So many sessions outlive an END without a floor, and end `goes_s` after one with a floor."""
     lines = [car(0.0)]
@@ -232,6 +244,7 @@ LIFT: list[tuple[str, Story, float, float]] = [
     ("L4.own", lambda x: [car(1.0), held(1.0 + x)], 2.9, 3.1),
     ("L4.grants", lambda x: asked_for_long(1.0 + x), 30.0, 30.1),
     ("L4.grants", lambda x: asked_so_often(int(x)), 9, 10),
+    ("L4.grants", asked_after_a_ride, 94.8, 95.0),
     ("L4.grants", lambda x: asked_for_long(31.5, last_ask_s=x), 3.1, 2.9),
     ("L4.grants", lambda x: asked_for_long(44.0, gap_s=x), 5.1, 4.9),
     (
