@@ -15,7 +15,7 @@ from bridges.kinds.shared.table import Table
 from drivers.driver_type import DriverType
 from drivers.hal.modbus import ModbusBus
 from drivers.hal.modbus.lines import ModbusLines
-from drivers.hal.modbus.registers import Unit
+from drivers.hal.modbus.registers import WRITABLE, Unit, misplaced
 from drivers.hal.points import Clearing
 from drivers.lift import checks
 from drivers.lift.dry_contact import DOOR as BY_CONTACTS
@@ -27,6 +27,7 @@ from drivers.lift.register_parts import (
     LiftFlag,
     MotionField,
     Number,
+    apart,
     place_of,
     point_at,
 )
@@ -129,7 +130,7 @@ def claims(settings: RegisterLiftSettings) -> Iterator[tuple[str, tuple[str, ...
     """Yield (place, path) of each command; no other device may write there."""
     seen: set[str] = set()
     for path, place, _ in settings.map.commands.places():
-        if place not in seen:
+        if place not in seen and misplaced(apart(place)[1], WRITABLE) is None:
             seen.add(place)
             yield str(point_at(settings.unit, place)), ("map", "commands", *path, "at")
 

@@ -36,10 +36,16 @@ def place_of(part: AtUnit) -> str:
 
 def point_at(unit: int, where: str) -> Point:
     """Return the point of a valid place as written by `place_of`. `unit`: the device's."""
+    own, place = apart(where)
+    return at(unit if own is None else own, place)
+
+
+def apart(where: str) -> tuple[int | None, str]:
+    """Split a place as written by `place_of` into its own unit and the place there, valid or not."""
     if not where.startswith("unit "):
-        return at(unit, where)
+        return None, where
     _, own, place = where.split(" ", 2)
-    return at(int(own), place)
+    return int(own), place
 
 
 class NumberField(InRegister, frozen=True, kw_only=True, forbid_unknown_fields=True):

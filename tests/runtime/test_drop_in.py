@@ -44,6 +44,7 @@ SHIPPED = {
     "lift_by_call": GPIO,
     "lift_dry_contact": GPIO,
     "lift_gateway": NET,
+    "lift_gateway_contacts": SERIAL,
     "lift_io_module": NET,
     "lift_low_level": GPIO,
     "lift_one_hot": GPIO,
