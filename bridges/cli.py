@@ -30,6 +30,10 @@ COMMANDS = {
         "validate device YAMLs and print their wiring as a table",
         "check my_lift.yaml --building-map hospital.building.yaml",
     ),
+    "migrate": (
+        "rewrite keys of a device YAML that an earlier version named otherwise",
+        "migrate my_lift.yaml --dry-run",
+    ),
     "enable": (
         "make a service of a device YAML, or update the service after a change",
         "enable my_lift.yaml --dry-run",

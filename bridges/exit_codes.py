@@ -53,6 +53,12 @@ EXIT_CODES: Final[dict[str, dict[int, str]]] = {
         73: "the sheet cannot be written",
         78: "a file has an error, or the files contradict each other",
     },
+    "migrate": {
+        0: "the file has no old key",
+        65: "an old key must be changed by hand",
+        73: "the file cannot be written",
+        **YAML,
+    },
     "enable": {
         0: "the service runs",
         69: "an output is not verified off",

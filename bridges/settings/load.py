@@ -13,6 +13,7 @@ Structs define the content of a section (`bridges/yaml/values.py`); this file an
 sections against each other. The daemon takes nothing else from the file, and checks nothing again.
 """
 
+from collections.abc import Iterable
 from functools import partial
 from pathlib import Path
 from typing import Final
@@ -31,6 +32,7 @@ from bridges.settings import names as named
 from bridges.settings.buses import BusRead, read_bus
 from bridges.settings.config import Config
 from bridges.settings.plausible import milliseconds, out_of_step
+from bridges.settings.renamed_keys import read_as_renamed
 from bridges.settings.top import MAPPING, keys_below, owner, top_keys, word
 from bridges.settings.wiring import Use, WiringCheck, note_conflicts, note_unknown_signals
 from bridges.yaml.parsing import Problem, SettingsError, YamlFile, compose, read
@@ -60,8 +62,9 @@ def understood(path: Path | str, text: bytes) -> Config:
     page = YamlFile(str(path))
     root = compose(page, text)
     _note_rmfs(page, root)
+    old = read_as_renamed(page, root)
     reading = _DeviceReading(page, root)
-    reading.all()
+    reading.all(old)
     page.check()
     return reading.config(Path(path), text)
 
@@ -115,8 +118,10 @@ class _DeviceReading:
             recording=self._recording,
         )
 
-    def all(self) -> None:
-        """Read every section, as far as the earlier sections allow."""
+    def all(self, remarks: Iterable[tuple[Node, str]]) -> None:
+        """Read every section, as far as the earlier sections allow. `remarks`: on renamed keys."""
+        for key, text in remarks:
+            self._warn(key, text)
         entries = self._values.entries(self._top)
         self._read_kind(below(self._top.node, "kind"))
         if not isinstance(self._kind, GraphKind):
