@@ -6,7 +6,7 @@ BIN := .venv/bin
 # compiles every file again.
 export PYTHONDONTWRITEBYTECODE :=
 
-.PHONY: help demo demo-charging demo-page test test-page suite deep test-ros lint style types docs reference man deb format bench flood soak torture test-vm mutate clean
+.PHONY: help demo demo-charging demo-page test test-page suite deep test-ros lint style types docs reference man deb lock reproducible release format bench flood soak torture test-vm mutate clean
 help:
 	@echo "make demo    a robot goes through a door, rides a lift and charges, on fake hardware"
 	@echo "             (TRANSPORT=zenoh make demo: on zenoh, the default on a Raspberry Pi)"
@@ -29,6 +29,9 @@ help:
 	@echo "make man     the manual page, build/rmf-bridge.1"
 	@echo "make deb     Debian packages in dist/, for Debian 12 and 13 and Ubuntu 24.04, amd64 and arm64"
 	@echo "             (one of them: make deb ARCHS=arm64 PYTHONS=3.11)"
+	@echo "make lock    renew the versions and hashes of the libraries inside the packages (deb/lock/)"
+	@echo "make reproducible  build the packages twice, and compare (ARCHS and PYTHONS as for make deb)"
+	@echo "make release  from a tag: packages, sdist, wheel, documentation, bills of materials, checksums; KEY=… signs them"
 	@echo "make format  rewrite the sources as the linter wants them"
 	@echo "make clean   remove the virtual environment and everything generated"
 
@@ -111,12 +114,26 @@ man: .venv/ready
 	  --project-name rmf-bridges --description "connect Open-RMF to lifts, doors and chargers" \
 	  --manual-section 1 --manual-title "rmf-bridges manual" --output build/rmf-bridge.1
 
+# The programs that build a release, with the versions and hashes of the lock.
+.venv/tools: deb/lock/tools.txt .venv/ready
+	@$(BIN)/pip install --quiet --disable-pip-version-check --no-deps --require-hashes -r $<
+	@touch $@
+
+lock: .venv/ready
+	deb/lock.sh
+
 # Built here for every architecture; none of the result runs here.
 ARCHS ?= amd64 arm64
 PYTHONS ?= 3.11 3.12 3.13
-deb: man docs
+deb: .venv/tools man docs
 	@for arch in $(ARCHS); do for python in $(PYTHONS); do \
 	  deb/build.sh $$arch $$python || exit 1; done; done
+
+reproducible: .venv/tools man docs
+	@ARCHS="$(ARCHS)" PYTHONS="$(PYTHONS)" deb/reproducible.sh
+
+release: .venv/tools
+	@KEY="$(KEY)" deb/release.sh
 
 format: .venv/ready
 	$(BIN)/ruff check --fix .

@@ -1,8 +1,8 @@
 """Add the commit to the version, which pyproject.toml cannot do.
 
 `0.1.0+r900.gabcdef0` is the 900th commit; `.m` and the time of the last change follow for a checkout
-with changes. Where there is no git, the build is unknown: the version is 0.1.0, and the built `bridges`
-has an empty BUILD.
+with changes. The commit with the tag `v0.1.0` is version 0.1.0 itself. Where there is no git, the build
+is unknown: the version is 0.1.0, and the built `bridges` has an empty BUILD.
 """
 
 import re
@@ -15,17 +15,22 @@ from setuptools.command.build_py import build_py
 
 HERE = Path(__file__).resolve().parent
 FACE = "bridges/__init__.py"
+RELEASE = "release"
+PLAIN = re.search(r'__version__ = "(.*)"', (HERE / FACE).read_text())[1]  # type: ignore[index]
 
 
 def build() -> str:
-    """Return the commit's number and short hash; "" if this folder is no checkout of its own."""
+    """Return the commit's number and short hash, or `release`; "" if this is no checkout of its own."""
     if not (HERE / ".git").exists():
         return ""
     try:
         number, short = _git("rev-list", "--count", "HEAD"), _git("rev-parse", "--short", "HEAD")
         changed = _git("diff", "--name-only", "HEAD").splitlines()
+        tags = _git("tag", "--points-at", "HEAD").splitlines()
     except (OSError, subprocess.CalledProcessError):
         return ""
+    if f"v{PLAIN}" in tags and not changed:
+        return RELEASE
     return f"r{number}.g{short}" + (_last_change(changed) if changed else "")
 
 
@@ -42,7 +47,7 @@ def _git(*words: str) -> str:
 
 
 BUILD = build()
-PLAIN = re.search(r'__version__ = "(.*)"', (HERE / FACE).read_text())[1]  # type: ignore[index]
+VERSION = PLAIN if BUILD in ("", RELEASE) else f"{PLAIN}+{BUILD}"
 
 
 class BuildPy(build_py):
@@ -57,4 +62,4 @@ class BuildPy(build_py):
             built.write_text(text.replace('BUILD = ""', f'BUILD = "{BUILD}"'))
 
 
-setup(version=PLAIN + (BUILD and f"+{BUILD}"), cmdclass={"build_py": BuildPy})
+setup(version=VERSION, cmdclass={"build_py": BuildPy})

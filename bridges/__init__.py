@@ -2,5 +2,6 @@
 
 __version__ = "0.1.0"
 BUILD = ""
-"""The commit, written by setup.py into the installed package; "" if unknown."""
-VERSION = f"{__version__}+{BUILD}" if BUILD else __version__
+"""The commit, written by setup.py into the installed package; `release` for the version itself; "" if
+unknown."""
+VERSION = __version__ if BUILD in ("", "release") else f"{__version__}+{BUILD}"

@@ -2,8 +2,9 @@
 # Builds the three Debian packages of one architecture and one Python: deb/build.sh ARCH PYTHON (`make deb`).
 # rmf-bridges has the daemons and the recorder, as one archive that its postinst unpacks; rmf-bridges-workbench adds the
 # workbench and the fakes; rmf-bridges-page adds the web page's libraries. The last two packages install into a
-# folder named after their version. Runs as an ordinary user, on any machine: wheels are fetched for the target. PyPI has no
-# lgpio for Python 3.13: lgpio.sh builds it.
+# folder named after their version. Runs as an ordinary user, on any machine: wheels are fetched for the target, with the versions
+# and hashes of deb/lock/ (`make lock`). PyPI has no lgpio for Python 3.13: lgpio.sh builds it. Each package has its bill of
+# materials (sbom.py). `deb/reproducible.sh` shows that two builds are the same.
 set -eu
 arch=$1 python=$2
 case $python in
@@ -26,13 +27,14 @@ mkdir -p "$root/DEBIAN" "$bench/DEBIAN" "$page/DEBIAN" "$root/$lib/bin" "$root/u
 
 # The workbench gets the libraries that the daemons lack; the page gets the libraries that daemons and workbench lack. Libraries of
 # Cyclone's own commands and colorzero's build tools are left out: they would double the byte code that an installation must make.
-[ "$python" != 3.13 ] || "$here/deb/lgpio.sh" "$arch" "$wheels"
-"$bin/pip" wheel --quiet --disable-pip-version-check --no-deps --wheel-dir "$work/wheel" "$here"
+built=
+[ "$python" != 3.13 ] || { "$here/deb/lgpio.sh" "$arch" "$wheels"; built="--built $wheels"; }
+"$bin/pip" wheel --quiet --disable-pip-version-check --no-deps --no-build-isolation --wheel-dir "$work/wheel" "$here"
 version=$(basename "$work"/wheel/*.whl | cut -d- -f2)+$release # with the commit (setup.py)
 fill() {
   into=$1; shift
   "$bin/python" "$here/deb/wheels.py" "$work"/wheel/*.whl --arch "$arch" --python "$python" \
-    --find-links "$wheels" --without cyclonedds:rich-click --without colorzero:setuptools --target "$into" "$@"
+    --lock "$here/deb/lock/runtime.txt" $built --without cyclonedds:rich-click --without colorzero:setuptools --target "$into" "$@"
 }
 # without PLACE OTHER: removes from PLACE every file that OTHER has too.
 without() { (cd "$2" && find . ! -type d -print0) | (cd "$1" && xargs -0 rm -f); }
@@ -51,6 +53,18 @@ for each in "$site" "$in_bench" "$in_page"; do
   find "$each" -type f -exec chmod 644 {} +
   find "$each" -type d -empty -delete
 done
+
+# sbom PACKAGE ROOT FOLDER...: adds the bill of materials and missing licence texts.
+sbom() {
+  package=$1 doc=$2/usr/share/doc/$1
+  shift 2
+  mkdir -p "$doc" "$here/dist"
+  "$bin/python" "$here/deb/sbom.py" "$package" "$version" "$@" --epoch "$SOURCE_DATE_EPOCH" --out "$doc/sbom.cdx.json"
+  cp "$doc/sbom.cdx.json" "$here/dist/${package}_${version}_$arch.cdx.json"
+}
+sbom rmf-bridges "$root" "$site"
+sbom rmf-bridges-workbench "$bench" "$in_bench" --with "$("$bin/pip" freeze | grep '^mkdocs-material==')"
+sbom rmf-bridges-page "$page" "$in_page"
 
 # A virtual environment that sees the system's packages (rclpy), on the system's own Python. postinst writes the first
 # line of its program, so that a daemon imports from its own tree, even if `current` later names another.

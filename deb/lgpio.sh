@@ -12,9 +12,9 @@ glibc=34 # as PyPI's own wheels; Debian 12 has 2.36
 
 headers=$("$bin/python" -c 'import sysconfig; print(sysconfig.get_path("include"))')
 [ -f "$headers/Python.h" ] || { echo "Python.h is missing: sudo apt install python3-dev" >&2; exit 1; }
-"$bin/pip" install --quiet --disable-pip-version-check -e "$here[deb]"
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
+sed -n '/^lgpio==/,/[^\\]$/p' "$here/deb/lock/runtime.txt" > "$work/lgpio.txt" # its version and hashes
 # Debian's pyconfig.h includes the architecture's pyconfig.h. For the stable ABI both architectures have the same.
 for each in x86_64 aarch64; do ln -s "/usr/include/$(uname -m)-linux-gnu" "$work/$each-linux-gnu"; done
 cat > "$work/setup.cfg" <<CONFIG
@@ -29,4 +29,4 @@ PATH=$bin:$PATH PYPI=1 DIST_EXTRA_CONFIG=$work/setup.cfg SETUPTOOLS_EXT_SUFFIX=.
   ZIG_GLOBAL_CACHE_DIR=$work/zig CC="$compiler" LDSHARED="$compiler -shared -s -Wl,-z,relro,-z,now" \
   CFLAGS="-DPy_LIMITED_API=0x030b0000 -I$work -O2 -fstack-protector-strong" \
   "$bin/pip" wheel --quiet --disable-pip-version-check --no-cache-dir --no-deps --no-binary lgpio \
-  --use-pep517 --no-build-isolation --wheel-dir "$wheels" 'lgpio>=0.2.2'
+  --use-pep517 --no-build-isolation --wheel-dir "$wheels" --require-hashes --requirement "$work/lgpio.txt"

@@ -2,15 +2,16 @@
 
 pip can fetch wheels of another platform, but judges conditions (`; platform_machine == ...`) by the
 machine that it runs on. So each round of this script finds the requirements still missing for the
-target machine, and fetches them with pip.
+target machine, and fetches them with pip: the version in the lock, if its SHA-256 is in the lock.
 """
 
 import argparse
+import re
 import shutil
 import subprocess
 import sys
 import tempfile
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from importlib.metadata import Distribution, distributions
 from pathlib import Path
 
@@ -35,11 +36,18 @@ def main() -> int:
         "python_full_version": f"{args.python}.0",
         "platform_machine": MACHINES[args.arch],
     }
+    lock = _locked(args.lock.read_text(), machine)
     _fetch([str(args.wheel)], args)
     extras = {canonicalize_name(args.wheel.name.split("-")[0]): tuple(args.extra)}
     without = {tuple(each.split(":")) for each in args.without}
     while missing := sorted(set(_missing(args.target, machine, extras, without))):
-        _fetch(missing, args)
+        built = [str(wheel) for name in missing for wheel in _built(name, args)]
+        pinned = [name for name in missing if not _built(name, args)]
+        if unknown := [name for name in pinned if name not in lock]:
+            print(f"{args.lock} lacks {', '.join(unknown)}: make lock", file=sys.stderr)
+            return 1
+        _fetch(built, args)
+        _fetch([f"{lock[name]}\n" for name in pinned], args, hashed=True)
     wrong = sorted(set(_wrong(args.target, machine, extras, without)))
     print(*wrong, sep="\n", file=sys.stderr)
     return 1 if wrong else 0
@@ -51,7 +59,10 @@ def _arguments() -> argparse.Namespace:
         "wheel", type=Path, help="the wheel to begin with, or a distribution's name"
     )
     parser.add_argument("--target", type=Path, required=True, help="the site-packages to fill")
-    parser.add_argument("--find-links", type=Path, required=True, help="a directory of more wheels")
+    parser.add_argument(
+        "--lock", type=Path, required=True, help="versions and hashes (`make lock`)"
+    )
+    parser.add_argument("--built", type=Path, help="a directory of wheels that were built here")
     parser.add_argument("--arch", choices=MACHINES, required=True)
     parser.add_argument("--python", required=True, help="such as 3.11")
     parser.add_argument("--extra", action="append", default=[], help="an extra of the wheel")
@@ -65,8 +76,35 @@ def _arguments() -> argparse.Namespace:
     return parser.parse_args()
 
 
-def _fetch(what: list[str], args: argparse.Namespace) -> None:
-    """Install these without their requirements."""
+def _locked(text: str, machine: dict[str, str]) -> dict[str, str]:
+    """Return name -> its lines in the lock, for the target machine."""
+    found = {}
+    for entry in re.split(r"\n(?=\S)", text):
+        if entry and not entry.startswith("#"):
+            need = Requirement(entry.partition("\\")[0])
+            if need.marker is None or need.marker.evaluate(machine | {"extra": ""}):
+                hashes = re.findall(r"--hash=\S+", entry)
+                found[canonicalize_name(need.name)] = (
+                    f"{need.name}{need.specifier} {' '.join(hashes)}"
+                )
+    return found
+
+
+def _built(name: str, args: argparse.Namespace) -> list[Path]:
+    """Return the wheel of this distribution that was built here for the target."""
+    wheels = [] if args.built is None else sorted(args.built.glob("*.whl"))
+    return [
+        wheel
+        for wheel in wheels
+        if canonicalize_name(wheel.name.split("-")[0]) == name
+        and wheel.name.endswith(("-any.whl", f"_{MACHINES[args.arch]}.whl"))
+    ]
+
+
+def _fetch(what: Iterable[str], args: argparse.Namespace, hashed: bool = False) -> None:
+    """Install these without their requirements. `hashed`: lines of a lock, and not files."""
+    if not (what := list(what)):
+        return
     machine = MACHINES[args.arch]
     platforms = [f"manylinux_2_{minor}_{machine}" for minor in GLIBC] + [f"manylinux2014_{machine}"]
     options = [word for platform in platforms for word in ("--platform", platform)]
@@ -76,9 +114,10 @@ def _fetch(what: list[str], args: argparse.Namespace) -> None:
     with tempfile.TemporaryDirectory() as closed:  # pip leaves out a package that is partly there
         fresh = f"{closed}/fresh"  # open to all users, as a daemon's user must read the copy
         place = ["--no-deps", "--no-compile", "--only-binary", ":all:", "--target", fresh]
-        subprocess.run(
-            [*pip, "--find-links", str(args.find_links), *place, *options, *what], check=True
-        )
+        if hashed:
+            (lines := Path(closed, "lock.txt")).write_text("".join(what))
+            what = ["--require-hashes", "--requirement", str(lines)]
+        subprocess.run([*pip, *place, *options, *what], check=True)
         shutil.copytree(fresh, args.target, dirs_exist_ok=True)
 
 
@@ -110,8 +149,8 @@ def _missing(
 ) -> Iterator[str]:
     there = _there(target)
     for need in _needed(target, machine, extras, without):
-        if canonicalize_name(need.name) not in there:
-            yield f"{need.name}{need.specifier}"
+        if (name := canonicalize_name(need.name)) not in there:
+            yield name
 
 
 def _wrong(

@@ -5,6 +5,7 @@ import subprocess
 import sys
 from itertools import pairwise
 from pathlib import Path
+from xml.etree import ElementTree
 
 import pytest
 
@@ -58,3 +59,23 @@ def test_without_a_checkout_of_its_own_the_build_is_unknown(sources: Path) -> No
     shutil.copytree(sources / "bridges", inner / "bridges")
     shutil.copy(sources / "setup.py", inner)
     assert version(inner) == __version__
+
+
+def test_the_commit_with_the_versions_tag_is_that_version_until_something_changes(
+    sources: Path,
+) -> None:
+    git(sources, "init", "-q")
+    git(sources, "add", "setup.py", "bridges")
+    git(sources, "commit", "-q", "-m", "a release")
+    git(sources, "tag", "v9.9.9")
+    assert version(sources).startswith(f"{__version__}+r1.g")
+    git(sources, "tag", f"v{__version__}")
+    assert version(sources) == __version__
+    with (sources / "bridges/__init__.py").open("a") as changed:
+        changed.write("# changed\n")
+    assert version(sources).startswith(f"{__version__}+r1.g")
+
+
+def test_ros_package_has_the_version_too() -> None:
+    package = ElementTree.parse(ROOT / "ros/package.xml").getroot()
+    assert package.findtext("version") == __version__

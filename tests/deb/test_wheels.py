@@ -1,11 +1,21 @@
 """deb/wheels.py fills a package's site-packages from wheels; here from wheels made by the tests."""
 
+import hashlib
 import subprocess
 import sys
+import tomllib
 import zipfile
 from pathlib import Path
 
-WHEELS = Path(__file__).parents[2] / "deb/wheels.py"
+import pytest
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
+
+ROOT = Path(__file__).parents[2]
+WHEELS = ROOT / "deb/wheels.py"
+LOCK = ROOT / "deb/lock/runtime.txt"
+IN_PACKAGES = ("gpio", "recording", "laptop", "plot", "page")
+"""The extras that deb/build.sh puts into packages."""
 
 
 def wheel(folder: Path, name: str, *needs: str) -> Path:
@@ -25,10 +35,11 @@ def wheel(folder: Path, name: str, *needs: str) -> Path:
     return path
 
 
-def fill(tmp_path: Path, arch: str, *options: str) -> Path:
-    """Fill a site-packages for this architecture; return the folder."""
-    for each in ("for_arm", "for_pc"):
-        wheel(tmp_path, each)
+def fill(tmp_path: Path, arch: str, *options: str, lock: str | None = None) -> Path:
+    """Fill a site-packages for this architecture. `lock`: by default, of the wheels made here."""
+    shop = tmp_path / "shop"
+    shop.mkdir()
+    wheels = [wheel(shop, each) for each in ("for_arm", "for_pc")]
     first = wheel(
         tmp_path,
         "first",
@@ -36,13 +47,22 @@ def fill(tmp_path: Path, arch: str, *options: str) -> Path:
         "for_pc; platform_machine == 'x86_64'",
     )
     target = tmp_path / "site-packages"
-    places = [str(each) for each in (WHEELS, first, "--find-links", tmp_path, "--target", target)]
+    locked = tmp_path / "lock.txt"
+    locked.write_text("".join(map(pinned, wheels)) if lock is None else lock)
+    places = [str(each) for each in (WHEELS, first, "--lock", locked, "--target", target)]
     subprocess.run(
         [sys.executable, *places, "--arch", arch, "--python", "3.12", *options],
         check=True,
-        env={"PIP_NO_INDEX": "1"},
+        env={"PIP_NO_INDEX": "1", "PIP_FIND_LINKS": str(shop)},
     )
     return target
+
+
+def pinned(wheel: Path, marker: str = "") -> str:
+    """Return the wheel's entry of a lock, as uv writes it."""
+    digest = hashlib.sha256(wheel.read_bytes()).hexdigest()
+    name, version, *_ = wheel.name.split("-")
+    return f"{name.replace('_', '-')}=={version} {marker}\\\n    --hash=sha256:{digest}\n"
 
 
 def test_requirements_are_those_of_the_target_machine(tmp_path: Path) -> None:
@@ -59,3 +79,49 @@ def test_the_daemons_own_user_may_read_what_root_has_built(tmp_path: Path) -> No
     site = fill(tmp_path, "amd64")
     readable = {path.name: path.stat().st_mode & 0o005 for path in (site, site / "for_pc.py")}
     assert readable == {"site-packages": 0o005, "for_pc.py": 0o004}
+
+
+def test_a_wheel_whose_hash_is_not_in_the_lock_ends_the_build(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    forged = f"for-pc==1.0 \\\n    --hash=sha256:{'0' * 64}\n"
+    with pytest.raises(subprocess.CalledProcessError):
+        fill(tmp_path, "amd64", lock=forged)
+    assert "DO NOT MATCH THE HASHES" in capfd.readouterr().err
+    assert not (tmp_path / "site-packages/for_pc.py").exists()
+
+
+def test_a_requirement_that_the_lock_lacks_ends_the_build(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(subprocess.CalledProcessError):
+        fill(tmp_path, "amd64", lock="# nothing\n")
+    assert capfd.readouterr().err.endswith("lock.txt lacks for-pc: make lock\n")
+
+
+def test_of_two_versions_in_the_lock_the_one_for_the_target_counts(tmp_path: Path) -> None:
+    other = f"for-pc==9.0 ; python_version < '3.12' \\\n    --hash=sha256:{'0' * 64}\n"
+    right = pinned(wheel(tmp_path, "for_pc"), "; python_version >= '3.12' ")
+    site = fill(tmp_path, "amd64", lock=other + right)
+    assert (site / "for_pc.py").exists()
+
+
+def test_a_wheel_that_was_built_here_is_taken_before_the_lock(tmp_path: Path) -> None:
+    here = tmp_path / "built"
+    here.mkdir()
+    wheel(here, "for_pc")
+    site = fill(tmp_path, "amd64", "--built", str(here), lock="# nothing\n")
+    assert (site / "for_pc.py").exists()
+
+
+def test_the_lock_has_a_fitting_version_of_each_library_of_a_package() -> None:
+    """`make lock` brings it up to date."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    extras = project["optional-dependencies"]
+    wanted = [*project["dependencies"], *(need for one in IN_PACKAGES for need in extras[one])]
+    entries = [line.partition("\\")[0] for line in LOCK.read_text().splitlines() if "==" in line]
+    locked = {canonicalize_name(Requirement(e).name): Requirement(e) for e in entries}
+    for need in map(Requirement, wanted):
+        found = locked[canonicalize_name(need.name)]
+        (version,) = [one.version for one in found.specifier]
+        assert need.specifier.contains(version), f"{need}: {found}"

@@ -1,0 +1,110 @@
+"""Writes a package's bill of materials (CycloneDX JSON): python deb/sbom.py --help.
+
+Its components are the distributions in the package's folders. A library whose wheel has no licence text
+gets the text from deb/licences/; if there is none either, the build ends.
+"""
+
+import argparse
+import datetime
+import shutil
+import sys
+import uuid
+from collections.abc import Iterator
+from importlib.metadata import Distribution, distributions
+from pathlib import Path
+
+from cyclonedx.contrib.license.factories import LicenseFactory
+from cyclonedx.model.bom import Bom
+from cyclonedx.model.component import Component, ComponentType
+from cyclonedx.model.license import License
+from cyclonedx.output.json import JsonV1Dot6
+from packageurl import PackageURL
+from packaging.utils import canonicalize_name
+
+OURS = "rmf-bridges"
+LICENCES = Path(__file__).parent / "licences"
+TEXTS = ("*LICEN[CS]E*", "*COPYING*", "licen[cs]es/**/*", "COPYRIGHT*")
+CLASSIFIER = "License :: OSI Approved :: "
+
+
+def main() -> int:
+    """Write the file. Return 1 if a library has no licence text."""
+    args = _arguments()
+    found = sorted(distributions(path=args.folder), key=lambda one: canonicalize_name(one.name))
+    libraries = [one for one in found if canonicalize_name(one.name) != OURS]
+    unlicensed = [one.name for one in libraries if not _has_text(one)]
+    if unlicensed:
+        print(f"no licence text: {', '.join(unlicensed)} (deb/licences/)", file=sys.stderr)
+        return 1
+    args.out.write_text(_bom(args, libraries) + "\n")
+    return 0
+
+
+def _arguments() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("name", help="the package")
+    parser.add_argument("version")
+    parser.add_argument("folder", nargs="+", help="a folder of distributions in the package")
+    parser.add_argument("--epoch", type=int, required=True, help="the time of the build (s)")
+    parser.add_argument("--with", dest="more", action="append", default=[], metavar="NAME==VERSION")
+    parser.add_argument("--out", type=Path, required=True)
+    return parser.parse_args()
+
+
+def _has_text(library: Distribution) -> bool:
+    """Is the licence's text beside the library, if need be now copied from deb/licences/?"""
+    metadata = next(file for file in library.files or () if file.name == "METADATA")
+    about = Path(str(library.locate_file(metadata))).parent
+    if any(text.is_file() for pattern in TEXTS for text in about.glob(pattern)):
+        return True
+    ours = LICENCES / f"{canonicalize_name(library.name)}.txt"
+    if not ours.exists():
+        return False
+    (about / "licenses").mkdir()
+    shutil.copyfile(ours, about / "licenses" / "LICENSE.txt")
+    return True
+
+
+def _bom(args: argparse.Namespace, libraries: list[Distribution]) -> str:
+    top = Component(
+        name=args.name, version=args.version, type=ComponentType.APPLICATION, bom_ref=args.name
+    )
+    top.licenses.add(LicenseFactory().make_from_string("Apache-2.0"))
+    bom = Bom(serial_number=uuid.uuid5(uuid.NAMESPACE_URL, f"{args.name}={args.version}"))
+    bom.metadata.timestamp = datetime.datetime.fromtimestamp(args.epoch, datetime.UTC)
+    bom.metadata.component = top
+    parts = [_component(one) for one in libraries]
+    parts += [_part(*pair.split("==")) for pair in args.more]
+    bom.components.update(parts)
+    bom.register_dependency(top, parts)
+    return JsonV1Dot6(bom).output_as_string(indent=1)
+
+
+def _component(library: Distribution) -> Component:
+    part = _part(library.name, library.version)
+    part.licenses.update(_licences(library))
+    return part
+
+
+def _part(name: str, version: str) -> Component:
+    purl = PackageURL("pypi", name=canonicalize_name(name), version=version)
+    return Component(name=name, version=version, purl=purl, bom_ref=str(purl))
+
+
+def _licences(library: Distribution) -> Iterator[License]:
+    """Yield the licences that the metadata names: an expression, else the field, else classifiers."""
+    about, factory = library.metadata, LicenseFactory()
+    said = about.get("License-Expression") or about.get("License", "").partition("\n")[0]
+    classes = about.get_all("Classifier", [])
+    named = [one.removeprefix(CLASSIFIER) for one in classes if one.startswith(CLASSIFIER)]
+    ours = LICENCES / f"{canonicalize_name(library.name)}.spdx"
+    if ours.exists():
+        yield factory.make_from_string(ours.read_text().strip())
+    elif said:
+        yield factory.make_from_string(said)
+    else:
+        yield from map(factory.make_with_name, named)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
