@@ -1,0 +1,69 @@
+"""The names that users build on: YAML keys, commands with their options, exit codes and topics.
+
+`promised.txt` has them, a line each. Within a major version a line is only added:
+`python -m tests.reference.promised` does so.
+"""
+
+import argparse
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, Final
+
+from bridges import cli
+from bridges.exit_codes import EXIT_CODES
+from bridges.messages import topics
+from workbench.commissioning import reference
+
+FILE: Final = Path(__file__).with_suffix(".txt")
+
+
+def promised() -> list[str]:
+    """Return the lines of the file."""
+    return FILE.read_text().splitlines()
+
+
+def present() -> set[str]:
+    """Return the names of this version, as lines."""
+    schema = reference.schema()
+    keys = {f"key {path}" for path in _keys(schema, schema, ())}
+    codes = {f"exit {name} {code}" for name, codes in EXIT_CODES.items() for code in codes}
+    ours = {f"topic {topic.name}" for topic in topics.every()}
+    return keys | codes | ours | set(_options(cli.whole_parser(), "rmf-bridge"))
+
+
+def _keys(node: Any, root: Any, path: tuple[str, ...]) -> Iterator[str]:
+    """Yield the path of each key; `*` stands for a name that the user chooses."""
+    if isinstance(node, list):
+        for one in node:
+            yield from _keys(one, root, path)
+    if not isinstance(node, dict):
+        return
+    if "$ref" in node:
+        yield from _keys(_component(root, node["$ref"]), root, path)
+    for word in ("anyOf", "oneOf", "allOf", "then", "else", "items", "prefixItems"):
+        yield from _keys(node.get(word), root, path)
+    for name, inner in node.get("properties", {}).items():
+        yield ".".join((*path, name))
+        yield from _keys(inner, root, (*path, name))
+    yield from _keys(node.get("additionalProperties"), root, (*path, "*"))
+
+
+def _component(root: Any, ref: str) -> Any:
+    for part in ref.removeprefix("#/").split("/"):
+        root = root[part]
+    return root
+
+
+def _options(parser: argparse.ArgumentParser, name: str) -> Iterator[str]:
+    for action in parser._actions:
+        if isinstance(action, argparse._SubParsersAction):
+            for word, inner in action.choices.items():
+                yield f"command {name} {word}"
+                yield from _options(inner, f"{name} {word}")
+        else:
+            names = action.option_strings or [f"{action.metavar or action.dest}"]
+            yield from (f"option {name} {word}" for word in names)
+
+
+if __name__ == "__main__":
+    FILE.write_text("".join(f"{line}\n" for line in sorted({*promised(), *present()})))
