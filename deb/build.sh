@@ -59,7 +59,7 @@ sbom() {
   package=$1 doc=$2/usr/share/doc/$1
   shift 2
   mkdir -p "$doc" "$here/dist"
-  "$bin/python" "$here/deb/sbom.py" "$package" "$version" "$@" --epoch "$SOURCE_DATE_EPOCH" --out "$doc/sbom.cdx.json"
+  "$bin/python" "$here/deb/sbom.py" "$package" "$version" "$arch" "$@" --epoch "$SOURCE_DATE_EPOCH" --out "$doc/sbom.cdx.json"
   cp "$doc/sbom.cdx.json" "$here/dist/${package}_${version}_$arch.cdx.json"
 }
 sbom rmf-bridges "$root" "$site"

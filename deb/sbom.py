@@ -44,6 +44,7 @@ def _arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("name", help="the package")
     parser.add_argument("version")
+    parser.add_argument("arch")
     parser.add_argument("folder", nargs="+", help="a folder of distributions in the package")
     parser.add_argument("--epoch", type=int, required=True, help="the time of the build (s)")
     parser.add_argument("--with", dest="more", action="append", default=[], metavar="NAME==VERSION")
@@ -66,11 +67,11 @@ def _has_text(library: Distribution) -> bool:
 
 
 def _bom(args: argparse.Namespace, libraries: list[Distribution]) -> str:
-    top = Component(
-        name=args.name, version=args.version, type=ComponentType.APPLICATION, bom_ref=args.name
-    )
+    purl = PackageURL("deb", name=args.name, version=args.version, qualifiers={"arch": args.arch})
+    top = Component(name=args.name, version=args.version, type=ComponentType.APPLICATION, purl=purl)
+    top.bom_ref.value = str(purl)
     top.licenses.add(LicenseFactory().make_from_string("Apache-2.0"))
-    bom = Bom(serial_number=uuid.uuid5(uuid.NAMESPACE_URL, f"{args.name}={args.version}"))
+    bom = Bom(serial_number=uuid.uuid5(uuid.NAMESPACE_URL, str(purl)))
     bom.metadata.timestamp = datetime.datetime.fromtimestamp(args.epoch, datetime.UTC)
     bom.metadata.component = top
     parts = [_component(one) for one in libraries]

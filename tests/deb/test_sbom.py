@@ -24,7 +24,7 @@ def library(site: Path, name: str, *metadata: str, licence: str = "") -> None:
 
 def written(site: Path, *more: str) -> dict[str, object]:
     out = site.parent / "sbom.cdx.json"
-    words = [sys.executable, "-W", "error", str(SBOM), "rmf-bridges", "1.2.3", str(site)]
+    words = [sys.executable, "-W", "error", str(SBOM), "rmf-bridges", "1.2.3", "arm64", str(site)]
     subprocess.run([*words, "--epoch", "1700000000", "--out", str(out), *more], check=True)
     found: dict[str, object] = json.loads(out.read_text())
     return found
@@ -45,6 +45,7 @@ def test_each_library_is_listed_with_its_version_licence_and_package_url(tmp_pat
         ("two", "1.0", "pkg:pypi/two@1.0", [{"license": {"name": "BSD License"}}]),
     ]
     assert bom["bomFormat"] == "CycloneDX"
+    assert "pkg:deb/rmf-bridges@1.2.3?arch=arm64" in json.dumps(bom["metadata"])
 
 
 def test_the_same_libraries_give_the_same_bytes(tmp_path: Path) -> None:
