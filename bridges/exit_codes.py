@@ -88,7 +88,7 @@ EXIT_CODES: Final[dict[str, dict[int, str]]] = {
     },
     "doctor": {
         0: "all is well",
-        1: "warnings",
+        1: "warnings, or facts that cannot be seen (`--hardening`)",
         2: "something is wrong",
         64: "the kill test was not confirmed",
         73: "the form cannot be written",

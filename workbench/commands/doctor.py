@@ -62,6 +62,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="MAP",
         help="compare the names with this map or graph of RMF, as check does",
     )
+    parser.add_argument(
+        "--hardening",
+        action="store_true",
+        help="check the points of docs/how-to/harden.md instead: networks, files, users",
+    )
     kill = parser.add_argument_group("the kill test, the only thing that switches an output on")
     kill.add_argument(
         "--kill-test",
@@ -78,7 +83,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Return 0: all well, 1: warnings, 2: something is wrong, 64: not confirmed, 78: wrong YAML."""
+    """Return 0: all well, 1: warnings or unknown facts, 2: wrong, 64: not confirmed, 78: wrong YAML."""
     log.start("CRITICAL")  # the findings say what the buses would log
     try:
         config = load(args.file)
@@ -148,8 +153,11 @@ def _examined(
     config: Config, building: "BuildingMap | None", args: argparse.Namespace
 ) -> Iterator[Finding]:
     from workbench.commissioning.doctor.examination import Options, examined
+    from workbench.commissioning.doctor.hardening import hardening
     from workbench.commissioning.doctor.machine import Machine
 
+    if args.hardening:
+        return hardening(config, Machine())
     asked = Options(
         runtime_dir=args.runtime_dir,
         whole_scan=args.scan,

@@ -12,6 +12,7 @@
     answers.py   devices that answer on the buses while no daemon runs; reads only
     network.py   RMF's graph: interface, domain, nodes present, message versions
     examination.py  every subject in turn
+    hardening.py the points of docs/how-to/harden.md, with `--hardening`
     kill_test.py kills a process (victim.py) that holds an output on
 
 A subject is a function that yields findings. Only the kill test switches an output.

@@ -5,10 +5,16 @@ from typing import Final, Literal
 
 import msgspec
 
-Level = Literal["ok", "note", "warning", "wrong"]
-"""`note`: worth knowing; needs no action."""
+Level = Literal["ok", "note", "unknown", "warning", "wrong"]
+"""`note`: worth knowing; needs no action. `unknown`: the fact cannot be seen from here."""
 WELL, WARNINGS, WRONG = 0, 1, 2
-EXIT_CODE: Final = {"ok": WELL, "note": WELL, "warning": WARNINGS, "wrong": WRONG}
+EXIT_CODE: Final = {
+    "ok": WELL,
+    "note": WELL,
+    "unknown": WARNINGS,
+    "warning": WARNINGS,
+    "wrong": WRONG,
+}
 
 
 class Finding(msgspec.Struct, frozen=True):
@@ -31,6 +37,11 @@ def note(subject: str, found: str, means: str = "", do: str = "") -> Finding:
     return Finding(subject, "note", found, means, do)
 
 
+def unknown(subject: str, found: str, means: str = "", do: str = "") -> Finding:
+    """Make a finding about a fact that cannot be seen from here."""
+    return Finding(subject, "unknown", found, means, do)
+
+
 def warning(subject: str, found: str, means: str, do: str) -> Finding:
     """Make a finding about something that works now, but may fail later."""
     return Finding(subject, "warning", found, means, do)
@@ -42,5 +53,5 @@ def wrong(subject: str, found: str, means: str, do: str) -> Finding:
 
 
 def exit_code(findings: Iterable[Finding]) -> int:
-    """Return 0 if all is well, 1 for warnings, 2 if something is wrong."""
+    """Return 0 if all is well, 1 for warnings and unknown facts, 2 if something is wrong."""
     return max((EXIT_CODE[one.level] for one in findings), default=WELL)

@@ -1,0 +1,257 @@
+"""`doctor --hardening` judges each point of docs/how-to/harden.md, and admits what it cannot see."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from bridges import cli
+from bridges.settings.config import Config
+from bridges.settings.load import load, understood
+from tests.workbench.commissioning.doctor.made_up import MadeUp
+from workbench.commissioning.doctor import hardening as points
+from workbench.commissioning.doctor.hardening import hardening
+
+ROOT = Path(__file__).parents[4]
+PAGE = ROOT / "docs/how-to/harden.md"
+LIFT = (ROOT / "config/lift_dry_contact.yaml").read_text()
+SUBJECTS = (
+    points.GRAPH, points.WIRES, points.FIREWALL, points.ROOT, points.FILES, points.USERS,
+    points.UPDATES,
+)  # fmt: skip
+TLS = """{transport: zenoh, zenoh: {connect: [tls/rmf:7447], tls: {ca: /etc/rmf-bridges/ca.pem,
+  certificate: /etc/rmf-bridges/lift.pem, private_key: /etc/rmf-bridges/lift.key}}}"""
+DROPS = """table inet filter {
+  chain input { type filter hook input priority filter; policy drop;
+    tcp dport 22 accept
+  }
+  chain forward { type filter hook forward priority filter; policy accept; }
+}
+"""
+HEAD = "  sl  local_address rem_address   st tx_queue rx_queue tr tm->when retrnsmt uid timeout inode\n"
+
+
+@pytest.fixture
+def made(tmp_path: Path) -> MadeUp:
+    (tmp_path / "machine").mkdir()
+    return MadeUp(tmp_path / "machine", installed=())
+
+
+def config(rmf: str = "{transport: dds}", text: str = LIFT) -> Config:
+    """Return an example that speaks to RMF in this way, as installed on the machine."""
+    body = re.sub(r"^rmf:\n(  .*\n|\n)*", "", text, flags=re.M)
+    file = Path("/etc/rmf-bridges/lift.yaml")
+    return understood(file, f"rmf: {rmf}\n{body}".encode())
+
+
+def found(made: MadeUp, subject: str, of: Config | None = None) -> list[tuple[str, str]]:
+    """Return (severity, fact) of each finding of a subject."""
+    return [
+        (one.level, one.found)
+        for one in hardening(of or config(), made.machine)
+        if one.subject == subject
+    ]
+
+
+def levels(made: MadeUp, subject: str, of: Config | None = None) -> list[str]:
+    return [level for level, _ in found(made, subject, of)]
+
+
+def test_each_point_is_a_heading_of_the_page() -> None:
+    headings = re.findall(r"^## (.*)$", PAGE.read_text(), re.M)
+    assert headings == [*SUBJECTS, "Seen"]
+
+
+def test_a_machine_that_shows_nothing_is_unknown_and_never_well(made: MadeUp) -> None:
+    of = config(TLS)
+    assert {one.level for one in hardening(of, made.machine) if one.subject != points.WIRES} == {
+        "ok",  # the YAML's own words about certificates, and no sshd
+        "unknown",
+    }
+    for subject in (points.FIREWALL, points.ROOT, points.FILES, points.UPDATES):
+        assert set(levels(made, subject, of)) == {"unknown"}, subject
+
+
+@pytest.mark.parametrize(
+    ("rmf", "wanted"),
+    [
+        ("{transport: dds}", ["warning"]),
+        ("{transport: dds, network: localhost}", ["ok"]),
+        ("{transport: zenoh}", ["warning", "unknown"]),
+        ("{transport: zenoh, zenoh: {connect: [tls/rmf:7447]}}", ["warning", "unknown"]),
+        (TLS, ["ok", "unknown"]),
+        (TLS.replace("tls/rmf:7447", "tls/rmf:7447, tcp/spare:7447"), ["warning", "unknown"]),
+        ("{transport: ros2}", ["unknown"]),
+        ("{transport: auto}", ["warning", "unknown"]),
+    ],
+)
+def test_the_graph_is_judged_by_the_yaml(made: MadeUp, rmf: str, wanted: list[str]) -> None:
+    assert levels(made, points.GRAPH, config(rmf)) == wanted
+
+
+@pytest.mark.parametrize(
+    ("strategy", "wanted"), [("Enforce", ["ok"]), ("Permissive", ["warning"]), ("", ["warning"])]
+)
+def test_sros_counts_only_if_the_service_enforces_it(
+    made: MadeUp, strategy: str, wanted: list[str]
+) -> None:
+    environment = f"ROS_SECURITY_ENABLE=true ROS_SECURITY_STRATEGY={strategy}"
+    made.command("systemctl", f"User=rmf-bridge\nEnvironment={environment}\nLoadState=loaded\n")
+    assert levels(made, points.GRAPH, config("{transport: ros2}")) == wanted
+
+
+@pytest.mark.parametrize(
+    ("example", "wanted"),
+    [
+        ("lift_dry_contact", "ok"),
+        ("charger_http", "warning"),
+        ("lift_gateway", "unknown"),
+        ("door_rs485", "ok"),
+        ("charger_wiferion", "ok"),
+    ],
+)
+def test_a_field_wire_is_judged_by_its_bus(made: MadeUp, example: str, wanted: str) -> None:
+    of = load(ROOT / f"config/{example}.yaml")
+    assert levels(made, points.WIRES, of)[0] == wanted
+
+
+def test_an_encrypted_controller_is_well(made: MadeUp) -> None:
+    text = (ROOT / "config/charger_http.yaml").read_text()
+    secure = text.replace('api_base: "', 'api_base: "https://')
+    assert levels(made, points.WIRES, config(text=secure))[0] == "ok"
+
+
+@pytest.mark.parametrize(("said", "wanted"), [("0\n", "ok"), ("1\n", "warning")])
+def test_a_machine_between_two_networks_must_not_forward(
+    made: MadeUp, said: str, wanted: str
+) -> None:
+    made.write("/proc/sys/net/ipv4/ip_forward", said)
+    assert levels(made, points.WIRES)[-1] == wanted
+
+
+@pytest.mark.parametrize(
+    ("rules", "wanted"),
+    [
+        (DROPS, ("ok", "an input chain drops what no rule accepts")),
+        (
+            DROPS.replace("policy drop", "policy accept"),
+            ("warning", "no input chain drops by its policy"),
+        ),
+        ("", ("warning", "there is no input chain")),
+        (
+            "chain forward { type filter hook forward priority 0; policy drop; }",
+            ("warning", "there is no input chain"),
+        ),
+    ],
+)
+def test_a_firewall_must_drop_by_its_policy(
+    made: MadeUp, rules: str, wanted: tuple[str, str]
+) -> None:
+    made.command("nft", rules)
+    assert found(made, points.FIREWALL)[0] == wanted
+
+
+def test_the_firewall_of_the_page_is_well(made: MadeUp) -> None:
+    block = re.findall(r"^```\n(table inet .*?)^```$", PAGE.read_text(), re.M | re.S)[0]
+    made.command("nft", block)
+    assert levels(made, points.FIREWALL)[0] == "ok"
+
+
+def test_ports_that_other_machines_reach_are_listed_and_loopback_is_not(made: MadeUp) -> None:
+    tcp = (
+        "   0: 00000000:0016 00000000:0000 0A 0:0 00:0 0 0 0 1\n"
+        "   1: 0100007F:1F90 00000000:0000 0A 0:0 00:0 0 0 0 2\n"
+        "   2: 0A01A8C0:D431 0501A8C0:1D17 01 0:0 00:0 0 0 0 3\n"
+    )
+    made.write("/proc/net/tcp", HEAD + tcp)
+    six = "   0: 00000000000000000000000001000000:0277 00000000000000000000000000000000:0000 0A 1\n"
+    made.write("/proc/net/tcp6", HEAD + six)
+    udp = "   0: 00000000:1CE8 00000000:0000 07 0:0 00:0 0 0 0 4\n"
+    made.write("/proc/net/udp", HEAD + udp)
+    text = "open to other machines, if the firewall permits: tcp 22, udp 7400"
+    assert found(made, points.FIREWALL)[1] == ("note", text)
+    made.write("/proc/net/tcp", HEAD)
+    made.write("/proc/net/udp", HEAD)
+    assert levels(made, points.FIREWALL)[1] == "ok"
+
+
+@pytest.mark.parametrize(
+    ("mounts", "wanted"),
+    [
+        ("/dev/mmcblk0p2 / ext4 rw,noatime 0 0\n", "warning"),
+        ("/dev/mmcblk0p2 / ext4 ro,noatime 0 0\n", "ok"),
+        ("overlay / overlay rw,lowerdir=/lower 0 0\n", "ok"),
+        ("rootfs / rootfs ro 0 0\n/dev/sda1 / ext4 rw 0 0\n", "warning"),
+        ("tmpfs /run tmpfs rw 0 0\n", "unknown"),
+    ],
+)
+def test_the_root_is_read_only_or_an_overlay(made: MadeUp, mounts: str, wanted: str) -> None:
+    made.write("/proc/mounts", mounts)
+    assert levels(made, points.ROOT) == [wanted]
+
+
+def test_files_are_judged_by_their_modes(made: MadeUp) -> None:
+    for name, mode in {"lift.yaml": 0o644, "ca.pem": 0o644, "lift.pem": 0o644}.items():
+        made.write(f"/etc/rmf-bridges/{name}", mode=mode)
+    made.write("/etc/rmf-bridges/lift.key", mode=0o600)
+    (made.root / "etc/rmf-bridges").chmod(0o755)
+    assert levels(made, points.FILES, config(TLS)) == ["ok"]
+    made.write("/etc/rmf-bridges/lift.key", mode=0o640)
+    made.write("/etc/rmf-bridges/lift.yaml", mode=0o664)
+    assert found(made, points.FILES, config(TLS)) == [
+        ("wrong", "/etc/rmf-bridges/lift.yaml has mode 664"),
+        ("wrong", "/etc/rmf-bridges/lift.key has mode 640"),
+    ]
+    (made.root / "etc/rmf-bridges/lift.key").unlink()
+    assert found(made, points.FILES, config(TLS))[-1] == (
+        "unknown",
+        "the mode of /etc/rmf-bridges/lift.key: No such file or directory",
+    )
+
+
+@pytest.mark.parametrize(
+    ("user", "wanted"), [("rmf-bridge", "ok"), ("root", "wrong"), ("", "wrong")]
+)
+def test_a_daemon_that_runs_as_root_is_wrong(made: MadeUp, user: str, wanted: str) -> None:
+    made.command("systemctl", f"User={user}\nEnvironment=\nLoadState=loaded\n")
+    assert levels(made, points.USERS)[0] == wanted
+
+
+@pytest.mark.parametrize(
+    ("said", "wanted"),
+    [
+        ("permitrootlogin no\npasswordauthentication no\n", "ok"),
+        ("permitrootlogin no\npasswordauthentication yes\n", "warning"),
+        ("permitrootlogin yes\npasswordauthentication no\n", "warning"),
+    ],
+)
+def test_people_log_in_with_keys(made: MadeUp, said: str, wanted: str) -> None:
+    made.command("sshd", said)
+    assert levels(made, points.USERS)[1] == wanted
+
+
+def test_an_sshd_that_does_not_say_its_settings_is_unknown(made: MadeUp) -> None:
+    made.write("/usr/sbin/sshd", "#!/bin/sh\nexit 1\n", 0o755)
+    assert levels(made, points.USERS)[1] == "unknown"
+
+
+@pytest.mark.parametrize(
+    ("said", "wanted"),
+    [
+        ('APT::Periodic::Unattended-Upgrade "1";\n', "ok"),
+        ('APT::Periodic::Unattended-Upgrade "0";\n', "warning"),
+        ("", "warning"),
+    ],
+)
+def test_security_updates_are_installed_by_themselves(made: MadeUp, said: str, wanted: str) -> None:
+    made.command("apt-config", said)
+    assert levels(made, points.UPDATES) == [wanted]
+
+
+def test_the_command_prints_each_point_and_ends_with_1_for_what_is_unknown(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    code = cli.main(["doctor", str(ROOT / "config/lift_gateway.yaml"), "--hardening"])
+    told = capsys.readouterr().out
+    assert code in (1, 2)
+    assert [line for line in told.splitlines() if not line.startswith(" ")] == list(SUBJECTS)
