@@ -17,7 +17,7 @@ from bridges.messages import topics
 from bridges.runtime import faults
 from bridges.settings.config import Config
 from bridges.settings.load import load
-from tests.reference import hazards
+from tests.reference import hazards, promised
 from workbench.commissioning import reference
 from workbench.commissioning.examples import device_yamls
 from workbench.judge.judge import KINDS
@@ -219,3 +219,4 @@ PAGES: Final[dict[str, Callable[[], str]]] = {
 if __name__ == "__main__":
     for page, text in PAGES.items():
         (DOCS / page).write_text(text())
+    promised.add()

@@ -1,7 +1,7 @@
 """The names that users build on: YAML keys, commands with their options, exit codes and topics.
 
-`promised.txt` has them, a line each. Within a major version a line is only added:
-`python -m tests.reference.promised` does so.
+`promised.txt` has them, a line each. Within a major version a line is only added: `make reference` does
+so.
 """
 
 import argparse
@@ -65,5 +65,6 @@ def _options(parser: argparse.ArgumentParser, name: str) -> Iterator[str]:
             yield from (f"option {name} {word}" for word in names)
 
 
-if __name__ == "__main__":
+def add() -> None:
+    """Add the names of this version to the file."""
     FILE.write_text("".join(f"{line}\n" for line in sorted({*promised(), *present()})))

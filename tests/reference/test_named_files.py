@@ -13,6 +13,7 @@ ROOMS = (
     "workbench",
     "tests",
     "bench",
+    "deb",
     "config",
     "docs",
     "systemd",

@@ -20,7 +20,7 @@ def test_every_promised_name_is_there() -> None:
 
 
 def test_every_name_of_this_version_is_promised() -> None:
-    """`python -m tests.reference.promised` adds what is new."""
+    """`make reference` adds what is new."""
     assert present() - set(promised()) == set()
 
 
