@@ -4,6 +4,7 @@ import json
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -22,11 +23,11 @@ def library(site: Path, name: str, *metadata: str, licence: str = "") -> None:
         (about / licence).write_text("Do as you like.\n")
 
 
-def written(site: Path, *more: str) -> dict[str, object]:
+def written(site: Path, *more: str) -> dict[str, Any]:
     out = site.parent / "sbom.cdx.json"
     words = [sys.executable, "-W", "error", str(SBOM), "rmf-bridges", "1.2.3", "arm64", str(site)]
     subprocess.run([*words, "--epoch", "1700000000", "--out", str(out), *more], check=True)
-    found: dict[str, object] = json.loads(out.read_text())
+    found: dict[str, Any] = json.loads(out.read_text())
     return found
 
 
@@ -38,7 +39,7 @@ def test_each_library_is_listed_with_its_version_licence_and_package_url(tmp_pat
     bom = written(site, "--with", "theme==9.8")
     assert [
         (part["name"], part["version"], part["purl"], part.get("licenses"))
-        for part in bom["components"]  # type: ignore[attr-defined]
+        for part in bom["components"]
     ] == [
         ("one", "1.0", "pkg:pypi/one@1.0", [{"license": {"id": "MIT"}}]),
         ("theme", "9.8", "pkg:pypi/theme@9.8", None),
@@ -73,7 +74,7 @@ def test_what_a_wheel_forgets_comes_from_us(
 ) -> None:
     site = tmp_path / "site"
     library(site, name)
-    (part,) = written(site)["components"]  # type: ignore[misc,attr-defined]
+    (part,) = written(site)["components"]
     assert part["licenses"] == [{"license": {"id": licence}}]
     text = (site / f"{name}-1.0.dist-info/licenses/LICENSE.txt").read_text()
     assert f"Copyright (c) {'2001-2020 ' if name == 'pyserial' else ''}{holder}" in text
