@@ -21,8 +21,19 @@ BEGIN: Final = "<!-- the table of tests/reference/hazards.toml -->\n"
 END: Final = "<!-- end of the table -->\n"
 
 
+class Cut(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """The change that takes a guard out of its file."""
+
+    file: str
+    cut: str
+    put: str
+
+
 class UnsafeAction(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """One row: an action with its guard and its test, or with `gap`, the reason why it has neither."""
+    """One row: an action with its guard and its test, or with `gap`, the reason why it has neither.
+
+    `also`: further guards, each enough alone, which must go out together with the first.
+    """
 
     id: str
     action: str
@@ -31,8 +42,14 @@ class UnsafeAction(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     guard: str = ""
     cut: str = ""
     put: str = ""
+    also: list[Cut] = []
     test: str = ""
     gap: str = ""
+
+    @property
+    def cuts(self) -> list[Cut]:
+        """Every change that takes this row's guards out."""
+        return [Cut(str(self.file), self.cut, self.put), *self.also]
 
     @property
     def file(self) -> Path:
@@ -61,19 +78,22 @@ def _row(row: UnsafeAction) -> str:
     function = row.guard.partition("::")[2]
     file, _, test = row.test.partition("::")
     told = re.sub(r"_", " ", test.removeprefix("test_"))
-    return f"{first} {row.rule}: `{function}` in `{row.file}` | {told} (`{file}`) |\n"
+    more = "".join(f", and alone enough too: `{one.file}`" for one in row.also)
+    return f"{first} {row.rule}: `{function}` in `{row.file}`{more} | {told} (`{file}`) |\n"
 
 
 def fails_without(row: UnsafeAction, tree: Path) -> bool:
     """Does the row's test pass in this tree, and fail there without the guard?"""
-    file = tree / row.file
-    whole = file.read_text()
+    whole = {tree / one.file: (tree / one.file).read_text() for one in row.cuts}
     passes = _exit_code(row.test, tree) == 0
-    file.write_text(whole.replace(row.cut, row.put))
+    for one in row.cuts:
+        file = tree / one.file
+        file.write_text(file.read_text().replace(one.cut, one.put))
     try:
         return passes and _exit_code(row.test, tree) == 1
     finally:
-        file.write_text(whole)
+        for file, text in whole.items():
+            file.write_text(text)
 
 
 def _exit_code(test: str, tree: Path) -> int:

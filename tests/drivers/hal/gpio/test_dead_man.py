@@ -31,6 +31,16 @@ def test_outputs_drop_when_scans_stop_and_stay_dropped_until_an_operator_resets(
     dead_man.close()
 
 
+def test_a_look_after_the_last_scan_is_too_old_drops_the_outputs() -> None:
+    now, drops = [0.0], []
+    dead_man = GpioDeadMan(lambda: drops.append(now[0]), lambda: now[0])
+    dead_man.fed()
+    now[0] = AFTER_S + 0.1
+    dead_man.check()  # the thread may have looked before
+    dead_man.close()
+    assert drops == [AFTER_S + 0.1]
+
+
 def test_the_relays_fall_and_neither_reads_nor_writes_work_until_a_reset(bench: Bench) -> None:
     bench.bus.scanned()
     bench.now += AFTER_S + 0.1
