@@ -66,6 +66,8 @@ def run(args: argparse.Namespace) -> int:
         for problem in error.problems:
             logging.error(str(problem))
         return os.EX_CONFIG
+    for old in config.old_keys:
+        logging.warning(str(old).replace(": warning:", ":", 1))
     if wrong := drop_in.misfit(config, os.environ) or too_slow(config, watchdog_s()):
         logging.error(wrong)
         return os.EX_CONFIG

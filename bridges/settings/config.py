@@ -20,9 +20,9 @@ class Config(Struct, frozen=True):
 
     `text`: its bytes as they were read. `buses` and `devices`: name -> settings, of a type that only
     the record of the bus type or driver knows. `bus_types`: name -> `type:`. `warnings`: legal settings
-    that may be a mistake. `notes`: intended settings whose effects the user should know.
-    `section`: the settings of a kind without devices (`bridges/kinds/shared/graph_kind.py`), which
-    has no driver and no buses.
+    that may be a mistake. `old_keys`: the warnings of keys with a new name. `notes`: intended settings
+    whose effects the user should know. `section`: the settings of a kind without devices
+    (`bridges/kinds/shared/graph_kind.py`), which has no driver and no buses.
     """
 
     path: Path
@@ -34,6 +34,7 @@ class Config(Struct, frozen=True):
     devices: Mapping[str, Any]
     bus_types: Mapping[str, str] = field(default_factory=dict)
     warnings: tuple[Problem, ...] = ()
+    old_keys: tuple[Problem, ...] = ()
     notes: tuple[Problem, ...] = ()
     section: Any = None
     recording: RecordingSettings = RecordingSettings()

@@ -13,7 +13,6 @@ Structs define the content of a section (`bridges/yaml/values.py`); this file an
 sections against each other. The daemon takes nothing else from the file, and checks nothing again.
 """
 
-from collections.abc import Iterable
 from functools import partial
 from pathlib import Path
 from typing import Final
@@ -64,9 +63,9 @@ def understood(path: Path | str, text: bytes) -> Config:
     _note_rmfs(page, root)
     old = read_as_renamed(page, root)
     reading = _DeviceReading(page, root)
-    reading.all(old)
+    reading.all()
     page.check()
-    return reading.config(Path(path), text)
+    return reading.config(Path(path), text, old)
 
 
 def _note_rmfs(page: YamlFile, root: MappingNode) -> None:
@@ -101,8 +100,8 @@ class _DeviceReading:
         self._warnings: list[Problem] = []
         self._notes: list[Problem] = []
 
-    def config(self, path: Path, text: bytes) -> Config:
-        """Return the Config of the sections that `all` has read."""
+    def config(self, path: Path, text: bytes, old: list[Problem]) -> Config:
+        """Return the Config of the sections that `all` has read. `old`: the file's old keys."""
         return Config(
             path=path,
             text=text,
@@ -112,16 +111,15 @@ class _DeviceReading:
             buses={name: bus.settings for name, bus in self._buses.items()},
             devices=self._devices,
             bus_types={name: bus.type or "" for name, bus in self._buses.items()},
-            warnings=tuple(sorted(self._warnings)),
+            warnings=tuple(sorted([*self._warnings, *old])),
+            old_keys=tuple(old),
             notes=tuple(sorted(self._notes)),
             section=self._section,
             recording=self._recording,
         )
 
-    def all(self, remarks: Iterable[tuple[Node, str]]) -> None:
-        """Read every section, as far as the earlier sections allow. `remarks`: on renamed keys."""
-        for key, text in remarks:
-            self._warn(key, text)
+    def all(self) -> None:
+        """Read every section, as far as the earlier sections allow."""
         entries = self._values.entries(self._top)
         self._read_kind(below(self._top.node, "kind"))
         if not isinstance(self._kind, GraphKind):

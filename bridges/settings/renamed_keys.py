@@ -11,7 +11,7 @@ from typing import Final
 from msgspec import Struct
 from yaml import MappingNode, Mark, Node, ScalarNode
 
-from bridges.yaml.parsing import YamlFile
+from bridges.yaml.parsing import Problem, YamlFile
 from bridges.yaml.positions import MappingEntry, below
 
 
@@ -55,8 +55,8 @@ def old_keys(root: MappingNode) -> list[OldKey]:
     return [old for row in RENAMED for old in _matches(root, row)]
 
 
-def read_as_renamed(page: YamlFile, root: MappingNode) -> list[tuple[Node, str]]:
-    """Move renamed keys to their present places, and return (place, remark) of each.
+def read_as_renamed(page: YamlFile, root: MappingNode) -> list[Problem]:
+    """Move renamed keys to their present places, and return a warning of each.
 
     Notes a problem if a file has both names.
     """
@@ -66,7 +66,7 @@ def read_as_renamed(page: YamlFile, root: MappingNode) -> list[tuple[Node, str]]
         old.parent.value = [one for one in old.parent.value if one != pair]
     for old in found:
         _put(page, root, old)
-    return [(old.entry.key, old.remark(page.file)) for old in found]
+    return [page.problem(old.entry.key, f"warning: {old.remark(page.file)}") for old in found]
 
 
 def _matches(root: MappingNode, row: RenamedKey) -> Iterator[OldKey]:

@@ -47,7 +47,7 @@ def rewritten(config: Config) -> str:
 
 
 def _meaning(config: Config) -> Config:
-    return replace(config, text=b"", warnings=(), notes=())
+    return replace(config, text=b"", warnings=(), old_keys=(), notes=())
 
 
 def _edits(text: str, root: MappingNode, old: OldKey) -> Iterator[_Edit]:

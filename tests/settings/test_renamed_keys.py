@@ -65,6 +65,18 @@ def test_check_says_what_to_write_and_accepts_the_file(
     assert "'stops_unfed_s' has a new name: write" in capsys.readouterr().err
 
 
+def test_a_service_that_starts_logs_its_old_keys(
+    old: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv(
+        "RMF_BRIDGE_FITS", "nothing"
+    )  # a unit without drop-in: the daemon ends at once
+    assert cli.main(["run", str(old)]) == os.EX_CONFIG
+    told = capsys.readouterr().err
+    assert told.count("has a new name") == 1
+    assert f"WARNING {old}:10:7: 'stops_unfed_s' has a new name: write chargers: {{bay1: " in told
+
+
 def test_migrate_moves_the_key_and_keeps_every_comment(old: Path) -> None:
     before = load(old)
     new = BAY.replace("      stops_unfed_s: 2   # asked of the maker\n", "").replace(
