@@ -4,6 +4,7 @@ Each subject is a heading of that page. A fact that cannot be seen from here is 
 neither good nor bad.
 """
 
+import re
 import stat
 from collections.abc import Iterable, Iterator
 from pathlib import Path
@@ -30,7 +31,7 @@ SECRETS: Final = ("private_key", "password_file", "token_file")
 READABLE: Final = ("ca", "certificate", "ca_file")
 LISTENS: Final = {"tcp": "0A", "udp": "07"}
 """Protocol -> the state of an open socket without peer, in /proc/net (include/net/tcp_states.h)."""
-LOOPBACK: Final = ("7F", "00000000000000000000000001000000")
+LOOPBACK: Final = re.compile("(0{16}FFFF0000)?[0-9A-F]{6}7F|0{24}01000000")
 """127.x.x.x and ::1, as x86 and arm write them in /proc/net: the last byte of a word first."""
 
 
@@ -142,11 +143,19 @@ def _firewall(rules: str | None, uid: int) -> Finding:
     if rules is None:
         why = "run doctor with sudo" if uid else "nft is not installed, or fails"
         return unknown(FIREWALL, "the firewall's rules cannot be read", do=why)
-    chains = [part.partition("}")[0] for part in rules.split("hook input")[1:]]
-    if any("policy drop" in chain for chain in chains):
+    tables = re.split(r"^table (\w+) ", rules, flags=re.M)
+    chains = [
+        (family, chain.partition("}")[0])
+        for family, table in zip(tables[1::2], tables[2::2], strict=True)
+        for chain in table.split("hook input")[1:]
+    ]
+    drops = {family for family, chain in chains if "policy drop" in chain}
+    if "inet" in drops or drops >= {"ip", "ip6"}:
         return ok(FIREWALL, "an input chain drops what no rule accepts")
     means = "every open port is reachable by every machine of the network"
-    found = "no input chain drops by its policy" if chains else "there is no input chain"
+    found = "no input chain drops by its policy" if chains else "nft shows no input chain"
+    if drops & {"ip", "ip6"}:
+        found = f"only {' and '.join(sorted(drops))} packets are dropped by policy"
     return warning(FIREWALL, found, means, f"the rules of {PAGE}")
 
 
@@ -171,7 +180,7 @@ def _open(name: str, text: str | None) -> Iterator[int]:
     for line in (text or "").splitlines()[1:]:
         words = line.split()
         address, _, port = words[1].partition(":")
-        if words[3] == LISTENS[name.rstrip("6")] and not address.endswith(LOOPBACK):
+        if words[3] == LISTENS[name.rstrip("6")] and not LOOPBACK.fullmatch(address):
             yield int(port, 16)
 
 

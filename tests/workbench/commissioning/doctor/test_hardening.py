@@ -137,10 +137,18 @@ def test_a_machine_between_two_networks_must_not_forward(
             DROPS.replace("policy drop", "policy accept"),
             ("warning", "no input chain drops by its policy"),
         ),
-        ("", ("warning", "there is no input chain")),
+        ("", ("warning", "nft shows no input chain")),
         (
-            "chain forward { type filter hook forward priority 0; policy drop; }",
-            ("warning", "there is no input chain"),
+            "table inet filter {\n chain forward { type filter hook forward; policy drop; } }",
+            ("warning", "nft shows no input chain"),
+        ),
+        (
+            DROPS.replace("table inet", "table ip"),
+            ("warning", "only ip packets are dropped by policy"),
+        ),
+        (
+            DROPS.replace("table inet", "table ip") + DROPS.replace("table inet", "table ip6"),
+            ("ok", "an input chain drops what no rule accepts"),
         ),
     ],
 )
@@ -164,13 +172,19 @@ def test_ports_that_other_machines_reach_are_listed_and_loopback_is_not(made: Ma
         "   2: 0A01A8C0:D431 0501A8C0:1D17 01 0:0 00:0 0 0 0 3\n"
     )
     made.write("/proc/net/tcp", HEAD + tcp)
-    six = "   0: 00000000000000000000000001000000:0277 00000000000000000000000000000000:0000 0A 1\n"
+    nobody = "00000000000000000000000000000000:0000 0A 1"
+    six = (
+        f"   0: 00000000000000000000000001000000:0277 {nobody}\n"
+        f"   1: 0000000000000000FFFF00000100007F:0278 {nobody}\n"
+        f"   2: 000080FE00000000FF0025020100007F:1F91 {nobody}\n"
+    )
     made.write("/proc/net/tcp6", HEAD + six)
     udp = "   0: 00000000:1CE8 00000000:0000 07 0:0 00:0 0 0 0 4\n"
     made.write("/proc/net/udp", HEAD + udp)
-    text = "open to other machines, if the firewall permits: tcp 22, udp 7400"
+    text = "open to other machines, if the firewall permits: tcp 22, tcp 8081, udp 7400"
     assert found(made, points.FIREWALL)[1] == ("note", text)
     made.write("/proc/net/tcp", HEAD)
+    made.write("/proc/net/tcp6", HEAD)
     made.write("/proc/net/udp", HEAD)
     assert levels(made, points.FIREWALL)[1] == "ok"
 
