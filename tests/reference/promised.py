@@ -1,4 +1,4 @@
-"""The names that users build on: YAML keys, commands with their options, exit codes and topics.
+"""The names that users build on: YAML keys, commands, options, exit codes, JSON, topics and faults.
 
 `promised.txt` has them, a line each. Within a major version a line is only added: `make reference` does
 so.
@@ -9,11 +9,27 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, Final
 
+import msgspec
+
 from bridges import cli
 from bridges.exit_codes import EXIT_CODES
 from bridges.messages import topics
+from bridges.runtime import faults
+from bridges.runtime.daemons import DaemonStatus
+from bridges.settings.sheets.findings import Findings
 from workbench.commissioning import reference
+from workbench.commissioning.doctor.finding import Finding
+from workbench.explain.explanation import Explanation
+from workbench.graph.board import BoardRow
 
+JSON: Final = {
+    "check": Findings,
+    "doctor": Finding,
+    "explain": Explanation,
+    "status": DaemonStatus,
+    "watch": BoardRow,
+}
+"""Command -> the object in the output of its `--json`. `judge`, `replay` and `log` are not listed."""
 FILE: Final = Path(__file__).with_suffix(".txt")
 
 
@@ -27,8 +43,16 @@ def present() -> set[str]:
     schema = reference.schema()
     keys = {f"key {path}" for path in _keys(schema, schema, ())}
     codes = {f"exit {name} {code}" for name, codes in EXIT_CODES.items() for code in codes}
+    told = {f"json {name} {path}" for name, shape in JSON.items() for path in _fields(shape)}
     ours = {f"topic {topic.name}" for topic in topics.every()}
-    return keys | codes | ours | set(_options(cli.whole_parser(), "rmf-bridge"))
+    codes |= {f"fault {code}" for code in faults.remedies()}
+    return keys | codes | told | ours | set(_options(cli.whole_parser(), "rmf-bridge"))
+
+
+def _fields(shape: type) -> Iterator[str]:
+    schema = msgspec.json.schema(shape)
+    found = _keys(schema, schema, ())
+    return (path for path in found if not path.endswith(".headings"))  # the keys of a row, there
 
 
 def _keys(node: Any, root: Any, path: tuple[str, ...]) -> Iterator[str]:
