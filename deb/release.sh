@@ -18,7 +18,7 @@ gpg --list-secret-keys "$KEY" > /dev/null 2>&1 || refuse "gpg has no secret key 
 
 SOURCE_DATE_EPOCH=$(git log -1 --format=%ct)
 export SOURCE_DATE_EPOCH
-rm -rf dist build/sdist
+rm -rf dist build/sdist && mkdir dist
 # tarball FILE FOLDER NAME: packs FOLDER/NAME so that the same content gives the same bytes.
 tarball() { tar -C "$2" --sort=name --owner=0 --group=0 --numeric-owner --mtime="@$SOURCE_DATE_EPOCH" -cf - "$3" | gzip -9n > "$1"; }
 make --no-print-directory deb

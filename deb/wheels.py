@@ -36,18 +36,19 @@ def main() -> int:
         "python_full_version": f"{args.python}.0",
         "platform_machine": MACHINES[args.arch],
     }
-    lock = _locked(args.lock.read_text(), machine)
     _fetch([str(args.wheel)], args)
     extras = {canonicalize_name(args.wheel.name.split("-")[0]): tuple(args.extra)}
     without = {tuple(each.split(":")) for each in args.without}
-    while missing := sorted(set(_missing(args.target, machine, extras, without))):
-        built = [str(wheel) for name in missing for wheel in _built(name, args)]
-        pinned = [name for name in missing if not _built(name, args)]
-        if unknown := [name for name in pinned if name not in lock]:
+    lock = None if args.lock is None else _locked(args.lock.read_text(), machine)
+    while missing := dict(_missing(args.target, machine, extras, without)):
+        built = {name: wheel for name in missing for wheel in _built(name, args)}
+        left = [name for name in sorted(missing) if name not in built]
+        if unknown := [name for name in left if lock is not None and name not in lock]:
             print(f"{args.lock} lacks {', '.join(unknown)}: make lock", file=sys.stderr)
             return 1
-        _fetch(built, args)
-        _fetch([f"{lock[name]}\n" for name in pinned], args, hashed=True)
+        _fetch(map(str, built.values()), args)
+        found = missing if lock is None else lock
+        _fetch([f"{found[name]}\n" for name in left], args, listed=True)
     wrong = sorted(set(_wrong(args.target, machine, extras, without)))
     print(*wrong, sep="\n", file=sys.stderr)
     return 1 if wrong else 0
@@ -60,7 +61,9 @@ def _arguments() -> argparse.Namespace:
     )
     parser.add_argument("--target", type=Path, required=True, help="the site-packages to fill")
     parser.add_argument(
-        "--lock", type=Path, required=True, help="versions and hashes (`make lock`)"
+        "--lock",
+        type=Path,
+        help="versions and hashes (`make lock`); without it, the newest fitting",
     )
     parser.add_argument("--built", type=Path, help="a directory of wheels that were built here")
     parser.add_argument("--arch", choices=MACHINES, required=True)
@@ -101,8 +104,11 @@ def _built(name: str, args: argparse.Namespace) -> list[Path]:
     ]
 
 
-def _fetch(what: Iterable[str], args: argparse.Namespace, hashed: bool = False) -> None:
-    """Install these without their requirements. `hashed`: lines of a lock, and not files."""
+def _fetch(what: Iterable[str], args: argparse.Namespace, listed: bool = False) -> None:
+    """Install these without their requirements. `listed`: lines of a requirements file, and not files.
+
+    If one line has a hash, pip demands a hash of all.
+    """
     if not (what := list(what)):
         return
     machine = MACHINES[args.arch]
@@ -114,9 +120,9 @@ def _fetch(what: Iterable[str], args: argparse.Namespace, hashed: bool = False) 
     with tempfile.TemporaryDirectory() as closed:  # pip leaves out a package that is partly there
         fresh = f"{closed}/fresh"  # open to all users, as a daemon's user must read the copy
         place = ["--no-deps", "--no-compile", "--only-binary", ":all:", "--target", fresh]
-        if hashed:
+        if listed:
             (lines := Path(closed, "lock.txt")).write_text("".join(what))
-            what = ["--require-hashes", "--requirement", str(lines)]
+            what = ["--requirement", str(lines), *(["--require-hashes"] if args.lock else [])]
         subprocess.run([*pip, *place, *options, *what], check=True)
         shutil.copytree(fresh, args.target, dirs_exist_ok=True)
 
@@ -146,11 +152,12 @@ def _there(target: Path) -> dict[str, Distribution]:
 
 def _missing(
     target: Path, machine: dict[str, str], extras: dict[str, tuple[str, ...]], without: Without
-) -> Iterator[str]:
+) -> Iterator[tuple[str, str]]:
+    """Yield the name and the version of each missing requirement."""
     there = _there(target)
     for need in _needed(target, machine, extras, without):
         if (name := canonicalize_name(need.name)) not in there:
-            yield name
+            yield name, f"{need.name}{need.specifier}"
 
 
 def _wrong(

@@ -106,6 +106,25 @@ def test_of_two_versions_in_the_lock_the_one_for_the_target_counts(tmp_path: Pat
     assert (site / "for_pc.py").exists()
 
 
+def test_without_a_lock_the_wheels_of_the_index_are_taken(tmp_path: Path) -> None:
+    first = wheel(tmp_path, "first", "second>=1")
+    wheel(tmp_path, "second")
+    target = tmp_path / "site-packages"
+    words = [
+        str(WHEELS),
+        str(first),
+        "--arch",
+        "arm64",
+        "--python",
+        "3.12",
+        "--target",
+        str(target),
+    ]
+    index = {"PIP_NO_INDEX": "1", "PIP_FIND_LINKS": str(tmp_path)}
+    subprocess.run([sys.executable, *words], check=True, env=index)
+    assert (target / "second.py").exists()
+
+
 def test_a_wheel_that_was_built_here_is_taken_before_the_lock(tmp_path: Path) -> None:
     here = tmp_path / "built"
     here.mkdir()

@@ -33,7 +33,7 @@ def _fetch(arch: str, root: Path, site: Path) -> None:
     """Fetch by deb/wheels.py, as for the package: pip alone would judge needs by this machine."""
     fresh = site.with_name("site.new")
     shutil.rmtree(fresh, ignore_errors=True)
-    words = ["--arch", arch, "--python", PYTHON, "--find-links", ".", "--target", str(fresh)]
+    words = ["--arch", arch, "--python", PYTHON, "--target", str(fresh)]
     for name in NEEDED:
         command = [sys.executable, str(root / "deb/wheels.py"), name, *words]
         if subprocess.run(command, stderr=subprocess.DEVNULL).returncode:
