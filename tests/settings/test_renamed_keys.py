@@ -219,3 +219,17 @@ def test_each_row_is_of_this_major_version_or_the_one_before_and_its_new_key_exi
     known = reference.page()
     assert f"`{row.now.split('.')[-1]}`" in known
     assert f"`{row.was.split('.')[-1]}`" not in known
+
+
+@pytest.mark.parametrize("mark", ["", "\ufeff"])
+@pytest.mark.parametrize("end", ["\n", "\r\n"])
+def test_a_file_of_another_editor_is_rewritten_too(old: Path, mark: str, end: str) -> None:
+    text = mark + (HEAD + BAY + MAP).replace("\n", end)
+    old.write_bytes(text.encode())
+    before = load(old).devices
+    assert cli.main(["migrate", str(old)]) == 0
+    after = old.read_bytes().decode()
+    assert after.startswith(mark)
+    assert "stops_unfed_s" not in after
+    assert after.count(f"{end}    map:{end}") == 1
+    assert load(old).devices == before
