@@ -101,7 +101,7 @@ class _DeviceReading:
         self._notes: list[Problem] = []
 
     def config(self, path: Path, text: bytes, old: list[Problem]) -> Config:
-        """Return the Config of the sections that `all` has read. `old`: the file's old keys."""
+        """Return the Config of what `all` has read. `old`: the file's old keys."""
         return Config(
             path=path,
             text=text,
