@@ -42,6 +42,13 @@ class JsonFlag(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     ] = []
 
 
+class JsonNumber(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A measurement."""
+
+    field: Annotated[Field, tells("the field of the answer that holds it.")]
+    scale: Annotated[float, tells("the factor from the maker's unit to ours (0.001 for mV).")] = 1.0
+
+
 def flag(answer: Mapping[str, object], place: JsonFlag) -> bool:
     """Return yes or no; null means no. Raises DriverError for an absent field or a wrong type."""
     value = needed(answer, place.field)
@@ -59,10 +66,16 @@ def flag_if(answer: Mapping[str, object], place: JsonFlag | None) -> bool | None
     return None if place is None else flag(answer, place)
 
 
-def place_text(place: JsonFlag) -> str:
-    """Describe the flag for `check`: its field, and the values that mean yes."""
-    values = (str(yes).lower() if isinstance(yes, bool) else str(yes) for yes in place.when)
-    return f"{place.field} is {', '.join(values) or 'true'}"
+def place_text(place: JsonFlag | JsonNumber) -> str:
+    """Describe the place for `check`: its field, and the values that mean yes or the scale."""
+    if isinstance(place, JsonNumber):
+        return place.field if place.scale == 1.0 else f"{place.field} x {place.scale:g}"
+    return f"{place.field} is {', '.join(map(value_text, place.when)) or 'true'}"
+
+
+def value_text(value: Value) -> str:
+    """Return a value as JSON has it, a text without its quotes."""
+    return clean(str(value).lower() if isinstance(value, bool) else str(value), 40)
 
 
 def same(value: object, given: Value) -> bool:

@@ -34,20 +34,25 @@ NONE: Final[Failures] = MappingProxyType({})
 
 def serve(settings: http.HttpSettings, stations: Sequence["HttpStation"]) -> "HttpServer":
     """Serve the stations of this bus on a free port of 127.0.0.1."""
-    return HttpServer(stations, http.base(settings.api_base).path, settings.timeout_s)
+    path = http.base(settings.api_base).path
+    return HttpServer(stations, path, settings.timeout_s, settings.push_path or "")
+
+
+Asked = tuple[str, str, str]
+"""A request: its method, its path below `api_base`, and its body ("" without a body)."""
 
 
 class HttpStation(Protocol):
     """A controller with a plant behind it.
 
-    `reads`: the path of its state. `commands`: method and path -> signal, and asserted or not.
+    `reads`: the requests for its state. `commands`: request -> signal, and asserted or not.
     """
 
     plant: Plant
-    reads: str
-    commands: Mapping[tuple[str, str], tuple[str, bool]]
+    reads: Sequence[Asked]
+    commands: Mapping[Asked, tuple[str, bool]]
 
-    def answer(self) -> bytes:
+    def answer(self, asked: Asked) -> bytes:
         """Return the body of a reading at this moment."""
 
     def obey(self, signal: str, asserted: bool) -> None:
@@ -61,12 +66,16 @@ class HttpServer:
     """A running server. `replace`: replacements for the bus's settings.
 
     `path`: the API's path. `timeout_s`: the client's deadline, which slow failures overrun.
+    `push_path`: the WebSocket below `path`, if the controller has one.
     """
 
-    def __init__(self, stations: Sequence[HttpStation], path: str, timeout_s: float) -> None:
-        self._server = _Listener(stations, path, timeout_s)
+    def __init__(
+        self, stations: Sequence[HttpStation], path: str, timeout_s: float, push_path: str = ""
+    ) -> None:
+        self._server = _Listener(stations, path, timeout_s, push_path)
         host, port = self._server.server_address[:2]
-        self.replace: dict[str, object] = {"api_base": f"{host!s}:{port}{path}", "token_file": None}
+        without = dict.fromkeys(("token_file", "token_header", "login", "ca_file"))
+        self.replace: dict[str, object] = {"api_base": f"{host!s}:{port}{path}", **without}
         self._thread = threading.Thread(
             target=self._server.serve_forever, args=(LOOK_S,), name="http", daemon=True
         )
@@ -83,22 +92,22 @@ class HttpServer:
 class _Listener(ThreadingHTTPServer):
     daemon_threads = True
 
-    def __init__(self, stations: Sequence[HttpStation], path: str, timeout_s: float) -> None:
-        self.get = {path + s.reads: s for s in stations}
-        self.commands = {
-            (method, path + below): (s, *does)
-            for s in stations
-            for (method, below), does in s.commands.items()
-        }
+    def __init__(
+        self, stations: Sequence[HttpStation], path: str, timeout_s: float, push_path: str
+    ) -> None:
+        self.api = path
+        self.reads = {asked: station for station in stations for asked in station.reads}
+        self.commands = {asked: (s, *does) for s in stations for asked, does in s.commands.items()}
         self.timeout_s = timeout_s
-        self._stations = stations
+        self.push_path = push_path
+        self.stations = stations
         self._callers: set[socket.socket] = set()
         self._lock = threading.Lock()
         super().__init__(("127.0.0.1", 0), _Call)
 
     def service_actions(self) -> None:
         """Look after the server between requests."""
-        for station in self._stations:
+        for station in self.stations:
             station.tick()
 
     def get_request(self) -> tuple[socket.socket, object]:
@@ -135,33 +144,55 @@ class _Call(BaseHTTPRequestHandler):
     server: _Listener
 
     def do_GET(self) -> None:
-        if ("GET", self.path) in self.server.commands:
-            self.do_POST()
+        if self.server.push_path and self.path == self.server.api + self.server.push_path:
+            self._push()
             return
-        station = self.server.get.get(self.path)
-        if station is None:
+        body = self.rfile.read(int(self.headers.get("Content-Length", "0"))).decode()
+        asked = (self.command, self.path.removeprefix(self.server.api), body)
+        if asked in self.server.commands:
+            station, signal, asserted = self.server.commands[asked]
+            failures = station.plant.failures
+            if failures.get("server") is None:
+                station.obey(signal, asserted)
+            self._answer(200, b"{}", failures)
+        elif asked in self.server.reads:
+            self._read(self.server.reads[asked], asked)
+        else:
             self._answer(404, b"{}")
-            return
-        failures, body = station.plant.failures, station.answer()
+
+    do_POST = do_PUT = do_GET
+
+    def _read(self, station: HttpStation, asked: Asked) -> None:
+        failures, body = station.plant.failures, station.answer(asked)
         if failures.get("server") == "slow":
             self._wait(2 * self.server.timeout_s)
         if failures.get("server") == "garbage":
             self._answer(200, PAGE, failures, "text/html")
-            return
-        self._answer(200, body, failures)
+        else:
+            self._answer(200, body, failures)
 
-    def do_POST(self) -> None:
-        self.rfile.read(int(self.headers.get("Content-Length", "0")))
-        if (self.command, self.path) not in self.server.commands:
-            self._answer(404, b"{}")
-            return
-        station, signal, asserted = self.server.commands[self.command, self.path]
-        failures = station.plant.failures
-        if failures.get("server") is None:
-            station.obey(signal, asserted)
-        self._answer(200, b"{}", failures)
+    def _push(self) -> None:
+        """Serve a WebSocket: at each change of a state, send a message without content."""
+        from websockets.datastructures import Headers
+        from websockets.http11 import Request
+        from websockets.protocol import OPEN
+        from websockets.server import ServerProtocol
 
-    do_PUT = do_POST
+        protocol = ServerProtocol()
+        protocol.send_response(protocol.accept(Request(self.path, Headers(self.headers.items()))))
+        self.wfile.write(b"".join(protocol.data_to_send()))
+        before: list[bytes] = []
+        while all(s.plant.failures.get("server") is None for s in self.server.stations):
+            if select([self.connection], [], [], LOOK_S)[0]:
+                protocol.receive_data(self.connection.recv(4096))
+            found = [station.answer(asked) for asked, station in self.server.reads.items()]
+            if found != before and protocol.state is OPEN:
+                protocol.send_text(b"{}")
+            before = found
+            self.wfile.write(b"".join(protocol.data_to_send()))
+            if protocol.state is not OPEN:
+                break
+        self.close_connection = True
 
     def _answer(
         self, status: int, body: bytes, failures: Failures = NONE, sort: str = "application/json"

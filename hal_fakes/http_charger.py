@@ -5,7 +5,7 @@
 
 import json
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 
 from bridges.kinds.charger.signals import Activity
 from drivers.charger.http import HttpChargerSettings
@@ -14,7 +14,8 @@ from drivers.charger.state_codes import ROBOT_ERROR
 from drivers.json_fields import Value, found
 from hal_fakes.charger_values import NEAREST, values
 from hal_fakes.fake import Fake
-from hal_fakes.json_answers import put, value_of
+from hal_fakes.http import Asked
+from hal_fakes.json_answers import asked, put, value_of
 from hal_fakes.plants.charger import ChargerPlant, Reading
 from hal_fakes.plants.plant import Plant
 
@@ -36,8 +37,8 @@ class FakeHttpCharger:
 
     def __init__(self, plant: Plant, settings: HttpChargerSettings) -> None:
         self.plant = plant
-        self.reads = settings.state_path
-        self.commands: Mapping[tuple[str, str], tuple[str, bool]] = dict(_commands(settings))
+        self.reads: Sequence[Asked] = [("GET", settings.state_path, "")]
+        self.commands: Mapping[Asked, tuple[str, bool]] = dict(_commands(settings))
         self._settings = settings
         self._lists = settings.codes.lists() if settings.codes else {}
         self._off_at = float("inf")
@@ -65,7 +66,7 @@ class FakeHttpCharger:
         if time.monotonic() >= self._off_at:
             self.obey("power", False)
 
-    def answer(self) -> bytes:
+    def answer(self, asked: Asked) -> bytes:
         """Return the present answer to `GET state_path`."""
         return self.body(self.reading())
 
@@ -128,17 +129,17 @@ class FakeHttpCharger:
         return next(code for code in range(100, 65536) if code not in known)
 
 
-def _commands(settings: HttpChargerSettings) -> Iterator[tuple[tuple[str, str], tuple[str, bool]]]:
-    """Return method and path of each command, and its effect on the plant."""
+def _commands(settings: HttpChargerSettings) -> Iterator[tuple[Asked, tuple[str, bool]]]:
+    """Return each command as a request, and its effect on the plant."""
     if settings.clear_error_path:
-        yield ("POST", settings.clear_error_path), ("clear_error", True)
+        yield ("POST", settings.clear_error_path, ""), ("clear_error", True)
     for call, signal, asserted in (
         (settings.start, "power", True),
         (settings.stop, "power", False),
         (settings.range_check, "range_check", True),
     ):
         if call:
-            yield (call.method, call.path), (signal, asserted)
+            yield asked(call), (signal, asserted)
 
 
 def _numbers(reading: Reading) -> list[tuple[str, float | None]]:

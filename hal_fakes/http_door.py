@@ -6,13 +6,14 @@ The relay switches itself off when its timer is not renewed. Failures of server,
 
 import json
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Final
 
 from drivers.door.http import HOLD, HttpDoorSettings
 from drivers.hal.points import Wire
 from hal_fakes.fake import Fake
-from hal_fakes.json_answers import put, value_of
+from hal_fakes.http import Asked
+from hal_fakes.json_answers import asked, put, value_of
 from hal_fakes.plants import door
 from hal_fakes.plants.plant import Plant
 
@@ -31,11 +32,10 @@ class FakeHttpDoor:
 
     def __init__(self, plant: Plant, settings: HttpDoorSettings) -> None:
         self.plant = plant
-        self.reads = settings.state_path
-        hold, release = settings.hold, settings.release
-        self.commands: Mapping[tuple[str, str], tuple[str, bool]] = {
-            (hold.method, hold.path): (HOLD, True),
-            (release.method, release.path): (HOLD, False),
+        self.reads: Sequence[Asked] = [("GET", settings.state_path, "")]
+        self.commands: Mapping[Asked, tuple[str, bool]] = {
+            asked(settings.hold): (HOLD, True),
+            asked(settings.release): (HOLD, False),
         }
         self._settings = settings
         self._on = False
@@ -54,7 +54,7 @@ class FakeHttpDoor:
         if time.monotonic() >= self._off_at:
             self.obey(HOLD, False)
 
-    def answer(self) -> bytes:
+    def answer(self, asked: Asked) -> bytes:
         """Return the present answer to `GET state_path`; a wrong answer if that failure is ordered."""
         self.tick()
         self.plant.advance(time.monotonic())

@@ -1,6 +1,12 @@
 """The other side of `drivers/json_fields.py`: writes the answer in which a driver finds its fields."""
 
+from drivers.http_call import Call
 from drivers.json_fields import JsonFlag, Value, same
+
+
+def asked(call: Call) -> tuple[str, str, str]:
+    """Return the command as the request that reaches its controller."""
+    return call.method, call.path, call.body or ""
 
 
 def value_of(place: JsonFlag, yes: bool) -> Value:

@@ -10,7 +10,7 @@ from bridges.kinds.charger.signals import FaultSide, Measured
 from bridges.kinds.shared.fields import Name, tells
 from drivers import json_fields
 from drivers.charger.state_codes import CODE_MAX
-from drivers.json_fields import Field, JsonFlag
+from drivers.json_fields import Field, JsonFlag, JsonNumber
 
 Answer = Mapping[str, object]
 """One JSON object."""
@@ -18,13 +18,6 @@ WORD_MAX: Final = 64
 Word = Annotated[str, msgspec.Meta(min_length=1, max_length=WORD_MAX)]
 TextMeans = Literal["none", "station", "robot"]
 WEEK_S: Final = 7 * 86400
-
-
-class JsonNumber(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A measurement."""
-
-    field: Annotated[Field, tells("the field of the answer that holds it.")]
-    scale: Annotated[float, tells("the factor from the maker's unit to ours (0.001 for mV).")] = 1.0
 
 
 class Fields(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -125,6 +118,4 @@ def _number(
 
 
 def _place(place: str | JsonNumber | JsonFlag) -> str:
-    if isinstance(place, JsonNumber):
-        return place.field if place.scale == 1.0 else f"{place.field} x {place.scale:g}"
-    return json_fields.place_text(place) if isinstance(place, JsonFlag) else place
+    return place if isinstance(place, str) else json_fields.place_text(place)

@@ -13,3 +13,11 @@ def misspelt_address(host: str) -> str:
     except ValueError:
         return f"{host} is not an address: write four numbers from 0 to 255 with dots between them"
     return ""
+
+
+def is_loopback(host: str) -> bool:
+    """Does this host name or address stay on this machine?"""
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return host == "localhost"

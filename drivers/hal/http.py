@@ -21,8 +21,11 @@ from bridges.system import user_files
 from drivers.hal import Bus, BusSettings, BusType, HalError, Needs, Where
 from drivers.hal.backoff import Backoff
 from drivers.hal.deadline import Dialler, Resolve, tls_socket
+from drivers.hal.hosts import is_loopback
 from drivers.hal.http_address import Base, Path, base
 from drivers.hal.http_json import excerpt, json_object
+from drivers.hal.http_login import Login, Signer
+from drivers.hal.http_push import Pushes
 
 __all__ = ["Base", "HttpBus", "HttpSettings", "Method", "Path", "base"]
 
@@ -53,7 +56,7 @@ Timeout = Annotated[float, msgspec.Meta(ge=0.1, le=5, extra={"unit": "s"})]
 
 _HINTS = {
     3: "redirects are not followed: put the final address in api_base",
-    4: "check api_base, the path, and token_file where the controller wants one",
+    4: "check api_base, the path, and token_file or login where the controller wants one",
     5: "the controller's own software fails: look at its log",
 }
 
@@ -75,6 +78,19 @@ class HttpSettings(BusSettings, frozen=True, kw_only=True, forbid_unknown_fields
         Header | None,
         tells("the token's header (`X-API-Key`); `Authorization: Bearer …` when absent."),
     ] = None
+    login: Annotated[
+        Login | None, tells("the user and password of a controller without tokens.")
+    ] = None
+    accept_unencrypted: Annotated[
+        Name | None,
+        tells("""the reason why a token or a password may go over the network unencrypted, which
+        `check` prints."""),
+    ] = None
+    push_path: Annotated[
+        Path | None,
+        tells("""a WebSocket below `api_base`: at each of its messages the controller is read at once.
+        The message itself is never believed."""),
+    ] = None
     ca_file: Annotated[
         AbsolutePath | None,
         tells("""with https, a PEM file with the certificate of the controller or of its authority;
@@ -92,11 +108,38 @@ class HttpSettings(BusSettings, frozen=True, kw_only=True, forbid_unknown_fields
             yield ("ca_file",), "is for https: write api_base: https://…, or delete ca_file"
         if self.token_header and not self.token_file:
             yield ("token_header",), "needs token_file: the file with the header's value"
+        if self.login and self.token_file and not self.token_header:
+            yield ("login",), "token_file sends its own Authorization: delete one of the two"
+        if self.push_path and self.login and self.login.method == "digest":
+            yield ("push_path",), "a WebSocket has no digest login: delete push_path"
+        readable = _readable_secret(self)
+        if readable == "login" and not self.accept_unencrypted:
+            text = (
+                "with method: basic anybody on the network can read the password: write https://… or"
+                " method: digest where the controller has it, or accept_unencrypted: <why it is safe>"
+            )
+            yield ("login",), text
+        if self.accept_unencrypted and not readable:
+            yield ("accept_unencrypted",), "no secret goes over the network readably: delete it"
+
+
+def _readable_secret(settings: HttpSettings) -> Literal["login", "token_file", ""]:
+    """Return the setting whose secret leaves this machine unencrypted; "" if there is none."""
+    where = base(settings.api_base)
+    if where.scheme == "https" or is_loopback(where.host):
+        return ""
+    if settings.login and settings.login.method == "basic":
+        return "login"
+    return "token_file" if settings.token_file else ""
 
 
 def warnings(settings: HttpSettings) -> Remarks:
     """Yield valid settings that deserve a second look: (path, text)."""
-    if settings.token_file and base(settings.api_base).scheme == "http":
+    readable = _readable_secret(settings)
+    if readable and settings.accept_unencrypted:
+        text = f"the secret goes over the network unencrypted: {settings.accept_unencrypted}"
+        yield ("accept_unencrypted",), text
+    elif readable:
         text = (
             "the token goes over the network unencrypted: write https://… where the controller has"
             " it, or keep such controllers on a network of their own"
@@ -131,12 +174,29 @@ class HttpBus(Bus):
         self._dialler = Dialler(self._base.host, self._base.port, resolve)
         self._adapter = _adapter(self._dialler, self._base.scheme)
         self._backoff, self._safe_backoff = (Backoff(clock, lambda: 0.0) for _ in range(2))
+        self._signer = Signer(settings.login) if settings.login else None
+        self._pushes: Pushes | None = None
 
-    def get_json(self, path: str) -> dict[str, object]:
-        """GET `api_base` + `path`; return the JSON object of the answer, which must have status 200."""
+    def on_edge(self, wake: Callable[[], None]) -> None:
+        """Call `wake` at each message of the controller's WebSocket, if it has one."""
+        if self._settings.push_path and self._pushes is None:
+            self._pushes = Pushes(
+                self._base.url(self._settings.push_path),
+                self._headers,
+                self._settings.ca_file,
+                wake,
+            )
+
+    def get_json(
+        self, path: str, method: Method = "GET", body: str | None = None
+    ) -> dict[str, object]:
+        """Read `api_base` + `path`; return the JSON object of the answer, which must have status 200.
+
+        `method`, `body`: for a controller that reads by other requests than GET.
+        """
         url = self._base.url(path)
         with self._attempt(self._backoff):
-            return json_object(url, *self._call("GET", url, reads=True))
+            return json_object(url, *self._call(method, url, body, reads=True))
 
     def send(
         self, path: str, method: Method = "POST", body: str | None = None, safe: bool = False
@@ -156,7 +216,9 @@ class HttpBus(Bus):
         self._safe_backoff.insist()
 
     def close(self) -> None:
-        """Do nothing: no connection stays open between calls."""
+        """End the WebSocket, if there is one; no other connection stays open between calls."""
+        if self._pushes:
+            self._pushes.close()
 
     @contextmanager
     def _attempt(self, backoff: Backoff) -> Iterator[None]:
@@ -184,8 +246,14 @@ class HttpBus(Bus):
         verify = self._settings.ca_file or True
         headers = HEADERS | self._authorization() | (JSON if sent else {})
         request = requests.Request(method, url, headers, data=sent and sent.encode()).prepare()
+        if self._signer:
+            self._signer.sign(request)
         try:
-            with self._adapter.send(request, stream=True, verify=verify) as answer:
+            answer = self._adapter.send(request, stream=True, verify=verify)
+            if self._signer and self._signer.is_challenge(answer):
+                self._dialler.hang_up()
+                answer = self._signer.answered(answer, verify)
+            with answer:
                 _check_status(url, reads, answer.status_code)
                 if not reads:
                     return "", b""
@@ -199,6 +267,10 @@ class HttpBus(Bus):
                 f"{url} answered more than {BODY_MAX // 1024} KiB: is it the right path?"
             )
         return answer.headers.get("Content-Type", ""), body
+
+    def _headers(self) -> dict[str, str]:
+        """Return the headers that open the WebSocket. Raises HalError."""
+        return self._authorization() | (self._signer.basic() if self._signer else {})
 
     def _authorization(self) -> dict[str, str]:
         """Read the token, for each call, because it may be renewed meanwhile."""

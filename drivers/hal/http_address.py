@@ -45,7 +45,9 @@ class Base(NamedTuple):
 def base(text: str) -> Base:
     """Split an `api_base` into its parts. Raises ValueError with the right form."""
     if "@" in text:
-        raise ValueError("no user or password here: put a bearer token in a file, as token_file")
+        raise ValueError(
+            "no user or password here: write login or token_file, with the secret in a file"
+        )
     found = _BASE.fullmatch(text)
     if not found:
         raise ValueError(

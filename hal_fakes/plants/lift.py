@@ -18,6 +18,7 @@ Failing parts: `car` (`off`, `stuck`: stands still; `slow`; `wrong`: goes a floo
 `hal_fakes/plants/contact.py`.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from bridges.kinds.lift.signals import Hazard, Side
@@ -61,8 +62,13 @@ class LiftPlant(WiredPlant):
     """One lift, standing at its lowest landing with its doors closed."""
 
     def __init__(
-        self, name: str, settings: DryContactLiftSettings, pace: LiftPace | None = None
+        self,
+        name: str,
+        settings: DryContactLiftSettings,
+        pace: LiftPace | None = None,
+        links: Sequence[str] = (),
     ) -> None:
+        """`links`: the parts of a wire to the controller that can fail besides."""
         self.car = Car()
         self.agv = False
         self._wiring = settings
@@ -71,7 +77,7 @@ class LiftPlant(WiredPlant):
         self._sides = {level: _sides(settings, level) for level in self._levels}
         self.doors = {side: CarDoor() for sides in self._sides.values() for side in sides}
         parts = [p for p in FAILS if p != "rear_door_operator" or Side.REAR in self.doors]
-        super().__init__(name, wires(settings), parts, _buttons(settings, self.doors))
+        super().__init__(name, wires(settings), [*parts, *links], _buttons(settings, self.doors))
         self._only_in_agv = {s for s, _, line in input_rows(settings) if line.valid_when}
         self._on: set[str] = set()
         self._people: list[int] = []

@@ -10,10 +10,10 @@ import pytest
 from bridges.kinds.charger.signals import Activity
 from bridges.settings.load import SettingsError, load
 from drivers.charger.dry_contact import decode
-from drivers.charger.http_fields import JsonNumber as HttpNumber
 from drivers.charger.register_map import RegisterNumber
 from drivers.hal.points import Input
 from drivers.json_fields import JsonFlag
+from drivers.json_fields import JsonNumber as HttpNumber
 from tests.drivers.charger import test_contract as switched
 from tests.drivers.charger.contract import OFF, Bench, MovingPadContract
 

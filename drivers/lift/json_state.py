@@ -1,0 +1,250 @@
+"""A lift's state in a JSON answer: floor, doors, motion, service state and hazards, each in a field.
+
+An unlisted value is a fault; it never means a floor, an open door or a standing car. A field that is
+null is not known, and a null hazard gives no reading at all.
+"""
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import Annotated, Literal, TypeAlias
+
+import msgspec
+
+from bridges.kinds.lift.signals import DoorReading, Hazard, LiftSample, Motion
+from bridges.kinds.shared.fields import Name, tells
+from bridges.kinds.shared.remarks import Remarks
+from drivers import DriverError, json_fields
+from drivers.json_fields import Field, JsonFlag, JsonNumber, Value
+from drivers.lift.wiring import ServiceState
+
+Answer: TypeAlias = Mapping[str, object]
+"""One JSON object."""
+DoorWord = Literal["open", "closed", "moving"]
+MotionWord = Literal["stopped", "up", "down", "moving"]
+Values = Annotated[list[Value], msgspec.Meta(min_length=1)]
+
+DOOR: Mapping[str | None, DoorReading] = {
+    "open": DoorReading.OPEN,
+    "closed": DoorReading.CLOSED,
+    "moving": DoorReading.BETWEEN,
+}
+
+
+class JsonFloor(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """The car's position."""
+
+    field: Annotated[Field, tells("the field that holds it; null between floors.")]
+    values: Annotated[
+        dict[Name, Value],
+        tells("landing -> its value; without `values` a landing's name is its value."),
+    ] = {}
+    between_floors: Annotated[list[Value], tells("the values for a car between floors.")] = []
+
+    def value(self, level: str) -> Value:
+        """Return the value that stands for this landing."""
+        return self.values.get(level, level)
+
+    def problems(self) -> Remarks:
+        """Yield a problem for each value with two meanings."""
+        landings = [(level, [value]) for level, value in self.values.items()]
+        yield from _doubles("values", [*landings, ("between floors", self.between_floors)])
+
+
+class JsonDoor(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A door."""
+
+    field: Annotated[Field, tells("the field that holds its state.")]
+    states: Annotated[
+        dict[DoorWord, Values], tells("state -> its values; an unlisted value is a fault.")
+    ]
+
+    def problems(self) -> Remarks:
+        """Yield problems: a state that is missing; a value with two meanings."""
+        if not {"open", "closed"} <= set(self.states):
+            yield ("states",), "needs values for open and for closed"
+        yield from _doubles("states", self.states.items())
+
+
+class JsonMotion(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """The car's motion."""
+
+    field: Annotated[Field, tells("the field that holds it.")]
+    states: Annotated[
+        dict[MotionWord, Values], tells("motion -> its values; an unlisted value is a fault.")
+    ]
+
+    def problems(self) -> Remarks:
+        """Yield problems: a state that is missing; a value with two meanings."""
+        if "stopped" not in self.states or not (
+            "moving" in self.states or {"up", "down"} <= set(self.states)
+        ):
+            yield ("states",), "needs values for stopped, and for moving or up and down"
+        yield from _doubles("states", self.states.items())
+
+
+class JsonService(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """The lift's service state."""
+
+    field: Annotated[Field, tells("the field that holds it.")]
+    states: Annotated[
+        dict[ServiceState, Values],
+        tells("state -> its values; at an unlisted value the lift is out of service."),
+    ]
+
+    def problems(self) -> Remarks:
+        """Yield a problem for each value with two meanings."""
+        yield from _doubles("states", self.states.items())
+
+
+StateField: TypeAlias = JsonDoor | JsonMotion | JsonService
+
+
+class JsonLiftState(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """The fields of a lift's answer: names with dots between them."""
+
+    online: Annotated[
+        JsonFlag | None, tells("the gateway reaches the lift; otherwise there is no reading.")
+    ] = None
+    age: Annotated[
+        JsonNumber | None,
+        tells("""the age of the gateway's own reading (s). An answer older than `stale_after_s` is no
+        reading."""),
+    ] = None
+    floor: Annotated[JsonFloor, tells("the car's position.")]
+    door: Annotated[JsonDoor, tells("the car's door.")]
+    rear_door: Annotated[JsonDoor | None, tells("the car's rear door.")] = None
+    motion: Annotated[JsonMotion | None, tells("the car's motion.")] = None
+    service: Annotated[
+        JsonService | None, tells("the lift's service state; it may include hazards and AGV mode.")
+    ] = None
+    agv_mode: Annotated[
+        JsonFlag | None, tells("the lift confirms AGV mode; not needed if `service` does.")
+    ] = None
+    fire_alarm: Annotated[
+        JsonFlag | None, tells("the fire alarm; MODE_FIRE, latched with `fire_reset: manual`.")
+    ] = None
+    code_blue: Annotated[JsonFlag | None, tells("the hospital's code blue; MODE_EMERGENCY.")] = None
+    earthquake: Annotated[JsonFlag | None, tells("an earthquake sensor; MODE_EMERGENCY.")] = None
+    emergency: Annotated[JsonFlag | None, tells("the car's emergency stop; MODE_EMERGENCY.")] = None
+    out_of_service: Annotated[
+        JsonFlag | None, tells("the lift is off or out of order; MODE_OFFLINE.")
+    ] = None
+    manual_mode: Annotated[
+        JsonFlag | None, tells("inspection or manual drive (key switch); MODE_OFFLINE.")
+    ] = None
+    overload: Annotated[JsonFlag | None, tells("the car is too heavy; delays the ride.")] = None
+
+    def places(self) -> dict[str, str]:
+        """Return part -> its field, for each given part."""
+        parts = {name: getattr(self, name) for name in self.__struct_fields__}
+        return {name: part.field for name, part in parts.items() if part is not None}
+
+    def shows(self, state: str) -> bool:
+        """Does the answer have this hazard or AGV mode, as a flag or as a state of `service`?"""
+        in_service = self.service is not None and state in self.service.states
+        return in_service or getattr(self, state) is not None
+
+    def problems(self) -> Remarks:
+        """Yield a problem for AGV mode that has two fields."""
+        if self.agv_mode and self.service and "agv_mode" in self.service.states:
+            yield ("agv_mode",), "service shows agv_mode too: delete one of the two"
+
+
+def _doubles(key: str, meanings: Iterable[tuple[str, Sequence[Value]]]) -> Remarks:
+    given: list[tuple[Value, str]] = []
+    for meaning, values in meanings:
+        for value in values:
+            for before, other in given:
+                if json_fields.same(value, before):
+                    yield (key,), f"{json_fields.value_text(value)} means {other} and {meaning}"
+            given.append((value, meaning))
+
+
+def decode(
+    place: JsonLiftState, answer: Answer, levels: Sequence[str], stale_s: float
+) -> LiftSample:
+    """Decode the answer of a lift with these landings. Raises DriverError with the field's name, also
+    for a reading of the gateway that is older than `stale_s`."""
+    _current(place, answer, stale_s)
+    level, code_fault = _floor(place.floor, answer, levels)
+    service = _service(place, answer)
+    return LiftSample(
+        level=level,
+        door=_door(place.door, answer),
+        code_fault=code_fault,
+        rear_door=_door(place.rear_door, answer) if place.rear_door else None,
+        motion=_motion(place.motion, answer) if place.motion else None,
+        agv=_agv(place, answer, service),
+        hazards=frozenset(h for h in Hazard if h == service or _certain(answer, getattr(place, h))),
+    )
+
+
+def _current(place: JsonLiftState, answer: Answer, stale_s: float) -> None:
+    if place.online and not json_fields.flag(answer, place.online):
+        raise DriverError(f"the gateway does not reach the lift ('{place.online.field}')")
+    if place.age is None:
+        return
+    age_s = json_fields.number(answer, place.age.field, place.age.scale)
+    if age_s is None:
+        raise DriverError(f"the answer does not give its age ('{place.age.field}')")
+    if not 0 <= age_s <= stale_s:
+        raise DriverError(
+            f"the gateway's reading is {age_s:g} s old ('{place.age.field}'): at most {stale_s:g} s"
+            " (stale_after_s) are accepted"
+        )
+
+
+def _value(answer: Answer, field: str) -> Value | None:
+    value = json_fields.needed(answer, field)
+    if value is not None and not isinstance(value, Value):
+        raise json_fields.wrong(field, value, "a text, a number, true or false")
+    return value
+
+
+def _state(place: StateField, answer: Answer) -> str | None:
+    """Return the state of this field's value; None for null and for an unlisted value."""
+    value = _value(answer, place.field)
+    listed: Iterator[tuple[str, list[Value]]] = iter(place.states.items())
+    return next((state for state, given in listed if _is_one(value, given)), None)
+
+
+def _is_one(value: Value | None, given: Sequence[Value]) -> bool:
+    return value is not None and any(json_fields.same(value, one) for one in given)
+
+
+def _floor(place: JsonFloor, answer: Answer, levels: Sequence[str]) -> tuple[str | None, str]:
+    value = _value(answer, place.field)
+    if value is None or _is_one(value, place.between_floors):
+        return None, ""
+    level = next((level for level in levels if _is_one(value, [place.value(level)])), None)
+    return level, "" if level else f"{json_fields.value_text(value)} is not a floor's value"
+
+
+def _door(place: JsonDoor, answer: Answer) -> DoorReading:
+    return DOOR.get(_state(place, answer), DoorReading.UNKNOWN)
+
+
+def _motion(place: JsonMotion, answer: Answer) -> Motion:
+    state = _state(place, answer)
+    return Motion(state) if state else Motion.CONTRADICTORY
+
+
+def _service(place: JsonLiftState, answer: Answer) -> str | None:
+    if place.service is None:
+        return None
+    state = _state(place.service, answer)
+    return Hazard.OUT_OF_SERVICE if state in (None, "fault") else state
+
+
+def _agv(place: JsonLiftState, answer: Answer, service: str | None) -> bool | None:
+    if place.agv_mode:
+        return json_fields.flag(answer, place.agv_mode)
+    return service == "agv_mode" if place.shows("agv_mode") else None
+
+
+def _certain(answer: Answer, place: JsonFlag | None) -> bool:
+    """Return the flag of a hazard, of which null would be no knowledge. Raises DriverError."""
+    if place is None:
+        return False
+    if json_fields.needed(answer, place.field) is None:
+        raise json_fields.wrong(place.field, None, "yes or no")
+    return json_fields.flag(answer, place)
