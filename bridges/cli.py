@@ -45,6 +45,10 @@ COMMANDS = {
         "serve a web page of RMF's graph, or of a recording",
         "page --localhost",
     ),
+    "mqtt-out": (
+        "publish lifts, doors and chargers to an MQTT broker; commands nothing",
+        "mqtt-out 192.168.1.5 --home-assistant",
+    ),
     "status": (
         "show every daemon on this machine: state, faults and what to do",
         "status --json",
@@ -107,7 +111,7 @@ COMMANDS = {
 }
 """Subcommand -> (its purpose, an example)."""
 WORKBENCH = frozenset(
-    {"init", "schema", "watch", "page", "doctor", "explain", "plot", "send"}
+    {"init", "schema", "watch", "page", "doctor", "explain", "plot", "send", "mqtt-out"}
     | {"judge", "release", "walk", "press", "fail", "replay"}
 )
 """The workbench's subcommands, which no daemon needs."""

@@ -80,6 +80,13 @@ EXIT_CODES: Final[dict[str, dict[int, str]]] = {
         69: "the port is taken, or NiceGUI is not installed",
         78: "the password file has an error",
     },
+    "mqtt-out": {
+        0: "Ctrl-C or SIGTERM",
+        1: "the graph cannot be joined, or was lost",
+        64: "the password would go over the network unencrypted",
+        69: "paho-mqtt is not installed",
+        78: "the password file or the certificate has an error",
+    },
     "status": {
         0: "all is well",
         1: "a daemon has a fault",
