@@ -13,7 +13,7 @@ from bridges.kinds.lift.signals import Hazard
 from drivers.json_fields import Value, found
 from drivers.lift.dry_contact import DryContactLiftSettings
 from drivers.lift.http import HttpLiftSettings, api_of
-from drivers.lift.json_state import JsonDoor, JsonMotion, JsonService
+from drivers.lift.json_state import ListedStates
 from hal_fakes.fake import Fake
 from hal_fakes.http import Asked
 from hal_fakes.json_answers import asked, put, value_of
@@ -33,7 +33,7 @@ def contacts(settings: HttpLiftSettings) -> DryContactLiftSettings:
     api = api_of(settings)
     state = api.state
     doors = [name for name in ("door", "rear_door") if getattr(state, name)]
-    motions = set(state.motion.states) if state.motion else set()
+    motions = set(state.motion.states()) if state.motion else set()
     return behind(settings, state.shows, doors, motions, api.commands.held())
 
 
@@ -118,7 +118,7 @@ class FakeHttpLift:
             if place := getattr(state, name):
                 yield place.field, _value(place, self._door(name))
         if state.motion:
-            moves = ("moving",) if "moving" in state.motion.states else ("up", "down")
+            moves = ("moving",) if state.motion.moving else ("up", "down")
             moving = [name for name in moves if self.plant.sense(name)]
             yield state.motion.field, _value(state.motion, *moving, "stopped")
         if state.service:
@@ -148,9 +148,9 @@ class FakeHttpLift:
         return NONSENSE if all(ends) else "open" if ends[0] else "closed" if ends[1] else "moving"
 
 
-def _value(place: JsonDoor | JsonMotion | JsonService, *states: str) -> Value:
+def _value(place: ListedStates, *states: str) -> Value:
     """Return the first value of the first of these states that the API has."""
-    listed: Mapping[str, list[Value]] = {str(state): given for state, given in place.states.items()}
+    listed = place.states()
     return next((listed[state][0] for state in states if state in listed), NONSENSE)
 
 

@@ -187,5 +187,5 @@ def value_rows(state: JsonLiftState) -> Iterator[tuple[str, str, str]]:
     """Yield each listed value: part, value and meaning."""
     for name in ("door", "rear_door", "motion", "service"):
         if place := getattr(state, name):
-            for meaning, values in place.states.items():
+            for meaning, values in place.states().items():
                 yield name, ", ".join(map(json_fields.value_text, values)), meaning

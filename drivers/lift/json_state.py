@@ -4,8 +4,8 @@ An unlisted value is a fault; it never means a floor, an open door or a standing
 null is not known, and a null hazard gives no reading at all.
 """
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import Annotated, Literal, TypeAlias
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Annotated, TypeAlias
 
 import msgspec
 
@@ -14,12 +14,9 @@ from bridges.kinds.shared.fields import Name, tells
 from bridges.kinds.shared.remarks import Remarks
 from drivers import DriverError, json_fields
 from drivers.json_fields import Field, JsonFlag, JsonNumber, Value
-from drivers.lift.wiring import ServiceState
 
 Answer: TypeAlias = Mapping[str, object]
 """One JSON object."""
-DoorWord = Literal["open", "closed", "moving"]
-MotionWord = Literal["stopped", "up", "down", "moving"]
 Values = Annotated[list[Value], msgspec.Meta(min_length=1)]
 
 DOOR: Mapping[str | None, DoorReading] = {
@@ -46,56 +43,59 @@ class JsonFloor(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
     def problems(self) -> Remarks:
         """Yield a problem for each value with two meanings."""
         landings = [(level, [value]) for level, value in self.values.items()]
-        yield from _doubles("values", [*landings, ("between floors", self.between_floors)])
+        yield from _doubles([*landings, ("between floors", self.between_floors)])
 
 
-class JsonDoor(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A door."""
-
-    field: Annotated[Field, tells("the field that holds its state.")]
-    states: Annotated[
-        dict[DoorWord, Values], tells("state -> its values; an unlisted value is a fault.")
-    ]
-
-    def problems(self) -> Remarks:
-        """Yield problems: a state that is missing; a value with two meanings."""
-        if not {"open", "closed"} <= set(self.states):
-            yield ("states",), "needs values for open and for closed"
-        yield from _doubles("states", self.states.items())
-
-
-class JsonMotion(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The car's motion."""
+class ListedStates(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A field whose values stand for states: each further key is a state, with a list of its values."""
 
     field: Annotated[Field, tells("the field that holds it.")]
-    states: Annotated[
-        dict[MotionWord, Values], tells("motion -> its values; an unlisted value is a fault.")
-    ]
 
-    def problems(self) -> Remarks:
-        """Yield problems: a state that is missing; a value with two meanings."""
-        if "stopped" not in self.states or not (
-            "moving" in self.states or {"up", "down"} <= set(self.states)
-        ):
-            yield ("states",), "needs values for stopped, and for moving or up and down"
-        yield from _doubles("states", self.states.items())
-
-
-class JsonService(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The lift's service state."""
-
-    field: Annotated[Field, tells("the field that holds it.")]
-    states: Annotated[
-        dict[ServiceState, Values],
-        tells("state -> its values; at an unlisted value the lift is out of service."),
-    ]
+    def states(self) -> dict[str, list[Value]]:
+        """Return state -> its values, for each state that has any."""
+        given = {name: getattr(self, name) for name in self.__struct_fields__ if name != "field"}
+        return {name: values for name, values in given.items() if values}
 
     def problems(self) -> Remarks:
         """Yield a problem for each value with two meanings."""
-        yield from _doubles("states", self.states.items())
+        yield from _doubles(self.states().items())
 
 
-StateField: TypeAlias = JsonDoor | JsonMotion | JsonService
+class JsonDoor(ListedStates, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A door. A value that is not listed is a fault."""
+
+    open: Annotated[Values, tells("the values for a fully open door.")]
+    closed: Annotated[Values, tells("the values for a closed door.")]
+    moving: Annotated[list[Value], tells("the values for a door between its ends.")] = []
+
+
+class JsonMotion(ListedStates, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """The car's motion. A value that is not listed is a fault."""
+
+    stopped: Annotated[Values, tells("the values for a standing car.")]
+    up: Annotated[list[Value], tells("the values for a car that goes up.")] = []
+    down: Annotated[list[Value], tells("the values for a car that goes down.")] = []
+    moving: Annotated[list[Value], tells("the values for a car that goes either way.")] = []
+
+    def problems(self) -> Remarks:
+        """Yield problems: no values for a moving car; a value with two meanings."""
+        yield from super().problems()
+        if not self.moving and not (self.up and self.down):
+            yield (), "needs values for moving, or for up and down"
+
+
+class JsonService(ListedStates, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """The lift's service state. At a value that is not listed the lift is out of service."""
+
+    normal: Annotated[Values, tells("the values for a lift that serves people.")]
+    agv_mode: Annotated[list[Value], tells("the values for AGV mode.")] = []
+    fire_alarm: Annotated[list[Value], tells("the values for a fire.")] = []
+    code_blue: Annotated[list[Value], tells("the values for a code blue.")] = []
+    earthquake: Annotated[list[Value], tells("the values for an earthquake.")] = []
+    emergency: Annotated[list[Value], tells("the values for the emergency stop.")] = []
+    out_of_service: Annotated[list[Value], tells("the values for a lift that is off.")] = []
+    manual_mode: Annotated[list[Value], tells("the values for inspection or manual drive.")] = []
+    overload: Annotated[list[Value], tells("the values for a car that is too heavy.")] = []
 
 
 class JsonLiftState(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -140,22 +140,22 @@ class JsonLiftState(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
 
     def shows(self, state: str) -> bool:
         """Does the answer have this hazard or AGV mode, as a flag or as a state of `service`?"""
-        in_service = self.service is not None and state in self.service.states
+        in_service = self.service is not None and state in self.service.states()
         return in_service or getattr(self, state) is not None
 
     def problems(self) -> Remarks:
         """Yield a problem for AGV mode that has two fields."""
-        if self.agv_mode and self.service and "agv_mode" in self.service.states:
+        if self.agv_mode and self.service and self.service.agv_mode:
             yield ("agv_mode",), "service shows agv_mode too: delete one of the two"
 
 
-def _doubles(key: str, meanings: Iterable[tuple[str, Sequence[Value]]]) -> Remarks:
+def _doubles(meanings: Iterable[tuple[str, Sequence[Value]]]) -> Remarks:
     given: list[tuple[Value, str]] = []
     for meaning, values in meanings:
         for value in values:
             for before, other in given:
                 if json_fields.same(value, before):
-                    yield (key,), f"{json_fields.value_text(value)} means {other} and {meaning}"
+                    yield (), f"{json_fields.value_text(value)} means {other} and {meaning}"
             given.append((value, meaning))
 
 
@@ -200,11 +200,10 @@ def _value(answer: Answer, field: str) -> Value | None:
     return value
 
 
-def _state(place: StateField, answer: Answer) -> str | None:
+def _state(place: ListedStates, answer: Answer) -> str | None:
     """Return the state of this field's value; None for null and for an unlisted value."""
     value = _value(answer, place.field)
-    listed: Iterator[tuple[str, list[Value]]] = iter(place.states.items())
-    return next((state for state, given in listed if _is_one(value, given)), None)
+    return next((state for state, given in place.states().items() if _is_one(value, given)), None)
 
 
 def _is_one(value: Value | None, given: Sequence[Value]) -> bool:
@@ -232,7 +231,7 @@ def _service(place: JsonLiftState, answer: Answer) -> str | None:
     if place.service is None:
         return None
     state = _state(place.service, answer)
-    return Hazard.OUT_OF_SERVICE if state in (None, "fault") else state
+    return state or Hazard.OUT_OF_SERVICE
 
 
 def _agv(place: JsonLiftState, answer: Answer, service: str | None) -> bool | None:

@@ -33,8 +33,8 @@ def timed(path: str, off_s: float | None = 10.0, **more: Any) -> dict[str, Any]:
 
 STATE: dict[str, Any] = {
     "floor": {"field": "car.floor", "values": {"B1": -1, "G": 0, "1": 1}},
-    "door": {"field": "car.door", "states": {"open": [2], "closed": [0], "moving": [1]}},
-    "motion": {"field": "car.motion", "states": {"stopped": ["still"], "moving": ["moves"]}},
+    "door": {"field": "car.door", "open": [2], "closed": [0], "moving": [1]},
+    "motion": {"field": "car.motion", "stopped": ["still"], "moving": ["moves"]},
     "agv_mode": {"field": "agv"},
     "fire_alarm": {"field": "alarms.fire", "when": ["FIRE"]},
     "online": {"field": "online"},
@@ -101,15 +101,21 @@ class TestPartsThatArePostedAndCallsByPath(HttpLiftContract):
             "floor": {"field": "place.body.floor"},
             "door": {
                 "field": "place.body.door",
-                "states": {"open": [True], "closed": [False], "moving": ["moving"]},
+                "open": [True],
+                "closed": [False],
+                "moving": ["moving"],
             },
             "motion": {
                 "field": "motion.body",
-                "states": {"stopped": ["still"], "up": ["up"], "down": ["down"]},
+                "stopped": ["still"],
+                "up": ["up"],
+                "down": ["down"],
             },
             "service": {
                 "field": "mode.is",
-                "states": {"normal": [0], "agv_mode": [1], "fire_alarm": [2]},
+                "normal": [0],
+                "agv_mode": [1],
+                "fire_alarm": [2],
             },
         },
         {
@@ -266,7 +272,7 @@ def test_an_answer_that_is_old_cut_or_of_another_type_is_no_reading(
 
 
 def test_an_unknown_service_state_is_out_of_service() -> None:
-    state = {**STATE, "service": {"field": "mode", "states": {"normal": [1], "manual_mode": [2]}}}
+    state = {**STATE, "service": {"field": "mode", "normal": [1], "manual_mode": [2]}}
     for said, hazards in ((1, set()), (2, {Hazard.MANUAL}), (3, {Hazard.OUT_OF_SERVICE})):
         driver = create("lift", settings_of(state), Gateway(mode=said))
         assert driver.read().hazards == hazards
@@ -356,12 +362,12 @@ def test_a_restart_after_a_lost_answer_ends_no_ride() -> None:
             " {agv_mode_request: <why it is safe here>}",
         ),
         ('{"floor": "{level}"}', "{}", '"{level}" into its body, or give calls'),
-        ("open: [OPEN], ", "", "needs values for open and for closed"),
+        ("open: [OPEN], ", "", "'door' needs 'open'"),
         ("closed: [CLOSED]", "closed: [OPEN]", "OPEN means open and closed"),
         ("L2: 1, ", "", "no value for L2"),
         ("L2: 1,", "L2: 1, L4: 4,", "'L4' is not a landing of this lift"),
         ("between_floors: [-1]", "between_floors: [2]", "2 means L3 and between floors"),
-        ("stopped: [none], ", "", "needs values for stopped"),
+        ("stopped: [none], ", "", "'motion' needs 'stopped'"),
         ("      state_path: /lifts/1\n", "", "give either state_path or state_parts"),
         (
             "      state_path: /lifts/1\n",
@@ -374,7 +380,8 @@ def test_a_restart_after_a_lost_answer_ends_no_ride() -> None:
         ("    api:\n", "    lift_id: east\n    api:\n", "no request carries"),
         ("    api:\n", "    profile: rmf-lift-template\n    api:\n", "delete one of the two"),
         ("method: digest}", "method: plain}", "digest"),
-        ("mode\n", "mode\n          states: {}\n", "already on line"),
+        ("moving: [OPENING", "shut: [OPENING", "unknown key 'shut'"),
+        ("up: [up], ", "", "needs values for moving, or for up and down"),
         ("path: /lifts/1/cancel", 'path: /lifts/1/call, body: \'{"floor": "{level}"}\'', "same"),
     ],
 )

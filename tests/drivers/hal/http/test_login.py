@@ -192,7 +192,7 @@ def test_a_password_that_anybody_could_read_is_refused_unless_the_site_gives_a_r
 
 def test_an_accepted_secret_is_still_warned_of_with_its_reason() -> None:
     for more in ({"login": LOGIN}, {"token_file": "t"}):
-        made = HttpSettings(api_base="tpu", accept_unencrypted="its own cable", **more)  # type: ignore[arg-type]
+        made = HttpSettings(api_base="tpu", accept_unencrypted="its own cable", **more)
         assert list(warnings(made)) == [
             (
                 ("accept_unencrypted",),
