@@ -42,8 +42,10 @@ class JsonFloor(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
 
     def problems(self) -> Remarks:
         """Yield a problem for each value with two meanings."""
-        landings = [(level, [value]) for level, value in self.values.items()]
-        yield from _doubles([*landings, ("between floors", self.between_floors)])
+        given = [(("values", level), value, level) for level, value in self.values.items()]
+        between = enumerate(self.between_floors)
+        given += [(("between_floors", str(n)), value, "between floors") for n, value in between]
+        yield from _doubles(given)
 
 
 class ListedStates(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -58,7 +60,11 @@ class ListedStates(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
 
     def problems(self) -> Remarks:
         """Yield a problem for each value with two meanings."""
-        yield from _doubles(self.states().items())
+        yield from _doubles(
+            ((state, str(n)), value, state)
+            for state, values in self.states().items()
+            for n, value in enumerate(values)
+        )
 
 
 class JsonDoor(ListedStates, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -149,14 +155,14 @@ class JsonLiftState(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
             yield ("agv_mode",), "service shows agv_mode too: delete one of the two"
 
 
-def _doubles(meanings: Iterable[tuple[str, Sequence[Value]]]) -> Remarks:
-    given: list[tuple[Value, str]] = []
-    for meaning, values in meanings:
-        for value in values:
-            for before, other in given:
-                if json_fields.same(value, before):
-                    yield (), f"{json_fields.value_text(value)} means {other} and {meaning}"
-            given.append((value, meaning))
+def _doubles(given: Iterable[tuple[tuple[str, str], Value, str]]) -> Remarks:
+    """Yield a problem for each value with two meanings. `given`: path, value and meaning."""
+    seen: list[tuple[Value, str]] = []
+    for path, value, meaning in given:
+        for before, other in seen:
+            if json_fields.same(value, before):
+                yield path, f"{json_fields.value_text(value)} means {other} and {meaning}"
+        seen.append((value, meaning))
 
 
 def decode(

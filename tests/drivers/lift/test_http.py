@@ -342,6 +342,20 @@ def test_an_off_that_fails_keeps_no_other_off_waiting() -> None:
     assert (gateway.sent, gateway.insisted) == (["/call/none", "/agv/off", "/door/off"], 1)
 
 
+def test_off_is_sent_although_the_state_cannot_be_read() -> None:
+    gateway = Gateway()
+    lift = create("lift", settings_of(), gateway)
+    lift.open()
+    lift.read()
+    lift.write(HOLD)
+    gateway.sent.clear()
+    gateway.answer = {}
+    with pytest.raises(DriverError):
+        lift.read()
+    lift.write(OFF)
+    assert gateway.sent == ["/agv/off", "/door/off"]
+
+
 def test_a_restart_after_a_lost_answer_ends_no_ride() -> None:
     gateway = Gateway()
     lift = create("lift", settings_of(), gateway)
