@@ -31,7 +31,8 @@ class Pushes:
     """Listens to a WebSocket in a thread of its own, until `close`.
 
     `headers`: those of the handshake, made for each connection. `wake`: called from the thread after
-    each connection and for messages.
+    each connection and for messages. A connection without a message counts as failed: a server may
+    accept each one and close it at once.
     """
 
     def __init__(
@@ -47,6 +48,7 @@ class Pushes:
         self._wake = wake
         self._ended = threading.Event()
         self._connection: ClientConnection | None = None
+        self._works = False
         self._thread = threading.Thread(target=self._run, name="http push", daemon=True)
         self._thread.start()
 
@@ -58,14 +60,15 @@ class Pushes:
         self._thread.join(OPEN_S)
 
     def _run(self) -> None:
-        pause_s, told = BACKOFF_FIRST_S, ""
+        pause_s, told = BACKOFF_FIRST_S, False
         while not self._ended.is_set():
+            self._works = False
             trouble = self._listened()
-            if self._connection:
-                pause_s, told, self._connection = BACKOFF_FIRST_S, "", None
-            if trouble != told and not self._ended.is_set():
+            if self._works:
+                pause_s, told = BACKOFF_FIRST_S, False
+            if not told and not self._ended.is_set():
                 log.warning(pairs("push_lost", url=self._url, reason=trouble))
-                told = trouble
+            told = True
             self._ended.wait(pause_s)
             pause_s = min(2 * pause_s, BACKOFF_MAX_S)
 
@@ -77,10 +80,12 @@ class Pushes:
             return "websockets is not installed: pip install 'rmf-bridges[push]'"
         try:
             with self._connected() as self._connection:
-                log.info(pairs("push_open", url=self._url))
                 self._wake()
                 while not self._ended.is_set():
                     self._connection.recv(decode=False)
+                    if not self._works:
+                        log.info(pairs("push_works", url=self._url))
+                    self._works = True
                     self._wake()
                     self._ended.wait(AT_MOST_EVERY_S)
         except (OSError, WebSocketException, HalError) as error:

@@ -116,6 +116,18 @@ def test_a_websocket_that_ends_is_opened_again_and_each_opening_wakes(
         wakes.more_than(1)
 
 
+def closes(connection: ServerConnection) -> None:
+    connection.close()
+
+
+def test_a_server_that_closes_each_websocket_at_once_is_logged_once(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    with pushing(closes) as (port, asked), listening(port):
+        wait_until(lambda: len(asked) > 2, "it connects again")
+    assert len([r for r in caplog.records if "push_" in r.message]) == 1
+
+
 def test_closing_a_silent_websocket_waits_for_nothing() -> None:
     with pushing(silent) as (port, asked), listening(port) as (_, wakes):
         wakes.more_than(0)
