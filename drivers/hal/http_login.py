@@ -5,7 +5,6 @@ Later requests carry the challenge's nonce from the start, for as long as the co
 """
 
 import base64
-import io
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import msgspec
@@ -71,7 +70,6 @@ class Signer:
         """Send the challenged request again, signed; return its answer. A second challenge is the
         answer then, a refusal. The body of the challenge is not read."""
         answer.raw.close()
-        answer.raw = io.BytesIO()
         signed: Response = self._digest.handle_401(  # type: ignore[no-untyped-call]
             answer, stream=True, verify=verify
         )

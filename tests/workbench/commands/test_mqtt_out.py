@@ -1,8 +1,10 @@
 """`mqtt-out` as a process, between RMF's graph and a real broker that is killed and restarted."""
 
+import argparse
 import json
 import subprocess
 import sys
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -16,9 +18,13 @@ from bridges.kinds.shared.rmf_section import Rmf
 from bridges.messages import definitions as d
 from bridges.messages import topics
 from bridges.transports.choose import open_transport
+from bridges.transports.transport import TransportError
 from hal_fakes.mosquitto import Mosquitto
 from hal_fakes.wire import runs_here
+from tests.transports.memory import MemoryNetwork, MemoryTransport
 from tests.waiting import wait_until
+from workbench.commands import mqtt_out as mqtt_out_command
+from workbench.graph import retained
 
 DOOR = d.DoorState(d.Time(1), "ward", d.DoorMode(0))
 STATE, AVAILABLE, STATUS = "rmf/door/ward/state", "rmf/door/ward/availability", "rmf/status"
@@ -140,6 +146,42 @@ def test_a_broker_that_is_killed_and_restarted_holds_everything_again(
         assert f"broker 127.0.0.1:{broker.port} is gone" in errors
         assert process.returncode == 0
     holds(broker, **{STATUS: "offline"})
+
+
+def test_what_a_restarted_broker_has_lost_is_published_at_once_and_not_only_renewed(
+    broker: Mosquitto, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(retained, "RENEWED_S", float("inf"))
+    network = MemoryNetwork()
+    node = MemoryTransport(network, "mqtt_out")
+    states = MemoryTransport(network, "door").publisher(topics.DOOR_STATES)
+    parser = argparse.ArgumentParser()
+    mqtt_out_command.add_arguments(parser)
+    out = mqtt_out_command.Broker(parser.parse_args([f"127.0.0.1:{broker.port}"]), STATUS)
+
+    def run() -> None:
+        with pytest.raises(TransportError):
+            mqtt_out_command.publish(node, out, retained.Retainer("rmf", None))
+
+    def holds_all() -> None:
+        with reader(broker) as found:
+
+            def shown() -> bool:
+                states.publish(DOOR)
+                return {STATUS, STATE, AVAILABLE} <= found.retained.keys()
+
+            wait_until(shown, "the broker holds everything")
+
+    thread = threading.Thread(target=run)
+    thread.start()
+    holds_all()
+    for _ in range(2):
+        broker.kill()
+        broker.start()
+        holds_all()
+    node.close()
+    thread.join()
+    out.close()
 
 
 def test_a_door_that_falls_silent_is_offline_and_a_killed_publisher_by_its_last_will(
