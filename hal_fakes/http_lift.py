@@ -101,9 +101,9 @@ class FakeHttpLift:
         """Yield each command as a request, and its effect on the plant."""
         commands = self._api.commands
         for name, command in commands.held().items():
-            yield asked(command.on), (name, True)
-            if command.off:
-                yield asked(command.off), (name, False)
+            yield asked(command.ask), (name, True)
+            if command.release:
+                yield asked(command.release), (name, False)
         for level in self._levels:
             value = self._api.state.floor.value(level)
             yield asked(commands.calling(level, value)), (f"call_{level}", True)

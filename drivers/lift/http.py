@@ -1,7 +1,7 @@
 """A lift behind a gateway that speaks HTTP and JSON (RMF's lift template, makers' gateways).
 
-If the network fails, only the gateway's own timers can end AGV mode and release the door. So `on` of
-a held command starts its timer (`switches_off_after_s`), and the driver sends `on` in every scan while
+If the network fails, only the gateway's own timers can end AGV mode and release the door. So `ask` of
+a held command starts its timer (`switches_off_after_s`), and the driver sends `ask` in every scan while
 the command is on. A call is one request, as a press of a button is.
 """
 
@@ -107,7 +107,7 @@ def _unsafe(settings: HttpLiftSettings) -> Iterator[Unsafe]:
     for name, command in api_of(settings).commands.held().items():
         if command.switches_off_after_s is None:
             text = (
-                f"when the network dies nothing ends {name}: let on set the gateway's own timer, and"
+                f"when the network dies nothing ends {name}: let ask set the gateway's own timer, and"
                 " write its time as switches_off_after_s"
             )
             yield name, _path(settings, "commands", name), text
@@ -153,7 +153,7 @@ def warnings(settings: HttpLiftSettings) -> Remarks:
         if off_s is not None:
             text = f"pull the network plug while {name} is on: it must end within {off_s:g} s"
             yield path, text
-            if command.off and (text := timer_unseen(command.on, off_s)):
+            if command.release and (text := timer_unseen(command.ask, off_s)):
                 yield path, text
         if not command.shown:
             yield path, f"{name} is not shown in the state: switching off is not verified"
@@ -310,7 +310,7 @@ class HttpLift:
     def _switch(self, name: Held, on: bool) -> None:
         self._told.pop(name, None)
         self._touched = True
-        send(self._bus, self._held[name].on if on else self._held[name].off, safe=not on)
+        send(self._bus, self._held[name].ask if on else self._held[name].release, safe=not on)
         self._told[name] = on
 
     def _call(self, level: str) -> None:

@@ -35,10 +35,10 @@ HELD: Final[tuple[Held, ...]] = ("agv_mode_request", "door_open", "rear_door_ope
 class HeldCommand(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """A command that is switched on and off."""
 
-    on: Annotated[Call, tells("switches it on.")]
-    off: Annotated[
+    ask: Annotated[Call, tells("asks for it.")]
+    release: Annotated[
         Call | None,
-        tells("""switches it off. Without `off` the request lasts for a moment at the gateway, and is
+        tells("""ends it. Without `release` the request lasts for a moment at the gateway, and is
         repeated in each scan while the command is on."""),
     ] = None
     shown: Annotated[
@@ -47,18 +47,18 @@ class HeldCommand(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     ] = None
     switches_off_after_s: Annotated[
         Timeout | None,
-        tells("""the gateway's own timer: it ends the command this long after the last `on`, which
+        tells("""the gateway's own timer: it ends the command this long after the last `ask`, which
         is sent in each scan."""),
     ] = None
 
     def is_renewed(self) -> bool:
-        """Is `on` sent in every scan while the command is on?"""
-        return self.off is None or self.switches_off_after_s is not None
+        """Is `ask` sent in every scan while the command is on?"""
+        return self.release is None or self.switches_off_after_s is not None
 
     def problems(self) -> Remarks:
-        """Yield a problem for an `off` that is the same request."""
-        if self.on == self.off:
-            yield ("off",), "is the same request as on"
+        """Yield a problem for a `release` that is the same request."""
+        if self.ask == self.release:
+            yield ("release",), "is the same request as ask"
 
 
 class LiftCommands(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -97,9 +97,9 @@ class LiftCommands(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
     def requests(self) -> Iterator[tuple[tuple[str, ...], Call]]:
         """Yield each request with its path below this section."""
         for name, command in self.held().items():
-            yield (name, "on"), command.on
-            if command.off:
-                yield (name, "off"), command.off
+            yield (name, "ask"), command.ask
+            if command.release:
+                yield (name, "release"), command.release
         yield from ((("calls", level), call) for level, call in self.calls.items())
         yield from (((n,), c) for n, c in (("call", self.call), ("cancel", self.cancel)) if c)
 
@@ -112,7 +112,7 @@ class LiftCommands(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
         seen: list[tuple[str, Call]] = []
         for path, call in self.requests():
             same = [other for other, before in seen if before == call]
-            if same and path[-1] != "off":
+            if same and path[-1] != "release":
                 yield path, f"{'.'.join(path)} is the same request as {same[0]}"
             seen.append((".".join(path), call))
 

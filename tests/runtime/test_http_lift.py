@@ -12,9 +12,9 @@ from bridges.settings.load import load
 from hal_fakes.http import HttpServer
 from hal_fakes.http_lift import FakeHttpLift, build
 from hal_fakes.realtime import RealTime
-from hal_fakes.wire import wire
+from hal_fakes.wire import join, wire
 from tests.drivers.lift.contract import QUICK
-from tests.runtime.site import daemon, join
+from tests.runtime.site import daemon
 from tests.waiting import wait_until
 
 EXAMPLE = Path(__file__).parents[2] / "config" / "lift_http.yaml"

@@ -35,6 +35,7 @@ WRITTEN: dict[str, object] = {
     "token_file": "/etc/rmf-bridges/charger.token",
     "token_header": "X-API-Key",
     "ca_file": "/etc/rmf-bridges/ca.pem",
+    "push_path": "/events",
     "driver": "register",
     "bus": "module",
     "accept_unsafe": {"fire_alarm": "the panel supervises its own loop"},

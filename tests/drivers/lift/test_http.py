@@ -28,7 +28,7 @@ SETTINGS: HttpLiftSettings = load(EXAMPLE).devices["Lift1"]
 
 def timed(path: str, off_s: float | None = 10.0, **more: Any) -> dict[str, Any]:
     off = {} if off_s is None else {"switches_off_after_s": off_s}
-    return {"on": {"path": f"{path}/on"}, "off": {"path": f"{path}/off"}, **off, **more}
+    return {"ask": {"path": f"{path}/on"}, "release": {"path": f"{path}/off"}, **off, **more}
 
 
 STATE: dict[str, Any] = {
@@ -369,9 +369,9 @@ def test_a_restart_after_a_lost_answer_ends_no_ride() -> None:
     ("old", "new", "wanted"),
     [
         (
-            "          switches_off_after_s: 10                  # the same number as in `on`\n",
+            "          switches_off_after_s: 10                  # the same number as in `ask`\n",
             "",
-            "unsafe: when the network dies nothing ends agv_mode_request: let on set the gateway's"
+            "unsafe: when the network dies nothing ends agv_mode_request: let ask set the gateway's"
             " own timer, and write its time as switches_off_after_s; or accept_unsafe:"
             " {agv_mode_request: <why it is safe here>}",
         ),
@@ -389,7 +389,7 @@ def test_a_restart_after_a_lost_answer_ends_no_ride() -> None:
             " outputs: {path: /o}}\n",
             "alarms.fire begins with none of state_parts",
         ),
-        ('{"on": false}', '{"on": true, "seconds": 10}', "is the same request as on"),
+        ('{"on": false}', '{"on": true, "seconds": 10}', "is the same request as ask"),
         ('{"hold": false}', "{hold: false}", "is not JSON"),
         ("    api:\n", "    lift_id: east\n    api:\n", "no request carries"),
         ("    api:\n", "    profile: rmf-lift-template\n    api:\n", "delete one of the two"),
@@ -426,7 +426,7 @@ def test_check_shows_every_request_and_field() -> None:
     rows = dict(describe(SETTINGS, http.HttpSettings(api_base="gateway", scan_s=0.5)))
     assert rows["state"] == "GET http://gateway/lifts/1 every 0.5 s"
     assert rows["age"] == "gateway.age_ms x 0.001"
-    assert rows["agv_mode_request on"].endswith('/lifts/1/robot {"on": true, "seconds": 10}')
+    assert rows["agv_mode_request ask"].endswith('/lifts/1/robot {"on": true, "seconds": 10}')
     assert rows["agv_mode_request ends"] == "by itself 10 s after its last request"
 
 
