@@ -66,6 +66,14 @@ def flag_if(answer: Mapping[str, object], place: JsonFlag | None) -> bool | None
     return None if place is None else flag(answer, place)
 
 
+def certain(answer: Mapping[str, object], place: JsonFlag | None) -> bool:
+    """Return the flag of a danger; False without a place. Raises DriverError as `flag` does, and for
+    null, which is no knowledge."""
+    if place and needed(answer, place.field) is None:
+        raise wrong(place.field, None, "yes or no")
+    return place is not None and flag(answer, place)
+
+
 def place_text(place: JsonFlag | JsonNumber) -> str:
     """Describe the place for `check`: its field, and the values that mean yes or the scale."""
     if isinstance(place, JsonNumber):

@@ -198,6 +198,8 @@ class HttpDoor:
 def decode(settings: HttpDoorSettings, answer: Mapping[str, object]) -> DoorSample:
     """Decode the answer. Raises DriverError with the name of an invalid field."""
     found, said = settings.inputs, partial(json_fields.flag_if, answer)
+    for danger in (found.obstruction, found.fire):
+        json_fields.certain(answer, danger)
     return DoorSample(
         said(found.opened), said(found.closed), said(found.obstruction), said(found.fire)
     )

@@ -180,7 +180,9 @@ def decode(
         rear_door=_door(place.rear_door, answer) if place.rear_door else None,
         motion=_motion(place.motion, answer) if place.motion else None,
         agv=_agv(place, answer, service),
-        hazards=frozenset(h for h in Hazard if h == service or _certain(answer, getattr(place, h))),
+        hazards=frozenset(
+            h for h in Hazard if h == service or json_fields.certain(answer, getattr(place, h))
+        ),
     )
 
 
@@ -244,12 +246,3 @@ def _agv(place: JsonLiftState, answer: Answer, service: str | None) -> bool | No
     if place.agv_mode:
         return json_fields.flag(answer, place.agv_mode)
     return service == "agv_mode" if place.shows("agv_mode") else None
-
-
-def _certain(answer: Answer, place: JsonFlag | None) -> bool:
-    """Return the flag of a hazard, of which null would be no knowledge. Raises DriverError."""
-    if place is None:
-        return False
-    if json_fields.needed(answer, place.field) is None:
-        raise json_fields.wrong(place.field, None, "yes or no")
-    return json_fields.flag(answer, place)

@@ -12,8 +12,9 @@ from bridges.kinds.door.signals import DoorOutputs, DoorSample
 from bridges.settings.load import load
 from drivers import DriverError
 from drivers.door import http as door_http
-from drivers.door.http import HttpDoorSettings, create
+from drivers.door.http import HttpDoorSettings, create, decode
 from drivers.hal import HalError, http
+from drivers.json_fields import JsonFlag
 from hal_fakes.http_door import PARTS, FakeHttpDoor, contacts
 from hal_fakes.plants.door import DoorPlant
 from hal_fakes.plants.plant import FailureMode
@@ -151,6 +152,16 @@ def test_an_input_that_is_neither_yes_nor_no_gives_no_reading() -> None:
         with pytest.raises(DriverError, match=r"'input:0\.state' is .* true or false is expected"):
             create("door", SETTINGS, Relay(opened=value)).read()
     assert create("door", SETTINGS, Relay(opened=None)).read() == DoorSample(False, True)
+
+
+@pytest.mark.parametrize("danger", ["obstruction", "fire"])
+def test_a_danger_that_is_null_gives_no_reading(danger: str) -> None:
+    inputs = msgspec.structs.replace(SETTINGS.inputs, **{danger: JsonFlag(field="danger")})
+    settings = msgspec.structs.replace(SETTINGS, inputs=inputs)
+    answer = Relay().get_json("")
+    assert getattr(decode(settings, {**answer, "danger": True}), danger) is True
+    with pytest.raises(DriverError, match="'danger' is null, and yes or no is expected"):
+        decode(settings, {**answer, "danger": None})
 
 
 WRONG = {
