@@ -6,7 +6,7 @@ BIN := .venv/bin
 # compiles every file again.
 export PYTHONDONTWRITEBYTECODE :=
 
-.PHONY: help demo demo-charging demo-page test test-page suite deep test-ros lint style types docs reference man deb lock reproducible release format bench flood soak torture test-vm mutate clean
+.PHONY: help broker demo demo-charging demo-page test test-page suite deep test-ros lint style types docs reference man deb lock reproducible release format bench flood soak torture test-vm mutate clean
 help:
 	@echo "make demo    a robot goes through a door, rides a lift and charges, on fake hardware"
 	@echo "             (TRANSPORT=zenoh make demo: on zenoh, the default on a Raspberry Pi)"
@@ -59,7 +59,13 @@ SIDE_BY_SIDE := -n 8 --dist loadscope --no-loadscope-reorder
 test: .venv/ready style docs
 	@$(MAKE) --no-print-directory -j 2 types suite
 
-suite: .venv/compiled
+# The broker of the tests on MQTT is from the distribution; as root, on a machine without one, it is installed.
+broker:
+	@PATH="$$PATH:/usr/sbin" command -v mosquitto >/dev/null || { test "$$(id -u)" = 0 && apt-get update -q && \
+	  apt-get install -y -q --no-install-recommends mosquitto; } || { \
+	  echo "An MQTT broker is missing: sudo apt install mosquitto"; exit 1; }
+
+suite: .venv/compiled broker
 	$(BIN)/pytest $(SIDE_BY_SIDE)
 
 # In a new environment one process compiles every file, so that the workers need not all do so at once.
@@ -75,7 +81,7 @@ test-page: .venv/ready
 	$(BIN)/pytest -m browser -n 3 --dist loadfile --no-loadscope-reorder tests/workbench/page/browser
 
 # Walks to their full depth and every example. Run it before a release and after a change to a core.
-deep: .venv/compiled
+deep: .venv/compiled broker
 	DEEP=1 $(BIN)/pytest $(SIDE_BY_SIDE)
 
 # rclpy needs ROS's own Python and its packages (numpy), so these tests have an environment on top of it.
