@@ -125,12 +125,13 @@ class HttpSettings(BusSettings, frozen=True, kw_only=True, forbid_unknown_fields
 
 def _readable_secret(settings: HttpSettings) -> Literal["login", "token_file", ""]:
     """Return the setting whose secret leaves this machine unencrypted; "" if there is none."""
+    basic = settings.login is not None and settings.login.method == "basic"
+    if not basic and not settings.token_file:
+        return ""
     where = base(settings.api_base)
     if where.scheme == "https" or is_loopback(where.host):
         return ""
-    if settings.login and settings.login.method == "basic":
-        return "login"
-    return "token_file" if settings.token_file else ""
+    return "login" if basic else "token_file"
 
 
 def warnings(settings: HttpSettings) -> Remarks:
