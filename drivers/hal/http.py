@@ -11,23 +11,19 @@ import socket
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING
 
-import msgspec
-
-from bridges.kinds.shared.fields import AbsolutePath, Name, Period, tells
-from bridges.kinds.shared.remarks import Remarks
 from bridges.system import user_files
-from drivers.hal import Bus, BusSettings, BusType, HalError, Needs, Where
+from drivers.hal import Bus, BusType, HalError
 from drivers.hal.backoff import Backoff
 from drivers.hal.deadline import Dialler, Resolve, tls_socket
-from drivers.hal.hosts import is_loopback
 from drivers.hal.http_address import Base, Path, base
 from drivers.hal.http_json import excerpt, json_object
-from drivers.hal.http_login import Login, Signer
+from drivers.hal.http_login import Signer
 from drivers.hal.http_push import Pushes
+from drivers.hal.http_settings import HttpSettings, Method, needs, warnings, where
 
-__all__ = ["Base", "HttpBus", "HttpSettings", "Method", "Path", "base"]
+__all__ = ["Base", "HttpBus", "HttpSettings", "Method", "Path", "base", "warnings"]
 
 if TYPE_CHECKING:
     from requests.adapters import HTTPAdapter
@@ -42,120 +38,11 @@ HEADERS = {
 }
 JSON = {"Content-Type": "application/json"}
 
-Method = Literal["POST", "PUT", "GET"]
-"""The HTTP method of a command. Some makes take commands as a GET with a query."""
-Header = Annotated[
-    str,
-    msgspec.Meta(
-        pattern=r"^[A-Za-z][A-Za-z0-9-]{0,63}$(?!\n)",
-        extra={"pattern": "the name of an HTTP header (X-API-Key)"},
-    ),
-]
-Timeout = Annotated[float, msgspec.Meta(ge=0.1, le=5, extra={"unit": "s"})]
-"""At most 5 s: a longer call would look like a hang to systemd (`WatchdogSec=10` of the unit)."""
-
 _HINTS = {
     3: "redirects are not followed: put the final address in api_base",
     4: "check api_base, the path, and token_file or login where the controller wants one",
     5: "the controller's own software fails: look at its log",
 }
-
-
-class HttpSettings(BusSettings, frozen=True, kw_only=True, forbid_unknown_fields=True, tag="http"):
-    """A controller's HTTP API."""
-
-    api_base: Annotated[
-        Name, tells("host, port and path that every path begins with (`192.168.1.60:8080/api`).")
-    ]
-    timeout_s: Annotated[
-        Timeout, tells("how long a whole call may take, from the name lookup to the last byte.")
-    ] = 1.0
-    scan_s: Annotated[Period, tells("how often the controller is read.")] = 1.0
-    token_file: Annotated[
-        Name | None, tells("a file with a bearer token or API key, which only the daemon may read.")
-    ] = None
-    token_header: Annotated[
-        Header | None,
-        tells("the token's header (`X-API-Key`); `Authorization: Bearer …` when absent."),
-    ] = None
-    login: Annotated[
-        Login | None, tells("the user and password of a controller without tokens.")
-    ] = None
-    accept_unencrypted: Annotated[
-        Name | None,
-        tells("""the reason why a token or a password may go over the network unencrypted, which
-        `check` prints."""),
-    ] = None
-    push_path: Annotated[
-        Path | None,
-        tells("""a WebSocket below `api_base`: at each of its messages the controller is read at once.
-        The message itself is never believed."""),
-    ] = None
-    ca_file: Annotated[
-        AbsolutePath | None,
-        tells("""with https, a PEM file with the certificate of the controller or of its authority;
-        when absent, the public authorities count."""),
-    ] = None
-
-    def problems(self) -> Remarks:
-        """Yield problems: an invalid address; settings without effect."""
-        try:
-            tls = base(self.api_base).scheme == "https"
-        except ValueError as error:
-            yield ("api_base",), str(error)
-            return
-        if self.ca_file and not tls:
-            yield ("ca_file",), "is for https: write api_base: https://…, or delete ca_file"
-        if self.token_header and not self.token_file:
-            yield ("token_header",), "needs token_file: the file with the header's value"
-        if self.login and self.token_file and not self.token_header:
-            yield ("login",), "token_file sends its own Authorization: delete one of the two"
-        if self.push_path and self.login and self.login.method == "digest":
-            yield ("push_path",), "a WebSocket has no digest login: delete push_path"
-        readable = _readable_secret(self)
-        if readable == "login" and not self.accept_unencrypted:
-            text = (
-                "with method: basic anybody on the network can read the password: write https://… or"
-                " method: digest where the controller has it, or accept_unencrypted: <why it is safe>"
-            )
-            yield ("login",), text
-        if self.accept_unencrypted and not readable:
-            yield ("accept_unencrypted",), "no secret goes over the network readably: delete it"
-
-
-def _readable_secret(settings: HttpSettings) -> Literal["login", "token_file", ""]:
-    """Return the setting whose secret leaves this machine unencrypted; "" if there is none."""
-    basic = settings.login is not None and settings.login.method == "basic"
-    if not basic and not settings.token_file:
-        return ""
-    where = base(settings.api_base)
-    if where.scheme == "https" or is_loopback(where.host):
-        return ""
-    return "login" if basic else "token_file"
-
-
-def warnings(settings: HttpSettings) -> Remarks:
-    """Yield valid settings that deserve a second look: (path, text)."""
-    readable = _readable_secret(settings)
-    if readable and settings.accept_unencrypted:
-        text = f"the secret goes over the network unencrypted: {settings.accept_unencrypted}"
-        yield ("accept_unencrypted",), text
-    elif readable:
-        text = (
-            "the token goes over the network unencrypted: write https://… where the controller has"
-            " it, or keep such controllers on a network of their own"
-        )
-        yield ("token_file",), text
-
-
-def needs(settings: HttpSettings) -> Needs:
-    """Return the controller's address."""
-    return Needs(host=base(settings.api_base).host)
-
-
-def where(settings: HttpSettings) -> Where:
-    """Return the controller's address."""
-    return Where(base(settings.api_base).url(""), local=False)
 
 
 class HttpBus(Bus):

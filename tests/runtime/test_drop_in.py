@@ -45,6 +45,7 @@ SHIPPED = {
     "lift_dry_contact": GPIO,
     "lift_gateway": NET,
     "lift_gateway_contacts": SERIAL,
+    "lift_http": NET,
     "lift_io_module": NET,
     "lift_low_level": GPIO,
     "lift_one_hot": GPIO,

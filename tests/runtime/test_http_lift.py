@@ -24,9 +24,7 @@ class Gateway:
     """A gateway with a lift; its timers are longer than any test, so only the daemon switches off."""
 
     def __init__(self, folder: Path, domain: int) -> None:
-        text = EXAMPLE.read_text().replace(
-            "switches_off_after_s: 10", "switches_off_after_s: 900"
-        )
+        text = EXAMPLE.read_text().replace("switches_off_after_s: 10", "switches_off_after_s: 900")
         text = text.replace("stale_after_s: 3", "stale_after_s: 3, floor_travel_min_s: 0.05")
         text = text.replace("    ca_file: /etc/rmf-bridges/gateway.pem\n", "")
         text = text.replace("# push_path: /events ", "push_path: /events  # ")
