@@ -7,8 +7,12 @@ a button. Failures of server, headers and body: `hal_fakes/http.py`.
 import json
 import time
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import count
 from typing import Final
 
+import msgspec
+
+from bridges.kinds.lift.settings import LiftSettings
 from bridges.kinds.lift.signals import Hazard
 from drivers.json_fields import Value, found
 from drivers.lift.dry_contact import DryContactLiftSettings
@@ -17,7 +21,6 @@ from drivers.lift.json_state import ListedStates
 from hal_fakes.fake import Fake
 from hal_fakes.http import Asked
 from hal_fakes.json_answers import asked, put, value_of
-from hal_fakes.lift_contacts import behind
 from hal_fakes.plants.lift import LiftPace, LiftPlant
 from hal_fakes.plants.plant import Plant
 
@@ -29,12 +32,29 @@ NEVER: Final = float("inf")
 
 
 def contacts(settings: HttpLiftSettings) -> DryContactLiftSettings:
-    """Return the wiring of the contacts of the lift behind the gateway."""
-    api = api_of(settings)
-    state = api.state
-    doors = [name for name in ("door", "rear_door") if getattr(state, name)]
-    motions = set(state.motion.states()) if state.motion else set()
-    return behind(settings, state.shows, doors, motions, api.commands.held())
+    """Return the wiring of the contacts of the lift behind the gateway; they can be cut as our wires
+    can."""
+    api, numbers = api_of(settings), count()
+    state, levels = api.state, settings.levels()
+
+    def line(active: str = "high") -> dict[str, str]:
+        return {"point": f"line {next(numbers)}", "active": active}
+
+    wired = {h.value: line("low") for h in Hazard if state.shows(h)}
+    inputs = ["agv_mode"] if state.shows("agv_mode") else []
+    doors = (name for name in ("door", "rear_door") if getattr(state, name))
+    inputs += [f"{door}_{end}" for door in doors for end in ("opened", "closed")]
+    if state.motion:
+        inputs += ["moving"] if state.motion.moving else ["up", "down"]
+    plain = {
+        **{n: getattr(settings, n) for n in LiftSettings.__struct_fields__},
+        "accept_unsafe": {},
+        "inputs": wired | {name: line() for name in inputs},
+        "floor_code": {"encoding": "one_hot", "lines": {level: line() for level in levels}},
+        "outputs": {name: line() for name in api.commands.held()},
+        "calls": {level: line() for level in levels},
+    }
+    return msgspec.convert(msgspec.to_builtins(plain), DryContactLiftSettings)
 
 
 def build(name: str, settings: HttpLiftSettings, pace: LiftPace | None = None) -> LiftPlant:
