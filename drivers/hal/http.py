@@ -20,7 +20,6 @@ from drivers.hal.deadline import Dialler, Resolve, tls_socket
 from drivers.hal.http_address import Base, Path, base
 from drivers.hal.http_json import excerpt, json_object
 from drivers.hal.http_login import Signer
-from drivers.hal.http_push import Pushes
 from drivers.hal.http_settings import HttpSettings, Method, needs, warnings, where
 
 __all__ = ["Base", "HttpBus", "HttpSettings", "Method", "Path", "base", "warnings"]
@@ -28,6 +27,8 @@ __all__ = ["Base", "HttpBus", "HttpSettings", "Method", "Path", "base", "warning
 if TYPE_CHECKING:
     from requests.adapters import HTTPAdapter
     from urllib3 import BaseHTTPResponse
+
+    from drivers.hal.http_push import Pushes
 
 BODY_MAX = 64 * 1024
 HEADERS = {
@@ -68,6 +69,8 @@ class HttpBus(Bus):
     def on_edge(self, wake: Callable[[], None]) -> None:
         """Call `wake` at each message of the controller's WebSocket, if it has one."""
         if self._settings.push_path and self._pushes is None:
+            from drivers.hal.http_push import Pushes
+
             self._pushes = Pushes(
                 self._base.url(self._settings.push_path),
                 self._headers,
