@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterable, Mapping
 from typing import Any, Generic
 
 from bridges.kinds.shared.decision import (
+    AlarmInputs,
     Fault,
     IoFailed,
     M,
@@ -28,7 +29,7 @@ from bridges.messages.stamps import ClockError
 from bridges.messages.topics import Topic
 from bridges.runtime import diagnostics
 from bridges.runtime.answers import RefusalAnswers
-from bridges.runtime.clock import Clock, PublishPace
+from bridges.runtime.clock import TELL_EVERY_S, Clock, PublishPace
 from bridges.runtime.contained import Contained
 from bridges.runtime.refusals import Refusals
 from bridges.runtime.ring_writer import NOBODY, NoWriter
@@ -37,13 +38,15 @@ from bridges.system.log import pairs, plain
 from drivers import Driver, DriverError
 
 NotSent = Callable[[Topic[Message], Exception], None]
+TellAlarm = Callable[[str, AlarmInputs], None]
 
 log = logging.getLogger(__name__)
 
 
 class Node(Generic[S, L, M, X, E, O, R]):
     """Serves one device. `publish(topic, message)` sends to RMF and does not raise.
-    `not_sent(topic, error)` notes a state that cannot be sent."""
+    `not_sent(topic, error)` notes a state that cannot be sent. `tell_alarm(name, causes)` tells the
+    daemon's alarm which causes the device sees; None if this device tells the fleets nothing."""
 
     def __init__(
         self,
@@ -56,6 +59,7 @@ class Node(Generic[S, L, M, X, E, O, R]):
         clock: Clock,
         writer: NoWriter = NOBODY,
         not_sent: NotSent = lambda topic, error: None,
+        tell_alarm: TellAlarm | None = None,
     ) -> None:
         self.name = name
         self.wake_at = AGES_AGO
@@ -64,6 +68,9 @@ class Node(Generic[S, L, M, X, E, O, R]):
         self._driver = Contained(name, driver, clock)
         self._publish = publish
         self._not_sent = not_sent
+        self._tell_alarm = tell_alarm
+        self._alarm_told: AlarmInputs | None = None
+        self._alarm_at = AGES_AGO
         self._clock = clock
         self._refusals = Refusals()
         memory = kind.initial(limits, clock.monotonic())
@@ -114,6 +121,7 @@ class Node(Generic[S, L, M, X, E, O, R]):
             self._decide(event)
         self._write()
         self._contacts = {} if self._failing else self._driver.contacts()
+        self._alarm()
         self._tell()
         self._answer()
         self._log()
@@ -173,6 +181,16 @@ class Node(Generic[S, L, M, X, E, O, R]):
         outputs = decision.outputs
         self._logged_outputs = outputs if self._logged_outputs is None else self._logged_outputs
 
+    def _alarm(self) -> None:
+        """Tell the daemon's alarm the causes that the device sees, at once and again each second."""
+        if self._tell_alarm is None or self._kind.alarm_inputs is None:
+            return
+        assert self.subject.decision is not None
+        now, inputs = self._clock.monotonic(), self._kind.alarm_inputs(self.subject.decision.report)
+        if inputs != self._alarm_told or now >= self._alarm_at:
+            self._alarm_told, self._alarm_at = inputs, now + TELL_EVERY_S
+            self._tell_alarm(self.name, inputs)
+
     def _tell(self) -> None:
         """Publish the state if it is due. A request alone does not make it due."""
         subject, now = self.subject, self._clock.monotonic()
@@ -196,14 +214,17 @@ class Node(Generic[S, L, M, X, E, O, R]):
         return self._kind.answer(self.name, request, reason, decision.report)
 
     def _send(self, report: R) -> bool:
-        """Publish the state; return False if it was not sent."""
+        """Publish the state; return False if it was not sent, or if RMF has no message for it."""
+        topic = self._kind.states
+        if topic is None:
+            return False
         try:
             at = self._clock.stamp(report.read_at)
         except ClockError as error:
-            self._not_sent(self._kind.states, error)
+            self._not_sent(topic, error)
             return False
         state = self._kind.state_message(self.name, self._settings, report, at)
-        return self._publish(self._kind.states, state) is not False
+        return self._publish(topic, state) is not False
 
     def _log(self) -> None:
         """Log changes. This is the last step of a scan, because a log line takes as long as a scan."""

@@ -18,6 +18,7 @@ from bridges.messages.topics import M_co, Topic
 from bridges.messages.words import LONGEST_NAME
 from bridges.runtime.clock import Clock, machine_s
 from bridges.runtime.device import AnyNode, Node
+from bridges.runtime.fleet_alarm import FleetAlarmNode, node_for
 from bridges.runtime.graph_node import AnyGraphNode, GraphNode
 from bridges.runtime.keeper import MemoryStore
 from bridges.runtime.loop import Loop
@@ -88,7 +89,8 @@ def service(
     if isinstance(kind, GraphKind):
         node = GraphNode(kind, config.section, transport, clock, named, kept, writer)
         return GraphService(node, clock)
-    return Devices(config, kind, transport, open_bus, named, clock, unsafe, writer)
+    alarm = node_for(config.devices, transport, clock, named, kept, writer)
+    return Devices(config, kind, transport, open_bus, named, clock, unsafe, writer, alarm)
 
 
 class GraphService:
@@ -118,8 +120,11 @@ class Devices:
         clock: Clock,
         unsafe: Collection[str] = (),
         writer: NoWriter = NOBODY,
+        alarm: FleetAlarmNode | None = None,
     ) -> None:
+        """`alarm`: the node that tells the fleets of the devices' alarms; None if no device does."""
         self._config = config
+        self._alarm = alarm
         self._writer = writer
         self._unsafe = unsafe
         self._kind = kind
@@ -132,7 +137,8 @@ class Devices:
         self._hears: dict[str, Subscription] = {}
         self._attended: bool | None = None
         self._loops = [self._loop(name, open_bus) for name in config.buses]
-        self.loops = [Serving(loop, clock) for loop in self._loops]
+        served = [*self._loops, *([alarm] if alarm else [])]
+        self.loops = [Serving(each, clock) for each in served]
         self._placed = {node.name: (node, loop) for loop in self._loops for node in loop.nodes}
 
     def subscribe(self) -> None:
@@ -143,18 +149,24 @@ class Devices:
             self._hears[topic.name] = self._transport.subscribe(self._named(topic), hear)
         for topic in self._kind.recorded:
             self._transport.subscribe(self._named(topic), partial(self._record, self._named(topic)))
-        states = self._kind.states
-        hear = self._to_inbox(states, lambda state, settings: RivalSeen())
-        self._transport.subscribe(self._named(states), hear, others_only=True)
+        if states := self._kind.states:
+            hear = self._to_inbox(states, lambda state, settings: RivalSeen())
+            self._transport.subscribe(self._named(states), hear, others_only=True)
+        if self._alarm:
+            self._alarm.subscribe()
 
     def reset(self) -> None:
-        """Put the reset into the inbox of each device."""
+        """Put the reset into the inbox of each device, and reset the alarm."""
+        if self._alarm:
+            self._alarm.reset()
         for device, (_, loop) in self._placed.items():
             loop.inbox.put(device, OperatorReset())
 
     def look(self) -> None:
         """Tell each device when a first node that may send requests appears, and when the last such
         node disappears."""
+        if self._alarm:
+            self._alarm.look()
         topic = self._kind.attended_by
         if topic is None:
             return
@@ -167,21 +179,21 @@ class Devices:
 
     def status(self) -> Status:
         """Return the service's status, for the status file."""
-        return {
+        shown = {
             "requests_for_others": self._strangers["requests"],
             "events_dropped": sum(loop.inbox.dropped for loop in self._loops),
             "faults": [{"code": f.code, "detail": f.detail} for f in self._outlet.faults],
             "heard_by": self._outlet.heard_by(),
             "hears": {name: end.matched() for name, end in self._hears.items()},
         }
+        return self._alarm.beside(shown) if self._alarm else shown
 
     def devices(self) -> Mapping[str, Status]:
         """Return each device's status, for the status file."""
         return {name: node.status() for name, (node, _) in self._placed.items()}
 
     def _topics(self) -> list[Topic[Message]]:
-        others = {t for d in self._config.devices.values() for t in self._kind.publishes(d)}
-        return [self._kind.states, *others]
+        return [self._kind.states] if self._kind.states else []
 
     def _loop(self, bus_name: str, open_bus: OpenBus) -> Loop:
         settings = self._config.buses[bus_name]
@@ -197,8 +209,9 @@ class Devices:
         if name in self._unsafe:
             driver = SafeFirst(name, driver)
         out, clock, writer = self._outlet, self._clock, self._writer
+        tell = self._alarm.tell if self._alarm and self._kind.publishes(device) else None
         return Node(
-            name, self._kind, device, limits, driver, out.publish, clock, writer, out.failed
+            name, self._kind, device, limits, driver, out.publish, clock, writer, out.failed, tell
         )
 
     def _to_inbox(

@@ -6,6 +6,7 @@ from itertools import pairwise
 
 from bridges.kinds.lift.settings import LiftSettings
 from bridges.kinds.lift.signals import Hazard, Side
+from bridges.kinds.shared.alarming import alarm_problems
 from bridges.kinds.shared.remarks import Remarks
 from drivers.hal.points import Wire, is_number
 from drivers.lift import codes
@@ -106,7 +107,8 @@ def notes(settings: LiftSettings, sees: Sees) -> Remarks:
 
 
 def alarm(settings: LiftSettings) -> Remarks:
-    """Yield a problem for `alarm_on` without a topic for its alarms."""
+    """Yield the problems of the alarm for the fleets."""
+    yield from alarm_problems(settings)
     if settings.alarm == "none" and settings.alarm_on != [Hazard.FIRE]:
         yield ("alarm_on",), "alarm: none sends no alarm; write alarm: emergency_signal"
 

@@ -14,7 +14,7 @@ from bridges.kinds.door.memory import (
     travel_ends_at,
 )
 from bridges.kinds.door.sensing import BelievedDoor, released_by_fire
-from bridges.kinds.shared.decision import Fault
+from bridges.kinds.shared.decision import AlarmInputs, Fault
 from bridges.messages.definitions import DoorModeValue
 
 
@@ -22,7 +22,7 @@ class DoorReport(msgspec.Struct, frozen=True):
     """The door's state for RMF and the status file. `hold`: we hold the door open, even between pulses.
 
     `estimated`: no contact proves `mode`. `waits`: the reason why RMF's OPEN is not yet fulfilled; ""
-    without an OPEN, or when the door is OPEN.
+    without an OPEN, or when the door is OPEN. `alarm`: the fire input, for the fleets.
     """
 
     mode: DoorModeValue
@@ -31,9 +31,10 @@ class DoorReport(msgspec.Struct, frozen=True):
     hold: bool = False
     estimated: bool = False
     waits: str = ""
+    alarm: AlarmInputs = AlarmInputs()
 
     def news(self) -> object:
-        """Return the report without its age and without `waits`, which RMF does not see."""
+        """Return the report without its age, and without `waits` and `alarm`, which DoorState lacks."""
         return self.mode, self.faults, self.hold, self.estimated
 
 
@@ -47,6 +48,7 @@ def report(memory: DoorMemory, view: BelievedDoor, now: float, limits: DoorLimit
         hold=memory.held,
         estimated=bool(view.estimated & _PROOFS.get(mode, frozenset())),
         waits=_waits(memory, view, mode, now),
+        alarm=AlarmInputs(frozenset({"fire"} if view.fire else ()), view.seen),
     )
 
 

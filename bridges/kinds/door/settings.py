@@ -5,7 +5,8 @@ from typing import Annotated, Literal
 import msgspec
 from msgspec import Meta
 
-from bridges.kinds.shared.fields import DeviceSettings, Patience, Seconds, Timeout, tells
+from bridges.kinds.shared.alarming import AlarmingSettings, alarm_problems
+from bridges.kinds.shared.fields import Patience, Seconds, Timeout, tells
 from bridges.kinds.shared.remarks import Remarks
 
 StaleAfter = Annotated[float, Meta(ge=0.1, le=60, extra={"unit": "s"})]
@@ -53,7 +54,7 @@ class Pulse(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     every_s: Annotated[PulseSeconds, tells("the time from one pulse's start to the next.")]
 
 
-class DoorSettings(DeviceSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class DoorSettings(AlarmingSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """The settings of one door, except its wiring."""
 
     limits: Annotated[DoorDurations, tells("the durations that differ from their defaults.")] = (
@@ -79,6 +80,10 @@ class DoorSettings(DeviceSettings, frozen=True, kw_only=True, forbid_unknown_fie
 
     def problems(self) -> Remarks:
         """Yield the contradictions between fields."""
+        yield from alarm_problems(self)
+        if self.alarm != "none" and self.on_fire is None:
+            text = "this door has no fire input, so it raises no alarm: delete alarm, or wire fire"
+            yield ("alarm",), text
         if self.pulse and self.pulse.on_s >= self.pulse.every_s:
             yield (
                 ("pulse", "on_s"),

@@ -5,6 +5,7 @@ from bridges.kinds.lift.memory import LiftLimits, LiftMemory
 from bridges.kinds.lift.report import LiftReport
 from bridges.kinds.lift.settings import LiftSettings
 from bridges.kinds.lift.signals import Asked, LiftOutputs, LiftSample
+from bridges.kinds.shared.alarming import alarm_topics
 from bridges.kinds.shared.kind import Kind
 from bridges.kinds.shared.recorded import Recorded
 from bridges.messages.topics import LIFT_REQUESTS, LIFT_STATES
@@ -28,7 +29,8 @@ KIND: Kind[
     initial=core.initial,
     decide=core.decide,
     published=core.published,
-    publishes=messages.alarm_topics,
+    publishes=alarm_topics,
+    alarm_inputs=lambda report: report.alarm,
     on_map=lambda settings: settings.on_map(),
     state_message=messages.state_message,
     summary=messages.summary,

@@ -54,14 +54,11 @@ from bridges.kinds.shared.decision import (
     IoFailed,
     OperatorReset,
     RivalSeen,
-    Said,
     Sampled,
     Suspended,
     WriteFailed,
 )
 from bridges.kinds.shared.durations import NEVER, RIVAL_QUIET_S
-from bridges.messages.definitions import Bool, EmergencySignal
-from bridges.messages.topics import EMERGENCY_SIGNAL, FIRE_ALARM_TRIGGER
 
 NOT_RMFS = frozenset(
     {
@@ -85,7 +82,6 @@ def decide(
     memory: LiftMemory, event: Event, now: float, limits: LiftLimits
 ) -> Decision[LiftMemory, LiftOutputs, LiftReport]:
     """Decide one scan: apply the event, judge the inputs, derive the outputs and the report afresh."""
-    alarmed_before = memory.alarmed
     memory, refused = _take(sessions.lapse(memory, now, limits), event, now, limits)
     view = look(memory.senses, now, limits)
     memory = _latch(memory, view, now, limits)
@@ -97,7 +93,6 @@ def decide(
         report(memory, view, outputs, _faults(memory, view, now, limits), now, limits),
         _wake_at(memory, view, outputs, now, limits),
         refused,
-        _alarms(alarmed_before, memory, limits),
     )
 
 
@@ -213,32 +208,20 @@ def _reset(memory: LiftMemory, now: float, limits: LiftLimits) -> LiftMemory:
         memory,
         session=session,
         fire_latched=unseen and memory.fire_latched,
-        alarmed=unseen and memory.alarmed,
         senses=trust(memory.senses),
     )
 
 
 def _latch(memory: LiftMemory, view: BelievedLift, now: float, limits: LiftLimits) -> LiftMemory:
-    """Latch a fire if `fire_reset` says so, and an alarm until an operator's reset. Forget a rival that
-    has been silent for RIVAL_QUIET_S."""
+    """Latch a fire if `fire_reset` says so. Forget a rival that has been silent for RIVAL_QUIET_S."""
     burning = Hazard.FIRE in view.hazards
     manual = limits.fire_reset == "manual"
     rival_at = memory.rival_at
     return replace(
         memory,
         fire_latched=manual and (burning or memory.fire_latched),
-        alarmed=memory.alarmed or bool(limits.alarm_on & view.hazards),
         rival_at=None if rival_at is None or now >= rival_at + RIVAL_QUIET_S else rival_at,
     )
-
-
-def _alarms(before: bool, memory: LiftMemory, limits: LiftLimits) -> tuple[Said, ...]:
-    """Publish `true` once when a hazard of `alarm_on` comes, `false` once when an operator resets."""
-    if memory.alarmed == before or limits.alarm == "none":
-        return ()
-    if limits.alarm == FIRE_ALARM_TRIGGER.name:
-        return ((FIRE_ALARM_TRIGGER, Bool(memory.alarmed)),)
-    return ((EMERGENCY_SIGNAL, EmergencySignal((), memory.alarmed)),)
 
 
 def _faults(

@@ -21,7 +21,7 @@ class LiftLimits(msgspec.Struct, frozen=True, dict=True):
     """The settings of a lift that its core needs.
 
     `stops`: RMF's floor name -> landing and door, from the lowest up. `t`: the durations.
-    `debounce`: signal -> s. `alarm_on`: the hazards that are published on the topic `alarm`.
+    `debounce`: signal -> s. `alarm_on`: the hazards that the fleets are told of.
     `by_call`: a call brings AGV mode.
     """
 
@@ -29,7 +29,6 @@ class LiftLimits(msgspec.Struct, frozen=True, dict=True):
     t: LiftDurations = LiftDurations()
     debounce: Mapping[str, float] = {}
     fire_reset: Literal["auto", "manual"] = "auto"
-    alarm: Literal["none", "fire_alarm_trigger", "emergency_signal"] = "none"
     alarm_on: frozenset[Hazard] = frozenset({Hazard.FIRE})
     by_call: bool = False
 
@@ -41,7 +40,6 @@ class LiftLimits(msgspec.Struct, frozen=True, dict=True):
             settings.limits,
             debounce,
             settings.fire_reset,
-            settings.alarm,
             frozenset(map(Hazard, settings.alarm_on)),
             by_call=settings.agv_mode == "by_call",
         )
@@ -187,7 +185,6 @@ class LiftMemory(msgspec.Struct, frozen=True):
     grace: Grace | None = None
     relays: Relays = Relays()
     fire_latched: bool = False
-    alarmed: bool = False
     rival_at: float | None = None
     io_fault: str = ""
     unwritten_since: float | None = None

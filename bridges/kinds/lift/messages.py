@@ -14,15 +14,9 @@ from bridges.messages.definitions import (
     LiftRequestDoor,
     LiftRequestType,
     LiftState,
-    Message,
     Time,
 )
-from bridges.messages.topics import (
-    ADAPTER_LIFT_REQUESTS,
-    EMERGENCY_SIGNAL,
-    FIRE_ALARM_TRIGGER,
-    Topic,
-)
+from bridges.messages.topics import ADAPTER_LIFT_REQUESTS
 
 OWN_REQUESTS = ADAPTER_LIFT_REQUESTS.live()
 """Fleet adapters' requests to RMF's supervisor. We listen there to the robot that has the lift."""
@@ -68,11 +62,6 @@ def _stamp(request: LiftRequest) -> int:
         return in_ns(request.request_time)
     except RequestRefused:
         return 0
-
-
-def alarm_topics(settings: LiftSettings) -> tuple[Topic[Message], ...]:
-    """Return the topic of this lift's alarms to the fleets; empty if it publishes none."""
-    return tuple(t for t in (FIRE_ALARM_TRIGGER, EMERGENCY_SIGNAL) if t.name == settings.alarm)
 
 
 def device_name(message: LiftRequest | LiftState) -> str:

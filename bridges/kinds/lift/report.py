@@ -8,7 +8,7 @@ from bridges.kinds.lift.memory import LiftLimits, LiftMemory, LiftSession
 from bridges.kinds.lift.relays import Relays
 from bridges.kinds.lift.sensing import BelievedLift
 from bridges.kinds.lift.signals import Hazard, LiftOutputs, Motion
-from bridges.kinds.shared.decision import Fault
+from bridges.kinds.shared.decision import AlarmInputs, Fault
 from bridges.messages.definitions import LiftDoor, LiftMode, LiftMotion
 
 NOT_FRESH = "INPUTS_NOT_FRESH"
@@ -22,6 +22,7 @@ class LiftReport(msgspec.Struct, frozen=True):
     `floor`: RMF's name, "" when unknown. `read_at`: monotonic seconds, None before the first reading.
     `estimated`: no contact proves `door`. `boarded`: a robot may be inside. `waits`: the reason why the
     session's request is not fulfilled yet; "" without a request, or once RMF sees it fulfilled.
+    `alarm`: the hazards of `alarm_on`.
     """
 
     read_at: float | None
@@ -35,6 +36,7 @@ class LiftReport(msgspec.Struct, frozen=True):
     estimated: bool = False
     boarded: bool = False
     waits: str = ""
+    alarm: AlarmInputs = AlarmInputs()
 
     @property
     def open_at(self) -> str:
@@ -74,6 +76,7 @@ def report(
         faults=(*faults, *_worn(relays, wanted, now, limits)),
         estimated=estimated,
         boarded=bool(session and session.boarded),
+        alarm=AlarmInputs(frozenset(map(str, limits.alarm_on & view.hazards)), view.fresh),
     )
     if session is None or (shown.open_at == destination and session.doubted is None):
         return shown

@@ -7,9 +7,9 @@ import msgspec
 from msgspec import Meta
 
 from bridges.kinds.lift.signals import Side, Stop
+from bridges.kinds.shared.alarming import AlarmingSettings
 from bridges.kinds.shared.fields import (
     Brief,
-    DeviceSettings,
     Name,
     Patience,
     Period,
@@ -103,7 +103,7 @@ class LiftDurations(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
             yield ("floor_timeout_s",), text
 
 
-class LiftSettings(DeviceSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class LiftSettings(AlarmingSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """The settings of one lift, except its wiring."""
 
     floors: Annotated[
@@ -124,12 +124,6 @@ class LiftSettings(DeviceSettings, frozen=True, kw_only=True, forbid_unknown_fie
         tells("""RMF may use the lift again when the alarm clears (`auto`), or only after
         `rmf-bridge reset` (`manual`)."""),
     ] = "auto"
-    alarm: Annotated[
-        Literal["none", "fire_alarm_trigger", "emergency_signal"],
-        tells(
-            "the topic that tells the fleets of an alarm; `none` if the site wants no such topic."
-        ),
-    ] = "none"
     alarm_on: Annotated[
         AlarmOn,
         tells("""the hazards that raise this alarm. All robots then leave the lifts and stop

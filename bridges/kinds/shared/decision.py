@@ -70,6 +70,18 @@ class OperatorReset(msgspec.Struct, frozen=True):
     """An operator has run `rmf-bridge reset`: a latched fault may clear if its cause is gone."""
 
 
+class AlarmInputs(msgspec.Struct, frozen=True):
+    """The causes at one device that the fleets are told of (`bridges/kinds/shared/fleet_alarm.py`).
+
+    `present`: the causes that are seen now. `seen`: the inputs are read, so that a cause outside
+    `present` is over. `drill`: the device asks for a drill.
+    """
+
+    present: frozenset[str] = frozenset()
+    seen: bool = False
+    drill: bool = False
+
+
 class Report(Protocol):
     """The content of RMF's state message and of the status file."""
 

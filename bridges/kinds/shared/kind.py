@@ -10,6 +10,7 @@ from typing import Any, Generic, NamedTuple, TypeVar, Union
 from msgspec import Struct
 
 from bridges.kinds.shared.decision import (
+    AlarmInputs,
     Decision,
     IoFailed,
     M,
@@ -51,7 +52,8 @@ class RefusalAnswer(NamedTuple):
 class Kind(Struct, Generic[S, L, M, X, E, O, R], frozen=True):
     """One kind of device: its settings, limits, memory, sample, requests, outputs and report.
 
-    `devices_key`: the section of the devices in the YAML. `states`: the topic of their states.
+    `devices_key`: the section of the devices in the YAML. `states`: the topic of their states; None if
+    RMF has no message about their state.
     `requests`: each topic that it obeys, with `accept(message, settings) -> event`, which raises
     RequestRefused for a message that is malformed or impossible for this device.
     `device_name`: the device named in a message (request or state). `sender`: the requester behind a
@@ -61,7 +63,9 @@ class Kind(Struct, Generic[S, L, M, X, E, O, R], frozen=True):
     `decide`: the core. `state_message(name, settings, report, stamp)`: the report as RMF's message.
     `summary(report)`: key -> value for the log line, the status file and `watch`.
     `published(memory, report)`: the memory after this report has gone out to RMF.
-    `publishes(settings)`: the topics on which a device publishes beside its states.
+    `publishes(settings)`: the topics on which the daemon of a device publishes beside its states.
+    `alarm_inputs(report)`: the causes of an alarm for the fleets that the device sees
+    (`bridges/kinds/shared/fleet_alarm.py`); None for a kind without alarms.
     `answer(name, request, reason, report)`: the published answer to a refused request; None for no
     answer. `request`: the message if it is malformed, else the event.
     `on_map(settings)`: settings that name a place on RMF's map, as `Place`s. The device's own name is
@@ -72,7 +76,7 @@ class Kind(Struct, Generic[S, L, M, X, E, O, R], frozen=True):
 
     name: str
     devices_key: str
-    states: Topic[Message]
+    states: Topic[Message] | None
     requests: Mapping[Topic[Message], Callable[[Any, S], E]]
     device_name: Callable[[Any], str]
     sender: Callable[[Any], str]
@@ -83,6 +87,7 @@ class Kind(Struct, Generic[S, L, M, X, E, O, R], frozen=True):
     summary: Callable[[R], Mapping[str, str]]
     published: Callable[[M, R], M] = lambda memory, report: memory
     publishes: Callable[[S], tuple[Topic[Message], ...]] = lambda settings: ()
+    alarm_inputs: Callable[[R], AlarmInputs] | None = None
     answer: Callable[[str, object, str, R], RefusalAnswer | None] = (
         lambda name, request, reason, report: None
     )

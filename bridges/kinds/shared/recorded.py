@@ -16,6 +16,7 @@ Recorded = Mapping[str, type[Any]]
 
 SHARED: Final[Recorded] = {
     "core.debounce.Settled": debounce.Settled,
+    "core.decision.AlarmInputs": decision.AlarmInputs,
     "core.decision.Attended": decision.Attended,
     "core.decision.Fault": decision.Fault,
     "core.decision.IoFailed": decision.IoFailed,

@@ -1,0 +1,130 @@
+"""Settings of devices that may tell the fleets of an alarm, and the messages of that alarm."""
+
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Annotated, Final, Literal
+
+import msgspec
+
+from bridges.kinds.shared.fields import DeviceSettings, Name, tells
+from bridges.kinds.shared.fleet_alarm import (
+    AlarmHeard,
+    AlarmStated,
+    FleetAlarmLimits,
+    FleetAlarmReport,
+    Fleets,
+)
+from bridges.kinds.shared.remarks import Remarks
+from bridges.messages.definitions import Bool, DiagnosticArray, EmergencySignal, Message
+from bridges.messages.topics import EMERGENCY_SIGNAL, FIRE_ALARM_TRIGGER, Topic
+
+AlarmTopic = Literal["fire_alarm_trigger", "emergency_signal"]
+TOPICS: Final[Mapping[str, Topic[Message]]] = {
+    topic.name: topic for topic in (FIRE_ALARM_TRIGGER, EMERGENCY_SIGNAL)
+}
+STATE, FLEETS, CAUSES = "alarm state", "alarm fleets", "alarm causes"
+"""Keys of a daemon's statement on `/diagnostics`: its status has the same words below `alarm`."""
+RAISED: Final = frozenset({"alarm", "drill"})
+
+
+class AlarmingSettings(DeviceSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Settings of every device that may raise an alarm for the fleets."""
+
+    alarm: Annotated[
+        Literal["none", AlarmTopic],
+        tells(
+            "the topic that tells the fleets of an alarm; `none` if the site wants no such topic."
+        ),
+    ] = "none"
+    fleets: Annotated[
+        tuple[Name, ...],
+        tells("""the fleets that are told, by their names in RMF; all fleets when absent. Only
+        `emergency_signal` names fleets."""),
+    ] = ()
+    without_fleets: Annotated[
+        Literal["tell_all", "tell_nobody"] | None,
+        tells("""with `fleets`, the effect of an alarm under a release of RMF without
+        `emergency_signal` (Jazzy and older): all fleets of the graph stop, or no fleet is told."""),
+    ] = None
+
+
+def alarm_topics(settings: AlarmingSettings) -> tuple[Topic[Message], ...]:
+    """Return the topic that tells the fleets of an alarm; empty if the device tells nobody."""
+    return (TOPICS[settings.alarm],) if settings.alarm != "none" else ()
+
+
+def alarm_problems(settings: AlarmingSettings) -> Remarks:
+    """Yield contradictions between the topic and the fleets."""
+    if settings.fleets and settings.alarm != EMERGENCY_SIGNAL.name:
+        text = "only emergency_signal names fleets: write alarm: emergency_signal, or delete fleets"
+        yield ("fleets",), text
+    elif settings.fleets and settings.without_fleets is None:
+        text = (
+            "Jazzy and older have no emergency_signal, and fire_alarm_trigger stops every fleet: write"
+            " without_fleets: tell_all, or without_fleets: tell_nobody"
+        )
+        yield ("fleets",), text
+    if settings.without_fleets and not settings.fleets:
+        yield ("without_fleets",), "is for fleets; all fleets are told: delete without_fleets"
+
+
+def alarm_limits(devices: Mapping[str, AlarmingSettings]) -> FleetAlarmLimits | None:
+    """Return the limits of a file's alarm; None if no device tells the fleets. Devices that do agree on
+    the topic and the fleets (`disagreements`)."""
+    alarming = {name: one for name, one in devices.items() if one.alarm != "none"}
+    if not alarming:
+        return None
+    one = next(iter(alarming.values()))
+    return FleetAlarmLimits(TOPICS[one.alarm], frozenset(one.fleets), frozenset(alarming))
+
+
+def disagreements(devices: Mapping[str, AlarmingSettings]) -> Iterator[tuple[str, str]]:
+    """Yield (device, text) of each device whose alarm differs from that of the file's first device."""
+    alarming = [(name, one) for name, one in devices.items() if one.alarm != "none"]
+    for name, one in alarming[1:]:
+        first = alarming[0][1]
+        if (one.alarm, set(one.fleets), one.without_fleets) != (
+            first.alarm,
+            set(first.fleets),
+            first.without_fleets,
+        ):
+            text = (
+                f"the devices of a file raise one alarm, but '{alarming[0][0]}' tells other fleets"
+            )
+            yield name, f"{text}: give both the same alarm and fleets, or put them into two files"
+
+
+def heard(message: Message, senders: Iterable[str]) -> AlarmHeard:
+    """Convert a message of an alarm's topic."""
+    if isinstance(message, EmergencySignal):
+        on, fleets = message.is_emergency, frozenset(message.fleet_names)
+    else:
+        assert isinstance(message, Bool)
+        on, fleets = message.data, frozenset[str]()
+    return AlarmHeard(frozenset(sender.lstrip("/") for sender in senders), on, fleets)
+
+
+def statement(report: FleetAlarmReport, fleets: Fleets) -> dict[str, str]:
+    """Return the daemon's statement, key -> text, for the status file and `/diagnostics`."""
+    causes = ", ".join(map(str, report.causes))
+    told = msgspec.json.encode(sorted(fleets)).decode()
+    return {"state": report.state, "fleets": told, "causes": causes or "-"}
+
+
+def stated(message: DiagnosticArray) -> Iterator[AlarmStated]:
+    """Yield the statements of our daemons in a message of `/diagnostics`; none if it has none."""
+    for status in message.status:
+        values = {pair.key: pair.value for pair in status.values}
+        if STATE in values:
+            yield AlarmStated(
+                status.hardware_id.lstrip("/"),
+                values[STATE] in RAISED,
+                fleets_in(values.get(FLEETS, "")),
+            )
+
+
+def fleets_in(text: str) -> Fleets:
+    """Return the fleets of a statement; all fleets for a text that `statement` did not make."""
+    try:
+        return frozenset(msgspec.json.decode(text, type=list[str]))
+    except msgspec.MsgspecError:
+        return frozenset()

@@ -1,0 +1,340 @@
+"""One alarm for the fleets of a graph: what one daemon publishes about the causes that its devices see.
+
+Lifts, doors and panels report their present causes (a burning fire contact). Fleet adapters stop their
+robots at a `true` and resume at any `false`, whoever sent it. So all sources of a graph are one alarm.
+
+Rules:
+FLEET-ALARM-1. A cause that is present latches, and the daemon's alarm is raised while a cause is
+   latched. Only a person's reset of this daemon ends a latched cause, and only while its device is read
+   and the cause is absent. Causes of a device that is no longer in the YAML may be reset.
+FLEET-ALARM-2. A raised alarm is published as `true`, once and at once. The publisher retains that
+   message for fleet adapters that start later.
+FLEET-ALARM-3. A daemon publishes `false` only if it has published `true`, none of its causes is
+   latched, and no alarm of another node stands for any of the same fleets. So the alarm ends when every
+   cause has ended and every daemon that saw one was reset. Each of these daemons then publishes its own
+   `false`, because the `true` that it retains would stop a fleet adapter that starts later.
+FLEET-ALARM-4. Another node's alarm stands from its `true`, or from the statement of one of our nodes on
+   `/diagnostics`, until that node publishes `false` or states that its alarm is over. Silence ends no
+   alarm: its source may have died in the fire. A `false` of any node also ends what stands, except the
+   alarms of our nodes that still make statements: RMF has obeyed, so the robots drive already.
+FLEET-ALARM-5. If another node publishes `false` while the alarm is raised, `true` is published again,
+   but no more often than each AGAIN_S, and the contradiction is a fault.
+FLEET-ALARM-6. Latched causes, the published `true` and other nodes' alarms survive a restart. After a
+   restart a raised alarm is published again, because the earlier process took its retained `true` with
+   it. In the quiet start no `false` is published: other nodes state their alarms each second. A daemon
+   that ends publishes nothing.
+FLEET-ALARM-7. A drill raises the alarm without latching, and its end needs no reset. A cause that
+   comes during a drill makes a real alarm of it.
+FLEET-ALARM-8. Where the wire hides a message's sender, any present publisher that is not one of our
+   nodes may have sent it.
+"""
+
+from collections.abc import Collection, Mapping
+from typing import Final
+
+import msgspec
+from msgspec.structs import replace
+
+from bridges.kinds.shared import keep
+from bridges.kinds.shared.decision import AlarmInputs, Decision, Fault, OperatorReset, Said
+from bridges.kinds.shared.durations import AGES_AGO, NEVER, RIVAL_QUIET_S, SILENT_S
+from bridges.kinds.shared.graph_kind import MaySpeak, Woken
+from bridges.messages.definitions import Bool, EmergencySignal, Message
+from bridges.messages.topics import EMERGENCY_SIGNAL, Topic
+
+AGAIN_S: Final = 0.2
+"""The least time between two `true`, because a node may publish `false` without end."""
+RENEW_S: Final = 5.0
+"""A retained `false` is withdrawn this long after it was published, when every node has heard it: a
+fleet adapter that starts in a later alarm might hear the old `false` last."""
+MOST_OTHERS: Final = 200
+"""The most other nodes whose alarms are remembered; a site has some dozens of daemons."""
+VERSION: Final = 1
+
+Fleets = frozenset[str]
+"""The fleets that are told; empty for all fleets."""
+
+
+class DeviceTells(msgspec.Struct, frozen=True):
+    """A device of this daemon reports its causes."""
+
+    device: str
+    inputs: AlarmInputs
+
+
+class AlarmHeard(msgspec.Struct, frozen=True):
+    """Another node has published an alarm, or its end. `senders`: the nodes that may have sent it."""
+
+    senders: frozenset[str]
+    on: bool
+    fleets: Fleets = frozenset()
+
+
+class AlarmStated(msgspec.Struct, frozen=True):
+    """Another of our nodes states on `/diagnostics` whether its alarm is raised."""
+
+    node: str
+    raised: bool
+    fleets: Fleets = frozenset()
+
+
+FleetAlarmEvent = DeviceTells | AlarmHeard | AlarmStated | MaySpeak | Woken | OperatorReset
+
+
+class AlarmCause(msgspec.Struct, frozen=True, order=True):
+    """A device and its signal."""
+
+    device: str
+    signal: str
+
+    def __str__(self) -> str:
+        return f"{self.signal} of {self.device}"
+
+
+class FleetAlarmLimits(msgspec.Struct, frozen=True):
+    """The settings of the alarm: its topic, its fleets, and the devices that report causes."""
+
+    topic: Topic[Message]
+    fleets: Fleets = frozenset()
+    devices: frozenset[str] = frozenset()
+
+
+class FleetAlarmMemory(msgspec.Struct, frozen=True):
+    """The memory of one daemon's alarm.
+
+    `told`: the fleets that our `true` went to; None if we have published no `true` since our last
+    `false`. `told_at`, `ended_at`: the times of our last `true` and `false`. `owed`: `true` must be
+    published again. `others`: node -> the fleets of its standing alarm. `ours`: our other nodes -> the
+    time of their last statement. `may_end`: the quiet start is over. `contradicted`: the nodes that
+    published `false` against our alarm, and the time.
+    """
+
+    inputs: Mapping[str, AlarmInputs] = {}
+    latched: tuple[AlarmCause, ...] = ()
+    told: Fleets | None = None
+    told_at: float = AGES_AGO
+    ended_at: float = AGES_AGO
+    owed: bool = False
+    others: Mapping[str, Fleets] = {}
+    ours: Mapping[str, float] = {}
+    may_end: bool = False
+    contradicted: tuple[str, float] = ("", AGES_AGO)
+
+    @property
+    def drill(self) -> bool:
+        """Is the alarm raised by a drill alone?"""
+        return not self.latched and any(inputs.drill for inputs in self.inputs.values())
+
+    @property
+    def raised(self) -> bool:
+        """Must the robots of our fleets stand, for a cause or a drill of our own?"""
+        return bool(self.latched) or self.drill
+
+
+class FleetAlarmReport(msgspec.Struct, frozen=True):
+    """The daemon's statement. `state`: `quiet`, `alarm`, `drill`, or `reset` while our `true` waits for
+    the end of other alarms. `waits`: these alarms' nodes."""
+
+    state: str
+    causes: tuple[AlarmCause, ...] = ()
+    waits: tuple[str, ...] = ()
+    faults: tuple[Fault, ...] = ()
+    read_at: float | None = None
+
+    def news(self) -> object:
+        """Return everything."""
+        return self.state, self.causes, self.waits, self.faults
+
+
+def overlap(one: Fleets, other: Fleets) -> bool:
+    """Is any fleet told by both? An empty set means all fleets."""
+    return not one or not other or bool(one & other)
+
+
+def initial() -> FleetAlarmMemory:
+    """Return the memory at the first start: no cause was seen, and nothing was published."""
+    return FleetAlarmMemory()
+
+
+def decide(
+    memory: FleetAlarmMemory, event: FleetAlarmEvent, now: float, limits: FleetAlarmLimits
+) -> Decision[FleetAlarmMemory, None, FleetAlarmReport]:
+    """Take the event, latch the present causes, and publish what the rules ask for."""
+    memory, refused = _take(memory, event, now, limits)
+    memory = _latch(memory)
+    memory, say = _say(memory, now, limits)
+    due = (
+        memory.told_at + AGAIN_S if memory.owed else NEVER,
+        memory.contradicted[1] + RIVAL_QUIET_S,
+    )
+    wake_at = min((at for at in due if at > now), default=NEVER)
+    return Decision(memory, None, _report(memory, now), wake_at, refused, say)
+
+
+def _take(
+    memory: FleetAlarmMemory, event: FleetAlarmEvent, now: float, limits: FleetAlarmLimits
+) -> tuple[FleetAlarmMemory, str]:
+    match event:
+        case DeviceTells(device, inputs):
+            return replace(memory, inputs={**memory.inputs, device: inputs}), ""
+        case AlarmHeard(senders, on, fleets):
+            hear = _hear_true if on else _hear_false
+            return hear(memory, senders, fleets, now), ""
+        case AlarmStated():
+            return _state(memory, event, now), ""
+        case MaySpeak(yes):
+            return replace(memory, may_end=yes), ""
+        case OperatorReset():
+            return _reset(memory, limits)
+    return memory, ""
+
+
+def _hear_true(
+    memory: FleetAlarmMemory, senders: Collection[str], fleets: Fleets, now: float
+) -> FleetAlarmMemory:
+    strangers = sorted(node for node in senders if node not in memory.ours)
+    node = " or ".join(strangers if len(senders) > 1 else sorted(senders))
+    if len(senders) > 1 and not strangers:
+        return memory  # one of our nodes, which will state its alarm within a second
+    return _stands(memory, node or "an unknown node", fleets)
+
+
+def _stands(memory: FleetAlarmMemory, node: str, fleets: Fleets) -> FleetAlarmMemory:
+    if len(memory.others) >= MOST_OTHERS and node not in memory.others:
+        return memory
+    before = memory.others.get(node, fleets)
+    both = before | fleets if before and fleets else frozenset[str]()
+    return replace(memory, others={**memory.others, node: both})
+
+
+def _hear_false(
+    memory: FleetAlarmMemory, senders: Collection[str], fleets: Fleets, now: float
+) -> FleetAlarmMemory:
+    live = {node for node, at in memory.ours.items() if now - at <= SILENT_S} - set(senders)
+    others = {
+        node: told
+        for node, told in memory.others.items()
+        if node in live or not overlap(told, fleets)
+    }
+    memory = replace(memory, others=others)
+    if memory.told is None or not memory.raised or not overlap(memory.told, fleets):
+        return memory
+    by = " or ".join(sorted(senders)) or "an unknown node"
+    return replace(memory, owed=True, contradicted=(by, now))
+
+
+def _state(memory: FleetAlarmMemory, said: AlarmStated, now: float) -> FleetAlarmMemory:
+    if len(memory.ours) >= MOST_OTHERS and said.node not in memory.ours:
+        return memory
+    others = {node: fleets for node, fleets in memory.others.items() if node != said.node}
+    if said.raised:
+        others[said.node] = said.fleets
+    return replace(memory, others=others, ours={**memory.ours, said.node: now})
+
+
+def _reset(memory: FleetAlarmMemory, limits: FleetAlarmLimits) -> tuple[FleetAlarmMemory, str]:
+    left = tuple(cause for cause in memory.latched if not _is_over(cause, memory, limits))
+    why = f"the alarm is not over: {', '.join(map(str, left))}" if left else ""
+    return replace(memory, latched=left), why
+
+
+def _is_over(cause: AlarmCause, memory: FleetAlarmMemory, limits: FleetAlarmLimits) -> bool:
+    if cause.device not in limits.devices:
+        return True
+    inputs = memory.inputs.get(cause.device, AlarmInputs())
+    return inputs.seen and cause.signal not in inputs.present
+
+
+def _latch(memory: FleetAlarmMemory) -> FleetAlarmMemory:
+    present = {AlarmCause(d, signal) for d, one in memory.inputs.items() for signal in one.present}
+    new = sorted(present.difference(memory.latched))
+    return replace(memory, latched=(*memory.latched, *new)) if new else memory
+
+
+def _say(
+    memory: FleetAlarmMemory, now: float, limits: FleetAlarmLimits
+) -> tuple[FleetAlarmMemory, tuple[Said, ...]]:
+    if memory.raised:
+        told = memory.told
+        if told is not None and not (memory.owed and now >= memory.told_at + AGAIN_S):
+            return memory, ()
+        both = limits.fleets if told is None else told | limits.fleets
+        fleets = both if limits.fleets and (told is None or told) else frozenset[str]()
+        memory = replace(memory, told=fleets, told_at=now, owed=False)
+        return memory, (_message(limits.topic, fleets, on=True),)
+    if memory.told is None or not memory.may_end or _waits(memory):
+        return replace(memory, owed=False) if memory.owed else memory, ()
+    over = _message(limits.topic, memory.told, on=False)
+    return replace(memory, told=None, ended_at=now, owed=False), (over,)
+
+
+def _message(topic: Topic[Message], fleets: Fleets, *, on: bool) -> Said:
+    if topic.name == EMERGENCY_SIGNAL.name:
+        return topic, EmergencySignal(tuple(sorted(fleets)), on)
+    return topic, Bool(on)
+
+
+def _waits(memory: FleetAlarmMemory) -> tuple[str, ...]:
+    """Return the nodes whose alarms stand for one of the fleets that we have told."""
+    told = memory.told
+    if told is None:
+        return ()
+    return tuple(sorted(node for node, fleets in memory.others.items() if overlap(told, fleets)))
+
+
+def _report(memory: FleetAlarmMemory, now: float) -> FleetAlarmReport:
+    waits = _waits(memory)
+    if memory.raised:
+        state = "drill" if memory.drill else "alarm"
+    else:
+        state = "quiet" if memory.told is None else "reset"
+    return FleetAlarmReport(state, memory.latched, waits, tuple(_faults(memory, waits, now)))
+
+
+def _faults(memory: FleetAlarmMemory, waits: tuple[str, ...], now: float) -> list[Fault]:
+    found = []
+    by, at = memory.contradicted
+    if memory.raised and now < at + RIVAL_QUIET_S:
+        found.append(Fault("ALARM_CONTRADICTED", f"{by} publishes false: robots hear both"))
+    if memory.drill:
+        found.append(Fault("ALARM_DRILL", "the robots stand for a drill, which ends by itself"))
+    elif memory.latched:
+        causes = ", ".join(map(str, memory.latched))
+        found.append(Fault("ALARM_RAISED", f"the robots stand: {causes}"))
+    elif memory.told is not None:
+        stands = (
+            f"the alarm of {', '.join(waits)} stands" if waits else "this daemon has just started"
+        )
+        found.append(Fault("ALARM_WAITS", f"reset here, but {stands}"))
+    return found
+
+
+class KeptAlarm(keep.Kept, frozen=True, forbid_unknown_fields=True):
+    """The parts of the memory that are kept. `latched`: device and signal of each cause."""
+
+    latched: list[tuple[str, str]]
+    told: list[str] | None
+    others: dict[str, list[str]]
+
+
+def persist(memory: FleetAlarmMemory) -> bytes:
+    """Encode the memory for the next start. The bytes stay the same until a kept part changes."""
+    return msgspec.json.encode(
+        KeptAlarm(
+            VERSION,
+            sorted((cause.device, cause.signal) for cause in memory.latched),
+            None if memory.told is None else sorted(memory.told),
+            {node: sorted(fleets) for node, fleets in sorted(memory.others.items())},
+        )
+    )
+
+
+def restore(kept: bytes) -> FleetAlarmMemory:
+    """Make the memory at a restart. Raises ValueError for bytes that `persist` did not make."""
+    found = keep.read(kept, KeptAlarm, VERSION, "an alarm's memory")
+    return FleetAlarmMemory(
+        latched=tuple(AlarmCause(*cause) for cause in found.latched),
+        told=None if found.told is None else frozenset(found.told),
+        owed=bool(found.latched),
+        others={node: frozenset(fleets) for node, fleets in found.others.items()},
+    )

@@ -1,0 +1,215 @@
+"""Serves the alarm that the devices of one daemon raise for the fleets, in a thread of its own.
+
+The devices' threads put their causes into this node's inbox, so a slow disk delays no scan. The memory
+is on disk before a message is published (`keeper.py`).
+"""
+
+import logging
+from collections.abc import Callable, Mapping
+from typing import Final
+
+from bridges.kinds.shared import alarming, fleet_alarm
+from bridges.kinds.shared.decision import AlarmInputs, Fault
+from bridges.kinds.shared.durations import NEVER
+from bridges.kinds.shared.fields import GraphSettings
+from bridges.kinds.shared.fleet_alarm import (
+    RENEW_S,
+    DeviceTells,
+    FleetAlarmEvent,
+    FleetAlarmLimits,
+    FleetAlarmMemory,
+    FleetAlarmReport,
+)
+from bridges.kinds.shared.graph_kind import GraphKind
+from bridges.messages.definitions import DiagnosticArray, EmergencySignal, Message, Time
+from bridges.messages.topics import DIAGNOSTICS, Topic
+from bridges.runtime.clock import Clock
+from bridges.runtime.graph_node import GraphNode
+from bridges.runtime.keeper import MemoryStore
+from bridges.runtime.outlet import Named
+from bridges.runtime.ring_writer import NOBODY, NoWriter
+from bridges.runtime.subject import Status
+from bridges.system.log import pairs
+from bridges.transports.transport import Subscription, Transport
+
+log = logging.getLogger(__name__)
+
+QUIET_S: Final = 3.0
+"""Our other nodes state their alarms each second; after three statements a silent node is dead."""
+ALARM: Final = "alarm"
+"""The name of the only subject."""
+
+
+class MessagesOnly(NoWriter):
+    """Passes the published alarms to the recording of the daemon, whose kind decides other values."""
+
+    def __init__(self, writer: NoWriter) -> None:
+        self._writer = writer
+
+    def spoken(self, topic: str, message: Message, *, sent: bool) -> None:
+        """Note a message that was sent or heard."""
+        self._writer.spoken(topic, message, sent=sent)
+
+
+def _kind(limits: FleetAlarmLimits) -> "AlarmKind":
+    return GraphKind(
+        name="fleet_alarm",
+        devices_key=ALARM,
+        settings=GraphSettings,
+        requests={},
+        publishes=(limits.topic,),
+        sole=(),
+        device_name=lambda message: ALARM,
+        quiet_s=lambda settings: QUIET_S,
+        limits=lambda settings: limits,
+        initial=lambda name, started_at: fleet_alarm.initial(),
+        decide=fleet_alarm.decide,
+        stamped=_without_stamp,
+        summary=lambda report, now: alarming.statement(report, limits.fleets),
+        idle=lambda memory, now: False,
+        persist=lambda memories: fleet_alarm.persist(memories[ALARM]),
+        restore=lambda kept, settings, now: {ALARM: fleet_alarm.restore(kept)},
+    )
+
+
+def _without_stamp(message: Message, at: Time) -> Message:
+    return message
+
+
+AlarmKind = GraphKind[
+    GraphSettings, FleetAlarmLimits, FleetAlarmMemory, FleetAlarmEvent, FleetAlarmReport
+]
+
+
+class FleetAlarmNode(
+    GraphNode[GraphSettings, FleetAlarmLimits, FleetAlarmMemory, FleetAlarmEvent, FleetAlarmReport]
+):
+    """The alarm of one daemon. `tells_nobody`: publish nothing under a release without fleets."""
+
+    def __init__(
+        self,
+        limits: FleetAlarmLimits,
+        transport: Transport,
+        clock: Clock,
+        named: Named,
+        kept: MemoryStore | None = None,
+        writer: NoWriter = NOBODY,
+        *,
+        tells_nobody: bool = False,
+    ) -> None:
+        self._limits = limits
+        self._tells_nobody = tells_nobody
+        self._renew_at = NEVER
+        self._untold = False
+        super().__init__(
+            _kind(limits), GraphSettings(), transport, clock, named, kept, MessagesOnly(writer)
+        )
+        if ALARM not in self.subjects:
+            self._add(ALARM, fleet_alarm.initial())
+
+    def tell(self, device: str, inputs: AlarmInputs) -> None:
+        """Take the causes that a device sees now; from any thread."""
+        self.inbox.put(ALARM, (self._limits.topic, DeviceTells(device, inputs)), device)
+
+    def subscribe(self) -> None:
+        """Subscribe to other nodes' statements, and to their alarms on each topic of the release."""
+        self._transport.subscribe(self._named(DIAGNOSTICS), self._on_statement, others_only=True)
+        self.look()
+
+    def look(self) -> None:
+        """Subscribe to a topic that RMF's release has only now; called each second."""
+        for topic in alarming.TOPICS.values():
+            if topic.name not in self._hears and self._transport.release.has(topic.type):
+                hear = self._on_alarm(topic)
+                name = self._named(topic)
+                self._hears[topic.name] = self._transport.subscribe(name, hear, others_only=True)
+
+    def round(self) -> None:
+        """Do a node's round; withdraw a retained `false` when every node has heard it."""
+        super().round()
+        memory, now = self.subjects[ALARM].memory, self._clock.monotonic()
+        if memory.told is not None:
+            self._renew_at = NEVER
+        elif now - memory.ended_at < RENEW_S:
+            self._renew_at = memory.ended_at + RENEW_S
+        elif now >= self._renew_at:
+            self._renew_at = NEVER
+            self._outlet.close()
+            self._outlet.open(self._kind.publishes)
+
+    @property
+    def wake_at(self) -> float:
+        """The time of the next round if no message arrives (monotonic s)."""
+        return min(super().wake_at, self._renew_at)
+
+    def beside(self, status: Status) -> Status:
+        """Add the daemon's statement, faults and connections to its status; from any thread."""
+        decision, own = self.subjects[ALARM].decision, self.status()
+        assert decision is not None  # a subject decides when it is made
+        return {
+            **status,
+            ALARM: alarming.statement(decision.report, self._limits.fleets),
+            **{key: [*own[key], *status[key]] for key in ("faults",)},
+            **{key: {**status[key], **own[key]} for key in ("heard_by", "hears")},
+            "refused": own["refused"],
+        }
+
+    def _faults(self) -> tuple[Fault, ...]:
+        decision = self.subjects[ALARM].decision
+        found = decision.report.faults if decision else ()
+        return *found, *super()._faults(), *self._not_told()
+
+    def _not_told(self) -> tuple[Fault, ...]:
+        if not self._untold:
+            return ()
+        text = "RMF's release has no emergency_signal, and without_fleets is tell_nobody"
+        return (Fault("ALARM_NOT_TOLD", text),)
+
+    def _publish(self, topic: Topic[Message], message: Message) -> None:
+        lacks = not self._transport.release.has(topic.type)
+        self._untold = self._tells_nobody and lacks and _is_on(message)
+        if not (self._tells_nobody and lacks):
+            super()._publish(topic, message)
+
+    def _on_alarm(self, topic: Topic[Message]) -> Callable[[Message], None]:
+        def put(message: Message) -> None:
+            event = alarming.heard(message, self._senders(self._hears.get(topic.name)))
+            if event.senders != {self._transport.name}:  # an earlier process of this daemon
+                self._writer.spoken(self._named(topic).name, message, sent=False)
+                self.inbox.put(ALARM, (topic, event))
+
+        return put
+
+    def _senders(self, hears: Subscription | None) -> list[str]:
+        """Return the nodes that may have sent the message that is being handed on."""
+        sender = self._transport.sender()
+        if sender is not None and sender.node:
+            return [sender.node]
+        return hears.senders() if hears else []
+
+    def _on_statement(self, message: DiagnosticArray) -> None:
+        for event in alarming.stated(message):
+            if event.node != self._transport.name:
+                self.inbox.put(ALARM, (DIAGNOSTICS, event), ("stated", event.node))
+
+
+def _is_on(message: Message) -> bool:
+    return isinstance(message, EmergencySignal) and message.is_emergency
+
+
+def node_for(
+    devices: Mapping[str, object],
+    transport: Transport,
+    clock: Clock,
+    named: Named,
+    kept: MemoryStore | None,
+    writer: NoWriter,
+) -> FleetAlarmNode | None:
+    """Return the alarm's node of a file; None if no device of the file tells the fleets."""
+    alarms = {n: one for n, one in devices.items() if isinstance(one, alarming.AlarmingSettings)}
+    limits = alarming.alarm_limits(alarms)
+    if limits is None:
+        return None
+    nobody = any(one.without_fleets == "tell_nobody" for one in alarms.values())
+    log.info(pairs("alarm", topic=limits.topic.name, fleets=sorted(limits.fleets) or "all"))
+    return FleetAlarmNode(limits, transport, clock, named, kept, writer, tells_nobody=nobody)
