@@ -30,7 +30,7 @@ from bridges.runtime.outlet import Named
 from bridges.runtime.ring_writer import NOBODY, NoWriter
 from bridges.runtime.subject import Status
 from bridges.system.log import pairs
-from bridges.transports.transport import Subscription, Transport
+from bridges.transports.transport import Subscription, Transport, any_type
 
 log = logging.getLogger(__name__)
 
@@ -113,7 +113,8 @@ class FleetAlarmNode(
 
     def subscribe(self) -> None:
         """Subscribe to other nodes' statements, and to their alarms on each topic of the release."""
-        self._transport.subscribe(self._named(DIAGNOSTICS), self._on_statement, others_only=True)
+        hear = any_type(self._on_statement)
+        self._transport.subscribe(self._named(DIAGNOSTICS), hear, others_only=True)
         self.look()
 
     def look(self) -> None:

@@ -25,7 +25,7 @@ from bridges.runtime.loop import Loop
 from bridges.runtime.outlet import Named, Outlet
 from bridges.runtime.predecessor import SafeFirst
 from bridges.runtime.ring_writer import NOBODY, NoWriter
-from bridges.runtime.serving import Serving
+from bridges.runtime.serving import Rounds, Serving
 from bridges.runtime.subject import Status
 from bridges.settings.load import Config
 from bridges.system.log import pairs
@@ -137,7 +137,7 @@ class Devices:
         self._hears: dict[str, Subscription] = {}
         self._attended: bool | None = None
         self._loops = [self._loop(name, open_bus) for name in config.buses]
-        served = [*self._loops, *([alarm] if alarm else [])]
+        served: list[Rounds] = [*self._loops, *([alarm] if alarm else [])]
         self.loops = [Serving(each, clock) for each in served]
         self._placed = {node.name: (node, loop) for loop in self._loops for node in loop.nodes}
 
@@ -193,7 +193,7 @@ class Devices:
         return {name: node.status() for name, (node, _) in self._placed.items()}
 
     def _topics(self) -> list[Topic[Message]]:
-        return [self._kind.states] if self._kind.states else []
+        return [*self._kind.stated_on]
 
     def _loop(self, bus_name: str, open_bus: OpenBus) -> Loop:
         settings = self._config.buses[bus_name]

@@ -168,7 +168,7 @@ def _published(name: str, examples: Iterable[Config]) -> Iterator[topics.AnyTopi
     if not isinstance(kind, Kind):
         yield from (*kind.publishes, *kind.sole)
         return
-    yield kind.states
+    yield from kind.stated_on
     for config in examples:
         if config.kind == name:
             for device in config.devices.values():

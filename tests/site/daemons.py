@@ -74,7 +74,7 @@ class DeviceDaemon:
         self.started(self)
         device, kind = self.device, self.device.kind
         self._place = Place(self._air, self.node, lambda: None)
-        topics = [kind.states, *kind.publishes(device.settings)]
+        topics = [*kind.stated_on]
         self._publishers = {topic.name: self._place.publisher(topic) for topic in topics}
         limits = kind.limits(device.settings, device.debounce)
         clock = Clock(
@@ -93,7 +93,8 @@ class DeviceDaemon:
         self.alive = True
         for topic in (*kind.requests, *kind.recorded):
             self._place.subscribe(topic, partial(self._hear, topic))
-        self._place.subscribe(kind.states, partial(self._hear, kind.states), others_only=True)
+        for topic in kind.stated_on:
+            self._place.subscribe(topic, partial(self._hear, topic), others_only=True)
         self.scan()
 
     def kill(self) -> None:

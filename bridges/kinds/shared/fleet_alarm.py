@@ -16,7 +16,8 @@ FLEET-ALARM-3. A daemon publishes `false` only if it has published `true`, none 
 FLEET-ALARM-4. Another node's alarm stands from its `true`, or from the statement of one of our nodes on
    `/diagnostics`, until that node publishes `false` or states that its alarm is over. Silence ends no
    alarm: its source may have died in the fire. A `false` of any node also ends what stands, except the
-   alarms of our nodes that still make statements: RMF has obeyed, so the robots drive already.
+   alarms of our nodes that still make statements: RMF has obeyed, so the robots drive already. In the
+   quiet start that `false` may be an old, retained one, and ends only its sender's alarm.
 FLEET-ALARM-5. If another node publishes `false` while the alarm is raised, `true` is published again,
    but no more often than each AGAIN_S, and the contradiction is a fault.
 FLEET-ALARM-6. Latched causes, the published `true` and other nodes' alarms survive a restart. After a
@@ -103,10 +104,10 @@ class FleetAlarmMemory(msgspec.Struct, frozen=True):
     """The memory of one daemon's alarm.
 
     `told`: the fleets that our `true` went to; None if we have published no `true` since our last
-    `false`. `told_at`, `ended_at`: the times of our last `true` and `false`. `owed`: `true` must be
-    published again. `others`: node -> the fleets of its standing alarm. `ours`: our other nodes -> the
-    time of their last statement. `may_end`: the quiet start is over. `contradicted`: the nodes that
-    published `false` against our alarm, and the time.
+    `false`. `told_at`, `ended_at`: the times of our last `true` and `false`. `owed`: our `true` no
+    longer counts, so a raised alarm must be published again. `others`: node -> the fleets of its
+    standing alarm. `ours`: our other nodes -> the time of their last statement. `may_end`: the quiet
+    start is over. `contradicted`: the nodes that published `false` against our alarm, and the time.
     """
 
     inputs: Mapping[str, AlarmInputs] = {}
@@ -164,7 +165,7 @@ def decide(
     memory = _latch(memory)
     memory, say = _say(memory, now, limits)
     due = (
-        memory.told_at + AGAIN_S if memory.owed else NEVER,
+        memory.told_at + AGAIN_S if memory.owed and memory.raised else NEVER,
         memory.contradicted[1] + RIVAL_QUIET_S,
     )
     wake_at = min((at for at in due if at > now), default=NEVER)
@@ -214,11 +215,13 @@ def _hear_false(
     others = {
         node: told
         for node, told in memory.others.items()
-        if node in live or not overlap(told, fleets)
+        if node in live or not overlap(told, fleets) or (node not in senders and not memory.may_end)
     }
     memory = replace(memory, others=others)
-    if memory.told is None or not memory.raised or not overlap(memory.told, fleets):
+    if memory.told is None or not overlap(memory.told, fleets):
         return memory
+    if not memory.raised:
+        return replace(memory, owed=True)
     by = " or ".join(sorted(senders)) or "an unknown node"
     return replace(memory, owed=True, contradicted=(by, now))
 
@@ -263,7 +266,7 @@ def _say(
         memory = replace(memory, told=fleets, told_at=now, owed=False)
         return memory, (_message(limits.topic, fleets, on=True),)
     if memory.told is None or not memory.may_end or _waits(memory):
-        return replace(memory, owed=False) if memory.owed else memory, ()
+        return memory, ()
     over = _message(limits.topic, memory.told, on=False)
     return replace(memory, told=None, ended_at=now, owed=False), (over,)
 
@@ -335,6 +338,6 @@ def restore(kept: bytes) -> FleetAlarmMemory:
     return FleetAlarmMemory(
         latched=tuple(AlarmCause(*cause) for cause in found.latched),
         told=None if found.told is None else frozenset(found.told),
-        owed=bool(found.latched),
+        owed=True,
         others={node: frozenset(fleets) for node, fleets in found.others.items()},
     )

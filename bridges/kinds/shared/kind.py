@@ -95,6 +95,11 @@ class Kind(Struct, Generic[S, L, M, X, E, O, R], frozen=True):
     attended_by: Topic[Message] | None = None
     recorded: tuple[Topic[Message], ...] = ()
 
+    @property
+    def stated_on(self) -> tuple[Topic[Message], ...]:
+        """The topic of the states; empty for a kind without states in RMF."""
+        return (self.states,) if self.states else ()
+
 
 AnyDeviceKind = Kind[Any, Any, Any, Any, Any, Any, Any]
 """A kind that was found by its name; its types are unknown."""

@@ -87,7 +87,7 @@ def findings(config: Config, errors: Sequence[Problem] = (), notes: Sequence[str
 def _rmf(config: Config) -> dict[str, str]:
     """Return the settings to compare with RMF's, and the topics by their names on this site."""
     rmf, kind = config.rmf, kind_called(config.kind)
-    spoken = [*([] if isinstance(kind, GraphKind) else [kind.states]), *_published(config)]
+    spoken = [*(() if isinstance(kind, GraphKind) else kind.stated_on), *_published(config)]
     heard = [*kind.requests, *(() if isinstance(kind, GraphKind) else kind.recorded)]
     names = {topic.name: rmf.topics.get(topic.name, topic.name) for topic in (*spoken, *heard)}
     return {

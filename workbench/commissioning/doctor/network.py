@@ -108,7 +108,8 @@ def _heard(config: Config, transport: Transport, look: GraphLook) -> Iterator[Fi
         _listened(Ear(transport, ()), look.listen_s)
         found = _rivals(rivals, look.serving)
     else:
-        messages = _listened(Ear(transport, [named_by(config, kind.states)]), look.listen_s)
+        states = [named_by(config, topic) for topic in kind.stated_on]
+        messages = _listened(Ear(transport, states), look.listen_s)
         found = _ours(list(config.devices), set(map(kind.device_name, messages)), look)
     yield ok(GRAPH, f"joined by {transport.speaks} for {look.listen_s:g} s")
     for topic, end in ends.items():
