@@ -28,6 +28,7 @@ from bridges.kinds.shared.rmf_section import Rmf
 from bridges.kinds.shared.rmf_section import warnings as rmf_warnings
 from bridges.messages import topics
 from bridges.settings import names as named
+from bridges.settings.alarms import note_alarms
 from bridges.settings.buses import BusRead, read_bus
 from bridges.settings.config import Config
 from bridges.settings.plausible import milliseconds, out_of_step
@@ -139,7 +140,10 @@ class _DeviceReading:
         if isinstance(self._kind, GraphKind):
             self._read_section(sections.get(self._kind.devices_key), self._kind)
         elif self._kind and self._kind.devices_key in sections:
-            self._read_devices(sections[self._kind.devices_key].spot())
+            spot = sections[self._kind.devices_key].spot()
+            self._read_devices(spot)
+            of_rmf = sections["rmf"].spot() if "rmf" in sections else None
+            note_alarms(self._page, self._devices, self._rmf, spot, of_rmf)
         note_conflicts(self._page, self._uses)
         self._collect_bus_remarks()
 

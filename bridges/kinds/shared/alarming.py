@@ -128,3 +128,17 @@ def fleets_in(text: str) -> Fleets:
         return frozenset(msgspec.json.decode(text, type=list[str]))
     except msgspec.MsgspecError:
         return frozenset()
+
+
+def alarm_notes(settings: AlarmingSettings) -> Remarks:
+    """Yield effects of the alarm that the site should know."""
+    if settings.alarm != "none" and not settings.fleets:
+        text = "an alarm stops the robots of every fleet on this graph, in every building of it"
+        yield ("alarm",), f"{text}; emergency_signal with fleets names fewer"
+    if settings.without_fleets == "tell_all":
+        yield (
+            ("without_fleets",),
+            "under Jazzy and older an alarm stops every fleet, not only these",
+        )
+    if settings.without_fleets == "tell_nobody":
+        yield ("without_fleets",), "under Jazzy and older an alarm stops no robot"

@@ -1,0 +1,42 @@
+"""Alarm panels: a fire panel, a code blue; their contacts stop the robots of the site's fleets."""
+
+from bridges.kinds.alarm import core, memory, messages, report, signals
+from bridges.kinds.alarm.memory import PanelLimits, PanelMemory
+from bridges.kinds.alarm.report import PanelReport
+from bridges.kinds.alarm.settings import PanelSettings
+from bridges.kinds.alarm.signals import PanelOutputs, PanelSample
+from bridges.kinds.shared.alarming import alarm_topics
+from bridges.kinds.shared.decision import OperatorReset
+from bridges.kinds.shared.kind import Kind
+from bridges.kinds.shared.recorded import Recorded
+
+KIND: Kind[
+    PanelSettings,
+    PanelLimits,
+    PanelMemory,
+    PanelSample,
+    OperatorReset,
+    PanelOutputs,
+    PanelReport,
+] = Kind(
+    name="alarm",
+    devices_key="alarms",
+    states=None,
+    requests={},
+    device_name=lambda message: "",
+    sender=lambda request: "",
+    limits=PanelLimits.of,
+    initial=core.initial,
+    decide=core.decide,
+    state_message=messages.state_message,
+    summary=messages.summary,
+    publishes=alarm_topics,
+    alarm_inputs=lambda report: report.alarm,
+)
+
+RECORDED: Recorded = {
+    "alarm.memory.PanelMemory": memory.PanelMemory,
+    "alarm.report.PanelReport": report.PanelReport,
+    "alarm.signals.PanelOutputs": signals.PanelOutputs,
+    "alarm.signals.PanelSample": signals.PanelSample,
+}

@@ -1,0 +1,118 @@
+"""The panel's decision core: which causes of an alarm does it see?
+
+The latch, the reset and the messages to the fleets are those of every alarm
+(`bridges/kinds/shared/fleet_alarm.py`). A panel has no outputs.
+
+Rules:
+ALARM-1. A source is active once it has been asserted for its debounce, and over once it has been clear
+   for `clear_s`. Before its first debounce is over, a single asserted reading counts. A failed reading
+   restarts the debounce.
+ALARM-2. Without a good reading for `stale_after_s` the panel is silent, which is a fault. Its sources
+   stay as they were, and none of them can be reset.
+ALARM-3. A silence of `silent_alarm_after_s`, counted from the last good reading or from the start, is a
+   cause of an alarm itself. The next good reading ends that cause.
+ALARM-4. A drill begins when the drill contact comes on after it was seen off. It ends `drill_s` later,
+   or when the contact goes off. A contact that is on at the start begins no drill.
+"""
+
+from collections.abc import Iterator
+
+from msgspec.structs import replace
+
+from bridges.kinds.alarm.memory import PanelLimits, PanelMemory
+from bridges.kinds.alarm.report import PanelReport
+from bridges.kinds.alarm.signals import DRILL, SILENT, Event, PanelOutputs, PanelSample
+from bridges.kinds.shared.debounce import Settled, forget, settle
+from bridges.kinds.shared.decision import AlarmInputs, Decision, Fault, IoFailed, Sampled
+from bridges.kinds.shared.durations import AGES_AGO, NEVER
+
+
+def initial(limits: PanelLimits, now: float) -> PanelMemory:
+    """Return the memory at start: nothing was read."""
+    return PanelMemory(began_at=now)
+
+
+def decide(
+    memory: PanelMemory, event: Event, now: float, limits: PanelLimits
+) -> Decision[PanelMemory, PanelOutputs, PanelReport]:
+    """Decide one scan. `now`: monotonic s, never earlier than in the last scan. Never raises."""
+    match event:
+        case Sampled(sample):
+            memory = _read(memory, sample, now, limits)
+        case IoFailed(reason):
+            kept = {name: one for name, old in memory.sources.items() if (one := forget(old))}
+            memory = replace(memory, io_fault=reason, sources=kept, drill=forget(memory.drill))
+    wake_at = min((at for at in _wakes(memory, now, limits) if at > now), default=NEVER)
+    return Decision(memory, PanelOutputs(), _report(memory, now, limits), wake_at)
+
+
+def _read(memory: PanelMemory, sample: PanelSample, now: float, limits: PanelLimits) -> PanelMemory:
+    sources = {}
+    for name, on in sample.sources.items():
+        before = memory.sources.get(name)
+        sources[name] = settle(before, on, now, _hold_s(name, before, on, limits))
+    drill = settle(memory.drill, sample.drill, now, limits.debounce.get(DRILL, 0.0))
+    was, until = memory.drill.value if memory.drill else None, memory.drill_until
+    if drill.value and was is False:
+        until = now + limits.drill_s
+    elif was and not drill.value:
+        until = AGES_AGO
+    return replace(
+        memory,
+        began_at=now,
+        read_at=now,
+        sources=sources,
+        drill=drill,
+        drill_until=until,
+        io_fault="",
+    )
+
+
+def _hold_s(name: str, before: Settled[bool] | None, on: bool, limits: PanelLimits) -> float:
+    """Return how long this value must last: the end of a source that was active lasts `clear_s`."""
+    over = before is not None and before.value is not None and not on
+    return limits.t.clear_s if over else limits.debounce.get(name, 0.0)
+
+
+def _is_active(source: Settled[bool]) -> bool:
+    return source.candidate if source.value is None else source.value
+
+
+def _report(memory: PanelMemory, now: float, limits: PanelLimits) -> PanelReport:
+    active = tuple(sorted(name for name, one in memory.sources.items() if _is_active(one)))
+    fresh = memory.read_at is not None and now < memory.read_at + limits.t.stale_after_s
+    silent = now >= memory.began_at + limits.silent_alarm_after_s
+    present = frozenset((*active, *((SILENT,) if silent else ())))
+    steady = all(one.value is not None for one in memory.sources.values())
+    drill = now < memory.drill_until
+    return PanelReport(
+        read_at=memory.read_at,
+        active=active,
+        silent=not fresh and (memory.read_at is not None or bool(memory.io_fault)),
+        faults=tuple(_faults(memory, active, fresh, silent, drill)),
+        alarm=AlarmInputs(present, fresh and steady, drill),
+    )
+
+
+def _faults(
+    memory: PanelMemory, active: tuple[str, ...], fresh: bool, silent: bool, drill: bool
+) -> Iterator[Fault]:
+    if active:
+        yield Fault("ALARM_SOURCE_ACTIVE", ", ".join(active))
+    if not fresh and (memory.io_fault or silent or memory.read_at is not None):
+        how = "and its silence is an alarm" if silent else "so a fire would not be seen"
+        yield Fault("PANEL_SILENT", f"{memory.io_fault or 'no reading'}, {how}")
+    if drill:
+        yield Fault("ALARM_DRILL", "a drill, which ends by itself")
+
+
+def _wakes(memory: PanelMemory, now: float, limits: PanelLimits) -> Iterator[float]:
+    """Yield each time at which the decision may change without an event."""
+    for name, one in memory.sources.items():
+        yield one.due_at(_hold_s(name, one, one.candidate, limits))
+    if memory.drill is not None:
+        yield memory.drill.due_at(limits.debounce.get(DRILL, 0.0))
+    yield memory.drill_until
+    yield memory.began_at + limits.silent_alarm_after_s
+    if memory.read_at is not None:
+        yield memory.read_at + limits.t.stale_after_s

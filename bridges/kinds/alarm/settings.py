@@ -1,0 +1,53 @@
+"""The part of an alarm panel's YAML that does not depend on its wiring."""
+
+from typing import Annotated
+
+import msgspec
+
+from bridges.kinds.shared.alarming import AlarmingSettings, alarm_problems
+from bridges.kinds.shared.fields import Patience, Period, Seconds, Timeout, tells
+from bridges.kinds.shared.remarks import Remarks
+
+
+class PanelDurations(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Durations of a panel."""
+
+    stale_after_s: Annotated[
+        Period, tells("after so long without a good reading the panel is silent, which is a fault.")
+    ] = 1.0
+    clear_s: Annotated[
+        Seconds, tells("how long a source must be clear to count as over; a person resets later.")
+    ] = 1.0
+
+
+class PanelSettings(AlarmingSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """The settings of one panel, except its wiring."""
+
+    silent_alarm_after_s: Annotated[
+        Patience,
+        tells("""how long the panel may be silent; after that its silence is an alarm. Weigh the
+        robots that a broken cable stops against a fire that a broken cable hides."""),
+    ]
+    drill_s: Annotated[
+        Timeout | None,
+        tells("how long a drill lasts that the drill contact begins; then it ends by itself."),
+    ] = None
+    limits: Annotated[PanelDurations, tells("the durations that differ from their defaults.")] = (
+        PanelDurations()
+    )
+
+    def stale_after(self) -> float:
+        """Return `stale_after_s` of the limits."""
+        return self.limits.stale_after_s
+
+    def problems(self) -> Remarks:
+        """Yield the contradictions between fields."""
+        yield from alarm_problems(self)
+        if self.alarm == "none":
+            text = (
+                "a panel is here to tell the fleets: write alarm: fire_alarm_trigger, which stops"
+            )
+            yield ("alarm",), f"{text} every fleet, or alarm: emergency_signal, which names fleets"
+        if self.silent_alarm_after_s < self.limits.stale_after_s:
+            least = f"must be at least stale_after_s ({self.limits.stale_after_s:g} s)"
+            yield ("silent_alarm_after_s",), least

@@ -1,0 +1,26 @@
+"""Checks that the devices of a file raise one alarm, and that other daemons can see it."""
+
+from collections.abc import Mapping
+
+from bridges.kinds.shared.alarming import AlarmingSettings, disagreements
+from bridges.kinds.shared.fields import DeviceSettings
+from bridges.kinds.shared.rmf_section import Rmf
+from bridges.yaml.parsing import YamlFile
+from bridges.yaml.positions import Spot, locate
+
+UNSEEN = (
+    "an alarm needs diagnostics: daemons state their alarms there, so that the end of one alarm does not"
+    " end another's; delete diagnostics: false"
+)
+
+
+def note_alarms(
+    page: YamlFile, devices: Mapping[str, DeviceSettings], rmf: Rmf, spot: Spot, of_rmf: Spot | None
+) -> None:
+    """Note alarms that contradict each other, or that other daemons cannot see. `spot`, `of_rmf`: the
+    devices' section and the section `rmf`."""
+    found = {n: one for n, one in devices.items() if isinstance(one, AlarmingSettings)}
+    for name, text in disagreements(found):
+        page.note(locate(spot, (name, "alarm")).where(), text)
+    if of_rmf and not rmf.diagnostics and any(one.alarm != "none" for one in found.values()):
+        page.note(locate(of_rmf, ("diagnostics",)).where(), UNSEEN)
