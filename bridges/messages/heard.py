@@ -4,6 +4,7 @@ A graph and a recording yield the same values in the same order, so code that ju
 need not know the source.
 """
 
+from collections.abc import Callable
 from operator import is_
 from typing import Any, Final
 
@@ -26,9 +27,11 @@ class Sender(Struct, eq=False):
     """One publisher on the graph, the same object for all its messages.
 
     `node`: the publisher's node, `/namespace/name`, which can be forged; "" until discovery tells.
+    `look`: looks the node up again, from any thread; None if there is nothing to look up.
     """
 
     node: str = ""
+    look: Callable[[], str] | None = None
 
 
 class Heard(Struct, frozen=True):

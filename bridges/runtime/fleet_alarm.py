@@ -8,12 +8,14 @@ import logging
 from collections.abc import Callable, Mapping
 from typing import Final
 
-from bridges.kinds.shared import alarming, fleet_alarm
+from bridges.kinds.shared import alarming, fleet_alarm, kept_alarm
 from bridges.kinds.shared.decision import AlarmInputs, Fault
 from bridges.kinds.shared.durations import NEVER
 from bridges.kinds.shared.fields import GraphSettings
 from bridges.kinds.shared.fleet_alarm import (
     RENEW_S,
+    UNKNOWN,
+    AlarmNamed,
     DeviceTells,
     FleetAlarmEvent,
     FleetAlarmLimits,
@@ -22,6 +24,7 @@ from bridges.kinds.shared.fleet_alarm import (
 )
 from bridges.kinds.shared.graph_kind import GraphKind
 from bridges.messages.definitions import DiagnosticArray, EmergencySignal, Message, Time
+from bridges.messages.heard import Sender
 from bridges.messages.topics import DIAGNOSTICS, Topic
 from bridges.runtime.clock import Clock
 from bridges.runtime.graph_node import GraphNode
@@ -30,7 +33,7 @@ from bridges.runtime.outlet import Named
 from bridges.runtime.ring_writer import NOBODY, NoWriter
 from bridges.runtime.subject import Status
 from bridges.system.log import pairs
-from bridges.transports.transport import Subscription, Transport, any_type
+from bridges.transports.transport import Transport, any_type
 
 log = logging.getLogger(__name__)
 
@@ -67,8 +70,8 @@ def _kind(limits: FleetAlarmLimits) -> "AlarmKind":
         stamped=_without_stamp,
         summary=lambda report, now: alarming.statement(report, limits.fleets),
         idle=lambda memory, now: False,
-        persist=lambda memories: fleet_alarm.persist(memories[ALARM]),
-        restore=lambda kept, settings, now: {ALARM: fleet_alarm.restore(kept)},
+        persist=lambda memories: kept_alarm.persist(memories[ALARM]),
+        restore=lambda kept, settings, now: {ALARM: kept_alarm.restore(kept)},
     )
 
 
@@ -101,6 +104,8 @@ class FleetAlarmNode(
         self._tells_nobody = tells_nobody
         self._renew_at = NEVER
         self._untold = False
+        self._counted = 0
+        self._unnamed: dict[str, tuple[Sender | None, str]] = {}
         super().__init__(
             _kind(limits), GraphSettings(), transport, clock, named, kept, MessagesOnly(writer)
         )
@@ -119,6 +124,7 @@ class FleetAlarmNode(
 
     def look(self) -> None:
         """Subscribe to a topic that RMF's release has only now; called each second."""
+        self._name_senders()
         for topic in alarming.TOPICS.values():
             if topic.name not in self._hears and self._transport.release.has(topic.type):
                 hear = self._on_alarm(topic)
@@ -174,19 +180,39 @@ class FleetAlarmNode(
 
     def _on_alarm(self, topic: Topic[Message]) -> Callable[[Message], None]:
         def put(message: Message) -> None:
-            event = alarming.heard(message, self._senders(self._hears.get(topic.name)))
+            sender = self._transport.sender()
+            names = self._names(sender, topic.name) or [self._unknown(sender, topic.name)]
+            event = alarming.heard(message, names)
             if event.senders != {self._transport.name}:  # an earlier process of this daemon
                 self._writer.spoken(self._named(topic).name, message, sent=False)
                 self.inbox.put(ALARM, (topic, event))
 
         return put
 
-    def _senders(self, hears: Subscription | None) -> list[str]:
-        """Return the nodes that may have sent the message that is being handed on."""
-        sender = self._transport.sender()
-        if sender is not None and sender.node:
-            return [sender.node]
+    def _names(self, sender: Sender | None, topic: str) -> list[str]:
+        """Return the nodes that may have sent a message; empty until discovery names them."""
+        if sender is not None:
+            node = sender.node or (sender.look() if sender.look else "")
+            return [node] if node else []
+        hears = self._hears.get(topic)
         return hears.senders() if hears else []
+
+    def _unknown(self, sender: Sender | None, topic: str) -> str:
+        """Return the provisional name of a sender; `look` asks for its name each second."""
+        for name, (known, on) in self._unnamed.items():
+            if known is sender and on == topic:
+                return name
+        self._counted += 1
+        name = f"{UNKNOWN} {self._counted}"
+        self._unnamed[name] = (sender, topic)
+        return name
+
+    def _name_senders(self) -> None:
+        for unknown, (sender, topic) in list(self._unnamed.items()):
+            if names := self._names(sender, topic):
+                del self._unnamed[unknown]
+                named = AlarmNamed(unknown, frozenset(name.lstrip("/") for name in names))
+                self.inbox.put(ALARM, (self._limits.topic, named))
 
     def _on_statement(self, message: DiagnosticArray) -> None:
         for event in alarming.stated(message):

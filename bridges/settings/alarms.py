@@ -9,8 +9,8 @@ from bridges.yaml.parsing import YamlFile
 from bridges.yaml.positions import Spot, locate
 
 UNSEEN = (
-    "an alarm needs diagnostics: daemons state their alarms there, so that the end of one alarm does not"
-    " end another's; delete diagnostics: false"
+    "an alarm needs diagnostics: daemons state their alarms there, so that the end of one alarm does"
+    " not end another's; delete diagnostics: false"
 )
 
 

@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable, Hashable
+from functools import partial
 from typing import Final
 
 from bridges.messages.heard import Sender
@@ -34,7 +35,8 @@ class Senders:
         sender = self._known[key] = self._known.pop(key) if key in self._known else Sender()
         if not sender.node and time.monotonic() >= self._look_at.get(key, 0.0):
             self._look_at[key] = time.monotonic() + AGAIN_S
-            sender.node = self.node_of(key)
+            sender.look = partial(self.node_of, key)
+            sender.node = sender.look()
         if len(self._known) > MOST:
             oldest = next(iter(self._known))
             del self._known[oldest], self._look_at[oldest]

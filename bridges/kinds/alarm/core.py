@@ -100,8 +100,7 @@ def _faults(
     if active:
         yield Fault("ALARM_SOURCE_ACTIVE", ", ".join(active))
     if not fresh and (memory.io_fault or silent or memory.read_at is not None):
-        how = "and its silence is an alarm" if silent else "so a fire would not be seen"
-        yield Fault("PANEL_SILENT", f"{memory.io_fault or 'no reading'}, {how}")
+        yield Fault("PANEL_SILENT", memory.io_fault or "no reading")
     if drill:
         yield Fault("ALARM_DRILL", "a drill, which ends by itself")
 

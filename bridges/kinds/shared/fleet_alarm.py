@@ -27,7 +27,7 @@ FLEET-ALARM-6. Latched causes, the published `true` and other nodes' alarms surv
 FLEET-ALARM-7. A drill raises the alarm without latching, and its end needs no reset. A cause that
    comes during a drill makes a real alarm of it.
 FLEET-ALARM-8. Where the wire hides a message's sender, any present publisher that is not one of our
-   nodes may have sent it.
+   nodes may have sent it. Until discovery names a sender, its alarm stands as that of an unknown node.
 """
 
 from collections.abc import Collection, Mapping
@@ -36,7 +36,6 @@ from typing import Final
 import msgspec
 from msgspec.structs import replace
 
-from bridges.kinds.shared import keep
 from bridges.kinds.shared.decision import AlarmInputs, Decision, Fault, OperatorReset, Said
 from bridges.kinds.shared.durations import AGES_AGO, NEVER, RIVAL_QUIET_S, SILENT_S
 from bridges.kinds.shared.graph_kind import MaySpeak, Woken
@@ -50,7 +49,10 @@ RENEW_S: Final = 5.0
 fleet adapter that starts in a later alarm might hear the old `false` last."""
 MOST_OTHERS: Final = 200
 """The most other nodes whose alarms are remembered; a site has some dozens of daemons."""
-VERSION: Final = 1
+UNKNOWN: Final = "unknown node"
+"""Begins the provisional name of a node that discovery has not named yet."""
+OR: Final = " or "
+"""Joins the nodes of which one has sent a message."""
 
 Fleets = frozenset[str]
 """The fleets that are told; empty for all fleets."""
@@ -71,6 +73,13 @@ class AlarmHeard(msgspec.Struct, frozen=True):
     fleets: Fleets = frozenset()
 
 
+class AlarmNamed(msgspec.Struct, frozen=True):
+    """The nodes that may have sent the messages that were heard from `unknown`."""
+
+    unknown: str
+    senders: frozenset[str]
+
+
 class AlarmStated(msgspec.Struct, frozen=True):
     """Another of our nodes states on `/diagnostics` whether its alarm is raised."""
 
@@ -79,7 +88,9 @@ class AlarmStated(msgspec.Struct, frozen=True):
     fleets: Fleets = frozenset()
 
 
-FleetAlarmEvent = DeviceTells | AlarmHeard | AlarmStated | MaySpeak | Woken | OperatorReset
+FleetAlarmEvent = (
+    DeviceTells | AlarmHeard | AlarmNamed | AlarmStated | MaySpeak | Woken | OperatorReset
+)
 
 
 class AlarmCause(msgspec.Struct, frozen=True, order=True):
@@ -179,8 +190,10 @@ def _take(
         case DeviceTells(device, inputs):
             return replace(memory, inputs={**memory.inputs, device: inputs}), ""
         case AlarmHeard(senders, on, fleets):
-            hear = _hear_true if on else _hear_false
-            return hear(memory, senders, fleets, now), ""
+            heard = (memory, senders, fleets)
+            return _hear_true(*heard) if on else _hear_false(*heard, now), ""
+        case AlarmNamed(unknown, senders):
+            return _name(memory, unknown, senders), ""
         case AlarmStated():
             return _state(memory, event, now), ""
         case MaySpeak(yes):
@@ -191,13 +204,20 @@ def _take(
 
 
 def _hear_true(
-    memory: FleetAlarmMemory, senders: Collection[str], fleets: Fleets, now: float
+    memory: FleetAlarmMemory, senders: Collection[str], fleets: Fleets
 ) -> FleetAlarmMemory:
     strangers = sorted(node for node in senders if node not in memory.ours)
-    node = " or ".join(strangers if len(senders) > 1 else sorted(senders))
     if len(senders) > 1 and not strangers:
         return memory  # one of our nodes, which will state its alarm within a second
-    return _stands(memory, node or "an unknown node", fleets)
+    return _stands(memory, OR.join(strangers if len(senders) > 1 else senders), fleets)
+
+
+def _name(memory: FleetAlarmMemory, unknown: str, senders: Collection[str]) -> FleetAlarmMemory:
+    fleets = memory.others.get(unknown)
+    if fleets is None:
+        return memory
+    others = {node: told for node, told in memory.others.items() if node != unknown}
+    return _hear_true(replace(memory, others=others), senders, fleets)
 
 
 def _stands(memory: FleetAlarmMemory, node: str, fleets: Fleets) -> FleetAlarmMemory:
@@ -222,17 +242,22 @@ def _hear_false(
         return memory
     if not memory.raised:
         return replace(memory, owed=True)
-    by = " or ".join(sorted(senders)) or "an unknown node"
+    by = OR.join(sorted(senders))
     return replace(memory, owed=True, contradicted=(by, now))
 
 
 def _state(memory: FleetAlarmMemory, said: AlarmStated, now: float) -> FleetAlarmMemory:
     if len(memory.ours) >= MOST_OTHERS and said.node not in memory.ours:
         return memory
-    others = {node: fleets for node, fleets in memory.others.items() if node != said.node}
+    ours = {**memory.ours, said.node: now}
+    others = {
+        nodes: fleets
+        for nodes, fleets in memory.others.items()
+        if nodes != said.node and (OR not in nodes or not ours.keys() >= {*nodes.split(OR)})
+    }
     if said.raised:
         others[said.node] = said.fleets
-    return replace(memory, others=others, ours={**memory.ours, said.node: now})
+    return replace(memory, others=others, ours=ours)
 
 
 def _reset(memory: FleetAlarmMemory, limits: FleetAlarmLimits) -> tuple[FleetAlarmMemory, str]:
@@ -310,34 +335,3 @@ def _faults(memory: FleetAlarmMemory, waits: tuple[str, ...], now: float) -> lis
         )
         found.append(Fault("ALARM_WAITS", f"reset here, but {stands}"))
     return found
-
-
-class KeptAlarm(keep.Kept, frozen=True, forbid_unknown_fields=True):
-    """The parts of the memory that are kept. `latched`: device and signal of each cause."""
-
-    latched: list[tuple[str, str]]
-    told: list[str] | None
-    others: dict[str, list[str]]
-
-
-def persist(memory: FleetAlarmMemory) -> bytes:
-    """Encode the memory for the next start. The bytes stay the same until a kept part changes."""
-    return msgspec.json.encode(
-        KeptAlarm(
-            VERSION,
-            sorted((cause.device, cause.signal) for cause in memory.latched),
-            None if memory.told is None else sorted(memory.told),
-            {node: sorted(fleets) for node, fleets in sorted(memory.others.items())},
-        )
-    )
-
-
-def restore(kept: bytes) -> FleetAlarmMemory:
-    """Make the memory at a restart. Raises ValueError for bytes that `persist` did not make."""
-    found = keep.read(kept, KeptAlarm, VERSION, "an alarm's memory")
-    return FleetAlarmMemory(
-        latched=tuple(AlarmCause(*cause) for cause in found.latched),
-        told=None if found.told is None else frozenset(found.told),
-        owed=True,
-        others={node: frozenset(fleets) for node, fleets in found.others.items()},
-    )

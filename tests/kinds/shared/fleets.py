@@ -10,7 +10,7 @@ from typing import Any
 import msgspec
 from msgspec.structs import replace
 
-from bridges.kinds.shared import alarming, fleet_alarm
+from bridges.kinds.shared import alarming, fleet_alarm, kept_alarm
 from bridges.kinds.shared.decision import AlarmInputs, OperatorReset, Said
 from bridges.kinds.shared.fleet_alarm import (
     AlarmHeard,
@@ -81,7 +81,7 @@ class AlarmGraph(msgspec.Struct, frozen=True):
     def start(self, name: str) -> "AlarmGraph":
         """Start a daemon, which reads its disk, and hears the retained messages of the others."""
         daemon = self.daemons[name]
-        memory = fleet_alarm.initial() if daemon.disk is None else fleet_alarm.restore(daemon.disk)
+        memory = fleet_alarm.initial() if daemon.disk is None else kept_alarm.restore(daemon.disk)
         graph = self._with(name, replace(daemon, memory=memory, started_at=self.now))
         graph = graph._decides(name, MaySpeak(False))
         for other, one in self.daemons.items():
@@ -151,7 +151,7 @@ class AlarmGraph(msgspec.Struct, frozen=True):
         daemon = replace(
             daemon,
             memory=made.memory,
-            disk=fleet_alarm.persist(made.memory),
+            disk=kept_alarm.persist(made.memory),
             state=report.state,
             faults=faults,
             wake_at=made.wake_at,

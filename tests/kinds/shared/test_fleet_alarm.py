@@ -1,9 +1,17 @@
 """Stories of one alarm for the fleets of a graph: two daemons, a stranger's node, robots."""
 
+from typing import Any
+
 from msgspec.structs import replace
 
-from bridges.kinds.shared import alarming, fleet_alarm
-from bridges.kinds.shared.fleet_alarm import AlarmHeard, FleetAlarmLimits
+from bridges.kinds.shared import alarming, fleet_alarm, kept_alarm
+from bridges.kinds.shared.fleet_alarm import (
+    AlarmHeard,
+    AlarmNamed,
+    AlarmStated,
+    FleetAlarmLimits,
+    FleetAlarmMemory,
+)
 from bridges.messages.definitions import (
     Bool,
     DiagnosticArray,
@@ -52,7 +60,7 @@ def test_a_cause_of_a_device_that_was_taken_out_of_the_file_can_be_reset() -> No
     """FLEET-ALARM-1."""
     disk = graph(a=()).tells("a", "fire").daemons["a"].disk
     assert disk is not None
-    memory = fleet_alarm.restore(disk)
+    memory = kept_alarm.restore(disk)
     gone = replace(LIMITS, devices=frozenset({"Other panel"}))
     made = fleet_alarm.decide(memory, fleet_alarm.OperatorReset(), 9.0, gone)
     assert made.memory.latched == ()
@@ -153,7 +161,6 @@ def test_where_the_wire_hides_the_sender_a_stranger_among_the_publishers_is_beli
 
     assert others("b", "c", "desk") == {"c or desk"}
     assert others("b") == {"b"}
-    assert others() == {"an unknown node"}
     assert (
         fleet_alarm.decide(
             replace(memory, ours={"b": 8.0, "c": 8.0}),
@@ -163,6 +170,30 @@ def test_where_the_wire_hides_the_sender_a_stranger_among_the_publishers_is_beli
         ).memory.others
         == {}
     )
+
+
+def test_a_sender_that_discovery_names_later_is_one_of_ours_or_a_stranger() -> None:
+    """FLEET-ALARM-8."""
+    memory = graph(a=(), b=()).until(8.0).daemons["a"].memory
+    assert memory is not None
+
+    def hears(memory: FleetAlarmMemory, *events: Any) -> set[str]:
+        for event in events:
+            memory = fleet_alarm.decide(memory, event, 9.0, LIMITS).memory
+        return set(memory.others)
+
+    true = AlarmHeard(frozenset({"unknown node 1"}), True)
+    assert hears(memory, true) == {"unknown node 1"}
+    assert hears(memory, true, AlarmNamed("unknown node 1", frozenset({"desk"}))) == {"desk"}
+    named = AlarmNamed("unknown node 1", frozenset({"b"}))
+    assert hears(memory, true, named, AlarmStated("b", False)) == set()
+    named = AlarmNamed("unknown node 1", frozenset({"b", "c"}))
+    assert hears(memory, true, named) == {"c"}
+    unstated = replace(memory, ours={})
+    assert hears(unstated, true, named) == {"b or c"}
+    assert hears(unstated, true, named, AlarmStated("b", False)) == {"b or c"}
+    assert hears(unstated, true, named, *(AlarmStated(n, False) for n in "bc")) == set()
+    assert hears(memory, named) == set()
 
 
 def test_an_alarm_is_said_on_its_topic_to_its_fleets() -> None:
@@ -189,7 +220,7 @@ def test_a_statement_comes_back_and_hostile_statements_mean_all_fleets() -> None
 def test_memory_that_no_daemon_wrote_is_refused() -> None:
     for kept in (b"", b"{}", b'{"version":2,"latched":[],"told":null,"others":{}}'):
         try:
-            fleet_alarm.restore(kept)
+            kept_alarm.restore(kept)
         except ValueError:
             continue
         raise AssertionError(kept)

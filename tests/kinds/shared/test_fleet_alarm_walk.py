@@ -10,7 +10,7 @@ from typing import Final
 
 from msgspec.structs import replace
 
-from bridges.kinds.shared import fleet_alarm
+from bridges.kinds.shared import fleet_alarm, kept_alarm
 from bridges.kinds.shared.fleet_alarm import overlap
 from tests.depth import depth
 from tests.kinds.shared.fleets import AlarmGraph, graph
@@ -53,7 +53,7 @@ def latched(g: AlarmGraph, name: str) -> bool:
 def kept(g: AlarmGraph, name: str) -> fleet_alarm.FleetAlarmMemory:
     """Return the memory on a daemon's disk."""
     disk = g.daemons[name].disk
-    return fleet_alarm.initial() if disk is None else fleet_alarm.restore(disk)
+    return fleet_alarm.initial() if disk is None else kept_alarm.restore(disk)
 
 
 def key(g: AlarmGraph) -> Hashable:

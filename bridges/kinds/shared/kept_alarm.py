@@ -1,0 +1,45 @@
+"""The memory of a daemon's alarm on disk, for a restart."""
+
+from typing import Final
+
+import msgspec
+
+from bridges.kinds.shared import keep
+from bridges.kinds.shared.fleet_alarm import UNKNOWN, AlarmCause, FleetAlarmMemory
+
+VERSION: Final = 1
+
+
+class KeptAlarm(keep.Kept, frozen=True, forbid_unknown_fields=True):
+    """The parts of the memory that are kept. `latched`: device and signal of each cause."""
+
+    latched: list[tuple[str, str]]
+    told: list[str] | None
+    others: dict[str, list[str]]
+
+
+def persist(memory: FleetAlarmMemory) -> bytes:
+    """Encode the memory for the next start. The bytes stay the same until a kept part changes."""
+    return msgspec.json.encode(
+        KeptAlarm(
+            VERSION,
+            sorted((cause.device, cause.signal) for cause in memory.latched),
+            None if memory.told is None else sorted(memory.told),
+            {
+                node: sorted(fleets)
+                for node, fleets in sorted(memory.others.items())
+                if not node.startswith(UNKNOWN)  # it retains its message for our next start
+            },
+        )
+    )
+
+
+def restore(kept: bytes) -> FleetAlarmMemory:
+    """Make the memory at a restart. Raises ValueError for bytes that `persist` did not make."""
+    found = keep.read(kept, KeptAlarm, VERSION, "an alarm's memory")
+    return FleetAlarmMemory(
+        latched=tuple(AlarmCause(*cause) for cause in found.latched),
+        told=None if found.told is None else frozenset(found.told),
+        owed=True,
+        others={node: frozenset(fleets) for node, fleets in found.others.items()},
+    )
