@@ -25,7 +25,11 @@ from workbench.replay.files import opened
 from workbench.replay.replayed import Replay, ReplayedCores, of_head
 from workbench.replay.sources import Notes
 
-ENDED = {"lift.memory.Session.own_stamp", "lift.signals.FromAdapter.stamp"}
+ENDED = {
+    "lift.memory.Memory.alarmed",
+    "lift.memory.Session.own_stamp",
+    "lift.signals.FromAdapter.stamp",
+}
 """Fields that a core no longer has (`lift.memory.Session.level`); their values are left out."""
 
 

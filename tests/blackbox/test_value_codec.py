@@ -97,12 +97,12 @@ def test_an_object_that_no_core_uses_cannot_become_a_tree() -> None:
 
 def test_two_trees_are_compared_in_the_fields_that_both_versions_know() -> None:
     memory = LiftMemory(session=LiftSession("r1", True, "L3", 2.0))
-    was, now = tree(memory), tree(replace(memory, alarmed=True))
+    was, now = tree(memory), tree(replace(memory, fire_latched=True))
     assert isinstance(was, dict)
     older = {name: part for name, part in was.items() if name != "fire_latched"}
 
     assert first_difference(was, was) is None
     assert first_difference(older, was) is None
-    assert first_difference(was, now) == ("alarmed", False, True)
+    assert first_difference(was, now) == ("fire_latched", False, True)
     assert first_difference(tree((1, Fault("A"))), tree((1, Fault("B")))) == ("1.code", "A", "B")
     assert first_difference([1], [1, 2]) == ("", [1], [1, 2])

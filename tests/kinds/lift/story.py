@@ -14,7 +14,9 @@ from bridges.kinds.lift import KIND
 from bridges.kinds.lift.memory import LiftLimits
 from bridges.kinds.lift.settings import Floor, LiftDurations, LiftSettings
 from bridges.kinds.lift.signals import DoorReading, Hazard, LiftOutputs, LiftSample, Motion
+from bridges.kinds.shared import alarming, fleet_alarm
 from bridges.kinds.shared.decision import OperatorReset, RivalSeen
+from bridges.kinds.shared.graph_kind import MaySpeak
 from bridges.kinds.shared.kind import AnyDeviceKind
 from bridges.messages.definitions import (
     LiftDoor,
@@ -234,6 +236,8 @@ class Story:
         self.node = Node(
             "Lift1", self._kind, self.settings, self.limits, self.building, self._publish, clock
         )
+        self._alarm = fleet_alarm.initial()
+        self._alarm_hears(MaySpeak(True))
         self._scan()
 
     def run(self, until: float) -> None:
@@ -278,6 +282,7 @@ class Story:
     def resets(self) -> None:
         """Reset, as an operator does with `rmf-bridge reset`."""
         self._scan(OperatorReset())
+        self._alarm_hears(OperatorReset())
 
     # ---- results
 
@@ -321,16 +326,25 @@ class Story:
     def _scan(self, *events: Any) -> None:
         self.building.advance(self.now)
         self.node.scan(events)
+        decision = self.node.subject.decision
+        assert decision is not None
+        self._alarm_hears(fleet_alarm.DeviceTells("Lift1", decision.report.alarm))
         if self.incoming:
             arrived, self.incoming = self.incoming, []
             self.receive(*arrived)
 
+    def _alarm_hears(self, event: Any) -> None:
+        """Let the daemon's alarm for the fleets decide."""
+        limits = alarming.alarm_limits({"Lift1": self.settings})
+        if limits is not None:
+            made = fleet_alarm.decide(self._alarm, event, self.now, limits)
+            self._alarm = made.memory
+            self.alarms += [(round(self.now, 2), message) for _, message in made.publish]
+
     def _publish(self, topic: Topic[Any], message: Any) -> bool:
         if self.deaf:
             return False
-        if topic == LIFT_STATES:
-            self.told.append((self.now, message))
-            self.hear(message)
-        else:
-            self.alarms.append((round(self.now, 2), message))
+        assert topic == LIFT_STATES
+        self.told.append((self.now, message))
+        self.hear(message)
         return True

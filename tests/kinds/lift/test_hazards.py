@@ -3,7 +3,6 @@
 import pytest
 from msgspec.structs import replace
 
-from bridges.kinds.lift.messages import alarm_topics
 from bridges.kinds.lift.settings import LiftSettings
 from bridges.kinds.lift.signals import (
     DoorReading,
@@ -14,6 +13,7 @@ from bridges.kinds.lift.signals import (
     Motion,
     Side,
 )
+from bridges.kinds.shared.alarming import alarm_topics
 from bridges.kinds.shared.decision import (
     RivalSeen,
 )

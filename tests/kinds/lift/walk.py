@@ -317,7 +317,7 @@ def key(world: World) -> tuple[Any, ...]:
     return (
         (senses.read_at, senses.code, senses.doors, senses.motion, senses.agv, hazards),
         (senses.position, memory.session, memory.grace, memory.relays, memory.fire_latched),
-        (memory.alarmed, memory.rival_at, memory.io_fault, memory.unwritten_since),
+        (memory.rival_at, memory.io_fault, memory.unwritten_since),
         (memory.write_failed, world.sample, world.readable, world.writable),
         tuple(sorted(memory.own.items())),
     )
