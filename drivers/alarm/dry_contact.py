@@ -16,16 +16,13 @@ from bridges.kinds.shared.alarming import alarm_notes
 from bridges.kinds.shared.fields import Name, tells
 from bridges.kinds.shared.remarks import Remarks
 from bridges.kinds.shared.table import Table
+from drivers.alarm.sources import PURPOSE, drill_problems
 from drivers.driver_type import DriverType
 from drivers.hal.points import Input, Points, PointsBus, Wire, is_number
 from drivers.on_points import OnPoints
 from drivers.unsafe import Unsafe, cut_must_read, needlessly_accepted, slow_alarms, unaccepted
 
 DEBOUNCE_S: Final = 0.1
-PURPOSE: Final = (
-    "purpose",
-    "it informs robots; it is no part of the building's alarm, which works without it",
-)
 
 
 class DryContactPanelSettings(PanelSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -43,12 +40,7 @@ class DryContactPanelSettings(PanelSettings, frozen=True, kw_only=True, forbid_u
     def problems(self) -> Remarks:
         """Yield problems that involve more than one field."""
         yield from super().problems()
-        for name in {SILENT, DRILL} & set(self.sources):
-            yield ("sources", name), f"'{name}' is a word of the panel itself: take another name"
-        if self.drill and self.drill_s is None:
-            yield ("drill",), "give the duration of a drill: drill_s: 300"
-        if self.drill_s and not self.drill:
-            yield ("drill_s",), "no contact begins a drill: wire drill, or delete drill_s"
+        yield from drill_problems(self, self.sources, self.drill is not None)
         yield from unaccepted(_unsafe(self), self.accept_unsafe)
 
 

@@ -1,0 +1,195 @@
+"""Stories of one panel: which causes of an alarm does it see?"""
+
+from typing import Any
+
+from bridges.kinds.alarm import core
+from bridges.kinds.alarm.memory import PanelLimits, PanelMemory
+from bridges.kinds.alarm.messages import summary
+from bridges.kinds.alarm.report import PanelReport
+from bridges.kinds.alarm.signals import PanelSample
+from bridges.kinds.shared.decision import AlarmInputs, IoFailed, Sampled, Suspended
+from tests.depth import depth
+from tests.walk import histories
+
+LIMITS = PanelLimits(
+    silent_alarm_after_s=10.0,
+    drill_s=5.0,
+    debounce={"fire": 0.25, "blue": 0.0, "drill": 0.25},
+)
+
+STEP_S = 0.125
+"""A power of two, so that sums of times stay exact."""
+
+
+class Panel:
+    """A panel that is read each STEP_S. `told` has (s, present causes, seen, drill) of each change."""
+
+    def __init__(self) -> None:
+        self.now = 0.0
+        self.on: dict[str, bool] = {"fire": False, "blue": False}
+        self.drill: bool | None = False
+        self.unreadable = ""
+        self.memory: PanelMemory = core.initial(LIMITS, 0.0)
+        self.report: PanelReport
+        self.told: list[tuple[float, str, bool, bool]] = []
+
+    def until(self, at: float) -> "Panel":
+        while self.now < at:
+            self.now += STEP_S
+            self.scan()
+        return self
+
+    def scan(self, event: Any = None) -> None:
+        sample = Sampled(PanelSample(dict(self.on), self.drill))
+        event = event or (IoFailed(self.unreadable) if self.unreadable else sample)
+        made = core.decide(self.memory, event, self.now, LIMITS)
+        assert made.wake_at > self.now
+        self.memory, self.report = made.memory, made.report
+        alarm = made.report.alarm
+        told = (self.now, " ".join(sorted(alarm.present)), alarm.seen, alarm.drill)
+        if not self.told or told[1:] != self.told[-1][1:]:
+            self.told.append(told)
+
+    @property
+    def faults(self) -> list[str]:
+        return [str(fault) for fault in self.report.faults]
+
+
+def test_a_source_is_active_after_its_debounce_and_over_after_it_was_clear() -> None:
+    """ALARM-1."""
+    panel = Panel().until(1.0)
+    panel.on["fire"] = True
+    panel.until(1.25)
+    panel.on["fire"] = False  # a bounce
+    panel.until(2.0)
+    panel.on["fire"] = True
+    panel.until(3.0)
+    assert panel.faults == ["ALARM_SOURCE_ACTIVE: fire"]
+    assert summary(panel.report) == {"state": "alarm", "active": "fire"}
+    panel.on["fire"] = False
+    panel.until(3.75)
+    panel.on["fire"] = True
+    panel.until(4.0)
+    panel.on["fire"] = False
+    panel.until(6.0)
+    assert panel.told == [
+        (0.125, "", False, False),
+        (0.375, "", True, False),
+        (2.375, "fire", True, False),
+        (5.125, "", True, False),
+    ]
+
+
+def test_a_fire_at_the_very_first_reading_counts_at_once() -> None:
+    """ALARM-1."""
+    panel = Panel()
+    panel.on["fire"] = True
+    assert panel.until(0.125).told == [(0.125, "fire", False, False)]
+
+
+def test_a_failed_reading_restarts_the_debounce() -> None:
+    """ALARM-1."""
+    panel = Panel().until(1.0)
+    panel.on["fire"] = True
+    panel.until(1.25)
+    panel.unreadable = "no answer"
+    panel.until(1.375)
+    panel.unreadable = ""
+    assert panel.until(1.625).told[-1][1] == ""
+    assert panel.until(1.75).told[-1][1] == "fire"
+
+
+def test_a_silent_panel_is_a_fault_and_its_sources_stay_unproven() -> None:
+    """ALARM-2."""
+    panel = Panel().until(1.0)
+    panel.on["fire"] = True
+    panel.until(2.0)
+    panel.unreadable = "no answer"
+    panel.on["fire"] = False
+    panel.until(5.0)
+    assert panel.report.alarm == AlarmInputs(frozenset({"fire"}), False)
+    assert panel.faults == ["ALARM_SOURCE_ACTIVE: fire", "PANEL_SILENT: no answer"]
+    panel.unreadable = ""
+    assert panel.until(7.0).report.alarm == AlarmInputs(frozenset(), True)
+
+
+def test_a_long_silence_is_an_alarm_until_the_next_reading() -> None:
+    """ALARM-3."""
+    panel = Panel().until(1.0)
+    panel.unreadable = "no answer"
+    panel.until(10.875)
+    assert panel.report.alarm.present == frozenset()
+    panel.until(11.0)
+    assert panel.report.alarm.present == {"silence"}
+    assert summary(panel.report)["state"] == "silent"
+    panel.unreadable = ""
+    assert panel.until(11.125).report.alarm == AlarmInputs(frozenset(), True)
+
+
+def test_a_panel_that_never_answers_alarms_after_the_same_time() -> None:
+    """ALARM-3."""
+    panel = Panel()
+    panel.unreadable = "no answer"
+    panel.until(9.875)
+    assert (panel.report.alarm.present, panel.faults) == (set(), ["PANEL_SILENT: no answer"])
+    assert panel.until(10.0).report.alarm.present == {"silence"}
+
+
+def test_a_machine_that_slept_counts_its_sleep_as_silence() -> None:
+    """ALARM-2 and ALARM-3."""
+    panel = Panel().until(1.0)
+    panel.now = 30.0
+    panel.scan(Suspended("slept"))
+    assert panel.report.alarm == AlarmInputs(frozenset({"silence"}), False)
+
+
+def test_a_drill_ends_after_its_time_or_with_its_key() -> None:
+    """ALARM-4."""
+    panel = Panel().until(1.0)
+    panel.drill = True
+    panel.until(8.0)
+    assert panel.told[-2:] == [(1.375, "", True, True), (6.375, "", True, False)]
+    panel.drill = False
+    panel.until(9.0)
+    panel.drill = True
+    panel.until(10.0)
+    assert panel.faults == ["ALARM_DRILL: a drill, which ends by itself"]
+    assert summary(panel.report) == {"state": "drill", "active": "-"}
+    panel.drill = False
+    assert panel.until(10.375).report.alarm.drill is False
+
+
+def test_a_key_that_is_on_at_the_start_begins_no_drill() -> None:
+    """ALARM-4."""
+    panel = Panel()
+    panel.drill = True
+    panel.until(3.0)
+    assert not any(told[3] for told in panel.told)
+
+
+def test_no_history_hides_a_lasting_cause_or_makes_a_drill_last() -> None:
+    """Every history of some readings, 0.375 s or 6 s apart, checked in other words."""
+    moves = ("fire", "out", "key", "no key", "dead", "later")
+
+    def after(state: tuple[PanelMemory, float, bool, bool], move: str) -> Any:
+        memory, now, fire, key = state
+        fire = {"fire": True, "out": False}.get(move, fire)
+        key = {"key": True, "no key": False}.get(move, key)
+        waits = 48 if move == "later" else 3
+        for _ in range(waits):
+            now += STEP_S
+            sample = PanelSample({"fire": fire}, key)
+            event = IoFailed("dead") if move == "dead" else Sampled(sample)
+            made = core.decide(memory, event, now, LIMITS)
+            memory = made.memory
+            assert made.wake_at > now
+        alarm = made.report.alarm
+        assert not fire or move == "dead" or "fire" in alarm.present
+        assert alarm.seen <= (move != "dead" or memory.read_at is not None)
+        assert not (alarm.drill and move == "later")
+        assert ("silence" in alarm.present) == (now >= memory.began_at + 10.0)
+        return memory, now, fire, key
+
+    start = (core.initial(LIMITS, 0.0), 0.0, False, False)
+    ends = [*histories(start, moves, depth(5, 7), after)]
+    assert len(ends) == len(moves) ** depth(5, 7)
