@@ -153,7 +153,8 @@ def test_a_source_that_is_null_or_missing_is_an_error_and_not_clear() -> None:
 
     plain = {**BASE, "drill_s": None, "state_path": "/", "sources": {"fire": {"field": "a.b"}}}
     settings = msgspec.convert(plain, http_panel.HttpPanelSettings)
-    for answer in ({"a": {"b": None}}, {"a": {}}, {"a": {"b": 3}}):
+    wrong: list[dict[str, object]] = [{"a": {"b": None}}, {"a": {}}, {"a": {"b": 3}}]
+    for answer in wrong:
         with pytest.raises(DriverError):
             http_panel.HttpPanel(settings, Answers(answer)).read()  # type: ignore[arg-type]
     told = http_panel.HttpPanel(settings, Answers({"a": {"b": True}})).read()  # type: ignore[arg-type]

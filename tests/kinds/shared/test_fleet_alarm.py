@@ -5,6 +5,7 @@ from typing import Any
 from msgspec.structs import replace
 
 from bridges.kinds.shared import alarming, fleet_alarm, kept_alarm
+from bridges.kinds.shared.decision import OperatorReset
 from bridges.kinds.shared.fleet_alarm import (
     AlarmHeard,
     AlarmNamed,
@@ -62,7 +63,7 @@ def test_a_cause_of_a_device_that_was_taken_out_of_the_file_can_be_reset() -> No
     assert disk is not None
     memory = kept_alarm.restore(disk)
     gone = replace(LIMITS, devices=frozenset({"Other panel"}))
-    made = fleet_alarm.decide(memory, fleet_alarm.OperatorReset(), 9.0, gone)
+    made = fleet_alarm.decide(memory, OperatorReset(), 9.0, gone)
     assert made.memory.latched == ()
 
 
@@ -70,7 +71,7 @@ def test_a_refused_reset_names_the_causes() -> None:
     """FLEET-ALARM-1."""
     memory = graph(a=()).tells("a", "fire").daemons["a"].memory
     assert memory is not None
-    made = fleet_alarm.decide(memory, fleet_alarm.OperatorReset(), 9.0, LIMITS)
+    made = fleet_alarm.decide(memory, OperatorReset(), 9.0, LIMITS)
     assert made.refused == "the alarm is not over: fire of Panel"
 
 
