@@ -13,6 +13,8 @@ from bridges.observe.requesters import Moment
 SIMULATED: Final = "SIMULATED"
 PASSIVE: Final = "PASSIVE"
 COORDINATOR: Final = "charger_coordinator"
+PANEL: Final = "alarm"
+"""The kind of alarm panels, which publish no state: their diagnostics are all that is heard."""
 REFUSED: Final = "refused "
 
 
@@ -35,9 +37,10 @@ def about(status: DiagnosticStatus) -> tuple[Kind, str] | None:
 
 
 def of_node(status: DiagnosticStatus) -> bool:
-    """Is the status about one of our daemons itself, or about a coordinator's whole site?"""
+    """Is the status about one of our daemons itself, a coordinator's whole site, or an alarm panel?"""
     kind = kind_in(status)
-    return kind == COORDINATOR or (bool(kind) and status.name == f"{status.hardware_id}: daemon")
+    of_daemon = bool(kind) and status.name == f"{status.hardware_id}: daemon"
+    return kind in (COORDINATOR, PANEL) or of_daemon
 
 
 @dataclass(slots=True)

@@ -17,6 +17,7 @@ from bridges.messages import definitions as d
 from bridges.messages import words
 from bridges.messages.heard import Heard, Own
 from bridges.messages.words import KINDS, Kind
+from bridges.observe.alarms import alarms
 from bridges.observe.all_devices import Key, ObservedGraph
 from bridges.observe.diagnosis import COORDINATOR
 from bridges.observe.limits import FLAPS, MOST_DEVICES
@@ -129,6 +130,8 @@ class HeardDevices(ObservedGraph[Device]):
             _act_on(answer, reason, around.remedies)
         if answer.because is None:
             common.say_waits(answer, device, clock)
+        because = [one.because for one in alarms(self.nodes, self.now.at) if one.stands]
+        answer.now[:0] = because
         if device is not last and last.state is not None:
             held = "" if kind == "door" else f"; held by {words.holder(last.state) or 'nobody'}"
             later = f"{words.condition(last.state)}{held}"

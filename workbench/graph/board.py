@@ -16,8 +16,9 @@ from msgspec.structs import asdict, replace
 from bridges.messages import definitions as d
 from bridges.messages import words
 from bridges.messages.heard import Heard
+from bridges.observe.alarms import alarms
 from bridges.observe.all_devices import AnyDevice, ObservedGraph, PlainGraph
-from bridges.observe.diagnosis import COORDINATOR, PASSIVE, SIMULATED, Diagnosis
+from bridges.observe.diagnosis import COORDINATOR, PANEL, PASSIVE, SIMULATED, Diagnosis
 from bridges.observe.door import ObservedDoor
 from bridges.observe.limits import SILENT_S
 from bridges.system.columns import aligned, clipped, hanging, width
@@ -35,7 +36,7 @@ Device = tuple[str, str]
 
 
 class BoardRow(Struct, frozen=True):
-    """One device, the charger coordinator, or a robot with its assigned place.
+    """One device, an alarm, the charger coordinator, or a robot with its assigned place.
 
     `waiting`: the waiting robots, or what the holder waits for. `age`: the reading's age. `mark`: why
     the row may be wrong. `simulated`: is the device without hardware? `faults`: the faults that its
@@ -111,7 +112,7 @@ class Board:
         """Return the rows, sorted by kind and name. `now`: monotonic s; `wall`: the stamps' clock."""
         every = [one for kind in words.KINDS for one in sorted(self._graph.stated(kind), key=_name)]
         devices = self.rows_of(every, now, wall)
-        return [*devices, *self._coordinators(now), *self._robots()]
+        return [*devices, *self._alarms(now), *self._coordinators(now), *self._robots()]
 
     def _device(self, one: AnyDevice, now: float, wall: float) -> BoardRow:
         found = _said(one, now)
@@ -130,6 +131,31 @@ class Board:
             any(said.kind == one.kind and self._simulated(said, now) for said in found),
             _faults(found),
         )
+
+    def _alarms(self, now: float) -> Iterator[BoardRow]:
+        """Yield a row for each daemon's alarm, and for each alarm panel."""
+        nodes = self._graph.nodes
+        for one in alarms(nodes, now):
+            daemon = nodes[f"{one.node}: daemon"]
+            mark = "" if one.current or not one.stands else "SILENT"
+            if one.current or one.stands:
+                simulated = self._simulated(daemon, now)
+                text, faults = one.condition, _faults([daemon])
+                yield BoardRow(
+                    "alarm", one.node, text, mark=mark, simulated=simulated, faults=faults
+                )
+        for name, panel in nodes.items():
+            if panel.kind == PANEL and not name.endswith(": daemon") and panel.is_current(now):
+                state = f"{panel.value('state')}: {panel.value('active') or 'no source'}"
+                shown = words.printable(name.partition(": ")[2])
+                simulated = self._simulated(panel, now)
+                yield BoardRow(
+                    "alarm",
+                    shown,
+                    words.printable(state),
+                    simulated=simulated,
+                    faults=_faults([panel]),
+                )
 
     def _coordinators(self, now: float) -> Iterator[BoardRow]:
         for name, diagnosis in self._graph.nodes.items():

@@ -19,7 +19,7 @@ from bridges.messages.topics import AnyTopic
 from bridges.messages.words import KINDS, Kind, Requested, Stated
 from bridges.observe.all_devices import Key
 from bridges.observe.charger import NOBODY, ObservedCharger
-from bridges.observe.diagnosis import about, kind_in
+from bridges.observe.diagnosis import PANEL, about, kind_in
 from bridges.observe.limits import FORGOTTEN_S
 from bridges.observe.requesters import Moment
 from bridges.runtime.diagnostics import MOST
@@ -251,4 +251,4 @@ def _view(row: BoardRow, device: Device | None) -> DeviceView:
 
 
 def _is_graph(status: d.DiagnosticStatus) -> bool:
-    return kind_in(status).endswith(("supervisor", "coordinator"))
+    return kind_in(status).endswith(("supervisor", "coordinator", PANEL))

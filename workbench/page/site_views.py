@@ -31,6 +31,7 @@ SECTIONS: Final = (
     ("lift", "Lifts"),
     ("door", "Doors"),
     ("charger", "Chargers"),
+    ("alarm", "Alarms"),
     ("coordinator", "Charger coordinators"),
     ("robot", "Charging schedule"),
 )

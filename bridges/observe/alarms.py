@@ -1,0 +1,57 @@
+"""The alarms of the fleets, as our daemons state them on `/diagnostics`."""
+
+from collections.abc import Iterator, Mapping
+from typing import Final
+
+from msgspec import Struct
+
+from bridges.kinds.shared.alarming import CAUSES, FLEETS, RAISED, STATE, fleets_in
+from bridges.messages.words import printable
+from bridges.observe.diagnosis import Diagnosis
+
+STANDS: Final = frozenset((*RAISED, "reset"))
+
+
+class ObservedAlarm(Struct, frozen=True):
+    """A daemon's statement. `state`: `quiet`, `alarm`, `drill` or `reset`. `fleets`: their names, ""
+    for all. `current`: the daemon still makes statements; the alarm of a silent daemon stands."""
+
+    node: str
+    state: str
+    causes: str
+    fleets: str
+    current: bool
+
+    @property
+    def stands(self) -> bool:
+        """Do robots stand for it?"""
+        return self.state in STANDS
+
+    @property
+    def condition(self) -> str:
+        """The alarm in a few words: `ALARM: fire_panel of Main panel; every fleet stands`."""
+        if not self.stands:
+            return "no alarm"
+        word = {"alarm": f"ALARM: {self.causes}", "drill": "DRILL"}.get(self.state, "reset, waits")
+        return f"{word}; {self.fleets or 'every fleet'} stands"
+
+    @property
+    def because(self) -> str:
+        """One sentence: why the robots stand."""
+        robots = f"Every robot of {self.fleets}" if self.fleets else "Every robot"
+        silent = "" if self.current else ", whose daemon has been silent since then"
+        why = {
+            "alarm": f"because {self.causes} raised an alarm and nobody has reset {self.node}",
+            "drill": f"for a drill of {self.node}, which ends by itself",
+        }.get(self.state, f"until another alarm ends: {self.node} was reset")
+        return f"{robots} stands {why}{silent}."
+
+
+def alarms(nodes: Mapping[str, Diagnosis], now: float) -> Iterator[ObservedAlarm]:
+    """Yield the statement of each daemon that may alarm. `nodes`: `<node>: daemon` -> its report."""
+    for name, said in sorted(nodes.items()):
+        if STATE in said.values:
+            told = ", ".join(sorted(fleets_in(said.value(FLEETS))))
+            state, causes = said.value(STATE), printable(said.value(CAUSES))
+            node = printable(name.rpartition(": ")[0])
+            yield ObservedAlarm(node, state, causes, printable(told), said.is_current(now))
