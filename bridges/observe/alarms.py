@@ -29,11 +29,11 @@ class ObservedAlarm(Struct, frozen=True):
 
     @property
     def condition(self) -> str:
-        """The alarm in a few words: `ALARM: fire_panel of Main panel; every fleet stands`."""
+        """The alarm in a few words: `ALARM: fire_panel of Main panel; every fleet is to stand`."""
         if not self.stands:
             return "no alarm"
         word = {"alarm": f"ALARM: {self.causes}", "drill": "DRILL"}.get(self.state, "reset, waits")
-        return f"{word}; {self.fleets or 'every fleet'} stands"
+        return f"{word}; {self.fleets or 'every fleet'} is to stand"
 
     @property
     def because(self) -> str:
@@ -44,7 +44,7 @@ class ObservedAlarm(Struct, frozen=True):
             "alarm": f"because {self.causes} raised an alarm and nobody has reset {self.node}",
             "drill": f"for a drill of {self.node}, which ends by itself",
         }.get(self.state, f"until another alarm ends: {self.node} was reset")
-        return f"{robots} stands {why}{silent}."
+        return f"{robots} is to stand {why}{silent}."
 
 
 def alarms(nodes: Mapping[str, Diagnosis], now: float) -> Iterator[ObservedAlarm]:

@@ -72,7 +72,7 @@ class Daemon:
         self._guard: Guard | None = None
         self._predecessor: Predecessor | None = None
         ours, unsafe = record.of(config), frozenset[str]()
-        if config.buses and not simulated:
+        if config.drives and not simulated:
             self._predecessor = Predecessor(runtime.records, ours, outputs_off)
             unsafe = self._predecessor.make_safe(end.wait)
         node_name = f"rmf_bridge_{config.path.stem}"
@@ -86,7 +86,7 @@ class Daemon:
         self._loops = self._service.loops
         # The record, which `outputs-off` reads, is written once every bus is open: if a bus cannot be
         # opened, there is none. It is written before `serve`, because `serve` claims the outputs.
-        if config.buses and not simulated:
+        if config.drives and not simulated:
             self._convenience("mark", partial(last_mark.leave, name=last_mark.CLAIMED))
             runtime.claim(ours)
             self._guard = Guard(outputs_off) if guard.needed() else None

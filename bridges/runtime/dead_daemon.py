@@ -88,7 +88,7 @@ def _off_by_yaml(file: Path, answered: Mapping[str, float]) -> int:
     except SettingsError as error:
         _say(error)
         return os.EX_CONFIG
-    if not config.buses:
+    if not config.drives:
         logging.info(pairs("nothing_to_switch_off", file=file, kind=config.kind))
         return 0
     return _told(_unsafe(config, (), answered, TIMEOUT_S) == set())

@@ -6,6 +6,8 @@ from typing import Any
 
 from msgspec import Struct, field
 
+from bridges.kinds import kind_called
+from bridges.kinds.shared.graph_kind import GraphKind
 from bridges.kinds.shared.recording_section import RecordingSettings
 from bridges.kinds.shared.rmf_section import Rmf
 from bridges.settings import names as named
@@ -38,6 +40,12 @@ class Config(Struct, frozen=True):
     notes: tuple[Problem, ...] = ()
     section: Any = None
     recording: RecordingSettings = RecordingSettings()
+
+    @property
+    def drives(self) -> bool:
+        """Does this file have outputs that must be off when its daemon is dead?"""
+        kind = kind_called(self.kind)
+        return not isinstance(kind, GraphKind) and kind.drives
 
     def bus_of(self, device_name: str) -> str:
         """Return the name of the bus that a device is on."""

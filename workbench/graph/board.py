@@ -185,7 +185,10 @@ class Board:
 
     def _simulated(self, diagnosis: Diagnosis, now: float) -> bool:
         daemon = self._daemon(diagnosis, now)
-        return daemon is not None and SIMULATED in daemon.message
+        simulated = (
+            daemon.value("simulated") == "yes" if daemon else False
+        )  # a fault hides the word
+        return daemon is not None and (simulated or SIMULATED in daemon.message)
 
 
 def _said(device: AnyDevice, now: float) -> list[Diagnosis]:

@@ -32,6 +32,7 @@ KIND: Kind[
     summary=messages.summary,
     publishes=alarm_topics,
     alarm_inputs=lambda report: report.alarm,
+    drives=False,
 )
 
 RECORDED: Recorded = {

@@ -70,6 +70,7 @@ class Kind(Struct, Generic[S, L, M, X, E, O, R], frozen=True):
     answer. `request`: the message if it is malformed, else the event.
     `on_map(settings)`: settings that name a place on RMF's map, as `Place`s. The device's own name is
     checked for every kind.
+    `drives`: do its devices have outputs? Without outputs there is nothing to switch off.
     `attended_by`: a topic of requests; the core gets `Attended` when its publishers appear or vanish.
     `recorded`: topics with messages about the device that are recorded, and that no core gets.
     """
@@ -94,6 +95,7 @@ class Kind(Struct, Generic[S, L, M, X, E, O, R], frozen=True):
     on_map: Callable[[S], Iterable[Place]] = lambda settings: ()
     attended_by: Topic[Message] | None = None
     recorded: tuple[Topic[Message], ...] = ()
+    drives: bool = True
 
     @property
     def stated_on(self) -> tuple[Topic[Message], ...]:
