@@ -151,6 +151,14 @@ def test_a_drill_ends_by_itself_and_a_cause_during_a_drill_is_an_alarm() -> None
     assert (g.daemons["a"].state, g.stands) == ("alarm", {"tiny": True})
 
 
+def test_an_alarm_of_one_building_does_not_hold_the_other_building() -> None:
+    """FLEET-ALARM-4: rmf's two buildings, each with its own fleets."""
+    g = graph(a=("x",), b=("y",)).tells("a", "fire").tells("b", "fire").until(8.0)
+    g = g.tells("a").resets("a").until(12.0)
+    assert g.stands == {"x": False, "y": True}
+    assert g.daemons["a"].state == "quiet"
+
+
 def test_where_the_wire_hides_the_sender_a_stranger_among_the_publishers_is_believed() -> None:
     """FLEET-ALARM-8."""
     memory = graph(a=(), b=()).until(8.0).daemons["a"].memory
