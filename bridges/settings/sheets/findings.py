@@ -6,11 +6,12 @@ from collections.abc import Sequence
 import msgspec
 
 from bridges.kinds import kind_called
+from bridges.kinds.shared.alarming import TOPICS, AlarmingSettings
 from bridges.kinds.shared.graph_kind import GraphKind
 from bridges.kinds.shared.table import Table
 from bridges.messages import fallbacks
 from bridges.messages.definitions import Message
-from bridges.messages.topics import Topic
+from bridges.messages.topics import DIAGNOSTICS, Topic
 from bridges.settings.load import Config
 from bridges.settings.shown import choices_of, plain
 from bridges.yaml.parsing import Problem
@@ -88,7 +89,11 @@ def _rmf(config: Config) -> dict[str, str]:
     """Return the settings to compare with RMF's, and the topics by their names on this site."""
     rmf, kind = config.rmf, kind_called(config.kind)
     spoken = [*(() if isinstance(kind, GraphKind) else kind.stated_on), *_published(config)]
-    heard = [*kind.requests, *(() if isinstance(kind, GraphKind) else kind.recorded)]
+    alarms = any(
+        isinstance(s, AlarmingSettings) and s.alarm != "none" for s in config.devices.values()
+    )
+    recorded = () if isinstance(kind, GraphKind) else kind.recorded
+    heard = [*kind.requests, *recorded, *((*TOPICS.values(), DIAGNOSTICS) if alarms else ())]
     names = {topic.name: rmf.topics.get(topic.name, topic.name) for topic in (*spoken, *heard)}
     return {
         "domain": "ROS_DOMAIN_ID or 0" if rmf.domain_id is None else str(rmf.domain_id),
@@ -110,8 +115,14 @@ def _published(config: Config) -> list[Topic[Message]]:
 
 def _lacking(config: Config) -> list[str]:
     """List the messages that RMF's release lacks, and their substitutes."""
-    lines = (fallbacks.remarks(topic, config.rmf.release) for topic in _published(config))
+    untold = {s.alarm for s in config.devices.values() if _tells_nobody(s)}  # a note says so
+    topics = (topic for topic in _published(config) if topic.name not in untold)
+    lines = (fallbacks.remarks(topic, config.rmf.release) for topic in topics)
     return list(dict.fromkeys(line for topic in lines for line in topic))
+
+
+def _tells_nobody(settings: object) -> bool:
+    return isinstance(settings, AlarmingSettings) and settings.without_fleets == "tell_nobody"
 
 
 def _bus(config: Config, name: str) -> BusShown:

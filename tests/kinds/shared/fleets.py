@@ -12,6 +12,7 @@ from msgspec.structs import replace
 
 from bridges.kinds.shared import alarming, fleet_alarm, kept_alarm
 from bridges.kinds.shared.decision import AlarmInputs, OperatorReset, Said
+from bridges.kinds.shared.durations import NEVER
 from bridges.kinds.shared.fleet_alarm import (
     AlarmHeard,
     AlarmStated,
@@ -44,7 +45,7 @@ class DaemonSeen(msgspec.Struct, frozen=True):
     state: str = "quiet"
     faults: tuple[str, ...] = ()
     started_at: float = 0.0
-    wake_at: float = fleet_alarm.NEVER
+    wake_at: float = NEVER
 
 
 class AlarmGraph(msgspec.Struct, frozen=True):
