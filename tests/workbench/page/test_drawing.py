@@ -96,7 +96,7 @@ def test_a_lift_with_a_thousand_floors_is_described_in_words_only() -> None:
     assert drawing.shaft(d.LiftState(available_floors=floors)) == ""
 
 
-@pytest.mark.parametrize("kind", ["lift", "door", "charger", "coordinator", "robot"])
+@pytest.mark.parametrize("kind", ["lift", "door", "charger", "alarm", "coordinator", "robot"])
 def test_a_name_is_shown_as_text_and_never_as_markup(kind: str) -> None:
     row = BoardRow(kind, HOSTILE, HOSTILE, HOSTILE, HOSTILE, HOSTILE, HOSTILE, True, HOSTILE)
     states: dict[str, Stated] = {
