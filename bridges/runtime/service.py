@@ -10,6 +10,7 @@ from functools import partial
 from typing import Any, Protocol
 
 from bridges.kinds import kind_called
+from bridges.kinds.shared.alarming import alarm_topics
 from bridges.kinds.shared.decision import Attended, OperatorReset, RequestRefused, RivalSeen
 from bridges.kinds.shared.graph_kind import GraphKind
 from bridges.kinds.shared.kind import AnyDeviceKind
@@ -193,7 +194,8 @@ class Devices:
         return {name: node.status() for name, (node, _) in self._placed.items()}
 
     def _topics(self) -> list[Topic[Message]]:
-        return [*self._kind.stated_on]
+        others = {t for d in self._config.devices.values() for t in self._kind.publishes(d)}
+        return [*self._kind.stated_on, *others]
 
     def _loop(self, bus_name: str, open_bus: OpenBus) -> Loop:
         settings = self._config.buses[bus_name]
@@ -209,7 +211,7 @@ class Devices:
         if name in self._unsafe:
             driver = SafeFirst(name, driver)
         out, clock, writer = self._outlet, self._clock, self._writer
-        tell = self._alarm.tell if self._alarm and self._kind.publishes(device) else None
+        tell = self._alarm.tell if self._alarm and alarm_topics(device) else None
         return Node(
             name, self._kind, device, limits, driver, out.publish, clock, writer, out.failed, tell
         )

@@ -12,6 +12,7 @@ from typing import Final
 from bridges import cli
 from bridges.exit_codes import ALWAYS, EXIT_CODES
 from bridges.kinds import kind_called, kind_names
+from bridges.kinds.shared.alarming import alarm_topics
 from bridges.kinds.shared.kind import Kind
 from bridges.messages import topics
 from bridges.runtime import faults
@@ -172,7 +173,7 @@ def _published(name: str, examples: Iterable[Config]) -> Iterator[topics.AnyTopi
     for config in examples:
         if config.kind == name:
             for device in config.devices.values():
-                yield from kind.publishes(device)
+                yield from (*kind.publishes(device), *alarm_topics(device))
 
 
 def _durability(qos: topics.Qos) -> str:

@@ -74,7 +74,7 @@ class DeviceDaemon:
         self.started(self)
         device, kind = self.device, self.device.kind
         self._place = Place(self._air, self.node, lambda: None)
-        topics = [*kind.stated_on]
+        topics = [*kind.stated_on, *kind.publishes(device.settings)]
         self._publishers = {topic.name: self._place.publisher(topic) for topic in topics}
         limits = kind.limits(device.settings, device.debounce)
         clock = Clock(

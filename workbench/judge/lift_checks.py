@@ -20,6 +20,8 @@ SUPERVISED_S: Final = 10.0
 """Without a request on lift_requests for so long (s), the supervisor may be dead, or not recorded."""
 SETTLED_S: Final = 3.0
 """Time (s) after a node's first state in which it may still obey requests that we have not heard."""
+ALARMS_END_S: Final = 3.0
+"""Nodes that end one alarm together publish their `false` within this time (s)."""
 
 
 def _is_open(history: LiftHistory) -> d.LiftState | None:
@@ -307,6 +309,18 @@ def no_false(history: LiftHistory) -> Finding:
     if history.often(history.false_alarms):
         return "`false` 3 times, with no alarm to call off"
     return KEPT if history.called_off else None
+
+
+def others_alarms(history: LiftHistory) -> Finding:
+    """A `false` waits for the alarms of all other nodes. Several nodes may end one alarm together."""
+    if not isinstance(history.news, d.Bool) or history.ended_by is None:
+        return None
+    by, others = history.ended_by, [s for s in history.alarming if s is not history.ended_by]
+    standing = [sender for sender in others if history.alarming[sender]]
+    if not standing:
+        return KEPT if others else None
+    who = f"`false` of {shown(by.node)} during the alarm of {shown(standing[0].node)}"
+    return Doubt(who, lambda: not any(map(history.alarming.get, standing)), ALARMS_END_S)
 
 
 def retained(history: LiftHistory) -> Finding:

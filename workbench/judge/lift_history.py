@@ -6,10 +6,10 @@ from typing import Final
 
 from bridges.messages import definitions as d
 from bridges.messages import topics
-from bridges.messages.heard import Heard
+from bridges.messages.heard import Heard, Sender
 from bridges.observe.lift import HAZARDS, ObservedLift
 from bridges.observe.limits import SLOWEST_S
-from workbench.judge.history import NOT_YET, History, keep
+from workbench.judge.history import NOT_YET, REMEMBERED, History, keep
 
 GRACE_S: Final = 65.0
 """Time (s) in which a session may resume: its robot may still be in the car."""
@@ -71,8 +71,8 @@ class LiftHistory(History[d.LiftState]):
     session. `bare_end`: the session before ended at an END without a floor. `free_since`: beginning of
     the present time without session and hazard.
     `false_alarms`: times of a needless false on the fire topic; `called_off`: its latest message ended
-    an alarm. `volatile`: does its publisher
-    retain nothing? None if unknown.
+    an alarm. `alarming`: sender -> its last word on the fire topic; `ended_by`: the sender of the
+    latest `false`. `volatile`: does its publisher retain nothing? None if unknown.
     """
 
     seen: ObservedLift
@@ -95,6 +95,8 @@ class LiftHistory(History[d.LiftState]):
         self.travelled = self.bare_end = False
         self.false_alarms: deque[float] = deque(maxlen=3)
         self.alarmed = self.called_off = False
+        self.alarming: dict[Sender, bool] = {}
+        self.ended_by: Sender | None = None
         self.volatile: bool | None = None
         self.free_since = NOT_YET
         self._open: tuple[str, float] = ("", NOT_YET)
@@ -125,7 +127,7 @@ class LiftHistory(History[d.LiftState]):
         """Take requests of this lift and of others, and the fire alarm."""
         message = heard.message
         if isinstance(message, d.Bool) and heard.topic == topics.FIRE_ALARM_TRIGGER.name:
-            return self._alarm(message.data)
+            return self._alarm(message.data, heard.sender)
         if not isinstance(message, d.LiftRequest):
             return False
         direct = heard.topic == topics.LIFT_REQUESTS.name
@@ -255,7 +257,10 @@ class LiftHistory(History[d.LiftState]):
             unserved = request.destination_floor not in served
             self.unserved_at = self.now if unserved else self.unserved_at
 
-    def _alarm(self, on: bool) -> bool:
+    def _alarm(self, on: bool, sender: Sender | None) -> bool:
+        self.ended_by = None if on else sender
+        if sender is not None and (sender in self.alarming or len(self.alarming) < REMEMBERED):
+            self.alarming[sender] = on
         self.called_off = self.alarmed and not on
         if not on and not self.alarmed:
             self.false_alarms.append(self.now)

@@ -5,7 +5,6 @@ from bridges.kinds.alarm.memory import PanelLimits, PanelMemory
 from bridges.kinds.alarm.report import PanelReport
 from bridges.kinds.alarm.settings import PanelSettings
 from bridges.kinds.alarm.signals import PanelOutputs, PanelSample
-from bridges.kinds.shared.alarming import alarm_topics
 from bridges.kinds.shared.decision import OperatorReset
 from bridges.kinds.shared.kind import Kind
 from bridges.kinds.shared.recorded import Recorded
@@ -30,7 +29,6 @@ KIND: Kind[
     decide=core.decide,
     state_message=messages.state_message,
     summary=messages.summary,
-    publishes=alarm_topics,
     alarm_inputs=lambda report: report.alarm,
     drives=False,
 )

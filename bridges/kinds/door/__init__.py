@@ -5,7 +5,6 @@ from bridges.kinds.door.memory import DoorLimits, DoorMemory
 from bridges.kinds.door.report import DoorReport
 from bridges.kinds.door.settings import DoorSettings
 from bridges.kinds.door.signals import CloseRequested, DoorOutputs, DoorSample, OpenRequested
-from bridges.kinds.shared.alarming import alarm_topics
 from bridges.kinds.shared.decision import Attended
 from bridges.kinds.shared.kind import Kind
 from bridges.kinds.shared.recorded import Recorded
@@ -33,7 +32,6 @@ KIND: Kind[
     attended_by=topics.DOOR_REQUESTS,
     recorded=(topics.ADAPTER_DOOR_REQUESTS,),
     summary=messages.summary,
-    publishes=alarm_topics,
     alarm_inputs=lambda report: report.alarm,
 )
 

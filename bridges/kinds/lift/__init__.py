@@ -5,7 +5,6 @@ from bridges.kinds.lift.memory import LiftLimits, LiftMemory
 from bridges.kinds.lift.report import LiftReport
 from bridges.kinds.lift.settings import LiftSettings
 from bridges.kinds.lift.signals import Asked, LiftOutputs, LiftSample
-from bridges.kinds.shared.alarming import alarm_topics
 from bridges.kinds.shared.kind import Kind
 from bridges.kinds.shared.recorded import Recorded
 from bridges.messages.topics import LIFT_REQUESTS, LIFT_STATES
@@ -29,7 +28,6 @@ KIND: Kind[
     initial=core.initial,
     decide=core.decide,
     published=core.published,
-    publishes=alarm_topics,
     alarm_inputs=lambda report: report.alarm,
     on_map=lambda settings: settings.on_map(),
     state_message=messages.state_message,

@@ -47,9 +47,10 @@ class AlarmingSettings(DeviceSettings, frozen=True, kw_only=True, forbid_unknown
     ] = None
 
 
-def alarm_topics(settings: AlarmingSettings) -> tuple[Topic[Message], ...]:
-    """Return the topic that tells the fleets of an alarm; empty if the device tells nobody."""
-    return (TOPICS[settings.alarm],) if settings.alarm != "none" else ()
+def alarm_topics(settings: object) -> tuple[Topic[Message], ...]:
+    """Return the topic that tells the fleets of a device's alarm; empty if the device tells nobody."""
+    alarms = isinstance(settings, AlarmingSettings) and settings.alarm != "none"
+    return (TOPICS[settings.alarm],) if alarms else ()  # type: ignore[attr-defined]
 
 
 def alarm_problems(settings: AlarmingSettings) -> Remarks:

@@ -63,7 +63,7 @@ class Kind(Struct, Generic[S, L, M, X, E, O, R], frozen=True):
     `decide`: the core. `state_message(name, settings, report, stamp)`: the report as RMF's message.
     `summary(report)`: key -> value for the log line, the status file and `watch`.
     `published(memory, report)`: the memory after this report has gone out to RMF.
-    `publishes(settings)`: the topics on which the daemon of a device publishes beside its states.
+    `publishes(settings)`: the topics on which a device publishes beside its states.
     `alarm_inputs(report)`: the causes of an alarm for the fleets that the device sees
     (`bridges/kinds/shared/fleet_alarm.py`); None for a kind without alarms.
     `answer(name, request, reason, report)`: the published answer to a refused request; None for no

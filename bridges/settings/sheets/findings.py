@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import msgspec
 
 from bridges.kinds import kind_called
-from bridges.kinds.shared.alarming import TOPICS, AlarmingSettings
+from bridges.kinds.shared.alarming import TOPICS, AlarmingSettings, alarm_topics
 from bridges.kinds.shared.graph_kind import GraphKind
 from bridges.kinds.shared.table import Table
 from bridges.messages import fallbacks
@@ -89,9 +89,7 @@ def _rmf(config: Config) -> dict[str, str]:
     """Return the settings to compare with RMF's, and the topics by their names on this site."""
     rmf, kind = config.rmf, kind_called(config.kind)
     spoken = [*(() if isinstance(kind, GraphKind) else kind.stated_on), *_published(config)]
-    alarms = any(
-        isinstance(s, AlarmingSettings) and s.alarm != "none" for s in config.devices.values()
-    )
+    alarms = any(map(alarm_topics, config.devices.values()))
     recorded = () if isinstance(kind, GraphKind) else kind.recorded
     heard = [*kind.requests, *recorded, *((*TOPICS.values(), DIAGNOSTICS) if alarms else ())]
     names = {topic.name: rmf.topics.get(topic.name, topic.name) for topic in (*spoken, *heard)}
@@ -110,7 +108,8 @@ def _published(config: Config) -> list[Topic[Message]]:
     kind = kind_called(config.kind)
     if isinstance(kind, GraphKind):
         return [*kind.publishes]
-    return [topic for device in config.devices.values() for topic in kind.publishes(device)]
+    devices = config.devices.values()
+    return [topic for one in devices for topic in (*kind.publishes(one), *alarm_topics(one))]
 
 
 def _lacking(config: Config) -> list[str]:

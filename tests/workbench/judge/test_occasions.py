@@ -9,7 +9,7 @@ from msgspec.structs import replace
 
 from bridges.messages import topics, words
 from bridges.messages.definitions import Bool
-from bridges.messages.heard import Heard
+from bridges.messages.heard import Heard, Sender
 from tests.workbench.judge.test_limits import (
     ASSIGNED,
     BLUE,
@@ -75,8 +75,8 @@ def verdict(kind: JudgedKind, law: str, lines: Lines) -> str:
     for look in lines:
         if not isinstance(look, tuple):
             look(judge)
-    for at, topic, message in told:
-        judge.hear(Heard(at, at, topic.name, message))
+    for at, topic, message, *by in told:
+        judge.hear(Heard(at, at, topic.name, message, *by))
     last = told[-1][0]
     [found] = judge.end(last, last)
     return found.verdict.value
@@ -87,8 +87,12 @@ def moving(at: float, door: int = CLOSED) -> Line:
     return at, topic, replace(state, motion_state=1)
 
 
-def alarm(at: float, on: bool) -> Line:
-    return at, topics.FIRE_ALARM_TRIGGER, Bool(on)
+def alarm(at: float, on: bool, *by: Sender) -> Line:
+    return at, topics.FIRE_ALARM_TRIGGER, Bool(on), *by  # type: ignore[return-value]
+
+
+A, B = Sender("/a"), Sender("/b")
+BOTH = (alarm(1.0, True, A), alarm(2.0, True, B))
 
 
 def twins(line: Callable[[float], Line]) -> Lines:
@@ -215,6 +219,11 @@ STORIES: dict[tuple[JudgedKind, str], tuple[Lines, Lines, Lines]] = {
         [car(0.0), alarm(1.0, False), alarm(2.0, True)],
         [car(0.0), alarm(1.0, True), alarm(2.0, False)],
         [car(0.0), *(alarm(n, False) for n in (1.0, 2.0, 3.0))],
+    ),
+    ("lift", "L12.others"): (
+        [car(0.0), alarm(1.0, True, A), alarm(2.0, False, A)],
+        [car(0.0), *BOTH, alarm(4.0, False, A), alarm(6.0, False, B), car(9.0)],
+        [car(0.0), *BOTH, alarm(4.0, False, A), car(9.0), alarm(9.5, False, B)],
     ),
     ("lift", "L12.retained"): (
         cars(),
