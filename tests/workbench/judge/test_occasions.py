@@ -75,6 +75,7 @@ def verdict(kind: JudgedKind, law: str, lines: Lines) -> str:
     for look in lines:
         if not isinstance(look, tuple):
             look(judge)
+    by: list[Sender]
     for at, topic, message, *by in told:
         judge.hear(Heard(at, at, topic.name, message, *by))
     last = told[-1][0]
