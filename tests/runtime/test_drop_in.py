@@ -25,6 +25,9 @@ CAN = ["WatchdogSec=3", "PrivateDevices=yes", "RestrictAddressFamilies=AF_CAN"]
 NET = ["WatchdogSec=3", "PrivateDevices=yes"]
 GRAPH = ["WatchdogSec=10", "PrivateDevices=yes"]
 SHIPPED = {
+    "alarm_http": NET,
+    "alarm_panel": GPIO,
+    "alarm_register": NET,
     "charger_canopen": CAN,
     "charger_contacts": NET,
     "charger_coordinator": GRAPH,
