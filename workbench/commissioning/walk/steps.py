@@ -3,6 +3,7 @@
 from collections.abc import Callable, Collection, Iterator
 from typing import Any, Final
 
+from bridges.kinds.alarm.signals import PanelOutputs
 from bridges.kinds.charger.signals import CURRENT_FLOWS, ChargerOutputs, ChargerSample
 from bridges.kinds.door.signals import DoorOutputs, DoorSample
 from bridges.kinds.lift.settings import LiftSettings
@@ -108,8 +109,14 @@ KINDS: Final[dict[str, Callable[[Any, Wired], Iterator[WalkStep]]]] = {
     "lift": _lift,
     "door": _door,
     "charger": _charger,
+    "alarm": lambda settings, wired: iter(()),  # a panel is only read
 }
-OFF: Final = {"lift": LiftOutputs(), "door": DoorOutputs(), "charger": ChargerOutputs(power=False)}
+OFF: Final = {
+    "lift": LiftOutputs(),
+    "door": DoorOutputs(),
+    "charger": ChargerOutputs(power=False),
+    "alarm": PanelOutputs(),
+}
 
 
 def steps(config: Config, device: str) -> list[WalkStep]:
