@@ -49,9 +49,11 @@ class MessagesOnly(NoWriter):
     def __init__(self, writer: NoWriter) -> None:
         self._writer = writer
 
-    def spoken(self, topic: str, message: Message, *, sent: bool) -> None:
+    def spoken(
+        self, topic: str, message: Message, *, sent: bool, sender: Sender | None = None
+    ) -> None:
         """Note a message that was sent or heard."""
-        self._writer.spoken(topic, message, sent=sent)
+        self._writer.spoken(topic, message, sent=sent, sender=sender)
 
 
 def _kind(limits: FleetAlarmLimits) -> "AlarmKind":
@@ -184,7 +186,8 @@ class FleetAlarmNode(
             names = self._names(sender, topic.name) or [self._unknown(sender, topic.name)]
             event = alarming.heard(message, names)
             if event.senders != {self._transport.name}:  # an earlier process of this daemon
-                self._writer.spoken(self._named(topic).name, message, sent=False)
+                name = self._named(topic).name
+                self._writer.spoken(name, message, sent=False, sender=sender)
                 self.inbox.put(ALARM, (topic, event))
 
         return put
