@@ -75,6 +75,10 @@ COMMANDS = {
     ),
     "release": ("end the session that holds a lift", "release Lift1"),
     "reset": ("tell a running daemon that its latched faults may clear", "reset my_lift.yaml"),
+    "workcell": (
+        "decide what became of a dispenser's or ingestor's request that is in doubt",
+        "workcell again my_dispenser.yaml",
+    ),
     "walk": (
         "try every wire of a device with the electrician, and sign what was seen",
         "walk my_lift.yaml --device Lift1",

@@ -119,6 +119,11 @@ EXIT_CODES: Final[dict[str, dict[int, str]]] = {
         1: "no daemon runs",
         69: "this user may not see or signal the daemon",
     },
+    "workcell": {
+        0: "the decision was sent",
+        1: "no daemon runs, or nothing is in doubt",
+        69: "this user may not see or signal the daemon",
+    },
     "walk": {
         0: "every output is off",
         1: "an output is not verified off",

@@ -5,10 +5,9 @@ import os
 import sys
 from pathlib import Path
 
-from bridges.runtime import holder
+from bridges.runtime import order
 from bridges.runtime.runtime_directory import find
-from bridges.runtime.signals import RESET
-from bridges.system.directories import Directories, act_as_owner
+from bridges.system.directories import act_as_owner
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -26,22 +25,10 @@ def run(args: argparse.Namespace) -> int:
             return 1
         places = find(args.file.absolute(), args.runtime_dir)
         act_as_owner(places)
-        return _reset(args.file, places)
+        code = order.send(args.file, places, None)
+        if code == 0:
+            print("reset sent; for remaining faults see rmf-bridge status, or the log")
+        return code
     except PermissionError as error:
         print(error, file=sys.stderr)
         return os.EX_UNAVAILABLE
-
-
-def _reset(file: Path, places: Directories) -> int:
-    found = holder.look(places)
-    if found is None or not found.serves or not found.started:  # another process may have its pid
-        why = f"{found}, which is not a daemon of this version" if found else "no process holds it"
-        print(f"no daemon serves {file}: {places.runtime}: {why}", file=sys.stderr)
-        return 1
-    try:
-        os.kill(found.pid, RESET)
-    except ProcessLookupError:
-        print(f"the daemon of {file} has just ended", file=sys.stderr)
-        return 1
-    print("reset sent; for remaining faults see rmf-bridge status, or the log")
-    return 0

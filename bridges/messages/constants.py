@@ -70,6 +70,22 @@ class ChargerStateValue(IntEnum):
     CHARGER_ERROR = 200
 
 
+class WorkcellMode(IntEnum):
+    """DispenserState.mode and IngestorState.mode."""
+
+    IDLE = 0
+    BUSY = 1
+    OFFLINE = 2
+
+
+class WorkcellStatus(IntEnum):
+    """DispenserResult.status and IngestorResult.status."""
+
+    ACKNOWLEDGED = 0
+    SUCCESS = 1
+    FAILED = 2
+
+
 class RobotModeValue(IntEnum):
     """RobotMode.mode."""
 

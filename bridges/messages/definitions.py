@@ -25,6 +25,8 @@ from bridges.messages.constants import LiftMotion as LiftMotion
 from bridges.messages.constants import LiftRequestDoor as LiftRequestDoor
 from bridges.messages.constants import LiftRequestType as LiftRequestType
 from bridges.messages.constants import RobotModeValue as RobotModeValue
+from bridges.messages.constants import WorkcellMode as WorkcellMode
+from bridges.messages.constants import WorkcellStatus as WorkcellStatus
 
 uint8 = Annotated[int, "uint8"]
 byte = Annotated[int, "byte"]
@@ -132,6 +134,67 @@ class ChargerState(Struct, frozen=True, gc=False):
     robot_fleet: str = ""
     robot_name: str = ""
     time_to_fully_charged: Duration = Duration()
+
+
+# --- rmf_dispenser_msgs, rmf_ingestor_msgs: the same fields under other names -------------------
+
+
+class DispenserRequestItem(Struct, frozen=True, gc=False):
+    type_guid: str = ""
+    quantity: int32 = 0
+    compartment_name: str = ""
+
+
+class DispenserRequest(Struct, frozen=True, gc=False):
+    time: Time = Time()
+    request_guid: str = ""
+    target_guid: str = ""
+    transporter_type: str = ""
+    items: tuple[DispenserRequestItem, ...] = ()
+
+
+class DispenserState(Struct, frozen=True, gc=False):
+    time: Time = Time()
+    guid: str = ""
+    mode: int32 = 0
+    request_guid_queue: tuple[str, ...] = ()
+    seconds_remaining: float32 = 0.0
+
+
+class DispenserResult(Struct, frozen=True, gc=False):
+    time: Time = Time()
+    request_guid: str = ""
+    source_guid: str = ""
+    status: uint8 = 0
+
+
+class IngestorRequestItem(Struct, frozen=True, gc=False):
+    type_guid: str = ""
+    quantity: int32 = 0
+    compartment_name: str = ""
+
+
+class IngestorRequest(Struct, frozen=True, gc=False):
+    time: Time = Time()
+    request_guid: str = ""
+    target_guid: str = ""
+    transporter_type: str = ""
+    items: tuple[IngestorRequestItem, ...] = ()
+
+
+class IngestorState(Struct, frozen=True, gc=False):
+    time: Time = Time()
+    guid: str = ""
+    mode: int32 = 0
+    request_guid_queue: tuple[str, ...] = ()
+    seconds_remaining: float32 = 0.0
+
+
+class IngestorResult(Struct, frozen=True, gc=False):
+    time: Time = Time()
+    request_guid: str = ""
+    source_guid: str = ""
+    status: uint8 = 0
 
 
 # --- rmf_fleet_msgs ----------------------------------------------------------------------------
@@ -249,6 +312,12 @@ Message = (
     | ChargerRequest
     | ChargerCancel
     | ChargerState
+    | DispenserRequest
+    | DispenserState
+    | DispenserResult
+    | IngestorRequest
+    | IngestorState
+    | IngestorResult
     | FleetState
     | ChargingAssignments
     | Alert
@@ -272,6 +341,14 @@ PACKAGES: Final[dict[type, str]] = {
     ChargerRequest: "rmf_charger_msgs",
     ChargerCancel: "rmf_charger_msgs",
     ChargerState: "rmf_charger_msgs",
+    DispenserRequestItem: "rmf_dispenser_msgs",
+    DispenserRequest: "rmf_dispenser_msgs",
+    DispenserState: "rmf_dispenser_msgs",
+    DispenserResult: "rmf_dispenser_msgs",
+    IngestorRequestItem: "rmf_ingestor_msgs",
+    IngestorRequest: "rmf_ingestor_msgs",
+    IngestorState: "rmf_ingestor_msgs",
+    IngestorResult: "rmf_ingestor_msgs",
     RobotMode: "rmf_fleet_msgs",
     Location: "rmf_fleet_msgs",
     RobotState: "rmf_fleet_msgs",

@@ -68,6 +68,13 @@ ADAPTER_CHARGER_REQUESTS = Topic("adapter_charger_requests", d.ChargerRequest)
 ADAPTER_CHARGER_CANCELS = Topic("adapter_charger_cancels", d.ChargerCancel)
 # A topic without messages. Its publisher shows that a coordinator serves the graph, so another waits.
 CHARGER_COORDINATOR = Topic("charger_coordinator", d.Bool)
+# Unchanged from Humble to Lyrical; the fleet adapter has SystemDefaults keep_last(100) at its ends.
+DISPENSER_REQUESTS = Topic("dispenser_requests", d.DispenserRequest)
+DISPENSER_STATES = Topic("dispenser_states", d.DispenserState)
+DISPENSER_RESULTS = Topic("dispenser_results", d.DispenserResult)
+INGESTOR_REQUESTS = Topic("ingestor_requests", d.IngestorRequest)
+INGESTOR_STATES = Topic("ingestor_states", d.IngestorState)
+INGESTOR_RESULTS = Topic("ingestor_results", d.IngestorResult)
 FLEET_STATES = Topic("fleet_states", d.FleetState)
 # Retained, as by rmf_charging_schedule, for fleet adapters that start later.
 CHARGING_ASSIGNMENTS = Topic(

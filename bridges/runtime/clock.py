@@ -43,9 +43,10 @@ class PublishPace:
         self.told_at = AGES_AGO
         self._told: object = None
 
-    def due_at(self, news: object) -> float:
-        """Return the time to publish `news` (monotonic s)."""
-        return self.told_at + (TELL_EVERY_S if news == self._told else TELL_GAP_S)
+    def due_at(self, news: object, *, at_once: bool = False) -> float:
+        """Return the time to publish `news` (monotonic s). `at_once`: even if nothing has changed."""
+        unchanged = news == self._told and not at_once
+        return self.told_at + (TELL_EVERY_S if unchanged else TELL_GAP_S)
 
     def published(self, news: object, now: float) -> None:
         """Note that `news` was published."""

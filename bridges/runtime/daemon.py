@@ -21,7 +21,7 @@ from bridges.blackbox.ring import Ring
 from bridges.messages.definitions import DiagnosticArray
 from bridges.messages.stamps import ClockError, stamp
 from bridges.messages.topics import DIAGNOSTICS
-from bridges.runtime import guard, last_mark, record, signals
+from bridges.runtime import guard, last_mark, order, record, signals
 from bridges.runtime.diagnostics import diagnosis
 from bridges.runtime.guard import Guard
 from bridges.runtime.notify import notify, watchdog_s
@@ -79,10 +79,15 @@ class Daemon:
         self._transport = open_transport(
             config.rmf, node_name, localhost=localhost, ros_args=ros_args
         )
-        kept = None if simulated else MemoryFile(state_file(config.path), runtime.path / KEPT)
+        # An older memory of devices would be worse than none, so it has no second place.
+        instead = None if config.buses else runtime.path / KEPT
+        path = runtime.path / KEPT if simulated else state_file(config.path)
+        kept = MemoryFile(path, instead)
         open_bus = open_bus or config.open_bus
         self._writer = self._writer_of(ours)
-        self._service = service(config, self._transport, open_bus, kept, unsafe, self._writer)
+        self._service = service(
+            config, self._transport, open_bus, kept, unsafe, self._writer, new=simulated
+        )
         self._loops = self._service.loops
         # The record, which `outputs-off` reads, is written once every bus is open: if a bus cannot be
         # opened, there is none. It is written before `serve`, because `serve` claims the outputs.
@@ -118,7 +123,7 @@ class Daemon:
 
     def serve(self) -> int:
         """Run until a signal; return the exit code, which is 0 if every output is verified off."""
-        signals.on_reset(self._service.reset)
+        signals.on_reset(self._obey)
         self._service.subscribe()
         log.info(pairs("serving", file=self._config.path, kind=self._config.kind, **self._about()))
         try:
@@ -131,6 +136,15 @@ class Daemon:
         finally:
             safe = self._shut_down()
         return 0 if safe else 1
+
+    def _obey(self) -> None:
+        """Obey a person: the decision that lies in the runtime directory, else a reset."""
+        decided = order.take(self._runtime.path, self._config.path)
+        if decided is None:
+            self._service.reset()
+        else:
+            log.info(pairs("decided", verdict=decided.verdict, device=decided.device))
+            self._service.decided(decided.verdict, decided.device)
 
     def _watch(self) -> None:
         """Tell systemd when the daemon is ready, and feed systemd's watchdog while every loop makes

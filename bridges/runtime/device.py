@@ -17,6 +17,7 @@ from bridges.kinds.shared.decision import (
     OperatorReset,
     R,
     RequestRefused,
+    Said,
     Sampled,
     Suspended,
     WriteFailed,
@@ -31,6 +32,7 @@ from bridges.runtime import diagnostics
 from bridges.runtime.answers import RefusalAnswers
 from bridges.runtime.clock import TELL_EVERY_S, Clock, PublishPace
 from bridges.runtime.contained import Contained
+from bridges.runtime.device_memory import DeviceKeeper, DeviceMemories, Unkept
 from bridges.runtime.refusals import Refusals
 from bridges.runtime.ring_writer import NOBODY, NoWriter
 from bridges.runtime.subject import Publish, Status, Subject, SubjectCore
@@ -60,6 +62,7 @@ class Node(Generic[S, L, M, X, E, O, R]):
         writer: NoWriter = NOBODY,
         not_sent: NotSent = lambda topic, error: None,
         tell_alarm: TellAlarm | None = None,
+        memories: DeviceMemories | None = None,
     ) -> None:
         self.name = name
         self.wake_at = AGES_AGO
@@ -74,6 +77,11 @@ class Node(Generic[S, L, M, X, E, O, R]):
         self._clock = clock
         self._refusals = Refusals()
         memory = kind.initial(limits, clock.monotonic())
+        self._keeper: DeviceKeeper[M] | None = None
+        if kind.keeping is not None:
+            memories = memories or DeviceMemories(Unkept(), new=True)
+            self._keeper = DeviceKeeper(name, kind.keeping, memories)
+            memory = self._keeper.restore(memory, clock.monotonic())
         core: SubjectCore[M, DeviceEvent[X, E], O, R] = SubjectCore(
             "device",
             lambda memory, event, now: kind.decide(memory, event, now, limits),
@@ -119,6 +127,7 @@ class Node(Generic[S, L, M, X, E, O, R]):
             if isinstance(event, OperatorReset):  # the next scan claims a failed device again
                 self._open = self._open and not self._io_fault
             self._decide(event)
+        self._keep()
         self._write()
         self._contacts = {} if self._failing else self._driver.contacts()
         self._alarm()
@@ -165,6 +174,13 @@ class Node(Generic[S, L, M, X, E, O, R]):
         self._has_read = True
         return Sampled(sample)
 
+    def _keep(self) -> None:
+        """Write the memory to disk before outputs and messages follow from it."""
+        if self._keeper is not None:
+            result = self._keeper.keep(self.subject.memory, self._clock.monotonic())
+            if result is not None:
+                self._decide(result)
+
     def _write(self) -> None:
         """Write all outputs, as levels, in each scan, but write nothing before the first reading."""
         if not self._has_read or self.subject.decision is None:
@@ -192,16 +208,18 @@ class Node(Generic[S, L, M, X, E, O, R]):
             self._tell_alarm(self.name, inputs)
 
     def _tell(self) -> None:
-        """Publish the state if it is due. A request alone does not make it due."""
+        """Publish the state if it is due, and results after it. A request alone makes no state due."""
         subject, now = self.subject, self._clock.monotonic()
         assert subject.decision is not None
         report = subject.decision.report
-        news = report.news()
-        if now >= self._pace.due_at(news):
+        news, results = report.news(), self._kind.results(self.name, report)
+        if now >= self._pace.due_at(news, at_once=bool(results)):
             if self._send(report):  # a door admits robots only after OPEN was published
+                self._send_results(results)
                 subject.published(self._kind.published(subject.memory, report))
+                results = ()
             self._pace.published(news, now)
-        self.wake_at = min(subject.wake_at, self._pace.due_at(news))
+        self.wake_at = min(subject.wake_at, self._pace.due_at(news, at_once=bool(results)))
 
     def _answer(self) -> None:
         """Publish the answers to refused requests, which give the reason and the device's holder."""
@@ -211,7 +229,19 @@ class Node(Generic[S, L, M, X, E, O, R]):
     def _answered(self, request: object, reason: str) -> RefusalAnswer | None:
         decision = self.subject.decision
         assert decision is not None
-        return self._kind.answer(self.name, request, reason, decision.report)
+        found = self._kind.answer(self.name, request, reason, decision.report)
+        if found is None:
+            return None
+        try:
+            stamp = self._clock.stamp(self._clock.monotonic())
+        except ClockError:
+            return None  # _send has noted it
+        return found._replace(message=self._kind.stamped(found.message, stamp))
+
+    def _send_results(self, results: Iterable[Said]) -> None:
+        for topic, message in results:
+            stamp = self._clock.stamp(self._clock.monotonic())
+            self._publish(topic, self._kind.stamped(message, stamp))
 
     def _send(self, report: R) -> bool:
         """Publish the state; return False if it was not sent, or if RMF has no message for it."""

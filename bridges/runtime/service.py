@@ -11,7 +11,13 @@ from typing import Any, Protocol
 
 from bridges.kinds import kind_called
 from bridges.kinds.shared.alarming import alarm_topics
-from bridges.kinds.shared.decision import Attended, OperatorReset, RequestRefused, RivalSeen
+from bridges.kinds.shared.decision import (
+    Attended,
+    DecidedByPerson,
+    OperatorReset,
+    RequestRefused,
+    RivalSeen,
+)
 from bridges.kinds.shared.graph_kind import GraphKind
 from bridges.kinds.shared.kind import AnyDeviceKind
 from bridges.messages.definitions import Message
@@ -19,6 +25,7 @@ from bridges.messages.topics import M_co, Topic
 from bridges.messages.words import LONGEST_NAME
 from bridges.runtime.clock import Clock, machine_s
 from bridges.runtime.device import AnyNode, Node
+from bridges.runtime.device_memory import DeviceMemories
 from bridges.runtime.fleet_alarm import FleetAlarmNode, node_for
 from bridges.runtime.graph_node import AnyGraphNode, GraphNode
 from bridges.runtime.keeper import MemoryStore
@@ -51,6 +58,9 @@ class Service(Protocol):
     def reset(self) -> None:
         """Clear latched faults on an operator's order."""
 
+    def decided(self, verdict: DecidedByPerson, device: str) -> None:
+        """Pass on a person's decision about one device, or about every device ("")."""
+
     def look(self) -> None:
         """Look for other nodes on the graph; called each second."""
 
@@ -78,10 +88,13 @@ def service(
     kept: MemoryStore | None = None,
     unsafe: Collection[str] = (),
     writer: NoWriter = NOBODY,
+    *,
+    new: bool = False,
 ) -> Service:
     """Return the service for this YAML. Raises HalError if a bus cannot be opened.
 
-    `kept`: the store for the memory of a kind without hardware across restarts; None for no store.
+    `kept`: the store for the memory across restarts, if the kind has such a memory; None for no store.
+    `new`: without a file in the store nothing has ever happened.
     `unsafe`: devices that a dead daemon may have left on. `writer`: the recording's writer.
     """
     kind = kind_called(config.kind)
@@ -90,8 +103,13 @@ def service(
     if isinstance(kind, GraphKind):
         node = GraphNode(kind, config.section, transport, clock, named, kept, writer)
         return GraphService(node, clock)
+    memories = None
+    if kind.keeping is not None and kept is not None:
+        memories = DeviceMemories(kept, new=new)
     alarm = node_for(config.devices, transport, clock, named, kept, writer)
-    return Devices(config, kind, transport, open_bus, named, clock, unsafe, writer, alarm)
+    return Devices(
+        config, kind, transport, open_bus, named, clock, unsafe, writer, alarm, memories
+    )
 
 
 class GraphService:
@@ -103,6 +121,9 @@ class GraphService:
         self.reset = node.reset
         self.status = node.status
         self.devices = node.devices
+
+    def decided(self, verdict: DecidedByPerson, device: str) -> None:
+        """Do nothing: no kind without hardware has an outcome for a person to decide."""
 
     def look(self) -> None:
         """Do nothing, because the node itself looks for other nodes."""
@@ -122,10 +143,12 @@ class Devices:
         unsafe: Collection[str] = (),
         writer: NoWriter = NOBODY,
         alarm: FleetAlarmNode | None = None,
+        memories: DeviceMemories | None = None,
     ) -> None:
         """`alarm`: the node that tells the fleets of the devices' alarms; None if no device does."""
         self._config = config
         self._alarm = alarm
+        self._memories = memories
         self._writer = writer
         self._unsafe = unsafe
         self._kind = kind
@@ -162,6 +185,12 @@ class Devices:
             self._alarm.reset()
         for device, (_, loop) in self._placed.items():
             loop.inbox.put(device, OperatorReset())
+
+    def decided(self, verdict: DecidedByPerson, device: str) -> None:
+        """Put the decision into the inbox of this device, or of each device ("")."""
+        for name, (_, loop) in self._placed.items():
+            if self._kind.keeping is not None and device in ("", name):
+                loop.inbox.put(name, verdict)
 
     def look(self) -> None:
         """Tell each device when a first node that may send requests appears, and when the last such
@@ -213,8 +242,9 @@ class Devices:
         out, clock, writer = self._outlet, self._clock, self._writer
         tell = self._alarm.tell if self._alarm and alarm_topics(device) else None
         return Node(
-            name, self._kind, device, limits, driver, out.publish, clock, writer, out.failed, tell
-        )
+            name, self._kind, device, limits, driver, out.publish, clock, writer, out.failed, tell,
+            self._memories,
+        )  # fmt: skip
 
     def _to_inbox(
         self, topic: Topic[Message], accept: Callable[[Any, Any], object]

@@ -5,7 +5,7 @@ clock and no log. `now` is monotonic seconds. Each call derives the whole set of
 whole report afresh, so a repeated, lost or reordered event cannot leave a relay in a wrong position.
 """
 
-from typing import Generic, Protocol, TypeVar
+from typing import Generic, Literal, Protocol, TypeVar
 
 import msgspec
 
@@ -80,6 +80,26 @@ class AlarmInputs(msgspec.Struct, frozen=True):
     present: frozenset[str] = frozenset()
     seen: bool = False
     drill: bool = False
+
+
+class MemoryKept(msgspec.Struct, frozen=True):
+    """The memory, as it was before this event, is on disk and outlives the daemon."""
+
+
+class MemoryNotKept(msgspec.Struct, frozen=True):
+    """The memory could not be written to disk. The next attempt follows in a second."""
+
+    reason: str
+
+
+class DecidedByPerson(msgspec.Struct, frozen=True):
+    """A person has run `rmf-bridge workcell`: the outcome of a request that the daemon does not know.
+
+    `request`: the request's guid; "" for every request in doubt, and for a lost memory.
+    """
+
+    verdict: Literal["done", "again", "failed"]
+    request: str = ""
 
 
 class Report(Protocol):

@@ -11,13 +11,17 @@ from msgspec import Struct
 
 from bridges.kinds.shared.decision import (
     AlarmInputs,
+    DecidedByPerson,
     Decision,
     IoFailed,
     M,
+    MemoryKept,
+    MemoryNotKept,
     O,
     OperatorReset,
     R,
     RivalSeen,
+    Said,
     Sampled,
     X,
 )
@@ -31,7 +35,16 @@ L = TypeVar("L")
 E = TypeVar("E")
 """The events into which `accept` turns requests."""
 
-DeviceEvent = Union[Sampled[X], IoFailed, RivalSeen, OperatorReset, E]  # noqa: UP007
+DeviceEvent = Union[  # noqa: UP007
+    Sampled[X],
+    IoFailed,
+    RivalSeen,
+    OperatorReset,
+    MemoryKept,
+    MemoryNotKept,
+    DecidedByPerson,
+    E,
+]
 """All events of a device's core."""
 
 FLOOR, LIFT, DOOR, CHARGER, WAYPOINT = "floor", "lift", "door", "charger", "waypoint"
@@ -47,6 +60,22 @@ class RefusalAnswer(NamedTuple):
     topic: Topic[Message]
     message: Message
     status: Mapping[str, str]
+
+
+class Keeping(Struct, Generic[M], frozen=True):
+    """The part of a device's memory that must survive a restart.
+
+    `part(memory)`: this part, compared by value. `persist(memory)`: its bytes. `restore(kept, now)`:
+    the memory from these bytes; raises ValueError for other bytes. `lost(reason)`: the memory of a
+    daemon that finds no bytes, or wrong bytes, where there may have been some.
+    The core gets `MemoryKept` or `MemoryNotKept` after each attempt to write, before outputs and
+    messages.
+    """
+
+    part: Callable[[M], object]
+    persist: Callable[[M], bytes]
+    restore: Callable[[bytes, float], M]
+    lost: Callable[[str], M]
 
 
 class Kind(Struct, Generic[S, L, M, X, E, O, R], frozen=True):
@@ -71,6 +100,9 @@ class Kind(Struct, Generic[S, L, M, X, E, O, R], frozen=True):
     `on_map(settings)`: settings that name a place on RMF's map, as `Place`s. The device's own name is
     checked for every kind.
     `drives`: do its devices have outputs? Without outputs there is nothing to switch off.
+    `results(name, report)`: messages that go out right after the state of this report; while there
+    are any, the state is due. `stamped(message, stamp)`: a result or an answer with its time of sending.
+    `keeping`: for a memory that must survive a restart.
     `attended_by`: a topic of requests; the core gets `Attended` when its publishers appear or vanish.
     `recorded`: topics with messages about the device that are recorded, and that no core gets.
     """
@@ -93,6 +125,9 @@ class Kind(Struct, Generic[S, L, M, X, E, O, R], frozen=True):
         lambda name, request, reason, report: None
     )
     on_map: Callable[[S], Iterable[Place]] = lambda settings: ()
+    results: Callable[[str, R], tuple[Said, ...]] = lambda name, report: ()
+    stamped: Callable[[Any, Time], Message] = lambda message, stamp: message
+    keeping: Keeping[M] | None = None
     attended_by: Topic[Message] | None = None
     recorded: tuple[Topic[Message], ...] = ()
     drives: bool = True

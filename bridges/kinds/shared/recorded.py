@@ -18,8 +18,11 @@ SHARED: Final[Recorded] = {
     "core.debounce.Settled": debounce.Settled,
     "core.decision.AlarmInputs": decision.AlarmInputs,
     "core.decision.Attended": decision.Attended,
+    "core.decision.DecidedByPerson": decision.DecidedByPerson,
     "core.decision.Fault": decision.Fault,
     "core.decision.IoFailed": decision.IoFailed,
+    "core.decision.MemoryKept": decision.MemoryKept,
+    "core.decision.MemoryNotKept": decision.MemoryNotKept,
     "core.decision.OperatorReset": decision.OperatorReset,
     "core.decision.RivalSeen": decision.RivalSeen,
     "core.decision.Sampled": decision.Sampled,
@@ -39,5 +42,7 @@ SHARED: Final[Recorded] = {
     "rmf.constants.LiftRequestDoor": constants.LiftRequestDoor,
     "rmf.constants.LiftRequestType": constants.LiftRequestType,
     "rmf.constants.RobotModeValue": constants.RobotModeValue,
+    "rmf.constants.WorkcellMode": constants.WorkcellMode,
+    "rmf.constants.WorkcellStatus": constants.WorkcellStatus,
     **{f"rmf.definitions.{message.__name__}": message for message in PACKAGES},  # ROS's own names
 }

@@ -1,0 +1,75 @@
+"""`rmf-bridge workcell done|again|failed FILE`: a person decides what became of a request in doubt."""
+
+import argparse
+import json
+import os
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, Final
+
+from bridges.kinds.shared.decision import DecidedByPerson
+from bridges.runtime import order
+from bridges.runtime.holder import STATUS, STATUS_MAX
+from bridges.runtime.runtime_directory import find
+from bridges.system import files
+from bridges.system.directories import Directories, act_as_owner, opened
+
+IN_DOUBT: Final = ("MEMORY_LOST", "OUTCOME_UNKNOWN")
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the options of `workcell`."""
+    parser.add_argument(
+        "verdict",
+        choices=("done", "again", "failed"),
+        help="done: the robot has it, RMF sends the robot on; again: nothing was moved, the cycle runs"
+        " (once more); failed: RMF ends the robot's task",
+    )
+    parser.add_argument("file", type=Path, metavar="FILE", help="the device YAML of the daemon")
+    parser.add_argument("--device", default="", metavar="NAME", help="one device of the file")
+    parser.add_argument(
+        "--request",
+        default="",
+        metavar="GUID",
+        help="one request; without this option every request in doubt, and a lost memory",
+    )
+    parser.add_argument("--runtime-dir", metavar="DIR", help="the daemon's runtime directory")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Return 0 if the decision was sent; 1 if no daemon runs or nothing is in doubt; 69 if this user
+    may not see or signal the daemon."""
+    try:
+        if not args.runtime_dir and not args.file.exists():
+            print(f"{args.file} does not exist", file=sys.stderr)
+            return 1
+        places = find(args.file.absolute(), args.runtime_dir)
+        act_as_owner(places)
+        doubts = list(_doubts(places, args.device))
+        verdict = DecidedByPerson(args.verdict, args.request)
+        if doubts and (code := order.send(args.file, places, verdict, args.device)):
+            return code
+    except PermissionError as error:
+        print(error, file=sys.stderr)
+        return os.EX_UNAVAILABLE
+    if not doubts:
+        print(f"no request of {args.device or args.file} is in doubt", file=sys.stderr)
+        return 1
+    print(*doubts, sep="\n")
+    print(f"decided: {args.verdict}; rmf-bridge status shows the effect")
+    return 0
+
+
+def _doubts(places: Directories, device: str) -> Iterator[str]:
+    """Yield what the daemon's status says to be in doubt: of this device, or of every device ("")."""
+    try:
+        with opened(places.runtime):
+            status = json.loads(files.read(places.runtime / STATUS, STATUS_MAX))
+    except (FileNotFoundError, NotADirectoryError, ValueError):
+        return
+    found: dict[str, Any] = status.get("devices", {})
+    for name, state in found.items():
+        for fault in state.get("faults", []):
+            if device in ("", name) and fault["code"] in IN_DOUBT:
+                yield f"{name}: {fault['code']}: {fault['detail']}"

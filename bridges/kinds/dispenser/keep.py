@@ -1,0 +1,80 @@
+"""The memory on disk of one dispenser or ingestor: its requests with their outcomes, and its halt."""
+
+from typing import Annotated, Final
+
+import msgspec
+from msgspec import Meta
+from msgspec.structs import replace
+
+from bridges.kinds.dispenser.memory import Job, Phase, WorkcellMemory
+from bridges.kinds.dispenser.signals import Item
+from bridges.kinds.shared import keep
+from bridges.kinds.shared.keep import Text
+from bridges.kinds.shared.kind import Keeping
+
+VERSION: Final = 1
+CUT_OFF: Final = "the daemon ended in the middle of its cycle"
+
+
+class JobRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A Job without the times, which a restart does not know."""
+
+    guid: Text
+    phase: Phase
+    type_guid: str = ""
+    quantity: Annotated[int, Meta(ge=0)] = 0
+    compartment: str = ""
+    transporter: str = ""
+    why: str = ""
+    closed: bool = False
+
+
+class KeptWorkcell(keep.Kept, frozen=True, forbid_unknown_fields=True):
+    """The parts of WorkcellMemory that are kept. `lost`: the memory before this file is missing."""
+
+    jobs: list[JobRecord]
+    halted: str = ""
+    lost: str = ""
+
+
+def persist(memory: WorkcellMemory) -> bytes:
+    """Encode the memory for the next start. The bytes stay the same until a kept part changes."""
+    jobs = [_record(job) for job in memory.jobs]
+    return msgspec.json.encode(KeptWorkcell(VERSION, jobs, memory.halted, memory.lost))
+
+
+def restore(kept: bytes, now: float) -> WorkcellMemory:
+    """Decode the memory. A cycle that ran has an unknown outcome. Raises ValueError for other bytes.
+
+    The silence of RMF counts anew from `now` (monotonic s), because nobody knows how long the daemon
+    was down.
+    """
+    found = keep.read(kept, KeptWorkcell, VERSION, "the memory of a dispenser or ingestor")
+    jobs = tuple(_job(record, now) for record in found.jobs)
+    if len({job.guid for job in jobs}) < len(jobs):
+        raise ValueError("one request is in the memory twice")
+    return WorkcellMemory(jobs=jobs, halted=found.halted, lost=found.lost)
+
+
+def _record(job: Job) -> JobRecord:
+    item = job.item
+    return JobRecord(
+        job.guid, job.phase, item.type_guid, item.quantity, item.compartment, job.transporter,
+        job.why, job.closed,
+    )  # fmt: skip
+
+
+def _job(record: JobRecord, now: float) -> Job:
+    item = Item(record.type_guid, record.quantity, record.compartment)
+    job = Job(record.guid, item, record.transporter, record.phase, record.why, record.phase)
+    if record.phase == "running":
+        return replace(job, phase="doubtful", why=CUT_OFF)
+    return replace(job, closed=record.closed, asked_at=now if job.is_over else None)
+
+
+KEEPING: Final[Keeping[WorkcellMemory]] = Keeping(
+    part=lambda memory: (memory.jobs, memory.halted, memory.lost),
+    persist=persist,
+    restore=restore,
+    lost=lambda reason: WorkcellMemory(lost=reason),
+)

@@ -1,0 +1,193 @@
+"""The memory of a dispenser or ingestor from scan to scan, and its limits."""
+
+from collections.abc import Iterator, Mapping
+from typing import Final, Literal
+
+import msgspec
+
+from bridges.kinds.dispenser.settings import WorkcellDurations, WorkcellSettings
+from bridges.kinds.dispenser.signals import Item, WorkcellSample
+from bridges.kinds.shared.debounce import Settled, forget, settle
+from bridges.kinds.shared.durations import NEVER, RIVAL_QUIET_S
+
+SIGNALS: Final = ("done", "busy", "ready", "fault")
+Contact = Settled[bool | None]
+"""One debounced input. If it is not wired, its value and its candidate are None."""
+Phase = Literal["queued", "running", "done", "failed", "doubtful"]
+"""`doubtful`: nobody but a person knows the outcome."""
+
+
+class WorkcellLimits(msgspec.Struct, frozen=True):
+    """The settings that the core needs. `debounce`: signal -> s. `pulse_s`: None for a steady start."""
+
+    t: WorkcellDurations = WorkcellDurations()
+    debounce: Mapping[str, float] = {}
+    pulse_s: float | None = None
+
+    @classmethod
+    def of(cls, settings: WorkcellSettings, debounce: Mapping[str, float]) -> "WorkcellLimits":
+        """Make the limits from the YAML and the wiring table's debounce (signal -> s)."""
+        return cls(settings.limits, debounce, settings.pulse_s)
+
+
+class WorkcellSenses(msgspec.Struct, frozen=True):
+    """The inputs, each None before its first reading. `read_at`: the time of the last reading."""
+
+    done: Contact | None = None
+    busy: Contact | None = None
+    ready: Contact | None = None
+    fault: Contact | None = None
+    errors: tuple[str, ...] = ()
+    read_at: float | None = None
+
+    def is_on(self, signal: str) -> bool:
+        """Has this input settled as asserted?"""
+        contact: Contact | None = getattr(self, signal)
+        return contact is not None and contact.value is True
+
+    def is_off(self, signal: str) -> bool:
+        """Has this input settled as not asserted? An input that is not wired has not."""
+        contact: Contact | None = getattr(self, signal)
+        return contact is not None and contact.value is False
+
+    def seen(self) -> bool:
+        """Has each input settled?"""
+        contacts: list[Contact | None] = [getattr(self, signal) for signal in SIGNALS]
+        return all(one is not None and one.steady_at is not None for one in contacts)
+
+
+class Job(msgspec.Struct, frozen=True):
+    """One request. `kept`: its phase on disk; None before it is there. Other nodes and the outputs
+    follow `kept`, so a restart never contradicts them.
+
+    `why`: the reason of a failure or a doubt. `asked_at`: the time of RMF's last request. `due`: RMF
+    waits for a result. `closed`: RMF has been silent about a finished request for so long that a
+    repeat would be in doubt.
+    """
+
+    guid: str
+    item: Item = Item()
+    transporter: str = ""
+    phase: Phase = "queued"
+    why: str = ""
+    kept: Phase | None = None
+    asked_at: float | None = None
+    due: bool = False
+    closed: bool = False
+
+    @property
+    def is_over(self) -> bool:
+        """Has the request been done, or has it failed?"""
+        return self.phase in ("done", "failed")
+
+    @property
+    def is_listed(self) -> bool:
+        """Is the request in the published queue? RMF takes a request that it no longer finds there for
+        done, so only a request that is done on disk leaves the queue: a failed one stays."""
+        return self.kept is not None and (self.phase, self.kept) != ("done", "done")
+
+
+class Cycle(msgspec.Struct, frozen=True):
+    """The cycle that runs. `started_at`: the time since which the start may be on. `worked`: `busy` was
+    seen. `rested_at`: the time since which `busy` has been over. `cut`: something has failed in this
+    cycle, so the start stays off until its end."""
+
+    guid: str
+    started_at: float
+    worked: bool = False
+    rested_at: float | None = None
+    cut: bool = False
+
+
+class WorkcellMemory(msgspec.Struct, frozen=True):
+    """Everything that the next decision needs to know of the past. Times are monotonic seconds.
+
+    `lost`: the reason why the memory of earlier requests is missing. `halted`: the reason why no cycle
+    starts before an operator's reset. `not_kept`: the reason why the memory is not on disk.
+    """
+
+    jobs: tuple[Job, ...] = ()
+    cycle: Cycle | None = None
+    senses: WorkcellSenses = WorkcellSenses()
+    lost: str = ""
+    halted: str = ""
+    rival_at: float | None = None
+    io_failure: str = ""
+    not_kept: str = ""
+
+    def job(self, guid: str) -> Job | None:
+        """Return the request with this guid."""
+        return next((job for job in self.jobs if job.guid == guid), None)
+
+    def doubtful(self) -> tuple[Job, ...]:
+        """Return the requests whose outcome is unknown."""
+        return tuple(job for job in self.jobs if job.phase == "doubtful")
+
+
+def take(
+    senses: WorkcellSenses, sample: WorkcellSample, now: float, limits: WorkcellLimits
+) -> WorkcellSenses:
+    """Add one reading. After a time without readings every input is unknown again."""
+    if not is_fresh(senses, now, limits):
+        senses = WorkcellSenses()
+    contacts: dict[str, Contact] = {
+        signal: settle(
+            getattr(senses, signal), getattr(sample, signal), now, limits.debounce.get(signal, 0.0)
+        )
+        for signal in SIGNALS
+    }
+    return WorkcellSenses(**contacts, errors=sample.errors, read_at=now)
+
+
+def miss(senses: WorkcellSenses) -> WorkcellSenses:
+    """Restart the debounce after a failed read."""
+    contacts = {signal: forget(getattr(senses, signal)) for signal in SIGNALS}
+    return msgspec.structs.replace(senses, **contacts)
+
+
+def is_fresh(senses: WorkcellSenses, now: float, limits: WorkcellLimits) -> bool:
+    """Is the last reading younger than `stale_after_s`?"""
+    return senses.read_at is not None and now < senses.read_at + limits.t.stale_after_s
+
+
+def rivalled(memory: WorkcellMemory, now: float) -> bool:
+    """Does another node publish states under this name?"""
+    return memory.rival_at is not None and now < memory.rival_at + RIVAL_QUIET_S
+
+
+def obstacles(memory: WorkcellMemory, now: float, limits: WorkcellLimits) -> Iterator[str]:
+    """Yield the codes of everything that keeps a cycle from starting, most serious first."""
+    if memory.lost:
+        yield "MEMORY_LOST"
+    if memory.doubtful():
+        yield "OUTCOME_UNKNOWN"
+    if memory.not_kept:
+        yield "NOT_KEPT"
+    if rivalled(memory, now):
+        yield "TWO_NODES_FOR_ONE_DEVICE"
+    if not is_fresh(memory.senses, now, limits):
+        yield "COMMUNICATION_LOST"
+    if memory.halted:
+        yield "WORKCELL_HALTED"
+    if memory.senses.is_on("fault") or memory.senses.errors:
+        yield "WORKCELL_FAULT"
+
+
+def changes(memory: WorkcellMemory, limits: WorkcellLimits) -> Iterator[float]:
+    """Yield each time at which the decision may change without an event (s)."""
+    senses, t, cycle = memory.senses, limits.t, memory.cycle
+    if senses.read_at is not None:
+        yield senses.read_at + t.stale_after_s
+    for signal in SIGNALS:
+        contact: Contact | None = getattr(senses, signal)
+        if contact is not None:
+            yield contact.due_at(limits.debounce.get(signal, 0.0))
+    if memory.rival_at is not None:
+        yield memory.rival_at + RIVAL_QUIET_S
+    for job in memory.jobs:
+        if job.is_over and not job.closed and job.asked_at is not None:
+            yield job.asked_at + t.repeats_within_s
+    if cycle is not None:
+        yield cycle.started_at + t.cycle_limit_s
+        yield cycle.started_at + (limits.pulse_s or NEVER)
+        yield NEVER if cycle.rested_at is None else cycle.rested_at + t.settle_s

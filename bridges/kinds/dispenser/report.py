@@ -1,0 +1,127 @@
+"""The report of a dispenser or ingestor to RMF, the log and the status file."""
+
+from collections.abc import Iterator
+
+import msgspec
+
+from bridges.kinds.dispenser.memory import (
+    Job,
+    WorkcellLimits,
+    WorkcellMemory,
+    obstacles,
+)
+from bridges.kinds.shared.decision import Fault
+from bridges.messages.constants import WorkcellMode, WorkcellStatus
+
+SHOWN = 3
+"""At most this many requests in doubt are named in a fault's text."""
+
+
+class WorkcellReport(msgspec.Struct, frozen=True):
+    """The state for RMF and the status file. `queue`: the guids that are listed. `results`: (guid,
+    result) for each request that waits for one; a state with `queue` is published before them.
+
+    `running`: the guid of the running cycle, and `item` its content. `start`: its start may be on.
+    `waits`: the reason why the next request does not run.
+    """
+
+    mode: WorkcellMode
+    queue: tuple[str, ...] = ()
+    results: tuple[tuple[str, WorkcellStatus], ...] = ()
+    read_at: float | None = None
+    faults: tuple[Fault, ...] = ()
+    running: str = ""
+    item: str = ""
+    waits: str = ""
+
+    def news(self) -> object:
+        """Return the report without its age, without results, and without texts that RMF does not
+        see."""
+        return self.mode, self.queue, self.faults, self.running
+
+
+def report(memory: WorkcellMemory, now: float, limits: WorkcellLimits) -> WorkcellReport:
+    """Report the present state, as far as it is on disk."""
+    cycle = memory.cycle
+    job = memory.job(cycle.guid) if cycle else None
+    runs = job is not None and job.kept == "running"
+    return WorkcellReport(
+        mode=_mode(memory, runs, now, limits),
+        queue=tuple(job.guid for job in memory.jobs if job.is_listed),
+        results=tuple(_results(memory)),
+        read_at=memory.senses.read_at,
+        faults=tuple(_faults(memory, now, limits)),
+        running=job.guid if job and runs else "",
+        item=str(job.item) if job and runs else "",
+        waits=_waits(memory, now, limits),
+    )
+
+
+def _mode(memory: WorkcellMemory, runs: bool, now: float, limits: WorkcellLimits) -> WorkcellMode:
+    if any(obstacles(memory, now, limits)):
+        return WorkcellMode.OFFLINE
+    return WorkcellMode.BUSY if runs else WorkcellMode.IDLE
+
+
+def _results(memory: WorkcellMemory) -> Iterator[tuple[str, WorkcellStatus]]:
+    for job in memory.jobs:
+        if not job.due or memory.not_kept:
+            continue
+        match job.kept, job.phase:
+            case "done", "done":
+                yield job.guid, WorkcellStatus.SUCCESS
+            case "failed", "failed":
+                yield job.guid, WorkcellStatus.FAILED
+            case (("queued" | "running"), ("queued" | "running")):
+                yield job.guid, WorkcellStatus.ACKNOWLEDGED
+
+
+def _faults(memory: WorkcellMemory, now: float, limits: WorkcellLimits) -> Iterator[Fault]:
+    """Yield all present faults, most serious first. No text has a running number, because every change
+    of a text is published."""
+    for code in obstacles(memory, now, limits):
+        if code == "COMMUNICATION_LOST" and memory.senses.read_at is None and not memory.io_failure:
+            continue  # the first reading has not come yet
+        yield Fault(code, _detail(code, memory, limits))
+
+
+def _detail(code: str, memory: WorkcellMemory, limits: WorkcellLimits) -> str:
+    match code:
+        case "MEMORY_LOST":
+            return f"{memory.lost}; decide: rmf-bridge workcell done, again or failed"
+        case "OUTCOME_UNKNOWN":
+            return _doubts(memory.doubtful())
+        case "NOT_KEPT":
+            return f"nothing is accepted or started: {memory.not_kept}"
+        case "TWO_NODES_FOR_ONE_DEVICE":
+            return "another node publishes states of this workcell"
+        case "COMMUNICATION_LOST":
+            return memory.io_failure or f"no reading for {limits.t.stale_after_s} s"
+        case "WORKCELL_HALTED":
+            return f"{memory.halted}; rmf-bridge reset when it is clear"
+        case _:
+            return "; ".join(memory.senses.errors) or "its fault contact is on"
+
+
+def _doubts(jobs: tuple[Job, ...]) -> str:
+    named = "; ".join(f"{job.guid} ({job.item}): {job.why}" for job in jobs[:SHOWN])
+    more = f"; and {len(jobs) - SHOWN} more" if len(jobs) > SHOWN else ""
+    return f"{named}{more}; look, then decide: rmf-bridge workcell done, again or failed"
+
+
+def _waits(memory: WorkcellMemory, now: float, limits: WorkcellLimits) -> str:
+    """Return the reason why no cycle runs although a request waits; "" without one."""
+    queued = [job for job in memory.jobs if job.phase == "queued"]
+    if memory.cycle is not None or not (queued or memory.doubtful()):
+        return ""
+    found = next(iter(obstacles(memory, now, limits)), "")
+    if found:
+        return f"because of {found}"
+    senses = memory.senses
+    if not senses.seen():
+        return "for its inputs to be steady"
+    if not senses.is_off("done"):
+        return "for done of the last cycle to end"
+    if senses.is_off("ready") or senses.is_on("busy"):
+        return "for the workcell to be ready"
+    return "for RMF to repeat the request"

@@ -1,0 +1,120 @@
+"""The memories of a daemon's devices that must survive a restart: one file, an entry for each device.
+
+A device's thread writes its entry before it switches an output or publishes a state that follows from
+it. If writing fails, the core learns the reason, and writing is retried each second.
+"""
+
+import logging
+import threading
+from typing import Final, Generic
+
+import msgspec
+
+from bridges.kinds.shared import keep
+from bridges.kinds.shared.decision import M, MemoryKept, MemoryNotKept
+from bridges.kinds.shared.durations import AGES_AGO
+from bridges.kinds.shared.kind import Keeping
+from bridges.runtime.keeper import AGAIN_S, MemoryStore
+from bridges.system.log import pairs
+
+log = logging.getLogger(__name__)
+
+VERSION: Final = 1
+NO_FILE: Final = "no memory on disk: this is the first start, or the memory was removed"
+
+
+class KeptDevices(keep.Kept, frozen=True, forbid_unknown_fields=True):
+    """The content of the file: device -> the JSON that its kind has made."""
+
+    devices: dict[str, msgspec.Raw]
+
+
+class Unkept:
+    """A store for a test or a kind that needs none: it forgets everything."""
+
+    def read(self) -> bytes | None:
+        """Return None."""
+        return None
+
+    def write(self, kept: bytes) -> None:
+        """Do nothing."""
+
+
+class DeviceMemories:
+    """The file of one daemon. `lost`: the reason why it cannot be read; "" if it was read.
+
+    `new`: no file means that nothing ever happened, which is true of a simulation alone.
+    """
+
+    def __init__(self, store: MemoryStore, *, new: bool = False) -> None:
+        self._store = store
+        self._lock = threading.Lock()
+        self._found: dict[str, bytes] = {}
+        self.lost = ""
+        try:
+            kept = store.read()
+            if kept is not None:
+                found = keep.read(kept, KeptDevices, VERSION, "the memory of devices")
+                self._found = {name: bytes(raw) for name, raw in found.devices.items()}
+            elif not new:
+                self.lost = NO_FILE
+        except (OSError, ValueError) as error:
+            self.lost = f"the memory on disk cannot be read: {error}"
+        self.new = new and not self.lost
+
+    def read(self, device: str) -> bytes | None:
+        """Return the device's bytes; None if there are none."""
+        return self._found.get(device)
+
+    def write(self, device: str, kept: bytes) -> None:
+        """Replace the device's bytes, on disk when this returns; from any thread. Raises OSError."""
+        with self._lock:
+            found = {**self._found, device: kept}
+            content = KeptDevices(VERSION, {name: msgspec.Raw(raw) for name, raw in found.items()})
+            self._store.write(msgspec.json.encode(content))
+            self._found = found
+
+
+class DeviceKeeper(Generic[M]):
+    """The keeper of one device's memory."""
+
+    def __init__(self, device: str, keeping: Keeping[M], memories: DeviceMemories) -> None:
+        self._device = device
+        self._keeping = keeping
+        self._memories = memories
+        self._part: object = None
+        self._bytes: bytes | None = None
+        self._again_at = AGES_AGO
+        self._failing = False
+
+    def restore(self, initial: M, now: float) -> M:
+        """Return the device's memory: from disk; `initial` for a new simulation; or the memory of a
+        device whose past is lost, with the reason in the log."""
+        kept = self._memories.read(self._device)
+        if kept is None and self._memories.new:
+            return initial
+        reason = self._memories.lost or f"{NO_FILE} (nothing about this device)"
+        try:
+            if kept is not None:
+                return self._keeping.restore(kept, now)
+        except ValueError as error:
+            reason = f"the memory on disk is damaged: {error}"
+        log.error(pairs("not_restored", device=self._device, reason=reason))
+        return self._keeping.lost(reason)
+
+    def keep(self, memory: M, now: float) -> MemoryKept | MemoryNotKept | None:
+        """Write the memory if its kept part has changed. Returns None if there was nothing to do."""
+        part = self._keeping.part(memory)
+        if now < self._again_at or (part == self._part and not self._failing):
+            return None
+        kept = self._keeping.persist(memory)
+        self._part = part
+        if kept == self._bytes and not self._failing:
+            return None
+        try:
+            self._memories.write(self._device, kept)
+        except OSError as error:
+            self._again_at, self._failing = now + AGAIN_S, True
+            return MemoryNotKept(str(error))
+        self._bytes, self._failing = kept, False
+        return MemoryKept()

@@ -1,0 +1,1 @@
+"""Drivers of dispensers, which serve ingestors too."""

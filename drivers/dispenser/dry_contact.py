@@ -1,0 +1,154 @@
+"""A dispenser or ingestor on dry contacts: a relay starts its cycle, contacts show the course.
+
+The contacts are on the GPIO header, or coils, discrete inputs and bits of registers behind Modbus. A
+contact says no number: a request is for one item, and a relay of its own may select each sort.
+"""
+
+from collections.abc import Iterator, Mapping
+from typing import Annotated, Final
+
+import msgspec
+
+from bridges.kinds.dispenser.settings import WorkcellSettings
+from bridges.kinds.dispenser.signals import WorkcellOutputs, WorkcellSample
+from bridges.kinds.shared.fields import Name, tells
+from bridges.kinds.shared.remarks import Remarks
+from bridges.kinds.shared.table import Table
+from drivers.driver_type import DriverType
+from drivers.hal.points import Input, Output, Points, PointsBus, Wire, input_wires
+from drivers.on_points import OnPoints
+from drivers.unsafe import Unsafe, needlessly_accepted, unaccepted, unsafe_wires
+
+DEBOUNCE_S: Final = 0.05
+
+CUT_MUST_READ: Final = {
+    "done": (False, "every request counts as done, and RMF sends robots off unloaded"),
+    "ready": (False, "a workcell that is not ready is started"),
+    "fault": (True, "a fault of the workcell is not seen"),
+}
+"""Signal -> (the safe level of a cut wire, the consequence of the other level)."""
+
+
+class WorkcellInputWiring(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """The contacts that are read."""
+
+    done: Annotated[
+        Input,
+        tells("the cycle has succeeded; it is off before a cycle and comes on at its end."),
+    ]
+    busy: Annotated[Input | None, tells("a cycle runs; its end without `done` is a failure.")] = (
+        None
+    )
+    ready: Annotated[
+        Input | None, tells("a cycle may start: filled, closed, no jam. Without it always.")
+    ] = None
+    fault: Annotated[Input | None, tells("the workcell reports a fault.")] = None
+
+
+class WorkcellOutputWiring(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """The relays that are driven."""
+
+    start: Annotated[Output, tells("starts one cycle; `pulse_s` sets how long it is on.")]
+    select: Annotated[
+        dict[Name, Output],
+        tells("type_guid -> the relay that selects this sort while its cycle runs."),
+    ] = {}
+
+
+class DryContactWorkcellSettings(
+    WorkcellSettings, frozen=True, kw_only=True, forbid_unknown_fields=True
+):
+    """A dispenser or ingestor and its wiring."""
+
+    inputs: Annotated[WorkcellInputWiring, tells("the contacts that are read.")]
+    outputs: Annotated[WorkcellOutputWiring, tells("the relays that are driven.")]
+
+    def problems(self) -> Remarks:
+        """Yield problems that involve more than one field."""
+        yield from super().problems()
+        select = self.outputs.select
+        for name, asked in self.items.items():
+            if asked.most > 1:
+                yield ("items", name, "most"), "a contact says no number: leave most out"
+            if len(asked.compartments) > 1:
+                yield ("items", name, "compartments"), "contacts can serve one compartment only"
+            if len(self.items) > 1 and name not in select:
+                text = f"needs a relay for {name}: the start is the same for every item"
+                yield ("outputs", "select"), text
+        for name in select.keys() - self.items.keys():
+            yield ("outputs", "select", name), "is not one of items"
+        yield from unaccepted(_unsafe(self), self.accept_unsafe)
+
+
+def wires(settings: DryContactWorkcellSettings) -> list[Wire]:
+    """Return the wiring table, inputs first."""
+    found = input_wires(settings.inputs, DEBOUNCE_S)
+    for name, relay in settings.outputs.select.items():
+        found.append(relay.wire(f"select_{name}", ("outputs", "select", name)))
+    return [*found, settings.outputs.start.wire("start", ("outputs", "start"))]
+
+
+def debounce(settings: DryContactWorkcellSettings) -> Mapping[str, float]:
+    """Return the debounce time of each input (s), by signal."""
+    return {w.signal: w.debounce_s for w in wires(settings) if w.debounce_s is not None}
+
+
+def warnings(settings: DryContactWorkcellSettings) -> Remarks:
+    """Yield valid settings to review before the workcell goes into service: (path, text)."""
+    yield from needlessly_accepted(_unsafe(settings), settings.accept_unsafe)
+    yield from blind(settings, busy=settings.inputs.busy is not None)
+
+
+def items_table(settings: WorkcellSettings) -> Iterator[Table]:
+    """Yield what RMF may ask for; everything else is answered FAILED."""
+    rows = tuple(
+        (name, str(one.most), ", ".join(one.compartments) or "-")
+        for name, one in settings.items.items()
+    )
+    yield Table(
+        "items", ("type_guid", "at most", "compartments"), rows or (("no items", "-", "-"),)
+    )
+
+
+def blind(settings: WorkcellSettings, *, busy: bool) -> Remarks:
+    """Yield what no driver of this wiring can see."""
+    if not busy:
+        text = "without busy a cycle that stops in the middle is seen after cycle_limit_s only"
+        yield (), f"{text} ({settings.limits.cycle_limit_s:g} s)"
+
+
+def create(name: str, settings: DryContactWorkcellSettings, bus: PointsBus) -> "DryContactWorkcell":
+    """Make the workcell's driver on its bus; it touches nothing before `open`."""
+    return DryContactWorkcell(Points(wires(settings), bus))
+
+
+class DryContactWorkcell(OnPoints):
+    """`drivers.Driver` for one dispenser or ingestor."""
+
+    def read(self) -> WorkcellSample:
+        """Read every contact now."""
+        read = self._points.read().get
+        return WorkcellSample(read("done"), read("busy"), read("ready"), read("fault"))
+
+    def write(self, outputs: WorkcellOutputs) -> None:
+        """Set the relays: the selected sort first, then the start."""
+        selected = {f"select_{outputs.item.type_guid}": True} if outputs.guid else {}
+        self._points.write(selected)
+        if outputs.start:
+            self._points.write({**selected, "start": True})
+
+
+def _unsafe(settings: DryContactWorkcellSettings) -> Iterator[Unsafe]:
+    return unsafe_wires(wires(settings), CUT_MUST_READ)
+
+
+DRIVER = DriverType(
+    settings=DryContactWorkcellSettings,
+    buses=("gpio", "modbus"),
+    create=create,
+    wires=wires,
+    debounce=debounce,
+    tables=items_table,
+    warnings=warnings,
+    fake="hal_fakes.plants.dispenser",
+)

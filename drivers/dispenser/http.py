@@ -1,0 +1,191 @@
+"""A dispenser or ingestor behind HTTP and JSON: `start` begins a cycle, `state_path` shows its course.
+
+The body of `start` may hold the texts $guid, $type_guid, $quantity and $compartment as values, which
+stand for those of the request. A start is sent once for each cycle, even if its answer is lost: a
+repeat could dispense twice.
+"""
+
+from collections.abc import Iterator
+from typing import Annotated, Any, Final
+
+import msgspec
+
+from bridges.kinds.dispenser.settings import WorkcellSettings
+from bridges.kinds.dispenser.signals import WorkcellOutputs, WorkcellSample
+from bridges.kinds.shared.fields import tells
+from bridges.kinds.shared.remarks import Remarks
+from drivers import DriverError, json_fields
+from drivers.dispenser.dry_contact import blind, items_table
+from drivers.driver_type import DriverType
+from drivers.hal import http
+from drivers.http_call import Call, InsistentCalls, claim, described, send
+from drivers.json_fields import JsonFlag
+from drivers.unsafe import Unsafe, needlessly_accepted, unaccepted
+
+STOP: Final = "stop"
+
+
+class WorkcellInputFields(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """The fields of the answer."""
+
+    done: Annotated[
+        JsonFlag,
+        tells("the cycle has succeeded; it is off before a cycle and comes on at its end."),
+    ]
+    busy: Annotated[
+        JsonFlag | None, tells("a cycle runs; its end without `done` is a failure.")
+    ] = None
+    ready: Annotated[JsonFlag | None, tells("a cycle may start. Without it always.")] = None
+    fault: Annotated[JsonFlag | None, tells("the workcell reports a fault.")] = None
+
+
+class HttpWorkcellSettings(WorkcellSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A dispenser or ingestor and its controller. The paths follow the bus's `api_base`."""
+
+    state_path: Annotated[http.Path, tells("the path that GET reads the inputs from.")]
+    inputs: Annotated[WorkcellInputFields, tells("the fields of that answer.")]
+    start: Annotated[
+        Call,
+        tells("""starts one cycle. In its body the values "$guid", "$type_guid", "$quantity" and
+        "$compartment" stand for those of the request."""),
+    ]
+    stop: Annotated[
+        Call | None,
+        tells("ends a cycle and its start, and does nothing to a workcell at rest."),
+    ] = None
+
+    def problems(self) -> Remarks:
+        """Yield problems that involve more than one field."""
+        yield from super().problems()
+        body = self.start.body or ""
+        for name, asked in self.items.items():
+            for wanted, mark, key in (
+                (len(self.items) > 1, "$type_guid", ""),
+                (asked.most > 1, "$quantity", "most"),
+                (len(asked.compartments) > 1, "$compartment", "compartments"),
+            ):
+                if wanted and f'"{mark}"' not in body:
+                    path = ("items", name, key) if key else ("items",)
+                    yield path, f'the body of start cannot say it: put "{mark}" there'
+        if self.pulse_s is not None:
+            yield ("pulse_s",), "a start over HTTP is one command: leave pulse_s out"
+        yield from unaccepted(_unsafe(self), self.accept_unsafe)
+
+
+def _unsafe(settings: HttpWorkcellSettings) -> Iterator[Unsafe]:
+    if settings.stop is None:
+        text = "nothing ends a cycle that takes too long, or one whose daemon has died: give stop"
+        yield STOP, (), text
+
+
+def claims(settings: HttpWorkcellSettings) -> Iterator[tuple[str, tuple[str, ...]]]:
+    """Yield (command, path) of the commands, which no other device may send."""
+    yield claim(settings.start), ("start", "path")
+    if settings.stop is not None:
+        yield claim(settings.stop), (STOP, "path")
+
+
+def describe(settings: HttpWorkcellSettings, bus: http.HttpSettings) -> Iterator[tuple[str, str]]:
+    """Yield rows for `check`: the reading and the commands."""
+    api = http.base(bus.api_base)
+    yield "state", f"GET {api.url(settings.state_path)} every {bus.scan_s:g} s"
+    for signal in settings.inputs.__struct_fields__:
+        if place := getattr(settings.inputs, signal):
+            yield signal, json_fields.place_text(place)
+    yield "start", f"{described(settings.start, api)}, once for each cycle"
+    yield STOP, described(settings.stop, api) if settings.stop else "nothing"
+
+
+def warnings(settings: HttpWorkcellSettings) -> Remarks:
+    """Yield valid settings to review before the workcell goes into service: (path, text)."""
+    yield from needlessly_accepted(_unsafe(settings), settings.accept_unsafe)
+    yield from blind(settings, busy=settings.inputs.busy is not None)
+
+
+def create(name: str, settings: HttpWorkcellSettings, bus: InsistentCalls) -> "HttpWorkcell":
+    """Make the workcell's driver on its bus; it sends nothing before `open`."""
+    return HttpWorkcell(settings, bus)
+
+
+class HttpWorkcell:
+    """`drivers.Driver` for one dispenser or ingestor. `_sent`: the guid whose start was sent last.
+    `_on`: that cycle has not been ended."""
+
+    def __init__(self, settings: HttpWorkcellSettings, bus: InsistentCalls) -> None:
+        self._settings = settings
+        self._bus = bus
+        self._sent = ""
+        self._on = False
+
+    def open(self) -> None:
+        """Check that the controller answers."""
+        self._bus.get_json(self._settings.state_path)
+
+    def read(self) -> WorkcellSample:
+        """Read every input now. Raises DriverError."""
+        answer, found = self._bus.get_json(self._settings.state_path), self._settings.inputs
+        return WorkcellSample(
+            json_fields.flag(answer, found.done),
+            *(json_fields.flag_if(answer, one) for one in (found.busy, found.ready, found.fault)),
+        )
+
+    def write(self, outputs: WorkcellOutputs) -> None:
+        """Start the cycle once; end it once it is over."""
+        if outputs.start and outputs.guid != self._sent:
+            self._sent, self._on = outputs.guid, True
+            send(self._bus, filled(self._settings.start, outputs))
+        elif not outputs.guid:
+            self._sent = ""
+            if self._on:
+                self.make_safe()
+
+    def make_safe(self) -> None:
+        """End the cycle."""
+        send(self._bus, self._settings.stop, safe=True)
+        self._on = False
+
+    def close(self) -> None:
+        """End the cycle if one runs. Does not raise."""
+        if not self._on:
+            return
+        self._bus.insist()
+        try:
+            self.make_safe()
+        except DriverError:
+            return  # the daemon is ending
+
+
+def filled(call: Call, outputs: WorkcellOutputs) -> Call:
+    """Return the call with the request's values in its body."""
+    if call.body is None:
+        return call
+    item = outputs.item
+    marks: dict[Any, object] = {
+        "$guid": outputs.guid,
+        "$type_guid": item.type_guid,
+        "$quantity": item.quantity,
+        "$compartment": item.compartment,
+    }
+    body = _put_in(msgspec.json.decode(call.body), marks)
+    return msgspec.structs.replace(call, body=msgspec.json.encode(body).decode())
+
+
+def _put_in(value: Any, marks: dict[Any, object]) -> object:
+    if isinstance(value, dict):
+        return {key: _put_in(inner, marks) for key, inner in value.items()}
+    if isinstance(value, list):
+        return [_put_in(inner, marks) for inner in value]
+    return marks.get(value, value) if isinstance(value, str) else value
+
+
+DRIVER = DriverType(
+    settings=HttpWorkcellSettings,
+    buses=("http",),
+    create=create,
+    describe=describe,
+    tables=items_table,
+    claims=claims,
+    warnings=warnings,
+    unwired=lambda settings: (STOP,),
+    fake="hal_fakes.http_dispenser",
+)

@@ -1,0 +1,1 @@
+"""Drivers of ingestors: those of dispensers."""

@@ -1,0 +1,5 @@
+"""An ingestor with a dispenser's wiring: see `drivers/dispenser/register.py`."""
+
+from drivers.dispenser import register
+
+DRIVER = register.DRIVER

@@ -1,0 +1,71 @@
+"""A dispenser or ingestor behind HTTP: its plant's contacts in the fields named by the YAML.
+
+The plant takes a start as a pulse. Failures of server, headers and body: `hal_fakes/http.py`.
+"""
+
+import json
+import time
+from collections.abc import Mapping
+from typing import Final
+
+from drivers.dispenser.http import HttpWorkcellSettings
+from drivers.hal.points import Wire
+from hal_fakes.fake import Fake
+from hal_fakes.json_answers import put, value_of
+from hal_fakes.plants.dispenser import WorkcellPlant
+from hal_fakes.plants.plant import Plant
+
+PARTS: Final = ("server", "headers", "body")
+
+
+def contacts(settings: HttpWorkcellSettings) -> list[Wire]:
+    """Return the controller's own contacts and relay, for the plant: they can fail as our wires can."""
+    fields = settings.inputs.__struct_fields__
+    inputs = [Wire(s, "in", s, "high") for s in fields if getattr(settings.inputs, s)]
+    return [*inputs, Wire("start", "out", "start", "high")]
+
+
+class FakeHttpWorkcell:
+    """A controller (`hal_fakes.http.HttpStation`)."""
+
+    def __init__(self, plant: Plant, settings: HttpWorkcellSettings) -> None:
+        self.plant = plant
+        self.reads = settings.state_path
+        self.commands: Mapping[tuple[str, str], tuple[str, bool]] = {
+            (call.method, call.path): ("start", on)
+            for call, on in ((settings.start, True), (settings.stop, False))
+            if call is not None
+        }
+        self._settings = settings
+        self._last: bytes | None = None
+
+    def obey(self, signal: str, asserted: bool) -> None:
+        """Start or end a cycle."""
+        self.plant.drive(signal, asserted, time.monotonic())
+
+    def tick(self) -> None:
+        """Let the plant run."""
+        self.plant.advance(time.monotonic())
+
+    def answer(self) -> bytes:
+        """Return the present answer to `GET state_path`; a wrong answer if that failure is ordered."""
+        self.tick()
+        server, body = self.plant.failures.get("server"), self.plant.failures.get("body")
+        if server == "stuck" and self._last is not None:
+            return self._last
+        said: dict[str, object] = {}
+        for signal in self._settings.inputs.__struct_fields__:
+            if place := getattr(self._settings.inputs, signal):
+                put(said, place.field, value_of(place, self.plant.sense(signal)))
+                if "wrong" in (server, body):
+                    put(said, place.field, ["?"])
+        self._last = json.dumps(said).encode()
+        return {"off": b"", "garbage": self._last[:-9]}.get(body or "", self._last)
+
+
+FAKE = Fake[HttpWorkcellSettings](
+    plant=lambda name, settings, wires: WorkcellPlant(
+        name, contacts(settings), steady=True, parts=PARTS
+    ),
+    station=lambda plant, settings: FakeHttpWorkcell(plant, settings),
+)

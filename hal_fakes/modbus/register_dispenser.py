@@ -1,0 +1,64 @@
+"""A dispenser or ingestor behind a PLC's registers: its plant's contacts as the map's status number."""
+
+from drivers.dispenser.register import RegisterWorkcellSettings, points
+from drivers.hal.modbus.points import Point
+from drivers.hal.points import Wire
+from hal_fakes.fake import Fake
+from hal_fakes.plants import dispenser
+from hal_fakes.plants.plant import Plant
+
+NONSENSE = 65535
+"""The status of a PLC that boots, and of a fault for which the map has no number."""
+
+
+def contacts(settings: RegisterWorkcellSettings) -> list[Wire]:
+    """Return the PLC's own contacts and relay, for the plant: they can fail as our wires can."""
+    at = points(settings)
+    inputs = [Wire(s, "in", str(at["status"]), "high") for s in ("done", "busy", "ready", "fault")]
+    return [*inputs, Wire("start", "out", str(at["command"]), "high")]
+
+
+class FakeRegisterWorkcell:
+    """The cells of one PLC, at `unit`. `points`: all cells, including `outputs`."""
+
+    def __init__(self, plant: Plant, settings: RegisterWorkcellSettings) -> None:
+        self.plant = plant
+        self.unit = settings.unit
+        self._map = settings.map
+        found = points(settings)
+        self._status, self._command = found.pop("status"), found["command"]
+        self.points = frozenset({self._status, *found.values()})
+        self.outputs = frozenset(found.values())
+        self.written = dict.fromkeys(self.outputs, 0) | {self._command: self._map.command.rest}
+
+    def get(self, point: Point, now: float) -> int:
+        """Return this point's value at `now` (monotonic s)."""
+        self.plant.advance(now)
+        return self._state() if point == self._status else self.written[point]
+
+    def set(self, point: Point, value: int, now: float) -> bool:
+        """Write a value; False if not writable."""
+        if point not in self.outputs:
+            return False
+        self.written[point] = value
+        if point == self._command:
+            self.plant.drive("start", value == self._map.command.start, now)
+        return True
+
+    def _state(self) -> int:
+        status, sense = self._map.status, self.plant.sense
+        if sense("fault"):
+            return next(iter(status.faults), NONSENSE)
+        if sense("done"):
+            return status.done[0]
+        if sense("busy"):
+            return status.busy[0]
+        if sense("ready"):
+            return status.ready[0]
+        return next(iter(status.waits), NONSENSE)
+
+
+FAKE = Fake[RegisterWorkcellSettings](
+    plant=lambda name, settings, wires: dispenser.build(name, settings, contacts(settings)),
+    station=lambda plant, settings: FakeRegisterWorkcell(plant, settings),
+)
