@@ -4,8 +4,8 @@ Contacts: `ready`, `busy`, `done` (on until the start is off, and at least DONE_
 `start`, and `select_…` for each sort. With a steady start the conveyor stops when the start goes off.
 The edge `moved` counts the items that really left. To press: `hatch` (somebody has it open: not ready,
 and a running cycle stands still), `restart` (the PLC restarts: it forgets its cycle, and takes a start
-that is still on for a new one), `fault`. Failing part `conveyor`: `off` and `stuck` jam in the middle, `slow`
-takes five times as long, `wrong` reports a fault in the middle, `garbage` ends without `done`.
+that is still on for a new one), `fault`. Failing part `conveyor`: `off` and `stuck` jam in the middle,
+`slow` takes five times as long, `wrong` reports a fault in the middle, `garbage` ends without `done`.
 """
 
 from collections.abc import Iterable

@@ -107,7 +107,7 @@ def answer_on(
 
 
 def stamped(message: Result, stamp: Time) -> Result:
-    """Return the result with the time of its sending: RMF ignores a result older than its last state."""
+    """Return the result with its time of sending: RMF ignores a result older than its last state."""
     return replace(message, time=stamp)
 
 

@@ -101,7 +101,7 @@ class Kind(Struct, Generic[S, L, M, X, E, O, R], frozen=True):
     checked for every kind.
     `drives`: do its devices have outputs? Without outputs there is nothing to switch off.
     `results(name, report)`: messages that go out right after the state of this report; while there
-    are any, the state is due. `stamped(message, stamp)`: a result or an answer with its time of sending.
+    are any, the state is due. `stamped(message, stamp)`: a result or an answer with its time.
     `keeping`: for a memory that must survive a restart.
     `attended_by`: a topic of requests; the core gets `Attended` when its publishers appear or vanish.
     `recorded`: topics with messages about the device that are recorded, and that no core gets.
