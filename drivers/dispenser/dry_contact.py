@@ -123,7 +123,11 @@ def create(name: str, settings: DryContactWorkcellSettings, bus: PointsBus) -> "
 
 
 class DryContactWorkcell(OnPoints):
-    """`drivers.Driver` for one dispenser or ingestor."""
+    """`drivers.Driver` for one dispenser or ingestor. `_selected`: the guid whose sort is selected."""
+
+    def __init__(self, points: Points) -> None:
+        super().__init__(points)
+        self._selected = ""
 
     def read(self) -> WorkcellSample:
         """Read every contact now."""
@@ -131,11 +135,12 @@ class DryContactWorkcell(OnPoints):
         return WorkcellSample(read("done"), read("busy"), read("ready"), read("fault"))
 
     def write(self, outputs: WorkcellOutputs) -> None:
-        """Set the relays: the selected sort first, then the start."""
-        selected = {f"select_{outputs.item.type_guid}": True} if outputs.guid else {}
-        self._points.write(selected)
-        if outputs.start:
-            self._points.write({**selected, "start": True})
+        """Set the relays: at the beginning of a cycle the selected sort first, then the start."""
+        relays = {f"select_{outputs.item.type_guid}": True} if outputs.guid else {}
+        if outputs.guid != self._selected:
+            self._points.write(relays)
+            self._selected = outputs.guid
+        self._points.write({**relays, "start": outputs.start})
 
 
 def _unsafe(settings: DryContactWorkcellSettings) -> Iterator[Unsafe]:

@@ -114,7 +114,7 @@ class WorkcellPlant(WiredPlant):
         found = [at for at in (self._done_until, self._boots_at) if at > self.now]
         if speed := self._speed():
             half = self._left_s - CYCLE_S / 2
-            found.append(self.now + (half if half > 1e-9 else self._left_s) / speed)
+            found.append(self._ran_at + (half if half > 1e-9 else self._left_s) / speed)
         return min(found, default=NEVER)
 
 

@@ -1,0 +1,100 @@
+"""RMF's phase never counts an undelivered item as done, wherever the daemon dies and whatever is lost.
+
+DISPENSER-1, DISPENSER-2, DISPENSER-3, DISPENSER-7: the daemon dies at each effect of a dispensing.
+"""
+
+from collections.abc import Iterable
+
+import pytest
+
+from tests.depth import depth
+from tests.kinds.dispenser.world import World
+from workbench.rmf_model.workcells import WorkcellPhase
+
+WHOLE_S = 6.0
+
+
+def told(world: World) -> str:
+    """Let a person who looks at the machine decide what is in doubt."""
+    if "OUTCOME_UNKNOWN" not in world.faults:
+        return ""
+    world.run(4.0)
+    assert world.results()[-1:] in ([], ["ACKNOWLEDGED"])
+    verdict = "done" if world.plant.moved else "failed" if world.plant.failures else "again"
+    world.decide(verdict)
+    return verdict
+
+
+def effects(jam: str = "") -> list[str]:
+    """Return every effect of a dispensing without a death."""
+    world = World()
+    return dispensed(world, jam) and world.effects
+
+
+def dispensed(world: World, jam: str = "", seconds: float = 12.0) -> WorkcellPhase:
+    """Let RMF ask, up to the end of its phase or a doubt. `jam`: the conveyor's failure."""
+    if jam:
+        world.plant.fail("conveyor", "stuck")
+    phase = world.ask()
+    world.run(seconds, until=lambda: bool(phase.outcome) or "OUTCOME_UNKNOWN" in world.faults)
+    return phase
+
+
+def test_a_request_is_on_disk_then_listed_then_acknowledged_and_so_is_its_start() -> None:
+    every = effects()
+    asked = every.index("before the disk", every.index("after dispenser_states"))
+    assert every[asked : asked + 10] == [
+        *("before the disk", "after the disk"),  # the request
+        *("before dispenser_states", "after dispenser_states"),
+        *("before dispenser_results", "after dispenser_results"),
+        *("before the disk", "after the disk"),  # its start
+        *("before the outputs", "after the outputs"),
+    ]
+
+
+@pytest.mark.parametrize("jam", ["", "stuck"])
+def test_wherever_the_daemon_dies_rmf_goes_on_only_with_the_item_and_with_one(jam: str) -> None:
+    doubts = 0
+    for place in range(len(effects(jam)) + 4):
+        world = World(die_at=place)
+        phase = dispensed(world, jam)
+        said = told(world)
+        doubts += bool(said)
+        world.run(20.0, until=lambda phase=phase: bool(phase.outcome))
+        what = (place, world.effects[place : place + 1], said, phase.outcome, phase.why)
+        assert world.plant.moved == (0 if jam else 1), what
+        assert phase.outcome == ("failed" if jam else "completed"), what
+    assert doubts > 4  # the deaths between the start and the outcome
+
+
+def losses(most: int) -> Iterable[tuple[str, int, int]]:
+    """Yield each topic, and a first and a last message of it that are lost."""
+    for topic in ("dispenser_requests", "dispenser_states", "dispenser_results"):
+        for first in range(most):
+            for last in range(first, most):
+                yield topic, first, last
+
+
+@pytest.mark.parametrize("jam", ["", "stuck"])
+def test_no_run_of_lost_messages_sends_the_robot_off_without_its_item(jam: str) -> None:
+    for topic, first, last in losses(depth(8, 24)):
+        world = World(lose=lambda t, n, at=(topic, first, last): t == at[0] and at[1] <= n <= at[2])
+        if jam:
+            world.plant.fail("conveyor", "stuck")
+        phase = world.ask()
+        world.run(60.0, until=lambda p=phase: bool(p.outcome))
+        what = (topic, first, last, phase.outcome, phase.why)
+        assert phase.outcome == ("failed" if jam else "completed"), what
+        assert world.plant.moved == (0 if jam else 1), what
+
+
+def test_a_death_and_lost_messages_together_send_no_robot_off_without_its_item() -> None:
+    """The states after the restart are the ones that could complete RMF's phase wrongly."""
+    for place in range(0, len(effects()) + 4, depth(3, 1)):
+        for first in range(depth(3, 8)):
+            world = World(
+                die_at=place, lose=lambda t, n, f=first: "request" not in t and n % 3 == f % 3
+            )
+            phase = world.ask()
+            world.run(12.0, until=lambda p=phase: bool(p.outcome))
+            assert not phase.outcome or world.plant.moved == 1, (place, first, phase.why)
