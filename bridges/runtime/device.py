@@ -177,9 +177,9 @@ class Node(Generic[S, L, M, X, E, O, R]):
     def _keep(self) -> None:
         """Write the memory to disk before outputs and messages follow from it."""
         if self._keeper is not None:
-            result = self._keeper.keep(self.subject.memory, self._clock.monotonic())
-            if result is not None:
-                self._decide(result)
+            kept: Any = self._keeper.keep(self.subject.memory, self._clock.monotonic())
+            if kept is not None:  # an event of every kind with `keeping`
+                self._decide(kept)
 
     def _write(self) -> None:
         """Write all outputs, as levels, in each scan, but write nothing before the first reading."""

@@ -125,8 +125,10 @@ class HttpWorkcell:
         """Read every input now. Raises DriverError."""
         answer, found = self._bus.get_json(self._settings.state_path), self._settings.inputs
         return WorkcellSample(
-            json_fields.flag(answer, found.done),
-            *(json_fields.flag_if(answer, one) for one in (found.busy, found.ready, found.fault)),
+            done=json_fields.flag(answer, found.done),
+            busy=json_fields.flag_if(answer, found.busy),
+            ready=json_fields.flag_if(answer, found.ready),
+            fault=json_fields.flag_if(answer, found.fault),
         )
 
     def write(self, outputs: WorkcellOutputs) -> None:

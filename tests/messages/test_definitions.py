@@ -1,6 +1,7 @@
 """`definitions.py` and `releases.py` against tables typed from the .msg files of each release.
 
 Source: every line of rmf_lift_msgs/msg, rmf_door_msgs/msg, rmf_charger_msgs/msg,
+rmf_dispenser_msgs/msg and rmf_ingestor_msgs/msg (where both kinds of workcell have the same constants),
 rmf_task_msgs/msg/Alert and its AlertParameter, and in rmf_fleet_msgs/msg of EmergencySignal,
 FleetState, ChargingAssignments and their parts, in open-rmf/rmf_internal_msgs at
 3d4df023bacaf7a091564e98f4aff0776f72a612 (4.1.0). Time, Duration, Bool and Header are from ROS 2 Jazzy's
@@ -56,6 +57,8 @@ CONSTANTS = {
         "CHARGER_RELEASED": 4,
         "CHARGER_ERROR": 200,
     },
+    d.WorkcellMode: {"IDLE": 0, "BUSY": 1, "OFFLINE": 2},
+    d.WorkcellStatus: {"ACKNOWLEDGED": 0, "SUCCESS": 1, "FAILED": 2},
     d.RobotModeValue: {
         "MODE_IDLE": 0,
         "MODE_CHARGING": 1,
@@ -107,6 +110,34 @@ FIELDS = {
         "builtin_interfaces/Time charger_time, uint32 state, string charger_name,"
         " string error_message, string request_id, string robot_fleet, string robot_name,"
         " builtin_interfaces/Duration time_to_fully_charged"
+    ),
+    "rmf_dispenser_msgs/DispenserRequestItem": (
+        "string type_guid, int32 quantity, string compartment_name"
+    ),
+    "rmf_dispenser_msgs/DispenserRequest": (
+        "builtin_interfaces/Time time, string request_guid, string target_guid,"
+        " string transporter_type, rmf_dispenser_msgs/DispenserRequestItem[] items"
+    ),
+    "rmf_dispenser_msgs/DispenserState": (
+        "builtin_interfaces/Time time, string guid, int32 mode, string[] request_guid_queue,"
+        " float32 seconds_remaining"
+    ),
+    "rmf_dispenser_msgs/DispenserResult": (
+        "builtin_interfaces/Time time, string request_guid, string source_guid, uint8 status"
+    ),
+    "rmf_ingestor_msgs/IngestorRequestItem": (
+        "string type_guid, int32 quantity, string compartment_name"
+    ),
+    "rmf_ingestor_msgs/IngestorRequest": (
+        "builtin_interfaces/Time time, string request_guid, string target_guid,"
+        " string transporter_type, rmf_ingestor_msgs/IngestorRequestItem[] items"
+    ),
+    "rmf_ingestor_msgs/IngestorState": (
+        "builtin_interfaces/Time time, string guid, int32 mode, string[] request_guid_queue,"
+        " float32 seconds_remaining"
+    ),
+    "rmf_ingestor_msgs/IngestorResult": (
+        "builtin_interfaces/Time time, string request_guid, string source_guid, uint8 status"
     ),
     "std_msgs/Bool": "bool data",
     "rmf_fleet_msgs/EmergencySignal": "string[] fleet_names, bool is_emergency",

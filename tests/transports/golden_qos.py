@@ -47,6 +47,14 @@ GOLDEN: Final[Mapping[str, tuple[str, Qos, Qos]]] = {
     "charger_refusals": ("diagnostic_msgs/DiagnosticStatus", PLAIN, PLAIN),
     "adapter_charger_requests": ("rmf_charger_msgs/ChargerRequest", PLAIN, PLAIN),
     "adapter_charger_cancels": ("rmf_charger_msgs/ChargerCancel", PLAIN, PLAIN),
+    # SystemDefaults keep_last(100) at the fleet adapter's ends (agv/Node.cpp:37,61-71,81-91). A result
+    # that the adapter has missed is repeated with its next request, so nothing is retained.
+    "dispenser_requests": ("rmf_dispenser_msgs/DispenserRequest", PLAIN, PLAIN),
+    "dispenser_states": ("rmf_dispenser_msgs/DispenserState", PLAIN, PLAIN),
+    "dispenser_results": ("rmf_dispenser_msgs/DispenserResult", PLAIN, PLAIN),
+    "ingestor_requests": ("rmf_ingestor_msgs/IngestorRequest", PLAIN, PLAIN),
+    "ingestor_states": ("rmf_ingestor_msgs/IngestorState", PLAIN, PLAIN),
+    "ingestor_results": ("rmf_ingestor_msgs/IngestorResult", PLAIN, PLAIN),
     # The fleet adapter publishes SystemDefaults 100.
     "charger_coordinator": ("std_msgs/Bool", PLAIN, PLAIN),
     "fleet_states": ("rmf_fleet_msgs/FleetState", PLAIN, PLAIN),

@@ -112,6 +112,80 @@ class ChargerRequest(IdlStruct, typename="rmf_charger_msgs.msg.dds_.ChargerReque
 
 @annotations.final
 @dataclass
+class DispenserRequestItem(IdlStruct, typename="rmf_dispenser_msgs.msg.dds_.DispenserRequestItem_"):
+    type_guid: str
+    quantity: int32
+    compartment_name: str
+
+
+@annotations.final
+@dataclass
+class DispenserRequest(IdlStruct, typename="rmf_dispenser_msgs.msg.dds_.DispenserRequest_"):
+    time: Time
+    request_guid: str
+    target_guid: str
+    transporter_type: str
+    items: sequence[DispenserRequestItem]
+
+
+@annotations.final
+@dataclass
+class DispenserState(IdlStruct, typename="rmf_dispenser_msgs.msg.dds_.DispenserState_"):
+    time: Time
+    guid: str
+    mode: int32
+    request_guid_queue: sequence[str]
+    seconds_remaining: float32
+
+
+@annotations.final
+@dataclass
+class DispenserResult(IdlStruct, typename="rmf_dispenser_msgs.msg.dds_.DispenserResult_"):
+    time: Time
+    request_guid: str
+    source_guid: str
+    status: uint8
+
+
+@annotations.final
+@dataclass
+class IngestorRequestItem(IdlStruct, typename="rmf_ingestor_msgs.msg.dds_.IngestorRequestItem_"):
+    type_guid: str
+    quantity: int32
+    compartment_name: str
+
+
+@annotations.final
+@dataclass
+class IngestorRequest(IdlStruct, typename="rmf_ingestor_msgs.msg.dds_.IngestorRequest_"):
+    time: Time
+    request_guid: str
+    target_guid: str
+    transporter_type: str
+    items: sequence[IngestorRequestItem]
+
+
+@annotations.final
+@dataclass
+class IngestorState(IdlStruct, typename="rmf_ingestor_msgs.msg.dds_.IngestorState_"):
+    time: Time
+    guid: str
+    mode: int32
+    request_guid_queue: sequence[str]
+    seconds_remaining: float32
+
+
+@annotations.final
+@dataclass
+class IngestorResult(IdlStruct, typename="rmf_ingestor_msgs.msg.dds_.IngestorResult_"):
+    time: Time
+    request_guid: str
+    source_guid: str
+    status: uint8
+
+
+@annotations.final
+@dataclass
 class ChargerCancel(IdlStruct, typename="rmf_charger_msgs.msg.dds_.ChargerCancel_"):
     charger_name: str
     request_id: str

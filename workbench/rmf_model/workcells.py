@@ -1,9 +1,10 @@
 """RMF's phases at a workcell: DispenseItem and IngestItem, which follow the same rules.
 
-Source: rmf_ros2 9dedd0f, rmf_fleet_adapter/src/rmf_fleet_adapter/phases/DispenseItem.cpp, IngestItem.cpp
-(`_init_obs`, `_get_status`) and Utils.cpp (`is_newer`: an equal stamp counts as newer). The request is
-repeated each second, without a stamp, until the phase ends. Nothing cancels it, and it has no time limit.
-tasks/Delivery.cpp gives the task's id as the guid, so two requests of one task have the same guid.
+Source: rmf_ros2 9dedd0f, rmf_fleet_adapter/src/rmf_fleet_adapter/phases/: DispenseItem.cpp and
+IngestItem.cpp (`_init_obs`, `_get_status`), Utils.cpp (`is_newer`: an equal stamp counts as newer). The
+request is repeated each second, without a stamp, until the phase ends. Nothing cancels the phase, and
+it has no time limit. tasks/Delivery.cpp gives the task's id as the guid, so two requests of one task
+have the same guid.
 """
 
 from typing import Final, Literal

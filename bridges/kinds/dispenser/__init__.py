@@ -8,6 +8,7 @@ from bridges.kinds.dispenser.memory import WorkcellLimits, WorkcellMemory
 from bridges.kinds.dispenser.report import WorkcellReport
 from bridges.kinds.dispenser.settings import WorkcellSettings
 from bridges.kinds.dispenser.signals import ItemRequested, WorkcellOutputs, WorkcellSample
+from bridges.kinds.shared.decision import DecidedByPerson, MemoryKept, MemoryNotKept
 from bridges.kinds.shared.kind import Kind
 from bridges.kinds.shared.recorded import Recorded
 from bridges.messages import topics
@@ -18,7 +19,7 @@ KIND: Kind[
     WorkcellLimits,
     WorkcellMemory,
     WorkcellSample,
-    ItemRequested,
+    ItemRequested | MemoryKept | MemoryNotKept | DecidedByPerson,
     WorkcellOutputs,
     WorkcellReport,
 ] = Kind(

@@ -11,12 +11,9 @@ from msgspec import Struct
 
 from bridges.kinds.shared.decision import (
     AlarmInputs,
-    DecidedByPerson,
     Decision,
     IoFailed,
     M,
-    MemoryKept,
-    MemoryNotKept,
     O,
     OperatorReset,
     R,
@@ -35,16 +32,7 @@ L = TypeVar("L")
 E = TypeVar("E")
 """The events into which `accept` turns requests."""
 
-DeviceEvent = Union[  # noqa: UP007
-    Sampled[X],
-    IoFailed,
-    RivalSeen,
-    OperatorReset,
-    MemoryKept,
-    MemoryNotKept,
-    DecidedByPerson,
-    E,
-]
+DeviceEvent = Union[Sampled[X], IoFailed, RivalSeen, OperatorReset, E]  # noqa: UP007
 """All events of a device's core."""
 
 FLOOR, LIFT, DOOR, CHARGER, WAYPOINT = "floor", "lift", "door", "charger", "waypoint"
@@ -68,8 +56,8 @@ class Keeping(Struct, Generic[M], frozen=True):
     `part(memory)`: this part, compared by value. `persist(memory)`: its bytes. `restore(kept, now)`:
     the memory from these bytes; raises ValueError for other bytes. `lost(reason)`: the memory of a
     daemon that finds no bytes, or wrong bytes, where there may have been some.
-    The core gets `MemoryKept` or `MemoryNotKept` after each attempt to write, before outputs and
-    messages.
+    The core's events include `MemoryKept` and `MemoryNotKept`, for each attempt to write, before
+    outputs and messages; and `DecidedByPerson`.
     """
 
     part: Callable[[M], object]

@@ -3,7 +3,7 @@
 DISPENSER-1, DISPENSER-2, DISPENSER-3, DISPENSER-7: the daemon dies at each effect of a dispensing.
 """
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 
 import pytest
 
@@ -28,7 +28,8 @@ def told(world: World) -> str:
 def effects(jam: str = "") -> list[str]:
     """Return every effect of a dispensing without a death."""
     world = World()
-    return dispensed(world, jam) and world.effects
+    dispensed(world, jam)
+    return world.effects
 
 
 def dispensed(world: World, jam: str = "", seconds: float = 12.0) -> WorkcellPhase:
@@ -60,11 +61,19 @@ def test_wherever_the_daemon_dies_rmf_goes_on_only_with_the_item_and_with_one(ja
         phase = dispensed(world, jam)
         said = told(world)
         doubts += bool(said)
-        world.run(20.0, until=lambda phase=phase: bool(phase.outcome))
+        world.run(20.0, until=is_over(phase))
         what = (place, world.effects[place : place + 1], said, phase.outcome, phase.why)
         assert world.plant.moved == (0 if jam else 1), what
         assert phase.outcome == ("failed" if jam else "completed"), what
     assert doubts > 4  # the deaths between the start and the outcome
+
+
+def is_over(phase: WorkcellPhase) -> Callable[[], bool]:
+    return lambda: bool(phase.outcome)
+
+
+def losing(topic: str, first: int, last: int) -> Callable[[str, int], bool]:
+    return lambda name, number: name == topic and first <= number <= last
 
 
 def losses(most: int) -> Iterable[tuple[str, int, int]]:
@@ -78,23 +87,25 @@ def losses(most: int) -> Iterable[tuple[str, int, int]]:
 @pytest.mark.parametrize("jam", ["", "stuck"])
 def test_no_run_of_lost_messages_sends_the_robot_off_without_its_item(jam: str) -> None:
     for topic, first, last in losses(depth(8, 24)):
-        world = World(lose=lambda t, n, at=(topic, first, last): t == at[0] and at[1] <= n <= at[2])
+        world = World(lose=losing(topic, first, last))
         if jam:
             world.plant.fail("conveyor", "stuck")
         phase = world.ask()
-        world.run(60.0, until=lambda p=phase: bool(p.outcome))
+        world.run(60.0, until=is_over(phase))
         what = (topic, first, last, phase.outcome, phase.why)
         assert phase.outcome == ("failed" if jam else "completed"), what
         assert world.plant.moved == (0 if jam else 1), what
 
 
+def every_third(first: int) -> Callable[[str, int], bool]:
+    return lambda name, number: "request" not in name and number % 3 == first % 3
+
+
 def test_a_death_and_lost_messages_together_send_no_robot_off_without_its_item() -> None:
     """The states after the restart are the ones that could complete RMF's phase wrongly."""
     for place in range(0, len(effects()) + 4, depth(3, 1)):
-        for first in range(depth(3, 8)):
-            world = World(
-                die_at=place, lose=lambda t, n, f=first: "request" not in t and n % 3 == f % 3
-            )
+        for first in range(3):
+            world = World(die_at=place, lose=every_third(first))
             phase = world.ask()
-            world.run(12.0, until=lambda p=phase: bool(p.outcome))
+            world.run(12.0, until=is_over(phase))
             assert not phase.outcome or world.plant.moved == 1, (place, first, phase.why)

@@ -208,7 +208,7 @@ class World:
         if self.daemon is None or self._is_lost(topic):
             return
         try:
-            event = KIND.requests[topics.DISPENSER_REQUESTS](message, self.settings)
+            event: Any = KIND.requests[topics.DISPENSER_REQUESTS](message, self.settings)
         except RequestRefused as refusal:
             self.daemon.refuse(message, refusal)
         else:

@@ -5,6 +5,7 @@ from typing import Any, Final
 
 from bridges.kinds.alarm.signals import PanelOutputs
 from bridges.kinds.charger.signals import CURRENT_FLOWS, ChargerOutputs, ChargerSample
+from bridges.kinds.dispenser.signals import WorkcellOutputs, WorkcellSample
 from bridges.kinds.door.signals import DoorOutputs, DoorSample
 from bridges.kinds.lift.settings import LiftSettings
 from bridges.kinds.lift.signals import DoorReading, LiftOutputs, LiftSample, Motion, Side
@@ -101,6 +102,22 @@ def _charger(settings: object, wired: Wired) -> Iterator[WalkStep]:
     )
 
 
+def _workcell(settings: object, wired: Wired) -> Iterator[WalkStep]:
+    def hinders(sample: WorkcellSample) -> str:
+        if sample.fault or sample.errors:
+            return f"it shows a fault {'; '.join(sample.errors)}".rstrip()
+        return "done is on before the start" if sample.done else ""
+
+    yield WalkStep(
+        "start",
+        "starts one cycle, with no robot there",
+        WorkcellOutputs(start=True, guid="walk"),
+        "the cycle has succeeded",
+        lambda sample: sample.done is True,
+        hinders,
+    )
+
+
 def _fault(sample: ChargerSample) -> bool:
     return sample.activity.value in ("error", "unknown")
 
@@ -110,12 +127,16 @@ KINDS: Final[dict[str, Callable[[Any, Wired], Iterator[WalkStep]]]] = {
     "door": _door,
     "charger": _charger,
     "alarm": lambda settings, wired: iter(()),  # a panel is only read
+    "dispenser": _workcell,
+    "ingestor": _workcell,
 }
 OFF: Final = {
     "lift": LiftOutputs(),
     "door": DoorOutputs(),
     "charger": ChargerOutputs(power=False),
     "alarm": PanelOutputs(),
+    "dispenser": WorkcellOutputs(),
+    "ingestor": WorkcellOutputs(),
 }
 
 
