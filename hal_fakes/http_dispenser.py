@@ -54,11 +54,14 @@ class FakeHttpWorkcell:
         if server == "stuck" and self._last is not None:
             return self._last
         said: dict[str, object] = {}
-        for signal in self._settings.inputs.__struct_fields__:
-            if place := getattr(self._settings.inputs, signal):
+        found = self._settings.inputs
+        signals = [one for one in found.__struct_fields__ if getattr(found, one)]
+        for signal in sorted(signals, key=self.plant.sense):  # signals may share a field
+            place = getattr(found, signal)
+            if self.plant.sense(signal) or place.field not in said:
                 put(said, place.field, value_of(place, self.plant.sense(signal)))
-                if "wrong" in (server, body):
-                    put(said, place.field, ["?"])
+            if "wrong" in (server, body):
+                put(said, place.field, ["?"])
         self._last = json.dumps(said).encode()
         return {"off": b"", "garbage": self._last[:-9]}.get(body or "", self._last)
 

@@ -11,13 +11,16 @@ from typing import Final, Literal
 from bridges.messages import definitions as d
 from bridges.messages.stamps import in_seconds
 
-Stated = d.LiftState | d.DoorState | d.ChargerState
-Requested = d.LiftRequest | d.DoorRequest | d.ChargerRequest | d.ChargerCancel
+WorkcellStated = d.DispenserState | d.IngestorState
+WorkcellRequested = d.DispenserRequest | d.IngestorRequest
+WorkcellResulted = d.DispenserResult | d.IngestorResult
+Stated = d.LiftState | d.DoorState | d.ChargerState | WorkcellStated
+Requested = d.LiftRequest | d.DoorRequest | d.ChargerRequest | d.ChargerCancel | WorkcellRequested
 LONGEST_NAME: Final = 256
 """The longest part of a name (characters) that is kept and shown, as anybody can send a name of 1
 MB."""
-Kind = Literal["lift", "door", "charger"]
-KINDS: Final[tuple[Kind, ...]] = ("lift", "door", "charger")
+Kind = Literal["lift", "door", "charger", "dispenser", "ingestor"]
+KINDS: Final[tuple[Kind, ...]] = ("lift", "door", "charger", "dispenser", "ingestor")
 
 
 def printable(text: str) -> str:
@@ -29,16 +32,23 @@ def printable(text: str) -> str:
 
 
 def word(enum: type[IntEnum], value: int) -> str:
-    """Write `DOOR_OPEN` as `OPEN`, and a number without a constant as `7?`."""
+    """Write `DOOR_OPEN` as `OPEN`, a name without a prefix whole, and a number without a constant as
+    `7?`."""
     try:
-        return enum(value).name.split("_", 1)[1]
+        return enum(value).name.split("_", 1)[-1]
     except ValueError:
         return f"{value}?"
 
 
-def device(message: Stated | Requested) -> str:
-    """Return the device that a state or request names."""
+def device(message: Stated | Requested | WorkcellResulted) -> str:
+    """Return the device that a state, request or result names."""
     match message:
+        case d.DispenserState() | d.IngestorState():
+            return message.guid
+        case d.DispenserRequest() | d.IngestorRequest():
+            return message.target_guid
+        case d.DispenserResult() | d.IngestorResult():
+            return message.source_guid
         case d.LiftState() | d.LiftRequest():
             return message.lift_name
         case d.DoorState() | d.DoorRequest():
@@ -47,9 +57,13 @@ def device(message: Stated | Requested) -> str:
             return message.charger_name
 
 
-def kind(message: Stated | Requested) -> Kind:
-    """Return the kind of device of a state or request."""
+def kind(message: Stated | Requested | WorkcellResulted) -> Kind:
+    """Return the kind of device of a state, request or result."""
     match message:
+        case d.DispenserState() | d.DispenserRequest() | d.DispenserResult():
+            return "dispenser"
+        case d.IngestorState() | d.IngestorRequest() | d.IngestorResult():
+            return "ingestor"
         case d.LiftState() | d.LiftRequest():
             return "lift"
         case d.DoorState() | d.DoorRequest():
@@ -67,6 +81,8 @@ def stamped_at(state: Stated) -> float:
             return in_seconds(state.door_time)
         case d.ChargerState():
             return in_seconds(state.charger_time)
+        case d.DispenserState() | d.IngestorState():
+            return in_seconds(state.time)
 
 
 def condition(state: Stated) -> str:
@@ -78,6 +94,8 @@ def condition(state: Stated) -> str:
             return plain(d.DoorModeValue, state.current_mode.value)
         case d.ChargerState():
             return _charger_condition(state)
+        case d.DispenserState() | d.IngestorState():
+            return plain(d.WorkcellMode, state.mode)
 
 
 def plain(enum: type[IntEnum], value: int) -> str:
@@ -121,12 +139,14 @@ def holder(state: Stated) -> str:
             request = f"request {state.request_id}" if state.request_id else ""
             both = f"{robot} ({request})" if robot and request else robot or request
             return printable(both)
+        case d.DispenserState() | d.IngestorState():
+            return printable(", ".join(state.request_guid_queue))
 
 
 def described(state: Stated) -> str:
     """Describe a state with its holder: `car at L1, door open, mode AGV, held by fleet/robot`."""
     who = holder(state)
-    has = "for" if isinstance(state, d.ChargerState) else "held by"
+    has = {"charger": "for", "lift": "held by"}.get(kind(state), "queue")
     return condition(state) + (f", {has} {who}" if who else "")
 
 
@@ -143,6 +163,24 @@ def request(message: Requested) -> str:
             return printable(f"charge {robot} (request {message.request_id})")
         case d.ChargerCancel():
             return printable(f"cancel request {message.request_id}")
+        case d.DispenserRequest() | d.IngestorRequest():
+            verb = "dispense" if isinstance(message, d.DispenserRequest) else "ingest"
+            return printable(f"{verb} {items(message)} (request {message.request_guid})")
+
+
+def items(message: WorkcellRequested) -> str:
+    """Describe the content of a request: `2 sheets in left`."""
+    places = [(one, f" in {one.compartment_name}") for one in message.items]
+    each = (
+        f"{one.quantity} {one.type_guid}{where if one.compartment_name else ''}"
+        for one, where in places
+    )
+    return printable(", ".join(each)) or "no items"
+
+
+def result(message: WorkcellResulted) -> str:
+    """Return RMF's word for a result: `acknowledged`, `success` or `failed`."""
+    return plain(d.WorkcellStatus, message.status)
 
 
 def _lift_request(message: d.LiftRequest) -> str:

@@ -22,6 +22,7 @@ from bridges.observe.limits import (
 )
 from bridges.observe.news import News
 from bridges.observe.requesters import Moment
+from bridges.observe.workcell import ObservedDispenser, ObservedIngestor
 
 AnyDevice = ObservedDevice[Any]
 D = TypeVar("D", bound=AnyDevice)
@@ -129,7 +130,7 @@ class ObservedGraph(Generic[D]):
     def _about(self, message: d.Message, moment: Moment) -> Iterator[D]:
         if isinstance(message, d.SupervisorHeartbeat):
             yield from (one for one in self.known.values() if one.kind == "door")
-        elif isinstance(message, words.Stated | words.Requested):
+        elif isinstance(message, words.Stated | words.Requested | words.WorkcellResulted):
             stated = isinstance(message, words.Stated)
             found = self.device(words.kind(message), words.device(message), moment, stated=stated)
             if found is not None:
@@ -174,4 +175,10 @@ def _heard_at(device: AnyDevice) -> float:
 class PlainGraph(ObservedGraph[AnyDevice]):
     """Every device, with observed facts only."""
 
-    makes: ClassVar = {"lift": ObservedLift, "door": ObservedDoor, "charger": ObservedCharger}
+    makes: ClassVar = {
+        "lift": ObservedLift,
+        "door": ObservedDoor,
+        "charger": ObservedCharger,
+        "dispenser": ObservedDispenser,
+        "ingestor": ObservedIngestor,
+    }

@@ -14,7 +14,7 @@ from bridges.observe.news import News
 from bridges.observe.publishers import StatePublishers
 from bridges.observe.requesters import DeviceRequester, DeviceRequesters, Fact, Moment
 
-T = TypeVar("T", d.LiftState, d.DoorState, d.ChargerState)
+T = TypeVar("T", d.LiftState, d.DoorState, d.ChargerState, d.DispenserState)
 
 
 class Check(NamedTuple):

@@ -15,6 +15,7 @@ What = Literal[
     "ends",  # a requester sends END; `passed_on`: the supervisor does
     "has",  # a requester has the device now
     "lost",  # `text` had the device until now
+    "result",  # a workcell gives the requester's request another result: `text`
     "met",  # RMF sees a requester's wish fulfilled
     "gone",  # a requester has stopped asking, without END
     "over",  # a requester's visit is over

@@ -46,6 +46,8 @@ STATES = {
     "lift": topics.LIFT_STATES.name,
     "door": topics.DOOR_STATES.name,
     "charger": topics.CHARGER_STATES.name,
+    "dispenser": topics.DISPENSER_STATES.name,
+    "ingestor": topics.INGESTOR_STATES.name,
     "adapter": topics.ADAPTER_LIFT_REQUESTS.name,
 }
 WIDTH = 120
@@ -151,8 +153,8 @@ def performance_of(args: argparse.Namespace) -> Scenario | None:
         return None
     if wanted != [args.kind]:
         args.usage(
-            "a lift is played by --ride A B, a door by --passages N, a charger by --charge; an"
-            " adapter is only listened to"
+            "a lift is played by --ride A B, a door by --passages N, a charger by --charge; "
+            " the others are only listened to"
         )
     if not args.active:
         args.usage(f"the play moves {words_of(args)}: add --active")

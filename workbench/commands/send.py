@@ -1,4 +1,4 @@
-"""`rmf-bridge send`: send one request to a lift, door or charger, as RMF would, and show its effect.
+"""`rmf-bridge send`: send one request to a device, as RMF would, and show its effect.
 
 Exit code 0: the effect was seen. 1: it was not, and the reason is printed. 2: a wrong command line.
 130: Ctrl-C.
@@ -33,16 +33,23 @@ from workbench.graph.requests import Failed, Fulfilled, Request, RequestProgress
 from workbench.graph.requests.charger import ChargeCancel, QueuedCancel, QueuedCharge, RobotCharge
 from workbench.graph.requests.door import DoorMove
 from workbench.graph.requests.lift import LiftEnd, LiftRide, aftermath
+from workbench.graph.requests.workcell import Dispensing, Ingesting
 
 NODE_NAME = "rmf_bridge_send"
 LOOK_EVERY_S = 0.1
-STATES = (topics.LIFT_STATES, topics.DOOR_STATES, topics.CHARGER_STATES)
+STATES = (
+    topics.LIFT_STATES,
+    topics.DOOR_STATES,
+    topics.CHARGER_STATES,
+    topics.DISPENSER_STATES,
+    topics.INGESTOR_STATES,
+)
 """The states of all kinds, because the given name may belong to another kind."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add `lift`, `door` and `charger`, each with the options of the graph."""
-    kinds = parser.add_subparsers(dest="kind", required=True, metavar="lift|door|charger")
+    """Add each kind of device, with the options of the graph."""
+    kinds = parser.add_subparsers(dest="kind", required=True, metavar="|".join(words.KINDS))
     for kind, (text, example, add) in {
         "lift": (
             "request a lift, or end a session",
@@ -54,6 +61,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
             "assign a charger, or cancel the assignment",
             "any --queue --robot fleet/robot",
             _charger_arguments,
+        ),
+        "dispenser": (
+            "ask a dispenser for items, and wait for its result",
+            "linen_store sheets --quantity 2 --compartment left",
+            _workcell_arguments,
+        ),
+        "ingestor": (
+            "ask an ingestor to take items, and wait for its result",
+            "laundry_intake linen_bag",
+            _workcell_arguments,
         ),
     }.items():
         example = f"example: rmf-bridge send {kind} {example}"
@@ -124,6 +141,17 @@ def _charger_arguments(parser: argparse.ArgumentParser) -> None:
     add_shared_arguments(parser, direct=False)
 
 
+def _workcell_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("name", metavar="NAME", help="the dispenser or ingestor, as RMF names it")
+    parser.add_argument("item", metavar="ITEM", nargs="?", default="", help="the item's type_guid")
+    parser.add_argument("--quantity", type=int, default=1, metavar="N", help="default: 1")
+    parser.add_argument("--compartment", default="", metavar="NAME", help="default: none")
+    parser.add_argument(
+        "--request-id", metavar="GUID", help="the request's guid, to repeat it (default: a new one)"
+    )
+    add_shared_arguments(parser, direct=False)
+
+
 def request_of(args: argparse.Namespace) -> Request:
     """Return the command line's request. Contradictory options end with exit code 2."""
     match args.kind:
@@ -134,8 +162,13 @@ def request_of(args: argparse.Namespace) -> Request:
             return DoorMove(
                 args.name, opened, args.requester, direct=args.direct, line=command_line(args)
             )
-        case _:
+        case "charger":
             return _charger_request(args)
+        case _:
+            guid = args.request_id or f"{NODE_NAME}-{uuid4().hex[:8]}"
+            made = Dispensing if args.kind == "dispenser" else Ingesting
+            what = args.item, args.quantity, args.compartment
+            return made(args.name, guid, *what, line=command_line(args))
 
 
 def _lift_request(args: argparse.Namespace) -> Request:

@@ -77,6 +77,8 @@ def listen_on(transport: Transport) -> Ear:
         topics.LIFT_STATES,
         topics.DOOR_STATES,
         topics.CHARGER_STATES,
+        topics.DISPENSER_STATES,
+        topics.INGESTOR_STATES,
         topics.DOOR_SUPERVISOR_HEARTBEAT,
         topics.CHARGING_ASSIGNMENTS,
         topics.DIAGNOSTICS,

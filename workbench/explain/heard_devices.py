@@ -23,7 +23,7 @@ from bridges.observe.diagnosis import COORDINATOR
 from bridges.observe.limits import FLAPS, MOST_DEVICES
 from bridges.observe.requesters import Moment
 from workbench.explain import answer as common
-from workbench.explain import charger, door, first_causes, known_defects, lift
+from workbench.explain import charger, door, first_causes, known_defects, lift, workcell
 from workbench.explain.answer import Answer, FileReason, Remedies
 from workbench.explain.charger_facts import ChargerFacts
 from workbench.explain.device import MOST_LINES, Device
@@ -33,6 +33,7 @@ from workbench.explain.lift_facts import LiftFacts
 from workbench.explain.noted import noted
 from workbench.explain.phrases import TimePhrases, lasted, on_graph
 from workbench.explain.rows import label
+from workbench.explain.workcell_facts import DispenserFacts, IngestorFacts, WorkcellFacts
 
 STORY_LINES: Final = 40
 SHOWS_S: Final = 1.5
@@ -46,7 +47,13 @@ class HeardDevices(ObservedGraph[Device]):
     that publish each topic, of a live graph on which FLEET_STATES are heard too; None if not known.
     """
 
-    makes: ClassVar = {"lift": LiftFacts, "door": DoorFacts, "charger": ChargerFacts}
+    makes: ClassVar = {
+        "lift": LiftFacts,
+        "door": DoorFacts,
+        "charger": ChargerFacts,
+        "dispenser": DispenserFacts,
+        "ingestor": IngestorFacts,
+    }
 
     def __init__(
         self,
@@ -181,6 +188,8 @@ class HeardDevices(ObservedGraph[Device]):
                 return door.answer(device, clock, around, self._session)
             case ChargerFacts():
                 return charger.answer(device, clock, around, self._coordinates())
+            case WorkcellFacts():
+                return workcell.answer(device, clock, around)
         raise AssertionError(device)
 
     def _story(self, device: Device, answer: Answer) -> tuple[StoryLine, ...]:

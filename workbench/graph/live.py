@@ -26,6 +26,12 @@ OF_DEVICES: Final[tuple[AnyTopic, ...]] = (
     topics.CHARGER_REFUSALS,
     topics.ADAPTER_CHARGER_REQUESTS,
     topics.ADAPTER_CHARGER_CANCELS,
+    topics.DISPENSER_STATES,
+    topics.DISPENSER_REQUESTS,
+    topics.DISPENSER_RESULTS,
+    topics.INGESTOR_STATES,
+    topics.INGESTOR_REQUESTS,
+    topics.INGESTOR_RESULTS,
     topics.DIAGNOSTICS,
 )
 """The topics about devices. Volatile, so that no retained request passes for a new request."""

@@ -42,7 +42,7 @@ SILENCES: Final = 5
 
 NOT_YET: Final = float("-inf")
 
-T = TypeVar("T", d.LiftState, d.DoorState, d.ChargerState)
+T = TypeVar("T", d.LiftState, d.DoorState, d.ChargerState, d.DispenserState)
 V = TypeVar("V")
 
 
@@ -300,4 +300,6 @@ class History(AnyHistory, Generic[T]):
 
 def _content(state: words.Stated) -> words.Stated:
     """Return all but the stamp."""
-    return replace(state, **{f"{words.kind(state)}_time": d.Time()})
+    kind = words.kind(state)
+    stamp = "time" if kind in ("dispenser", "ingestor") else f"{kind}_time"
+    return replace(state, **{stamp: d.Time()})

@@ -7,13 +7,14 @@ from typing import Any, Final, Literal
 
 from bridges.messages import words
 from bridges.messages.heard import Heard
-from workbench.judge import adapter_laws, charger_laws, door_laws, lift_laws
+from workbench.judge import adapter_laws, charger_laws, door_laws, lift_laws, workcell_laws
 from workbench.judge.adapter_history import AdapterHistory
 from workbench.judge.charger_history import ChargerHistory
 from workbench.judge.door_history import DoorHistory
 from workbench.judge.history import AnyHistory
 from workbench.judge.law import Doubt, Evidence, JudgedLaw, Law, Verdict
 from workbench.judge.lift_history import LiftHistory
+from workbench.judge.workcell_history import DispenserHistory, IngestorHistory
 
 JudgedKind = words.Kind | Literal["adapter"]
 KINDS: Final[tuple[JudgedKind, ...]] = (*words.KINDS, "adapter")
@@ -22,11 +23,20 @@ LAWS: Final[Mapping[JudgedKind, tuple[Law[Any], ...]]] = MappingProxyType(
         "lift": lift_laws.LAWS,
         "door": door_laws.LAWS,
         "charger": charger_laws.LAWS,
+        "dispenser": workcell_laws.LAWS,
+        "ingestor": workcell_laws.LAWS,
         "adapter": adapter_laws.LAWS,
     }
 )
 SCENES: Final[Mapping[JudgedKind, Callable[[str], AnyHistory]]] = MappingProxyType(
-    {"lift": LiftHistory, "door": DoorHistory, "charger": ChargerHistory, "adapter": AdapterHistory}
+    {
+        "lift": LiftHistory,
+        "door": DoorHistory,
+        "charger": ChargerHistory,
+        "dispenser": DispenserHistory,
+        "ingestor": IngestorHistory,
+        "adapter": AdapterHistory,
+    }
 )
 MUTE_S: Final = 10.0
 """A publisher that sends no state in this time (s) would not send one to RMF."""

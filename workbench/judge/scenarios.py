@@ -42,6 +42,8 @@ def busy(state: words.Stated) -> str:
             idle = state.current_mode.value == d.DoorModeValue.MODE_CLOSED
         case d.ChargerState():
             idle = state.state == d.ChargerStateValue.CHARGER_IDLE
+        case d.DispenserState() | d.IngestorState():
+            idle = state.mode == d.WorkcellMode.IDLE and not state.request_guid_queue
     return "" if idle else f"{shown(words.device(state))} is not idle: {words.described(state)}"
 
 

@@ -32,6 +32,8 @@ SECTIONS: Final = (
     ("door", "Doors"),
     ("charger", "Chargers"),
     ("alarm", "Alarms"),
+    ("dispenser", "Dispensers"),
+    ("ingestor", "Ingestors"),
     ("coordinator", "Charger coordinators"),
     ("robot", "Charging schedule"),
 )

@@ -33,7 +33,8 @@ class RequestProgress(Struct, frozen=True):
     request, in order, the last at `stated_at`. `there`: kind and name of every device heard.
     `graph`: where we listen, for people. `hinted`: the hints printed. `heartbeat`: the door
     supervisor's latest, at `heartbeat_at`. `boarded`: is a robot inside, by the lift's diagnostics?
-    "yes" or "no"; "" if not heard. `refusals`: the chargers' refusals after our first request.
+    "yes" or "no"; "" if not heard. `refusals`: the chargers' refusals after our first request;
+    `results`: the workcells' results.
     """
 
     began_at: float
@@ -50,6 +51,7 @@ class RequestProgress(Struct, frozen=True):
     heartbeat_at: float = NEVER_AT
     boarded: str = ""
     refusals: tuple[ChargerRefusal, ...] = ()
+    results: tuple[words.WorkcellResulted, ...] = ()
 
     def hears(self, heard: Heard, about: Callable[[words.Stated], bool]) -> "RequestProgress":
         """Take a message. `about(state)`: does the state concern the request?"""
@@ -59,6 +61,8 @@ class RequestProgress(Struct, frozen=True):
         if isinstance(message, DiagnosticStatus):
             refusal = read(message) if self.first_sent_at is not None else None
             return replace(self, refusals=(*self.refusals, refusal)) if refusal else self
+        if isinstance(message, words.WorkcellResulted):
+            return replace(self, results=(*self.results[-9:], message))
         if not isinstance(message, words.Stated):
             return self
         there = self.there | {(words.kind(message), words.device(message))}

@@ -1,0 +1,71 @@
+"""Explain a dispenser or ingestor: which request waits, and who must act next.
+
+RMF's fleet adapter goes on with a result SUCCESS, and with a newer state that no longer lists an
+acknowledged request (rmf_ros2, DispenseItem.cpp and IngestItem.cpp). It has no time limit.
+"""
+
+from typing import Final
+
+from workbench.explain import answer as common
+from workbench.explain import first_causes
+from workbench.explain.answer import Answer
+from workbench.explain.phrases import TimePhrases
+from workbench.explain.workcell_facts import WorkcellFacts
+
+DECIDE: Final = (
+    "look at robot and machine, then `rmf-bridge workcell done FILE`, or `again`, `failed`"
+)
+ENDS: Final = {
+    "success": "It has succeeded: RMF goes on with its next state or result.",
+    "failed": "It has failed: RMF ends the task.",
+}
+
+
+def answer(workcell: WorkcellFacts, clock: TimePhrases, around: common.OthersHeard) -> Answer:
+    """Explain the workcell at the last message."""
+    if workcell.last_state is None:
+        return common.unheard(workcell, around)
+    stopped = common.stopped(workcell, around, clock)
+    if stopped is not None:
+        return stopped
+    found = Answer(since=min([one.first.at for one in workcell.requesters], default=float("-inf")))
+    found.say(f"{workcell.name} has been {workcell.mode.value} {clock.since(workcell.mode.since)}.")
+    if old := common.old_reading(workcell, clock):
+        found.say(old)
+    _doubt(found, workcell, clock)
+    states = f"{workcell.kind}_states"
+    if not (
+        first_causes.two_nodes(found, workcell, clock, around, states)
+        or first_causes.own_fault(found, workcell, clock, around)
+    ):
+        _next(found, workcell, clock)
+    return found
+
+
+def _doubt(found: Answer, workcell: WorkcellFacts, clock: TimePhrases) -> None:
+    """Say what no repeat and no restart will end."""
+    for wait in workcell.waits(clock.now):
+        if workcell.mode.value == "offline" and wait.who not in workcell.results:
+            found.say(f"Request {wait.who} has had no answer, and RMF repeats it without end.")
+
+
+def _next(found: Answer, workcell: WorkcellFacts, clock: TimePhrases) -> None:
+    waits = list(workcell.waits(clock.now))
+    if not waits:
+        queue = workcell.queue.value
+        left = f" It still lists {queue}, which no fleet adapter repeats." if queue else ""
+        found.say(f"Nobody asks for it.{left}", "nobody", "there is nothing to do")
+        return
+    first = waits[0]
+    said = f"Request {first.who} asks for {first.wants} {clock.since(first.since)}."
+    result = workcell.results.get(first.who, "")
+    if result in ENDS:
+        found.say(f"{said} {ENDS[result]}", "the fleet adapter", "go on")
+    elif workcell.mode.value == "offline":
+        found.say(said, "a person", DECIDE)
+    elif workcell.mode.value == "busy":
+        found.say(said, "the controller", "finish its cycle")
+    elif workcell.lists(first.who):
+        found.say(said, "the controller", "become ready; the daemon's `waits` gives the reason")
+    else:
+        found.say(said, "the device's node", "list the request, and acknowledge it")

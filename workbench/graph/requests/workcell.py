@@ -1,0 +1,73 @@
+"""Ask a dispenser or ingestor for one cycle, as DispenseItem.cpp and IngestItem.cpp do."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from typing import ClassVar
+
+from bridges.messages import definitions as d
+from bridges.messages import topics, words
+from bridges.messages.topics import AnyTopic
+from workbench.graph.requests import Failed, Fulfilled, Obstacle, Request, RequestProgress
+
+DECIDE = "its daemon's machine: rmf-bridge status, then rmf-bridge workcell done, again or failed"
+
+
+@dataclass(frozen=True, slots=True)
+class Dispensing(Request):
+    """Ask for `quantity` items of `type_guid`, "" for no items, until there is a result."""
+
+    guid: str
+    type_guid: str = ""
+    quantity: int = 1
+    compartment: str = ""
+    transporter: str = field(default="rmf_bridge_send", kw_only=True)
+
+    kind: ClassVar[str] = "dispenser"
+    states: ClassVar[AnyTopic] = topics.DISPENSER_STATES
+    own: ClassVar[AnyTopic] = topics.DISPENSER_REQUESTS
+    answers: ClassVar[tuple[AnyTopic, ...]] = (topics.DISPENSER_RESULTS,)
+    made: ClassVar[type[words.WorkcellRequested]] = d.DispenserRequest
+    part: ClassVar[type[d.DispenserRequestItem | d.IngestorRequestItem]] = d.DispenserRequestItem
+
+    def message(self, seen: RequestProgress) -> words.WorkcellRequested:
+        """Return the request, always with the same guid: a repeat is no new request."""
+        one = self.part(self.type_guid, self.quantity, self.compartment)
+        items = (one,) if self.type_guid else ()
+        return self.made(d.Time(), self.guid, self.name, self.transporter, items)  # type: ignore[arg-type]
+
+    def outcome(self, seen: RequestProgress) -> Fulfilled | Failed | None:
+        """Return the outcome that a result gives. (RMF also takes an unlisted request for done.)"""
+        for one in seen.results:
+            if (one.source_guid, one.request_guid) == (self.name, self.guid):
+                if one.status == d.WorkcellStatus.SUCCESS:
+                    return Fulfilled(f"{self.name} has served request {self.guid}")
+                if one.status == d.WorkcellStatus.FAILED:
+                    return Failed(f"{self.name} has failed request {self.guid}: see its log")
+        return None
+
+    def obstacles(self, seen: RequestProgress) -> Iterable[Obstacle]:
+        """Return the obstacles, judged by its last state."""
+        state = seen.states[-1]
+        assert isinstance(state, words.WorkcellStated)
+        listed = self.guid in state.request_guid_queue
+        return (
+            Obstacle(
+                state.mode == d.WorkcellMode.OFFLINE,
+                f"{self.name} is offline; request {self.guid} {'waits' if listed else 'is not listed'}",
+                DECIDE,
+            ),
+            Obstacle(not listed, f"{self.name} does not list request {self.guid}"),
+            Obstacle(True, f"{self.name} lists request {self.guid}, and gives no result yet"),
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Ingesting(Dispensing):
+    """The same for an ingestor."""
+
+    kind: ClassVar[str] = "ingestor"
+    states: ClassVar[AnyTopic] = topics.INGESTOR_STATES
+    own: ClassVar[AnyTopic] = topics.INGESTOR_REQUESTS
+    answers: ClassVar[tuple[AnyTopic, ...]] = (topics.INGESTOR_RESULTS,)
+    made: ClassVar[type[words.WorkcellRequested]] = d.IngestorRequest
+    part: ClassVar[type[d.DispenserRequestItem | d.IngestorRequestItem]] = d.IngestorRequestItem

@@ -1,0 +1,81 @@
+"""The history of a dispenser or ingestor: requests, what its states list, and its results."""
+
+from typing import Any
+
+from bridges.messages import definitions as d
+from bridges.messages import words
+from bridges.messages.heard import Heard
+from bridges.observe.requesters import Moment
+from bridges.observe.workcell import ObservedDispenser, ObservedIngestor
+from workbench.judge.history import NOT_YET, History, keep
+
+
+class WorkcellHistory(History[d.DispenserState]):
+    """`listed`: guid -> time of the first state that listed it. `results`: guid -> the last status.
+    `left`: the guids that the latest state lists no longer. `asked_since`: guid -> the times of the
+    requests after its last result. `result`: the latest message, if it is a result of this workcell;
+    `result_before`: the status of the result before that for the same guid."""
+
+    def __init__(self, name: str) -> None:
+        super().__init__(name)
+        self.listed: dict[str, float] = {}
+        self.results: dict[str, int] = {}
+        self.left: tuple[str, ...] = ()
+        self.asked_since: dict[str, list[float]] = {}
+        self.result: words.WorkcellResulted | None = None
+        self.result_before: int | None = None
+
+    @staticmethod
+    def claims(state: Any) -> bool:
+        """Is it any state but OFFLINE?"""
+        return bool(state.mode != d.WorkcellMode.OFFLINE)
+
+    def take(self, heard: Heard, own: bool = False) -> bool:
+        """Take a message; an own result is no state and no request."""
+        self.result, self.left = None, ()
+        return super().take(heard, own)
+
+    def take_other(self, heard: Heard) -> bool:
+        """Take requests to this workcell, and its results."""
+        message = heard.message
+        if not isinstance(message, words.WorkcellRequested | words.WorkcellResulted):
+            return False
+        if (words.kind(message), words.device(message)) != (self.seen.kind, self.name):
+            return False
+        guid = message.request_guid
+        if isinstance(message, words.WorkcellRequested):
+            self.asked()
+            keep(self.asked_since, guid, [*self.asked_since.get(guid, []), self.now][-10:])
+            return True
+        self.seen.hear(Moment(heard.at, heard.wall), heard.topic, message)
+        self.result, self.result_before = message, self.results.get(guid)
+        keep(self.results, guid, message.status)
+        self.asked_since[guid] = []
+        return True
+
+    def settle(self, state: d.DispenserState) -> None:
+        """Note which requests the state lists, and which it lists no longer."""
+        queue = set(state.request_guid_queue)
+        before = set(self.before.request_guid_queue) if self.before else set(self.listed)
+        self.left = tuple(sorted(before - queue))
+        for guid in queue - self.listed.keys():
+            keep(self.listed, guid, self.now)
+        for guid in self.left:
+            self.listed.pop(guid, None)
+
+    def waited_s(self, guid: str) -> float:
+        """Return for how long RMF has repeated this request without a result (s)."""
+        times = self.asked_since.get(guid) or [self.now]
+        return self.now - times[0] if len(times) > 2 else NOT_YET
+
+
+class DispenserHistory(WorkcellHistory):
+    """The history of a dispenser."""
+
+    observes = ObservedDispenser
+
+
+class IngestorHistory(WorkcellHistory):
+    """The history of an ingestor."""
+
+    observes = ObservedIngestor

@@ -1,0 +1,125 @@
+"""The laws of a dispenser's or ingestor's node: RMF completes a request by its states and results."""
+
+from functools import partial
+from typing import Final
+
+from bridges.messages import definitions as d
+from bridges.messages import words
+from workbench.judge.law import KEPT, Doubt, Finding, Law, shown
+from workbench.judge.shared_laws import ONE, RATE, STAMP, named
+from workbench.judge.workcell_history import WorkcellHistory
+
+ACKNOWLEDGED, SUCCESS, FAILED = d.WorkcellStatus
+SOURCE: Final = "rmf_ros2 phases/DispenseItem.cpp, IngestItem.cpp (_get_status)"
+REPEATS_S: Final = 5.0
+
+
+def _numbers(history: WorkcellHistory) -> Finding:
+    if history.new is not None:
+        known = history.new.mode in list(d.WorkcellMode)
+        return KEPT if known else f"mode {history.new.mode}: RMF has no such number"
+    if history.result is None:
+        return None
+    known = history.result.status in list(d.WorkcellStatus)
+    return KEPT if known else f"status {history.result.status}: RMF has no such number"
+
+
+def _lists_first(history: WorkcellHistory) -> Finding:
+    result = history.result
+    if result is None or result.status != ACKNOWLEDGED:
+        return None
+    guid = result.request_guid
+    if guid in history.listed:
+        return KEPT
+    text = f"request {shown(guid)} is acknowledged, and no state has listed it"
+    return Doubt(text, lambda: guid in history.listed)
+
+
+def _leaves_done(history: WorkcellHistory) -> Finding:
+    for guid in history.left:
+        if history.results.get(guid) == SUCCESS:
+            continue
+        text = f"request {shown(guid)} left the queue without SUCCESS: RMF sends the robot on"
+        return Doubt(text, partial(_succeeded, history, guid))
+    return KEPT if history.left else None
+
+
+def _succeeded(history: WorkcellHistory, guid: str) -> bool:
+    return history.results.get(guid) == SUCCESS
+
+
+def _keeps_result(history: WorkcellHistory) -> Finding:
+    result, before = history.result, history.result_before
+    if result is None or before not in (SUCCESS, FAILED):
+        return None
+    if result.status == before:
+        return KEPT
+    was, now = words.plain(d.WorkcellStatus, before), words.result(result)
+    return f"request {shown(result.request_guid)} was {was}, and is {now} now"
+
+
+def _repeats(history: WorkcellHistory) -> Finding:
+    if history.result is not None:
+        return KEPT if history.result_before == history.result.status else None
+    for guid, status in history.results.items():
+        if history.waited_s(guid) > REPEATS_S:
+            said = words.plain(d.WorkcellStatus, status)
+            return f"request {shown(guid)} is {said}; RMF has repeated it for {REPEATS_S:g} s since"
+    return None
+
+
+LAWS: Final[tuple[Law[WorkcellHistory], ...]] = (
+    Law(
+        "W1.numbers",
+        "Modes and results are RMF's",
+        "a state or a result",
+        "RMF ignores an unknown status, and the robot waits for ever",
+        "DispenserState.msg, DispenserResult.msg",
+        _numbers,
+    ),
+    Law(
+        "W2.lists",
+        "A request is listed in a state before it is acknowledged",
+        "a result ACKNOWLEDGED",
+        "An acknowledged request that a newer state does not list is complete for RMF",
+        SOURCE,
+        _lists_first,
+    ),
+    Law(
+        "W2.done",
+        "A listed request leaves the queue only if it has succeeded",
+        "a state that lists a request no longer",
+        "RMF takes the request for complete, even after FAILED, and sends the robot off",
+        SOURCE,
+        _leaves_done,
+    ),
+    Law(
+        "W3.result",
+        "A result is final",
+        "two results for one request, the first SUCCESS or FAILED",
+        "RMF ends at the first result that it hears, and which one it hears is chance",
+        SOURCE,
+        _keeps_result,
+    ),
+    Law(
+        "W3.repeats",
+        "A result is repeated while its request is",
+        "a request that comes again after its result",
+        "RMF repeats a request until it hears the result: a lost result would hold the robot for ever",
+        SOURCE,
+        _repeats,
+    ),
+    named(
+        RATE,
+        "W4.rate",
+        reason="RMF learns from states that a request is listed, and the page that the node lives",
+        source=SOURCE,
+    ),
+    named(
+        STAMP,
+        "W4.stamp",
+        reason="RMF ignores a state that is older than the last state or result",
+        source="rmf_ros2 phases/Utils.cpp (is_newer)",
+    ),
+    named(ONE, "B0.one"),
+)
