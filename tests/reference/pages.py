@@ -112,13 +112,15 @@ OF: Final = {
     "lift": "a lift",
     "door": "a door",
     "charger": "a charger",
+    "dispenser": "a dispenser",
+    "ingestor": "an ingestor",
     "adapter": "a fleet's adapter",
 }
 LAWS_HEAD: Final = """\
 # Laws
 
-What RMF's supervisors and fleet adapters need of any node for a lift, door or charger, and what lifts
-and doors need of a fleet's adapter. `rmf-bridge judge` holds a node against them
+What RMF's supervisors and fleet adapters need of any node for a lift, door, charger, dispenser or
+ingestor, and what lifts and doors need of a fleet's adapter. `rmf-bridge judge` holds a node against them
 ([how](../how-to/judge.md)); `rmf-bridge judge KIND --laws` prints them. A stuck or noisy wire below a
 right node can break a law marked with \\* too.
 

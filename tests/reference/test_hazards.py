@@ -5,14 +5,15 @@ import re
 import pytest
 
 from bridges.kinds.charger.signals import ChargerOutputs
+from bridges.kinds.dispenser.signals import WorkcellOutputs
 from bridges.kinds.door.signals import DoorOutputs
 from bridges.kinds.lift.signals import LiftOutputs
 from tests.reference.hazards import PAGE, ROOT, UnsafeAction, actions, page
 
 ROWS = actions()
 WAYS = ("given", "not_given", "timing", "duration")
-NO_COMMANDS = {"door.between_pulses"}
-"""Tells the driver why the hold is off, and drives nothing."""
+NO_COMMANDS = {"door.between_pulses", "dispenser.guid", "dispenser.item"}
+"""These tell the driver why the hold is off, and the content of a start; they drive nothing."""
 
 
 def test_the_page_has_the_table() -> None:
@@ -21,7 +22,12 @@ def test_the_page_has_the_table() -> None:
 
 
 def test_every_output_of_every_kind_has_its_four_rows() -> None:
-    kinds = {"lift": LiftOutputs, "door": DoorOutputs, "charger": ChargerOutputs}
+    kinds = {
+        "lift": LiftOutputs,
+        "door": DoorOutputs,
+        "charger": ChargerOutputs,
+        "dispenser": WorkcellOutputs,  # and of an ingestor
+    }
     outputs = {f"{kind}.{field}" for kind, of in kinds.items() for field in of.__struct_fields__}
     wanted = {f"{output}.{way}" for output in outputs - NO_COMMANDS for way in WAYS}
     assert wanted - {row.id for row in ROWS} == set()

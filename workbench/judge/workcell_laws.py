@@ -6,7 +6,7 @@ from typing import Final
 from bridges.messages import definitions as d
 from bridges.messages import words
 from workbench.judge.law import KEPT, Doubt, Finding, Law, shown
-from workbench.judge.shared_laws import ONE, RATE, STAMP, named
+from workbench.judge.shared_laws import ONE, RATE, STAMP, named, stamped
 from workbench.judge.workcell_history import WorkcellHistory
 
 ACKNOWLEDGED, SUCCESS, FAILED = d.WorkcellStatus
@@ -120,6 +120,7 @@ LAWS: Final[tuple[Law[WorkcellHistory], ...]] = (
         "W4.stamp",
         reason="RMF ignores a state that is older than the last state or result",
         source="rmf_ros2 phases/Utils.cpp (is_newer)",
+        check=stamped(lambda state: state.mode == d.WorkcellMode.OFFLINE),
     ),
     named(ONE, "B0.one"),
 )

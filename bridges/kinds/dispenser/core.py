@@ -210,9 +210,8 @@ def _watch(memory: WorkcellMemory, now: float, limits: WorkcellLimits) -> Workce
 
 def _end(memory: WorkcellMemory, now: float, limits: WorkcellLimits) -> WorkcellMemory:
     """End the cycle if the inputs or the time say so."""
-    cycle, senses, t = memory.cycle, memory.senses, limits.t
-    job = memory.job(cycle.guid) if cycle else None
-    if cycle is None or job is None or job.kept != "running":
+    cycle, job, senses, t = memory.cycle, memory.running(), memory.senses, limits.t
+    if cycle is None or job is None:
         return memory
     fresh = is_fresh(senses, now, limits)
     why = ""
@@ -249,9 +248,8 @@ def _is_asked(job: Job, now: float, limits: WorkcellLimits) -> bool:
 
 
 def _outputs(memory: WorkcellMemory, now: float, limits: WorkcellLimits) -> WorkcellOutputs:
-    cycle = memory.cycle
-    job = memory.job(cycle.guid) if cycle else None
-    if cycle is None or job is None or job.kept != "running":
+    cycle, job = memory.cycle, memory.running()
+    if cycle is None or job is None:
         return WorkcellOutputs()
     on = limits.pulse_s is None or now < cycle.started_at + limits.pulse_s
     return WorkcellOutputs(on and not cycle.cut, job.guid, job.item)

@@ -119,6 +119,11 @@ class WorkcellMemory(msgspec.Struct, frozen=True):
         """Return the request with this guid."""
         return next((job for job in self.jobs if job.guid == guid), None)
 
+    def running(self) -> Job | None:
+        """Return the request whose cycle runs, once that is on disk."""
+        job = self.job(self.cycle.guid) if self.cycle else None
+        return job if job is not None and job.kept == "running" else None
+
     def doubtful(self) -> tuple[Job, ...]:
         """Return the requests whose outcome is unknown."""
         return tuple(job for job in self.jobs if job.phase == "doubtful")

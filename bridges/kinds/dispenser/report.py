@@ -42,17 +42,15 @@ class WorkcellReport(msgspec.Struct, frozen=True):
 
 def report(memory: WorkcellMemory, now: float, limits: WorkcellLimits) -> WorkcellReport:
     """Report the present state, as far as it is on disk."""
-    cycle = memory.cycle
-    job = memory.job(cycle.guid) if cycle else None
-    runs = job is not None and job.kept == "running"
+    runs = memory.running()
     return WorkcellReport(
-        mode=_mode(memory, runs, now, limits),
+        mode=_mode(memory, runs is not None, now, limits),
         queue=tuple(job.guid for job in memory.jobs if job.is_listed),
         results=tuple(_results(memory)),
         read_at=memory.senses.read_at,
         faults=tuple(_faults(memory, now, limits)),
-        running=job.guid if job and runs else "",
-        item=str(job.item) if job and runs else "",
+        running=runs.guid if runs else "",
+        item=str(runs.item) if runs else "",
         waits=_waits(memory, now, limits),
     )
 

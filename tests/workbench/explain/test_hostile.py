@@ -69,6 +69,14 @@ def test_terminal_escapes_in_names_are_shown_and_have_no_effect(kind: str) -> No
             d.ChargerRequest(name, name, name, d.Duration(), name),
         ),
     }
+    for other, state_type, request_type in (
+        ("dispenser", d.DispenserState, d.DispenserRequest),
+        ("ingestor", d.IngestorState, d.IngestorRequest),
+    ):
+        said[other] = (
+            state_type(d.Time(), name, 77, (name, ESCAPE)),
+            request_type(d.Time(), name, name, name),
+        )
     state, request = said[kind]
     for n in range(9):
         site.take(heard(n, f"{kind}_states", state))

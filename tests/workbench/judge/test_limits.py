@@ -19,7 +19,13 @@ RED, BLUE = "fleet/red", "fleet/blue"
 OPEN, CLOSED = 2, 0
 AGV, FIRE = 2, 3
 IDLE, ASSIGNED, CHARGING = 1, 2, 3
-NAMES: dict[JudgedKind, str] = {"lift": "Lift1", "door": "ward", "charger": "bay1"}
+NAMES: dict[JudgedKind, str] = {
+    "lift": "Lift1",
+    "door": "ward",
+    "charger": "bay1",
+    "dispenser": "store",
+    "ingestor": "intake",
+}
 Line = tuple[float, AnyTopic, d.Message]
 Story = Callable[[float], list[Line]]
 

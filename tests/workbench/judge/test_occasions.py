@@ -41,6 +41,7 @@ from tests.workbench.judge.test_limits import (
     stays_shut,
     to_door,
 )
+from tests.workbench.judge.workcell_stories import stories
 from workbench.judge.judge import LAWS, Judge, JudgedKind
 
 ERROR, RELEASED = 200, 4
@@ -312,6 +313,8 @@ STORIES: dict[tuple[JudgedKind, str], tuple[Lines, Lines, Lines]] = {
         bay(20.0),
         [*seconds(0.0, 18.0, lambda s: station(s, IDLE, read_at=0.0))],
     ),
+    **stories("dispenser", senders, twins),
+    **stories("ingestor", senders, twins),
 }
 
 
