@@ -120,9 +120,9 @@ LAWS_HEAD: Final = """\
 # Laws
 
 What RMF's supervisors and fleet adapters need of any node for a lift, door, charger, dispenser or
-ingestor, and what lifts and doors need of a fleet's adapter. `rmf-bridge judge` holds a node against them
-([how](../how-to/judge.md)); `rmf-bridge judge KIND --laws` prints them. A stuck or noisy wire below a
-right node can break a law marked with \\* too.
+ingestor, and what lifts and doors need of a fleet's adapter. `rmf-bridge judge` holds a node against
+them ([how](../how-to/judge.md)); `rmf-bridge judge KIND --laws` prints them. A stuck or noisy wire
+below a right node can break a law marked with \\* too.
 
 No part of RMF sends ChargerRequest, and RMF has no names for its topics: `charger_states`,
 `charger_requests` and `charger_cancels` are ours (`topics:` in a YAML given by `--config` renames
