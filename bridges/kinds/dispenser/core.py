@@ -23,7 +23,9 @@ DISPENSER-6. After a failed read or write, and when `busy` is over without `done
    another request. `done` may still come until the limit.
 DISPENSER-7. The outcome is in doubt if the daemon has died in mid-cycle; if the memory on disk is lost;
    if a guid comes again with other items; if it comes again after `repeats_within_s` of silence. Then
-   the state is OFFLINE, no cycle starts, and the request gets no result until a person decides.
+   the state is OFFLINE, no cycle starts, and the request gets no result until a person decides. While
+   the memory is lost, or nothing was read yet, the state has the stamp 0, which RMF ignores, and lists
+   nothing.
 DISPENSER-8. A finished request is forgotten a day after RMF's last request for it.
 """
 

@@ -41,13 +41,17 @@ class WorkcellReport(msgspec.Struct, frozen=True):
 
 
 def report(memory: WorkcellMemory, now: float, limits: WorkcellLimits) -> WorkcellReport:
-    """Report the present state, as far as it is on disk."""
+    """Report the present state, as far as it is on disk. Without its memory the state has no time: RMF
+    would take a request that a newer state does not list for done. A state without a time has no list
+    either, so that RMF never compares two of them."""
     runs = memory.running()
+    read_at = None if memory.lost else memory.senses.read_at
+    listed = [job for job in memory.jobs if job.is_listed and read_at is not None]
     return WorkcellReport(
         mode=_mode(memory, runs is not None, now, limits),
-        queue=tuple(job.guid for job in memory.jobs if job.is_listed),
-        results=tuple(_results(memory)),
-        read_at=memory.senses.read_at,
+        queue=tuple(job.guid for job in listed),
+        results=tuple(_results(memory, listed)),
+        read_at=read_at,
         faults=tuple(_faults(memory, now, limits)),
         running=runs.guid if runs else "",
         item=str(runs.item) if runs else "",
@@ -61,7 +65,7 @@ def _mode(memory: WorkcellMemory, runs: bool, now: float, limits: WorkcellLimits
     return WorkcellMode.BUSY if runs else WorkcellMode.IDLE
 
 
-def _results(memory: WorkcellMemory) -> Iterator[tuple[str, WorkcellStatus]]:
+def _results(memory: WorkcellMemory, listed: list[Job]) -> Iterator[tuple[str, WorkcellStatus]]:
     for job in memory.jobs:
         if not job.due or memory.not_kept:
             continue
@@ -70,7 +74,7 @@ def _results(memory: WorkcellMemory) -> Iterator[tuple[str, WorkcellStatus]]:
                 yield job.guid, WorkcellStatus.SUCCESS
             case "failed", "failed":
                 yield job.guid, WorkcellStatus.FAILED
-            case (("queued" | "running"), ("queued" | "running")):
+            case "queued" | "running", "queued" | "running" if job in listed:
                 yield job.guid, WorkcellStatus.ACKNOWLEDGED
 
 

@@ -214,7 +214,8 @@ def test_a_steady_start_is_on_until_done() -> None:
 
 def test_a_plc_that_restarts_in_mid_cycle_does_not_dispense_twice() -> None:
     """With a steady start, a restarted PLC would take the start that is still on for another."""
-    world = World(replace(SETTINGS, pulse_s=None))
+    limits = WorkcellDurations(cycle_limit_s=8.0, settle_s=4.0)
+    world = World(replace(SETTINGS, pulse_s=None, limits=limits))
     phase = world.ask()
     world.run(5.0, until=lambda: world.relays() == [True])
     world.run(0.5)
@@ -308,6 +309,23 @@ def test_a_daemon_without_its_memory_is_offline_and_gives_no_result_until_a_pers
     world.decide("again")
     world.run(10.0, until=over(phase))
     assert (phase.outcome, world.plant.moved, world.faults) == ("completed", 1, [])
+
+
+def test_a_lost_memory_completes_no_request_that_the_daemon_has_acknowledged_before() -> None:
+    """The first states after the restart list nothing yet; RMF ignores them, as their stamp is 0."""
+    world = World(new=False)
+    world.decide("again")
+    world.run(1.0)
+    world.plant.fail("conveyor", "stuck")
+    phase = world.ask()
+    world.run(3.0)
+    assert world.results() == ["ACKNOWLEDGED"]
+    world.kill()
+    world.disk.content = None
+    world.run(8.0)
+    assert (phase.outcome, world.plant.moved) == ("", 0)
+    assert world.state.time == d.Time()
+    assert world.faults == ["MEMORY_LOST", "OUTCOME_UNKNOWN"]
 
 
 def test_a_damaged_entry_loses_the_memory_of_its_device() -> None:
