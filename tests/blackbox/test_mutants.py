@@ -27,7 +27,7 @@ ATTENDED = {"": "core.decision.Attended", "yes": True}
 @pytest.mark.long(10)
 @pytest.mark.parametrize("seed", range(depth(4, 40)))
 def test_no_wrong_recording_ends_a_command_with_a_traceback(seed: int, tmp_path: Path) -> None:
-    found = endings(Mutator(seed), 20, tmp_path)
+    found = endings(Mutator(seed), 25, tmp_path)
 
     assert {"replay: 65", "replay: 66", "explain: 0", "plot: 66", "incident: 69"} <= set(found)
 

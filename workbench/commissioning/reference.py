@@ -173,9 +173,9 @@ def page() -> str:
         " first line names the schema: `# yaml-language-server: $schema=FILE`. `rmf-bridge init` writes"
         " this line. For another file: `rmf-bridge schema > FILE`, again after each upgrade. Only"
         " `check` finds errors across several keys.",
-        "A file has these keys, and its devices under the key of their kind (`lifts`, `doors` or"
-        " `chargers`). The file of a supervisor or coordinator has `kind`, `rmf`, `recording` and"
-        " one section of its own.",
+        "A file has these keys, and its devices under the key of their kind (`lifts`, `doors`,"
+        " `chargers`, `dispensers` or `ingestors`). The file of a supervisor or coordinator has"
+        " `kind`, `rmf`, `recording` and one section of its own.",
         "\n".join(["| key | meaning |", "|---|---|", *rows]),
     ]
     headings = _headings(_tops())
@@ -195,14 +195,22 @@ def _is_of_one(heading: str) -> bool:
     return heading.startswith("## ") or ": `" in heading
 
 
+def _keys_of(same: list[Shape]) -> str:
+    return ", ".join(f"`{shape.devices_key}`" for shape in same)
+
+
 def _tops() -> Headings:
     """Return a file's sections and their headings; structs common to several come first."""
     found: Headings = {Rmf: "## `rmf`", RecordingSettings: "## `recording`"}
     for name in named.bus_types():
         found[named.bus_called(name).settings] = f"## Bus of `type: {name}`"
+    of_driver: dict[type, list[Shape]] = {}
+    for shape in shapes():
+        of_driver.setdefault(shape.type.settings, []).append(shape)
     last = [
-        (s.devices_key, s.type.settings, f"`{s.devices_key}` with `driver: {s.driver}`")
-        for s in shapes()
+        (s.devices_key, s.type.settings, f"{_keys_of(same)} with `driver: {s.driver}`")
+        for same in of_driver.values()
+        for s in same
     ] + [
         (k.devices_key, k.settings, f"`{k.devices_key}` of `kind: {k.name}`") for k in graph_kinds()
     ]

@@ -8,11 +8,15 @@ import msgspec
 from bridges.kinds.dispenser.settings import WorkcellDurations, WorkcellSettings
 from bridges.kinds.dispenser.signals import Item, WorkcellSample
 from bridges.kinds.shared.debounce import Settled, forget, settle
+from bridges.kinds.shared.decision import Fault
 from bridges.kinds.shared.durations import NEVER, RIVAL_QUIET_S
 
 SIGNALS: Final = ("done", "busy", "ready", "fault")
 Contact = Settled[bool | None]
 """One debounced input. If it is not wired, its value and its candidate are None."""
+DECIDE: Final = "decide: rmf-bridge workcell done, again or failed"
+SHOWN: Final = 3
+"""At most this many requests in doubt are named in a fault's text."""
 Phase = Literal["queued", "running", "done", "failed", "doubtful"]
 """`doubtful`: nobody but a person knows the outcome."""
 
@@ -160,22 +164,31 @@ def rivalled(memory: WorkcellMemory, now: float) -> bool:
     return memory.rival_at is not None and now < memory.rival_at + RIVAL_QUIET_S
 
 
-def obstacles(memory: WorkcellMemory, now: float, limits: WorkcellLimits) -> Iterator[str]:
-    """Yield the codes of everything that keeps a cycle from starting, most serious first."""
+def obstacles(memory: WorkcellMemory, now: float, limits: WorkcellLimits) -> Iterator[Fault]:
+    """Yield everything that keeps a cycle from starting, most serious first. No text has a running
+    number, because every change of a text is published."""
     if memory.lost:
-        yield "MEMORY_LOST"
-    if memory.doubtful():
-        yield "OUTCOME_UNKNOWN"
+        yield Fault("MEMORY_LOST", f"{memory.lost}; {DECIDE}")
+    if doubtful := memory.doubtful():
+        yield Fault("OUTCOME_UNKNOWN", _doubts(doubtful))
     if memory.not_kept:
-        yield "NOT_KEPT"
+        yield Fault("NOT_KEPT", f"nothing is accepted or started: {memory.not_kept}")
     if rivalled(memory, now):
-        yield "TWO_NODES_FOR_ONE_DEVICE"
+        yield Fault("TWO_NODES_FOR_ONE_DEVICE", "another node publishes states of this workcell")
     if not is_fresh(memory.senses, now, limits):
-        yield "COMMUNICATION_LOST"
+        silent = f"no reading for {limits.t.stale_after_s} s"
+        yield Fault("COMMUNICATION_LOST", memory.io_failure or silent)
     if memory.halted:
-        yield "WORKCELL_HALTED"
+        yield Fault("WORKCELL_HALTED", f"{memory.halted}; rmf-bridge reset when it is clear")
     if memory.senses.is_on("fault") or memory.senses.errors:
-        yield "WORKCELL_FAULT"
+        errors = "; ".join(memory.senses.errors)
+        yield Fault("WORKCELL_FAULT", errors or "its fault contact is on")
+
+
+def _doubts(jobs: tuple[Job, ...]) -> str:
+    named = "; ".join(f"{job.guid} ({job.item}): {job.why}" for job in jobs[:SHOWN])
+    more = f"; and {len(jobs) - SHOWN} more" if len(jobs) > SHOWN else ""
+    return f"{named}{more}; look, then {DECIDE}"
 
 
 def changes(memory: WorkcellMemory, limits: WorkcellLimits) -> Iterator[float]:

@@ -13,9 +13,6 @@ from bridges.kinds.dispenser.memory import (
 from bridges.kinds.shared.decision import Fault
 from bridges.messages.constants import WorkcellMode, WorkcellStatus
 
-SHOWN = 3
-"""At most this many requests in doubt are named in a fault's text."""
-
 
 class WorkcellReport(msgspec.Struct, frozen=True):
     """The state for RMF and the status file. `queue`: the guids that are listed. `results`: (guid,
@@ -79,36 +76,10 @@ def _results(memory: WorkcellMemory, listed: list[Job]) -> Iterator[tuple[str, W
 
 
 def _faults(memory: WorkcellMemory, now: float, limits: WorkcellLimits) -> Iterator[Fault]:
-    """Yield all present faults, most serious first. No text has a running number, because every change
-    of a text is published."""
-    for code in obstacles(memory, now, limits):
-        if code == "COMMUNICATION_LOST" and memory.senses.read_at is None and not memory.io_failure:
-            continue  # the first reading has not come yet
-        yield Fault(code, _detail(code, memory, limits))
-
-
-def _detail(code: str, memory: WorkcellMemory, limits: WorkcellLimits) -> str:
-    match code:
-        case "MEMORY_LOST":
-            return f"{memory.lost}; decide: rmf-bridge workcell done, again or failed"
-        case "OUTCOME_UNKNOWN":
-            return _doubts(memory.doubtful())
-        case "NOT_KEPT":
-            return f"nothing is accepted or started: {memory.not_kept}"
-        case "TWO_NODES_FOR_ONE_DEVICE":
-            return "another node publishes states of this workcell"
-        case "COMMUNICATION_LOST":
-            return memory.io_failure or f"no reading for {limits.t.stale_after_s} s"
-        case "WORKCELL_HALTED":
-            return f"{memory.halted}; rmf-bridge reset when it is clear"
-        case _:
-            return "; ".join(memory.senses.errors) or "its fault contact is on"
-
-
-def _doubts(jobs: tuple[Job, ...]) -> str:
-    named = "; ".join(f"{job.guid} ({job.item}): {job.why}" for job in jobs[:SHOWN])
-    more = f"; and {len(jobs) - SHOWN} more" if len(jobs) > SHOWN else ""
-    return f"{named}{more}; look, then decide: rmf-bridge workcell done, again or failed"
+    never_tried = memory.senses.read_at is None and not memory.io_failure
+    for fault in obstacles(memory, now, limits):
+        if fault.code != "COMMUNICATION_LOST" or not never_tried:
+            yield fault
 
 
 def _waits(memory: WorkcellMemory, now: float, limits: WorkcellLimits) -> str:
@@ -116,9 +87,9 @@ def _waits(memory: WorkcellMemory, now: float, limits: WorkcellLimits) -> str:
     queued = [job for job in memory.jobs if job.phase == "queued"]
     if memory.cycle is not None or not (queued or memory.doubtful()):
         return ""
-    found = next(iter(obstacles(memory, now, limits)), "")
+    found = next(iter(obstacles(memory, now, limits)), None)
     if found:
-        return f"because of {found}"
+        return f"because of {found.code}"
     senses = memory.senses
     if not senses.seen():
         return "for its inputs to be steady"

@@ -34,7 +34,7 @@ def checked(step: Any) -> None:
 
 def test_every_state_within_some_steps_keeps_the_promises_to_rmf() -> None:
     roots = [WALKER.path(start(), *steps, seen=checked) for steps in BEGUN]
-    states = WALKER.walk(roots, depth(2, 4), seen=checked)
+    states = WALKER.walk(roots, depth(3, 5), seen=checked)
     outcomes = {world.phase.outcome for world in states}
     assert outcomes == {"", "completed", "failed"}
     assert {world.moved for world in states} >= {0, 1}

@@ -6,6 +6,7 @@ from bridges.messages import definitions as d
 from bridges.messages import topics
 from bridges.messages.stamps import stamp
 from bridges.messages.topics import AnyTopic
+from workbench.judge.judge import JudgedKind
 
 ACKNOWLEDGED, SUCCESS, FAILED = 0, 1, 2
 Line = tuple[float, AnyTopic, d.Message]
@@ -43,7 +44,7 @@ class WorkcellLines:
         return [self.state(begin + n, *queue) for n in range(count)]
 
 
-def stories(kind: str, senders: Any, twins: Any) -> dict[tuple[str, str], Any]:
+def stories(kind: JudgedKind, senders: Any, twins: Any) -> dict[tuple[JudgedKind, str], Any]:
     """Return (kind, law) -> the lines of a story without occasion, a right one and a wrong one."""
     of = WorkcellLines(kind)
     served = [of.ask(0.1), of.state(0.2, "a", mode=1), of.result(0.3, ACKNOWLEDGED)]
