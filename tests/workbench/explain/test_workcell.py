@@ -1,0 +1,65 @@
+"""A dispenser or ingestor is explained by the requests for it and by its list."""
+
+from typing import Any
+
+import pytest
+
+from bridges.messages import definitions as d
+from bridges.messages.heard import Heard
+from bridges.messages.stamps import stamp
+from workbench.explain.heard_devices import HeardDevices
+
+WALL = 1_800_000_000.0
+
+
+def told(*lines: tuple[float, str, Any], kind: str = "dispenser") -> Any:
+    site = HeardDevices()
+    for at, topic, message in sorted(lines, key=lambda line: line[0]):
+        site.take(Heard(at, WALL + at, f"{kind}_{topic}", message))
+    [(found, name)] = site.devices()
+    return site.explain(found, name, None)
+
+
+def states(until: float, mode: int, *queue: str) -> list[tuple[float, str, Any]]:
+    return [
+        (float(n), "states", d.DispenserState(stamp(WALL + n), "store", mode, queue))
+        for n in range(int(until) + 1)
+    ]
+
+
+def asks(until: float) -> list[tuple[float, str, Any]]:
+    items = (d.DispenserRequestItem("box", 1),)
+    request = d.DispenserRequest(d.Time(), "task", "store", "", items)
+    return [(n + 0.5, "requests", request) for n in range(int(until))]
+
+
+def result(at: float, status: int) -> tuple[float, str, Any]:
+    return at, "results", d.DispenserResult(stamp(WALL + at), "task", "store", status)
+
+
+@pytest.mark.parametrize(
+    ("lines", "says", "who"),
+    [
+        (states(9, 0), "Nobody asks for it.", "nobody"),
+        (states(9, 0, "task"), "It still lists task, which no fleet adapter repeats.", "nobody"),
+        (states(9, 2, "task") + asks(9), "has had no answer", "a person"),
+        (states(9, 1, "task") + asks(9), "Request task asks for 1 box", "the controller"),
+        (states(9, 0, "task") + asks(9), "Request task asks for 1 box", "the controller"),
+        (states(9, 0) + asks(9), "Request task asks for 1 box", "the device's node"),
+        ([*states(9, 2, "task"), *asks(9), result(5.6, 2)], "It has failed", "the fleet adapter"),
+    ],
+)
+def test_it_says_which_request_waits_and_who_must_act(lines: Any, says: str, who: str) -> None:
+    found = told(*lines)
+    assert says in " ".join(found.now)
+    assert [step.who for step in found.next][:1] == [who]
+
+
+def test_the_story_has_the_request_its_results_and_the_changes() -> None:
+    lines = [*states(3, 0), *asks(3), result(1.6, 0), result(2.6, 1)]
+    story = [line.text for line in told(*lines).story]
+    assert story == [
+        "store is asked for 1 box (request task)",
+        "store answers request task: acknowledged",
+        "store answers request task: success",
+    ]
