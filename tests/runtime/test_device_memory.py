@@ -3,6 +3,7 @@
 import os
 from pathlib import Path
 
+import msgspec
 import pytest
 
 from bridges.kinds.dispenser import keep
@@ -69,7 +70,7 @@ def test_an_order_is_obeyed_by_the_process_that_it_names_and_by_no_other(
     verdict = DecidedByPerson("again", "guid")
     given = order.PersonsOrder(verdict, "store", os.getpid(), ours.started + shift)
     path = tmp_path / order.ORDER
-    path.write_bytes(order.msgspec.json.encode(given))
+    path.write_bytes(msgspec.json.encode(given))
     assert order.take(tmp_path, tmp_path / "x.yaml") == (None if shift else given)
     assert not path.exists()
     assert order.take(tmp_path, tmp_path / "x.yaml") is None

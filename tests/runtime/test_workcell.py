@@ -76,6 +76,7 @@ class Site:
             self.phase.hear(message, self._now)
         self._now += 1.0
         for _, message in self.phase.tick(self._now):
+            assert isinstance(message, d.DispenserRequest)
             self._requests.publish(message)
 
     def until(self, is_so: Callable[[], bool], what: str) -> None:
@@ -86,6 +87,10 @@ class Site:
             return is_so()
 
         wait_until(looked, what)
+
+    def outcome(self) -> str:
+        """Return the outcome of RMF's phase; "" while it is active."""
+        return self.phase.outcome
 
     def is_offline(self) -> bool:
         """Is the last state OFFLINE?"""
@@ -125,8 +130,7 @@ def test_a_daemon_that_is_killed_in_mid_cycle_leaves_the_outcome_to_a_person(
         wait_until(lambda: decided(site, "again", run) == 0, "the first start is confirmed")
         site.ask("first")
         site.until(lambda: site.says(d.WorkcellStatus.ACKNOWLEDGED), "it is acknowledged")
-        site.until(lambda: site.phase.outcome != "", "RMF goes on")
-        assert site.phase.outcome == "completed"
+        site.until(lambda: site.outcome() == "completed", "RMF goes on")
         site.plc.order("fail store conveyor stuck")
         site.ask("second")
         site.until(lambda: site.mode(d.WorkcellMode.BUSY), "the machine works")
@@ -138,11 +142,10 @@ def test_a_daemon_that_is_killed_in_mid_cycle_leaves_the_outcome_to_a_person(
         site.until(site.is_offline, "it is offline")
         for _ in range(5):
             site.look()
-        assert site.phase.outcome == ""
+        assert site.outcome() == ""
         assert not site.says(d.WorkcellStatus.SUCCESS)
         assert decided(site, "failed", run) == 0
-        site.until(lambda: site.phase.outcome != "", "RMF hears the decision")
-        assert site.phase.outcome == "failed"
+        site.until(lambda: site.outcome() == "failed", "RMF hears the decision")
         wait_until(lambda: decided(site, "done", run) == 1, "nothing is in doubt any more")
         assert running.end(signal.SIGTERM) == 0
     assert "second (1 box): the daemon ended in the middle" in capsys.readouterr().out

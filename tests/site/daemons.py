@@ -18,7 +18,9 @@ from bridges.messages.heard import Sender
 from bridges.messages.topics import DOOR_REQUESTS, DOOR_SUPERVISOR_HEARTBEAT, LIFT_REQUESTS, Topic
 from bridges.runtime.clock import Clock
 from bridges.runtime.device import AnyNode, Node
+from bridges.runtime.device_memory import DeviceMemories
 from bridges.runtime.graph_node import AnyGraphNode, GraphNode
+from bridges.runtime.keeper import MemoryStore
 from bridges.runtime.ring_writer import NOBODY, NoWriter
 from bridges.runtime.subject import Status
 from bridges.transports.transport import Publisher
@@ -56,6 +58,7 @@ class DeviceDaemon:
         self.scanned: Callable[[DeviceDaemon], None] = lambda daemon: None
         self.relayed: Callable[[Edge], None] = lambda edge: None
         self.writer: NoWriter = NOBODY
+        self.disk: MemoryStore | None = None
         self.started: Callable[[DeviceDaemon], None] = lambda daemon: None
         self.hears: Callable[[DeviceDaemon, Topic[Any], Any], None] = lambda daemon, topic, told: (
             None
@@ -70,7 +73,7 @@ class DeviceDaemon:
         self._place: Place
 
     def start(self) -> None:
-        """Start a new daemon, which remembers nothing."""
+        """Start a new daemon, which remembers nothing but what is on `disk`."""
         self.started(self)
         device, kind = self.device, self.device.kind
         self._place = Place(self._air, self.node, lambda: None)
@@ -89,6 +92,7 @@ class DeviceDaemon:
             self._publish,
             clock,
             self.writer,
+            memories=DeviceMemories(self.disk, new=True) if self.disk else None,
         )
         self.alive = True
         for topic in (*kind.requests, *kind.recorded):

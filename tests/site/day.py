@@ -27,6 +27,7 @@ from tests.site.growth import Look, look
 from tests.site.laws import BOUND_S, Laws
 from tests.site.network import CLEAR, Air, Place
 from tests.site.robots import Places, Resident
+from tests.site.storeroom import Storeroom
 from tests.site.timeline import NEVER, Timeline
 from tests.site.trouble import BY_RESET_S, Ill, Ills, Mortal, Trouble, breakable, pressable
 
@@ -85,6 +86,7 @@ class Site:
         )
         self.kill_every_s = kill_every_s
         self.kills = {"supervisor kills": 0, "of them with a robot in a car": 0}
+        self.storeroom = Storeroom(timeline, Random(f"storeroom {seed}"), self.laws.require)
         self.looks: list[Look] = []
         self._people = Random(self.random.random())
         self._people_at: dict[str, float] = {}
@@ -129,6 +131,7 @@ class Site:
             for what, count in robot.done.items():
                 done[what] = done.get(what, 0) + count
         done["scans"] = sum(daemon.scans for daemon in self.daemons.values())
+        done["dispensings"] = sum(self.storeroom.done.values())
         kills = self.kills if self.kill_every_s else {}
         return {**done, **kills, "checks": self.laws.checks, **self.air.counts}
 
@@ -140,6 +143,7 @@ class Site:
             self.timeline.after(self.random.uniform(0.0, 2.0), daemon.start)
             assert name == daemon.name
         self.laws.speakers = self._speakers
+        self.storeroom.open()
         parties: list[Mortal] = [*self.nodes, *self.robots]
         for party in parties:
             self.timeline.after(self.random.uniform(2.0, 6.0), party.start)

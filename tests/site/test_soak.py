@@ -27,6 +27,7 @@ def test_a_site_lives_through_its_troubles(seed: int) -> None:
     assert done["rides"] > depth(4, 20)
     assert done["doors"] > depth(8, 40)
     assert sum(site.trouble.counts.values()) > depth(1, 5)
+    assert done["dispensings"] == 1
 
 
 @pytest.mark.long(3)
