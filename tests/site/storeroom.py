@@ -6,6 +6,7 @@ person comes later, looks, and decides what is in doubt.
 """
 
 from collections.abc import Callable
+from functools import partial
 from random import Random
 from typing import Any
 
@@ -56,7 +57,7 @@ class Storeroom:
         self._judge = Judge("dispenser", NAME, only=LAWS)
         self._requests = self._rmf.publisher(topics.DISPENSER_REQUESTS)
         for topic in (topics.DISPENSER_STATES, topics.DISPENSER_RESULTS):
-            self._rmf.subscribe(topic, lambda message, topic=topic: self._hear(topic, message))
+            self._rmf.subscribe(topic, partial(self._hear, topic))
         self._phase: WorkcellPhase | None = None
         self._trouble = ""
         self._before = 0
