@@ -5,6 +5,7 @@ from typing import Any
 from bridges.messages import definitions as d
 from bridges.messages import words
 from bridges.messages.heard import Heard
+from bridges.messages.stamps import in_seconds
 from bridges.observe.requesters import Moment
 from bridges.observe.workcell import ObservedDispenser, ObservedIngestor
 from workbench.judge.history import NOT_YET, History, keep
@@ -12,8 +13,9 @@ from workbench.judge.history import NOT_YET, History, keep
 
 class WorkcellHistory(History[d.DispenserState]):
     """`listed`: guid -> time of the first state that listed it. `results`: guid -> the last status.
-    `left`: the guids that the latest state lists no longer. `asked_since`: guid -> the times of the
-    requests after its last result. `result`: the latest message, if it is a result of this workcell;
+    `acknowledged`: guid -> stamp of its result ACKNOWLEDGED, before any state has listed it. `left`:
+    the guids that the latest state lists no longer. `asked_since`: guid -> the times of the requests
+    after its last result. `result`: the latest message, if it is a result of this workcell;
     `result_before`: the status of the result before that for the same guid."""
 
     def __init__(self, name: str) -> None:
@@ -22,6 +24,7 @@ class WorkcellHistory(History[d.DispenserState]):
         self.results: dict[str, int] = {}
         self.left: tuple[str, ...] = ()
         self.asked_since: dict[str, list[float]] = {}
+        self.acknowledged: dict[str, float] = {}
         self.result: words.WorkcellResulted | None = None
         self.result_before: int | None = None
 
@@ -50,6 +53,9 @@ class WorkcellHistory(History[d.DispenserState]):
         self.seen.hear(Moment(heard.at, heard.wall), heard.topic, message)
         self.result, self.result_before = message, self.results.get(guid)
         keep(self.results, guid, message.status)
+        self.acknowledged.pop(guid, None)
+        if message.status == d.WorkcellStatus.ACKNOWLEDGED and guid not in self.listed:
+            keep(self.acknowledged, guid, in_seconds(message.time))
         self.asked_since[guid] = []
         return True
 
@@ -60,6 +66,7 @@ class WorkcellHistory(History[d.DispenserState]):
         self.left = tuple(sorted(before - queue))
         for guid in queue - self.listed.keys():
             keep(self.listed, guid, self.now)
+            self.acknowledged.pop(guid, None)
         for guid in self.left:
             self.listed.pop(guid, None)
 

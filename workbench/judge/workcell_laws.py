@@ -25,14 +25,21 @@ def _numbers(history: WorkcellHistory) -> Finding:
 
 
 def _lists_first(history: WorkcellHistory) -> Finding:
-    result = history.result
-    if result is None or result.status != ACKNOWLEDGED:
-        return None
-    guid = result.request_guid
-    if guid in history.listed:
-        return KEPT
-    text = f"request {shown(guid)} is acknowledged, and no state has listed it"
-    return Doubt(text, lambda: guid in history.listed)
+    """RMF compares stamps: it ignores a state older than the acknowledgement, and the state that lists
+    the request may have been lost."""
+    result, state = history.result, history.new
+    if result is not None:
+        acknowledged = result.status == ACKNOWLEDGED and result.request_guid in history.listed
+        return KEPT if acknowledged else None
+    for guid, at in history.acknowledged.items():
+        if state is not None and words.stamped_at(state) >= at:
+            text = f"request {shown(guid)} was acknowledged, and a newer state does not list it"
+            return Doubt(text, partial(_excused, history, guid))
+    return None
+
+
+def _excused(history: WorkcellHistory, guid: str) -> bool:
+    return guid not in history.acknowledged
 
 
 def _leaves_done(history: WorkcellHistory) -> Finding:
@@ -79,8 +86,8 @@ LAWS: Final[tuple[Law[WorkcellHistory], ...]] = (
     ),
     Law(
         "W2.lists",
-        "A request is listed in a state before it is acknowledged",
-        "a result ACKNOWLEDGED",
+        "A state that is newer than the acknowledgement of a request lists it",
+        "a result ACKNOWLEDGED for a listed request",
         "An acknowledged request that a newer state does not list is complete for RMF",
         SOURCE,
         _lists_first,

@@ -41,7 +41,7 @@ from tests.workbench.judge.test_limits import (
     stays_shut,
     to_door,
 )
-from tests.workbench.judge.workcell_stories import stories
+from tests.workbench.judge.workcell_stories import WorkcellLines, stories
 from workbench.judge.judge import LAWS, Judge, JudgedKind
 
 ERROR, RELEASED = 200, 4
@@ -335,3 +335,12 @@ def test_a_charge_may_be_taken_over_only_after_its_end() -> None:
     assert verdict("charger", "C1.keeps", late) == "kept"
     taken = served(RIVAL, station(6.0, CHARGING, "r2"), state=CHARGING)
     assert verdict("charger", "C1.keeps", taken) == "broken"
+
+
+def test_a_listing_state_that_was_lost_or_comes_late_accuses_no_workcell() -> None:
+    """RMF compares stamps, and ignores a state older than the acknowledgement."""
+    of = WorkcellLines("dispenser")
+    story = [of.ask(0.1), of.result(0.3, 0), of.state(0.4, read_at=0.2), of.state(3.0, "a", mode=1)]
+    assert verdict("dispenser", "W2.lists", [of.state(0.0), *story]) == "not seen"
+    quick = [of.ask(0.1), of.result(0.3, 0), of.state(0.9), of.result(1.5, 1), of.state(2.0)]
+    assert verdict("dispenser", "W2.lists", [of.state(0.0), *quick]) == "not seen"

@@ -53,7 +53,7 @@ def stories(kind: JudgedKind, senders: Any, twins: Any) -> dict[tuple[JudgedKind
         (kind, "W2.lists"): (
             of.states(2.0),
             [of.state(0.0), *served],
-            [of.state(0.0), of.ask(0.1), of.result(0.2, ACKNOWLEDGED), of.state(3.0)],
+            [of.state(0.0), of.ask(0.1), of.result(0.2, ACKNOWLEDGED), *of.states(4.0, begin=1.0)],
         ),
         (kind, "W2.done"): (
             [*served, of.state(1.0, "a")],
