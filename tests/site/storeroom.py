@@ -34,8 +34,8 @@ COMES_S = 90.0
 """A person comes this long (s) after the request."""
 WAITS_S = 400.0
 """No delivery takes longer than this (s)."""
-LAWS = ("W1.numbers", "W2.lists", "W2.done", "W3.result", "W4.stamp")
-"""The laws that hold although the daemon dies."""
+LAWS = ("W1.numbers", "W2.lists", "W3.result", "W4.stamp")
+"""The laws that hold although the daemon dies and results are lost."""
 TROUBLES = ("nothing", "dies", "jam", "restart", "slow", "dies and is out of reach")
 
 Require = Callable[[bool, str], None]

@@ -14,15 +14,17 @@ from workbench.judge.history import NOT_YET, History, keep
 class WorkcellHistory(History[d.DispenserState]):
     """`listed`: guid -> time of the first state that listed it. `results`: guid -> the last status.
     `acknowledged`: guid -> stamp of its result ACKNOWLEDGED, before any state has listed it. `left`:
-    the guids that the latest state lists no longer. `asked_since`: guid -> the times of the requests
-    after its last result. `result`: the latest message, if it is a result of this workcell;
-    `result_before`: the status of the result before that for the same guid."""
+    the guids that the latest state lists no longer. `unexplained`: guids that have left without SUCCESS
+    -> the time. `asked_since`: guid -> the times of the requests after its last result. `result`: the
+    latest message, if it is a result of this workcell; `result_before`: the status of the result before
+    that for the same guid."""
 
     def __init__(self, name: str) -> None:
         super().__init__(name)
         self.listed: dict[str, float] = {}
         self.results: dict[str, int] = {}
         self.left: tuple[str, ...] = ()
+        self.unexplained: dict[str, float] = {}
         self.asked_since: dict[str, list[float]] = {}
         self.acknowledged: dict[str, float] = {}
         self.result: words.WorkcellResulted | None = None
@@ -54,6 +56,8 @@ class WorkcellHistory(History[d.DispenserState]):
         self.result, self.result_before = message, self.results.get(guid)
         keep(self.results, guid, message.status)
         self.acknowledged.pop(guid, None)
+        if message.status == d.WorkcellStatus.SUCCESS:
+            self.unexplained.pop(guid, None)
         if message.status == d.WorkcellStatus.ACKNOWLEDGED and guid not in self.listed:
             keep(self.acknowledged, guid, in_seconds(message.time))
         self.asked_since[guid] = []
@@ -69,6 +73,8 @@ class WorkcellHistory(History[d.DispenserState]):
             self.acknowledged.pop(guid, None)
         for guid in self.left:
             self.listed.pop(guid, None)
+            if self.results.get(guid) != d.WorkcellStatus.SUCCESS:
+                keep(self.unexplained, guid, self.now)
 
     def waited_s(self, guid: str) -> float:
         """Return for how long RMF has repeated this request without a result (s)."""

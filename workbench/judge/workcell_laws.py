@@ -43,9 +43,14 @@ def _excused(history: WorkcellHistory, guid: str) -> bool:
 
 
 def _leaves_done(history: WorkcellHistory) -> Finding:
+    """One SUCCESS may be lost, and RMF, which goes on, asks for no repeat. So a request that leaves
+    without a result is a breach the second time, or if the node has restarted in between."""
     for guid in history.left:
-        if history.results.get(guid) == SUCCESS:
+        result = history.results.get(guid)
+        if result == SUCCESS:
             continue
+        if result != FAILED and len(history.unexplained) < 2 and history.before is not None:
+            return None
         text = f"request {shown(guid)} left the queue without SUCCESS: RMF sends the robot on"
         return Doubt(text, partial(_succeeded, history, guid))
     return KEPT if history.left else None

@@ -344,3 +344,23 @@ def test_a_listing_state_that_was_lost_or_comes_late_accuses_no_workcell() -> No
     assert verdict("dispenser", "W2.lists", [of.state(0.0), *story]) == "not seen"
     quick = [of.ask(0.1), of.result(0.3, 0), of.state(0.9), of.result(1.5, 1), of.state(2.0)]
     assert verdict("dispenser", "W2.lists", [of.state(0.0), *quick]) == "not seen"
+
+
+def test_a_request_that_leaves_without_a_result_is_a_breach_the_second_time_or_after_a_restart() -> (
+    None
+):
+    of = WorkcellLines("dispenser")
+
+    def dropped(at: float, guid: str) -> Lines:
+        listed = [
+            of.state(at, guid, mode=1),
+            of.result(at + 0.1, 0, guid),
+            of.state(at + 0.5, guid),
+        ]
+        return [of.ask(at - 0.1, guid), *listed, of.state(at + 1.0), of.state(at + 3.0)]
+
+    assert verdict("dispenser", "W2.done", [of.state(0.0), *dropped(1.0, "a")]) == "not seen"
+    twice: Lines = [of.state(0.0), *dropped(1.0, "a"), *dropped(5.0, "b")]
+    assert verdict("dispenser", "W2.done", twice) == "broken"
+    restarted: Lines = [*of.states(3.0), of.state(3.5, "a"), of.state(12.0), of.state(13.0)]
+    assert verdict("dispenser", "W2.done", [*restarted, of.state(14.5)]) == "broken"
