@@ -20,6 +20,7 @@ CYCLE_S: Final = 2.0
 DONE_S: Final = 1.0
 BOOT_S: Final = 1.0
 SLOWNESS: Final = 5.0
+NEAR_S: Final = 1e-9
 NEVER: Final = float("inf")
 
 
@@ -87,7 +88,7 @@ class WorkcellPlant(WiredPlant):
         self._move()
         if self.now == self._boots_at and self._on:
             self._begin()
-        if self._busy and self._left_s <= 1e-9:
+        if self._busy and self._left_s <= NEAR_S:
             self._busy = False
             if self.failures.get("conveyor") != "garbage":
                 self.moved += 1
@@ -98,7 +99,7 @@ class WorkcellPlant(WiredPlant):
         if not self._busy or self.pressed["hatch"] or self.pressed["restart"]:
             return 0.0
         failure = self.failures.get("conveyor", "")
-        jams = failure in ("off", "stuck", "wrong") and self._left_s <= CYCLE_S / 2
+        jams = failure in ("off", "stuck", "wrong") and self._left_s <= CYCLE_S / 2 + NEAR_S
         return 0.0 if jams else 1 / SLOWNESS if failure == "slow" else 1.0
 
     def _move(self) -> None:
@@ -114,7 +115,7 @@ class WorkcellPlant(WiredPlant):
         found = [at for at in (self._done_until, self._boots_at) if at > self.now]
         if speed := self._speed():
             half = self._left_s - CYCLE_S / 2
-            found.append(self._ran_at + (half if half > 1e-9 else self._left_s) / speed)
+            found.append(self._ran_at + (half if half > NEAR_S else self._left_s) / speed)
         return min(found, default=NEVER)
 
 
