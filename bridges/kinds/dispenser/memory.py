@@ -64,9 +64,9 @@ class Job(msgspec.Struct, frozen=True):
     """One request. `kept`: its phase on disk; None before it is there. Other nodes and the outputs
     follow `kept`, so a restart never contradicts them.
 
-    `why`: the reason of a failure or a doubt. `asked_at`: the time of RMF's last request. `due`: RMF
-    waits for a result. `closed`: RMF has been silent about a finished request for so long that a
-    repeat would be in doubt.
+    `transporter`: the fleet that asks. `why`: the reason of a failure or a doubt. `asked_at`: the time
+    of RMF's last request. `due`: RMF waits for a result. `closed`: RMF has been silent about a finished
+    request for so long that a repeat would be in doubt.
     """
 
     guid: str
@@ -78,6 +78,12 @@ class Job(msgspec.Struct, frozen=True):
     asked_at: float | None = None
     due: bool = False
     closed: bool = False
+
+    @property
+    def named(self) -> str:
+        """Return the request for people: its guid, its content, and the fleet that asks."""
+        whose = f" for {self.transporter}" if self.transporter else ""
+        return f"{self.guid} ({self.item}{whose})"
 
     @property
     def is_over(self) -> bool:
@@ -186,7 +192,7 @@ def obstacles(memory: WorkcellMemory, now: float, limits: WorkcellLimits) -> Ite
 
 
 def _doubts(jobs: tuple[Job, ...]) -> str:
-    named = "; ".join(f"{job.guid} ({job.item}): {job.why}" for job in jobs[:SHOWN])
+    named = "; ".join(f"{job.named}: {job.why}" for job in jobs[:SHOWN])
     more = f"; and {len(jobs) - SHOWN} more" if len(jobs) > SHOWN else ""
     return f"{named}{more}; look, then {DECIDE}"
 

@@ -39,8 +39,9 @@ def accept(message: Request, settings: WorkcellSettings) -> ItemRequested:
     if not message.request_guid:
         raise RequestRefused("empty request_guid", "a result must name its request")
     check_length(request_guid=message.request_guid, transporter_type=message.transporter_type)
-    if not message.request_guid.isprintable():
-        raise RequestRefused("impossible request_guid", f"{message.request_guid[:40]!r}")
+    for field in ("request_guid", "transporter_type"):
+        if not (text := getattr(message, field)).isprintable():
+            raise RequestRefused(f"impossible {field}", f"{text[:40]!r}")
     return ItemRequested(message.request_guid, _item(message, settings), message.transporter_type)
 
 

@@ -419,6 +419,20 @@ def test_items_that_the_wiring_cannot_say_fail_at_once(items: object) -> None:
     assert world.state.request_guid_queue == ()
 
 
+def test_a_doubt_names_the_content_and_the_fleet() -> None:
+    world = World()
+    doubtful(world)
+    assert "task (1 box for robot): the daemon ended" in str(world.status["faults"])
+
+
+def test_a_guid_that_cannot_be_printed_is_refused() -> None:
+    world = World()
+    world.run(1.0)
+    world.ask("a\nb")
+    world.run(1.5)
+    assert world.status["refused"] == {"impossible request_guid": 2}
+
+
 def test_a_request_without_a_guid_is_refused_without_an_answer() -> None:
     world = World()
     world.run(1.0)
