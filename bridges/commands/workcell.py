@@ -4,12 +4,12 @@ import argparse
 import json
 import os
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, Final
 
 from bridges.kinds.shared.decision import DecidedByPerson
-from bridges.runtime import order
+from bridges.runtime import holder, order
 from bridges.runtime.holder import STATUS, STATUS_MAX
 from bridges.runtime.runtime_directory import find
 from bridges.system import files
@@ -46,7 +46,11 @@ def run(args: argparse.Namespace) -> int:
             return 1
         places = find(args.file.absolute(), args.runtime_dir)
         act_as_owner(places)
-        doubts = list(_doubts(places, args.device))
+        status = _status(places)
+        if status is None:
+            print(f"no daemon of {args.file} has shown its state yet", file=sys.stderr)
+            return 1
+        doubts = list(_doubts(status, args.device))
         verdict = DecidedByPerson(args.verdict, args.request)
         if doubts and (code := order.send(args.file, places, verdict, args.device)):
             return code
@@ -61,13 +65,19 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def _doubts(places: Directories, device: str) -> Iterator[str]:
-    """Yield what the daemon's status says to be in doubt: of this device, or of every device ("")."""
+def _status(places: Directories) -> Mapping[str, Any] | None:
+    """Return the status of the living daemon; None before it has written one."""
+    daemon = holder.look(places)
     try:
         with opened(places.runtime):
-            status = json.loads(files.read(places.runtime / STATUS, STATUS_MAX))
+            status: dict[str, Any] = json.loads(files.read(places.runtime / STATUS, STATUS_MAX))
     except (FileNotFoundError, NotADirectoryError, ValueError):
-        return
+        return None
+    return status if daemon is not None and status.get("pid") == daemon.pid else None
+
+
+def _doubts(status: Mapping[str, Any], device: str) -> Iterator[str]:
+    """Yield what the daemon's status says to be in doubt: of this device, or of every device ("")."""
     found: dict[str, Any] = status.get("devices", {})
     for name, state in found.items():
         for fault in state.get("faults", []):

@@ -37,6 +37,8 @@ SHIPPED = {
     "charger_register": SERIAL,
     "charger_relay": NET,
     "charger_wiferion": SERIAL,  # on slcan
+    "dispenser_contacts": GPIO,
+    "dispenser_register": NET,
     "door_http": NET,
     "door_line": SERIAL,
     "door_modbus": NET,
@@ -44,6 +46,7 @@ SHIPPED = {
     "door_rs485": SERIAL,
     "door_supervisor": GRAPH,
     "door_waveshare": SERIAL,
+    "ingestor_http": NET,
     "lift_by_call": GPIO,
     "lift_dry_contact": GPIO,
     "lift_gateway": NET,

@@ -144,7 +144,7 @@ def test_a_daemon_that_is_killed_in_mid_cycle_leaves_the_outcome_to_a_person(
             site.look()
         assert site.outcome() == ""
         assert not site.says(d.WorkcellStatus.SUCCESS)
-        assert decided(site, "failed", run) == 0
+        wait_until(lambda: decided(site, "failed", run) == 0, "a person decides")
         site.until(lambda: site.outcome() == "failed", "RMF hears the decision")
         wait_until(lambda: decided(site, "done", run) == 1, "nothing is in doubt any more")
         assert running.end(signal.SIGTERM) == 0
