@@ -107,9 +107,7 @@ def service(
     if kind.keeping is not None and kept is not None:
         memories = DeviceMemories(kept, new=new)
     alarm = node_for(config.devices, transport, clock, named, kept, writer)
-    return Devices(
-        config, kind, transport, open_bus, named, clock, unsafe, writer, alarm, memories
-    )
+    return Devices(config, kind, transport, open_bus, named, clock, unsafe, writer, alarm, memories)
 
 
 class GraphService:
