@@ -40,6 +40,8 @@ def serve(settings: http.HttpSettings, stations: Sequence["HttpStation"]) -> "Ht
 
 Asked = tuple[str, str, str]
 """A request: its method, its path below `api_base`, and its body ("" without a body)."""
+ANY_BODY: Final = "*"
+"""In a command's request: the body differs from call to call."""
 
 
 class HttpStation(Protocol):
@@ -149,8 +151,10 @@ class _Call(BaseHTTPRequestHandler):
             return
         body = self.rfile.read(int(self.headers.get("Content-Length", "0"))).decode()
         asked = (self.command, self.path.removeprefix(self.server.api), body)
-        if asked in self.server.commands:
-            station, signal, asserted = self.server.commands[asked]
+        commands = self.server.commands
+        command = commands.get(asked) or commands.get((*asked[:2], ANY_BODY))
+        if command:
+            station, signal, asserted = command
             failures = station.plant.failures
             if failures.get("server") is None:
                 station.obey(signal, asserted)

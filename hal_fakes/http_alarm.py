@@ -5,7 +5,7 @@ Failures of server, headers and body: `hal_fakes/http.py`.
 
 import json
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Final
 
 from bridges.kinds.alarm.signals import DRILL
@@ -13,6 +13,7 @@ from drivers.alarm.http import HttpPanelSettings
 from drivers.hal.points import Wire
 from drivers.json_fields import JsonFlag
 from hal_fakes.fake import Fake
+from hal_fakes.http import Asked
 from hal_fakes.json_answers import put, value_of
 from hal_fakes.plants.alarm import PanelPlant
 from hal_fakes.plants.plant import Plant
@@ -31,8 +32,8 @@ class FakeHttpPanel:
 
     def __init__(self, plant: Plant, settings: HttpPanelSettings) -> None:
         self.plant = plant
-        self.reads = settings.state_path
-        self.commands: Mapping[tuple[str, str], tuple[str, bool]] = {}
+        self.reads: Sequence[Asked] = [("GET", settings.state_path, "")]
+        self.commands: Mapping[Asked, tuple[str, bool]] = {}
         self._settings = settings
         self._last: bytes | None = None
 
@@ -42,7 +43,7 @@ class FakeHttpPanel:
     def tick(self) -> None:
         """Do nothing: the controller has no timer."""
 
-    def answer(self) -> bytes:
+    def answer(self, asked: Asked) -> bytes:
         """Return the present answer to `GET state_path`; a wrong answer if that failure is ordered."""
         self.plant.advance(time.monotonic())
         server, body = self.plant.failures.get("server"), self.plant.failures.get("body")

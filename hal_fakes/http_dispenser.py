@@ -5,12 +5,13 @@ The plant takes a start as a pulse. Failures of server, headers and body: `hal_f
 
 import json
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Final
 
 from drivers.dispenser.http import HttpWorkcellSettings
 from drivers.hal.points import Wire
 from hal_fakes.fake import Fake
+from hal_fakes.http import ANY_BODY, Asked
 from hal_fakes.json_answers import put, value_of
 from hal_fakes.plants.dispenser import WorkcellPlant
 from hal_fakes.plants.plant import Plant
@@ -30,9 +31,9 @@ class FakeHttpWorkcell:
 
     def __init__(self, plant: Plant, settings: HttpWorkcellSettings) -> None:
         self.plant = plant
-        self.reads = settings.state_path
-        self.commands: Mapping[tuple[str, str], tuple[str, bool]] = {
-            (call.method, call.path): ("start", on)
+        self.reads: Sequence[Asked] = [("GET", settings.state_path, "")]
+        self.commands: Mapping[Asked, tuple[str, bool]] = {
+            (call.method, call.path, ANY_BODY): ("start", on)
             for call, on in ((settings.start, True), (settings.stop, False))
             if call is not None
         }
@@ -47,7 +48,7 @@ class FakeHttpWorkcell:
         """Let the plant run."""
         self.plant.advance(time.monotonic())
 
-    def answer(self) -> bytes:
+    def answer(self, asked: Asked) -> bytes:
         """Return the present answer to `GET state_path`; a wrong answer if that failure is ordered."""
         self.tick()
         server, body = self.plant.failures.get("server"), self.plant.failures.get("body")
