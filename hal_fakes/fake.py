@@ -52,9 +52,11 @@ class Outside(Generic[Settings, Station]):
 
     `serve(settings, stations)`: starts a real server on 127.0.0.1, or on its own line, and returns at
     once. The server may call the plants from any thread, and never advances the plants' time.
+    `parts`: the parts of the far side that each plant on the bus can fail by.
     """
 
     serve: Callable[[Settings, Sequence[Station]], Server]
+    parts: Sequence[str] = ()
 
 
 @dataclass(frozen=True)
@@ -72,10 +74,14 @@ FarSide: TypeAlias = Inside[Any, Any] | Outside[Any, Any]
 
 def plants_on(config: Config, bus: str) -> dict[str, Plant]:
     """Make a plant for each device on this bus."""
-    return {
+    far = far_side(config, bus)
+    plants = {
         name: _fake(config, name).plant(name, config.devices[name], config.wires(name))
         for name in config.devices_on(bus)
     }
+    for plant in plants.values() if isinstance(far, Outside) else ():
+        plant.add_parts(far.parts)
+    return plants
 
 
 def stations_on(config: Config, bus: str, plants: Mapping[str, Plant]) -> list[Any]:

@@ -5,7 +5,7 @@ The thread sleeps until the next event of any plant, so an idle simulation costs
 
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 
 from hal_fakes.plants.plant import Edge, FailureMode, Plant
 
@@ -123,6 +123,10 @@ class _Serialised:
     def next_at(self) -> float:
         with self._world.lock:
             return self._plant.next_at()
+
+    def add_parts(self, parts: Iterable[str]) -> None:
+        with self._world.lock:
+            self._plant.add_parts(parts)
 
     def fail(self, part: str, mode: FailureMode | None) -> None:
         with self._world.lock:

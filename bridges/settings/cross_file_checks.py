@@ -120,11 +120,12 @@ def _claims(config: Config, one_machine: bool) -> Iterator[ExclusiveUse]:
 
 def _places(config: Config, bus: str, device: str) -> Iterator[tuple[str, Path]]:
     """Yield every point and exclusive place of a device, in the canonical spelling of its bus."""
-    canonical = config.bus_type(bus).canonical
+    hal = config.bus_type(bus)
     for wire in config.wires(device):
-        yield canonical(wire.point), (*wire.path, "point")
-        if wire.flash is not None:
-            yield canonical(wire.flash.point), (*wire.path, "flash")
+        flash = [("flash", wire.flash.point)] if wire.flash is not None else []
+        for key, point in [("point", wire.point), *flash]:
+            if what := hal.place(config.buses[bus], hal.canonical(point)):
+                yield what, (*wire.path, key)
     yield from config.driver_type(device).claims(config.devices[device])
 
 

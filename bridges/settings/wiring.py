@@ -5,6 +5,7 @@ of its `BUS` in `drivers/hal/`).
 """
 
 from collections.abc import Iterable
+from typing import Literal
 
 from msgspec import Struct
 from yaml import Node
@@ -25,6 +26,7 @@ class Use(Struct, frozen=True):
     written: str
     user: str
     node: Node
+    direction: Literal["in", "out"] | None = None
 
 
 class WiringCheck:
@@ -45,14 +47,21 @@ class WiringCheck:
     def _point(self, text: str, spot: Spot) -> str | None:
         return self._use(text, spot.path[:-1], spot.node)
 
-    def _use(self, point: str, path: tuple[str, ...], node: Node) -> str | None:
+    def _use(
+        self,
+        point: str,
+        path: tuple[str, ...],
+        node: Node,
+        direction: Literal["in", "out"] | None = None,
+    ) -> str | None:
         if self._hal is None:
             return None
         try:
             name = self._hal.canonical(point)
         except ValueError as error:
             return str(error)
-        self.uses.append(Use(self._bus, name, point, f"{self._device} {'.'.join(path)}", node))
+        user = f"{self._device} {'.'.join(path)}"
+        self.uses.append(Use(self._bus, name, point, user, node, direction))
         return None
 
     def wires(self, wires: Iterable[Wire], spot: Spot) -> None:
@@ -73,7 +82,7 @@ class WiringCheck:
         entry = locate(spot, wire.path)
         point = below(entry.value, key)
         node = point.value if point else entry.where()
-        reason = self._use(text, wire.path or (wire.signal,), node)
+        reason = self._use(text, wire.path or (wire.signal,), node, wire.direction)
         if reason:
             self._page.note(node, reason)
         return reason is None
@@ -95,7 +104,10 @@ class WiringCheck:
         """Note the points that a bus with these settings does not have. `bus`: BROKEN if unknown."""
         for use in self.uses if self._hal and bus is not BROKEN else ():
             assert self._hal
-            if reason := self._hal.unreachable(bus, use.point):
+            reason = self._hal.unreachable(bus, use.point)
+            if not reason and use.direction:
+                reason = self._hal.unfit(bus, use.point, use.direction)
+            if reason:
                 self._page.note(use.node, reason)
 
     def parts(self, structs: Iterable[tuple[tuple[str, ...], object]], spot: Spot) -> None:

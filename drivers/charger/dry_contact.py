@@ -174,7 +174,7 @@ def decode(shown: Mapping[str, bool], enabled: bool) -> ChargerSample:
 
 DRIVER = DriverType(
     settings=DryContactChargerSettings,
-    buses=("gpio", "modbus"),
+    buses=("gpio", "modbus", "mqtt"),
     create=create,
     wires=wires,
     tables=tables,

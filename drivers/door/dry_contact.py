@@ -185,7 +185,7 @@ def _unsafe(settings: DryContactDoorSettings) -> Iterator[Unsafe]:
 
 DRIVER = DriverType(
     settings=DryContactDoorSettings,
-    buses=("gpio", "modbus"),
+    buses=("gpio", "modbus", "mqtt"),
     create=create,
     wires=wires,
     debounce=debounce,

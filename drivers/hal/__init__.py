@@ -114,7 +114,10 @@ class BusType(msgspec.Struct, Generic[Settings], frozen=True):
     `describe(point)`: every spelling, for the electrician's table;
     `wire_problems(wire)`: the errors in this wire on this bus;
     `wire_warnings(wire)`: legal properties of the wire that are worth a look;
-    `unreachable(settings, point)`: why a bus with these settings cannot reach this canonical point.
+    `unreachable(settings, point)`: why a bus with these settings cannot reach this canonical point;
+    `unfit(settings, point, direction)`: why the point cannot be an input, or an output;
+    `place(settings, point)`: the thing at this canonical point that no other file may use; None if
+    every file may use it.
     """
 
     settings: type[Settings]
@@ -137,6 +140,10 @@ class BusType(msgspec.Struct, Generic[Settings], frozen=True):
     wire_problems: Callable[[Wire], Iterable[str]] = lambda wire: ()
     wire_warnings: Callable[[Wire], Iterable[str]] = lambda wire: ()
     unreachable: Callable[[Settings, str], str | None] = lambda settings, point: None
+    unfit: Callable[[Settings, str, Literal["in", "out"]], str | None] = (
+        lambda settings, point, direction: None
+    )
+    place: Callable[[Settings, str], str | None] = lambda settings, point: point
 
 
 AnyBus: TypeAlias = BusType[Any]

@@ -1,4 +1,4 @@
-"""Checks the text of a host's name or address, for Modbus TCP and HTTP."""
+"""Checks the text of a host's name or address, for Modbus TCP, HTTP and MQTT."""
 
 import ipaddress
 import re
@@ -21,3 +21,13 @@ def is_loopback(host: str) -> bool:
         return ipaddress.ip_address(host).is_loopback
     except ValueError:
         return host == "localhost"
+
+
+def misspelt_host(host: str) -> str:
+    """Return the error for a text that is neither an address nor a host's name; "" for a good text."""
+    if re.fullmatch(r"[^:]*:[0-9]+", host):
+        name, _, port = host.partition(":")
+        return f"is {host!r}: write host: {name}, port: {port}"
+    if not re.fullmatch(r"[A-Za-z0-9_.:-]+", host):
+        return f"{host!r} is not a host: write its address, such as 192.168.1.50"
+    return misspelt_address(host)

@@ -18,14 +18,20 @@ def json_object(url: str, content_type: str, body: bytes) -> dict[str, object]:
         what = excerpt(sort) or "no content type"
         raise HalError(f"{url} answered {what} instead of JSON: is api_base the API's address?")
     try:
-        found = json.loads(
-            body.decode(), parse_constant=_no_number, object_pairs_hook=_without_doubles
-        )
-    except (ValueError, RecursionError) as error:
+        found = strict_json(body.decode())
+    except ValueError as error:
         raise HalError(f"{url} answered invalid JSON: {excerpt(str(error))}") from None
     if not isinstance(found, dict):
         raise HalError(f"{url} answered JSON that is not an object: {excerpt(repr(found))}")
     return found
+
+
+def strict_json(text: str) -> object:
+    """Decode JSON as RFC 8259 has it: no NaN, no duplicate key. Raises ValueError."""
+    try:
+        return json.loads(text, parse_constant=_no_number, object_pairs_hook=_without_doubles)
+    except RecursionError:
+        raise ValueError("it is nested too deeply") from None
 
 
 def _no_number(word: str) -> NoReturn:

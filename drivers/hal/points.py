@@ -177,6 +177,14 @@ class FlashLines(Protocol):
         """
 
 
+@runtime_checkable
+class RenewedLines(Protocol):
+    """Lines of a bus whose relays may have timers of their own, which switch them off."""
+
+    def renew(self, points: Iterable[str]) -> None:
+        """Start the timers of these relays again, which are on. Raises HalError."""
+
+
 class PointsBus(Protocol):
     """A bus that has points: GPIO, or Modbus."""
 
@@ -239,6 +247,7 @@ class Points:
         known = self._written or {}
         unread = {s for s, (wire, _) in self._out.items() if not wire.read_back}
         changed = [s for s in wanted if known.get(s) != wanted[s] or s in unread]
+        kept = [self._out[s][1] for s in wanted if wanted[s] and s not in changed]
         for turning_on in (False, True):
             levels = {
                 self._out[s][1]: self._out[s][0].level(wanted[s])
@@ -248,6 +257,9 @@ class Points:
             if levels:
                 self._written = None
                 self._lines.write(levels)
+        if kept and isinstance(self._lines, RenewedLines):
+            self._written = None
+            self._lines.renew(kept)
         self._written = wanted
 
     def flash(self, signal: str) -> None:

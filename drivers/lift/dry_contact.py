@@ -150,7 +150,7 @@ def _motion(inputs: LiftInputWiring, shown: Mapping[str, bool]) -> Motion | None
 
 DRIVER = DriverType(
     settings=DryContactLiftSettings,
-    buses=("gpio", "modbus"),
+    buses=("gpio", "modbus", "mqtt"),
     create=create,
     wires=wires,
     debounce=debounce,

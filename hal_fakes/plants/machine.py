@@ -22,7 +22,8 @@ class WiredPlant(ABC):
     `wires`: the driver's wiring table of this device; empty where the controller has no contacts.
     `parts`: parts that can fail besides wires (`car`, `door_operator`); the plant reads `failures`.
     `buttons`: signals that can be pressed; `pressed`: button -> is it pressed?
-    Wires to an I/O module add its parts `unit` and `server` (`hal_fakes/modbus/`).
+    Wires to an I/O module add its parts `unit` and `server` (`hal_fakes/modbus/`); other far sides add
+    theirs by `add_parts`.
     """
 
     def __init__(
@@ -102,6 +103,10 @@ class WiredPlant(ABC):
     def next_at(self) -> float:
         """Return the time of the next change without a command (s), or inf."""
         return min([self.event_at(), *(contact.next_at() for contact in self._broken)])
+
+    def add_parts(self, parts: Iterable[str]) -> None:
+        """Let the plant fail by these parts of the far side as well."""
+        self._parts |= {*parts}
 
     def fail(self, part: str, mode: FailureMode | None) -> None:
         """Make a wire or part fail; None mends it. Raises ValueError with the known parts."""

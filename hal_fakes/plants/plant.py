@@ -3,7 +3,7 @@
 `machine.py` implements all but the physics. A kind's plants are in `<kind>.py`.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Literal, Protocol
 
@@ -50,6 +50,9 @@ class Plant(Protocol):
 
     def next_at(self) -> float:
         """Return the time of the next change without a command (monotonic s), or inf."""
+
+    def add_parts(self, parts: Iterable[str]) -> None:
+        """Let the plant fail by these parts of the far side as well."""
 
     def fail(self, part: str, mode: FailureMode | None) -> None:
         """Make a signal or part fail; None mends it. Raises ValueError with the known parts."""

@@ -7,7 +7,7 @@ import msgspec
 
 from bridges.kinds.shared.fields import Name, tells
 from bridges.kinds.shared.remarks import Remarks
-from drivers.hal.hosts import misspelt_address
+from drivers.hal.hosts import misspelt_host
 
 BAUDRATES: Final = (
     *(300, 600, 1200, 2400, 4800, 9600, 14400, 19200, 28800, 38400, 56000, 57600, 76800, 115200),
@@ -24,12 +24,7 @@ class Tcp(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
 
     def problems(self) -> Remarks:
         """Yield a problem for an invalid address."""
-        if re.fullmatch(r"[^:]*:[0-9]+", self.host):
-            host, _, port = self.host.partition(":")
-            yield ("host",), f"is {self.host!r}: write host: {host}, port: {port}"
-        elif not re.fullmatch(r"[A-Za-z0-9_.:-]+", self.host):
-            yield ("host",), f"{self.host!r} is not a host: write its address, such as 192.168.1.50"
-        elif reason := misspelt_address(self.host):
+        if reason := misspelt_host(self.host):
             yield ("host",), reason
 
 

@@ -1,0 +1,36 @@
+"""MQTT: contacts and relays behind a broker, and topics for drivers of their own.
+
+settings.py   settings of the YAML; points.py: one contact or relay; topics.py: topics and messages
+makes.py      the topics of well-known makes, for `profile`
+bus.py        the broker: listening, publishing, ages, backoff; a driver uses this
+lines.py      one device's contacts and relays: claim, read, write, read back, renew, release
+link.py       one connection, through paho-mqtt, which only this file imports
+"""
+
+from drivers.hal import BusType
+from drivers.hal.mqtt.bus import Heard, MqttBus
+from drivers.hal.mqtt.settings import (
+    MqttSettings,
+    needs,
+    place,
+    tables,
+    unfit,
+    warnings,
+    where,
+    wire_problems,
+)
+
+__all__ = ["BUS", "Heard", "MqttBus", "MqttSettings"]
+
+BUS = BusType(
+    settings=MqttSettings,
+    open_bus=MqttBus,
+    fake="hal_fakes.mqtt",
+    where=where,
+    needs=needs,
+    warnings=warnings,
+    wire_problems=wire_problems,
+    unfit=unfit,
+    place=place,
+    tables=tables,
+)

@@ -1,0 +1,239 @@
+"""The broker as a bus: what devices have published, and messages to them.
+
+A driver of its own (one that is not on contacts) uses these calls:
+
+    bus.listen(topic)                  when it is made, for each topic that it reads
+    bus.fresh(topic, stale_after_s)    in `read`: the last message, or a HalError if it is no fact
+    bus.heard(topic)                   the last message of any age; None without one
+    bus.publish(topic, payload)        in `write`; with `safe=True` for a message that switches off
+    bus.up()                           in `open`: a HalError if there is no broker
+
+No reading waits: the messages come on a thread of the connection, and a changed payload wakes the
+bus's thread for a scan. With `listen(topic, take)` the connection's thread calls `take` with each
+message, for a driver that must not miss one.
+
+- A retained message is what once was: it has no age. A message is a fact only if it came live in this
+  connection, not longer ago than the device's own period.
+- The connection is shared. If it fails, every device of the bus fails; then the bus backs off for 0.5
+  to 30 s. A silent device costs the others nothing, because nobody waits for it.
+- Every connection starts with a clean session, and with nothing heard: a message that was missed
+  while the broker was away may have been the message that counts.
+- A message to a device is never retained, and is sent once. "On" expires at the broker (MQTT 5), so
+  that it never reaches a device that comes back later.
+"""
+
+import math
+import random
+import time
+from collections.abc import Callable, Iterable, Mapping
+from typing import TYPE_CHECKING, Final
+
+import msgspec
+
+from drivers.hal import Bus, HalError
+from drivers.hal.backoff import Backoff
+from drivers.hal.mqtt.lines import MqttLines
+from drivers.hal.mqtt.settings import MqttSettings
+from drivers.hal.mqtt.topics import PAYLOAD_MAX, TOPICS_MAX, Ask, Qos
+from drivers.hal.points import Pull
+
+if TYPE_CHECKING:
+    from drivers.hal.mqtt.link import Link
+
+EXPIRES_S: Final = 2
+"""The time (s) after which the broker drops an "on" that it could not deliver."""
+KEPT_MAX: Final = 4 * 1024 * 1024
+"""The length (bytes) of all kept payloads together, from which on no more are kept."""
+
+
+class Heard(msgspec.Struct, frozen=True):
+    """The last message of a topic: `at` is monotonic seconds; None for a retained message.
+
+    `length`: that of the payload in bytes, of which too long a payload is not kept.
+    """
+
+    payload: bytes
+    at: float | None
+    length: int
+
+
+class MqttBus(Bus):
+    """One broker (also a `drivers.hal.points.PointsBus`). `now`: its clock, which tests replace."""
+
+    def __init__(
+        self,
+        settings: MqttSettings,
+        clock: Callable[[], float] = time.monotonic,
+        jitter: Callable[[], float] = random.random,
+    ) -> None:
+        self.now = clock
+        self.settings = settings
+        self.points = settings.wholes()
+        self._backoff, self._safe_backoff = (Backoff(clock, jitter) for _ in range(2))
+        self._link: Link | None = None
+        self._heard: dict[str, Heard] = {}
+        self._kept = 0
+        self._takers: dict[str, Callable[[Heard], None] | None] = {}
+        self._asked: dict[Ask, float] = {}
+        self._wake: Callable[[], None] = lambda: None
+
+    def canonical(self, point: str) -> str:
+        """Return the point's name, which has one spelling."""
+        return point
+
+    def lines(self, inputs: Mapping[str, Pull | None], outputs: Mapping[str, bool]) -> MqttLines:
+        """Return these points; listen to their topics."""
+        found = {name: self.points[name] for name in (*inputs, *outputs)}
+        for point in found.values():
+            for place in (point, point.availability):
+                if place and place.topic:
+                    self.listen(place.topic)
+        return MqttLines(self, {n: found[n] for n in inputs}, {n: found[n] for n in outputs})
+
+    def listen(self, topic: str, take: Callable[[Heard], None] | None = None) -> None:
+        """Subscribe to this topic, now and in each later connection.
+
+        `take`: called with each message, on another thread; it must be quick and not raise. Raises
+        HalError for more topics than a bus may have.
+        """
+        if len(self._takers) >= TOPICS_MAX and topic not in self._takers:
+            raise HalError(f"a bus listens to at most {TOPICS_MAX} topics: define a second bus")
+        self._takers[topic] = take or self._takers.get(topic)
+        if self._link is not None and self._link.up:
+            self._link.subscribe([topic])
+
+    def up(self, safe: bool = False) -> "Link":
+        """Return the connection; make it if there is none. Raises HalError; then, in the backoff, at
+        once. `safe`: to switch off, which does not wait for the backoff of a failed reading.
+        """
+        if self._link is not None and self._link.up:
+            return self._link
+        backoff = self._safe_backoff if safe else self._backoff
+        backoff.check()
+        try:
+            link = self._connected()
+        except HalError as error:
+            raise backoff.failed(str(error)) from None
+        finally:
+            self.calls += 1
+        for each in (self._backoff, self._safe_backoff):
+            each.mended()
+        return link
+
+    def heard(self, topic: str) -> Heard | None:
+        """Return the topic's last message in this connection; None without one. Raises HalError."""
+        if reason := self.up().refused.get(topic):
+            raise HalError(f"the broker does not let us read {topic}: {reason}")
+        return self._heard.get(topic)
+
+    def fresh(self, topic: str, stale_after_s: float = math.inf) -> Heard:
+        """Return the topic's last message if it is a fact. Raises HalError for any other."""
+        found = self.heard(topic)
+        if found is None or found.at is None:
+            was = (
+                f"; a retained message of unknown age says {_shown(found.payload)}" if found else ""
+            )
+            raise HalError(f"nothing was published on {topic} since we listen{was}")
+        age_s = self.now() - found.at
+        if age_s > stale_after_s:
+            raise HalError(
+                f"the last message on {topic} is {age_s:.1f} s old, more than stale_after_s"
+                f" ({stale_after_s:g} s): check the device's power and network"
+            )
+        if len(found.payload) != found.length:
+            raise HalError(f"the message on {topic} is too long: {found.length} bytes")
+        return found
+
+    def publish(
+        self,
+        topic: str,
+        payload: str | bytes,
+        qos: Qos = 1,
+        safe: bool = False,
+        expires_s: int | None = EXPIRES_S,
+    ) -> None:
+        """Send a message, not retained; with `qos` 1, wait for the broker's confirmation.
+
+        `safe`: the message switches off; it does not wait for a backoff, and never expires. It is sent
+        once. Raises HalError; then the device may have received it.
+        """
+        data = payload.encode() if isinstance(payload, str) else payload
+        link = self.up(safe)
+        try:
+            link.publish(topic, data, qos, None if safe else expires_s)
+        finally:
+            self.calls += 1
+
+    def ask(self, asks: Iterable[Ask]) -> None:
+        """Send these messages, each at most once in half a scan, however many points need it."""
+        now, rest_s = self.now(), self.settings.scan_s / 2
+        for one in asks:
+            if now - self._asked.get(one, -math.inf) >= rest_s:
+                self._asked[one] = now
+                self.publish(one.topic, one.payload, qos=0)
+
+    def wait(self, done: Callable[[], bool], timeout_s: float) -> bool:
+        """Wait until `done`, which is asked again at each message; return whether it is true."""
+        link = self._link
+        if link is None:
+            return done()
+        with link.changed:
+            return link.changed.wait_for(lambda: bool(link.failure) or done(), timeout_s)
+
+    def on_edge(self, wake: Callable[[], None]) -> None:
+        """Call `wake`, from the connection's thread, when a topic's payload changes, and at its end."""
+        self._wake = wake
+
+    def insist(self) -> None:
+        """Make the next connection at once, without waiting for the backoff."""
+        for backoff in (self._backoff, self._safe_backoff):
+            backoff.insist()
+
+    def close(self) -> None:
+        """End the connection."""
+        link, self._link = self._link, None
+        if link is not None:
+            link.on_end = lambda: None
+            link.close()
+
+    def _connected(self) -> "Link":
+        """Make a connection within `timeout_s`. Raises HalError."""
+        from drivers.hal.mqtt.link import Link
+
+        old = self._link
+        if old is not None and old.is_alive() and not old.failure:
+            raise HalError("the last attempt to reach the broker has not ended yet")
+        self._heard.clear()
+        self._kept = 0
+        link = Link(self.settings, self._takers, self._take)
+        link.on_end = self._lost
+        self._link = link
+        link.start()
+        with link.changed:
+            ended = link.changed.wait_for(lambda: link.up or link.failure, self.settings.timeout_s)
+        if not ended:
+            link.close(f"the broker does not answer within {self.settings.timeout_s:g} s")
+        if link.failure:
+            raise HalError(link.failure)
+        return link
+
+    def _take(self, topic: str, payload: bytes, retained: bool) -> None:
+        link, before = self._link, self._heard.get(topic)
+        if topic not in self._takers or link is None:
+            return
+        kept = b"" if len(payload) > PAYLOAD_MAX or self._kept > KEPT_MAX else payload
+        self._kept += len(kept) - (len(before.payload) if before else 0)
+        found = self._heard[topic] = Heard(kept, None if retained else self.now(), len(payload))
+        if take := self._takers[topic]:
+            take(found)
+        with link.changed:
+            link.changed.notify_all()
+        if before is None or before.payload != payload or before.at is None:
+            self._wake()
+
+    def _lost(self) -> None:
+        self._wake()
+
+
+def _shown(payload: bytes) -> str:
+    return repr(payload[:40].decode(errors="replace"))

@@ -1,0 +1,170 @@
+"""One device's contacts and relays behind a broker (`drivers.hal.points.Lines`).
+
+A relay is switched off when it is claimed. Its state must follow each change within `answers_within_s`.
+A later contradiction means that the device has restarted, that its timer has run out, or that somebody
+else switches the relay too (`Rivals`). Every relay that goes off gets its message, even if another
+relay fails.
+"""
+
+from collections.abc import Iterable, Mapping
+from typing import TYPE_CHECKING
+
+from drivers.hal import HalError
+from drivers.hal.every import Every
+from drivers.hal.mqtt.points import MqttPoint
+from drivers.hal.rivals import Rivals
+
+if TYPE_CHECKING:
+    from drivers.hal.mqtt.bus import MqttBus
+
+
+class MqttLines:
+    """The points of one device, by name."""
+
+    def __init__(
+        self, bus: "MqttBus", inputs: Mapping[str, MqttPoint], outputs: Mapping[str, MqttPoint]
+    ) -> None:
+        self._bus = bus
+        self._inputs = inputs
+        self._outputs = outputs
+        self._asks = {p.ask for p in (*inputs.values(), *outputs.values()) if p.ask}
+        self._set: dict[str, bool] = {}
+        self._since: dict[str, float] = {}
+        self._claimed = False
+        self._touched = False
+        self._rivals = Rivals(bus.now)
+
+    def claim(self) -> None:
+        """Switch every relay off, once only, and give the device time to publish its first states.
+
+        A claim after a failure only looks for the broker: a lost confirmation must not release a held
+        door.
+        """
+        self._bus.up()
+        if self._claimed:
+            return
+        self.write(dict.fromkeys(self._outputs, False))
+        self._claimed = True
+        self._bus.ask(self._asks)
+        self._bus.wait(self._all_heard, self._bus.settings.timeout_s)
+
+    def read(self) -> dict[str, bool]:
+        """Read every contact. Raises HalError for a state that is no fact, or a contradicting relay."""
+        self._bus.ask(self._asks)
+        found = {name: self._state(point) for name, point in self._inputs.items()}
+        for name, level in self._set.items():
+            self._verify(name, level)
+        return found
+
+    def write(self, levels: Mapping[str, bool]) -> None:
+        """Switch these relays, off first. Raises HalError; then their states are unknown."""
+        self._touched = self._touched or bool(levels)
+        every = Every()
+        for name in sorted(levels, key=lambda name: levels[name]):
+            self._set.pop(name, None)
+            if levels[name] and every.failure:
+                continue
+            with every.one():
+                if levels[name]:
+                    self._rivals.check([name])
+                self._send(name, levels[name])
+                self._set[name], self._since[name] = levels[name], self._bus.now()
+        every.check()
+
+    def renew(self, names: Iterable[str]) -> None:
+        """Start the timers of these relays again, which are on. Raises HalError."""
+        for name in names:
+            if self._outputs[name].switches_off_after_s is not None:
+                self._rivals.check([name])
+                self._send(name, True)
+
+    def outputs(self) -> dict[str, int] | None:
+        """Wait until each relay's state follows its last command; return the readable states."""
+        readable = {n: p for n, p in self._outputs.items() if p.topic}
+        self._bus.ask(self._asks)
+        within_s = max((p.answers_within_s for p in readable.values()), default=0.0)
+        self._bus.wait(lambda: all(map(self._follows, readable)), within_s)
+        for name in readable:
+            if self._said(name) is None:
+                raise HalError(f"'{name}' publishes no state after it was switched")
+        return {name: bool(self._said(name)) for name in readable}
+
+    def close(self) -> None:
+        """Try once to switch every relay off, if any was ever switched. Does not raise."""
+        if not self._touched:
+            return
+        self._bus.insist()
+        unheard = Every()  # failures are dropped: the daemon is ending
+        for name in self._outputs:
+            with unheard.one():
+                self._send(name, False)
+
+    def _send(self, name: str, on: bool) -> None:
+        command = self._outputs[name].command
+        assert command  # `unfit` refuses an output without a command
+        payload = command.on if on else command.off
+        self._bus.publish(command.topic, payload, command.qos, safe=not on)
+
+    def _state(self, point: MqttPoint) -> bool:
+        """Return the state. Raises HalError if it is no fact."""
+        assert point.topic
+        assert point.stale_after_s
+        found = self._bus.fresh(point.topic, point.stale_after_s)
+        if point.availability:
+            notice = self._bus.heard(point.availability.topic)
+            if notice and notice.payload.decode(errors="replace") in point.availability.offline:
+                at = notice.at
+                if at is not None and at >= (found.at or 0.0):
+                    raise HalError(f"{point.availability.topic} says that the device is offline")
+        return point.asserted(found.payload)
+
+    def _verify(self, name: str, level: bool) -> None:
+        """Raise HalError if this relay's state contradicts `level`, and has had time to follow it."""
+        point = self._outputs[name]
+        if point.topic is None:
+            return
+        waiting = self._bus.now() - self._since[name] <= point.answers_within_s
+        said = self._said(name)
+        if waiting and said in (None, not level):
+            return
+        state = self._state(point)
+        if said is None:
+            raise HalError(
+                f"'{name}' publishes no state within answers_within_s after it was switched"
+            )
+        if state == level:
+            return
+        self._rivals.contradicted(name)
+        self._set.pop(name)
+        self._rivals.check([name])
+        raise HalError(
+            f"'{name}' is {_word(not level)} after it was switched {_word(level)}: the device has"
+            " restarted, its timer has run out, or somebody else switches it"
+        )
+
+    def _said(self, name: str) -> bool | None:
+        """Return the relay's state after its last command; None without one."""
+        point = self._outputs[name]
+        assert point.topic
+        found = self._bus.heard(point.topic)
+        if found is None or found.at is None or found.at < self._since.get(name, 0.0):
+            return None
+        return point.asserted(found.payload)
+
+    def _follows(self, name: str) -> bool:
+        try:
+            return self._said(name) == self._set.get(name, False)
+        except HalError:
+            return False
+
+    def _all_heard(self) -> bool:
+        try:
+            for point in self._inputs.values():
+                self._state(point)
+            return all(self._said(name) is not None for name, p in self._outputs.items() if p.topic)
+        except HalError:
+            return False
+
+
+def _word(on: bool) -> str:
+    return "on" if on else "off"

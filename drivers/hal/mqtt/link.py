@@ -1,0 +1,287 @@
+"""One connection to a broker, through paho: from the lookup of the name to the end, and never again.
+
+Each connection has a client of its own and a clean session. So nothing of an earlier connection is sent
+again: paho repeats unconfirmed messages when it reconnects, and an "on" of a minute ago must not be
+repeated. A thread serves the connection; it ends with it.
+
+The protocol allows packets of 256 MB. With MQTT 5 we tell the broker our limit (Maximum Packet Size, MQTT
+5.0 section 3.1.2.11.4), and the broker holds longer packets back. MQTT 3.1.1 has no such limit, so with
+that version a longer packet ends the connection before its payload is read.
+"""
+
+import os
+import socket
+import ssl
+import struct
+import threading
+from collections.abc import Callable, Iterable
+from typing import Any, Final
+
+import paho.mqtt.client as paho
+from paho.mqtt.enums import CallbackAPIVersion
+from paho.mqtt.packettypes import PacketTypes
+from paho.mqtt.properties import Properties
+from paho.mqtt.reasoncodes import ReasonCode
+
+from bridges.system import user_files
+from drivers.hal.http_json import excerpt
+from drivers.hal.mqtt.settings import BrokerTls, MqttSettings
+from drivers.hal.mqtt.topics import PAYLOAD_MAX
+from drivers.hal.points import HalError
+
+PACKET_MAX: Final = PAYLOAD_MAX + 1024
+"""The longest packet: a payload with its topic and properties."""
+NOBODY: Final = 0x10
+"""No matching subscribers (MQTT 5.0, 3.4.2.1): no device has received the message."""
+TAKEN: Final = ""
+ACKS_MAX: Final = 256
+"""The number of confirmations that are remembered."""
+LOOK_S: Final = 1.0
+
+Taken = Callable[[str, bytes, bool], None]
+"""Takes topic, payload, and whether the message is retained. Called on the connection's thread."""
+
+
+class Link(threading.Thread):
+    """A connection. `up`: connected, and the topics are subscribed to. `failure`: why it has ended.
+
+    `refused`: topic -> the broker's reason for not letting us subscribe. `changed` is notified, and
+    `on_end` called, when one of these changes.
+    """
+
+    def __init__(self, settings: MqttSettings, topics: Iterable[str], take: Taken) -> None:
+        super().__init__(name="mqtt", daemon=True)
+        self.changed = threading.Condition()
+        self.up = False
+        self.failure = ""
+        self.refused: dict[str, str] = {}
+        self.on_end: Callable[[], None] = lambda: None
+        self._settings = settings
+        self._topics = list(topics)
+        self._take = take
+        self._closing = False
+        self._acks: dict[int, str] = {}
+        self._asked: dict[int, list[str]] = {}
+        self._client = self._made()
+
+    def run(self) -> None:
+        """Connect, and serve the connection until its end."""
+        failure = "the broker has closed the connection"
+        try:
+            host, port = self._settings.address()
+            self._client.connect(
+                host, port, self._settings.keepalive_s, **_connect_options(self._v5)
+            )
+            while not self._closing and self._client.loop(LOOK_S) == paho.MQTT_ERR_SUCCESS:
+                pass
+        except OSError as error:
+            failure = self._explained(error)
+        except (
+            ValueError,
+            IndexError,
+            KeyError,
+            TypeError,
+            struct.error,
+            paho.MQTTException,
+        ) as error:
+            failure = f"no MQTT ({excerpt(str(error))}): is it an MQTT broker?"
+        finally:
+            self._ended(failure)
+
+    def subscribe(self, topics: Iterable[str]) -> None:
+        """Subscribe to more topics."""
+        asked = list(topics)
+        with self.changed:
+            _, mid = self._client.subscribe([(topic, 0) for topic in asked])
+            if mid is not None:
+                self._asked[mid] = asked
+
+    def publish(self, topic: str, payload: bytes, qos: int, expires_s: int | None) -> None:
+        """Send a message. With `qos` 1, wait for the broker's confirmation. Raises HalError."""
+        properties = None
+        if self._v5 and expires_s is not None:
+            properties = Properties(PacketTypes.PUBLISH)
+            properties.MessageExpiryInterval = expires_s
+        info = self._client.publish(topic, payload, qos, retain=False, properties=properties)
+        if info.rc != paho.MQTT_ERR_SUCCESS:
+            raise HalError(f"{topic} was not sent: {paho.error_string(info.rc)}")
+        if qos == 0:
+            return
+        with self.changed:
+            timeout_s, acks = self._settings.timeout_s, self._acks
+            if not self.changed.wait_for(lambda: info.mid in acks or self.failure, timeout_s):
+                self.close(f"the broker does not confirm a message within {timeout_s:g} s")
+            if (reason := acks.get(info.mid, self.failure)) != TAKEN:
+                raise HalError(f"{topic}: {reason}")
+
+    def close(self, failure: str = "closed") -> None:
+        """End the connection, without waiting for its thread."""
+        self._closing = True
+        with self.changed:
+            self.up, self.failure = False, self.failure or failure
+        self._client.disconnect()
+
+    @property
+    def _v5(self) -> bool:
+        return self._settings.version == "5"
+
+    def _made(self) -> paho.Client:
+        settings = self._settings
+        client = BoundedClient(
+            CallbackAPIVersion.VERSION2,
+            client_id=settings.client_id or f"rmf-{os.urandom(6).hex()}",
+            protocol=paho.MQTTv5 if self._v5 else paho.MQTTv311,
+            reconnect_on_failure=False,
+            **({} if self._v5 else {"clean_session": True}),
+        )
+        client.connect_timeout = settings.timeout_s
+        if settings.user:
+            client.username_pw_set(settings.user, _password(settings.password_file))
+        if settings.tls:
+            client.tls_set_context(_tls(settings.tls))
+        client.on_connect = self._on_connect
+        client.on_subscribe = self._on_subscribe
+        client.on_message = self._on_message
+        client.on_publish = self._on_publish
+        client.on_disconnect = self._on_disconnect
+        client.on_socket_open = _without_delay
+        client.on_socket_register_write = _nothing  # so that only this thread writes to the socket
+        return client
+
+    def _on_connect(
+        self, client: object, _: object, flags: Any, reason: ReasonCode, properties: object
+    ) -> None:
+        if reason.is_failure:
+            self._fail(
+                f"the broker refuses us: {str(reason).lower()}: check user and password_file"
+            )
+        elif flags.session_present:
+            self._fail("the broker has kept an old session, although we asked for a clean one")
+        elif self._topics:
+            self.subscribe(self._topics)
+        else:
+            self._rise()
+
+    def _on_subscribe(
+        self, client: object, _: object, mid: int, reasons: list[ReasonCode], properties: object
+    ) -> None:
+        with self.changed:
+            for topic, reason in zip(self._asked.pop(mid, []), reasons, strict=False):
+                if reason.is_failure:
+                    self.refused[topic] = str(reason).lower()
+        self._rise()
+
+    def _on_message(self, client: object, _: object, message: paho.MQTTMessage) -> None:
+        self._take(message.topic, message.payload, message.retain)
+
+    def _on_publish(
+        self, client: object, _: object, mid: int, reason: ReasonCode, properties: object
+    ) -> None:
+        text = TAKEN
+        if reason.value == NOBODY:
+            text = "no device listens there: check its power, its network and the topic"
+        elif reason.is_failure:
+            text = f"the broker refuses the message: {str(reason).lower()}"
+        with self.changed:
+            if len(self._acks) >= ACKS_MAX:
+                del self._acks[next(iter(self._acks))]
+            self._acks[mid] = text
+            self.changed.notify_all()
+
+    def _on_disconnect(
+        self, client: object, _: object, flags: Any, reason: ReasonCode, properties: object
+    ) -> None:
+        if flags.is_disconnect_packet_from_server:
+            self._fail(f"the broker has ended the connection: {str(reason).lower()}")
+
+    def _rise(self) -> None:
+        with self.changed:
+            self.up = not self.failure
+            self.changed.notify_all()
+
+    def _fail(self, failure: str) -> None:
+        self._closing = True
+        with self.changed:
+            self.failure = self.failure or failure
+
+    def _ended(self, failure: str) -> None:
+        if cut := self._client.cut:
+            failure = cut
+        with self.changed:
+            self.up, self.failure = False, self.failure or failure
+            self.changed.notify_all()
+        self._client.disconnect()
+        self._client.loop_write()
+        self.on_end()
+
+    def _explained(self, error: OSError) -> str:
+        host, port = self._settings.address()
+        if isinstance(error, ConnectionRefusedError):
+            return f"{host}:{port} refuses the connection: is the broker running there?"
+        if isinstance(error, socket.gaierror):
+            return f"{host} is not known: check the name and the DNS server"
+        if isinstance(error, ssl.SSLError):
+            reason = getattr(error, "verify_message", None) or str(error)
+            return f"TLS with {host}:{port} fails: {excerpt(reason)}: check tls and host"
+        if isinstance(error, TimeoutError):
+            return f"{host}:{port} does not answer: check power, cable and address"
+        return f"{host}:{port} cannot be reached: {error.strerror or error}"
+
+
+class BoundedClient(paho.Client):
+    """A client that ends the connection before it reads a packet beyond PACKET_MAX.
+
+    `cut`: the reason, if it has done so. paho reads the rest of a packet with one call of `_sock_recv`.
+    """
+
+    cut = ""
+
+    def _sock_recv(self, bufsize: int) -> bytes:
+        if bufsize > PACKET_MAX:
+            self.cut = (
+                f"the broker sent a message of {bufsize} bytes; at most {PAYLOAD_MAX} are taken"
+            )
+            raise ConnectionError(self.cut)
+        return super()._sock_recv(bufsize)
+
+
+def _connect_options(v5: bool) -> dict[str, Any]:
+    if not v5:
+        return {}
+    properties = Properties(PacketTypes.CONNECT)
+    properties.MaximumPacketSize = PACKET_MAX
+    properties.SessionExpiryInterval = 0
+    return {"clean_start": True, "properties": properties}
+
+
+def _password(file: str | None) -> str | None:
+    """Read the password, for each connection, because it may be renewed meanwhile. Raises HalError."""
+    if file is None:
+        return None
+    try:
+        return user_files.secret_line("password_file", file, "password")
+    except user_files.SecretError as error:
+        raise HalError(str(error)) from None
+
+
+def _tls(settings: BrokerTls) -> ssl.SSLContext:
+    """Read the certificates, for each connection. Raises HalError."""
+    for file in (settings.ca_file, settings.certificate_file, settings.key_file):
+        if file and not os.access(file, os.R_OK):
+            raise HalError(f"tls: {file} cannot be read")
+    try:
+        context = ssl.create_default_context(cafile=settings.ca_file)
+        if settings.certificate_file:
+            context.load_cert_chain(settings.certificate_file, settings.key_file)
+    except (OSError, ValueError) as error:
+        raise HalError(f"tls: the certificates cannot be used: {excerpt(str(error))}") from None
+    return context
+
+
+def _without_delay(client: object, _: object, sock: Any) -> None:
+    """Send each message at once: by Nagle's algorithm a command may wait 40 ms for an ACK."""
+    sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+
+
+def _nothing(client: object, _: object, sock: object) -> None:
+    """Do nothing."""

@@ -1,0 +1,165 @@
+"""One point of the YAML's `points`: a state that a device publishes, or a relay that it switches."""
+
+from typing import Annotated
+
+import msgspec
+
+from bridges.kinds.shared.fields import Name, Timeout, tells
+from bridges.kinds.shared.remarks import Remarks
+from drivers import DriverError, json_fields
+from drivers.hal.http_json import strict_json
+from drivers.hal.mqtt.makes import MAKES, Profile
+from drivers.hal.mqtt.topics import Age, Ask, Availability, RelayCommand, Topic
+from drivers.hal.points import HalError
+from drivers.json_fields import Field, Value
+
+WHOLE = "payload"
+"""The name of a payload without `field`, in messages."""
+
+
+class MqttPoint(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A contact or relay behind a broker. A profile has the topics, payloads and fields of a make."""
+
+    profile: Annotated[
+        Profile | None, tells("the make; when absent, the keys from `topic` on are written here.")
+    ] = None
+    device: Annotated[
+        Topic | None,
+        tells("with a profile, the device's name on MQTT, with which its topics begin."),
+    ] = None
+    part: Annotated[
+        Name | None, tells("with a profile, the relay or input: `switch:0`, `POWER1`, `contact`.")
+    ] = None
+    topic: Annotated[Topic | None, tells("where the device publishes the state.")] = None
+    field: Annotated[
+        Field | None, tells("the field of the JSON payload; the whole payload when absent.")
+    ] = None
+    when: Annotated[
+        list[Value], tells("the values that mean on; without them the value must be true or false.")
+    ] = []
+    when_not: Annotated[
+        list[Value], tells("with `when`, the values that mean off. Any other value is a fault.")
+    ] = []
+    stale_after_s: Annotated[
+        Age | None,
+        tells("""the age from which a state is unknown: longer than the device's own period, or than
+        the time in which it answers `ask`."""),
+    ] = None
+    ask: Annotated[
+        Ask | None, tells("a message, sent in every scan, that makes the device publish its state.")
+    ] = None
+    availability: Annotated[
+        Availability | None, tells("the device's own notice that it has lost its connection.")
+    ] = None
+    command: Annotated[RelayCommand | None, tells("switches the relay.")] = None
+    answers_within_s: Annotated[
+        Timeout, tells("how long the state may take to follow a command.")
+    ] = 2.0
+    switches_off_after_s: Annotated[
+        Timeout | None,
+        tells("""the relay's own timer: it switches the relay off this long after the last message
+        that switched it on. That message is sent in every scan while the relay is on."""),
+    ] = None
+    accept_unsafe: Annotated[
+        Name | None, tells("why this relay may stay on when the network or the broker fails.")
+    ] = None
+
+    def whole(self) -> "MqttPoint":
+        """Return the point with its profile's keys, except written keys. Raises ValueError."""
+        if self.profile is None:
+            return self
+        keys = MAKES[self.profile](self.device or "", self.part or "", self.switches_off_after_s)
+        own = {name: value for name in keys if (value := getattr(self, name)) not in (None, [])}
+        return msgspec.structs.replace(
+            msgspec.convert({**keys, "answers_within_s": self.answers_within_s}, MqttPoint),
+            **own,
+            **{name: getattr(self, name) for name in _KEPT},
+        )
+
+    def problems(self) -> Remarks:
+        """Yield problems that involve more than one key."""
+        if self.profile and not (self.device and self.part):
+            yield (
+                ("profile",),
+                "needs device and part: its name on MQTT, and its relay or input",
+            )
+            return
+        if not self.profile and (self.device or self.part):
+            yield (
+                ("device" if self.device else "part",),
+                "is for a profile: add profile, or delete this",
+            )
+            return
+        try:
+            whole = self.whole()
+        except ValueError as error:
+            yield ("part",), str(error)
+            return
+        yield from _state_problems(whole)
+        yield from _relay_problems(whole)
+
+    def asserted(self, payload: bytes) -> bool:
+        """Decode the state. Raises HalError for a payload that means neither on nor off."""
+        text = _text(payload)
+        try:
+            value = self._value(text)
+            if not self.when and isinstance(value, bool):
+                return value
+            for values, means in ((self.when, True), (self.when_not, False)):
+                if any(json_fields.same(value, one) for one in values):
+                    return means
+            wanted = " or ".join(map(str, [*self.when, *self.when_not])) or "true or false"
+            raise json_fields.wrong(self.field or WHOLE, value, wanted)
+        except DriverError as error:
+            raise HalError(f"{self.topic}: {error}") from None
+
+    def _value(self, text: str) -> object:
+        try:
+            value = strict_json(text)
+        except ValueError as error:
+            if self.field:
+                raise DriverError(f"is no JSON: {error}") from None
+            return text
+        if self.field is None:
+            return value
+        if not isinstance(value, dict):
+            raise json_fields.wrong(WHOLE, value, "a JSON object")
+        return json_fields.needed(value, self.field)
+
+
+_KEPT = (*("profile", "device", "part", "stale_after_s", "switches_off_after_s", "accept_unsafe"),)
+
+
+def _text(payload: bytes) -> str:
+    return payload.decode(errors="replace")
+
+
+def _state_problems(point: MqttPoint) -> Remarks:
+    if point.topic is None and point.command is None:
+        yield (), "needs topic, for a state, or command, for a relay; or a profile"
+    if point.topic and point.stale_after_s is None:
+        yield (), "needs stale_after_s: the age from which this state is unknown"
+    if bool(point.when) != bool(point.when_not):
+        yield ("when",), "when and when_not need each other: any other value is then a fault"
+    for value in point.when:
+        if any(json_fields.same(value, other) for other in point.when_not):
+            yield ("when_not",), f"{value} is in when too"
+    if point.topic is None and (point.field or point.when or point.ask or point.availability):
+        yield (), "field, when, ask and availability belong to a state: add topic"
+
+
+def _relay_problems(point: MqttPoint) -> Remarks:
+    if point.command is None:
+        for key in ("switches_off_after_s", "accept_unsafe"):
+            if getattr(point, key) is not None:
+                yield (key,), "is for a relay: add command, or delete this"
+        return
+    if point.switches_off_after_s is None and point.accept_unsafe is None:
+        text = (
+            "unsafe: when the network or the broker fails nothing switches this relay off: use the"
+            " relay's own timer, and write its time as switches_off_after_s; or accept_unsafe: <why it"
+            " is safe here>"
+        )
+        yield (), text
+    if point.switches_off_after_s is not None and point.accept_unsafe is not None:
+        yield ("accept_unsafe",), "the relay has a timer of its own: delete accept_unsafe"

@@ -1,0 +1,231 @@
+"""`type: mqtt` of a device YAML: the broker, its secrets, and the points behind it."""
+
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Annotated, Literal
+
+import msgspec
+
+from bridges.kinds.shared.fields import AbsolutePath, Name, Period, tells
+from bridges.kinds.shared.remarks import Remarks
+from bridges.kinds.shared.table import Table
+from bridges.yaml.spelling import unknown
+from drivers.hal import BusSettings, Needs, Where
+from drivers.hal.hosts import misspelt_host
+from drivers.hal.mqtt.points import MqttPoint
+from drivers.hal.mqtt.topics import TOPICS_MAX
+from drivers.hal.points import Wire
+
+Answer = Annotated[float, msgspec.Meta(ge=0.1, le=5, extra={"unit": "s"})]
+"""At most 5 s: a longer wait would look like a hang to systemd (`WatchdogSec=10` of the unit)."""
+RENEWED = 3
+"""The least number of scans after which a relay may switch itself off."""
+
+
+class BrokerTls(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """TLS to the broker. Its certificate must be valid for `host`."""
+
+    ca_file: Annotated[
+        AbsolutePath | None,
+        tells("""a PEM file with the certificate of the broker or of its authority; when absent, the
+        public authorities count."""),
+    ] = None
+    certificate_file: Annotated[
+        AbsolutePath | None, tells("a PEM file with our certificate, for a broker that wants one.")
+    ] = None
+    key_file: Annotated[
+        AbsolutePath | None,
+        tells("a PEM file with its private key, which only the daemon may read."),
+    ] = None
+
+    def problems(self) -> Remarks:
+        """Yield a problem for half of a client certificate."""
+        if bool(self.certificate_file) != bool(self.key_file):
+            key = "key_file" if self.key_file else "certificate_file"
+            yield (key,), "certificate_file and key_file need each other"
+
+
+class MqttSettings(BusSettings, frozen=True, kw_only=True, forbid_unknown_fields=True, tag="mqtt"):
+    """A broker, and the contacts and relays behind it."""
+
+    host: Annotated[Name, tells("the broker's address or name.")]
+    port: Annotated[
+        Annotated[int, msgspec.Meta(ge=1, le=65535)] | None,
+        tells("the TCP port; 1883 when absent, or 8883 with tls."),
+    ] = None
+    version: Annotated[
+        Literal["5", "3.1.1"],
+        tells("""the version of MQTT. Only with 5 does the broker hold long payloads back, drop a
+        command that cannot be delivered at once, and tell us that no device receives it."""),
+    ] = "5"
+    tls: Annotated[BrokerTls | None, tells("encryption, and who is trusted.")] = None
+    user: Annotated[Name | None, tells("our name at the broker.")] = None
+    password_file: Annotated[
+        Name | None, tells("a file with our password, which only the daemon may read.")
+    ] = None
+    client_id: Annotated[
+        Name | None,
+        tells("our client id, for a broker that grants rights by it; a random one when absent."),
+    ] = None
+    keepalive_s: Annotated[
+        int,
+        msgspec.Meta(ge=1, le=60, extra={"unit": "s"}),
+        tells("after this silence the broker is asked for a sign of life."),
+    ] = 5
+    timeout_s: Annotated[
+        Answer, tells("how long a connection, or the broker's confirmation, may take.")
+    ] = 1.0
+    scan_s: Annotated[Period, tells("how often the states are judged, and asked for.")] = 0.5
+    points: Annotated[
+        dict[Name, MqttPoint], tells("name -> a contact or relay, for `point:` of a device.")
+    ] = msgspec.field(default_factory=dict)
+
+    def wholes(self) -> Mapping[str, MqttPoint]:
+        """Return the points with the keys of their profiles, without points that have problems."""
+        valid = {name: point for name, point in self.points.items() if not any(point.problems())}
+        return {name: point.whole() for name, point in valid.items()}
+
+    def problems(self) -> Remarks:
+        """Yield problems that involve more than one key."""
+        if reason := misspelt_host(self.host):
+            yield ("host",), reason
+        if self.password_file and not self.user:
+            yield ("password_file",), "needs user: the name that the password belongs to"
+        points = self.wholes()
+        if len(points) > TOPICS_MAX // 2:
+            yield (
+                ("points",),
+                f"at most {TOPICS_MAX // 2} points fit on one bus: define a second bus",
+            )
+        yield from _used_twice(points)
+        yield from self._late_renewals()
+
+    def _late_renewals(self) -> Remarks:
+        least_s = RENEWED * self.scan_s + self.timeout_s
+        for name, point in self.points.items():
+            off_s = point.switches_off_after_s
+            if off_s is not None and off_s < least_s:
+                text = f"is {off_s:g}, but renewed every {self.scan_s:g} s (scan_s): write at least"
+                path = ("points", name, "switches_off_after_s")
+                yield path, f"switches_off_after_s {text} {least_s:g}"
+
+    def address(self) -> tuple[str, int]:
+        """Return the broker's host and port."""
+        return self.host, self.port or (8883 if self.tls else 1883)
+
+
+def _used_twice(points: Mapping[str, MqttPoint]) -> Remarks:
+    """Yield problems: a state or command that two points use; a command topic that is a state's."""
+    states = {point.topic: name for name, point in points.items() if point.topic}
+    first: dict[object, str] = {}
+    for name, point in points.items():
+        for key, use in _uses(point):
+            other = first.setdefault(use, name)
+            if other != name:
+                yield _at(points[name], name, key), f"is the same {key} as that of '{other}'"
+        for key, topic in _written(point):
+            if topic in states:
+                text = f"{topic} is the state topic of '{states[topic]}': the {key} would be taken for it"
+                yield _at(point, name, key), text
+
+
+def _uses(point: MqttPoint) -> Iterator[tuple[str, object]]:
+    if point.topic:
+        yield "topic", ("state", point.topic, point.field, str(point.when))
+    if point.command:
+        yield "command", ("command", point.command.topic, point.command.on)
+
+
+def _written(point: MqttPoint) -> Iterator[tuple[str, str]]:
+    if point.command:
+        yield "command", point.command.topic
+    if point.ask:
+        yield "ask", point.ask.topic
+
+
+def _at(point: MqttPoint, name: str, key: str) -> tuple[str, ...]:
+    """Return the path of a key of this point; a profile's keys are not in the YAML."""
+    if point.profile:
+        return "points", name, "part"
+    return ("points", name, key) if key == "topic" else ("points", name, key, "topic")
+
+
+def warnings(settings: MqttSettings) -> Remarks:
+    """Yield valid settings that deserve a second look: (path, text)."""
+    if settings.password_file and not settings.tls:
+        text = "the password goes over the network unencrypted: add tls where the broker has it"
+        yield ("password_file",), text
+    for name, point in settings.wholes().items():
+        path = ("points", name)
+        if point.accept_unsafe:
+            yield (
+                (*path, "accept_unsafe"),
+                f"unsafe relay '{name}' is accepted: {point.accept_unsafe}",
+            )
+        if point.command is None:
+            continue
+        if point.switches_off_after_s is not None:
+            text = "pull the network plug while it is on: the relay must drop within this time"
+            yield (*path, "switches_off_after_s"), text
+        if point.topic is None:
+            yield path, f"'{name}' has no topic for its state: switching off is not verified"
+        if settings.version == "3.1.1" and point.command.qos == 1:
+            text = (
+                f"a device that keeps its session gets an old 'on' of '{name}' when it returns: write"
+                ' version: "5", which drops late commands, or qos: 0'
+            )
+            yield path, text
+
+
+def needs(settings: MqttSettings) -> Needs:
+    """Return the broker's address."""
+    return Needs(host=settings.host)
+
+
+def where(settings: MqttSettings) -> Where:
+    """Return the broker's address."""
+    host, port = settings.address()
+    return Where(f"{host}:{port}", local=False)
+
+
+def unfit(settings: MqttSettings, point: str, direction: Literal["in", "out"]) -> str | None:
+    """Return why this name cannot be an input or output; None if it can."""
+    found = settings.points.get(point)
+    if found is None:
+        return unknown("point", point, settings.points)
+    whole = found.whole()
+    if direction == "in" and whole.topic is None:
+        return f"'{point}' has no topic, so its state cannot be read: add topic to it"
+    if direction == "out" and whole.command is None:
+        return f"'{point}' has no command, so it cannot be switched: add command to it"
+    return None
+
+
+def place(settings: MqttSettings, point: str) -> str | None:
+    """Return the command that no other file may send; None for a state, which every file may read."""
+    command = settings.points[point].whole().command
+    return command and f"the command {command.topic} {command.on}"
+
+
+def wire_problems(wire: Wire) -> Iterable[str]:
+    """Yield the errors in this wire on MQTT."""
+    if wire.pull is not None:
+        yield "pull is for GPIO pins: delete pull"
+    if wire.flash is not None:
+        yield "a pulse that the module times is for Modbus: use the relay's own timer"
+    if wire.direction == "out" and wire.active == "low":
+        yield "write active: high: the point's `on` and `off` say which message switches the relay on"
+
+
+def tables(settings: MqttSettings) -> Iterable[Table]:
+    """Yield the topics of each point."""
+    rows = []
+    for name, point in settings.wholes().items():
+        state = " ".join(filter(None, (point.topic, point.field))) or "-"
+        age = "-" if point.stale_after_s is None else f"{point.stale_after_s:g} s"
+        sent = "-"
+        if point.command:
+            sent = f"{point.command.topic}: {point.command.on or '(empty)'}"
+        timer = point.switches_off_after_s
+        rows.append((name, state, age, sent, "-" if timer is None else f"{timer:g} s"))
+    heads = ("point", "state", "stale after", "on", "off by itself after")
+    yield Table("topics", heads, tuple(rows))

@@ -1,0 +1,65 @@
+"""Topics, messages and commands of MQTT as the YAML has them."""
+
+from typing import Annotated, Final, Literal
+
+import msgspec
+
+from bridges.kinds.shared.fields import tells
+from bridges.kinds.shared.remarks import Remarks
+
+PAYLOAD_MAX: Final = 256 * 1024
+"""The longest payload (bytes) that is taken. The state of a vehicle by VDA 5050 may be that long."""
+TOPICS_MAX: Final = 512
+"""The greatest number of topics that one bus listens to."""
+
+Topic = Annotated[
+    str,
+    msgspec.Meta(
+        pattern=r"^[^\x00-\x20\x7f-\x9f#+$]([^\x00-\x1f\x7f-\x9f#+]*[^\x00-\x20\x7f-\x9f#+])?$(?!\n)",
+        max_length=256,
+        extra={"pattern": "one whole topic, without the wildcards # and + (door-1/status/input:0)"},
+    ),
+]
+"""The name of one topic. A wildcard would let an unknown device speak for a known device."""
+Payload = Annotated[str, msgspec.Meta(max_length=1024)]
+Age = Annotated[float, msgspec.Meta(ge=0.1, le=86400, extra={"unit": "s"})]
+Qos = Literal[0, 1]
+"""At most once, or at least once. "Exactly once" (2) adds nothing to a level that is sent again."""
+
+
+class Ask(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A message that makes a device publish its state."""
+
+    topic: Annotated[Topic, tells("where the device listens.")]
+    payload: Annotated[Payload, tells("the message.")] = ""
+
+
+class Availability(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A device's own notice of its connection: its last will, or a gateway's judgement.
+
+    The notice is a hint: a broker publishes a last will after one and a half keepalives of silence.
+    """
+
+    topic: Annotated[Topic, tells("where the notice is published.")]
+    offline: Annotated[
+        list[Payload],
+        msgspec.Meta(min_length=1),
+        tells("the payloads of a device without a connection (`offline`)."),
+    ]
+
+
+class RelayCommand(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """The messages that switch one relay. They are never retained."""
+
+    topic: Annotated[Topic, tells("where the device listens.")]
+    on: Annotated[Payload, tells("the message that switches the relay on.")]
+    off: Annotated[Payload, tells("the message that switches the relay off.")]
+    qos: Annotated[
+        Qos,
+        tells("1: the broker confirms the message, and repeats it to the device; 0: it does not."),
+    ] = 1
+
+    def problems(self) -> Remarks:
+        """Yield a problem for messages that do not differ."""
+        if self.on == self.off:
+            yield ("off",), "is the same message as on"

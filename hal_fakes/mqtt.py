@@ -1,0 +1,267 @@
+"""The far side of an `mqtt` bus: a real broker on 127.0.0.1, and the devices that publish there.
+
+The devices are one real MQTT client. They publish a changed state at once, answer `ask`, and publish
+states that are not asked for three times in `stale_after_s`. A relay with a timer switches itself off.
+On command (`fail DEVICE unit|server MODE`) one device, or the broker, is
+
+|        | off              | stuck                     | slow           | garbage         | wrong          |
+| unit   | silent           | publishes its last states | obeys too late | publishes noise | publishes `?`  |
+| server | killed           | frozen                    | answers late   | is no broker    | only remembers |
+"""
+
+import contextlib
+import json
+import random
+import socket
+import threading
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Final
+
+import paho.mqtt.client as paho
+from paho.mqtt.enums import CallbackAPIVersion
+
+from drivers.hal.mqtt import MqttSettings
+from drivers.hal.mqtt.points import MqttPoint
+from drivers.hal.points import HalError
+from hal_fakes.fake import Outside
+from hal_fakes.json_answers import put
+from hal_fakes.mosquitto import Mosquitto
+from hal_fakes.plants.plant import FailureMode
+from hal_fakes.wiring import PlantWiring
+
+PARTS: Final = ("server", "unit")
+LOOK_S: Final = 0.02
+READY_S: Final = 15.0
+NEVER: Final = float("inf")
+
+
+def serve(settings: MqttSettings, stations: Sequence[PlantWiring]) -> "MqttSite":
+    """Serve the devices of this bus behind a broker of their own."""
+    return MqttSite(settings, stations)
+
+
+class MqttDevice:
+    """One device's points: what it publishes, and what it does with a message."""
+
+    def __init__(self, wiring: PlantWiring, points: Mapping[str, MqttPoint]) -> None:
+        self.plant = wiring.plant
+        self._wiring = wiring
+        self.points = {n: points[n] for n in (*wiring.inputs, *wiring.outputs)}
+        self.asks = {p.ask.topic: p.ask.payload for p in self.points.values() if p.ask}
+        self.commands = {
+            (command.topic, payload): (name, on)
+            for name in wiring.outputs
+            if (command := self.points[name].command)
+            for payload, on in ((command.on, True), (command.off, False))
+        }
+        self._on = dict.fromkeys(wiring.outputs, False)
+        self._off_at = dict.fromkeys(wiring.outputs, NEVER)
+
+    def obey(self, name: str, on: bool) -> None:
+        """Switch a relay, and start its timer again."""
+        now, off_s = time.monotonic(), self.points[name].switches_off_after_s
+        self._on[name] = on
+        self._off_at[name] = now + off_s if on and off_s else NEVER
+        self._wiring.drive(name, on, now)
+
+    def tick(self) -> None:
+        """Switch off the relays whose timers have run out."""
+        for name, at in self._off_at.items():
+            if time.monotonic() >= at:
+                self.obey(name, False)
+
+    def states(self) -> dict[str, bytes]:
+        """Return topic -> payload of each state."""
+        levels = {**self._wiring.levels(time.monotonic()), **self._on}
+        said: dict[str, dict[str, object]] = {}
+        whole: dict[str, bytes] = {}
+        for name, point in self.points.items():
+            if point.topic is None:
+                continue
+            value = _value(point, levels[name])
+            if self.plant.failures.get("unit") == "wrong":
+                value = ["?"]
+            if point.field:
+                put(said.setdefault(point.topic, {}), point.field, value)
+            else:
+                whole[point.topic] = _plain(value)
+        return whole | {topic: json.dumps(value).encode() for topic, value in said.items()}
+
+
+class MqttSite:
+    """A broker with its devices. `replace`: replacements for the bus's settings."""
+
+    def __init__(self, settings: MqttSettings, stations: Sequence[PlantWiring]) -> None:
+        points = settings.wholes()
+        self._devices = [MqttDevice(station, points) for station in stations]
+        ages = [p.stale_after_s for p in points.values() if p.stale_after_s]
+        self._period_s = min(ages, default=1.0) / 3
+        self._slow_s = 2 * max(ages, default=1.0) + settings.timeout_s
+        self._noise = random.Random("mqtt")
+        self._last: dict[str, bytes] = {}
+        self._mode: FailureMode | None = None
+        self._failing = contextlib.ExitStack()
+        self._lock = threading.Lock()
+        self._closed = threading.Event()
+        self._broker = Mosquitto()
+        self._client = self._attached()
+        self.replace: dict[str, object] = {
+            **{"host": "127.0.0.1", "port": self._broker.port, "tls": None},
+            **{"user": None, "password_file": None},
+        }
+        self._thread = threading.Thread(target=self._run, name="mqtt-site", daemon=True)
+        self._thread.start()
+
+    def close(self) -> None:
+        """End the devices and the broker. May be called twice."""
+        if self._closed.is_set():
+            return
+        self._closed.set()
+        self._thread.join()
+        self._failing.close()
+        self._detach()
+        self._broker.close()
+
+    def _run(self) -> None:
+        next_at = 0.0
+        while not self._closed.wait(LOOK_S):
+            self._fail_as_ordered()
+            due = time.monotonic() >= next_at
+            if due:
+                next_at = time.monotonic() + self._period_s
+            for device in self._devices:
+                with self._lock:
+                    device.tick()
+                self._publish(device, everything=due and not device.asks)
+
+    def _attached(self) -> paho.Client:
+        """Connect the devices, and listen for commands. Raises HalError."""
+        client, ready = paho.Client(CallbackAPIVersion.VERSION2), threading.Event()
+        client.on_message = self._take
+        client.on_subscribe = lambda *_: ready.set()
+        client.connect("127.0.0.1", self._broker.port)
+        topics = {topic for d in self._devices for topic, _ in d.commands} | {
+            topic for d in self._devices for topic in d.asks
+        }
+        client.loop_start()
+        client.subscribe([(topic, 1) for topic in sorted(topics)] or "nothing")
+        if not ready.wait(READY_S):
+            raise HalError("the devices cannot reach their broker")
+        return client
+
+    def _detach(self) -> None:
+        self._client.disconnect()
+        self._client.loop_stop()
+
+    def _take(self, client: object, _: object, message: paho.MQTTMessage) -> None:
+        topic, payload = message.topic, message.payload.decode()
+        for device in self._devices:
+            mode = device.plant.failures.get("unit")
+            if mode == "off":
+                continue
+            if mode == "slow":
+                self._closed.wait(self._slow_s)
+            if found := device.commands.get((topic, payload)):
+                with self._lock:
+                    device.obey(*found)
+                self._publish(device, topic=device.points[found[0]].topic)
+            if device.asks.get(topic) == payload:
+                self._publish(device, everything=True)
+
+    def _publish(
+        self, device: MqttDevice, everything: bool = False, topic: str | None = None
+    ) -> None:
+        mode = device.plant.failures.get("unit")
+        if mode == "off" or self._mode == "wrong":
+            return
+        with self._lock:
+            for at, payload in device.states().items():
+                if mode == "stuck":
+                    payload = self._last.get(at, payload)
+                if everything or at == topic or self._last.get(at) != payload:
+                    self._last[at] = payload
+                    sent = self._noise.randbytes(20) if mode == "garbage" else payload
+                    self._client.publish(at, sent)
+
+    def _fail_as_ordered(self) -> None:
+        modes = (device.plant.failures.get("server") for device in self._devices)
+        mode = next((mode for mode in modes if mode), None)
+        if mode == self._mode:
+            return
+        self._failing.close()
+        self._mode = mode
+        if mode is not None:
+            self._failing.enter_context(getattr(self, f"_{mode}")())
+
+    @contextlib.contextmanager
+    def _off(self) -> Iterator[None]:
+        self._detach()
+        self._broker.kill()
+        yield
+        self._broker.start()
+        self._client = self._attached()
+
+    @contextlib.contextmanager
+    def _stuck(self) -> Iterator[None]:
+        self._broker.freeze()
+        yield
+        self._broker.thaw()
+
+    @contextlib.contextmanager
+    def _slow(self) -> Iterator[None]:
+        """Let the broker work for a moment at a time, with long rests between."""
+        over = threading.Event()
+
+        def rest() -> None:
+            while not over.is_set():
+                self._broker.freeze()
+                over.wait(self._slow_s)
+                self._broker.thaw()
+                over.wait(LOOK_S)
+
+        thread = threading.Thread(target=rest)
+        thread.start()
+        yield
+        over.set()
+        thread.join()
+
+    @contextlib.contextmanager
+    def _garbage(self) -> Iterator[None]:
+        """Put a server that speaks something else in the broker's place."""
+        with self._off(), socket.create_server(("127.0.0.1", self._broker.port)) as server:
+            threading.Thread(target=self._talk, args=(server,), daemon=True).start()
+            yield
+            with contextlib.suppress(OSError):
+                server.shutdown(socket.SHUT_RDWR)
+
+    def _talk(self, server: socket.socket) -> None:
+        with contextlib.suppress(OSError):
+            while True:
+                caller, _ = server.accept()
+                with caller:
+                    caller.sendall(self._noise.randbytes(200))
+
+    @contextlib.contextmanager
+    def _wrong(self) -> Iterator[None]:
+        """Restart the broker with retained states alone; the devices stay away."""
+        self._detach()
+        self._broker.kill()
+        self._broker.start()
+        self._client = self._attached()
+        for device in self._devices:
+            for topic, payload in device.states().items():
+                self._client.publish(topic, payload, retain=True)
+        yield
+
+
+def _value(point: MqttPoint, on: bool) -> object:
+    values = point.when if on else point.when_not
+    return values[0] if values else on
+
+
+def _plain(value: object) -> bytes:
+    return value.encode() if isinstance(value, str) else json.dumps(value).encode()
+
+
+FAKE = Outside(serve, parts=PARTS)

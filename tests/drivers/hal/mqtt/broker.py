@@ -1,0 +1,81 @@
+"""A broker, a bus to it, and a device's side of the wire, for the tests of the bus."""
+
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import msgspec
+import paho.mqtt.client as paho
+from paho.mqtt.enums import CallbackAPIVersion
+
+from drivers.hal import HalError
+from drivers.hal.mqtt import MqttBus, MqttSettings
+from hal_fakes.mosquitto import Mosquitto
+from tests.waiting import wait_until
+
+STATE, SWITCH = "relay/state", "relay/set"
+RELAY = {
+    "topic": STATE,
+    "when": ["ON"],
+    "when_not": ["OFF"],
+    "stale_after_s": 60,
+    "command": {"topic": SWITCH, "on": "ON", "off": "OFF"},
+    "switches_off_after_s": 60,
+}
+
+
+def settings(port: int, points: dict[str, Any] | None = None, **more: Any) -> MqttSettings:
+    """Return the settings of a bus to this port."""
+    plain = {"type": "mqtt", "host": "127.0.0.1", "port": port, "points": points or {}, **more}
+    return msgspec.convert(plain, MqttSettings)
+
+
+@contextmanager
+def bus_to(port: int, points: dict[str, Any] | None = None, **more: Any) -> Iterator[MqttBus]:
+    """Yield a bus to this port."""
+    bus = MqttBus(settings(port, points, **more))
+    try:
+        yield bus
+    finally:
+        bus.close()
+
+
+class FarDevice:
+    """A client of the broker on the far side. `taken`: the messages that it has received."""
+
+    def __init__(self, broker: Mosquitto, *topics: str, **options: Any) -> None:
+        self.taken: list[tuple[str, bytes, bool]] = []
+        self.ready = threading.Event()
+        self.client = paho.Client(CallbackAPIVersion.VERSION2, **options)
+        self.client.on_message = lambda _, __, m: self.taken.append((m.topic, m.payload, m.retain))
+        self.client.on_subscribe = lambda *_: self.ready.set()
+        self.client.connect("127.0.0.1", broker.port)
+        self.client.loop_start()
+        self.client.subscribe([(topic, 1) for topic in (*topics, "nothing")])
+        assert self.ready.wait(30)
+
+    def says(self, topic: str, payload: bytes | str, retain: bool = False) -> None:
+        """Publish, and wait until the broker has the message."""
+        info = self.client.publish(topic, payload, qos=1, retain=retain)
+        info.wait_for_publish(30)
+
+    def close(self) -> None:
+        """Leave the broker."""
+        self.client.disconnect()
+        self.client.loop_stop()
+
+
+def reason(bus: MqttBus, topic: str, stale_after_s: float = 60.0) -> str:
+    """Return why the topic's last message is no fact; "" if it is one."""
+    try:
+        bus.fresh(topic, stale_after_s)
+    except HalError as error:
+        return str(error)
+    return ""
+
+
+def hears(bus: MqttBus, topic: str) -> bytes:
+    """Wait until the topic's message is a fact; return it."""
+    wait_until(lambda: not reason(bus, topic), f"a live message on {topic}")
+    return bus.fresh(topic, 60.0).payload

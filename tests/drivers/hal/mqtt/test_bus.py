@@ -1,0 +1,237 @@
+"""The `mqtt` bus against a real broker that is killed, frozen and restarted."""
+
+import itertools
+from collections.abc import Iterator
+
+import pytest
+
+from drivers.hal import HalError
+from hal_fakes.mosquitto import Mosquitto
+from tests.drivers.hal.mqtt.broker import STATE, SWITCH, FarDevice, bus_to, hears, reason, settings
+from tests.waiting import wait_until
+
+VERSIONS = ["5", "3.1.1"]
+
+
+@pytest.fixture
+def broker() -> Iterator[Mosquitto]:
+    broker = Mosquitto()
+    yield broker
+    broker.close()
+
+
+@pytest.fixture
+def device(broker: Mosquitto) -> Iterator[FarDevice]:
+    device = FarDevice(broker, SWITCH)
+    yield device
+    device.close()
+
+
+@pytest.fixture(params=VERSIONS)
+def version(request: pytest.FixtureRequest) -> str:
+    return str(request.param)
+
+
+# ---- truth
+
+
+def test_a_live_message_is_a_fact_and_has_an_age(
+    broker: Mosquitto, device: FarDevice, version: str
+) -> None:
+    now = itertools.count(100.0, 10.0)
+    with bus_to(broker.port, version=version) as bus:
+        bus.listen(STATE)
+        bus.up()
+        device.says(STATE, "ON")
+        assert hears(bus, STATE) == b"ON"
+        bus.now = lambda: next(now) + 1e6
+        assert "more than stale_after_s (5 s)" in reason(bus, STATE, 5.0)
+
+
+def test_a_retained_message_is_no_fact_until_a_live_one_comes(
+    broker: Mosquitto, device: FarDevice, version: str
+) -> None:
+    device.says(STATE, "ON", retain=True)
+    with bus_to(broker.port, version=version) as bus:
+        bus.listen(STATE)
+        bus.up()
+        wait_until(lambda: bus.heard(STATE), "the retained message")
+        assert reason(bus, STATE) == (
+            "nothing was published on relay/state since we listen;"
+            " a retained message of unknown age says 'ON'"
+        )
+        device.says(STATE, "OFF", retain=True)
+        assert hears(bus, STATE) == b"OFF"
+
+
+def test_what_was_heard_before_the_broker_went_is_forgotten(
+    broker: Mosquitto, device: FarDevice
+) -> None:
+    with bus_to(broker.port) as bus:
+        bus.listen(STATE)
+        bus.up()
+        device.says(STATE, "ON")
+        hears(bus, STATE)
+        broker.kill()
+        wait_until(lambda: "refuses the connection" in reason(bus, STATE), "the broker is missed")
+        broker.start()
+        bus.insist()
+        wait_until(lambda: "since we listen" in reason(bus, STATE), "a connection with nothing heard")
+
+
+def test_every_message_reaches_a_driver_that_takes_them(
+    broker: Mosquitto, device: FarDevice
+) -> None:
+    taken: list[bytes] = []
+    with bus_to(broker.port) as bus:
+        bus.listen(STATE, lambda heard: taken.append(heard.payload))
+        bus.up()
+        said = [str(n).encode() for n in range(50)]
+        for payload in said:
+            device.says(STATE, payload)
+        wait_until(lambda: len(taken) == 50, "all messages")
+        assert taken == said
+
+
+def test_a_changed_state_wakes_the_bus_and_a_repeated_one_does_not(
+    broker: Mosquitto, device: FarDevice
+) -> None:
+    woken: list[None] = []
+    with bus_to(broker.port) as bus:
+        bus.on_edge(lambda: woken.append(None))
+        for topic in (STATE, "last"):
+            bus.listen(topic)
+        bus.up()
+        for payload in ("ON", "ON", "ON", "OFF"):
+            device.says(STATE, payload)
+        device.says("last", "")
+        hears(bus, "last")
+        assert len(woken) == 3
+
+
+# ---- commands
+
+
+def test_a_command_reaches_the_device_once_and_is_not_retained(
+    broker: Mosquitto, device: FarDevice, version: str
+) -> None:
+    with bus_to(broker.port, version=version) as bus:
+        bus.publish(SWITCH, "ON")
+        bus.publish(SWITCH, "OFF", safe=True)
+        wait_until(lambda: len(device.taken) == 2, "both commands")
+    assert device.taken == [(SWITCH, b"ON", False), (SWITCH, b"OFF", False)]
+    late = FarDevice(broker, SWITCH)
+    late.close()
+    assert late.taken == []
+
+
+def test_a_command_that_no_device_receives_is_an_error(broker: Mosquitto) -> None:
+    with bus_to(broker.port) as bus, pytest.raises(HalError, match="no device listens there"):
+        bus.publish("nobody/set", "ON")
+
+
+def test_on_expires_for_a_device_that_returns_later_and_off_does_not(broker: Mosquitto) -> None:
+    options = {"client_id": "relay", "clean_session": False}
+    FarDevice(broker, SWITCH, **options).close()
+    with bus_to(broker.port) as bus:
+        bus.publish(SWITCH, "ON", expires_s=1)
+        bus.publish(SWITCH, "OFF", safe=True)
+
+        def first_command() -> bytes:
+            device = FarDevice(broker, SWITCH, **options)
+            wait_until(lambda: device.taken, "a command")
+            device.close()
+            return device.taken[0][1]
+
+        marks = itertools.count()
+
+        def expired() -> bool:
+            bus.publish(SWITCH, f"mark {next(marks)}", safe=True)
+            return first_command() != b"ON"
+
+        wait_until(expired, "the broker has dropped 'on'")
+
+
+def test_no_command_of_an_earlier_connection_is_sent_again(
+    broker: Mosquitto, device: FarDevice, version: str
+) -> None:
+    with bus_to(broker.port, version=version, timeout_s=0.3) as bus:
+        bus.up()
+        broker.freeze()
+        with pytest.raises(HalError, match="does not confirm"):
+            bus.publish(SWITCH, "ON")
+        broker.kill()
+        broker.start()
+        later = FarDevice(broker, SWITCH)
+        bus.insist()
+        wait_until(lambda: _sent(bus, "OFF"), "the command to the new broker")
+        wait_until(lambda: later.taken, "a command")
+        later.close()
+        assert later.taken == [(SWITCH, b"OFF", False)]
+
+
+def _sent(bus: object, payload: str) -> bool:
+    try:
+        bus.publish(SWITCH, payload)  # type: ignore[attr-defined]
+    except HalError:
+        return False
+    return True
+
+
+# ---- the connection
+
+
+def test_a_lost_broker_costs_one_attempt_and_then_fails_at_once(broker: Mosquitto) -> None:
+    now = 0.0
+    with bus_to(broker.port) as bus:
+        bus.now = lambda: now
+        broker.kill()
+        for _ in range(3):
+            with pytest.raises(HalError, match="refuses the connection: is the broker running there?"):
+                bus.up()
+        assert bus.calls == 3 or bus.calls == 1
+
+
+def test_the_backoff_of_a_failed_reading_does_not_delay_switching_off(broker: Mosquitto) -> None:
+    broker.kill()
+    with bus_to(broker.port) as bus:
+        with pytest.raises(HalError):
+            bus.up()
+        broker.start()
+        with pytest.raises(HalError):
+            bus.up()
+        assert bus.up(safe=True).up
+
+
+def test_a_frozen_broker_is_noticed_by_its_silence(broker: Mosquitto) -> None:
+    with bus_to(broker.port, keepalive_s=1) as bus:
+        bus.listen(STATE)
+        link = bus.up()
+        broker.freeze()
+        wait_until(lambda: link.failure, "the broker's silence")
+
+
+def test_a_connection_is_without_delay(broker: Mosquitto) -> None:
+    import socket
+
+    with bus_to(broker.port) as bus:
+        sock = bus.up()._client.socket()
+        assert isinstance(sock, socket.socket)
+        assert sock.getsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY)
+
+
+def test_another_client_with_our_id_is_named(broker: Mosquitto) -> None:
+    with bus_to(broker.port, client_id="lift") as bus, bus_to(broker.port, client_id="lift") as other:
+        link = bus.up()
+        other.up()
+        wait_until(lambda: link.failure, "the end of the first connection")
+        assert link.failure == "the broker has ended the connection: session taken over"
+
+
+def test_a_bus_has_a_limit_of_topics() -> None:
+    bus_settings = settings(1883)
+    with bus_to(bus_settings.port or 0) as bus:
+        for n in range(512):
+            bus.listen(f"topic/{n}")
+        with pytest.raises(HalError, match="at most 512 topics"):
+            bus.listen("topic/512")
