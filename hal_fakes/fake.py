@@ -79,8 +79,8 @@ def plants_on(config: Config, bus: str) -> dict[str, Plant]:
         name: _fake(config, name).plant(name, config.devices[name], config.wires(name))
         for name in config.devices_on(bus)
     }
-    for plant in plants.values() if isinstance(far, Outside) else ():
-        plant.add_parts(far.parts)
+    for plant in plants.values():
+        plant.add_parts(far.parts if isinstance(far, Outside) else ())
     return plants
 
 

@@ -4,9 +4,9 @@ The devices are one real MQTT client. They publish a changed state at once, answ
 states that are not asked for three times in `stale_after_s`. A relay with a timer switches itself off.
 On command (`fail DEVICE unit|server MODE`) one device, or the broker, is
 
-|        | off              | stuck                     | slow           | garbage         | wrong          |
-| unit   | silent           | publishes its last states | obeys too late | publishes noise | publishes `?`  |
-| server | killed           | frozen                    | answers late   | is no broker    | only remembers |
+|        | off    | stuck           | slow           | garbage         | wrong          |
+| unit   | silent | says the same   | obeys too late | publishes noise | publishes `?`  |
+| server | killed | frozen          | answers late   | is no broker    | only remembers |
 """
 
 import contextlib
@@ -107,8 +107,11 @@ class MqttSite:
         self._broker = Mosquitto()
         self._client = self._attached()
         self.replace: dict[str, object] = {
-            **{"host": "127.0.0.1", "port": self._broker.port, "tls": None},
-            **{"user": None, "password_file": None},
+            "host": "127.0.0.1",
+            "port": self._broker.port,
+            "tls": None,
+            "user": None,
+            "password_file": None,
         }
         self._thread = threading.Thread(target=self._run, name="mqtt-site", daemon=True)
         self._thread.start()

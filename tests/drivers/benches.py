@@ -9,13 +9,14 @@ import msgspec
 import pytest
 
 from drivers import Driver, DriverError
-from drivers.hal import gpio, http, modbus
+from drivers.hal import gpio, http, modbus, mqtt
 from drivers.hal.points import Wire
 from hal_fakes.gpio import WiredFactory
 from hal_fakes.http import HttpServer, HttpStation
 from hal_fakes.modbus import ModbusServer
 from hal_fakes.modbus.rtu import RtuLine
 from hal_fakes.modbus.units import FarSide
+from hal_fakes.mqtt import PARTS, MqttSite
 from hal_fakes.plants.plant import FailureMode, Plant
 from hal_fakes.realtime import RealTime
 from hal_fakes.wiring import PlantWiring
@@ -144,6 +145,29 @@ def on_http(
     finally:
         bus.close()
         server.close()
+        world.close()
+
+
+@contextmanager
+def on_mqtt(
+    world: RealTime, wirings: Sequence[PlantWiring], points: dict[str, object], timeout_s: float
+) -> Iterator[mqtt.MqttBus]:
+    """Yield a bus to a real broker, with these devices behind it; its clock is real."""
+    plain: dict[str, object] = {
+        "type": "mqtt",
+        "host": "x",
+        "timeout_s": timeout_s,
+        "points": points,
+    }
+    for wiring in wirings:
+        wiring.plant.add_parts(PARTS)
+    site = MqttSite(msgspec.convert(plain, mqtt.MqttSettings), wirings)
+    bus = mqtt.MqttBus(msgspec.convert(plain | site.replace, mqtt.MqttSettings))
+    try:
+        yield bus
+    finally:
+        bus.close()
+        site.close()
         world.close()
 
 

@@ -37,16 +37,18 @@ class MqttLines:
     def claim(self) -> None:
         """Switch every relay off, once only, and give the device time to publish its first states.
 
-        A claim after a failure only looks for the broker: a lost confirmation must not release a held
-        door.
+        Raises HalError for a state that is no fact. A claim after a failure only reads: a lost
+        confirmation must not release a held door.
         """
-        self._bus.up()
-        if self._claimed:
-            return
-        self.write(dict.fromkeys(self._outputs, False))
-        self._claimed = True
+        if not self._claimed:
+            self.write(dict.fromkeys(self._outputs, False))
+            self._claimed = True
+            self._bus.ask(self._asks)
+            self._bus.wait(self._all_heard, self._bus.settings.timeout_s)
         self._bus.ask(self._asks)
-        self._bus.wait(self._all_heard, self._bus.settings.timeout_s)
+        for point in (*self._inputs.values(), *self._outputs.values()):
+            if point.topic:
+                self._state(point)
 
     def read(self) -> dict[str, bool]:
         """Read every contact. Raises HalError for a state that is no fact, or a contradicting relay."""
@@ -158,12 +160,8 @@ class MqttLines:
             return False
 
     def _all_heard(self) -> bool:
-        try:
-            for point in self._inputs.values():
-                self._state(point)
-            return all(self._said(name) is not None for name, p in self._outputs.items() if p.topic)
-        except HalError:
-            return False
+        topics = {p.topic for p in (*self._inputs.values(), *self._outputs.values()) if p.topic}
+        return all(found and found.at is not None for found in map(self._bus.heard, topics))
 
 
 def _word(on: bool) -> str:

@@ -4,8 +4,8 @@ Each connection has a client of its own and a clean session. So nothing of an ea
 again: paho repeats unconfirmed messages when it reconnects, and an "on" of a minute ago must not be
 repeated. A thread serves the connection; it ends with it.
 
-The protocol allows packets of 256 MB. With MQTT 5 we tell the broker our limit (Maximum Packet Size, MQTT
-5.0 section 3.1.2.11.4), and the broker holds longer packets back. MQTT 3.1.1 has no such limit, so with
+The protocol allows packets of 256 MB. With MQTT 5 we tell the broker our limit (Maximum Packet Size,
+section 3.1.2.11.4), and the broker holds longer packets back. MQTT 3.1.1 has no such limit, so with
 that version a longer packet ends the connection before its payload is read.
 """
 
@@ -18,6 +18,7 @@ from collections.abc import Callable, Iterable
 from typing import Any, Final
 
 import paho.mqtt.client as paho
+from paho.mqtt import MQTTException
 from paho.mqtt.enums import CallbackAPIVersion
 from paho.mqtt.packettypes import PacketTypes
 from paho.mqtt.properties import Properties
@@ -67,6 +68,8 @@ class Link(threading.Thread):
     def run(self) -> None:
         """Connect, and serve the connection until its end."""
         failure = "the broker has closed the connection"
+        if self._settings.client_id:
+            failure += f": does another client have the id {self._settings.client_id}?"
         try:
             host, port = self._settings.address()
             self._client.connect(
@@ -82,7 +85,7 @@ class Link(threading.Thread):
             KeyError,
             TypeError,
             struct.error,
-            paho.MQTTException,
+            MQTTException,
         ) as error:
             failure = f"no MQTT ({excerpt(str(error))}): is it an MQTT broker?"
         finally:
@@ -100,7 +103,7 @@ class Link(threading.Thread):
         """Send a message. With `qos` 1, wait for the broker's confirmation. Raises HalError."""
         properties = None
         if self._v5 and expires_s is not None:
-            properties = Properties(PacketTypes.PUBLISH)
+            properties = Properties(PacketTypes.PUBLISH)  # type: ignore[no-untyped-call]
             properties.MessageExpiryInterval = expires_s
         info = self._client.publish(topic, payload, qos, retain=False, properties=properties)
         if info.rc != paho.MQTT_ERR_SUCCESS:
@@ -125,14 +128,14 @@ class Link(threading.Thread):
     def _v5(self) -> bool:
         return self._settings.version == "5"
 
-    def _made(self) -> paho.Client:
+    def _made(self) -> "BoundedClient":
         settings = self._settings
         client = BoundedClient(
             CallbackAPIVersion.VERSION2,
             client_id=settings.client_id or f"rmf-{os.urandom(6).hex()}",
+            clean_session=None if self._v5 else True,
             protocol=paho.MQTTv5 if self._v5 else paho.MQTTv311,
             reconnect_on_failure=False,
-            **({} if self._v5 else {"clean_session": True}),
         )
         client.connect_timeout = settings.timeout_s
         if settings.user:
@@ -172,7 +175,7 @@ class Link(threading.Thread):
         self._rise()
 
     def _on_message(self, client: object, _: object, message: paho.MQTTMessage) -> None:
-        self._take(message.topic, message.payload, message.retain)
+        self._take(message.topic, bytes(message.payload), message.retain)
 
     def _on_publish(
         self, client: object, _: object, mid: int, reason: ReasonCode, properties: object
@@ -248,7 +251,7 @@ class BoundedClient(paho.Client):
 def _connect_options(v5: bool) -> dict[str, Any]:
     if not v5:
         return {}
-    properties = Properties(PacketTypes.CONNECT)
+    properties = Properties(PacketTypes.CONNECT)  # type: ignore[no-untyped-call]
     properties.MaximumPacketSize = PACKET_MAX
     properties.SessionExpiryInterval = 0
     return {"clean_start": True, "properties": properties}

@@ -124,8 +124,8 @@ def _used_twice(points: Mapping[str, MqttPoint]) -> Remarks:
                 yield _at(points[name], name, key), f"is the same {key} as that of '{other}'"
         for key, topic in _written(point):
             if topic in states:
-                text = f"{topic} is the state topic of '{states[topic]}': the {key} would be taken for it"
-                yield _at(point, name, key), text
+                whose = f"{topic} is the state topic of '{states[topic]}'"
+                yield _at(point, name, key), f"{whose}: the {key} would be taken for a state"
 
 
 def _uses(point: MqttPoint) -> Iterator[tuple[str, object]]:
@@ -203,7 +203,7 @@ def unfit(settings: MqttSettings, point: str, direction: Literal["in", "out"]) -
 def place(settings: MqttSettings, point: str) -> str | None:
     """Return the command that no other file may send; None for a state, which every file may read."""
     command = settings.points[point].whole().command
-    return command and f"the command {command.topic} {command.on}"
+    return f"the command {command.topic} {command.on}" if command else None
 
 
 def wire_problems(wire: Wire) -> Iterable[str]:

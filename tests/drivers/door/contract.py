@@ -108,6 +108,7 @@ class DoorContract(Contract[Bench]):
         bench.driver.make_safe()
         bench.write(HOLD)
         bench.driver.close()
+        wait_until(lambda: len(bench.relay()) == 4, "the last release")
         assert bench.relay() == [True, False] * 2
 
 

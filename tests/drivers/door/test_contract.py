@@ -9,10 +9,11 @@ import msgspec
 from drivers.door import dry_contact as door_dry_contact
 from drivers.door import register as door_register
 from drivers.hal import modbus
+from drivers.hal.mqtt import MqttBus
 from hal_fakes.modbus.register_door import FakeRegisterDoor, contacts
 from hal_fakes.realtime import RealTime
 from hal_fakes.wiring import PlantWiring
-from tests.drivers.benches import RS485, on_modbus, on_pins
+from tests.drivers.benches import RS485, TIMEOUT_S, on_modbus, on_mqtt, on_pins
 from tests.drivers.door.contract import Bench, DoorContract, WiredDoorContract, quick
 
 
@@ -69,6 +70,34 @@ class TestDryContactsOnGpio(DoorContract):
         plant = world.plants["door"]
         with on_pins(world, plant, wires) as bus:
             yield Bench(door_dry_contact.create("door", settings, bus), plant)
+
+
+class MqttBench(Bench):
+    """A bench whose bus has a real clock, so that a pause of the bus is skipped."""
+
+    bus: MqttBus
+
+    def a_moment(self) -> None:
+        self.bus.insist()
+
+
+class TestDryContactsOnMqtt(WiredDoorContract):
+    @contextmanager
+    def benches(self) -> Iterator[Bench]:
+        settings = dry(("opened", "closed", "hold"))
+        wires = door_dry_contact.wires(settings)
+        world = RealTime({"door": quick("door", wires)})
+        wiring = PlantWiring(world.plants["door"], wires, str)
+        shelly = {"profile": "shelly-gen2", "device": "door", "stale_after_s": 1}
+        points: dict[str, object] = {
+            "opened": {**shelly, "part": "input:0"},
+            "closed": {**shelly, "part": "input:1"},
+            "hold": {**shelly, "part": "switch:0", "switches_off_after_s": 60},
+        }
+        with on_mqtt(world, [wiring], points, TIMEOUT_S) as bus:
+            bench = MqttBench(door_dry_contact.create("door", settings, bus), wiring.plant)
+            bench.bus = bus
+            yield bench
 
 
 class RegisterContract(WiredDoorContract):

@@ -1,7 +1,8 @@
 """A broker, a bus to it, and a device's side of the wire, for the tests of the bus."""
 
 import threading
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
@@ -32,9 +33,14 @@ def settings(port: int, points: dict[str, Any] | None = None, **more: Any) -> Mq
 
 
 @contextmanager
-def bus_to(port: int, points: dict[str, Any] | None = None, **more: Any) -> Iterator[MqttBus]:
+def bus_to(
+    port: int,
+    points: dict[str, Any] | None = None,
+    clock: Callable[[], float] = time.monotonic,
+    **more: Any,
+) -> Iterator[MqttBus]:
     """Yield a bus to this port."""
-    bus = MqttBus(settings(port, points, **more))
+    bus = MqttBus(settings(port, points, **more), clock)
     try:
         yield bus
     finally:
@@ -48,7 +54,9 @@ class FarDevice:
         self.taken: list[tuple[str, bytes, bool]] = []
         self.ready = threading.Event()
         self.client = paho.Client(CallbackAPIVersion.VERSION2, **options)
-        self.client.on_message = lambda _, __, m: self.taken.append((m.topic, m.payload, m.retain))
+        self.client.on_message = lambda _, __, m: self.taken.append(
+            (m.topic, bytes(m.payload), m.retain)
+        )
         self.client.on_subscribe = lambda *_: self.ready.set()
         self.client.connect("127.0.0.1", broker.port)
         self.client.loop_start()

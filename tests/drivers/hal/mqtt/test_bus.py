@@ -1,11 +1,14 @@
 """The `mqtt` bus against a real broker that is killed, frozen and restarted."""
 
 import itertools
+import socket
 from collections.abc import Iterator
+from typing import Any
 
 import pytest
 
 from drivers.hal import HalError
+from drivers.hal.mqtt import MqttBus
 from hal_fakes.mosquitto import Mosquitto
 from tests.drivers.hal.mqtt.broker import STATE, SWITCH, FarDevice, bus_to, hears, reason, settings
 from tests.waiting import wait_until
@@ -76,7 +79,9 @@ def test_what_was_heard_before_the_broker_went_is_forgotten(
         wait_until(lambda: "refuses the connection" in reason(bus, STATE), "the broker is missed")
         broker.start()
         bus.insist()
-        wait_until(lambda: "since we listen" in reason(bus, STATE), "a connection with nothing heard")
+        wait_until(
+            lambda: "since we listen" in reason(bus, STATE), "a connection with nothing heard"
+        )
 
 
 def test_every_message_reaches_a_driver_that_takes_them(
@@ -131,7 +136,7 @@ def test_a_command_that_no_device_receives_is_an_error(broker: Mosquitto) -> Non
 
 
 def test_on_expires_for_a_device_that_returns_later_and_off_does_not(broker: Mosquitto) -> None:
-    options = {"client_id": "relay", "clean_session": False}
+    options: dict[str, Any] = {"client_id": "relay", "clean_session": False}
     FarDevice(broker, SWITCH, **options).close()
     with bus_to(broker.port) as bus:
         bus.publish(SWITCH, "ON", expires_s=1)
@@ -170,9 +175,9 @@ def test_no_command_of_an_earlier_connection_is_sent_again(
         assert later.taken == [(SWITCH, b"OFF", False)]
 
 
-def _sent(bus: object, payload: str) -> bool:
+def _sent(bus: MqttBus, payload: str) -> bool:
     try:
-        bus.publish(SWITCH, payload)  # type: ignore[attr-defined]
+        bus.publish(SWITCH, payload)
     except HalError:
         return False
     return True
@@ -182,19 +187,17 @@ def _sent(bus: object, payload: str) -> bool:
 
 
 def test_a_lost_broker_costs_one_attempt_and_then_fails_at_once(broker: Mosquitto) -> None:
-    now = 0.0
-    with bus_to(broker.port) as bus:
-        bus.now = lambda: now
+    with bus_to(broker.port, clock=lambda: 0.0) as bus:
         broker.kill()
         for _ in range(3):
-            with pytest.raises(HalError, match="refuses the connection: is the broker running there?"):
+            with pytest.raises(HalError, match="refuses the connection: is the broker running"):
                 bus.up()
-        assert bus.calls == 3 or bus.calls == 1
+        assert bus.calls == 1
 
 
 def test_the_backoff_of_a_failed_reading_does_not_delay_switching_off(broker: Mosquitto) -> None:
     broker.kill()
-    with bus_to(broker.port) as bus:
+    with bus_to(broker.port, clock=lambda: 0.0) as bus:
         with pytest.raises(HalError):
             bus.up()
         broker.start()
@@ -212,8 +215,6 @@ def test_a_frozen_broker_is_noticed_by_its_silence(broker: Mosquitto) -> None:
 
 
 def test_a_connection_is_without_delay(broker: Mosquitto) -> None:
-    import socket
-
     with bus_to(broker.port) as bus:
         sock = bus.up()._client.socket()
         assert isinstance(sock, socket.socket)
@@ -221,11 +222,17 @@ def test_a_connection_is_without_delay(broker: Mosquitto) -> None:
 
 
 def test_another_client_with_our_id_is_named(broker: Mosquitto) -> None:
-    with bus_to(broker.port, client_id="lift") as bus, bus_to(broker.port, client_id="lift") as other:
+    with (
+        bus_to(broker.port, client_id="lift") as bus,
+        bus_to(broker.port, client_id="lift") as other,
+    ):
         link = bus.up()
         other.up()
         wait_until(lambda: link.failure, "the end of the first connection")
-        assert link.failure == "the broker has ended the connection: session taken over"
+        assert link.failure in (
+            "the broker has closed the connection: does another client have the id lift?",
+            "the broker has ended the connection: session taken over",
+        )
 
 
 def test_a_bus_has_a_limit_of_topics() -> None:
