@@ -69,8 +69,9 @@ class MqttLines:
             with every.one():
                 if levels[name]:
                     self._rivals.check([name])
+                self._since[name] = self._bus.now()  # an answer may come before the confirmation
                 self._send(name, levels[name])
-                self._set[name], self._since[name] = levels[name], self._bus.now()
+                self._set[name] = levels[name]
         every.check()
 
     def renew(self, names: Iterable[str]) -> None:

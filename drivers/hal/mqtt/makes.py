@@ -67,8 +67,8 @@ def zigbee2mqtt(device: str, part: str, off_s: float | None) -> Keys:
     """Return a property such as `state` (a relay) or `contact`; `device`: its friendly name.
 
     `contact` is true while the contact is closed. The relay's firmware must support `on_time`. A
-    battery sensor sleeps and does not answer `get`, so its properties are never asked for. The availability
-    topic is published only if Zigbee2MQTT has `availability` enabled. Sources:
+    battery sensor sleeps and does not answer `get`, so its properties are never asked for. The
+    availability topic is published only if Zigbee2MQTT has `availability` enabled. Sources:
     www.zigbee2mqtt.io/guide/usage/mqtt_topics_and_messages.html, and "On with timed off" on the pages
     of switches below www.zigbee2mqtt.io/devices.
     """
