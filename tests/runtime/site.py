@@ -45,19 +45,21 @@ doors:
 class Module:
     """The I/O module and the door behind it, in this process; the module outlives every daemon."""
 
+    text = YAML
+
     def __init__(self, directory: Path, domain: int, transport: str | None = None) -> None:
         transport = transport or wire()
         self.directory = directory
         self.domain = domain
         self.edges: list[dict[str, Any]] = []
         draft = directory / "draft.yaml"
-        draft.write_text(YAML.format(domain=domain, transport=transport, port=502))
+        draft.write_text(self.text.format(domain=domain, transport=transport, port=502))
         path = directory / "plant.sock"
         self._far_side = ExitStack()
         there: Any = self._far_side.enter_context(served(draft, "module", path))
         self.file = directory / "ward_door.yaml"
-        port = there["tcp"]["port"]
-        self.yaml = YAML.format(domain=domain, transport=transport, port=port)
+        port = there.get("tcp", there)["port"]
+        self.yaml = self.text.format(domain=domain, transport=transport, port=port)
         self.file.write_text(self.yaml)
         self._follow = socket.socket(socket.AF_UNIX)
         self._follow.connect(str(path))
