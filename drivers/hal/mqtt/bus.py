@@ -173,12 +173,42 @@ class MqttBus(Bus):
                 self.publish(one.topic, one.payload, qos=0)
 
     def wait(self, done: Callable[[], bool], timeout_s: float) -> bool:
-        """Wait until `done`, which is asked again at each message; return whether it is true."""
-        link = self._link
-        if link is None:
-            return done()
+        """Wait until `done`, which is asked again at each message; return whether it is true.
+
+        Raises HalError without a connection.
+        """
+        link = self.up()
         with link.changed:
             return link.changed.wait_for(lambda: bool(link.failure) or done(), timeout_s)
+
+    def topics(self) -> Iterable[str]:
+        """Return the topics that the bus listens to."""
+        return tuple(self._takers)
+
+    def survey(self, listen_s: float) -> tuple[Mapping[str, str], bool]:
+        """Listen to every topic of the broker on a second connection; for people who look for devices.
+
+        Return topic -> `live` or `retained`, and whether all topics had room. Raises HalError.
+        """
+        from drivers.hal.mqtt.link import Link
+
+        found: dict[str, str] = {}
+
+        def take(topic: str, payload: bytes, retained: bool) -> None:
+            if len(found) < TOPICS_MAX:
+                found[topic] = "retained" if retained else "live"
+
+        settings = msgspec.structs.replace(self.settings, client_id=None)
+        link = Link(settings, ["#"], take)
+        link.start()
+        with link.changed:
+            link.changed.wait_for(lambda: link.up or link.failure, settings.timeout_s)
+            link.changed.wait_for(lambda: link.failure, listen_s if link.up else 0.0)
+        failure = link.failure or link.refused.get("#") or ("" if link.up else "no answer")
+        link.close()
+        if failure:
+            raise HalError(failure)
+        return found, len(found) < TOPICS_MAX
 
     def on_edge(self, wake: Callable[[], None]) -> None:
         """Call `wake`, from the connection's thread, when a topic's payload changes, and at its end."""

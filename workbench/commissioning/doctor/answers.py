@@ -21,6 +21,9 @@ from workbench.commissioning.doctor.finding import Finding, note, ok, warning, w
 TRIES: Final = 3
 HEARD_S: Final = 1.5
 """Slow broadcasts come once a second."""
+ANSWERS_S: Final = 0.5
+"""Devices on MQTT take so long to answer a question."""
+TOPICS_SHOWN: Final = 40
 UNITS_MOST: Final = {"modbus": 247, "can": 127}
 """Modbus over Serial Line V1.02, 2.2; CiA 301."""
 SOME: Final = 16
@@ -28,6 +31,7 @@ LOOK_AT: Final = {
     "modbus": 'supply and cable; docs/how-to/wire.md, "RS-485"',
     "can": 'supply and cable; docs/how-to/wire.md, "CAN"',
     "http": "curl with the same address",
+    "mqtt": "mosquitto_sub -v with the same address and topics; rmf-bridge doctor --scan",
 }
 TEXTS: Final = "docs/how-to/troubleshoot.md"
 NO_PATH: Final = (10, 11)
@@ -89,17 +93,17 @@ def _read(read: Callable[[], Any], bus: Bus) -> Any:
         try:
             return read()
         except DriverError:
-            continue
+            _listened(bus, ANSWERS_S)
     bus.insist()
     return read()
 
 
-def _listened(bus: Any) -> None:
-    """On CAN, receive for a while. Faults of the bus show in the readings."""
+def _listened(bus: Any, listen_s: float = HEARD_S) -> None:
+    """On CAN and MQTT, receive for a while. Faults of the bus show in the readings."""
     if not hasattr(bus, "wait"):
         return
     try:
-        bus.wait(lambda: False, HEARD_S)
+        bus.wait(lambda: False, listen_s)
     except HalError:
         return
 
@@ -151,7 +155,26 @@ def _can(config: Config, bus_name: str, bus: Any, whole: bool) -> Iterator[Findi
         yield _scanned(f"bus {bus_name}", "node", "can", ours, whole, answering)
 
 
-SCANS: Final = {"modbus": _modbus, "can": _can}
+def _mqtt(config: Config, bus_name: str, bus: Any, whole: bool) -> Iterator[Finding]:
+    """List the topics that there are, for `--scan` only: our user may not be allowed to read them."""
+    if not whole:
+        return
+    subject, ours = f"bus {bus_name}", set(bus.topics())
+    try:
+        found, all_heard = bus.survey(HEARD_S)
+    except HalError as error:
+        yield warning(subject, f"the topics cannot be listed: {error}", "", LOOK_AT["mqtt"])
+        return
+    number = f"{len(found)} topics" if all_heard else f"more than {len(found)} topics"
+    yield note(subject, f"{number} were heard in {HEARD_S:g} s; a silent device is not among them")
+    strangers = sorted(topic for topic in found if topic not in ours)
+    for topic in strangers[:TOPICS_SHOWN]:
+        yield note(subject, f"{found[topic]} {topic}")
+    if len(strangers) > TOPICS_SHOWN:
+        yield note(subject, f"and {len(strangers) - TOPICS_SHOWN} more: {LOOK_AT['mqtt']}")
+
+
+SCANS: Final = {"modbus": _modbus, "can": _can, "mqtt": _mqtt}
 
 
 def _scanned(
