@@ -34,7 +34,7 @@ from drivers.hal import Bus, HalError
 from drivers.hal.backoff import Backoff
 from drivers.hal.mqtt.lines import MqttLines
 from drivers.hal.mqtt.settings import MqttSettings
-from drivers.hal.mqtt.topics import PAYLOAD_MAX, TOPICS_MAX, Ask, Qos
+from drivers.hal.mqtt.topics import PAYLOAD_MAX, TOPICS_MAX, Ask, Availability, Qos
 from drivers.hal.points import Pull
 
 if TYPE_CHECKING:
@@ -142,6 +142,18 @@ class MqttBus(Bus):
             )
         if len(found.payload) != found.length:
             raise HalError(f"the message on {topic} is too long: {found.length} bytes")
+        return found
+
+    def believed(self, topic: str, stale_after_s: float, notices: Availability | None) -> Heard:
+        """Return the topic's last message if it is a fact and the device has not gone since.
+
+        Raises HalError for any other. A retained notice proves nothing.
+        """
+        found = self.fresh(topic, stale_after_s)
+        notice = self.heard(notices.topic) if notices else None
+        if notices and notice and notice.payload.decode(errors="replace") in notices.offline:
+            if notice.at is not None and found.at is not None and notice.at >= found.at:
+                raise HalError(f"{notices.topic} says that the device is offline")
         return found
 
     def publish(

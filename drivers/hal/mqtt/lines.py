@@ -112,13 +112,7 @@ class MqttLines:
         """Return the state. Raises HalError if it is no fact."""
         assert point.topic
         assert point.stale_after_s
-        found = self._bus.fresh(point.topic, point.stale_after_s)
-        if point.availability:
-            notice = self._bus.heard(point.availability.topic)
-            if notice and notice.payload.decode(errors="replace") in point.availability.offline:
-                at = notice.at
-                if at is not None and at >= (found.at or 0.0):
-                    raise HalError(f"{point.availability.topic} says that the device is offline")
+        found = self._bus.believed(point.topic, point.stale_after_s, point.availability)
         return point.asserted(found.payload)
 
     def _verify(self, name: str, level: bool) -> None:

@@ -100,9 +100,8 @@ class MqttPoint(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
 
     def asserted(self, payload: bytes) -> bool:
         """Decode the state. Raises HalError for a payload that means neither on nor off."""
-        text = _text(payload)
         try:
-            value = self._value(text)
+            value = self._value(payload)
             if not self.when and isinstance(value, bool):
                 return value
             for values, means in ((self.when, True), (self.when_not, False)):
@@ -113,15 +112,13 @@ class MqttPoint(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
         except DriverError as error:
             raise HalError(f"{self.topic}: {error}") from None
 
-    def _value(self, text: str) -> object:
-        try:
-            value = strict_json(text)
-        except ValueError as error:
-            if self.field:
-                raise DriverError(f"is no JSON: {error}") from None
-            return text
+    def _value(self, payload: bytes) -> object:
         if self.field is None:
-            return value
+            return decoded(payload)
+        try:
+            value = strict_json(payload.decode(errors="replace"))
+        except ValueError as error:
+            raise DriverError(f"is no JSON: {error}") from None
         if not isinstance(value, dict):
             raise json_fields.wrong(WHOLE, value, "a JSON object")
         return json_fields.needed(value, self.field)
@@ -130,8 +127,13 @@ class MqttPoint(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
 _KEPT = (*("profile", "device", "part", "stale_after_s", "switches_off_after_s", "accept_unsafe"),)
 
 
-def _text(payload: bytes) -> str:
-    return payload.decode(errors="replace")
+def decoded(payload: bytes) -> object:
+    """Decode JSON; return any other payload as its text."""
+    text = payload.decode(errors="replace")
+    try:
+        return strict_json(text)
+    except ValueError:
+        return text
 
 
 def _state_problems(point: MqttPoint) -> Remarks:

@@ -48,6 +48,33 @@ class Availability(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
     ]
 
 
+class StateTopic(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A topic where a device publishes a state, as JSON or as a plain text or number."""
+
+    topic: Annotated[Topic, tells("where the state is published.")]
+    stale_after_s: Annotated[
+        Age,
+        tells("""the age from which a state is unknown: longer than the device's own period, or than
+        the time in which it answers `ask`."""),
+    ]
+    ask: Annotated[
+        Ask | None, tells("a message, sent in every scan, that makes the device publish its state.")
+    ] = None
+    availability: Annotated[
+        Availability | None, tells("the device's own notice that it has lost its connection.")
+    ] = None
+
+
+class Message(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """One command to a device. It is never retained."""
+
+    topic: Annotated[Topic, tells("where the device listens.")]
+    payload: Annotated[Payload, tells("the message.")] = ""
+    qos: Annotated[
+        Qos, tells("1: the broker confirms the message, and repeats it; 0: it does not.")
+    ] = 1
+
+
 class RelayCommand(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """The messages that switch one relay. They are never retained."""
 

@@ -13,7 +13,7 @@ import pytest
 from bridges.kinds.charger.signals import Activity, ChargerOutputs, ChargerSample
 from bridges.settings.load import Config, load
 from drivers import DriverError
-from drivers.charger.http import HttpCharger, create
+from drivers.charger.http import create
 from drivers.charger.state_codes import Codes
 from drivers.hal.http import HttpBus
 from hal_fakes.fake import plants_on, stations_on
@@ -39,7 +39,7 @@ class Fake:
         pointed = msgspec.structs.replace(settings, **self.server.replace)
         calls = iter(range(10**6))
         self.bus = HttpBus(pointed, clock=lambda: 1000.0 * next(calls))
-        self.driver: HttpCharger = create("charger_a", config.devices["charger_a"], self.bus)
+        self.driver = create("charger_a", config.devices["charger_a"], self.bus)
 
     def press(self, signal: str, asserted: bool) -> None:
         self.plant.press(signal, asserted, time.monotonic())

@@ -1,0 +1,131 @@
+"""A charging station behind an MQTT broker, whose states are JSON or plain values on topics.
+
+`topics` names each state topic; a field then begins with that name (`status.charger.state`), and the name
+alone is a plain payload. What the fields mean is written as for a station on HTTP. Every topic must
+have a live message that is not stale, or there is no reading.
+"""
+
+from collections.abc import Iterator, Mapping
+from typing import Annotated
+
+import msgspec
+
+from bridges.kinds.shared.fields import tells
+from bridges.kinds.shared.remarks import Remarks
+from drivers.charger import json_station
+from drivers.charger.json_station import POWER, JsonCharger, JsonChargerSettings, StationCommand
+from drivers.driver_type import DriverType
+from drivers.hal.mqtt import MqttBus, MqttSettings
+from drivers.hal.mqtt.points import decoded
+from drivers.hal.mqtt.topics import Message, StateTopic
+
+Key = Annotated[
+    str,
+    msgspec.Meta(
+        pattern=r"^[A-Za-z_][A-Za-z0-9_-]{0,63}$(?!\n)",
+        extra={"pattern": "a short name without dots (status)"},
+    ),
+]
+COMMANDS = ("start", "stop", "range_check", "clear_error")
+
+
+class MqttChargerSettings(
+    JsonChargerSettings, frozen=True, kw_only=True, forbid_unknown_fields=True
+):
+    """One station and its topics."""
+
+    topics: Annotated[
+        dict[Key, StateTopic],
+        msgspec.Meta(min_length=1, max_length=32),
+        tells("name -> a topic with states; the fields begin with this name."),
+    ]
+    start: Annotated[Message | None, tells("switches the power on for the robot on the pad.")] = (
+        None
+    )
+    stop: Annotated[Message | None, tells("switches the power off.")] = None
+    range_check: Annotated[
+        Message | None,
+        tells("orders a check of the robot's position, if the station needs an order."),
+    ] = None
+    clear_error: Annotated[Message | None, tells("clears the station's error.")] = None
+
+    def problems(self) -> Remarks:
+        """Yield problems that involve more than one field."""
+        yield from super().problems()
+        states = {topic.topic: name for name, topic in self.topics.items()}
+        for name, topic in self.topics.items():
+            if states[topic.topic] != name:
+                yield ("topics", name, "topic"), f"is the topic of {states[topic.topic]} too"
+        for command in COMMANDS:
+            message = self.command(command)
+            if message and message.topic in states:
+                text = f"{message.topic} is a state topic: the command would be taken for a state"
+                yield (command, "topic"), text
+        if self.start and self.start == self.stop:
+            yield ("stop",), "is the same message as start"
+
+
+def claims(settings: MqttChargerSettings) -> Iterator[tuple[str, tuple[str, ...]]]:
+    """Yield (place, path) of the station's commands: no other charger may send them."""
+    for name in COMMANDS:
+        if message := settings.command(name):
+            yield f"the command {message.topic} {message.payload}".rstrip(), (name, "topic")
+
+
+def describe(settings: MqttChargerSettings, bus: MqttSettings) -> list[tuple[str, str]]:
+    """Return rows that `check` prints instead of a wiring table: (subject, meaning)."""
+    rows = [
+        (f"topic {name}", f"{state.topic}, unknown after {state.stale_after_s:g} s")
+        for name, state in settings.topics.items()
+    ]
+    for name in COMMANDS:
+        if message := settings.command(name):
+            text = f"{message.topic} {message.payload or '(empty)'}"
+            often = f", {json_station.how_often(settings)}" if name == "clear_error" else ""
+            rows.append((name.replace("_", " "), text + often))
+    return [*rows, *json_station.power_off(settings, bus.scan_s), *json_station.rows(settings)]
+
+
+class MqttStation:
+    """A station's states and commands as messages (`drivers.charger.json_station.JsonStation`)."""
+
+    def __init__(self, settings: MqttChargerSettings, bus: MqttBus) -> None:
+        self._settings = settings
+        self._bus = bus
+        self._asks = {state.ask for state in settings.topics.values() if state.ask}
+        for state in settings.topics.values():
+            for place in (state, state.availability):
+                if place:
+                    bus.listen(place.topic)
+
+    def answer(self) -> Mapping[str, object]:
+        """Return name -> the last message of each topic."""
+        self._bus.ask(self._asks)
+        return {
+            name: decoded(
+                self._bus.believed(state.topic, state.stale_after_s, state.availability).payload
+            )
+            for name, state in self._settings.topics.items()
+        }
+
+    def send(self, name: StationCommand, safe: bool = False) -> None:
+        """Send this command once, if the station has it."""
+        if message := self._settings.command(name):
+            self._bus.publish(message.topic, message.payload, message.qos, safe)
+
+
+def create(name: str, settings: MqttChargerSettings, bus: MqttBus) -> JsonCharger:
+    """Make the station's driver on its bus; it sends nothing before the first reading."""
+    return JsonCharger(settings, MqttStation(settings, bus))
+
+
+DRIVER = DriverType(
+    settings=MqttChargerSettings,
+    buses=("mqtt",),
+    create=create,
+    describe=describe,
+    claims=claims,
+    warnings=json_station.warnings,
+    unwired=lambda settings: (POWER,) if settings.start else (),
+    fake="hal_fakes.mqtt_charger",
+)
