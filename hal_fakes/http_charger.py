@@ -9,6 +9,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 from bridges.kinds.charger.signals import Activity
 from drivers.charger.http import HttpChargerSettings
+from drivers.charger.json_station import JsonChargerSettings
 from drivers.charger.rules import places
 from drivers.charger.state_codes import ROBOT_ERROR
 from drivers.json_fields import Value, found
@@ -20,25 +21,25 @@ from hal_fakes.plants.charger import ChargerPlant, Reading
 from hal_fakes.plants.plant import Plant
 
 
-def build(name: str, settings: HttpChargerSettings) -> ChargerPlant:
+def build(
+    name: str, settings: JsonChargerSettings, links: Sequence[str] = ("server", "headers", "body")
+) -> ChargerPlant:
     """Build the station for these settings, with the robots of `receivers`."""
     return ChargerPlant(
         name,
         settings.receivers,
         commanded=settings.can_stop(),
-        asked=settings.range_check is not None,
-        cleared=settings.clear_error_path is not None,
-        links=("server", "headers", "body"),
+        asked=settings.command("range_check") is not None,
+        cleared=settings.command("clear_error") is not None,
+        links=links,
     )
 
 
-class FakeHttpCharger:
-    """A station (`hal_fakes.http.HttpStation`): one plant with its maker's numbers and paths."""
+class FakeJsonCharger:
+    """A station that answers with JSON: one plant with its maker's fields, numbers and words."""
 
-    def __init__(self, plant: Plant, settings: HttpChargerSettings) -> None:
+    def __init__(self, plant: Plant, settings: JsonChargerSettings) -> None:
         self.plant = plant
-        self.reads: Sequence[Asked] = [("GET", settings.state_path, "")]
-        self.commands: Mapping[Asked, tuple[str, bool]] = dict(_commands(settings))
         self._settings = settings
         self._lists = settings.codes.lists() if settings.codes else {}
         self._off_at = float("inf")
@@ -127,6 +128,15 @@ class FakeHttpCharger:
     def _unknown(self) -> int:
         known = {code for codes in self._lists.values() for code in codes}
         return next(code for code in range(100, 65536) if code not in known)
+
+
+class FakeHttpCharger(FakeJsonCharger):
+    """A station (`hal_fakes.http.HttpStation`) with its maker's paths."""
+
+    def __init__(self, plant: Plant, settings: HttpChargerSettings) -> None:
+        super().__init__(plant, settings)
+        self.reads: Sequence[Asked] = [("GET", settings.state_path, "")]
+        self.commands: Mapping[Asked, tuple[str, bool]] = dict(_commands(settings))
 
 
 def _commands(settings: HttpChargerSettings) -> Iterator[tuple[Asked, tuple[str, bool]]]:

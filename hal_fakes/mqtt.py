@@ -16,7 +16,7 @@ import socket
 import threading
 import time
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Final
+from typing import Final, Protocol
 
 import paho.mqtt.client as paho
 from paho.mqtt.enums import CallbackAPIVersion
@@ -27,7 +27,7 @@ from drivers.hal.points import HalError
 from hal_fakes.fake import Outside
 from hal_fakes.json_answers import put
 from hal_fakes.mosquitto import Mosquitto
-from hal_fakes.plants.plant import FailureMode
+from hal_fakes.plants.plant import FailureMode, Plant
 from hal_fakes.wiring import PlantWiring
 
 PARTS: Final = ("server", "unit")
@@ -36,34 +36,64 @@ READY_S: Final = 15.0
 NEVER: Final = float("inf")
 
 
-def serve(settings: MqttSettings, stations: Sequence[PlantWiring]) -> "MqttSite":
+class MqttStation(Protocol):
+    """A device with a plant behind it.
+
+    `asks`: topic -> the message that makes it publish. `commands`: topic and message -> signal, and
+    asserted or not.
+    """
+
+    plant: Plant
+    asks: Mapping[str, str]
+    commands: Mapping[tuple[str, str], tuple[str, bool]]
+
+    def obey(self, signal: str, asserted: bool) -> None:
+        """Obey a command for this signal."""
+
+    def echo(self, signal: str) -> str | None:
+        """Return the topic that is published after each command for this signal, changed or not."""
+
+    def tick(self) -> None:
+        """Let timers run out. Called often."""
+
+    def states(self) -> dict[str, bytes]:
+        """Return topic -> payload of each state."""
+
+
+def serve(settings: MqttSettings, stations: Sequence[PlantWiring | MqttStation]) -> "MqttSite":
     """Serve the devices of this bus behind a broker of their own."""
     return MqttSite(settings, stations)
 
 
 class MqttDevice:
-    """One device's points: what it publishes, and what it does with a message."""
+    """One device's points as a station: relays that publish their states, and contacts."""
 
     def __init__(self, wiring: PlantWiring, points: Mapping[str, MqttPoint]) -> None:
         self.plant = wiring.plant
         self._wiring = wiring
-        self.points = {n: points[n] for n in (*wiring.inputs, *wiring.outputs)}
-        self.asks = {p.ask.topic: p.ask.payload for p in self.points.values() if p.ask}
-        self.commands = {
+        self._points = {n: points[n] for n in (*wiring.inputs, *wiring.outputs)}
+        self.asks: Mapping[str, str] = {
+            p.ask.topic: p.ask.payload for p in self._points.values() if p.ask
+        }
+        self.commands: Mapping[tuple[str, str], tuple[str, bool]] = {
             (command.topic, payload): (name, on)
             for name in wiring.outputs
-            if (command := self.points[name].command)
+            if (command := self._points[name].command)
             for payload, on in ((command.on, True), (command.off, False))
         }
         self._on = dict.fromkeys(wiring.outputs, False)
         self._off_at = dict.fromkeys(wiring.outputs, NEVER)
 
-    def obey(self, name: str, on: bool) -> None:
+    def obey(self, signal: str, asserted: bool) -> None:
         """Switch a relay, and start its timer again."""
-        now, off_s = time.monotonic(), self.points[name].switches_off_after_s
-        self._on[name] = on
-        self._off_at[name] = now + off_s if on and off_s else NEVER
-        self._wiring.drive(name, on, now)
+        now, off_s = time.monotonic(), self._points[signal].switches_off_after_s
+        self._on[signal] = asserted
+        self._off_at[signal] = now + off_s if asserted and off_s else NEVER
+        self._wiring.drive(signal, asserted, now)
+
+    def echo(self, signal: str) -> str | None:
+        """Return the relay's state topic."""
+        return self._points[signal].topic
 
     def tick(self) -> None:
         """Switch off the relays whose timers have run out."""
@@ -76,7 +106,7 @@ class MqttDevice:
         levels = {**self._wiring.levels(time.monotonic()), **self._on}
         said: dict[str, dict[str, object]] = {}
         whole: dict[str, bytes] = {}
-        for name, point in self.points.items():
+        for name, point in self._points.items():
             if point.topic is None:
                 continue
             value = _value(point, levels[name])
@@ -85,18 +115,23 @@ class MqttDevice:
             if point.field:
                 put(said.setdefault(point.topic, {}), point.field, value)
             else:
-                whole[point.topic] = _plain(value)
+                whole[point.topic] = plain(value)
         return whole | {topic: json.dumps(value).encode() for topic, value in said.items()}
 
 
 class MqttSite:
     """A broker with its devices. `replace`: replacements for the bus's settings."""
 
-    def __init__(self, settings: MqttSettings, stations: Sequence[PlantWiring]) -> None:
+    def __init__(
+        self, settings: MqttSettings, stations: Sequence[PlantWiring | MqttStation]
+    ) -> None:
         points = settings.wholes()
-        self._devices = [MqttDevice(station, points) for station in stations]
+        self._devices: list[MqttStation] = [
+            MqttDevice(station, points) if isinstance(station, PlantWiring) else station
+            for station in stations
+        ]
         ages = [p.stale_after_s for p in points.values() if p.stale_after_s]
-        self._period_s = min(ages, default=1.0) / 3
+        self._period_s = min(ages, default=0.3) / 3
         self._slow_s = 2 * max(ages, default=1.0) + settings.timeout_s
         self._noise = random.Random("mqtt")
         self._last: dict[str, bytes] = {}
@@ -168,12 +203,12 @@ class MqttSite:
             if found := device.commands.get((topic, payload)):
                 with self._lock:
                     device.obey(*found)
-                self._publish(device, topic=device.points[found[0]].topic)
+                self._publish(device, topic=device.echo(found[0]))
             if device.asks.get(topic) == payload:
                 self._publish(device, everything=True)
 
     def _publish(
-        self, device: MqttDevice, everything: bool = False, topic: str | None = None
+        self, device: MqttStation, everything: bool = False, topic: str | None = None
     ) -> None:
         mode = device.plant.failures.get("unit")
         if mode == "off" or self._mode == "wrong":
@@ -263,7 +298,8 @@ def _value(point: MqttPoint, on: bool) -> object:
     return values[0] if values else on
 
 
-def _plain(value: object) -> bytes:
+def plain(value: object) -> bytes:
+    """Encode a payload: a text as it is, anything else as JSON."""
     return value.encode() if isinstance(value, str) else json.dumps(value).encode()
 
 

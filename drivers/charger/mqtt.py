@@ -1,8 +1,8 @@
 """A charging station behind an MQTT broker, whose states are JSON or plain values on topics.
 
-`topics` names each state topic; a field then begins with that name (`status.charger.state`), and the name
-alone is a plain payload. What the fields mean is written as for a station on HTTP. Every topic must
-have a live message that is not stale, or there is no reading.
+`topics` names each state topic. A field begins with that name (`status.charger.state`); the name alone
+is a plain payload. The meanings of the fields are written as for a station on HTTP. Without a live
+message on every topic, which is not stale, there is no reading.
 """
 
 from collections.abc import Iterator, Mapping
@@ -12,12 +12,15 @@ import msgspec
 
 from bridges.kinds.shared.fields import tells
 from bridges.kinds.shared.remarks import Remarks
-from drivers.charger import json_station
+from bridges.yaml.spelling import unknown
+from drivers.charger import json_station, rules
+from drivers.charger.http_fields import JsonNumber
 from drivers.charger.json_station import POWER, JsonCharger, JsonChargerSettings, StationCommand
 from drivers.driver_type import DriverType
 from drivers.hal.mqtt import MqttBus, MqttSettings
 from drivers.hal.mqtt.points import decoded
 from drivers.hal.mqtt.topics import Message, StateTopic
+from drivers.json_fields import JsonFlag
 
 Key = Annotated[
     str,
@@ -63,6 +66,26 @@ class MqttChargerSettings(
                 yield (command, "topic"), text
         if self.start and self.start == self.stop:
             yield ("stop",), "is the same message as start"
+        for path, field in _fields(self):
+            if field.split(".")[0] not in self.topics:
+                text = unknown("topic", field.split(".")[0], self.topics)
+                yield path, f"{field} begins with the name of a topic: {text}"
+
+
+def _fields(settings: MqttChargerSettings) -> Iterator[tuple[tuple[str, ...], str]]:
+    """Yield the path in the YAML and the name of each field that is read."""
+    for name in settings.fields.__struct_fields__:
+        place = getattr(settings.fields, name)
+        if isinstance(place, JsonFlag | JsonNumber):
+            yield ("fields", name), place.field
+        elif (name == "receiver_id" and place) or (name == "state" and settings.codes):
+            yield ("fields", name), place
+    for name, number in settings.fields.temperatures.items():
+        yield ("fields", "temperatures", name), number.field
+    for path, field in rules.places(settings.rules):
+        yield ("rules", *path), field
+    for path, field in settings.errors.places():
+        yield ("errors", *path), field
 
 
 def claims(settings: MqttChargerSettings) -> Iterator[tuple[str, tuple[str, ...]]]:
@@ -98,6 +121,11 @@ class MqttStation:
                 if place:
                     bus.listen(place.topic)
 
+    def await_first(self) -> None:
+        """Give the station time to publish its first states. Raises HalError without a broker."""
+        topics = [state.topic for state in self._settings.topics.values()]
+        self._bus.await_first(topics, self._asks)
+
     def answer(self) -> Mapping[str, object]:
         """Return name -> the last message of each topic."""
         self._bus.ask(self._asks)
@@ -114,9 +142,21 @@ class MqttStation:
             self._bus.publish(message.topic, message.payload, message.qos, safe)
 
 
-def create(name: str, settings: MqttChargerSettings, bus: MqttBus) -> JsonCharger:
-    """Make the station's driver on its bus; it sends nothing before the first reading."""
-    return JsonCharger(settings, MqttStation(settings, bus))
+class MqttCharger(JsonCharger):
+    """`drivers.Driver` for one station."""
+
+    def __init__(self, settings: MqttChargerSettings, station: MqttStation) -> None:
+        super().__init__(settings, station)
+        self._first = station
+
+    def open(self) -> None:
+        """Wait for the station's first states; a restart must not end a charge."""
+        self._first.await_first()
+
+
+def create(name: str, settings: MqttChargerSettings, bus: MqttBus) -> MqttCharger:
+    """Make the station's driver on its bus; it sends nothing before `open`."""
+    return MqttCharger(settings, MqttStation(settings, bus))
 
 
 DRIVER = DriverType(

@@ -150,10 +150,11 @@ class MqttBus(Bus):
         Raises HalError for any other. A retained notice proves nothing.
         """
         found = self.fresh(topic, stale_after_s)
-        notice = self.heard(notices.topic) if notices else None
-        if notices and notice and notice.payload.decode(errors="replace") in notices.offline:
-            if notice.at is not None and found.at is not None and notice.at >= found.at:
-                raise HalError(f"{notices.topic} says that the device is offline")
+        if notices is None or (notice := self.heard(notices.topic)) is None or notice.at is None:
+            return found
+        gone = notice.payload.decode(errors="replace") in notices.offline
+        if gone and notice.at >= (found.at or 0.0):
+            raise HalError(f"{notices.topic} says that the device is offline")
         return found
 
     def publish(
@@ -183,6 +184,16 @@ class MqttBus(Bus):
             if now - self._asked.get(one, -math.inf) >= rest_s:
                 self._asked[one] = now
                 self.publish(one.topic, one.payload, qos=0)
+
+    def await_first(self, topics: Iterable[str], asks: Iterable[Ask]) -> None:
+        """Give the devices `timeout_s` to publish these topics for the first time. Raises HalError."""
+
+        def all_live() -> bool:
+            found = [self._heard.get(topic) for topic in topics]
+            return all(heard and heard.at is not None for heard in found)
+
+        self.ask(asks)
+        self.wait(all_live, self.settings.timeout_s)
 
     def wait(self, done: Callable[[], bool], timeout_s: float) -> bool:
         """Wait until `done`, which is asked again at each message; return whether it is true.

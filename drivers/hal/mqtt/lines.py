@@ -40,13 +40,13 @@ class MqttLines:
         Raises HalError for a state that is no fact. A claim after a failure only reads: a lost
         confirmation must not release a held door.
         """
+        points = (*self._inputs.values(), *self._outputs.values())
         if not self._claimed:
             self.write(dict.fromkeys(self._outputs, False))
             self._claimed = True
-            self._bus.ask(self._asks)
-            self._bus.wait(self._all_heard, self._bus.settings.timeout_s)
+            self._bus.await_first({p.topic for p in points if p.topic}, self._asks)
         self._bus.ask(self._asks)
-        for point in (*self._inputs.values(), *self._outputs.values()):
+        for point in points:
             if point.topic:
                 self._state(point)
 
@@ -153,10 +153,6 @@ class MqttLines:
             return self._said(name) == self._set.get(name, False)
         except HalError:
             return False
-
-    def _all_heard(self) -> bool:
-        topics = {p.topic for p in (*self._inputs.values(), *self._outputs.values()) if p.topic}
-        return all(found and found.at is not None for found in map(self._bus.heard, topics))
 
 
 def _word(on: bool) -> str:

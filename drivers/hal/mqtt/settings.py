@@ -228,4 +228,5 @@ def tables(settings: MqttSettings) -> Iterable[Table]:
         timer = point.switches_off_after_s
         rows.append((name, state, age, sent, "-" if timer is None else f"{timer:g} s"))
     heads = ("point", "state", "stale after", "on", "off by itself after")
-    yield Table("topics", heads, tuple(rows))
+    if rows:
+        yield Table("topics", heads, tuple(rows))
