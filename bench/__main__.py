@@ -13,7 +13,7 @@ from argparse import ArgumentParser
 from pathlib import Path
 from typing import Any
 
-from bench import buses, day, explain, idle, latency, page, recording
+from bench import brokers, buses, day, explain, idle, latency, page, recording
 from bench.figures import lines
 
 RESULTS = Path(__file__).parent / "results"
@@ -21,6 +21,7 @@ SECTIONS = {
     "latency": latency,
     "idle": idle,
     "buses": buses,
+    "brokers": brokers,
     "day": day,
     "explain": explain,
     "recording": recording,

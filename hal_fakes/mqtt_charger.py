@@ -1,6 +1,7 @@
 """A charging station behind an MQTT broker: it publishes its plant's state on the YAML's topics."""
 
 import json
+from collections.abc import Mapping
 
 from drivers.charger.json_station import StationCommand
 from drivers.charger.mqtt import MqttChargerSettings
@@ -25,8 +26,8 @@ class FakeMqttCharger(FakeJsonCharger):
         super().__init__(plant, settings)
         self._topics = {name: state.topic for name, state in settings.topics.items()}
         asks = (state.ask for state in settings.topics.values())
-        self.asks = {ask.topic: ask.payload for ask in asks if ask}
-        self.commands = {
+        self.asks: Mapping[str, str] = {ask.topic: ask.payload for ask in asks if ask}
+        self.commands: Mapping[tuple[str, str], tuple[str, bool]] = {
             (message.topic, message.payload): does
             for name, does in EFFECTS.items()
             if (message := settings.command(name))

@@ -5,8 +5,8 @@ is a plain payload. The meanings of the fields are written as for a station on H
 message on every topic, which is not stale, there is no reading.
 """
 
-from collections.abc import Iterator, Mapping
-from typing import Annotated
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Annotated, Final
 
 import msgspec
 
@@ -29,7 +29,7 @@ Key = Annotated[
         extra={"pattern": "a short name without dots (status)"},
     ),
 ]
-COMMANDS = ("start", "stop", "range_check", "clear_error")
+COMMANDS: Final[Sequence[StationCommand]] = ("start", "stop", "range_check", "clear_error")
 
 
 class MqttChargerSettings(

@@ -34,6 +34,7 @@ SHIPPED = {
     "charger_http": NET,
     "charger_http_full": NET,
     "charger_modbus": SERIAL,
+    "charger_mqtt": NET,
     "charger_register": SERIAL,
     "charger_relay": NET,
     "charger_wiferion": SERIAL,  # on slcan
@@ -42,6 +43,7 @@ SHIPPED = {
     "door_http": NET,
     "door_line": SERIAL,
     "door_modbus": NET,
+    "door_mqtt": NET,
     "door_register": NET,
     "door_rs485": SERIAL,
     "door_supervisor": GRAPH,

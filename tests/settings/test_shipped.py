@@ -117,7 +117,8 @@ def spots(problems: list[str]) -> list[str]:
 def own_names(config: Path) -> set[str]:
     """Return the freely chosen names of a file: of buses, of devices, and in the kind's section."""
     loaded = load(config)
-    return {*loaded.buses, *loaded.devices, *names_in(loaded.section)}
+    in_buses = (name for bus in loaded.buses.values() for name in names_in(bus))
+    return {*loaded.buses, *loaded.devices, *names_in(loaded.section), *in_buses}
 
 
 def names_in(value: object) -> set[str]:

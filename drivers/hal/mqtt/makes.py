@@ -4,11 +4,10 @@ Each function takes the device's name on MQTT, one part of the device, and the r
 (None without one); it returns the keys of a point (`points.py`).
 """
 
+import json
 import re
 from collections.abc import Callable, Mapping
 from typing import Any, Final, Literal
-
-import msgspec
 
 Profile = Literal["shelly-gen2", "tasmota", "zigbee2mqtt"]
 Keys = Mapping[str, Any]
@@ -73,7 +72,7 @@ def zigbee2mqtt(device: str, part: str, off_s: float | None) -> Keys:
     of switches below www.zigbee2mqtt.io/devices.
     """
     _matched(part, r"([A-Za-z][A-Za-z0-9_]{0,40})()", "state, contact or another property")
-    away = ['{"state":"offline"}', "offline"]
+    away = ['{"state":"offline"}', _json({"state": "offline"}), "offline"]
     keys = {
         "topic": f"zigbee2mqtt/{device}",
         "field": part,
@@ -111,4 +110,4 @@ def _switch_set(number: int, more: Keys) -> str:
 
 
 def _json(value: Keys) -> str:
-    return msgspec.json.encode(value).decode()
+    return json.dumps(value)

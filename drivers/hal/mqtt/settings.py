@@ -189,10 +189,11 @@ def where(settings: MqttSettings) -> Where:
 
 def unfit(settings: MqttSettings, point: str, direction: Literal["in", "out"]) -> str | None:
     """Return why this name cannot be an input or output; None if it can."""
-    found = settings.points.get(point)
-    if found is None:
+    if point not in settings.points:
         return unknown("point", point, settings.points)
-    whole = found.whole()
+    whole = settings.wholes().get(point)
+    if whole is None:
+        return None  # the point's own problems are told
     if direction == "in" and whole.topic is None:
         return f"'{point}' has no topic, so its state cannot be read: add topic to it"
     if direction == "out" and whole.command is None:
@@ -202,7 +203,7 @@ def unfit(settings: MqttSettings, point: str, direction: Literal["in", "out"]) -
 
 def place(settings: MqttSettings, point: str) -> str | None:
     """Return the command that no other file may send; None for a state, which every file may read."""
-    command = settings.points[point].whole().command
+    command = settings.wholes()[point].command
     return f"the command {command.topic} {command.on}" if command else None
 
 

@@ -10,7 +10,6 @@ import pytest
 from bridges.kinds.charger.signals import Activity, ChargerOutputs, ChargerSample
 from bridges.settings.load import load
 from drivers import DriverError
-from drivers.charger.json_station import JsonCharger
 from drivers.charger.mqtt import DRIVER, MqttChargerSettings
 from drivers.hal.mqtt import MqttBus, MqttSettings
 from hal_fakes.mqtt import MqttSite
@@ -42,7 +41,7 @@ class Pad:
         self.site = MqttSite(config.buses["building"], [FakeMqttCharger(self.plant, settings)])
         plain: dict[str, Any] = {"type": "mqtt", "timeout_s": 0.5, **self.site.replace}
         self.bus = MqttBus(msgspec.convert(plain, MqttSettings))
-        self.driver: JsonCharger = DRIVER.create("charger_b", settings, self.bus)
+        self.driver = DRIVER.create("charger_b", settings, self.bus)
 
     def close(self) -> None:
         self.driver.close()

@@ -156,18 +156,18 @@ def test_a_profile_decodes_the_payloads_of_its_make(
 
 def test_the_commands_of_the_makes_carry_the_timer_where_the_make_takes_it() -> None:
     sent = {(profile, part): MAKES[profile]("d", part, 10)["command"] for profile, part in RELAYS}
-    rpc = '{"id":1,"src":"rmf-bridges","method":"Switch.Set","params":'
+    rpc = '{"id": 1, "src": "rmf-bridges", "method": "Switch.Set", "params": '
     assert sent == {
         ("shelly-gen2", "switch:0"): {
             "topic": "d/rpc",
-            "on": rpc + '{"id":0,"on":true,"toggle_after":10}}',
-            "off": rpc + '{"id":0,"on":false}}',
+            "on": rpc + '{"id": 0, "on": true, "toggle_after": 10}}',
+            "off": rpc + '{"id": 0, "on": false}}',
         },
         ("tasmota", "POWER"): {"topic": "cmnd/d/POWER", "on": "ON", "off": "OFF"},
         ("zigbee2mqtt", "state"): {
             "topic": "zigbee2mqtt/d/set",
-            "on": '{"state":"ON","on_time":10}',
-            "off": '{"state":"OFF"}',
+            "on": '{"state": "ON", "on_time": 10}',
+            "off": '{"state": "OFF"}',
         },
     }
 
@@ -186,31 +186,31 @@ RELAYS: list[tuple[Profile, str]] = [
     ("old", "new", "problem"),
     [
         (
-            "{point: opened,",
-            "{point: openend,",
-            "34:23: unknown point 'openend': did you mean 'opened'?"
-            " known here: held open, opened, closed",
+            "{point: input 0,",
+            "{point: inptu 0,",
+            "34:23: unknown point 'inptu 0': did you mean 'input 0'?"
+            " known here: relay, input 0, input 1",
         ),
         (
-            "{point: opened,",
-            "{point: opened, pull: up,",
+            "{point: input 0,",
+            "{point: input 0, pull: up,",
             "34:7: 'opened': pull is for GPIO pins: delete pull",
         ),
         (
-            "{point: held open, active: high}",
-            "{point: held open, active: low}",
+            "{point: relay, active: high}",
+            "{point: relay, active: low}",
             "37:7: 'hold_open': write active: high: the point's `on` and `off` say which message"
             " switches the relay on",
         ),
         (
-            "{point: held open,",
-            "{point: closed,",
-            "37:26: 'closed' has no command, so it cannot be switched: add command to it",
+            "{point: relay,",
+            "{point: input 1,",
+            "37:26: 'input 1' has no command, so it cannot be switched: add command to it",
         ),
         (
             "part: input:1",
             "part: input:0",
-            "28:15: 'part' is the same topic as that of 'opened'",
+            "28:15: 'part' is the same topic as that of 'input 0'",
         ),
         (
             "device: shellyplus2pm-a0b1c2d3e4f5\n        part: input:1",
