@@ -215,6 +215,8 @@ class Link(threading.Thread):
             self.changed.notify_all()
         self._client.disconnect()
         self._client.loop_write()
+        if (sock := self._client.socket()) is not None:
+            sock.close()  # a broker that does not read leaves the farewell unsent
         self.on_end()
 
     def _explained(self, error: OSError) -> str:

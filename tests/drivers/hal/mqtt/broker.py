@@ -12,7 +12,6 @@ from paho.mqtt.enums import CallbackAPIVersion
 
 from drivers.hal import HalError
 from drivers.hal.mqtt import MqttBus, MqttSettings
-from hal_fakes.mosquitto import Mosquitto
 from tests.waiting import wait_until
 
 STATE, SWITCH = "relay/state", "relay/set"
@@ -50,7 +49,7 @@ def bus_to(
 class FarDevice:
     """A client of the broker on the far side. `taken`: the messages that it has received."""
 
-    def __init__(self, broker: Mosquitto, *topics: str, **options: Any) -> None:
+    def __init__(self, port: int, *topics: str, **options: Any) -> None:
         self.taken: list[tuple[str, bytes, bool]] = []
         self.ready = threading.Event()
         self.client = paho.Client(CallbackAPIVersion.VERSION2, **options)
@@ -58,7 +57,7 @@ class FarDevice:
             (m.topic, bytes(m.payload), m.retain)
         )
         self.client.on_subscribe = lambda *_: self.ready.set()
-        self.client.connect("127.0.0.1", broker.port)
+        self.client.connect("127.0.0.1", port)
         self.client.loop_start()
         self.client.subscribe([(topic, 1) for topic in (*topics, "nothing")])
         assert self.ready.wait(30)

@@ -102,7 +102,7 @@ TOO_LONG = "the broker sent a message of 10000013 bytes; at most 262144 are take
 
 @pytest.mark.parametrize("version", ["5", "3.1.1"])
 def test_a_payload_of_10_mb_is_never_a_fact_and_never_kept(broker: Mosquitto, version: str) -> None:
-    device = FarDevice(broker)
+    device = FarDevice(broker.port)
     with bus_to(broker.port, version=version) as bus:
         bus.listen(STATE)
         link = bus.up()
@@ -123,7 +123,7 @@ def _said(device: FarDevice, bus: MqttBus) -> bool:
 
 
 def test_a_payload_that_fits_into_a_packet_but_is_too_long_is_named(broker: Mosquitto) -> None:
-    device = FarDevice(broker)
+    device = FarDevice(broker.port)
     with bus_to(broker.port) as bus:
         bus.listen(STATE)
         bus.up()
@@ -134,7 +134,7 @@ def test_a_payload_that_fits_into_a_packet_but_is_too_long_is_named(broker: Mosq
 
 
 def test_payloads_together_are_kept_up_to_a_limit(broker: Mosquitto) -> None:
-    device = FarDevice(broker)
+    device = FarDevice(broker.port)
     with bus_to(broker.port) as bus:
         for n in range(40):
             bus.listen(f"long/{n}")
@@ -155,7 +155,7 @@ def test_payloads_together_are_kept_up_to_a_limit(broker: Mosquitto) -> None:
 
 
 def test_ten_thousand_topics_that_nobody_asked_for_leave_nothing(broker: Mosquitto) -> None:
-    device = FarDevice(broker)
+    device = FarDevice(broker.port)
     with bus_to(broker.port) as bus:
         bus.listen(STATE)
         bus.up()
@@ -219,7 +219,7 @@ def test_a_broker_that_never_answers_is_an_error_within_the_timeout() -> None:
 
 
 def test_a_retained_lie_moves_no_relay_and_is_not_told(broker: Mosquitto) -> None:
-    device = FarDevice(broker, SWITCH)
+    device = FarDevice(broker.port, SWITCH)
     device.says(STATE, "ON", retain=True)
     with bus_to(broker.port, {"relay": RELAY}, timeout_s=0.3) as bus:
         lines = bus.lines({"relay": None}, {"relay": False})

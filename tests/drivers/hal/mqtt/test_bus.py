@@ -25,7 +25,7 @@ def broker() -> Iterator[Mosquitto]:
 
 @pytest.fixture
 def device(broker: Mosquitto) -> Iterator[FarDevice]:
-    device = FarDevice(broker, SWITCH)
+    device = FarDevice(broker.port, SWITCH)
     yield device
     device.close()
 
@@ -125,7 +125,7 @@ def test_a_command_reaches_the_device_once_and_is_not_retained(
         bus.publish(SWITCH, "OFF", safe=True)
         wait_until(lambda: len(device.taken) == 2, "both commands")
     assert device.taken == [(SWITCH, b"ON", False), (SWITCH, b"OFF", False)]
-    late = FarDevice(broker, SWITCH)
+    late = FarDevice(broker.port, SWITCH)
     late.close()
     assert late.taken == []
 
@@ -142,7 +142,7 @@ RELAYS = 60
 def test_on_expires_for_a_device_that_returns_later_and_off_does_not(broker: Mosquitto) -> None:
     def relay(number: int) -> FarDevice:
         options: dict[str, Any] = {"client_id": f"relay {number}", "clean_session": False}
-        return FarDevice(broker, SWITCH, **options)
+        return FarDevice(broker.port, SWITCH, **options)
 
     for number in range(RELAYS):
         relay(number).close()
@@ -170,7 +170,7 @@ def test_no_command_of_an_earlier_connection_is_sent_again(
             bus.publish(SWITCH, "ON")
         broker.kill()
         broker.start()
-        later = FarDevice(broker, SWITCH)
+        later = FarDevice(broker.port, SWITCH)
         bus.insist()
         wait_until(lambda: _sent(bus, "OFF"), "the command to the new broker")
         wait_until(lambda: later.taken, "a command")

@@ -34,7 +34,7 @@ class Site:
         self.bus = bus
         ticks = itertools.count()
         bus.now = lambda: self.now + 1e-6 * next(ticks)
-        self.device = FarDevice(broker, SWITCH)
+        self.device = FarDevice(broker.port, SWITCH)
         self.obeys = True
         self.answer = b""
         self.points = Points([WIRE, CONTACT], bus)

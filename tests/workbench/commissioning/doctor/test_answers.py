@@ -9,15 +9,16 @@ import pytest
 
 from bridges.settings.load import load
 from hal_fakes.__main__ import served
+from tests.drivers.hal.mqtt.broker import FarDevice
 from tests.waiting import wait_until
-from workbench.commissioning.doctor.answers import numbers, ranges, readings, unarmed
+from workbench.commissioning.doctor.answers import answers, numbers, ranges, readings, unarmed
 from workbench.commissioning.examples import device_yamls
 
 CONFIG = Path(__file__).parents[4] / "config"
 ASKED = sorted(
     path.name
     for path in device_yamls()
-    if re.search(r"type: (modbus|http|can)\b", path.read_text())
+    if re.search(r"type: (modbus|http|mqtt|can)\b", path.read_text())
 )
 
 
@@ -37,6 +38,27 @@ def test_the_devices_of_each_example_answer_an_unopened_driver(name: str, tmp_pa
                     return {one.level for one in found} == {"ok"}
 
                 wait_until(check_all_answer, f"{', '.join(devices)} answer")
+
+
+def test_the_topics_that_there_are_are_listed_up_to_a_number(tmp_path: Path) -> None:
+    name = "door_mqtt.yaml"
+    config = load(CONFIG / name)
+    with served(CONFIG / name, "building", tmp_path / "plant.sock") as replace:
+        port = replace["port"]
+        text = (CONFIG / name).read_text()
+        file = tmp_path / name
+        file.write_text(text.replace("host: 192.168.1.10", f"host: 127.0.0.1\n    port: {port}"))
+        config = load(file)
+        with closing(FarDevice(int(str(port)))) as far:
+            for number in range(60):
+                far.says(f"sensor/{number:02}", "1", retain=True)
+            told = [finding.found for finding in answers(config, "building", whole=True)]
+            without = [finding.found for finding in answers(config, "building", whole=False)]
+    assert [one for one in told if "sensor/" in one] == [
+        f"retained sensor/{number:02}" for number in range(40)
+    ]
+    assert told[-1].startswith("and 20 more: mosquitto_sub")
+    assert not any("sensor/" in one for one in without)
 
 
 def test_the_units_and_nodes_of_a_file_are_known() -> None:
