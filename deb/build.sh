@@ -40,11 +40,11 @@ fill() {
 without() { (cd "$2" && find . ! -type d -print0) | (cd "$1" && xargs -0 rm -f); }
 in_bench=$bench/usr/lib/rmf-bridges-workbench/$version in_page=$page/usr/lib/rmf-bridges-page/$version
 mkdir -p "$in_bench" "$in_page"
-fill "$site" --extra=gpio --extra=recording --extra=push
+fill "$site" --extra=gpio --extra=recording --extra=push --extra=mqtt
 cp -R "$site/." "$in_bench"
-fill "$in_bench" --extra=gpio --extra=recording --extra=push --extra=laptop --extra=plot --extra=mqtt
+fill "$in_bench" --extra=gpio --extra=recording --extra=push --extra=mqtt --extra=laptop --extra=plot
 cp -R "$in_bench/." "$in_page"
-fill "$in_page" --extra=gpio --extra=recording --extra=push --extra=laptop --extra=plot --extra=mqtt --extra=page
+fill "$in_page" --extra=gpio --extra=recording --extra=push --extra=mqtt --extra=laptop --extra=plot --extra=page
 without "$in_page" "$in_bench"
 rm -rf "$site/workbench" "$site/hal_fakes"
 without "$in_bench" "$site"

@@ -104,18 +104,20 @@ class MqttDevice:
     def states(self) -> dict[str, bytes]:
         """Return topic -> payload of each state."""
         levels = {**self._wiring.levels(time.monotonic()), **self._on}
+        groups: dict[tuple[str, str], list[tuple[MqttPoint, bool]]] = {}
+        for name, point in self._points.items():
+            if point.topic is not None:
+                place = (point.topic, point.field or "")
+                groups.setdefault(place, []).append((point, levels[name]))
         said: dict[str, dict[str, object]] = {}
         whole: dict[str, bytes] = {}
-        for name, point in self._points.items():
-            if point.topic is None:
-                continue
-            value = _value(point, levels[name])
-            if self.plant.failures.get("unit") == "wrong":
-                value = ["?"]
-            if point.field:
-                put(said.setdefault(point.topic, {}), point.field, value)
+        wrong = self.plant.failures.get("unit") == "wrong"
+        for (topic, field), group in groups.items():
+            value = ["?"] if wrong else _value(group)
+            if field:
+                put(said.setdefault(topic, {}), field, value)
             else:
-                whole[point.topic] = plain(value)
+                whole[topic] = plain(value)
         return whole | {topic: json.dumps(value).encode() for topic, value in said.items()}
 
 
@@ -293,9 +295,15 @@ class MqttSite:
         yield
 
 
-def _value(point: MqttPoint, on: bool) -> object:
-    values = point.when if on else point.when_not
-    return values[0] if values else on
+def _value(group: Sequence[tuple[MqttPoint, bool]]) -> object:
+    """Return the value of a field that these points read: a word that is right for all of them."""
+    points = [point for point, _ in group]
+    asserted = [point for point, on in group if on]
+    if not points[0].when:
+        return bool(asserted)
+    if asserted:
+        return asserted[0].when[0]
+    return next(v for v in points[0].when_not if all(v in point.when_not for point in points))
 
 
 def plain(value: object) -> bytes:

@@ -56,6 +56,7 @@ SHIPPED = {
     "lift_http": NET,
     "lift_io_module": NET,
     "lift_low_level": GPIO,
+    "lift_mqtt": NET,
     "lift_one_hot": GPIO,
     "lift_relay_board": GPIO,
     "lift_supervisor": GRAPH,

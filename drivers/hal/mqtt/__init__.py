@@ -8,7 +8,7 @@ link.py       one connection, through paho-mqtt, which only this file imports
 """
 
 from drivers.hal import BusType
-from drivers.hal.mqtt.bus import Heard, MqttBus
+from drivers.hal.mqtt.bus import Heard, MqttBus, open_bus
 from drivers.hal.mqtt.settings import (
     MqttSettings,
     needs,
@@ -24,7 +24,7 @@ __all__ = ["BUS", "Heard", "MqttBus", "MqttSettings"]
 
 BUS = BusType(
     settings=MqttSettings,
-    open_bus=MqttBus,
+    open_bus=open_bus,
     fake="hal_fakes.mqtt",
     where=where,
     needs=needs,

@@ -26,6 +26,7 @@ import math
 import random
 import time
 from collections.abc import Callable, Iterable, Mapping
+from importlib.util import find_spec
 from typing import TYPE_CHECKING, Final
 
 import msgspec
@@ -55,6 +56,15 @@ class Heard(msgspec.Struct, frozen=True):
     payload: bytes
     at: float | None
     length: int
+
+
+def open_bus(settings: MqttSettings) -> "MqttBus":
+    """Make the bus. Raises HalError where paho is not installed."""
+    if find_spec("paho") is None:
+        raise HalError(
+            "MQTT needs the Python package paho-mqtt: in the clone .venv/bin/pip install '.[mqtt]'"
+        )
+    return MqttBus(settings)
 
 
 class MqttBus(Bus):

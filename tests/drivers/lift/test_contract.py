@@ -8,13 +8,15 @@ from typing import Any, ClassVar
 import msgspec
 
 from drivers.hal import modbus
+from drivers.hal.mqtt import MqttBus
+from drivers.hal.points import Wire
 from drivers.lift import register
 from drivers.lift.dry_contact import DryContactLiftSettings, create, wires
 from hal_fakes.modbus import register_lift
 from hal_fakes.plants.lift import LiftPlant
 from hal_fakes.realtime import RealTime
 from hal_fakes.wiring import PlantWiring
-from tests.drivers.benches import RS485, on_modbus, on_pins
+from tests.drivers.benches import RS485, TIMEOUT_S, on_modbus, on_mqtt, on_pins
 from tests.drivers.lift.contract import QUICK, Bench, LiftContract, WiredLiftContract
 from tests.drivers.lift.wirings import FLOORS, inputs, line, whole
 
@@ -33,6 +35,56 @@ class TestDryContactsOnModbus(WiredLiftContract):
         wiring = PlantWiring(world.plants["lift"], wires(settings), modbus.canonical)
         with on_modbus(world, [wiring], self.serial) as (bus, clock):
             yield Bench(create("lift", settings, bus), wiring.plant, clock)
+
+
+class MqttBench(Bench):
+    """A bench whose bus has a real clock, so that a pause of the bus is skipped."""
+
+    bus: MqttBus
+
+    def a_moment(self) -> None:
+        self.bus.insist()
+
+
+class TestWordsOnMqtt(WiredLiftContract):
+    """A gateway that publishes words in one JSON object, and takes a word for each command."""
+
+    @contextmanager
+    def benches(self) -> Iterator[Bench]:
+        plain = on_topics(whole(inputs=inputs(moving=line(4))), [])
+        settings = msgspec.convert(plain, DryContactLiftSettings)
+        points: dict[str, object] = {wire.point: _point(wire) for wire in wires(settings)}
+        world = RealTime({"lift": LiftPlant("lift", settings, QUICK)})
+        wiring = PlantWiring(world.plants["lift"], wires(settings), str)
+        with on_mqtt(world, [wiring], points, TIMEOUT_S) as bus:
+            bench = MqttBench(create("lift", settings, bus), wiring.plant)
+            bench.bus = bus
+            yield bench
+
+
+LANDINGS = ("floor_B1", "floor_G", "floor_1")
+
+
+def _point(wire: Wire) -> dict[str, object]:
+    found: dict[str, object] = {"topic": "lift/state", "field": wire.signal, "stale_after_s": 1}
+    found["ask"] = {"topic": "lift/ask"}
+    if wire.signal in LANDINGS:
+        others = [signal for signal in LANDINGS if signal != wire.signal]
+        found |= {"field": "floor", "when": [wire.signal], "when_not": [*others, "between"]}
+    if wire.direction == "out":
+        command = {"topic": "lift/do", "on": f"{wire.signal} on", "off": f"{wire.signal} off"}
+        found |= {"command": command, "switches_off_after_s": 60}
+    return found
+
+
+def on_topics(part: Any, names: list[str]) -> Any:
+    """Return the same wiring with a name in place of each point."""
+    if not isinstance(part, dict):
+        return part
+    if "point" in part:
+        names.append(f"point {len(names)}")
+        return {**part, "point": names[-1]}
+    return {key: on_topics(value, names) for key, value in part.items()}
 
 
 def number(register: int, codes: dict[int, str], **more: Any) -> dict[str, Any]:

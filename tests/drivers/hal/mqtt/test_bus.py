@@ -2,13 +2,17 @@
 
 import itertools
 import socket
+import subprocess
+import sys
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import pytest
 
 from drivers.hal import HalError
 from drivers.hal.mqtt import MqttBus
+from drivers.hal.mqtt.bus import open_bus
 from hal_fakes.mosquitto import Mosquitto
 from tests.drivers.hal.mqtt.broker import STATE, SWITCH, FarDevice, bus_to, hears, reason, settings
 from tests.waiting import wait_until
@@ -236,6 +240,27 @@ def test_another_client_with_our_id_is_named(broker: Mosquitto) -> None:
             "the broker has closed the connection: does another client have the id lift?",
             "the broker has ended the connection: session taken over",
         )
+
+
+def test_without_paho_the_error_names_the_package(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "paho", None)
+    with pytest.raises(HalError, match=r"paho-mqtt: in the clone \.venv/bin/pip install"):
+        open_bus(settings(1883))
+
+
+def test_no_daemon_on_another_bus_loads_paho() -> None:
+    program = (
+        "import sys\n"
+        "from pathlib import Path\n"
+        "from bridges.settings.load import load\n"
+        "for name in ('door_modbus', 'door_mqtt'):\n"
+        "    config = load(Path(f'config/{name}.yaml'))\n"
+        "    for bus in config.buses:\n"
+        "        config.bus_type(bus).open_bus(config.buses[bus])\n"
+        "assert not any(m.partition('.')[0] == 'paho' for m in sys.modules), 'loaded'\n"
+    )
+    root = Path(__file__).parents[4]
+    subprocess.run([sys.executable, "-c", program], check=True, cwd=root)
 
 
 def test_a_bus_has_a_limit_of_topics() -> None:

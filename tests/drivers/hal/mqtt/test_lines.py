@@ -17,6 +17,10 @@ from tests.waiting import wait_until
 WIRE = Wire("hold", "out", "relay", "high")
 CONTACT = Wire("closed", "in", "contact", "high")
 POINTS: dict[str, Any] = {
+    "other": {
+        "command": {"topic": "other/set", "on": "ON", "off": "OFF"},
+        "accept_unsafe": "a lamp",
+    },
     "relay": {**RELAY, "answers_within_s": 1},
     "contact": {
         "topic": "contact/state",
@@ -192,6 +196,15 @@ def test_a_device_that_says_that_it_is_offline_is_a_fault_until_it_speaks_again(
     site.now = 2.0
     site.contact(closed=False)
     assert site.until_read() == {"closed": False}
+
+
+def test_off_reaches_each_relay_although_another_relay_fails(site: Site) -> None:
+    both = Points([Wire("other", "out", "other", "high"), WIRE], site.bus)
+    with pytest.raises(HalError, match="other/set: no device listens there"):
+        both.open()
+    with pytest.raises(HalError, match="other/set: no device listens there"):
+        both.write({"other": True, "hold": True})
+    wait_until(lambda: site.commands() == [b"OFF"], "the relay's command")
 
 
 def test_a_silent_device_delays_no_other(site: Site) -> None:
