@@ -212,7 +212,9 @@ class MqttBus(Bus):
         """
         link = self.up()
         with link.changed:
-            return link.changed.wait_for(lambda: bool(link.failure) or done(), timeout_s)
+            found = link.changed.wait_for(lambda: bool(link.failure) or done(), timeout_s)
+        self.calls += 1
+        return found
 
     def topics(self) -> Iterable[str]:
         """Return the topics that the bus listens to."""

@@ -6,8 +6,9 @@ else switches the relay too (`Rivals`). Every relay that goes off gets its messa
 relay fails.
 """
 
+import math
 from collections.abc import Iterable, Mapping
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from drivers.hal import HalError
 from drivers.hal.every import Every
@@ -16,6 +17,10 @@ from drivers.hal.rivals import Rivals
 
 if TYPE_CHECKING:
     from drivers.hal.mqtt.bus import MqttBus
+
+
+WAIT_S: Final = 0.5
+"""A call never waits longer for a state: systemd's watchdog counts ended calls."""
 
 
 class MqttLines:
@@ -86,7 +91,9 @@ class MqttLines:
         readable = {n: p for n, p in self._outputs.items() if p.topic}
         self._bus.ask(self._asks)
         within_s = max((p.answers_within_s for p in readable.values()), default=0.0)
-        self._bus.wait(lambda: all(map(self._follows, readable)), within_s)
+        for _ in range(math.ceil(within_s / WAIT_S)):
+            if self._bus.wait(lambda: all(map(self._follows, readable)), WAIT_S):
+                break
         for name in readable:
             if self._said(name) is None:
                 raise HalError(f"'{name}' publishes no state after it was switched")

@@ -9,7 +9,7 @@ from bridges.kinds.shared.remarks import Remarks
 from drivers import DriverError, json_fields
 from drivers.hal.http_json import strict_json
 from drivers.hal.mqtt.makes import MAKES, Profile
-from drivers.hal.mqtt.topics import Age, Ask, Availability, RelayCommand, Topic
+from drivers.hal.mqtt.topics import Age, Answer, Ask, Availability, RelayCommand, Topic
 from drivers.hal.points import HalError
 from drivers.json_fields import Field, Value
 
@@ -53,7 +53,7 @@ class MqttPoint(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
     ] = None
     command: Annotated[RelayCommand | None, tells("switches the relay.")] = None
     answers_within_s: Annotated[
-        Timeout, tells("how long the state may take to follow a command.")
+        Answer, tells("how long the state may take to follow a command.")
     ] = 2.0
     switches_off_after_s: Annotated[
         Timeout | None,

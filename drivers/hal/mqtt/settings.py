@@ -15,7 +15,7 @@ from drivers.hal.mqtt.points import MqttPoint
 from drivers.hal.mqtt.topics import TOPICS_MAX
 from drivers.hal.points import Wire
 
-Answer = Annotated[float, msgspec.Meta(ge=0.1, le=5, extra={"unit": "s"})]
+Confirmation = Annotated[float, msgspec.Meta(ge=0.1, le=5, extra={"unit": "s"})]
 """At most 5 s: a longer wait would look like a hang to systemd (`WatchdogSec=10` of the unit)."""
 RENEWED = 3
 """The least number of scans after which a relay may switch itself off."""
@@ -72,7 +72,7 @@ class MqttSettings(BusSettings, frozen=True, kw_only=True, forbid_unknown_fields
         tells("after this silence the broker is asked for a sign of life."),
     ] = 5
     timeout_s: Annotated[
-        Answer, tells("how long a connection, or the broker's confirmation, may take.")
+        Confirmation, tells("how long a connection, or the broker's confirmation, may take.")
     ] = 1.0
     scan_s: Annotated[Period, tells("how often the states are judged, and asked for.")] = 0.5
     points: Annotated[

@@ -23,6 +23,7 @@ Topic = Annotated[
 """The name of one topic. A wildcard would let an unknown device speak for a known device."""
 Payload = Annotated[str, msgspec.Meta(max_length=1024)]
 Age = Annotated[float, msgspec.Meta(ge=0.1, le=86400, extra={"unit": "s"})]
+Answer = Annotated[float, msgspec.Meta(ge=0.1, le=60, extra={"unit": "s"})]
 Qos = Literal[0, 1]
 """At most once, or at least once. "Exactly once" (2) adds nothing to a level that is sent again."""
 
