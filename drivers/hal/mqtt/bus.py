@@ -188,12 +188,16 @@ class MqttBus(Bus):
             self.calls += 1
 
     def ask(self, asks: Iterable[Ask]) -> None:
-        """Send these messages, each at most once in half a scan, however many points need it."""
+        """Send these messages, each at most once in half a scan, however many points need it.
+
+        The broker must confirm each within `timeout_s`: a broker that was frozen delivers old states
+        as if they were live, and its connection has ended by then. Raises HalError.
+        """
         now, rest_s = self.now(), self.settings.scan_s / 2
         for one in asks:
             if now - self._asked.get(one, -math.inf) >= rest_s:
                 self._asked[one] = now
-                self.publish(one.topic, one.payload, qos=0)
+                self.publish(one.topic, one.payload)
 
     def await_first(self, topics: Iterable[str], asks: Iterable[Ask]) -> None:
         """Give the devices `timeout_s` to publish these topics for the first time. Raises HalError."""

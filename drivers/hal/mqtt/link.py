@@ -175,7 +175,8 @@ class Link(threading.Thread):
         self._rise()
 
     def _on_message(self, client: object, _: object, message: paho.MQTTMessage) -> None:
-        self._take(message.topic, bytes(message.payload), message.retain)
+        if not self._closing:  # what an ended connection still delivers may be old
+            self._take(message.topic, bytes(message.payload), message.retain)
 
     def _on_publish(
         self, client: object, _: object, mid: int, reason: ReasonCode, properties: object

@@ -17,7 +17,9 @@ WHOLE = "payload"
 """The name of a payload without `field`, in messages."""
 
 
-class MqttPoint(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class MqttPoint(
+    msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_defaults=True
+):
     """A contact or relay behind a broker. A profile has the topics, payloads and fields of a make."""
 
     profile: Annotated[
@@ -69,12 +71,7 @@ class MqttPoint(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
         if self.profile is None:
             return self
         keys = MAKES[self.profile](self.device or "", self.part or "", self.switches_off_after_s)
-        own = {name: value for name in keys if (value := getattr(self, name)) not in (None, [])}
-        return msgspec.structs.replace(
-            msgspec.convert({**keys, "answers_within_s": self.answers_within_s}, MqttPoint),
-            **own,
-            **{name: getattr(self, name) for name in _KEPT},
-        )
+        return msgspec.convert({**keys, **msgspec.to_builtins(self)}, MqttPoint)
 
     def problems(self) -> Remarks:
         """Yield problems that involve more than one key."""
@@ -122,9 +119,6 @@ class MqttPoint(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
         if not isinstance(value, dict):
             raise json_fields.wrong(WHOLE, value, "a JSON object")
         return json_fields.needed(value, self.field)
-
-
-_KEPT = (*("profile", "device", "part", "stale_after_s", "switches_off_after_s", "accept_unsafe"),)
 
 
 def decoded(payload: bytes) -> object:

@@ -207,6 +207,43 @@ def test_off_reaches_each_relay_although_another_relay_fails(site: Site) -> None
     wait_until(lambda: site.commands() == [b"OFF"], "the relay's command")
 
 
+def test_a_frozen_broker_ends_the_reading_before_its_old_states_come() -> None:
+    broker = Mosquitto()
+    asked = {"topic": "a/state", "stale_after_s": 60, "ask": {"topic": "a/ask"}}
+    device = FarDevice(broker.port, "a/ask")
+    with bus_to(broker.port, {"contact": asked}, timeout_s=0.2) as bus:
+        points = Points([CONTACT], bus)
+        bus.up()
+        device.says("a/state", "true")
+        wait_until(lambda: bus.heard("a/state"), "the state")
+        assert points.read() == {"closed": True}
+        broker.freeze()
+        device.client.publish("a/state", "false")
+
+        def fails() -> bool:
+            try:
+                points.read()
+            except HalError as error:
+                return "does not confirm a message within 0.2 s" in str(error)
+            return False
+
+        wait_until(fails, "the broker's silence")
+        broker.thaw()
+        bus.insist()
+        bus.up()
+        assert bus.heard("a/state") is None
+    device.close()
+    broker.close()
+
+
+def test_a_device_that_is_asked_and_does_not_listen_is_named(site: Site) -> None:
+    asked = {"topic": "b/state", "stale_after_s": 60, "ask": {"topic": "b/ask"}}
+    with bus_to(site.bus.settings.port or 0, {"contact": asked}) as bus:
+        points = Points([CONTACT], bus)
+        with pytest.raises(HalError, match="b/ask: no device listens there"):
+            points.read()
+
+
 def test_a_silent_device_delays_no_other(site: Site) -> None:
     """The silent device's reading fails from what was heard: no call goes out for it."""
     opened(site).until_read()
