@@ -79,7 +79,7 @@ class MqttDevice:
             (command.topic, payload): (name, on)
             for name in wiring.outputs
             if (command := self._points[name].command)
-            for payload, on in ((command.on, True), (command.off, False))
+            for payload, on in ((command.payload_on, True), (command.payload_off, False))
         }
         self._on = dict.fromkeys(wiring.outputs, False)
         self._off_at = dict.fromkeys(wiring.outputs, NEVER)

@@ -215,13 +215,17 @@ def _tops() -> Headings:
         (k.devices_key, k.settings, f"`{k.devices_key}` of `kind: {k.name}`") for k in graph_kinds()
     ]
     keys: dict[type, list[str]] = {}
-    for key, struct, _ in last:
+    titles: dict[type, list[str]] = {}
+    for key, struct, title in last:
         for base in _bases(struct):
             keys.setdefault(base, []).append(f"`{key}`")
+            titles.setdefault(base, []).append(title)
     for _, struct, title in last:
         for base in reversed(_bases(struct)):
-            if len(keys[base]) > 1:
-                found[base] = f"## All {', '.join(dict.fromkeys(keys[base]))}"
+            if len(keys[base]) > 1 and base not in found:
+                every = f"## All {', '.join(dict.fromkeys(keys[base]))}"
+                some = f"## {' or '.join(titles[base])}"
+                found[base] = some if every in found.values() else every
         found[struct] = f"## {title}"
     return found
 

@@ -112,7 +112,7 @@ class MqttLines:
     def _send(self, name: str, on: bool) -> None:
         command = self._outputs[name].command
         assert command  # `unfit` refuses an output without a command
-        payload = command.on if on else command.off
+        payload = command.payload_on if on else command.payload_off
         self._bus.publish(command.topic, payload, command.qos, safe=not on)
 
     def _state(self, point: MqttPoint) -> bool:

@@ -35,7 +35,7 @@ def shelly(device: str, part: str, off_s: float | None) -> Keys:
     on, off = (
         _switch_set(int(number), {"on": on} | more) for on, more in ((True, timer), (False, {}))
     )
-    return keys | {"command": {"topic": f"{device}/rpc", "on": on, "off": off}}
+    return keys | {"command": {"topic": f"{device}/rpc", "payload_on": on, "payload_off": off}}
 
 
 def tasmota(device: str, part: str, off_s: float | None) -> Keys:
@@ -57,7 +57,7 @@ def tasmota(device: str, part: str, off_s: float | None) -> Keys:
             "field": f"StatusSNS.{part}",
             "ask": ask,
         }
-    command = {"topic": f"cmnd/{device}/{part}", "on": "ON", "off": "OFF"}
+    command = {"topic": f"cmnd/{device}/{part}", "payload_on": "ON", "payload_off": "OFF"}
     result = {"topic": f"stat/{device}/{part}", "ask": {"topic": command["topic"]}}
     return words | result | {"command": command}
 
@@ -86,7 +86,7 @@ def zigbee2mqtt(device: str, part: str, off_s: float | None) -> Keys:
         "when": ["ON"],
         "when_not": ["OFF"],
         "ask": {"topic": f"zigbee2mqtt/{device}/get", "payload": _json({part: ""})},
-        "command": {"topic": f"zigbee2mqtt/{device}/set", "on": on, "off": off},
+        "command": {"topic": f"zigbee2mqtt/{device}/set", "payload_on": on, "payload_off": off},
     }
 
 

@@ -62,7 +62,7 @@ class MqttPoint(
         tells("""the relay's own timer: it switches the relay off this long after the last message
         that switched it on. That message is sent in every scan while the relay is on."""),
     ] = None
-    accept_unsafe: Annotated[
+    without_timer: Annotated[
         Name | None, tells("why this relay may stay on when the network or the broker fails.")
     ] = None
 
@@ -146,16 +146,16 @@ def _state_problems(point: MqttPoint) -> Remarks:
 
 def _relay_problems(point: MqttPoint) -> Remarks:
     if point.command is None:
-        for key in ("switches_off_after_s", "accept_unsafe"):
+        for key in ("switches_off_after_s", "without_timer"):
             if getattr(point, key) is not None:
                 yield (key,), "is for a relay: add command, or delete this"
         return
-    if point.switches_off_after_s is None and point.accept_unsafe is None:
+    if point.switches_off_after_s is None and point.without_timer is None:
         text = (
             "unsafe: when the network or the broker fails nothing switches this relay off: use the"
-            " relay's own timer, and write its time as switches_off_after_s; or accept_unsafe: <why it"
+            " relay's own timer, and write its time as switches_off_after_s; or without_timer: <why it"
             " is safe here>"
         )
         yield (), text
-    if point.switches_off_after_s is not None and point.accept_unsafe is not None:
-        yield ("accept_unsafe",), "the relay has a timer of its own: delete accept_unsafe"
+    if point.switches_off_after_s is not None and point.without_timer is not None:
+        yield ("without_timer",), "the relay has a timer of its own: delete without_timer"

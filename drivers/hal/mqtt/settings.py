@@ -132,7 +132,7 @@ def _uses(point: MqttPoint) -> Iterator[tuple[str, object]]:
     if point.topic:
         yield "topic", ("state", point.topic, point.field, str(point.when))
     if point.command:
-        yield "command", ("command", point.command.topic, point.command.on)
+        yield "command", ("command", point.command.topic, point.command.payload_on)
 
 
 def _written(point: MqttPoint) -> Iterator[tuple[str, str]]:
@@ -156,10 +156,10 @@ def warnings(settings: MqttSettings) -> Remarks:
         yield ("password_file",), text
     for name, point in settings.wholes().items():
         path = ("points", name)
-        if point.accept_unsafe:
+        if point.without_timer:
             yield (
-                (*path, "accept_unsafe"),
-                f"unsafe relay '{name}' is accepted: {point.accept_unsafe}",
+                (*path, "without_timer"),
+                f"unsafe relay '{name}' is accepted: {point.without_timer}",
             )
         if point.command is None:
             continue
@@ -204,7 +204,7 @@ def unfit(settings: MqttSettings, point: str, direction: Literal["in", "out"]) -
 def place(settings: MqttSettings, point: str) -> str | None:
     """Return the command that no other file may send; None for a state, which every file may read."""
     command = settings.wholes()[point].command
-    return f"the command {command.topic} {command.on}" if command else None
+    return f"the command {command.topic} {command.payload_on}" if command else None
 
 
 def wire_problems(wire: Wire) -> Iterable[str]:
@@ -214,7 +214,7 @@ def wire_problems(wire: Wire) -> Iterable[str]:
     if wire.flash is not None:
         yield "a pulse that the module times is for Modbus: use the relay's own timer"
     if wire.direction == "out" and wire.active == "low":
-        yield "write active: high: the point's `on` and `off` say which message switches the relay on"
+        yield "write active: high: the point says which message switches the relay on"
 
 
 def tables(settings: MqttSettings) -> Iterable[Table]:
@@ -225,7 +225,7 @@ def tables(settings: MqttSettings) -> Iterable[Table]:
         age = "-" if point.stale_after_s is None else f"{point.stale_after_s:g} s"
         sent = "-"
         if point.command:
-            sent = f"{point.command.topic}: {point.command.on or '(empty)'}"
+            sent = f"{point.command.topic}: {point.command.payload_on or '(empty)'}"
         timer = point.switches_off_after_s
         rows.append((name, state, age, sent, "-" if timer is None else f"{timer:g} s"))
     heads = ("point", "state", "stale after", "on", "off by itself after")

@@ -80,8 +80,8 @@ class RelayCommand(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
     """The messages that switch one relay. They are never retained."""
 
     topic: Annotated[Topic, tells("where the device listens.")]
-    on: Annotated[Payload, tells("the message that switches the relay on.")]
-    off: Annotated[Payload, tells("the message that switches the relay off.")]
+    payload_on: Annotated[Payload, tells("the message that switches the relay on.")]
+    payload_off: Annotated[Payload, tells("the message that switches the relay off.")]
     qos: Annotated[
         Qos,
         tells("1: the broker confirms the message, and repeats it to the device; 0: it does not."),
@@ -89,5 +89,5 @@ class RelayCommand(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
 
     def problems(self) -> Remarks:
         """Yield a problem for messages that do not differ."""
-        if self.on == self.off:
-            yield ("off",), "is the same message as on"
+        if self.payload_on == self.payload_off:
+            yield ("payload_off",), "is the same message as payload_on"

@@ -72,7 +72,11 @@ def _point(wire: Wire) -> dict[str, object]:
         others = [signal for signal in LANDINGS if signal != wire.signal]
         found |= {"field": "floor", "when": [wire.signal], "when_not": [*others, "between"]}
     if wire.direction == "out":
-        command = {"topic": "lift/do", "on": f"{wire.signal} on", "off": f"{wire.signal} off"}
+        command = {
+            "topic": "lift/do",
+            "payload_on": f"{wire.signal} on",
+            "payload_off": f"{wire.signal} off",
+        }
         found |= {"command": command, "switches_off_after_s": 60}
     return found
 

@@ -20,7 +20,7 @@ RELAY = {
     "when": ["ON"],
     "when_not": ["OFF"],
     "stale_after_s": 60,
-    "command": {"topic": SWITCH, "on": "ON", "off": "OFF"},
+    "command": {"topic": SWITCH, "payload_on": "ON", "payload_off": "OFF"},
     "switches_off_after_s": 60,
 }
 

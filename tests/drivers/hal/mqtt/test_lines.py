@@ -18,8 +18,8 @@ WIRE = Wire("hold", "out", "relay", "high")
 CONTACT = Wire("closed", "in", "contact", "high")
 POINTS: dict[str, Any] = {
     "other": {
-        "command": {"topic": "other/set", "on": "ON", "off": "OFF"},
-        "accept_unsafe": "a lamp",
+        "command": {"topic": "other/set", "payload_on": "ON", "payload_off": "OFF"},
+        "without_timer": "a lamp",
     },
     "relay": {**RELAY, "answers_within_s": 1},
     "contact": {

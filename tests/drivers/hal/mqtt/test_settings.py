@@ -50,7 +50,7 @@ def test_a_relay_without_a_timer_needs_a_reason() -> None:
     [(path, text)] = point_problems(**bare)
     assert path == ()
     assert text.startswith("unsafe: when the network or the broker fails nothing switches")
-    assert point_problems(**bare, accept_unsafe="the lock opens by hand") == []
+    assert point_problems(**bare, without_timer="the lock opens by hand") == []
 
 
 def test_a_profile_needs_a_device_and_a_part_that_the_make_has() -> None:
@@ -77,8 +77,8 @@ def test_a_topic_used_twice_is_refused_at_the_second_use() -> None:
 
 
 def test_a_command_topic_that_is_a_states_is_refused() -> None:
-    command = {"topic": "a/state", "on": "1", "off": "0"}
-    relay = {"command": command, "accept_unsafe": "a lamp"}
+    command = {"topic": "a/state", "payload_on": "1", "payload_off": "0"}
+    relay = {"command": command, "without_timer": "a lamp"}
     assert problems({"a": STATE, "b": relay}) == [
         (
             ("points", "b", "command", "topic"),
@@ -111,7 +111,7 @@ def test_the_port_is_that_of_the_protocol_unless_given() -> None:
 
 
 def test_warnings_name_what_an_integrator_should_look_at() -> None:
-    bare = {"command": RELAY["command"], "accept_unsafe": "a lamp"}
+    bare = {"command": RELAY["command"], "without_timer": "a lamp"}
     found = settings(
         1883, {"relay": RELAY, "lamp": bare}, version="3.1.1", user="u", password_file="f"
     )
@@ -122,7 +122,7 @@ def test_warnings_name_what_an_integrator_should_look_at() -> None:
             "pull the network plug while it is on",
         ),
         ("relay", "a device that keeps its session gets an old 'on' of 'relay' when it returns"),
-        ("accept_unsafe", "unsafe relay 'lamp' is accepted"),
+        ("without_timer", "unsafe relay 'lamp' is accepted"),
         ("lamp", "'lamp' has no topic for its state"),
         ("lamp", "a device that keeps its session gets an old 'on' of 'lamp' when it returns"),
     ]
@@ -160,14 +160,14 @@ def test_the_commands_of_the_makes_carry_the_timer_where_the_make_takes_it() -> 
     assert sent == {
         ("shelly-gen2", "switch:0"): {
             "topic": "d/rpc",
-            "on": rpc + '{"id": 0, "on": true, "toggle_after": 10}}',
-            "off": rpc + '{"id": 0, "on": false}}',
+            "payload_on": rpc + '{"id": 0, "on": true, "toggle_after": 10}}',
+            "payload_off": rpc + '{"id": 0, "on": false}}',
         },
-        ("tasmota", "POWER"): {"topic": "cmnd/d/POWER", "on": "ON", "off": "OFF"},
+        ("tasmota", "POWER"): {"topic": "cmnd/d/POWER", "payload_on": "ON", "payload_off": "OFF"},
         ("zigbee2mqtt", "state"): {
             "topic": "zigbee2mqtt/d/set",
-            "on": '{"state": "ON", "on_time": 10}',
-            "off": '{"state": "OFF"}',
+            "payload_on": '{"state": "ON", "on_time": 10}',
+            "payload_off": '{"state": "OFF"}',
         },
     }
 
@@ -188,34 +188,33 @@ RELAYS: list[tuple[Profile, str]] = [
         (
             "{point: input 0,",
             "{point: inptu 0,",
-            "34:23: unknown point 'inptu 0': did you mean 'input 0'?"
+            "37:23: unknown point 'inptu 0': did you mean 'input 0'?"
             " known here: relay, input 0, input 1",
         ),
         (
             "{point: input 0,",
             "{point: input 0, pull: up,",
-            "34:7: 'opened': pull is for GPIO pins: delete pull",
+            "37:7: 'opened': pull is for GPIO pins: delete pull",
         ),
         (
             "{point: relay, active: high}",
             "{point: relay, active: low}",
-            "37:7: 'hold_open': write active: high: the point's `on` and `off` say which message"
-            " switches the relay on",
+            "40:7: 'hold_open': write active: high: the point says which message switches the relay on",
         ),
         (
             "{point: relay,",
             "{point: input 1,",
-            "37:26: 'input 1' has no command, so it cannot be switched: add command to it",
+            "40:26: 'input 1' has no command, so it cannot be switched: add command to it",
         ),
         (
             "part: input:1",
             "part: input:0",
-            "28:15: 'part' is the same topic as that of 'input 0'",
+            "31:15: 'part' is the same topic as that of 'input 0'",
         ),
         (
             "device: shellyplus2pm-a0b1c2d3e4f5\n        part: input:1",
             "device: shellyplus2pm/#\n        part: input:1",
-            "27:17: 'device' is 'shellyplus2pm/#': write one whole topic, without the wildcards"
+            "30:17: 'device' is 'shellyplus2pm/#': write one whole topic, without the wildcards"
             " # and + (door-1/status/input:0)",
         ),
     ],
