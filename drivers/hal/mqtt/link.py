@@ -38,6 +38,8 @@ TAKEN: Final = ""
 ACKS_MAX: Final = 256
 """The number of confirmations that are remembered."""
 LOOK_S: Final = 1.0
+GARBLED: Final = (ValueError, IndexError, KeyError, TypeError, struct.error, MQTTException)
+"""Errors of paho at bytes that are no MQTT."""
 
 Taken = Callable[[str, bytes, bool], None]
 """Takes topic, payload, and whether the message is retained. Called on the connection's thread."""
@@ -79,14 +81,7 @@ class Link(threading.Thread):
                 pass
         except OSError as error:
             failure = self._explained(error)
-        except (
-            ValueError,
-            IndexError,
-            KeyError,
-            TypeError,
-            struct.error,
-            MQTTException,
-        ) as error:
+        except GARBLED as error:
             failure = f"no MQTT ({excerpt(str(error))}): is it an MQTT broker?"
         finally:
             self._ended(failure)
@@ -151,9 +146,7 @@ class Link(threading.Thread):
         client.on_socket_register_write = _nothing  # so that only this thread writes to the socket
         return client
 
-    def _on_connect(
-        self, client: object, _: object, flags: Any, reason: ReasonCode, properties: object
-    ) -> None:
+    def _on_connect(self, _c: Any, _u: Any, flags: Any, reason: ReasonCode, _p: Any) -> None:
         if reason.is_failure:
             self._fail(
                 f"the broker refuses us: {str(reason).lower()}: check user and password_file"
@@ -165,9 +158,7 @@ class Link(threading.Thread):
         else:
             self._rise()
 
-    def _on_subscribe(
-        self, client: object, _: object, mid: int, reasons: list[ReasonCode], properties: object
-    ) -> None:
+    def _on_subscribe(self, _c: Any, _u: Any, mid: int, reasons: Any, _p: Any) -> None:
         with self.changed:
             for topic, reason in zip(self._asked.pop(mid, []), reasons, strict=False):
                 if reason.is_failure:
@@ -178,9 +169,7 @@ class Link(threading.Thread):
         if not self._closing:  # what an ended connection still delivers may be old
             self._take(message.topic, bytes(message.payload), message.retain)
 
-    def _on_publish(
-        self, client: object, _: object, mid: int, reason: ReasonCode, properties: object
-    ) -> None:
+    def _on_publish(self, _c: Any, _u: Any, mid: int, reason: ReasonCode, _p: Any) -> None:
         text = TAKEN
         if reason.value == NOBODY:
             text = "no device listens there: check its power, its network and the topic"
@@ -192,9 +181,7 @@ class Link(threading.Thread):
             self._acks[mid] = text
             self.changed.notify_all()
 
-    def _on_disconnect(
-        self, client: object, _: object, flags: Any, reason: ReasonCode, properties: object
-    ) -> None:
+    def _on_disconnect(self, _c: Any, _u: Any, flags: Any, reason: ReasonCode, _p: Any) -> None:
         if flags.is_disconnect_packet_from_server:
             self._fail(f"the broker has ended the connection: {str(reason).lower()}")
 
