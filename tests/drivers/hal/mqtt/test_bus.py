@@ -9,10 +9,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from paho.mqtt.client import MQTTMessage
 
 from drivers.hal import HalError
 from drivers.hal.mqtt import MqttBus
 from drivers.hal.mqtt.bus import open_bus
+from drivers.hal.mqtt.link import Link
 from hal_fakes.mosquitto import Mosquitto
 from tests.drivers.hal.mqtt.broker import STATE, SWITCH, FarDevice, bus_to, hears, reason, settings
 from tests.waiting import wait_until
@@ -130,8 +132,10 @@ def test_a_command_reaches_the_device_once_and_is_not_retained(
         wait_until(lambda: len(device.taken) == 2, "both commands")
     assert device.taken == [(SWITCH, b"ON", False), (SWITCH, b"OFF", False)]
     late = FarDevice(broker.port, SWITCH)
+    late.says("nothing", "a mark")  # a retained command would come before it
+    wait_until(lambda: late.taken, "the mark")
     late.close()
-    assert late.taken == []
+    assert late.taken == [("nothing", b"a mark", False)]
 
 
 def test_a_command_that_no_device_receives_is_an_error(broker: Mosquitto) -> None:
@@ -219,6 +223,16 @@ def test_a_frozen_broker_is_noticed_by_its_silence(broker: Mosquitto) -> None:
         link = bus.up()
         broker.freeze()
         wait_until(lambda: link.failure, "the broker's silence")
+
+
+def test_what_an_ended_connection_still_delivers_is_dropped() -> None:
+    taken: list[str] = []
+    link = Link(settings(1883), [], lambda topic, payload, retained: taken.append(topic))
+    message = MQTTMessage(topic=STATE.encode())
+    link._on_message(None, None, message)
+    link.close()
+    link._on_message(None, None, message)
+    assert taken == [STATE]
 
 
 def test_a_connection_is_without_delay(broker: Mosquitto) -> None:
