@@ -25,8 +25,9 @@ message, for a driver that must not miss one.
 import math
 import random
 import time
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from importlib.util import find_spec
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Final
 
 import msgspec
@@ -36,7 +37,7 @@ from drivers.hal.backoff import Backoff
 from drivers.hal.mqtt.lines import MqttLines
 from drivers.hal.mqtt.settings import MqttSettings
 from drivers.hal.mqtt.topics import PAYLOAD_MAX, TOPICS_MAX, Ask, Availability, Qos
-from drivers.hal.points import Pull
+from drivers.hal.points import Clearing, Pull
 
 if TYPE_CHECKING:
     from drivers.hal.mqtt.link import Link
@@ -91,8 +92,14 @@ class MqttBus(Bus):
         """Return the point's name, which has one spelling."""
         return point
 
-    def lines(self, inputs: Mapping[str, Pull | None], outputs: Mapping[str, bool]) -> MqttLines:
-        """Return these points; listen to their topics."""
+    def lines(
+        self,
+        inputs: Mapping[str, Pull | None],
+        outputs: Mapping[str, bool],
+        unread: Collection[str] = (),
+        clearing: Mapping[str, Clearing] = MappingProxyType({}),
+    ) -> MqttLines:
+        """Return these points; listen to their topics. The last two parameters are for modules."""
         found = {name: self.points[name] for name in (*inputs, *outputs)}
         for point in found.values():
             for place in (point, point.availability):

@@ -213,6 +213,8 @@ def wire_problems(wire: Wire) -> Iterable[str]:
         yield "pull is for GPIO pins: delete pull"
     if wire.flash is not None:
         yield "a pulse that the module times is for Modbus: use the relay's own timer"
+    if not wire.read_back:
+        yield "read_back is for coils; a point without topic is not read back: delete read_back"
     if wire.direction == "out" and wire.active == "low":
         yield "write active: high: the point says which message switches the relay on"
 
