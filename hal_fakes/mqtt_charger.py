@@ -39,7 +39,7 @@ class FakeMqttCharger(FakeJsonCharger):
 
     def states(self) -> dict[str, bytes]:
         """Return topic -> payload of each state."""
-        said = json.loads(self.answer())
+        said = json.loads(self.body(self.reading()))
         if self.plant.failures.get("unit") == "wrong":
             said = {name: ["?"] for name in self._topics}
         return {topic: plain(said.get(name)) for name, topic in self._topics.items()}

@@ -14,13 +14,12 @@ from bridges.kinds.shared.fields import tells
 from bridges.kinds.shared.remarks import Remarks
 from bridges.yaml.spelling import unknown
 from drivers.charger import json_station, rules
-from drivers.charger.http_fields import JsonNumber
 from drivers.charger.json_station import POWER, JsonCharger, JsonChargerSettings, StationCommand
 from drivers.driver_type import DriverType
 from drivers.hal.mqtt import MqttBus, MqttSettings
 from drivers.hal.mqtt.points import decoded
 from drivers.hal.mqtt.topics import Message, StateTopic
-from drivers.json_fields import JsonFlag
+from drivers.json_fields import JsonFlag, JsonNumber
 
 Key = Annotated[
     str,
