@@ -28,7 +28,8 @@ INSIDE = {
     "drivers": "lift door charger profiles"
     " driver_type http_call json_fields numbers on_points tables unsafe",
     "drivers.hal": "can gpio http modbus"
-    " backoff deadline every hosts http_address http_json http_login http_settings points rivals serial_port",
+    " backoff deadline every hosts http_address http_json http_login http_settings points rivals"
+    " serial_port",
 }
 CORE = [f"{package}.{name}" for package, listed in INSIDE.items() for name in listed.split()]
 """Modules and whole folders of the core. A driver there that knows only other buses is an extra."""
