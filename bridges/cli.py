@@ -49,6 +49,10 @@ COMMANDS = {
         "publish lifts, doors and chargers to an MQTT broker; commands nothing",
         "mqtt-out 192.168.1.5 --home-assistant",
     ),
+    "exporter": (
+        "serve metrics of RMF's graph and this machine's daemons, for Prometheus",
+        "exporter --localhost",
+    ),
     "status": (
         "show every daemon on this machine: state, faults and what to do",
         "status --json",
@@ -115,7 +119,7 @@ COMMANDS = {
 }
 """Subcommand -> (its purpose, an example)."""
 WORKBENCH = frozenset(
-    {"init", "schema", "watch", "page", "doctor", "explain", "plot", "send", "mqtt-out"}
+    {"init", "schema", "watch", "page", "doctor", "explain", "plot", "send", "mqtt-out", "exporter"}
     | {"judge", "release", "walk", "press", "fail", "replay"}
 )
 """The workbench's subcommands, which no daemon needs."""

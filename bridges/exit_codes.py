@@ -87,6 +87,11 @@ EXIT_CODES: Final[dict[str, dict[int, str]]] = {
         69: "paho-mqtt is not installed",
         78: "the password file or the certificate has an error",
     },
+    "exporter": {
+        0: "Ctrl-C or SIGTERM",
+        1: GRAPH,
+        69: "the port is taken, or prometheus_client is not installed",
+    },
     "status": {
         0: "all is well",
         1: "a daemon has a fault",

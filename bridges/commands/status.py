@@ -21,7 +21,7 @@ from bridges.runtime.subject import Status
 from bridges.system.directories import runtimes
 from bridges.system.paint import bold, red
 
-NOT_TOLD: Final = ("contacts", "faults", "input_age_s", "outputs", "refused")
+NOT_TOLD: Final = ("contacts", "counts", "faults", "input_age_s", "outputs", "refused")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -11,6 +11,7 @@ from bridges.observe.news import News
 from bridges.observe.requesters import Fact, Moment
 
 NOBODY: Final = "nobody"
+CHARGING: Final = "charging"
 
 
 class ObservedCharger(ObservedDevice[d.ChargerState]):

@@ -97,6 +97,7 @@ class Daemon:
             self._guard = Guard(outputs_off) if guard.needed() else None
         self._health_topic = named_by(config, DIAGNOSTICS)
         self._told = 0
+        self._longest_unfed_s = 0.0
         self._diagnostics: Publisher[DiagnosticArray] | None = None
         if config.rmf.diagnostics:
             self._diagnostics = self._transport.publisher(self._health_topic)
@@ -151,7 +152,7 @@ class Daemon:
         progress."""
         period_s = min(STATUS_EVERY_S, (watchdog_s() or 10.0) / 6)
         told_ready, tell_at = False, 0.0
-        fed = [-1] * len(self._loops)
+        fed, fed_at = [-1] * len(self._loops), time.monotonic()
         while not self._end.wait(0.02 if not told_ready else period_s):
             self._require_life()
             if not told_ready and all(loop.ready for loop in self._loops):
@@ -161,7 +162,8 @@ class Daemon:
             finished = [loop.finished for loop in self._loops]
             if all(now > before for now, before in zip(finished, fed, strict=True)):
                 self._convenience("sd_notify", partial(notify, ALIVE if told_ready else STARTING))
-                fed = finished
+                self._longest_unfed_s = max(self._longest_unfed_s, time.monotonic() - fed_at)
+                fed, fed_at = finished, time.monotonic()
             if self._predecessor is not None:
                 self._predecessor.tick(time.monotonic())
             if told_ready and time.monotonic() >= tell_at:
@@ -218,6 +220,12 @@ class Daemon:
         """Return the faults that keep this node and others from hearing each other."""
         return [{"code": code, "detail": detail} for code, detail in self._transport.faults()]
 
+    def _slack(self) -> dict[str, float]:
+        """Return the least time that was left before systemd's watchdog since the last call (s)."""
+        unfed_s, self._longest_unfed_s = self._longest_unfed_s, 0.0
+        allowed_s = watchdog_s()
+        return {"watchdog_slack_s": round(allowed_s - unfed_s, 3)} if allowed_s else {}
+
     def _tell(self) -> None:
         """Write the status file and publish diagnostics."""
         service = self._service.status()
@@ -231,6 +239,7 @@ class Daemon:
             "domain_id": self._transport.domain_id,
             "samples_dropped": dict(self._transport.dropped),
             "predecessor_not_off": self._left(),
+            **self._slack(),
             **service,
             "faults": [*service.get("faults", []), *self._apart()],
         }

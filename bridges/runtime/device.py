@@ -35,6 +35,7 @@ from bridges.runtime.contained import Contained
 from bridges.runtime.device_memory import DeviceKeeper, DeviceMemories, Unkept
 from bridges.runtime.refusals import Refusals
 from bridges.runtime.ring_writer import NOBODY, NoWriter
+from bridges.runtime.scan_counts import COUNTS, ScanCounts
 from bridges.runtime.subject import Publish, Status, Subject, SubjectCore
 from bridges.system.log import pairs, plain
 from drivers import Driver, DriverError
@@ -98,6 +99,7 @@ class Node(Generic[S, L, M, X, E, O, R]):
         self._bus_words: set[str] = set()
         self._failing = False
         self._logged_outputs: O | None = None
+        self._counts = ScanCounts()
 
     @property
     def ready(self) -> bool:
@@ -120,6 +122,7 @@ class Node(Generic[S, L, M, X, E, O, R]):
 
     def scan(self, events: Iterable[DeviceEvent[X, E]] = ()) -> None:
         """Read, decide with each event, write, publish."""
+        started = self._clock.monotonic()
         self._failing = False
         self._bus_words.clear()
         self._decide(self._read())
@@ -129,6 +132,7 @@ class Node(Generic[S, L, M, X, E, O, R]):
             self._decide(event)
         self._keep()
         self._write()
+        self._count(self._clock.monotonic() - started)
         self._contacts = {} if self._failing else self._driver.contacts()
         self._alarm()
         self._tell()
@@ -160,6 +164,7 @@ class Node(Generic[S, L, M, X, E, O, R]):
             return {}
         outputs = plain(decision.outputs)
         shown = {**self.subject.status(), "outputs": outputs, "refused": self.refused}
+        shown[COUNTS] = self._counts.status()
         contacts = {diagnostics.CONTACTS: self._contacts} if self._contacts else {}
         return {**shown, **contacts, **self._answers.status()}
 
@@ -206,6 +211,11 @@ class Node(Generic[S, L, M, X, E, O, R]):
         if inputs != self._alarm_told or now >= self._alarm_at:
             self._alarm_told, self._alarm_at = inputs, now + TELL_EVERY_S
             self._tell_alarm(self.name, inputs)
+
+    def _count(self, took_s: float) -> None:
+        decision = self.subject.decision
+        assert decision is not None
+        self._counts.scanned(took_s, decision.outputs, failed=self._failing)
 
     def _tell(self) -> None:
         """Publish the state if it is due, and results after it. A request alone makes no state due."""

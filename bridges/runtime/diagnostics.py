@@ -25,6 +25,7 @@ from bridges.messages.definitions import (
     Time,
 )
 from bridges.observe.diagnosis import PASSIVE, SIMULATED
+from bridges.runtime.scan_counts import COUNTS
 from bridges.runtime.subject import Status
 from bridges.system.log import plain
 
@@ -74,7 +75,7 @@ def _pairs(status: Status) -> Iterator[tuple[str, str]]:
     """Yield the status as (key, value), with a pair for each fault (code, detail) and each table
     entry."""
     for key, value in status.items():
-        if key == CONTACTS:
+        if key in (CONTACTS, COUNTS):
             continue
         if key == "faults":
             yield from ((fault["code"], fault["detail"]) for fault in value)

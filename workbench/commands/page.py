@@ -16,7 +16,13 @@ from typing import Final
 
 from bridges.system import directories, log
 from bridges.system.installed import how_to_install
-from workbench.graph.join import add_graph_arguments, command_line, complain, open_graph
+from workbench.graph.join import (
+    add_graph_arguments,
+    address_and_port,
+    command_line,
+    complain,
+    open_graph,
+)
 
 PORT: Final = 8080
 LOOPBACK: Final = "127.0.0.1"
@@ -31,7 +37,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--listen",
-        type=_address,
+        type=address_and_port,
         default=(LOOPBACK, PORT),
         metavar="ADDRESS:PORT",
         help=f"default: {LOOPBACK}:{PORT}; with port 0 a free port",
@@ -74,19 +80,6 @@ def _incidents() -> Path:
     if os.access(RECORDER, os.R_OK | os.X_OK):
         return RECORDER
     return directories.state_base() / "recordings"
-
-
-def _address(text: str) -> tuple[str, int]:
-    host, _, port = text.rpartition(":")
-    host = host.strip("[]")
-    try:
-        ipaddress.ip_address(host)
-        number = int(port)
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"'{text}' is not ADDRESS:PORT, as 0.0.0.0:8080") from None
-    if not 0 <= number <= 65535:
-        raise argparse.ArgumentTypeError(f"'{text}': a port is 0 to 65535")
-    return host, number
 
 
 def run(args: argparse.Namespace) -> int:

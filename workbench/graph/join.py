@@ -1,6 +1,7 @@
 """The common part of the commands on a graph: options, joining, durations, ending."""
 
 import argparse
+import ipaddress
 import os
 import shlex
 import signal
@@ -57,6 +58,20 @@ def seconds(least: float, most: float) -> Callable[[str], float]:
         raise argparse.ArgumentTypeError(f"'{text}': write {least:g} to {most:g} seconds")
 
     return read
+
+
+def address_and_port(text: str) -> tuple[str, int]:
+    """Read `--listen ADDRESS:PORT`, for argparse."""
+    host, _, port = text.rpartition(":")
+    host = host.strip("[]")
+    try:
+        ipaddress.ip_address(host)
+        number = int(port)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"'{text}' is not ADDRESS:PORT, as 0.0.0.0:8080") from None
+    if not 0 <= number <= 65535:
+        raise argparse.ArgumentTypeError(f"'{text}': a port is 0 to 65535")
+    return host, number
 
 
 def open_graph(args: argparse.Namespace, node_name: str) -> Transport:

@@ -1,0 +1,168 @@
+"""Counts of what each device did: rides, waits, door cycles, charges, and its availability.
+
+The exporter and the recorder's daily figures add up the same news. A wait or ride whose beginning was
+not heard is not counted, because its length is unknown.
+"""
+
+from bisect import bisect_left
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from typing import Final
+
+from bridges.observe.all_devices import AnyDevice, Key, ObservedGraph
+from bridges.observe.charger import CHARGING, ObservedCharger
+from bridges.observe.door import OPEN, ObservedDoor
+from bridges.observe.lift import ObservedLift
+from bridges.observe.limits import SLOWEST_S
+from bridges.observe.news import News
+
+BOUNDS_S: Final = (1.0, 2.0, 5.0, 10.0, 20.0, 30.0, 60.0, 120.0, 300.0, 600.0)
+"""The upper bounds of the histograms' buckets (s)."""
+NO_SERVICE: Final = frozenset(
+    {"OFFLINE", "UNKNOWN", "EMERGENCY", "FIRE", "offline", "unknown", "error"}
+)
+"""Lift modes, door modes and charger states in which RMF's robots are not served."""
+
+
+@dataclass(slots=True)
+class DurationHistogram:
+    """Durations, counted by bucket: one for each of BOUNDS_S, and one for longer durations."""
+
+    counts: list[int] = field(default_factory=lambda: [0] * (len(BOUNDS_S) + 1))
+    sum_s: float = 0.0
+
+    def add(self, duration_s: float) -> None:
+        """Count a duration (s)."""
+        self.counts[bisect_left(BOUNDS_S, duration_s)] += 1
+        self.sum_s += duration_s
+
+    @property
+    def total(self) -> int:
+        """The number of durations."""
+        return sum(self.counts)
+
+    def quantile(self, share: float) -> float | None:
+        """Return the upper bound (s) of the bucket with this share of the durations, infinity for the
+        last bucket; None without durations."""
+        rest = share * self.total
+        for bound, count in zip((*BOUNDS_S, float("inf")), self.counts, strict=True):
+            rest -= count
+            if count and rest <= 0:
+                return bound
+        return None
+
+
+@dataclass(slots=True)
+class DeviceTally:
+    """The counts of one device since the beginning.
+
+    `waits`: from a robot's first request until RMF lets it board, pass or charge. `rides`: of a lift,
+    from the request for the next floor until the robot may leave. `cycles`: a door's openings, a
+    charger's charges, or a lift's stops with an open door. `energy_j`: the energy of a charger that
+    reports volts and amps. `watched_s`, `served_s`: the time with states, and the time in service.
+    """
+
+    waits: DurationHistogram = field(default_factory=DurationHistogram)
+    rides: DurationHistogram = field(default_factory=DurationHistogram)
+    cycles: int = 0
+    energy_j: float = 0.0
+    watched_s: float = 0.0
+    served_s: float = 0.0
+    _at: float | None = None
+    _counted: dict[str, float] = field(default_factory=dict)
+
+    def take(self, device: AnyDevice, news: Iterable[News], at: float) -> None:
+        """Add one message's news. `at`: the message's time (s)."""
+        for one in news:
+            if one.what == "met":
+                self._met(device, one)
+            elif one.what == "over":
+                self._counted.pop(one.who, None)
+            elif one.what == "changed" and _cycled(device):
+                self.cycles += 1
+        if device.last_state is not None and device.last_state.at == at and self._at != at:
+            self._pass_time(device, at)
+        self._charged(device)
+
+    def _met(self, device: AnyDevice, one: News) -> None:
+        asked = one.requester
+        if asked is None or self._counted.get(asked.who) == asked.since.at:
+            return
+        self._counted[asked.who] = asked.since.at
+        if not asked.since.seen:
+            return
+        boards = not isinstance(device, ObservedLift) or asked.boarded is one.at
+        (self.waits if boards else self.rides).add(one.at.at - asked.since.at)
+
+    def _pass_time(self, device: AnyDevice, at: float) -> None:
+        if self._at is not None and at - self._at <= SLOWEST_S:
+            self.watched_s += at - self._at
+            self.served_s += (at - self._at) * in_service(device)
+            self.energy_j += (at - self._at) * _watts(device)
+        self._at = at
+
+    def _charged(self, device: AnyDevice) -> None:
+        """Count the wait of a charger's request, for which no phase of RMF exists."""
+        if not isinstance(device, ObservedCharger) or device.condition.value != CHARGING:
+            return
+        asked = device.requesters.get(device.request.value)
+        if asked is not None and self._counted.get(asked.who) != asked.since.at:
+            self._counted = {asked.who: asked.since.at}
+            if asked.since.seen:
+                self.waits.add(device.condition.since.at - asked.since.at)
+
+
+class SiteTally:
+    """The counts of every device, in the bounds of an `ObservedGraph`."""
+
+    def __init__(self) -> None:
+        self.devices: dict[Key, DeviceTally] = {}
+
+    def take(
+        self, graph: ObservedGraph[AnyDevice], found: Iterable[tuple[AnyDevice, list[News]]]
+    ) -> None:
+        """Add the news of one message, as `ObservedGraph.hear` returns them."""
+        for device, news in found:
+            key = device.kind, device.id
+            if key not in self.devices:
+                self.devices = {
+                    one: self.devices[one] for one in self.devices if one in graph.known
+                }
+            self.devices.setdefault(key, DeviceTally()).take(device, news, graph.now.at)
+
+
+def in_service(device: AnyDevice) -> bool:
+    """Is the device in a mode in which it serves robots?"""
+    shown = device.condition if isinstance(device, ObservedCharger) else device.mode  # type: ignore[attr-defined]
+    return shown.value not in NO_SERVICE
+
+
+def _cycled(device: AnyDevice) -> bool:
+    """Has a door just opened, a lift's door opened at a floor, or a charge begun?"""
+    match device:
+        case ObservedDoor():
+            return "mode" in device.changed and device.mode.value == OPEN
+        case ObservedLift():
+            return "door" in device.changed and device.door.value == OPEN
+        case ObservedCharger():
+            return "condition" in device.changed and device.condition.value == CHARGING
+    return False
+
+
+def _watts(device: AnyDevice) -> float:
+    """Return the power (W) that a charger's daemon reports on /diagnostics; 0 if it reports none."""
+    if not isinstance(device, ObservedCharger) or device.condition.value != CHARGING:
+        return 0.0
+    for said in device.diagnoses.values():
+        volts, amps = _number(said.value("volts")), _number(said.value("amps"))
+        if volts and amps:
+            return max(0.0, volts * amps)
+    return 0.0
+
+
+def _number(text: str) -> float:
+    try:
+        found = float(text)
+    except ValueError:
+        return 0.0
+    return found if abs(found) < 1e6 else 0.0

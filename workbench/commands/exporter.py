@@ -1,0 +1,129 @@
+"""`rmf-bridge exporter`: metrics for Prometheus, of RMF's graph and of this machine's daemons.
+
+It only listens. It needs the extra `metrics` (prometheus_client), which no daemon imports. On an
+address other than 127.0.0.1 everybody on that network can read the names, states and faults of the
+site's devices; a reverse proxy with TLS and a login prevents that.
+"""
+
+import argparse
+import os
+import signal
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import closing
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+from bridges.observe.all_devices import PlainGraph
+from bridges.observe.requesters import Moment
+from bridges.observe.tally import SiteTally
+from bridges.runtime import daemons
+from bridges.system import directories, log
+from bridges.system.installed import how_to_install
+from bridges.transports.transport import TransportError
+from workbench.graph.join import (
+    add_graph_arguments,
+    address_and_port,
+    complain,
+    interruptible,
+    open_graph,
+)
+from workbench.graph.live import Ear
+
+if TYPE_CHECKING:
+    from prometheus_client.core import Metric
+
+PORT: Final = 9763
+RECORDER: Final = Path("/var/lib/rmf-bridge-recorder")
+"""The folder of `rmf-bridge-recorder.service`."""
+LISTEN_S: Final = 0.5
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the options of `exporter`."""
+    parser.add_argument(
+        "--listen",
+        type=address_and_port,
+        default=("127.0.0.1", PORT),
+        metavar="ADDRESS:PORT",
+        help=f"default: 127.0.0.1:{PORT}; with port 0 a free port",
+    )
+    parser.add_argument(
+        "--no-graph",
+        action="store_true",
+        help="only this machine's daemons: for every machine but one, as the graph is the same",
+    )
+    add_graph_arguments(parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Return 0 after Ctrl-C or SIGTERM; 1 if the graph cannot be joined; 69 with the remedy printed."""
+    log.start()
+    try:
+        from prometheus_client import CollectorRegistry, ProcessCollector, start_http_server
+    except ImportError as error:
+        complain("exporter", f"{error}: {how_to_install('workbench')}")
+        return os.EX_UNAVAILABLE
+    site = Site()
+    registry = CollectorRegistry()
+    ProcessCollector(registry=registry)
+    registry.register(site)
+    try:
+        server, thread = start_http_server(args.listen[1], args.listen[0], registry)
+    except OSError as error:
+        complain("exporter", f"{args.listen[0]} port {args.listen[1]}: {error.strerror}")
+        return os.EX_UNAVAILABLE
+    print(f"metrics on http://{args.listen[0]}:{server.server_port}/metrics", flush=True)
+    try:
+        with interruptible():
+            _serve(args, site)
+    except TransportError as error:
+        complain("exporter", error)
+        return 1
+    except KeyboardInterrupt:
+        return 0
+    finally:
+        server.shutdown()
+        thread.join()
+    return 0
+
+
+def _serve(args: argparse.Namespace, site: "Site") -> None:
+    """Listen until interrupted."""
+    if args.no_graph:
+        while True:
+            signal.pause()
+    with closing(open_graph(args, "rmf_bridge_exporter")) as transport:
+        ear = Ear(transport)
+        while True:
+            site.listen(ear)
+
+
+class Site:
+    """A collector for prometheus_client: the graph's devices, and this machine's daemons."""
+
+    def __init__(self) -> None:
+        self._graph, self._tally = PlainGraph(), SiteTally()
+        self._lock = threading.Lock()
+        self._listens = False
+
+    def listen(self, ear: Ear) -> None:
+        """Take the messages of the next half second."""
+        for heard in ear.listen(LISTEN_S):
+            with self._lock:
+                self._tally.take(self._graph, self._graph.hear(heard))
+        with self._lock:
+            self._listens = True
+
+    def collect(self) -> "Iterator[Metric]":
+        """Yield every family; called by the server's threads for each scrape."""
+        from workbench.metrics import families, machine
+
+        now = Moment(time.monotonic(), time.time())
+        with self._lock:
+            if self._listens:
+                yield from families.of_graph(self._graph, self._tally, now)
+        found = daemons.daemons(directories.runtimes(), daemons.units(), now.wall)
+        yield from machine.of_machine(found)
+        yield from machine.of_recordings(RECORDER)

@@ -1,0 +1,1 @@
+"""Metrics for Prometheus: of RMF's graph, and of the daemons on this machine."""

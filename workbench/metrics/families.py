@@ -1,0 +1,224 @@
+"""Metric families of RMF's graph, from the memory of its devices. Pure: `now` is an argument.
+
+Names and labels follow Prometheus' conventions: base units, `_total` for counters, `_info` for facts.
+Every label from the network is printable and of bounded length, and the devices are those that an
+`ObservedGraph` keeps, so invented names cannot make series without end.
+"""
+
+from collections.abc import Iterable, Iterator
+from enum import IntEnum
+from typing import Final
+
+from prometheus_client.core import (
+    CounterMetricFamily,
+    GaugeMetricFamily,
+    HistogramMetricFamily,
+    InfoMetricFamily,
+    Metric,
+)
+
+from bridges.messages import definitions as d
+from bridges.messages import words
+from bridges.observe.all_devices import AnyDevice, ObservedGraph
+from bridges.observe.charger import ObservedCharger
+from bridges.observe.diagnosis import SIMULATED
+from bridges.observe.door import ObservedDoor
+from bridges.observe.lift import NOBODY, ObservedLift
+from bridges.observe.requesters import Moment
+from bridges.observe.tally import BOUNDS_S, DeviceTally, DurationHistogram, SiteTally
+
+PREFIX: Final = "rmf_bridge_"
+DEVICE: Final = ("kind", "device")
+LONGEST: Final = 128
+"""The longest label from the network (characters)."""
+MODES: Final[dict[str, type[IntEnum]]] = {
+    "lift": d.LiftMode,
+    "door": d.DoorModeValue,
+    "charger": d.ChargerStateValue,
+}
+
+
+def label(text: str) -> str:
+    """Return a name from the network as a label."""
+    return words.printable(text[:LONGEST])[:LONGEST]
+
+
+def of_graph(graph: ObservedGraph[AnyDevice], tally: SiteTally, now: Moment) -> Iterator[Metric]:
+    """Yield the families of all devices that have published a state, and of our nodes."""
+    devices = graph.stated()
+    yield from _states(graph, devices, now)
+    yield from _trouble(devices, now)
+    yield from _waits(devices, now)
+    yield from _counts(devices, tally)
+    yield from _nodes(graph, now)
+
+
+def _states(
+    graph: ObservedGraph[AnyDevice], devices: Iterable[AnyDevice], now: Moment
+) -> Iterator[Metric]:
+    up = _gauge("device_up", "1 while states of the device arrive, 0 in a silence.", DEVICE)
+    age = _gauge(
+        "device_reading_age_seconds",
+        "Age of the reading in the last state, by this machine's clock; absent before any reading.",
+        DEVICE,
+    )
+    mode = _gauge(
+        "device_mode", "1 for the present mode (lift, door) or state (charger).", (*DEVICE, "mode")
+    )
+    simulated = _gauge("device_simulated", "1 if the device's daemon moves no hardware.", DEVICE)
+    for one in devices:
+        names = _names(one)
+        up.add_metric(names, not one.is_silent(now))
+        if one.stamped_at > 0:
+            age.add_metric(names, max(0.0, now.wall - one.stamped_at))
+        shown = _mode(one)
+        for known in MODES[one.kind]:
+            mode.add_metric((*names, words.plain(MODES[one.kind], known)), known == shown)
+        simulated.add_metric(names, any(_simulated(graph, name) for name in one.diagnoses))
+    yield from (up, age, mode, simulated)
+
+
+def _trouble(devices: Iterable[AnyDevice], now: Moment) -> Iterator[Metric]:
+    fault = _gauge("device_fault", "1 while a daemon reports this fault.", (*DEVICE, "code"))
+    publishers = _gauge(
+        "device_publishers",
+        "Nodes that publish states under this name; 0 if the transport does not tell.",
+        DEVICE,
+    )
+    refused = CounterMetricFamily(
+        f"{PREFIX}device_refusals",
+        "Requests that the device's daemon has refused, by reason.",
+        labels=(*DEVICE, "reason"),
+    )
+    for one in devices:
+        names = _names(one)
+        said = [report for report in one.diagnoses.values() if report.is_current(now.at)]
+        for code in sorted({code for report in said for code in report.faults}):
+            fault.add_metric((*names, label(code)), 1)
+        publishers.add_metric(names, len(one.publishers(now)))
+        counts: dict[str, int] = {}
+        for report in one.diagnoses.values():
+            for reason, (count, _) in report.refused.items():
+                counts[label(reason)] = counts.get(label(reason), 0) + count
+        for reason, count in counts.items():
+            refused.add_metric((*names, reason), count)
+    yield from (fault, publishers, refused)
+
+
+def _waits(devices: Iterable[AnyDevice], now: Moment) -> Iterator[Metric]:
+    waiting = _gauge(
+        "device_waiting_seconds", "Longest present wait of a robot; 0 if nobody waits.", DEVICE
+    )
+    held = _gauge("device_held", "1 while a robot has the lift, door or charger.", DEVICE)
+    still = _gauge(
+        "lift_session_still_seconds",
+        "Time without any change of a lift that a robot has; absent while nobody has it.",
+        ("device",),
+    )
+    for one in devices:
+        names = _names(one)
+        longest = max((now.at - wait.since.at for wait in one.waits(now)), default=0.0)
+        waiting.add_metric(names, longest)
+        held.add_metric(names, _held(one))
+        if isinstance(one, ObservedLift) and _held(one):
+            facts = (one.floor, one.door, one.motion, one.mode, one.session, one.destination)
+            still.add_metric(names[1:], now.at - max(fact.since.at for fact in facts))
+    yield from (waiting, held, still)
+
+
+def _counts(devices: Iterable[AnyDevice], tally: SiteTally) -> Iterator[Metric]:
+    waits = _histogram(
+        "wait_seconds", "Time from a robot's request until RMF lets it go on.", DEVICE
+    )
+    rides = _histogram(
+        "lift_ride_seconds", "Time from a request in the car to its floor.", ("device",)
+    )
+    cycles = _counter("device_cycles", "Openings of a lift's or door's door; charges.", DEVICE)
+    energy = _counter(
+        "charger_energy_joules", "Energy to robots, from reported V and A.", ("device",)
+    )
+    watched = _counter("device_watched_seconds", "Time in which states arrived.", DEVICE)
+    served = _counter("device_in_service_seconds", "Part of it in which robots are served.", DEVICE)
+    for one in devices:
+        names, counted = _names(one), tally.devices.get((one.kind, one.id), DeviceTally())
+        _add(waits, names, counted.waits)
+        cycles.add_metric(names, counted.cycles)
+        watched.add_metric(names, counted.watched_s)
+        served.add_metric(names, counted.served_s)
+        if isinstance(one, ObservedLift):
+            _add(rides, names[1:], counted.rides)
+        if counted.energy_j:
+            energy.add_metric(names[1:], counted.energy_j)
+    yield from (waits, rides, cycles, energy, watched, served)
+
+
+def _nodes(graph: ObservedGraph[AnyDevice], now: Moment) -> Iterator[Metric]:
+    info = InfoMetricFamily(f"{PREFIX}node", "Our daemons on the graph.", labels=("node",))
+    up = _gauge("node_up", "1 while the daemon reports on /diagnostics.", ("node",))
+    fault = _gauge(
+        "node_fault", "1 while the daemon reports this fault of its own.", ("node", "code")
+    )
+    for name, report in graph.nodes.items():
+        node = label(name.partition(": ")[0])
+        if not name.endswith(": daemon"):
+            continue
+        facts = {key: label(report.value(key)) for key in ("version", "transport", "release")}
+        info.add_metric((node,), {"kind": label(report.kind), **facts})
+        up.add_metric((node,), report.is_current(now.at))
+        for code in report.faults if report.is_current(now.at) else ():
+            fault.add_metric((node, label(code)), 1)
+    left_out = _gauge("devices_left_out", "1 if more devices were heard than are kept.", ("kind",))
+    for kind in words.KINDS:
+        left_out.add_metric((kind,), kind in graph.crowded)
+    yield from (info, up, fault, left_out)
+
+
+def _names(device: AnyDevice) -> tuple[str, str]:
+    return device.kind, label(device.id)
+
+
+def _mode(device: AnyDevice) -> int:
+    match device:
+        case ObservedLift():
+            return device.state.current_mode if device.state else -1
+        case ObservedDoor():
+            return device.state.current_mode.value if device.state else -1
+        case _:
+            return device.state.state if device.state else -1
+
+
+def _held(device: AnyDevice) -> bool:
+    match device:
+        case ObservedLift():
+            return device.session.value != NOBODY
+        case ObservedDoor():
+            return bool(device.holders)
+        case ObservedCharger():
+            return device.robot.value != NOBODY
+    return False
+
+
+def _simulated(graph: ObservedGraph[AnyDevice], reporter: str) -> bool:
+    """Does the daemon of the report `<node>: <device>` move no hardware?"""
+    daemon = graph.nodes.get(f"{reporter.partition(': ')[0]}: daemon")
+    return daemon is not None and SIMULATED in daemon.message
+
+
+def _gauge(name: str, text: str, labels: tuple[str, ...]) -> GaugeMetricFamily:
+    return GaugeMetricFamily(PREFIX + name, text, labels=labels)
+
+
+def _counter(name: str, text: str, labels: tuple[str, ...]) -> CounterMetricFamily:
+    return CounterMetricFamily(PREFIX + name, text, labels=labels)
+
+
+def _histogram(name: str, text: str, labels: tuple[str, ...]) -> HistogramMetricFamily:
+    return HistogramMetricFamily(PREFIX + name, text, labels=labels)
+
+
+def _add(family: HistogramMetricFamily, names: tuple[str, ...], counted: DurationHistogram) -> None:
+    buckets, total = list[tuple[str, float]](), 0
+    for bound, count in zip((*map(str, BOUNDS_S), "+Inf"), counted.counts, strict=True):
+        total += count
+        buckets.append((bound, total))
+    family.add_metric(names, buckets, counted.sum_s)

@@ -1,0 +1,109 @@
+"""Metric families of the daemons on this machine, from the status files that they write anyway."""
+
+import os
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
+from typing import Any, Final
+
+from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metric
+
+from bridges.messages.words import printable
+from bridges.runtime.daemons import LEVEL_OF, WELL, DaemonStatus
+
+PREFIX: Final = "rmf_bridge_daemon_"
+DAEMON: Final = ("daemon",)
+DEVICE: Final = ("daemon", "device")
+COUNTS: Final = {
+    "scans": "Scans of the device.",
+    "failed_scans": "Scans in which a reading or a command failed.",
+    "scan_seconds": "Time spent in scans.",
+}
+
+
+def of_machine(found: Iterable[DaemonStatus]) -> Iterator[Metric]:
+    """Yield the families of these daemons. A file that a daemon has not renewed gives only its age."""
+    every = list(found)
+    yield from _daemons(every)
+    serving = [one for one in every if one.state == "serving"]
+    yield from _devices(serving)
+
+
+def of_recordings(folder: Path) -> Iterator[Metric]:
+    """Yield the size of the recorder's folder and its disk's free space (bytes).
+
+    A folder that this user cannot read yields nothing, because its size is unknown.
+    """
+    try:
+        with os.scandir(folder) as entries:
+            size = sum(one.stat(follow_symlinks=False).st_size for one in entries)
+        disk = os.statvfs(folder)
+    except OSError:
+        return
+    free = float(disk.f_bavail * disk.f_frsize)
+    yield GaugeMetricFamily("rmf_bridge_recordings_bytes", "Size of the recordings.", value=size)
+    yield GaugeMetricFamily(
+        "rmf_bridge_recordings_disk_free_bytes", "Free space on the recordings' disk.", value=free
+    )
+
+
+def _daemons(every: Iterable[DaemonStatus]) -> Iterator[Metric]:
+    up = _gauge("up", "1 while the daemon serves and renews its status.", DAEMON)
+    left_on = _gauge("outputs_unverified", "1 if a dead daemon's outputs may be on.", DAEMON)
+    age = _gauge("status_age_seconds", "Age of the daemon's status.", DAEMON)
+    slack = _gauge(
+        "watchdog_slack_seconds", "Time that was left before systemd's watchdog.", DAEMON
+    )
+    fault = _gauge("fault", "1 while the daemon has this fault of its own.", (*DAEMON, "code"))
+    for one in every:
+        names = (printable(one.name),)
+        up.add_metric(names, LEVEL_OF[one.state] == WELL and one.state == "serving")
+        left_on.add_metric(names, one.state == "left on")
+        if one.age_s is not None:
+            age.add_metric(names, one.age_s)
+        if (left := _number(one.status.get("watchdog_slack_s"))) is not None:
+            slack.add_metric(names, left)
+        for found in one.status.get("faults", ()):
+            fault.add_metric((*names, printable(str(found.get("code", "")))), 1)
+    yield from (up, left_on, age, slack, fault)
+
+
+def _devices(serving: Iterable[DaemonStatus]) -> Iterator[Metric]:
+    counters = {key: _counter(f"device_{key}", text, DEVICE) for key, text in COUNTS.items()}
+    longest = _gauge("device_longest_scan_seconds", "Longest scan in the last second.", DEVICE)
+    switched = _counter(
+        "output_switched_on", "Times that an output was switched on.", (*DEVICE, "output")
+    )
+    age = _gauge("device_input_age_seconds", "Age of the last reading.", DEVICE)
+    for one, name, device in _each(serving):
+        names = (printable(one.name), printable(name))
+        counts = device.get("counts", {})
+        for key, family in counters.items():
+            if (value := _number(counts.get(key))) is not None:
+                family.add_metric(names, value)
+        if (value := _number(counts.get("longest_scan_s"))) is not None:
+            longest.add_metric(names, value)
+        for output, times in counts.get("switched_on", {}).items():
+            switched.add_metric((*names, printable(output)), times)
+        if (value := _number(device.get("input_age_s"))) is not None:
+            age.add_metric(names, value)
+    yield from (*counters.values(), longest, switched, age)
+
+
+def _each(
+    serving: Iterable[DaemonStatus],
+) -> Iterator[tuple[DaemonStatus, str, Mapping[str, Any]]]:
+    for one in serving:
+        for name, device in one.devices.items():
+            yield one, name, device
+
+
+def _number(value: object) -> float | None:
+    return float(value) if isinstance(value, int | float) else None
+
+
+def _gauge(name: str, text: str, labels: tuple[str, ...]) -> GaugeMetricFamily:
+    return GaugeMetricFamily(PREFIX + name, text, labels=labels)
+
+
+def _counter(name: str, text: str, labels: tuple[str, ...]) -> CounterMetricFamily:
+    return CounterMetricFamily(PREFIX + name, text, labels=labels)
