@@ -10,6 +10,7 @@ from bridges.messages.stamps import stamp
 from bridges.messages.words import Kind
 from bridges.observe.all_devices import AnyDevice, PlainGraph
 from bridges.observe.requesters import Moment
+from bridges.observe.tally import SiteTally
 
 WALL = 1_800_000_000.0
 RED, BLUE = "fleet/red", "fleet/blue"
@@ -25,13 +26,16 @@ class Story:
     """The course of messages and time; `news` has a line for each change that a message makes."""
 
     graph: PlainGraph = field(default_factory=PlainGraph)
+    tally: SiteTally = field(default_factory=SiteTally)
     now: float = 0.0
     news: list[str] = field(default_factory=list)
 
     def hear(self, topic: str, message: d.Message) -> "Story":
         """Let a message arrive now."""
         heard = Heard(self.now, WALL + self.now, topic, message)
-        for _, news in self.graph.hear(heard):
+        found = self.graph.hear(heard)
+        self.tally.take(self.graph, found)
+        for _, news in found:
             for one in news:
                 said = one.what, one.who, one.text, "passed on" if one.passed_on else ""
                 self.news.append(f"{self.now:g} {' '.join(filter(None, said))}")

@@ -1,0 +1,112 @@
+"""Counts of rides, waits, door cycles, charges and availability, from what was heard."""
+
+from msgspec.structs import replace
+
+from bridges.messages import definitions as d
+from bridges.messages.words import Kind
+from bridges.observe.all_devices import PlainGraph
+from bridges.observe.limits import SLOWEST_S
+from bridges.observe.tally import BOUNDS_S, DeviceTally, DurationHistogram
+from tests.observe.story import BLUE, CHARGER, CLOSED, LIFT, OPEN, RED, Story
+
+
+def counted(story: Story, kind: Kind, name: str) -> DeviceTally:
+    return story.tally.devices[kind, name]
+
+
+def durations(histogram: DurationHistogram) -> tuple[int, float]:
+    return histogram.total, histogram.sum_s
+
+
+def asks_for(story: Story, floor: str, seconds: int) -> Story:
+    """Let a robot repeat its request for so long, with a state each second."""
+    for _ in range(seconds):
+        story.asks(RED, floor).lift(
+            *HELD if story.device("lift", "Lift1").session.value == RED else FREE
+        )
+        story.passes(1)
+    return story.asks(RED, floor)
+
+
+FREE, HELD = ("", "L2"), (RED, "L1")
+
+
+def ride(story: Story) -> Story:
+    """A robot asks at L1, boards after 20 s, asks for L2, and may leave the car 8 s later."""
+    asks_for(story.lift(*FREE), "L1", 20).lift(RED, "L1", OPEN)
+    asks_for(story, "L2", 8).lift(RED, "L2", OPEN)
+    return story.ends(RED).ends(RED, passed=True).lift()
+
+
+def test_a_ride_has_one_wait_and_one_ride_whatever_the_door_does_meanwhile() -> None:
+    story = ride(Story().lift(*FREE).passes(10))
+    whole = counted(story, "lift", "Lift1")
+    assert (durations(whole.waits), durations(whole.rides), whole.cycles) == ((1, 20), (1, 8), 2)
+    story.passes(1).asks(BLUE, "L1").lift(BLUE, "L1", OPEN)
+    for _ in range(3):
+        story.passes(1).asks(BLUE, "L1").lift(BLUE, "L1", CLOSED).lift(BLUE, "L1", OPEN)
+    assert durations(whole.waits) == (2, 20)
+
+
+def test_a_wait_that_began_before_we_listened_is_not_counted() -> None:
+    story = ride(Story())
+    assert durations(counted(story, "lift", "Lift1").waits) == (0, 0)
+    assert durations(counted(story, "lift", "Lift1").rides) == (1, 8)
+
+
+def test_a_door_counts_its_openings_and_the_wait_of_each_robot() -> None:
+    story = Story().door(CLOSED).lists().passes(5)
+    story.asks_door(RED).passes(3).asks_door(RED).lists(RED).door(OPEN)
+    story.passes(1).asks_door(BLUE).lists(RED, BLUE).door(OPEN).lists().passes(4).door(CLOSED)
+    door = counted(story, "door", "ward")
+    assert (durations(door.waits), door.cycles) == ((2, 3), 1)
+
+
+def test_a_charger_counts_charges_the_wait_for_each_and_the_energy_that_its_daemon_reports() -> (
+    None
+):
+    values = [("kind", "charger"), ("volts", "24.0"), ("amps", "10.0")]
+    pairs = tuple(d.KeyValue(*pair) for pair in values)
+    said = d.DiagnosticStatus(0, "node: bay", "OK", "bay", pairs)
+    story = Story().hear("charger_states", CHARGER).passes(20)
+    request = d.ChargerRequest("bay", "fleet", "red", request_id="r1")
+    story.hear("charger_requests", request).passes(5)
+    charging = replace(CHARGER, state=3, request_id="r1")
+    story.hear("charger_states", charging).hear("/diagnostics", d.DiagnosticArray(status=(said,)))
+    for _ in range(10):
+        story.passes(1).hear("charger_states", charging)
+    bay = counted(story, "charger", "bay")
+    assert (durations(bay.waits), bay.cycles, bay.energy_j) == ((1, 5), 1, 2400.0)
+
+
+def test_time_in_service_is_time_with_states_and_a_silence_is_no_part_of_either() -> None:
+    serving = replace(LIFT, current_mode=d.LiftMode.MODE_AGV)
+    story = Story().hear("lift_states", serving)
+    for _ in range(10):
+        story.passes(1).hear("lift_states", serving)
+    offline = replace(LIFT, current_mode=d.LiftMode.MODE_OFFLINE)
+    for _ in range(5):
+        story.passes(1).hear("lift_states", offline)
+    story.passes(SLOWEST_S + 1).lift()
+    lift = counted(story, "lift", "Lift1")
+    assert (lift.watched_s, lift.served_s) == (15.0, 10.0)
+
+
+def test_a_quantile_is_the_bound_of_its_bucket_and_beyond_the_last_bound_it_is_infinite() -> None:
+    histogram = DurationHistogram()
+    assert histogram.quantile(0.5) is None
+    for duration_s in (0.5, 4.0, 4.0, 900.0):
+        histogram.add(duration_s)
+    assert [histogram.quantile(share) for share in (0.25, 0.5, 0.75, 1.0)] == [
+        BOUNDS_S[0],
+        5.0,
+        5.0,
+        float("inf"),
+    ]
+
+
+def test_invented_names_leave_no_counts_behind() -> None:
+    story = Story(graph=PlainGraph(most=5))
+    for number in range(50):
+        story.passes(100).hear("lift_states", replace(LIFT, lift_name=f"made up {number}"))
+    assert len(story.tally.devices) <= 6

@@ -1,0 +1,126 @@
+"""Metrics of the graph and of this machine, as Prometheus reads them."""
+
+from collections.abc import Iterable
+from pathlib import Path
+
+from msgspec.structs import replace
+from prometheus_client import CollectorRegistry, generate_latest
+from prometheus_client.core import Metric
+from prometheus_client.parser import text_string_to_metric_families
+from prometheus_client.registry import Collector
+
+from bridges.messages import definitions as d
+from bridges.observe.requesters import Moment
+from bridges.runtime.daemons import DaemonStatus
+from tests.observe.story import LIFT, OPEN, RED, WALL, Story
+from workbench.metrics.families import LONGEST, of_graph
+from workbench.metrics.machine import of_machine, of_recordings
+
+
+class Once(Collector):
+    """A collector of ready families."""
+
+    def __init__(self, families: Iterable[Metric]) -> None:
+        self._families = [*families]
+
+    def collect(self) -> Iterable[Metric]:
+        return self._families
+
+
+def samples(families: Iterable[Metric]) -> dict[str, float]:
+    """Return the samples as a scrape gives them: `name{label="value",…}` -> value."""
+    registry = CollectorRegistry()
+    registry.register(Once(families))
+    text = generate_latest(registry).decode()
+    found = [one for family in text_string_to_metric_families(text) for one in family.samples]
+    names = [
+        one.name + "{" + ",".join(f'{key}="{one.labels[key]}"' for key in sorted(one.labels)) + "}"
+        for one in found
+    ]
+    assert len(set(names)) == len(names)
+    return dict(zip(names, (one.value for one in found), strict=True))
+
+
+def scraped(story: Story) -> dict[str, float]:
+    now = Moment(story.now, WALL + story.now)
+    return samples(of_graph(story.graph, story.tally, now))
+
+
+LIFT1 = '{device="Lift1",kind="lift"}'
+
+
+def test_a_silent_lift_is_down_and_its_reading_ages() -> None:
+    story = Story().lift().passes(1).lift()
+    found = scraped(story)
+    up, age = f"rmf_bridge_device_up{LIFT1}", f"rmf_bridge_device_reading_age_seconds{LIFT1}"
+    assert (found[up], found[age]) == (1.0, 0.0)
+    found = scraped(story.passes(10))
+    assert (found[up], found[age]) == (0.0, 10.0)
+
+
+def test_exactly_one_mode_is_present() -> None:
+    shown = replace(LIFT, current_mode=d.LiftMode.MODE_FIRE)
+    found = scraped(Story().hear("lift_states", shown))
+    modes = {name: value for name, value in found.items() if "device_mode" in name}
+    assert len(modes) == len(d.LiftMode)
+    assert [name for name, value in modes.items() if value] == [
+        'rmf_bridge_device_mode{device="Lift1",kind="lift",mode="fire"}'
+    ]
+
+
+def test_a_waiting_robot_and_a_still_car_with_a_robot_show_their_seconds() -> None:
+    story = Story().lift().passes(10).asks(RED).passes(2).asks(RED).lift()
+    assert scraped(story)[f"rmf_bridge_device_waiting_seconds{LIFT1}"] == 2.0
+    story.lift(RED, "L2", OPEN)
+    for _ in range(200):
+        story.passes(1).asks(RED).lift(RED, "L2", OPEN)
+    found = scraped(story)
+    assert found['rmf_bridge_lift_session_still_seconds{device="Lift1"}'] == 200.0
+    assert found[f"rmf_bridge_device_held{LIFT1}"] == 1.0
+    assert found['rmf_bridge_wait_seconds_bucket{device="Lift1",kind="lift",le="2.0"}'] == 1.0
+
+
+def test_faults_and_refusals_of_the_daemon_are_series_and_end_with_its_silence() -> None:
+    pairs = (("kind", "lift"), ("FIRE", "the alarm"), ("refused unknown floor", "3"))
+    values = tuple(d.KeyValue(*pair) for pair in pairs)
+    said = d.DiagnosticStatus(2, "node: Lift1", "FIRE", "Lift1", values)
+    story = Story().lift().hear("/diagnostics", d.DiagnosticArray(status=(said,)))
+    fault = 'rmf_bridge_device_fault{code="FIRE",device="Lift1",kind="lift"}'
+    found = scraped(story)
+    assert found[fault] == 1.0
+    refused = 'rmf_bridge_device_refusals_total{device="Lift1",kind="lift",reason="unknown floor"}'
+    assert found[refused] == 3.0
+    assert fault not in scraped(story.passes(10))
+
+
+def test_no_name_from_the_network_breaks_a_line_or_grows_without_bound() -> None:
+    name = 'a"\n\\' + "x" * 1000
+    found = scraped(Story().hear("lift_states", replace(LIFT, lift_name=name)))
+    assert all(len(one) < 4 * LONGEST + 200 for one in found)
+    assert sum("device_up" in one for one in found) == 1
+
+
+def test_a_daemons_counts_come_from_its_status_and_a_dead_daemon_is_down() -> None:
+    counts = {"scans": 7, "failed_scans": 2, "scan_seconds": 0.5, "switched_on": {"call": 3}}
+    device = {"counts": counts, "input_age_s": 0.1, "faults": []}
+    status = {"devices": {"Lift1": device}, "faults": [{"code": "RIVAL", "detail": ""}]}
+    serving = DaemonStatus(name="lift", state="serving", by="service", status=status, age_s=0.5)
+    dead = DaemonStatus(name="door", state="left on", by="service")
+    found = samples(of_machine([serving, dead]))
+    assert {name: value for name, value in found.items() if value} == {
+        'rmf_bridge_daemon_up{daemon="lift"}': 1.0,
+        'rmf_bridge_daemon_outputs_unverified{daemon="door"}': 1.0,
+        'rmf_bridge_daemon_status_age_seconds{daemon="lift"}': 0.5,
+        'rmf_bridge_daemon_fault{code="RIVAL",daemon="lift"}': 1.0,
+        'rmf_bridge_daemon_device_scans_total{daemon="lift",device="Lift1"}': 7.0,
+        'rmf_bridge_daemon_device_failed_scans_total{daemon="lift",device="Lift1"}': 2.0,
+        'rmf_bridge_daemon_device_scan_seconds_total{daemon="lift",device="Lift1"}': 0.5,
+        'rmf_bridge_daemon_output_switched_on_total{daemon="lift",device="Lift1",output="call"}': 3.0,
+        'rmf_bridge_daemon_device_input_age_seconds{daemon="lift",device="Lift1"}': 0.1,
+    }
+
+
+def test_a_folder_of_recordings_that_cannot_be_read_is_no_series(tmp_path: Path) -> None:
+    (tmp_path / "one.mcap").write_bytes(b"x" * 1000)
+    assert samples(of_recordings(tmp_path))["rmf_bridge_recordings_bytes{}"] == 1000.0
+    assert samples(of_recordings(tmp_path / "missing")) == {}
