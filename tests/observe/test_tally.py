@@ -18,13 +18,10 @@ def durations(histogram: DurationHistogram) -> tuple[int, float]:
     return histogram.total, histogram.sum_s
 
 
-def asks_for(story: Story, floor: str, seconds: int) -> Story:
-    """Let a robot repeat its request for so long, with a state each second."""
+def asks_for(story: Story, floor: str, seconds: int, shown: tuple[str, str]) -> Story:
+    """Let a robot repeat its request for so long, and the lift show this session and floor."""
     for _ in range(seconds):
-        story.asks(RED, floor).lift(
-            *HELD if story.device("lift", "Lift1").session.value == RED else FREE
-        )
-        story.passes(1)
+        story.asks(RED, floor).lift(*shown).passes(1)
     return story.asks(RED, floor)
 
 
@@ -33,8 +30,8 @@ FREE, HELD = ("", "L2"), (RED, "L1")
 
 def ride(story: Story) -> Story:
     """A robot asks at L1, boards after 20 s, asks for L2, and may leave the car 8 s later."""
-    asks_for(story.lift(*FREE), "L1", 20).lift(RED, "L1", OPEN)
-    asks_for(story, "L2", 8).lift(RED, "L2", OPEN)
+    asks_for(story.lift(*FREE), "L1", 20, FREE).lift(RED, "L1", OPEN)
+    asks_for(story, "L2", 8, HELD).lift(RED, "L2", OPEN)
     return story.ends(RED).ends(RED, passed=True).lift()
 
 
