@@ -45,6 +45,7 @@ cp -R "$site/." "$in_bench"
 fill "$in_bench" --extra=gpio --extra=recording --extra=push --extra=mqtt --extra=laptop --extra=plot
 cp -R "$in_bench/." "$in_page"
 fill "$in_page" --extra=gpio --extra=recording --extra=push --extra=mqtt --extra=laptop --extra=plot --extra=page
+fill "$in_page" --extra=gpio --extra=recording --extra=laptop --extra=plot --extra=page --extra=metrics
 without "$in_page" "$in_bench"
 rm -rf "$site/workbench" "$site/hal_fakes"
 without "$in_bench" "$site"
@@ -93,7 +94,7 @@ for each in rmf-bridges.target rmf-bridge@.service rmf-bridge-recorder.service r
 done
 mkdir "$root/usr/lib/systemd/system/multi-user.target.wants" # for every enabled service, because off is safe
 ln -s ../rmf-bridge-outputs-off.service "$root/usr/lib/systemd/system/multi-user.target.wants/"
-unit "$page" rmf-bridge-page.service
+for each in rmf-bridge-page.service rmf-bridge-exporter.service; do unit "$page" "$each"; done
 put "$root" systemd/rmf-bridges-slice.conf 'usr/lib/systemd/system/system-rmf\x2dbridge.slice.d/10-boot.conf'
 put "$root" systemd/rmf-bridges.sysusers usr/lib/sysusers.d/rmf-bridges.conf
 put "$page" systemd/rmf-bridges-page.sysusers usr/lib/sysusers.d/rmf-bridges-page.conf
@@ -156,7 +157,8 @@ package rmf-bridges-workbench "$bench" "rmf-bridges (= $version), $libc" \
  judge, replay, init, doctor and walk, and fake hardware to simulate a device.
 DESCRIPTION
 package rmf-bridges-page "$page" "rmf-bridges-workbench (= $version), $libc" \
-  "web page of Open-RMF's lifts, doors and chargers" <<'DESCRIPTION'
- The web page of rmf-bridge page: RMF's graph, each device and recordings, as
- a service with a user of its own.
+  "web page and metrics of Open-RMF's lifts, doors and chargers" <<'DESCRIPTION'
+ The web page of rmf-bridge page: RMF's graph, each device and recordings, and
+ the metrics of rmf-bridge exporter for Prometheus; services with a user of
+ their own.
 DESCRIPTION

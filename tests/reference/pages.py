@@ -19,6 +19,7 @@ from bridges.runtime import faults
 from bridges.settings.config import Config
 from bridges.settings.load import load
 from tests.reference import hazards, promised
+from tests.reference import alerts, hazards
 from workbench.commissioning import reference
 from workbench.commissioning.examples import device_yamls
 from workbench.judge.judge import KINDS
@@ -217,6 +218,7 @@ PAGES: Final[dict[str, Callable[[], str]]] = {
     "reference/topics.md": every_topic,
     "explanation/decisions/index.md": decisions,
     "explanation/hazards.md": hazards.page,
+    "../deploy/prometheus/rmf-bridges.rules.yaml": alerts.page,
 }
 
 if __name__ == "__main__":

@@ -19,7 +19,8 @@ UNIT = FILES / "rmf-bridge@.service"
 RECORDER = FILES / "rmf-bridge-recorder.service"
 PAGE = FILES / "rmf-bridge-page.service"
 EARLY = FILES / "rmf-bridge-outputs-off.service"
-OTHERS = (RECORDER, PAGE, EARLY)
+EXPORTER = FILES / "rmf-bridge-exporter.service"
+OTHERS = (RECORDER, PAGE, EXPORTER, EARLY)
 CONFIG = device_yamls()
 VERIFY = ("systemd-analyze", "verify", "--man=no")
 MOST = 2.0
@@ -67,7 +68,9 @@ def test_no_shipped_file_needs_a_service_that_is_more_exposed_than_this(
 
 
 @needs_systemd
-@pytest.mark.parametrize(("service", "most"), [(RECORDER, 1.0), (PAGE, 1.5), (EARLY, MOST)])
+@pytest.mark.parametrize(
+    ("service", "most"), [(RECORDER, 1.0), (PAGE, 1.5), (EXPORTER, 1.5), (EARLY, MOST)]
+)
 def test_the_other_units_are_no_more_exposed_than_a_daemon(
     tmp_path: Path, service: Path, most: float
 ) -> None:

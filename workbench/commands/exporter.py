@@ -54,6 +54,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="only this machine's daemons: for every machine but one, as the graph is the same",
     )
+    parser.add_argument(
+        "--runtime-dirs", type=Path, metavar="DIR", help="the folder of this machine's daemons"
+    )
     add_graph_arguments(parser)
 
 
@@ -63,9 +66,9 @@ def run(args: argparse.Namespace) -> int:
     try:
         from prometheus_client import CollectorRegistry, ProcessCollector, start_http_server
     except ImportError as error:
-        complain("exporter", f"{error}: {how_to_install('workbench')}")
+        complain("exporter", f"{error}: {how_to_install('page')}")
         return os.EX_UNAVAILABLE
-    site = Site()
+    site = Site(args.runtime_dirs)
     registry = CollectorRegistry()
     ProcessCollector(registry=registry)
     registry.register(site)
@@ -103,7 +106,8 @@ def _serve(args: argparse.Namespace, site: "Site") -> None:
 class Site:
     """A collector for prometheus_client: the graph's devices, and this machine's daemons."""
 
-    def __init__(self) -> None:
+    def __init__(self, runtime_dirs: Path | None = None) -> None:
+        self._runtime_dirs = runtime_dirs
         self._graph, self._tally = PlainGraph(), SiteTally()
         self._lock = threading.Lock()
         self._listens = False
@@ -124,6 +128,10 @@ class Site:
         with self._lock:
             if self._listens:
                 yield from families.of_graph(self._graph, self._tally, now)
-        found = daemons.daemons(directories.runtimes(), daemons.units(), now.wall)
-        yield from machine.of_machine(found)
+        yield from machine.of_machine(self._daemons(now.wall))
         yield from machine.of_recordings(RECORDER)
+
+    def _daemons(self, wall: float) -> Iterator[daemons.DaemonStatus]:
+        if self._runtime_dirs is not None:
+            return daemons.daemons(sorted(self._runtime_dirs.iterdir()), {}, wall)
+        return daemons.daemons(directories.runtimes(), daemons.units(), wall)

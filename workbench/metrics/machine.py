@@ -8,7 +8,7 @@ from typing import Any, Final
 from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metric
 
 from bridges.messages.words import printable
-from bridges.runtime.daemons import LEVEL_OF, WELL, DaemonStatus
+from bridges.runtime.daemons import DaemonStatus
 
 PREFIX: Final = "rmf_bridge_daemon_"
 DAEMON: Final = ("daemon",)
@@ -21,8 +21,12 @@ COUNTS: Final = {
 
 
 def of_machine(found: Iterable[DaemonStatus]) -> Iterator[Metric]:
-    """Yield the families of these daemons. A file that a daemon has not renewed gives only its age."""
-    every = list(found)
+    """Yield the families of these daemons, without stopped ones.
+
+    A status that its daemon has not renewed gives only its age. Of a daemon whose files this user may
+    not read, nothing but `unreadable` is known.
+    """
+    every = [one for one in found if one.state != "stopped"]
     yield from _daemons(every)
     serving = [one for one in every if one.state == "serving"]
     yield from _devices(serving)
@@ -50,13 +54,17 @@ def _daemons(every: Iterable[DaemonStatus]) -> Iterator[Metric]:
     up = _gauge("up", "1 while the daemon serves and renews its status.", DAEMON)
     left_on = _gauge("outputs_unverified", "1 if a dead daemon's outputs may be on.", DAEMON)
     age = _gauge("status_age_seconds", "Age of the daemon's status.", DAEMON)
+    unreadable = _gauge("unreadable", "1 if this user may not see the daemon.", DAEMON)
     slack = _gauge(
         "watchdog_slack_seconds", "Time that was left before systemd's watchdog.", DAEMON
     )
     fault = _gauge("fault", "1 while the daemon has this fault of its own.", (*DAEMON, "code"))
     for one in every:
         names = (printable(one.name),)
-        up.add_metric(names, LEVEL_OF[one.state] == WELL and one.state == "serving")
+        unreadable.add_metric(names, one.state == "unknown")
+        if one.state == "unknown":
+            continue
+        up.add_metric(names, one.state == "serving")
         left_on.add_metric(names, one.state == "left on")
         if one.age_s is not None:
             age.add_metric(names, one.age_s)
@@ -64,7 +72,7 @@ def _daemons(every: Iterable[DaemonStatus]) -> Iterator[Metric]:
             slack.add_metric(names, left)
         for found in one.status.get("faults", ()):
             fault.add_metric((*names, printable(str(found.get("code", "")))), 1)
-    yield from (up, left_on, age, slack, fault)
+    yield from (up, left_on, age, unreadable, slack, fault)
 
 
 def _devices(serving: Iterable[DaemonStatus]) -> Iterator[Metric]:

@@ -1,0 +1,140 @@
+"""The alert rules of deploy/prometheus/, made of the faults and their remedies."""
+
+from collections.abc import Iterator
+from typing import Any, Final
+
+import yaml
+
+from bridges.blackbox.recordings import LEAST_FREE
+from bridges.runtime import faults
+
+HEAD: Final = """\
+# Alert rules for Prometheus (docs/how-to/monitor.md). `make reference` makes this file from
+# bridges/runtime/faults.yaml and tests/reference/alerts.py.
+"""
+LONG_WAIT: Final = (
+    "histogram_quantile(0.95, sum by (device, le)"
+    ' (increase(rmf_bridge_wait_seconds_bucket{kind="lift"}[1h])))'
+)
+
+
+def page() -> str:
+    """Return the rules file."""
+    groups = {
+        "groups": [
+            {"name": "rmf-bridges", "rules": [*_fixed()]},
+            {"name": "rmf-bridges-faults", "rules": [*_faults()]},
+        ]
+    }
+    return HEAD + yaml.safe_dump(groups, sort_keys=False, width=110, allow_unicode=True)
+
+
+def _fixed() -> Iterator[dict[str, Any]]:
+    yield _rule(
+        "RobotStuckInLift",
+        "rmf_bridge_lift_session_still_seconds > 180",
+        "0s",
+        "critical",
+        "Nothing about lift {{ $labels.device }} has changed for 3 minutes, and a robot has it.",
+        "Look into the car. `rmf-bridge explain --live {{ $labels.device }}` says who must act.",
+    )
+    yield _rule(
+        "DeviceSilent",
+        "rmf_bridge_device_up == 0",
+        "30s",
+        "critical",
+        "No states of {{ $labels.kind }} {{ $labels.device }} arrive.",
+        "Run `rmf-bridge status` on its machine; if the machine does not answer, look at its power"
+        " and network.",
+    )
+    yield _rule(
+        "ReadingOld",
+        "rmf_bridge_device_reading_age_seconds > 10",
+        "30s",
+        "warning",
+        "The last reading of {{ $labels.kind }} {{ $labels.device }} is old.",
+        "The device's own fault names the wire or bus. Without a fault compare the clocks of the"
+        " machines (`timedatectl`).",
+    )
+    yield _rule(
+        "TwoNodesForOneDevice",
+        "rmf_bridge_device_publishers > 1",
+        "10s",
+        "critical",
+        "Several nodes publish states of {{ $labels.kind }} {{ $labels.device }}.",
+        "Stop one of them: `rmf-bridge explain --live {{ $labels.device }}` names both.",
+    )
+    yield _rule(
+        "LongWaits",
+        f"{LONG_WAIT} > 300",
+        "0s",
+        "warning",
+        "One robot in twenty waited more than 5 minutes for lift {{ $labels.device }}.",
+        "Compare the rides and the time in service of the last hour on the dashboard.",
+    )
+    yield _rule(
+        "RobotWaits",
+        "rmf_bridge_device_waiting_seconds > 300",
+        "0s",
+        "warning",
+        "A robot has waited more than 5 minutes for {{ $labels.kind }} {{ $labels.device }}.",
+        "`rmf-bridge explain --live {{ $labels.device }}` says for whom the robot waits.",
+    )
+    yield _rule(
+        "OutputsUnverified",
+        "rmf_bridge_daemon_outputs_unverified == 1",
+        "0s",
+        "critical",
+        "Daemon {{ $labels.daemon }} has died, and its outputs may be on.",
+        "Run `rmf-bridge status` there: it prints the command that switches them off.",
+    )
+    yield _rule(
+        "DaemonDown",
+        "rmf_bridge_daemon_up == 0",
+        "1m",
+        "critical",
+        "Daemon {{ $labels.daemon }} does not serve.",
+        "Run `rmf-bridge log {{ $labels.daemon }}` on {{ $labels.instance }}.",
+    )
+    yield _rule(
+        "RecorderDiskFull",
+        f"rmf_bridge_recordings_disk_free_bytes < {LEAST_FREE}",
+        "5m",
+        "warning",
+        "The disk of the recordings on {{ $labels.instance }} is full: nothing more is recorded.",
+        "Copy the recordings away and remove them, or lower `files_mb` in the YAMLs.",
+    )
+    yield _rule(
+        "ExporterDown",
+        'up{job="rmf-bridges"} == 0',
+        "1m",
+        "critical",
+        "The exporter on {{ $labels.instance }} does not answer, so nothing is known of its machine.",
+        "Run `systemctl status rmf-bridge-exporter` there.",
+    )
+
+
+def _faults() -> Iterator[dict[str, Any]]:
+    for code, remedy in faults.remedies().items():
+        metric = f'rmf_bridge_device_fault{{code="{code}"}}'
+        name = "".join(part.capitalize() for part in code.split("_"))
+        about = "{{ $labels.kind }} {{ $labels.device }}"
+        summary = f"{about}: {_plain(remedy.cause)}."
+        yield _rule(f"Fault{name}", f"{metric} == 1", "1m", "warning", summary, _plain(remedy.do))
+
+
+def _rule(
+    alert: str, expr: str, lasts: str, severity: str, summary: str, remedy: str
+) -> dict[str, Any]:
+    return {
+        "alert": f"RmfBridge{alert}",
+        "expr": expr,
+        "for": lasts,
+        "labels": {"severity": severity},
+        "annotations": {"summary": summary, "remedy": remedy},
+    }
+
+
+def _plain(text: str) -> str:
+    """Return a text without what Prometheus would read as a template."""
+    return text.strip().replace("{{", "{ {")
