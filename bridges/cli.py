@@ -53,6 +53,10 @@ COMMANDS = {
         "serve metrics of RMF's graph and this machine's daemons, for Prometheus",
         "exporter --localhost",
     ),
+    "notify": (
+        "tell people of a site's troubles, by webhook, mail or ntfy",
+        "notify recipients.yaml --test",
+    ),
     "status": (
         "show every daemon on this machine: state, faults and what to do",
         "status --json",
@@ -119,7 +123,7 @@ COMMANDS = {
 }
 """Subcommand -> (its purpose, an example)."""
 WORKBENCH = frozenset(
-    {"init", "schema", "watch", "page", "doctor", "explain", "plot", "send", "mqtt-out", "exporter"}
+    {"init", "schema", "watch", "page", "doctor", "explain", "plot", "send", "mqtt-out", "exporter", "notify"}
     | {"judge", "release", "walk", "press", "fail", "replay"}
 )
 """The workbench's subcommands, which no daemon needs."""

@@ -92,6 +92,12 @@ EXIT_CODES: Final[dict[str, dict[int, str]]] = {
         1: GRAPH,
         69: "the port is taken, or prometheus_client is not installed",
     },
+    "notify": {
+        0: "Ctrl-C or SIGTERM, or every test notice was taken",
+        1: f"{GRAPH}, or a test notice was not taken",
+        73: "--ack cannot be written",
+        78: "the file of recipients has an error",
+    },
     "status": {
         0: "all is well",
         1: "a daemon has a fault",

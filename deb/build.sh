@@ -94,7 +94,7 @@ for each in rmf-bridges.target rmf-bridge@.service rmf-bridge-recorder.service r
 done
 mkdir "$root/usr/lib/systemd/system/multi-user.target.wants" # for every enabled service, because off is safe
 ln -s ../rmf-bridge-outputs-off.service "$root/usr/lib/systemd/system/multi-user.target.wants/"
-for each in rmf-bridge-page.service rmf-bridge-exporter.service; do unit "$page" "$each"; done
+for each in rmf-bridge-page.service rmf-bridge-exporter.service rmf-bridge-notify.service; do unit "$page" "$each"; done
 put "$root" systemd/rmf-bridges-slice.conf 'usr/lib/systemd/system/system-rmf\x2dbridge.slice.d/10-boot.conf'
 put "$root" systemd/rmf-bridges.sysusers usr/lib/sysusers.d/rmf-bridges.conf
 put "$page" systemd/rmf-bridges-page.sysusers usr/lib/sysusers.d/rmf-bridges-page.conf
@@ -159,6 +159,6 @@ DESCRIPTION
 package rmf-bridges-page "$page" "rmf-bridges-workbench (= $version), $libc" \
   "web page and metrics of Open-RMF's lifts, doors and chargers" <<'DESCRIPTION'
  The web page of rmf-bridge page: RMF's graph, each device and recordings, and
- the metrics of rmf-bridge exporter for Prometheus; services with a user of
- their own.
+ the metrics of rmf-bridge exporter for Prometheus, and the notices of
+ rmf-bridge notify; services with a user of their own.
 DESCRIPTION

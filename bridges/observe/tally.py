@@ -7,7 +7,7 @@ not heard is not counted, because its length is unknown.
 from bisect import bisect_left
 from collections.abc import Iterable
 from dataclasses import dataclass, field
-from typing import Final
+from typing import Any, Final
 
 from bridges.observe.all_devices import AnyDevice, Key, ObservedGraph
 from bridges.observe.charger import CHARGING, ObservedCharger
@@ -119,7 +119,7 @@ class SiteTally:
         self.devices: dict[Key, DeviceTally] = {}
 
     def take(
-        self, graph: ObservedGraph[AnyDevice], found: Iterable[tuple[AnyDevice, list[News]]]
+        self, graph: ObservedGraph[Any], found: Iterable[tuple[AnyDevice, list[News]]]
     ) -> None:
         """Add the news of one message, as `ObservedGraph.hear` returns them."""
         for device, news in found:

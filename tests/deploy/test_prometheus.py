@@ -5,13 +5,13 @@ import os
 import re
 import shutil
 import signal
-import socket
 import subprocess
 import urllib.parse
 import urllib.request
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -20,6 +20,7 @@ from bridges.observe.requesters import Moment
 from bridges.observe.tally import SiteTally
 from hal_fakes.wire import runs_here
 from tests.runtime.site import Module, command, daemon, environment
+from tests.transports.zenoh_programs import free_port
 from tests.waiting import PATIENCE_S, wait_until
 from workbench.metrics.families import of_graph
 from workbench.metrics.machine import of_machine, of_recordings
@@ -45,12 +46,6 @@ def test_the_rules_tell_what_recorded_series_show(tmp_path: Path) -> None:
         text=True,
     )
     assert done.returncode == 0, done.stdout + done.stderr
-
-
-def free_port() -> int:
-    with socket.create_server(("127.0.0.1", 0)) as probe:
-        port: int = probe.getsockname()[1]
-        return port
 
 
 @contextmanager
@@ -83,7 +78,7 @@ class Prometheus:
         found = self._get("alerts")["alerts"]
         return {one["labels"]["alertname"]: one["state"] for one in found}
 
-    def _get(self, path: str) -> dict[str, list[dict[str, object]]]:
+    def _get(self, path: str) -> dict[str, Any]:
         with urllib.request.urlopen(f"{self._base}/{path}", timeout=10) as answer:
             return json.load(answer)["data"]  # type: ignore[no-any-return]
 

@@ -20,7 +20,8 @@ RECORDER = FILES / "rmf-bridge-recorder.service"
 PAGE = FILES / "rmf-bridge-page.service"
 EARLY = FILES / "rmf-bridge-outputs-off.service"
 EXPORTER = FILES / "rmf-bridge-exporter.service"
-OTHERS = (RECORDER, PAGE, EXPORTER, EARLY)
+NOTIFY = FILES / "rmf-bridge-notify.service"
+OTHERS = (RECORDER, PAGE, EXPORTER, NOTIFY, EARLY)
 CONFIG = device_yamls()
 VERIFY = ("systemd-analyze", "verify", "--man=no")
 MOST = 2.0
@@ -69,7 +70,8 @@ def test_no_shipped_file_needs_a_service_that_is_more_exposed_than_this(
 
 @needs_systemd
 @pytest.mark.parametrize(
-    ("service", "most"), [(RECORDER, 1.0), (PAGE, 1.5), (EXPORTER, 1.5), (EARLY, MOST)]
+    ("service", "most"),
+    [(RECORDER, 1.0), (PAGE, 1.5), (EXPORTER, 1.5), (NOTIFY, 1.5), (EARLY, MOST)],
 )
 def test_the_other_units_are_no_more_exposed_than_a_daemon(
     tmp_path: Path, service: Path, most: float

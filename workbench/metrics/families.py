@@ -7,7 +7,7 @@ Every label from the network is printable and of bounded length, and the devices
 
 from collections.abc import Iterable, Iterator
 from enum import IntEnum
-from typing import Final
+from typing import Any, Final
 
 from prometheus_client.core import (
     CounterMetricFamily,
@@ -43,7 +43,7 @@ def label(text: str) -> str:
     return words.printable(text[:LONGEST])[:LONGEST]
 
 
-def of_graph(graph: ObservedGraph[AnyDevice], tally: SiteTally, now: Moment) -> Iterator[Metric]:
+def of_graph(graph: ObservedGraph[Any], tally: SiteTally, now: Moment) -> Iterator[Metric]:
     """Yield the families of all devices that have published a state, and of our nodes."""
     devices = graph.stated()
     yield from _states(graph, devices, now)
@@ -54,7 +54,7 @@ def of_graph(graph: ObservedGraph[AnyDevice], tally: SiteTally, now: Moment) -> 
 
 
 def _states(
-    graph: ObservedGraph[AnyDevice], devices: Iterable[AnyDevice], now: Moment
+    graph: ObservedGraph[Any], devices: Iterable[AnyDevice], now: Moment
 ) -> Iterator[Metric]:
     up = _gauge("device_up", "1 while states of the device arrive, 0 in a silence.", DEVICE)
     age = _gauge(
@@ -152,7 +152,7 @@ def _counts(devices: Iterable[AnyDevice], tally: SiteTally) -> Iterator[Metric]:
     yield from (waits, rides, cycles, energy, watched, served)
 
 
-def _nodes(graph: ObservedGraph[AnyDevice], now: Moment) -> Iterator[Metric]:
+def _nodes(graph: ObservedGraph[Any], now: Moment) -> Iterator[Metric]:
     info = InfoMetricFamily(f"{PREFIX}node", "Our daemons on the graph.", labels=("node",))
     up = _gauge("node_up", "1 while the daemon reports on /diagnostics.", ("node",))
     fault = _gauge(
@@ -198,7 +198,7 @@ def _held(device: AnyDevice) -> bool:
     return False
 
 
-def _simulated(graph: ObservedGraph[AnyDevice], reporter: str) -> bool:
+def _simulated(graph: ObservedGraph[Any], reporter: str) -> bool:
     """Does the daemon of the report `<node>: <device>` move no hardware?"""
     daemon = graph.nodes.get(f"{reporter.partition(': ')[0]}: daemon")
     return daemon is not None and SIMULATED in daemon.message

@@ -1,0 +1,87 @@
+"""`rmf-bridge notify` beside a real daemon: what people get when the daemon is killed and is back."""
+
+import json
+import os
+import signal
+import subprocess
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+from hal_fakes.wire import runs_here
+from tests.runtime.site import Module, command, daemon, environment
+from tests.waiting import PATIENCE_S, wait_until
+from tests.workbench.notify.sink import Sink
+
+FILE = """
+after_s: 3
+over_s: 3
+again_s: 5
+to:
+  - {{webhook: "{url}"}}
+"""
+
+
+@contextmanager
+def notify(file: Path, state: Path, domain: int) -> Iterator[subprocess.Popen[bytes]]:
+    graph = ("--localhost", "--domain-id", str(domain), "--transport", runs_here())
+    line = command("notify", file, "--state", state, *graph)
+    process = subprocess.Popen(line, env=environment())
+    try:
+        yield process
+    finally:
+        process.terminate()
+        assert process.wait(PATIENCE_S) == 0
+
+
+def states_are_heard(status: Path) -> None:
+    """Wait until another node hears the daemon's states, and the daemon has published two more."""
+
+    def heard() -> bool:
+        return bool(json.loads(status.read_text())["heard_by"]["door_states"])
+
+    wait_until(lambda: status.exists() and heard(), "notify listens")
+    times = {status.stat().st_mtime_ns}
+
+    def renewed() -> bool:
+        times.add(status.stat().st_mtime_ns)
+        return len(times) > 3
+
+    wait_until(renewed, "two more states")
+
+
+@pytest.mark.long(20)
+def test_a_killed_daemon_is_told_repeated_until_acknowledged_and_over_when_it_is_back(
+    sink: Sink, tmp_path: Path, domain: int
+) -> None:
+    module = Module(tmp_path, domain, runs_here())
+    file = tmp_path / "to.yaml"
+    file.write_text(FILE.format(url=sink.url))
+    state = tmp_path / "state"
+
+    def got(event: str) -> dict[str, str] | None:
+        every = [json.loads(body) for _, body in sink.got]
+        return next((one for one in every if one["event"] == event), None)
+
+    with notify(file, state, domain):
+        with daemon(module.file, tmp_path / "one", RMF_BRIDGE_SERVICE="1") as running:
+            running.wait_for("ready")
+            states_are_heard(tmp_path / "one" / "status.json")
+            running.end(signal.SIGKILL)
+        wait_until(lambda: got("new"), "the death is told")
+        told = got("new")
+        assert told is not None
+        assert told["title"] == "door ward_door is silent"
+        assert "its daemon is not running, or is cut off" in told["text"]
+        wait_until(lambda: got("again"), "the death is told again")
+        acknowledge = command("notify", file, "--state", state, "--ack", told["key"])
+        assert subprocess.run(acknowledge, env=environment()).returncode == os.EX_OK
+        wait_until(lambda: not (state / "acknowledged").exists(), "the acknowledgement is taken")
+    sink.got.clear()
+    with notify(file, state, domain), daemon(module.file, tmp_path / "one") as running:
+        running.wait_for("ready")
+        wait_until(lambda: got("over"), "its return is told")
+        assert [json.loads(body)["event"] for _, body in sink.got] == ["over"]
+    module.close()

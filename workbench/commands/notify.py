@@ -1,0 +1,219 @@
+"""`rmf-bridge notify FILE`: tells people of a site's troubles by webhook, mail or ntfy.
+
+It only listens to RMF's graph. It runs beside the page or the recorder, never in a daemon that moves
+something.
+"""
+
+import argparse
+import logging
+import os
+import sys
+import threading
+import time
+from collections import deque
+from contextlib import closing, suppress
+from datetime import datetime
+from pathlib import Path
+from typing import Final
+
+import msgspec
+
+from bridges.messages.words import printable
+from bridges.runtime import faults
+from bridges.system import directories, files, log
+from bridges.system.log import pairs
+from bridges.transports.transport import TransportError
+from bridges.yaml.problems import SettingsError
+from workbench.explain.heard_devices import HeardDevices
+from workbench.graph.join import (
+    add_graph_arguments,
+    command_line,
+    complain,
+    interruptible,
+    open_graph,
+)
+from workbench.graph.live import Ear
+from workbench.notify import channels
+from workbench.notify.messages import NoticeText, worded
+from workbench.notify.notices import KeptTrouble, Notices
+from workbench.notify.settings import NotifySettings, Recipient, load
+from workbench.notify.troubles import troubles
+
+logger = logging.getLogger(__name__)
+TURN_S: Final = 1.0
+RETRY_S: Final = (5.0, 30.0, 120.0, 600.0)
+"""The pauses after failed tries; the last one is repeated."""
+MOST_WAITING: Final = 200
+"""Notices that wait for a recipient out of reach; the oldest are dropped, which is logged."""
+SERVICE_STATE: Final = Path("/var/lib/rmf-bridge-notify")
+"""The folder of `rmf-bridge-notify.service`."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the options of `notify`."""
+    parser.add_argument("file", type=Path, metavar="FILE", help="the recipients (docs: Monitor)")
+    parser.add_argument(
+        "--test", action="store_true", help="send a test notice to each recipient, and end"
+    )
+    parser.add_argument(
+        "--ack", metavar="TROUBLE", help="stop the repeats of this trouble, as its notice names it"
+    )
+    parser.add_argument(
+        "--state", type=Path, default=_state(), metavar="DIR", help="the folder of what was told"
+    )
+    add_graph_arguments(parser)
+
+
+def _state() -> Path:
+    given = os.environ.get("STATE_DIRECTORY", "").split(":")[0]
+    if given:
+        return Path(given)
+    service = os.access(SERVICE_STATE, os.R_OK | os.W_OK | os.X_OK)
+    return SERVICE_STATE if service else directories.state_base() / "notify"
+
+
+def run(args: argparse.Namespace) -> int:
+    """Return 0 after Ctrl-C or SIGTERM, or if every test notice was taken; 1 if one was not, or the
+    graph cannot be joined; 73 if --ack cannot be written; 78 if FILE has an error."""
+    log.start()
+    try:
+        settings = load(args.file)
+    except SettingsError as error:
+        print("\n".join(map(str, error.problems)), file=sys.stderr)
+        return os.EX_CONFIG
+    if args.ack:
+        return _acknowledge(args.state, args.ack)
+    if args.test:
+        return _test(settings)
+    try:
+        with interruptible():
+            _serve(args, settings)
+    except TransportError as error:
+        complain("notify", error)
+        return 1
+    except KeyboardInterrupt:
+        return 0
+    return 0
+
+
+def _acknowledge(state: Path, key: str) -> int:
+    try:
+        files.replace(state / "acknowledged", key.encode())
+    except OSError as error:
+        complain("notify", f"{state} cannot be written: {error.strerror}")
+        return os.EX_CANTCREAT
+    print(f"{key}: no more repeats, if it is a present trouble (the log of notify says so)")
+    return 0
+
+
+def _test(settings: NotifySettings) -> int:
+    text = "This is a test. Nothing is wrong."
+    notice = NoticeText("new", "warning", "test", "rmf-bridges: a test", text, settings.page or "")
+    refused = 0
+    for to in settings.to:
+        try:
+            channels.send(to, notice)
+        except channels.ChannelError as error:
+            complain("notify", f"{to.name}: {error}")
+            refused = 1
+        else:
+            print(f"{to.name}: taken")
+    return refused
+
+
+def _serve(args: argparse.Namespace, settings: NotifySettings) -> None:
+    desk = Desk(settings, args.state, [Courier(to) for to in settings.to])
+    with closing(open_graph(args, "rmf_bridge_notify")) as transport:
+        ear = Ear(transport)
+        site = HeardDevices(graph=command_line(args).options)
+        while True:
+            for heard in ear.listen(TURN_S):
+                site.take(heard)
+            site.pass_time(time.monotonic(), time.time())
+            desk.turn(site)
+
+
+class Courier:
+    """Sends one recipient's notices on a thread of its own, so that none delays another's."""
+
+    def __init__(self, to: Recipient) -> None:
+        self._to = to
+        self._waiting: deque[NoticeText] = deque(maxlen=MOST_WAITING)
+        self._came = threading.Event()
+        threading.Thread(target=self._run, name=to.name, daemon=True).start()
+
+    def take(self, notice: NoticeText) -> None:
+        """Queue a notice, if this recipient wants its severity."""
+        if self._to.least == "critical" and notice.severity != "critical":
+            return
+        if len(self._waiting) == MOST_WAITING:
+            logger.error(pairs("notice_dropped", to=self._to.name, title=self._waiting[0].title))
+        self._waiting.append(notice)
+        self._came.set()
+
+    def _run(self) -> None:
+        tries = 0
+        while True:
+            self._came.wait()
+            self._came.clear()
+            while self._waiting:
+                tries = 0 if self._sent(self._waiting[0]) else tries + 1
+                if tries:
+                    time.sleep(RETRY_S[min(tries, len(RETRY_S)) - 1])
+                else:
+                    self._waiting.popleft()
+
+    def _sent(self, notice: NoticeText) -> bool:
+        try:
+            channels.send(self._to, notice)
+        except channels.ChannelError as error:
+            logger.error(pairs("notice_not_taken", to=self._to.name, reason=error))
+            return False
+        logger.info(pairs("notice", to=self._to.name, what=notice.event, title=notice.title))
+        return True
+
+
+class Desk:
+    """Finds the notices of each turn, hands them to the couriers, and keeps on disk what was told."""
+
+    def __init__(self, settings: NotifySettings, state: Path, couriers: list[Courier]) -> None:
+        self._settings = settings
+        self._told, self._acknowledged = state / "told.json", state / "acknowledged"
+        self._couriers = couriers
+        self._notices = Notices(settings)
+        self._remedies = faults.for_explain()
+        self._kept = b""
+        with suppress(OSError, msgspec.MsgspecError):
+            self._kept = files.read(self._told, 1 << 20)
+            kept = msgspec.json.decode(self._kept, type=list[KeptTrouble])
+            self._notices.restore(kept, time.monotonic())
+
+    def turn(self, site: HeardDevices) -> None:
+        """Look at the site once."""
+        self._take_acknowledgement()
+        present = [*troubles(site, site.now, self._settings)]
+        ids = {(one.kind, printable(one.id)): one.id for one in site.stated()}
+        for notice in self._notices.turn(present, ids, site.now.at, datetime.now().time()):
+            one = notice.trouble
+            name = ids.get((one.kind, one.device))
+            explained = site.explain(one.kind, name, None, self._remedies) if name else None
+            text = worded(notice, explained, self._settings.page)
+            for courier in self._couriers:
+                courier.take(text)
+        self._keep()
+
+    def _take_acknowledgement(self) -> None:
+        with suppress(OSError):
+            key = files.read(self._acknowledged, 4096).decode(errors="replace")
+            self._acknowledged.unlink()
+            known = self._notices.acknowledge(key)
+            logger.info(pairs("acknowledged", trouble=key, known=known))
+
+    def _keep(self) -> None:
+        kept = msgspec.json.encode(self._notices.kept())
+        if kept != self._kept:
+            try:
+                files.replace(self._told, kept)
+            except OSError as error:
+                logger.error(pairs("not_kept", file=self._told, reason=error))
+            self._kept = kept

@@ -1,0 +1,1 @@
+"""Notices to people about a site's troubles: by webhook, mail and ntfy."""

@@ -1,0 +1,99 @@
+"""The ways to people: a webhook, an ntfy topic, a mail server.
+
+Each raises ChannelError if the notice was not taken. ntfy: publish by headers (docs.ntfy.sh/publish:
+Title, Priority, Tags, Click, Authorization). Mail is sent over TLS only: STARTTLS, or TLS from the
+beginning on port 465 (RFC 8314).
+"""
+
+import smtplib
+import ssl
+from collections.abc import Mapping
+from email.header import Header
+from email.message import EmailMessage
+from typing import Final
+
+import msgspec
+
+from bridges.system.user_files import SecretError, secret_line
+from workbench.notify.messages import NoticeText
+from workbench.notify.settings import Recipient
+
+TIMEOUT_S: Final = 10.0
+SMTPS: Final = 465
+PRIORITY: Final = {"critical": "5", "warning": "3"}
+
+
+class ChannelError(Exception):
+    """The notice was not taken. The text says why, without secrets."""
+
+
+def send(to: Recipient, notice: NoticeText) -> None:
+    """Send a notice, within some TIMEOUT_S. Raises ChannelError."""
+    try:
+        secret = secret_line("token_file", to.token_file, "token") if to.token_file else ""
+    except SecretError as error:
+        raise ChannelError(str(error)) from None
+    if to.mail:
+        _mail(to, notice, secret)
+    elif to.ntfy:
+        _post(to.ntfy, notice.text.encode(), _ntfy_headers(notice) | _bearer(secret))
+    else:
+        assert to.webhook  # one of the three is there
+        headers = {"Content-Type": "application/json"} | _bearer(secret)
+        _post(to.webhook, msgspec.json.encode(notice), headers)
+
+
+def _bearer(secret: str) -> dict[str, str]:
+    return {"Authorization": f"Bearer {secret}"} if secret else {}
+
+
+def _ntfy_headers(notice: NoticeText) -> dict[str, str]:
+    tag = "white_check_mark" if notice.event == "over" else "warning"
+    title = Header(notice.title, "utf-8", maxlinelen=10_000).encode()  # RFC 2047, which ntfy reads
+    click = {"Click": notice.link} if notice.link else {}
+    return {"Title": title, "Priority": PRIORITY[notice.severity], "Tags": tag} | click
+
+
+def _post(url: str, body: bytes, headers: Mapping[str, str]) -> None:
+    import requests
+
+    with requests.Session() as session:
+        session.trust_env = False
+        try:
+            answer = session.post(
+                url,
+                data=body,
+                headers=headers,
+                timeout=TIMEOUT_S,
+                allow_redirects=False,
+                stream=True,
+            )
+        except requests.RequestException as error:
+            raise ChannelError(f"{type(error).__name__}") from None
+        with answer:
+            if not answer.ok or answer.is_redirect:
+                raise ChannelError(f"it answers {answer.status_code} {answer.reason}")
+
+
+def _mail(to: Recipient, notice: NoticeText, password: str) -> None:
+    message = EmailMessage()
+    message["Subject"], message["From"] = f"[rmf-bridges] {notice.title}", to.sender
+    message["To"] = ", ".join(to.mail)
+    message.set_content("\n\n".join(filter(None, (notice.text, notice.link))))
+    context = ssl.create_default_context()
+    try:
+        with _server(to, context) as server:
+            if to.user:
+                server.login(to.user, password)
+            server.send_message(message)
+    except (OSError, smtplib.SMTPException) as error:
+        raise ChannelError(f"{type(error).__name__}: {error}") from None
+
+
+def _server(to: Recipient, context: ssl.SSLContext) -> smtplib.SMTP:
+    assert to.host  # `problems` refuses mail without it
+    if to.port == SMTPS:
+        return smtplib.SMTP_SSL(to.host, to.port, timeout=TIMEOUT_S, context=context)
+    server = smtplib.SMTP(to.host, to.port, timeout=TIMEOUT_S)
+    server.starttls(context=context)
+    return server

@@ -1,0 +1,46 @@
+"""A notice as text for people: a headline, the sentences of `explain`, and who must act."""
+
+from typing import Final
+from urllib.parse import quote
+
+from msgspec import Struct
+
+from workbench.explain.explanation import Explanation
+from workbench.notify.notices import Notice
+
+SAYS: Final = {"new": "", "again": "Still: ", "over": "Over: "}
+MOST_SENTENCES: Final = 4
+
+
+class NoticeText(Struct, frozen=True):
+    """A notice as sent. `key`: for `rmf-bridge notify FILE --ack`."""
+
+    event: str
+    severity: str
+    key: str
+    title: str
+    text: str
+    link: str = ""
+
+
+def worded(notice: Notice, explained: Explanation | None, page: str | None) -> NoticeText:
+    """Word a notice. `explained`: the device's explanation now; None if it is no longer known."""
+    trouble = notice.trouble
+    lines = [f"It has lasted {_lasted(notice.for_s)}."]
+    if notice.event == "over":
+        lines = [f"It lasted {_lasted(notice.for_s)}."]
+    elif explained is not None:
+        lines += explained.now[:MOST_SENTENCES]
+        lines += [f"Next, {step.who}: {step.what}." for step in explained.next]
+        lines += [f"{one.code}: {one.cause}. {one.do}" for one in explained.faults if one.do]
+    if trouble.severity == "critical" and notice.event != "over":
+        lines.append(f"To stop the repeats: rmf-bridge notify FILE --ack '{trouble.key}'")
+    link = f"{page.rstrip('/')}/{trouble.kind}/{quote(trouble.device, safe='')}" if page else ""
+    title = SAYS[notice.event] + trouble.headline
+    return NoticeText(notice.event, trouble.severity, trouble.key, title, "\n".join(lines), link)
+
+
+def _lasted(seconds: float) -> str:
+    if seconds < 120:
+        return f"{seconds:.0f} s"
+    return f"{seconds / 60:.0f} min" if seconds < 7200 else f"{seconds / 3600:.1f} h"

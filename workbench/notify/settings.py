@@ -1,0 +1,131 @@
+"""The file of `rmf-bridge notify`: the recipients, and when each of them is told.
+
+page: https://rmf.hospital.example      # optional: the page that notices link to
+quiet: {from: "22:00", to: "06:00"}     # optional: warnings wait until the end of this time
+to:
+  - {ntfy: "https://ntfy.sh/our-topic", token_file: /etc/rmf-bridges/ntfy.token}
+  - {webhook: "https://chat.example/hook", least: critical}
+  - {mail: [lifts@hospital.example], from: rmf@hospital.example, host: mail.hospital.example}
+"""
+
+from datetime import time
+from pathlib import Path
+from typing import Annotated, Literal
+
+import msgspec
+from msgspec import Meta
+
+from bridges.kinds.shared.fields import AbsolutePath, Name, Patience, Seconds, tells
+from bridges.kinds.shared.remarks import Remarks
+from bridges.yaml.parsing import Sort, YamlFile, compose, read
+from bridges.yaml.positions import Spot
+from bridges.yaml.values import BROKEN, Values
+
+SORT = Sort("file of notify", "to: ...", 64 * 1024, 2_000)
+Severity = Literal["warning", "critical"]
+Url = Annotated[
+    str,
+    Meta(
+        max_length=2048,
+        pattern=r"^https?://[!-~]+$(?!\n)",
+        extra={"pattern": "an address that begins with https:// or http://"},
+    ),
+]
+Clock = Annotated[
+    str,
+    Meta(
+        pattern=r"^([01][0-9]|2[0-3]):[0-5][0-9]$(?!\n)",
+        extra={"pattern": 'a time of day in quotes, such as "22:00"'},
+    ),
+]
+
+
+class QuietHours(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """The time of day in which only critical notices are sent."""
+
+    begins: Annotated[Clock, tells("its beginning.")] = msgspec.field(name="from")
+    ends: Annotated[Clock, tells("its end, on the next day if it is earlier.")] = msgspec.field(
+        name="to"
+    )
+
+    def contains(self, at: time) -> bool:
+        """Is it quiet at this time of day?"""
+        begins, ends = time.fromisoformat(self.begins), time.fromisoformat(self.ends)
+        if begins <= ends:
+            return begins <= at < ends
+        return at >= begins or at < ends
+
+
+class Recipient(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """One way to people: exactly one of `ntfy`, `webhook` and `mail`."""
+
+    ntfy: Annotated[Url | None, tells("the address of an ntfy topic.")] = None
+    webhook: Annotated[Url | None, tells("an address that takes a JSON object by POST.")] = None
+    mail: Annotated[list[Name], Meta(max_length=20), tells("addresses for mail.")] = []
+    least: Annotated[
+        Severity, tells("`critical`: only notices of robots shut in and of silent devices.")
+    ] = "warning"
+    token_file: Annotated[
+        AbsolutePath | None,
+        tells("a file with a bearer token, or with the password of mail, for this user alone."),
+    ] = None
+    host: Annotated[Name | None, tells("the mail server.")] = None
+    port: Annotated[int, Meta(ge=1, le=65535), tells("its port; TLS is required.")] = 587
+    user: Annotated[Name | None, tells("the user at the mail server.")] = None
+    sender: Annotated[Name | None, tells("the address of the sender of mail.")] = msgspec.field(
+        name="from", default=None
+    )
+
+    @property
+    def name(self) -> str:
+        """The recipient's name in the log, without a path that may hold a secret."""
+        if self.mail:
+            return f"mail to {', '.join(self.mail)}"
+        way, url = ("ntfy", self.ntfy) if self.ntfy else ("webhook", self.webhook or "")
+        return f"{way} at {(url or '').split('/')[2]}"
+
+    def problems(self) -> Remarks:
+        """Yield a recipient without a way, with several ways, or with half of a mail's settings."""
+        ways = [bool(self.ntfy), bool(self.webhook), bool(self.mail)]
+        if sum(ways) != 1:
+            yield (), "write exactly one of ntfy, webhook and mail; another way is another entry"
+            return
+        mails = {"host": self.host, "from": self.sender}
+        for key, value in mails.items():
+            if self.mail and not value:
+                yield ("mail",), f"needs {key} too"
+            if value and not self.mail:
+                yield (key,), "is only for mail"
+        if self.user and not (self.mail and self.token_file):
+            yield ("user",), "is for mail, and needs token_file: the file with the user's password"
+
+
+class NotifySettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Who is told, and when."""
+
+    to: Annotated[list[Recipient], Meta(min_length=1, max_length=20), tells("the recipients.")]
+    page: Annotated[Url | None, tells("the page of `rmf-bridge page`, for links.")] = None
+    quiet: Annotated[QuietHours | None, tells("only critical notices are sent then.")] = None
+    after_s: Annotated[Patience, tells("how long a trouble must last before anybody is told.")] = (
+        30.0
+    )
+    over_s: Annotated[
+        Patience, tells("how long a trouble must be gone before its end is told.")
+    ] = 60.0
+    waits_s: Annotated[Patience, tells("a robot that waits longer than this is a trouble.")] = 300.0
+    stuck_s: Annotated[
+        Patience, tells("a lift with a robot in which nothing changes for this long is critical.")
+    ] = 180.0
+    again_s: Annotated[
+        Seconds, tells("a critical notice is repeated after this long without --ack; 0: never.")
+    ] = 900.0
+
+
+def load(file: Path) -> NotifySettings:
+    """Read the file. Raises SettingsError with every problem found."""
+    page = YamlFile(str(file))
+    root = compose(page, read(str(file), SORT), SORT)
+    found = Values(page).make(NotifySettings, Spot(root, root, "the file"))
+    page.check()
+    assert found is not BROKEN  # otherwise `check` raises
+    return found

@@ -1,0 +1,62 @@
+"""A site's present troubles, from its devices' memory. Pure."""
+
+from collections.abc import Iterator
+from typing import Any
+
+from msgspec import Struct
+
+from bridges.messages.words import Kind, printable
+from bridges.observe.all_devices import AnyDevice, ObservedGraph
+from bridges.observe.lift import NOBODY, ObservedLift
+from bridges.observe.requesters import Moment
+from workbench.notify.settings import NotifySettings, Severity
+
+
+class Trouble(Struct, frozen=True):
+    """One trouble of one device. `what`: the same for as long as it is the same trouble."""
+
+    kind: Kind
+    device: str
+    what: str
+    severity: Severity
+    headline: str
+
+    @property
+    def key(self) -> str:
+        """The trouble's name for `--ack` and on disk."""
+        return f"{self.kind} {self.device}: {self.what}"
+
+
+def troubles(graph: ObservedGraph[Any], now: Moment, settings: NotifySettings) -> Iterator[Trouble]:
+    """Yield the present troubles. A silent device has only this one: nothing else is known of it."""
+    for one in graph.stated():
+        name = printable(one.id)
+        if one.is_silent(now):
+            headline = f"{one.kind} {name} is silent"
+            yield Trouble(one.kind, name, "SILENT", "critical", headline)
+            continue
+        yield from _of_lift(one, name, now, settings)
+        if len(one.publishers(now)) > 1:
+            headline = f"several nodes publish {one.kind} {name}"
+            yield Trouble(one.kind, name, "TWO_NODES", "critical", headline)
+        for code in sorted({code for said in _current(one, now) for code in said}):
+            shown = printable(code)
+            yield Trouble(one.kind, name, shown, "warning", f"{one.kind} {name}: {shown}")
+        if any(now.at - wait.since.at > settings.waits_s for wait in one.waits(now)):
+            headline = f"a robot waits for {one.kind} {name}"
+            yield Trouble(one.kind, name, "WAITING", "warning", headline)
+
+
+def _of_lift(one: AnyDevice, name: str, now: Moment, settings: NotifySettings) -> Iterator[Trouble]:
+    if not isinstance(one, ObservedLift) or one.session.value == NOBODY:
+        return
+    facts = (one.floor, one.door, one.motion, one.mode, one.session, one.destination)
+    if now.at - max(fact.since.at for fact in facts) > settings.stuck_s:
+        headline = f"lift {name} has a robot and does not move"
+        yield Trouble("lift", name, "STUCK", "critical", headline)
+
+
+def _current(one: AnyDevice, now: Moment) -> Iterator[list[str]]:
+    for said in one.diagnoses.values():
+        if said.is_current(now.at):
+            yield [*said.faults]
