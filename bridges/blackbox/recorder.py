@@ -7,10 +7,12 @@ the time after it. Nothing is written while all is well, unless a YAML asks for 
 
 import logging
 import os
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from datetime import date
 from pathlib import Path
 from typing import Final
 
+from bridges.blackbox import days
 from bridges.blackbox.entries import AnyEntry, Clocks, DaemonDied, DaemonEnded, Decided, Head, Known
 from bridges.blackbox.incident import AFTER_S, BEFORE_S, Incident, Note, part
 from bridges.blackbox.recordings import CONTINUOUS, DEATH, Recordings, reason
@@ -18,6 +20,8 @@ from bridges.blackbox.ring import DIED as DIED_NAME
 from bridges.blackbox.ring import NAME, RingContent, RingError, Tail
 from bridges.blackbox.triggers import AGAIN_S, DIED, Triggers
 from bridges.kinds.shared.durations import AGES_AGO
+from bridges.observe.all_devices import Key
+from bridges.observe.tally import DeviceCounts
 from bridges.system.log import pairs
 
 log = logging.getLogger(__name__)
@@ -26,6 +30,8 @@ LATE_S: Final = 60.0
 """Entries older than this at the first look at a ring are left to the recorder that ran before."""
 GRACE_S: Final = 2.0
 """The extra wait (s) after which the ring certainly has all entries of a recording."""
+COUNTED_S: Final = 3600.0
+"""The day's counts are written so often (s), because each write wears an SD card."""
 PART_S: Final = 300.0
 """The length (s) of one file of `keep: continuous`."""
 
@@ -46,6 +52,7 @@ class Recorder:
         self._seen_dead: set[tuple[int, int]] = set()
         self._died_at: dict[str, float] = {}
         self._failing = False
+        self._counted_at = now()
 
     def look(self) -> None:
         """Read new entries, and write due recordings. Called each second; does not raise."""
@@ -54,9 +61,13 @@ class Recorder:
             self._look_at(folder)
         for folder in [known for known in self._followed if known not in folders]:
             self._finish(self._followed.pop(folder))
+        if self._now() >= self._counted_at + COUNTED_S:
+            self._counted_at = self._now()
+            for followed in self._followed.values():
+                self._count(followed)
 
     def close(self) -> None:
-        """Write the unfinished recordings as they are."""
+        """Write the unfinished recordings as they are, and the day's counts."""
         for followed in self._followed.values():
             self._finish(followed)
         self._followed.clear()
@@ -88,6 +99,14 @@ class Recorder:
     def _finish(self, followed: "_Followed") -> None:
         for due in followed.due(float("inf")):
             self._put(*due)
+        self._count(followed)
+
+    def _count(self, followed: "_Followed") -> None:
+        """Add the counts of a ring's own devices to the day."""
+        try:
+            days.add(self._recordings.folder, date.today(), followed.counts())
+        except OSError as error:
+            log.warning(pairs("not_counted", folder=self._recordings.folder, reason=error))
 
     def _take_died(self, path: Path) -> None:
         """Record, once, the ring of a run that did not shut down cleanly. A failed start is not
@@ -160,6 +179,11 @@ class _Followed:
             self._kept = RingContent(self._tail.path)
         if self.head.recording.keep == "continuous":
             self._part += new
+
+    def counts(self) -> Mapping[Key, DeviceCounts]:
+        """Return the counts of the daemon's own devices since the last call."""
+        found = self._triggers.tally.take_out()
+        return {key: one for key, one in found.items() if key[0] == self.head.kind}
 
     def due(self, now: float) -> list[tuple[Incident, str]]:
         """Return the recordings that are complete now; with `now` infinite, all that have begun."""

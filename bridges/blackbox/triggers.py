@@ -20,6 +20,7 @@ from bridges.messages.heard import Heard
 from bridges.messages.releases import RELEASES
 from bridges.messages.rihs01 import MESSAGES
 from bridges.observe.all_devices import PlainGraph
+from bridges.observe.tally import SiteTally
 
 AGAIN_S: Final = 600.0
 MOST_NOTED: Final = 1000
@@ -28,13 +29,15 @@ FAULT, REFUSED, WAITING, DIED = "FAULT", "REFUSED", "WAITING", "DIED"
 
 
 class Triggers:
-    """Finds the reasons to record one run of a daemon. `waiting_s`: the wait (s) that is a reason."""
+    """Finds the reasons to record one run of a daemon. `waiting_s`: the wait (s) that is a reason.
+    `tally`: what the devices in its messages did."""
 
     def __init__(self, waiting_s: float) -> None:
         self._faults: dict[str, set[str]] = {}
         self._noted: dict[tuple[str, str, str], float] = {}
         self._waiting_s = waiting_s
         self._graph = PlainGraph()
+        self.tally = SiteTally()
 
     def take(self, entry: AnyEntry) -> list[Note]:
         """Return the new reasons for a recording that this entry gives."""
@@ -74,7 +77,9 @@ class Triggers:
             message = cdr.decode(kind, spoken.cdr, release)
         except cdr.CdrError:
             return
-        for device, _ in self._graph.hear(Heard(spoken.at, spoken.at, spoken.topic, message)):
+        found = self._graph.hear(Heard(spoken.at, spoken.at, spoken.topic, message))
+        self.tally.take(self._graph, found)
+        for device, _ in found:
             for wait in device.waits(self._graph.now):
                 for_s = spoken.at - wait.since.at
                 if for_s >= self._waiting_s:

@@ -4,8 +4,10 @@ import argparse
 import os
 import sys
 from contextlib import suppress
+from datetime import date
 from pathlib import Path
 
+from bridges.blackbox import days
 from bridges.blackbox.incident import INSTALL
 from bridges.blackbox.recorder import Recorder
 from bridges.blackbox.recordings import Recordings
@@ -13,6 +15,7 @@ from bridges.runtime import signals
 from bridges.runtime.clock import machine_s
 from bridges.runtime.notify import notify
 from bridges.system import directories, log
+from bridges.system.columns import aligned
 
 EVERY_S = 1.0
 
@@ -26,10 +29,21 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="DIR",
         help="default: the unit's state directory, else a folder in the user's state directory",
     )
+    parser.add_argument(
+        "--days",
+        type=int,
+        nargs="?",
+        const=1,
+        metavar="N",
+        help="print the rides, waits and availability of the last N days (default 1), and end",
+    )
+    parser.add_argument("--csv", action="store_true", help="print every day as CSV, and end")
 
 
 def run(args: argparse.Namespace) -> int:
     """Return 0 after SIGTERM or SIGINT; 69 if the library is missing."""
+    if args.csv or args.days is not None:
+        return _tell_days(args)
     log.start()
     try:
         from bridges.blackbox import mcap_write  # noqa: F401 - fails now, not at an incident
@@ -47,6 +61,16 @@ def run(args: argparse.Namespace) -> int:
         _notify("WATCHDOG=1")
     _notify("STOPPING=1")
     recorder.close()
+    return 0
+
+
+def _tell_days(args: argparse.Namespace) -> int:
+    found = days.read(args.output or _folder())
+    if args.csv:
+        print(days.as_csv(found), end="")
+        return 0
+    told = [days.HEADINGS, *(row.cells for row in days.rows(found, date.today(), args.days))]
+    print("\n".join(aligned(told)) if len(told) > 1 else "nothing was counted in this time")
     return 0
 
 

@@ -36,6 +36,11 @@ class DurationHistogram:
         self.counts[bisect_left(BOUNDS_S, duration_s)] += 1
         self.sum_s += duration_s
 
+    def merge(self, other: "DurationHistogram") -> None:
+        """Add the durations of another histogram."""
+        self.counts = [sum(pair) for pair in zip(self.counts, other.counts, strict=True)]
+        self.sum_s += other.sum_s
+
     @property
     def total(self) -> int:
         """The number of durations."""
@@ -53,8 +58,8 @@ class DurationHistogram:
 
 
 @dataclass(slots=True)
-class DeviceTally:
-    """The counts of one device since the beginning.
+class DeviceCounts:
+    """The counts of one device.
 
     `waits`: from a robot's first request until RMF lets it board, pass or charge. `rides`: of a lift,
     from the request for the next floor until the robot may leave. `cycles`: a door's openings, a
@@ -68,8 +73,24 @@ class DeviceTally:
     energy_j: float = 0.0
     watched_s: float = 0.0
     served_s: float = 0.0
-    _at: float | None = None
-    _counted: dict[str, float] = field(default_factory=dict)
+
+    def add(self, other: "DeviceCounts") -> None:
+        """Add the counts of another time."""
+        self.waits.merge(other.waits)
+        self.rides.merge(other.rides)
+        self.cycles += other.cycles
+        self.energy_j += other.energy_j
+        self.watched_s += other.watched_s
+        self.served_s += other.served_s
+
+
+class DeviceTally:
+    """Counts one device. `counts`: since the beginning, or since another object took them out."""
+
+    def __init__(self) -> None:
+        self.counts = DeviceCounts()
+        self._at: float | None = None
+        self._counted: dict[str, float] = {}
 
     def take(self, device: AnyDevice, news: Iterable[News], at: float) -> None:
         """Add one message's news. `at`: the message's time (s)."""
@@ -79,7 +100,7 @@ class DeviceTally:
             elif one.what == "over":
                 self._counted.pop(one.who, None)
             elif one.what == "changed" and _cycled(device):
-                self.cycles += 1
+                self.counts.cycles += 1
         if device.last_state is not None and device.last_state.at == at and self._at != at:
             self._pass_time(device, at)
         self._charged(device)
@@ -92,13 +113,15 @@ class DeviceTally:
         if not asked.since.seen:
             return
         boards = not isinstance(device, ObservedLift) or asked.boarded is one.at
-        (self.waits if boards else self.rides).add(one.at.at - asked.since.at)
+        counts = self.counts
+        (counts.waits if boards else counts.rides).add(one.at.at - asked.since.at)
 
     def _pass_time(self, device: AnyDevice, at: float) -> None:
         if self._at is not None and at - self._at <= SLOWEST_S:
-            self.watched_s += at - self._at
-            self.served_s += (at - self._at) * in_service(device)
-            self.energy_j += (at - self._at) * _watts(device)
+            counts, passed_s = self.counts, at - self._at
+            counts.watched_s += passed_s
+            counts.served_s += passed_s * in_service(device)
+            counts.energy_j += passed_s * _watts(device)
         self._at = at
 
     def _charged(self, device: AnyDevice) -> None:
@@ -109,7 +132,7 @@ class DeviceTally:
         if asked is not None and self._counted.get(asked.who) != asked.since.at:
             self._counted = {asked.who: asked.since.at}
             if asked.since.seen:
-                self.waits.add(device.condition.since.at - asked.since.at)
+                self.counts.waits.add(device.condition.since.at - asked.since.at)
 
 
 class SiteTally:
@@ -129,6 +152,13 @@ class SiteTally:
                     one: self.devices[one] for one in self.devices if one in graph.known
                 }
             self.devices.setdefault(key, DeviceTally()).take(device, news, graph.now.at)
+
+    def take_out(self) -> dict[Key, DeviceCounts]:
+        """Return the counts since the last call, and begin anew."""
+        found = {key: one.counts for key, one in self.devices.items()}
+        for one in self.devices.values():
+            one.counts = DeviceCounts()
+        return found
 
 
 def in_service(device: AnyDevice) -> bool:

@@ -6,12 +6,12 @@ from bridges.messages import definitions as d
 from bridges.messages.words import Kind
 from bridges.observe.all_devices import PlainGraph
 from bridges.observe.limits import SLOWEST_S
-from bridges.observe.tally import BOUNDS_S, DeviceTally, DurationHistogram
+from bridges.observe.tally import BOUNDS_S, DeviceCounts, DurationHistogram
 from tests.observe.story import BLUE, CHARGER, CLOSED, LIFT, OPEN, RED, Story
 
 
-def counted(story: Story, kind: Kind, name: str) -> DeviceTally:
-    return story.tally.devices[kind, name]
+def counted(story: Story, kind: Kind, name: str) -> DeviceCounts:
+    return story.tally.devices[kind, name].counts
 
 
 def durations(histogram: DurationHistogram) -> tuple[int, float]:
@@ -107,3 +107,15 @@ def test_invented_names_leave_no_counts_behind() -> None:
     for number in range(50):
         story.passes(100).hear("lift_states", replace(LIFT, lift_name=f"made up {number}"))
     assert len(story.tally.devices) <= 6
+
+
+def test_counts_that_were_taken_out_begin_anew_and_add_up() -> None:
+    story = ride(Story().lift(*FREE).passes(10))
+    first = story.tally.take_out()["lift", "Lift1"]
+    assert counted(story, "lift", "Lift1") == DeviceCounts()
+    story.passes(1).lift(*FREE)
+    second = story.tally.take_out()["lift", "Lift1"]
+    assert (second.watched_s, second.waits.total) == (1.0, 0)
+    watched_s = first.watched_s
+    first.add(second)
+    assert (first.watched_s, durations(first.waits)) == (watched_s + 1.0, (1, 20))

@@ -140,7 +140,7 @@ def _counts(devices: Iterable[AnyDevice], tally: SiteTally) -> Iterator[Metric]:
     watched = _counter("device_watched_seconds", "Time in which states arrived.", DEVICE)
     served = _counter("device_in_service_seconds", "Part of it in which robots are served.", DEVICE)
     for one in devices:
-        names, counted = _names(one), tally.devices.get((one.kind, one.id), DeviceTally())
+        names, counted = _names(one), tally.devices.get((one.kind, one.id), DeviceTally()).counts
         _add(waits, names, counted.waits)
         cycles.add_metric(names, counted.cycles)
         watched.add_metric(names, counted.watched_s)
