@@ -38,6 +38,10 @@ COMMANDS = {
         "make a service of a device YAML, or update the service after a change",
         "enable my_lift.yaml --dry-run",
     ),
+    "backup": (
+        "save this machine's configuration in one file, or restore it",
+        "backup pi-lift1.tar.gz",
+    ),
     "disable": ("end a service, with its outputs off; its YAML stays", "disable my_lift"),
     "schema": ("print the JSON Schema of a device YAML", "schema > rmf-bridge.json"),
     "watch": ("show lifts, doors and chargers live, as RMF sees them", "watch --localhost"),

@@ -65,6 +65,14 @@ EXIT_CODES: Final[dict[str, dict[int, str]]] = {
         **ROOT,
         78: "the YAML has an error, or contradicts another service's YAML",
     },
+    "backup": {
+        0: "saved, or restored and every service runs",
+        66: "FILE is no backup",
+        69: "an output is not verified off",
+        73: "a file cannot be written",
+        **ROOT,
+        78: "a restored YAML has an error",
+    },
     "disable": {
         0: "the service has ended",
         64: "no service can have this name",
@@ -103,6 +111,7 @@ EXIT_CODES: Final[dict[str, dict[int, str]]] = {
         1: "a daemon has a fault",
         2: "a daemon died or is silent",
         3: "there is no daemon",
+        4: "with --idle: a device is in use, or that is not known",
     },
     "doctor": {
         0: "all is well",

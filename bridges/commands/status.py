@@ -21,6 +21,17 @@ from bridges.runtime.subject import Status
 from bridges.system.directories import runtimes
 from bridges.system.paint import bold, red
 
+IN_USE: Final[Mapping[str, tuple[str, ...]]] = {
+    "lift": ("session",),
+    "door": ("hold",),
+    "charger": ("request", "robot"),
+    "lift_supervisor": ("session", "holder", "ending", "waiting"),
+    "door_supervisor": ("held_by",),
+    "charger_coordinator": ("queue",),
+}
+"""Kind -> the keys of a device's status that name its user. A kind that is not listed is never idle."""
+FREE: Final = ("-", "off", "")
+IDLE, BUSY = 0, 4
 NOT_TOLD: Final = ("contacts", "counts", "faults", "input_age_s", "outputs", "refused")
 
 
@@ -30,12 +41,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "name", nargs="?", metavar="NAME", help="only this daemon: a device YAML, or its name"
     )
     parser.add_argument("--json", action="store_true", help="print JSON, for programs")
+    parser.add_argument(
+        "--idle",
+        action="store_true",
+        help="say whether a restart now would disturb a robot: exit code 0 if no device is in use",
+    )
     parser.add_argument("--runtime-dir", metavar="DIR", help="only the daemon of this directory")
 
 
 def run(args: argparse.Namespace) -> int:
     """Return 0 if all daemons serve; 1 for faults; 2 if a daemon died or is silent; 3 without a visible
-    daemon."""
+    daemon. With --idle: 0 if no device is in use, else 4."""
     folders = [Path(args.runtime_dir)] if args.runtime_dir else list(runtimes())
     found = list(daemons(folders, {} if args.runtime_dir else units(), time.time()))
     if args.name:
@@ -47,11 +63,35 @@ def run(args: argparse.Namespace) -> int:
                 return NONE
     else:  # leave out stopped daemons that were started by hand
         found = [one for one in found if one.state != "stopped" or one.unit]
+    if args.idle:
+        return _tell_use(found)
     if args.json:
         print(json.dumps([{**msgspec.to_builtins(one), "level": one.level} for one in found]))
     else:
         show(found, sys.stdout)
     return max((one.level for one in found), default=NONE)
+
+
+def users(one: DaemonStatus) -> Iterator[str]:
+    """Yield why a daemon must not be restarted now: each device in use, or what is not known."""
+    if one.state == "stopped":
+        return
+    if one.state != "serving":
+        yield f"{one.name}: its devices' users are not known, because it is not serving"
+        return
+    kind = str(one.status.get("kind"))
+    if kind not in IN_USE:
+        yield f"{one.name}: whether a {kind} is in use is not known"
+    for name, device in one.devices.items():
+        for key in IN_USE.get(kind, ()):
+            if (value := str(device.get(key, ""))) not in FREE:
+                yield f"{one.name}: {printable(name)} is in use ({key} {printable(value)})"
+
+
+def _tell_use(found: Iterable[DaemonStatus]) -> int:
+    told = [line for one in found for line in users(one)]
+    print("\n".join(told) or "idle: no device of this machine is in use")
+    return BUSY if told else IDLE
 
 
 def show(found: Iterable[DaemonStatus], out: TextIO) -> None:

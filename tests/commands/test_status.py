@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from bridges import cli
-from bridges.commands.status import show
+from bridges.commands.status import show, users
 from bridges.runtime import daemons as on_machine
 from bridges.runtime import faults
 from bridges.runtime.daemons import DOWN, FAULTY, NONE, WELL, DaemonStatus, daemons
@@ -245,3 +245,37 @@ def test_an_unknown_name_is_answered_with_the_known_ones(
     told = capsys.readouterr()
     assert re.search(r"^no daemon no_such_lift; there is .*\blift_named\b", told.err)
     assert told.out == ""
+
+
+@pytest.mark.parametrize(
+    ("kind", "device", "told"),
+    [
+        ("lift", {"session": "-"}, []),
+        ("lift", {"session": "fleet/a"}, ["one: X is in use (session fleet/a)"]),
+        ("door", {"hold": "on"}, ["one: X is in use (hold on)"]),
+        ("charger", {"request": "-", "robot": "fleet/a"}, ["one: X is in use (robot fleet/a)"]),
+        ("door_supervisor", {"held_by": "-"}, []),
+        ("new_kind", {"session": "-"}, ["one: whether a new_kind is in use is not known"]),
+    ],
+)
+def test_a_device_with_a_user_is_not_idle_and_an_unknown_kind_neither(
+    kind: str, device: dict[str, str], told: list[str]
+) -> None:
+    status = {"kind": kind, "devices": {"X": device}}
+    one = DaemonStatus(name="one", state="serving", by="service", status=status)
+    assert list(users(one)) == told
+
+
+@pytest.mark.parametrize("state", ["old", "died", "left on", "unknown", "failed"])
+def test_the_users_of_a_daemon_that_does_not_serve_are_not_known(state: str) -> None:
+    one = DaemonStatus(name="one", state=state, by="service")
+    assert list(users(one)) == ["one: its devices' users are not known, because it is not serving"]
+
+
+def test_idle_is_an_exit_code_for_a_rollout(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with served(tmp_path / "lift_a", lift()) as folder:
+        line = ["status", "--idle", "--runtime-dir", str(folder)]
+        assert cli.main(line) == 0
+        assert capsys.readouterr().out == "idle: no device of this machine is in use\n"

@@ -1,0 +1,156 @@
+"""`rmf-bridge backup FILE`: saves a machine's configuration in one file; `--restore` brings it back.
+
+The backup has the device YAMLs, the profiles and maps beside them, the options of page, exporter and
+notify, the page's users with their password hashes, and what supervisors and coordinator keep. A secret
+is left out and named: any other file that only its owner may read.
+
+What supervisors keep is restored only for FRESH_S: afterwards nobody knows whether a door held then is
+still to be held, and a restored hold would open it.
+"""
+
+import argparse
+import os
+import sys
+import tarfile
+import time
+from collections.abc import Iterator
+from pathlib import Path, PurePosixPath
+from typing import Final
+
+from bridges.commands import enable
+from bridges.runtime.daemons import UNIT
+from bridges.runtime.runtime_directory import KEPT
+from bridges.runtime.services import CONFIG, add_root, carry_out, unit
+from bridges.settings.load import Config, SettingsError, understood
+from bridges.system import files
+from bridges.system.directories import SERVICE_STATE
+
+FRESH_S: Final = 3600.0
+MOST_BYTES: Final = 16 << 20
+WANTS: Final = Path("etc/systemd/system/rmf-bridges.target.wants")
+USERS: Final = "users"
+SECRET: Final = 0o077
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the options of `backup`."""
+    parser.add_argument("file", type=Path, metavar="FILE", help="the backup, a .tar.gz")
+    parser.add_argument(
+        "--restore", action="store_true", help="write its files here, and enable its services"
+    )
+    add_root(parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Return 0; 66 if FILE is no backup; 73 if a file cannot be written; 78 for an invalid YAML."""
+    if not args.restore:
+        return _save(args.file, args.root)
+    try:
+        saved = dict(_read(args.file))
+    except (OSError, tarfile.TarError, ValueError) as error:
+        print(f"{args.file} cannot be restored: {error}", file=sys.stderr)
+        return os.EX_NOINPUT
+    return _restore(saved, args)
+
+
+def _save(file: Path, root: Path) -> int:
+    try:
+        opened = os.open(file, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600)
+        with open(opened, "wb") as out, tarfile.open(fileobj=out, mode="w:gz") as archive:
+            for path in _found(root):
+                name = path.relative_to(root)
+                if path.parent == root / WANTS:
+                    archive.addfile(tarfile.TarInfo(str(name)))
+                elif _is_secret(path):
+                    print(f"left out, as a secret: /{name}; copy this file by hand")
+                else:
+                    archive.add(path, str(name), recursive=False)
+    except OSError as error:
+        print(f"{file} cannot be written: {error.strerror}", file=sys.stderr)
+        return os.EX_CANTCREAT
+    print(f"saved: {file}")
+    return 0
+
+
+def _is_secret(path: Path) -> bool:
+    """May only the owner read this file, and is it neither the page's users nor a memory?"""
+    return not path.stat().st_mode & SECRET and USERS not in path.name and path.name != KEPT
+
+
+def _found(root: Path) -> Iterator[Path]:
+    """Yield the files to save."""
+    yield from sorted(one for one in (root / CONFIG).rglob("*") if one.is_file())
+    yield from sorted((root / SERVICE_STATE.relative_to("/")).glob(f"*/{KEPT}"))
+    yield from sorted((root / WANTS).glob("rmf-bridge*.service"))
+
+
+def _read(file: Path) -> Iterator[tuple[PurePosixPath, tuple[bytes, float]]]:
+    """Yield each file's path, content and time. Raises ValueError for a path outside these folders."""
+    with tarfile.open(file) as archive:
+        for member in archive:
+            path = PurePosixPath(member.name)
+            homes = (CONFIG, SERVICE_STATE.relative_to("/"), WANTS)
+            if not any(path.is_relative_to(home) for home in homes) or ".." in path.parts:
+                raise ValueError(f"{member.name} is no file of a backup")
+            if not member.isreg() or member.size > MOST_BYTES:
+                raise ValueError(f"{member.name} is no regular file of at most {MOST_BYTES} bytes")
+            content = archive.extractfile(member)
+            yield path, (content.read() if content else b"", member.mtime)
+
+
+def _restore(saved: dict[PurePosixPath, tuple[bytes, float]], args: argparse.Namespace) -> int:
+    units = [path.name for path in saved if path.is_relative_to(WANTS)]
+    try:
+        configs = [*_configs(saved, units, args.root)]
+    except SettingsError as error:
+        print("\n".join(map(str, error.problems)), file=sys.stderr)
+        return os.EX_CONFIG
+    for path, (content, mtime) in saved.items():
+        if path.is_relative_to(WANTS) or (path.name == KEPT and not _is_fresh(path, mtime)):
+            continue
+        if args.dry_run:
+            print(f"write /{path}")
+        elif code := _write(args.root / path, content):
+            return code
+    for config in configs:
+        steps = enable.steps(config, args.root, enable.groups(args.root))
+        if code := carry_out(steps, args, keeps=unit(config.path.stem)):
+            return code
+    for name in units:
+        if not name.startswith(UNIT):
+            print(f"enable this service yourself: systemctl enable --now {name}")
+    return 0
+
+
+def _configs(
+    saved: dict[PurePosixPath, tuple[bytes, float]], units: list[str], root: Path
+) -> Iterator[Config]:
+    """Yield the files of the enabled services. Raises SettingsError before anything is written."""
+    for name in units:
+        path = PurePosixPath(CONFIG) / f"{name.removeprefix(UNIT).removesuffix('.service')}.yaml"
+        if name.startswith(UNIT) and path in saved:
+            yield understood(root / path, saved[path][0])
+
+
+def _is_fresh(path: PurePosixPath, mtime: float) -> bool:
+    """Is a memory recent enough to be true still? Otherwise say that it is left out."""
+    fresh = time.time() - mtime <= FRESH_S
+    if not fresh:
+        print(f"left out, because it is older than {FRESH_S / 3600:g} h: /{path}")
+    return fresh
+
+
+def _write(path: Path, content: bytes) -> int:
+    """Write a file; passwords and memories only for their owner, which is that of their folder."""
+    private = USERS in path.name or path.name == KEPT
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        files.replace(path, content)
+        path.chmod(0o600 if private else 0o644)
+        if private and os.geteuid() == 0:
+            owner = path.parent.stat()
+            os.chown(path, owner.st_uid, owner.st_gid)
+    except OSError as error:
+        print(f"{path} cannot be written: {error.strerror}", file=sys.stderr)
+        return os.EX_CANTCREAT
+    return 0

@@ -1,0 +1,143 @@
+"""`rmf-bridge backup`: what it saves, what it leaves out, and what a restored machine has."""
+
+import io
+import os
+import shutil
+import subprocess
+import tarfile
+import time
+from pathlib import Path
+
+import pytest
+
+from bridges import cli
+from bridges.commands.backup import FRESH_S
+from bridges.runtime.runtime_directory import KEPT
+
+ROOT = Path(__file__).parents[2]
+WANTS = "etc/systemd/system/rmf-bridges.target.wants"
+
+
+@pytest.fixture
+def machine(tmp_path: Path) -> Path:
+    """A machine with one enabled and one disabled door, a secret, users and a memory."""
+    root = tmp_path / "old"
+    config, state = root / "etc/rmf-bridges", root / "var/lib/rmf-bridge/door_supervisor"
+    for folder in (config, state, root / WANTS):
+        folder.mkdir(parents=True)
+    shutil.copy(ROOT / "config/door_modbus.yaml", config / "ward.yaml")
+    shutil.copy(ROOT / "config/door_modbus.yaml", config / "spare.yaml")
+    (root / WANTS / "rmf-bridge@ward.service").symlink_to(
+        "/usr/lib/systemd/system/rmf-bridge@.service"
+    )
+    for name, mode in {"ward.token": 0o600, "page.users": 0o600, "page.env": 0o644}.items():
+        (config / name).write_text(f"content of {name}")
+        (config / name).chmod(mode)
+    (state / KEPT).write_text("held")
+    return root
+
+
+@pytest.fixture
+def calls(monkeypatch: pytest.MonkeyPatch) -> list[list[str]]:
+    """Return the commands that were run; each command succeeds."""
+    found: list[list[str]] = []
+
+    def run(words: list[str]) -> subprocess.CompletedProcess[str]:
+        found.append(list(words))
+        return subprocess.CompletedProcess(words, 0)
+
+    monkeypatch.setattr(subprocess, "run", run)
+    return found
+
+
+def saved(root: Path, file: Path) -> int:
+    return cli.main(["backup", str(file), "--root", str(root)])
+
+
+def restored(root: Path, file: Path, *options: str) -> int:
+    root.mkdir(exist_ok=True)
+    return cli.main(["backup", str(file), "--restore", "--root", str(root), *options])
+
+
+def content(root: Path) -> dict[str, str]:
+    return {str(p.relative_to(root)): p.read_text() for p in root.rglob("*") if p.is_file()}
+
+
+MEMORY = f"var/lib/rmf-bridge/door_supervisor/{KEPT}"
+
+
+def test_a_restored_machine_has_the_same_files_and_services_and_no_secret_was_saved(
+    machine: Path, tmp_path: Path, calls: list[list[str]], capsys: pytest.CaptureFixture[str]
+) -> None:
+    file, new = tmp_path / "backup.tar.gz", tmp_path / "new"
+    assert saved(machine, file) == 0
+    assert "left out, as a secret: /etc/rmf-bridges/ward.token" in capsys.readouterr().out
+    assert file.stat().st_mode & 0o777 == 0o600
+    assert restored(new, file) == 0
+    drop_in = "etc/systemd/system/rmf-bridge@ward.service.d/10-enable.conf"
+    before = content(machine)
+    del before["etc/rmf-bridges/ward.token"]
+    after = content(new)
+    assert drop_in in after
+    assert {name: after[name] for name in after if name != drop_in} == before
+    assert calls == [
+        ["systemctl", f"--root={new}", "enable", "rmf-bridges.target", "rmf-bridge@ward.service"]
+    ]
+    assert (new / "etc/rmf-bridges/page.users").stat().st_mode & 0o777 == 0o600
+
+
+def test_an_old_memory_is_not_restored_because_it_would_open_a_door(
+    machine: Path, tmp_path: Path, calls: list[list[str]], capsys: pytest.CaptureFixture[str]
+) -> None:
+    long_ago = time.time() - FRESH_S - 60
+    os.utime(machine / MEMORY, (long_ago, long_ago))
+    file, new = tmp_path / "backup.tar.gz", tmp_path / "new"
+    saved(machine, file)
+    assert restored(new, file) == 0
+    assert MEMORY not in content(new)
+    assert f"left out, because it is older than 1 h: /{MEMORY}" in capsys.readouterr().out
+
+
+def test_a_backup_with_an_invalid_yaml_changes_nothing(
+    machine: Path, tmp_path: Path, calls: list[list[str]], capsys: pytest.CaptureFixture[str]
+) -> None:
+    (machine / "etc/rmf-bridges/ward.yaml").write_text("kind: dor\n")
+    file, new = tmp_path / "backup.tar.gz", tmp_path / "new"
+    saved(machine, file)
+    assert restored(new, file) == os.EX_CONFIG
+    assert "ward.yaml:1:7" in capsys.readouterr().err
+    assert (content(new), calls) == ({}, [])
+
+
+@pytest.mark.parametrize(
+    "name", ["../etc/passwd", "/etc/passwd", "etc/passwd", "etc/rmf-bridges/../passwd"]
+)
+def test_a_file_outside_our_folders_is_no_backup(tmp_path: Path, name: str) -> None:
+    file, new = tmp_path / "bad.tar.gz", tmp_path / "new"
+    with tarfile.open(file, "w:gz") as out:
+        member = tarfile.TarInfo(name)
+        member.size = 4
+        out.addfile(member, io.BytesIO(b"root"))
+    assert restored(new, file) == os.EX_NOINPUT
+    assert content(new) == {}
+
+
+def test_a_link_in_a_backup_is_refused_and_so_is_what_is_no_archive(tmp_path: Path) -> None:
+    file, new = tmp_path / "bad.tar.gz", tmp_path / "new"
+    with tarfile.open(file, "w:gz") as out:
+        member = tarfile.TarInfo("etc/rmf-bridges/a.yaml")
+        member.type, member.linkname = tarfile.SYMTYPE, "/etc/passwd"
+        out.addfile(member)
+    assert restored(new, file) == os.EX_NOINPUT
+    file.write_bytes(b"nothing")
+    assert restored(new, file) == os.EX_NOINPUT
+
+
+def test_a_dry_run_only_prints_the_steps(
+    machine: Path, tmp_path: Path, calls: list[list[str]], capsys: pytest.CaptureFixture[str]
+) -> None:
+    file, new = tmp_path / "backup.tar.gz", tmp_path / "new"
+    saved(machine, file)
+    assert restored(new, file, "--dry-run") == 0
+    assert "write /etc/rmf-bridges/ward.yaml" in capsys.readouterr().out
+    assert (content(new), calls) == ({}, [])
