@@ -7,6 +7,7 @@ BIN := .venv/bin
 export PYTHONDONTWRITEBYTECODE :=
 
 .PHONY: help broker demo demo-charging demo-page test test-page suite deep test-ros lint style types docs reference man deb lock reproducible release format bench flood soak torture test-vm mutate clean
+.PHONY: help demo demo-charging demo-page test test-page suite deep test-ros lint style types docs reference man deb repo format bench flood soak torture test-vm mutate clean
 help:
 	@echo "make demo    a robot goes through a door, rides a lift and charges, on fake hardware"
 	@echo "             (TRANSPORT=zenoh make demo: on zenoh, the default on a Raspberry Pi)"
@@ -32,6 +33,7 @@ help:
 	@echo "make lock    renew the versions and hashes of the libraries inside the packages (deb/lock/)"
 	@echo "make reproducible  build the packages twice, and compare (ARCHS and PYTHONS as for make deb)"
 	@echo "make release  from a tag: packages, sdist, wheel, documentation, bills of materials, checksums; KEY=… signs them"
+	@echo "make repo KEY=ID  an apt repository of the packages in dist/, signed with this key, in build/apt"
 	@echo "make format  rewrite the sources as the linter wants them"
 	@echo "make clean   remove the virtual environment and everything generated"
 
@@ -140,6 +142,9 @@ reproducible: .venv/tools man docs
 
 release: .venv/tools
 	@KEY="$(KEY)" deb/release.sh
+# A signed apt repository of the packages in dist/: make repo KEY=releases@hospital.example
+repo:
+	@deploy/apt-repository.sh dist build/apt $(or $(KEY),$(error name the key that signs: make repo KEY=ID))
 
 format: .venv/ready
 	$(BIN)/ruff check --fix .
