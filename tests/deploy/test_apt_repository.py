@@ -22,17 +22,8 @@ def key(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
     home = tmp_path / "gpg"
     home.mkdir(mode=0o700)
     monkeypatch.setenv("GNUPGHOME", str(home))
-    line = [
-        "gpg",
-        "--batch",
-        "--passphrase",
-        "",
-        "--quick-gen-key",
-        "test@localhost",
-        "ed25519",
-        "sign",
-    ]
-    subprocess.run(line, check=True, capture_output=True)
+    words = ("--quick-gen-key", "test@localhost", "ed25519", "sign")
+    subprocess.run(["gpg", "--batch", "--passphrase", "", *words], check=True, capture_output=True)
     return "test@localhost"
 
 
@@ -50,26 +41,25 @@ def made(debs: Path, out: Path, key: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run([SCRIPT, debs, out, key], capture_output=True, text=True)
 
 
+FOLDERS = (
+    *("var/lib/dpkg", "var/lib/apt/lists/partial", "var/cache/apt/archives/partial"),
+    *("var/log/apt", "etc/apt/apt.conf.d", "etc/apt/preferences.d"),
+)
+
+
 class Machine:
     """A root directory with apt's and dpkg's own folders, and one source."""
 
     def __init__(self, root: Path, repository: Path, suite: str) -> None:
         self.root = root
-        folders = (
-            "var/lib/dpkg",
-            "var/lib/apt/lists/partial",
-            "var/cache/apt/archives/partial",
-            "etc/apt",
-        )
-        for folder in folders:
+        for folder in FOLDERS:
             (root / folder).mkdir(parents=True)
         (root / "var/lib/dpkg/status").touch()
         key = f"signed-by={repository}/rmf-bridges.gpg"
         source = f"deb [{key}] file:{repository} {suite} main\n"
         (root / "etc/apt/sources.list").write_text(source)
-        (root / "apt.conf").write_text(
-            f'Dir "{root}";\nDPkg::Options {{ "--root={root}"; "--force-all"; }};\n'
-        )
+        dpkg = f'DPkg::Options {{ "--root={root}"; "--force-all"; }};'
+        (root / "apt.conf").write_text(f'Dir "{root}";\n{dpkg}\n')
 
     def apt(self, *words: str) -> subprocess.CompletedProcess[str]:
         """Run apt-get in this root."""
