@@ -23,7 +23,7 @@ def head(title: str, login: Login, request: Request) -> None:
     ui.colors(primary=BLUE, positive=GREEN, negative=RED)
     ui.page_title(f"{printable(title)} · RMF bridges")
     who = login.form(request, login.user(request))
-    links = '<a href="/">Site</a><a href="/incidents">Incidents</a>'
+    links = '<a href="/">Site</a><a href="/incidents">Incidents</a><a href="/days">Day and week</a>'
     skip = '<a class="skip" href="#main">To the content</a>'
     links = f'<nav aria-label="Page">{links}</nav><span class="zone"></span>'
     html = f"{skip}<h1>{escape(title)}</h1>{links}{who}"

@@ -30,6 +30,7 @@ from workbench.graph.join import interruptible
 from workbench.page.access import PasswordCheck
 from workbench.page.actions import Deeds
 from workbench.page.cards import Cards
+from workbench.page.day_views import DayViews
 from workbench.page.guard import HttpRefusal, RequestGuard
 from workbench.page.idle_connections import Silent
 from workbench.page.incident_views import IncidentViews
@@ -105,6 +106,7 @@ def serve(
     app.post("/login")(login.log_in)
     app.post("/logout")(login.log_out)
     IncidentViews(args.incidents, args.recording, login).install()
+    DayViews(args.incidents, login).install()
     listener = None
     if args.recording is None:
         listener = _live(args, join, login, graph)
