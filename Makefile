@@ -6,8 +6,7 @@ BIN := .venv/bin
 # compiles every file again.
 export PYTHONDONTWRITEBYTECODE :=
 
-.PHONY: help broker demo demo-charging demo-page test test-page suite deep test-ros lint style types docs reference man deb lock reproducible release format bench flood soak torture test-vm mutate clean
-.PHONY: help demo demo-charging demo-page test test-page suite deep test-ros lint style types docs reference man deb repo format bench flood soak torture test-vm mutate clean
+.PHONY: help servers demo demo-charging demo-page test test-page suite deep test-ros lint style types docs reference man deb lock reproducible release repo format bench flood soak torture test-vm mutate clean
 help:
 	@echo "make demo    a robot goes through a door, rides a lift and charges, on fake hardware"
 	@echo "             (TRANSPORT=zenoh make demo: on zenoh, the default on a Raspberry Pi)"
@@ -61,13 +60,16 @@ SIDE_BY_SIDE := -n 8 --dist loadscope --no-loadscope-reorder
 test: .venv/ready style docs
 	@$(MAKE) --no-print-directory -j 2 types suite
 
-# The broker of the tests on MQTT is from the distribution; as root, on a machine without one, it is installed.
-broker:
-	@PATH="$$PATH:/usr/sbin" command -v mosquitto >/dev/null || { test "$$(id -u)" = 0 && apt-get update -q && \
-	  apt-get install -y -q --no-install-recommends mosquitto; } || { \
-	  echo "An MQTT broker is missing: sudo apt install mosquitto"; exit 1; }
+# The servers of the tests are from the distribution: the broker, Prometheus, and what signs a repository. As root, on a
+# machine without them, they are installed.
+SERVERS := mosquitto prometheus promtool apt-ftparchive gpg
+servers:
+	@PATH="$$PATH:/usr/sbin"; for each in $(SERVERS); do command -v $$each >/dev/null || { \
+	  test "$$(id -u)" = 0 && apt-get update -q && \
+	  apt-get install -y -q --no-install-recommends mosquitto prometheus apt-utils gnupg; } || { \
+	  echo "Programs of the tests are missing: sudo apt install mosquitto prometheus apt-utils gnupg"; exit 1; }; done
 
-suite: .venv/compiled broker
+suite: .venv/compiled servers
 	$(BIN)/pytest $(SIDE_BY_SIDE)
 
 # In a new environment one process compiles every file, so that the workers need not all do so at once.
@@ -83,7 +85,7 @@ test-page: .venv/ready
 	$(BIN)/pytest -m browser -n 3 --dist loadfile --no-loadscope-reorder tests/workbench/page/browser
 
 # Walks to their full depth and every example. Run it before a release and after a change to a core.
-deep: .venv/compiled broker
+deep: .venv/compiled servers
 	DEEP=1 $(BIN)/pytest $(SIDE_BY_SIDE)
 
 # rclpy needs ROS's own Python and its packages (numpy), so these tests have an environment on top of it.
@@ -142,6 +144,7 @@ reproducible: .venv/tools man docs
 
 release: .venv/tools
 	@KEY="$(KEY)" deb/release.sh
+
 # A signed apt repository of the packages in dist/: make repo KEY=releases@hospital.example
 repo:
 	@deploy/apt-repository.sh dist build/apt $(or $(KEY),$(error name the key that signs: make repo KEY=ID))

@@ -127,7 +127,19 @@ COMMANDS = {
 }
 """Subcommand -> (its purpose, an example)."""
 WORKBENCH = frozenset(
-    {"init", "schema", "watch", "page", "doctor", "explain", "plot", "send", "mqtt-out", "exporter", "notify"}
+    {
+        "init",
+        "schema",
+        "watch",
+        "page",
+        "doctor",
+        "explain",
+        "plot",
+        "send",
+        "mqtt-out",
+        "exporter",
+        "notify",
+    }
     | {"judge", "release", "walk", "press", "fail", "replay"}
 )
 """The workbench's subcommands, which no daemon needs."""

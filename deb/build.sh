@@ -44,8 +44,7 @@ fill "$site" --extra=gpio --extra=recording --extra=push --extra=mqtt
 cp -R "$site/." "$in_bench"
 fill "$in_bench" --extra=gpio --extra=recording --extra=push --extra=mqtt --extra=laptop --extra=plot
 cp -R "$in_bench/." "$in_page"
-fill "$in_page" --extra=gpio --extra=recording --extra=push --extra=mqtt --extra=laptop --extra=plot --extra=page
-fill "$in_page" --extra=gpio --extra=recording --extra=laptop --extra=plot --extra=page --extra=metrics
+fill "$in_page" --extra=gpio --extra=recording --extra=push --extra=mqtt --extra=laptop --extra=plot --extra=page --extra=metrics
 without "$in_page" "$in_bench"
 rm -rf "$site/workbench" "$site/hal_fakes"
 without "$in_bench" "$site"

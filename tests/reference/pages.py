@@ -18,8 +18,7 @@ from bridges.messages import topics
 from bridges.runtime import faults
 from bridges.settings.config import Config
 from bridges.settings.load import load
-from tests.reference import hazards, promised
-from tests.reference import alerts, hazards
+from tests.reference import alerts, hazards, promised
 from workbench.commissioning import reference
 from workbench.commissioning.examples import device_yamls
 from workbench.judge.judge import KINDS
