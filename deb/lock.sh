@@ -10,5 +10,5 @@ lock() {
   "$uv" pip compile --quiet --upgrade --universal --python-version 3.11 --generate-hashes --no-annotate \
     --custom-compile-command "make lock" --output-file "deb/lock/$1.txt" "$2" $3
 }
-lock runtime pyproject.toml "--extra gpio --extra mqtt --extra recording --extra laptop --extra plot --extra page"
+lock runtime pyproject.toml "--extra gpio --extra mqtt --extra push --extra metrics --extra recording --extra laptop --extra plot --extra page"
 lock tools deb/lock/tools.in ""
