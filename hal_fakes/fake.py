@@ -24,13 +24,15 @@ Station = TypeVar("Station")
 class Fake(Generic[Settings]):
     """A fake controller of one sort.
 
-    `plant(name, settings, wires)`: its physics; `wires` is the driver's table.
-    `station(plant, settings)`: the controller for the bus's fake, with that plant behind it. Without
-    `station`, the plant's contacts are wired to the bus as a `PlantWiring`.
+    `plant(name, settings, wires)`: its physics; `wires` is the driver's table. `station(plant,
+    settings)`: the controller for the bus's fake, with that plant behind it. Without `station`, the
+    plant's contacts are wired to the bus as a `PlantWiring`. `sited(config, name)`: makes a plant
+    that needs more of the file than the device's settings, in place of `plant`.
     """
 
     plant: Callable[[str, Settings, Sequence[Wire]], Plant]
     station: Callable[[Plant, Settings], object] | None = None
+    sited: Callable[[Config, str], Plant] | None = None
 
 
 class Server(Protocol):
@@ -75,13 +77,17 @@ FarSide: TypeAlias = Inside[Any, Any] | Outside[Any, Any]
 def plants_on(config: Config, bus: str) -> dict[str, Plant]:
     """Make a plant for each device on this bus."""
     far = far_side(config, bus)
-    plants = {
-        name: _fake(config, name).plant(name, config.devices[name], config.wires(name))
-        for name in config.devices_on(bus)
-    }
+    plants = {name: _plant(config, name) for name in config.devices_on(bus)}
     for plant in plants.values():
         plant.add_parts(far.parts if isinstance(far, Outside) else ())
     return plants
+
+
+def _plant(config: Config, name: str) -> Plant:
+    fake = _fake(config, name)
+    if fake.sited is not None:
+        return fake.sited(config, name)
+    return fake.plant(name, config.devices[name], config.wires(name))
 
 
 def stations_on(config: Config, bus: str, plants: Mapping[str, Plant]) -> list[Any]:

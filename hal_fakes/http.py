@@ -18,7 +18,7 @@ from collections.abc import Mapping, Sequence
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from select import select
 from types import MappingProxyType
-from typing import Final, Protocol
+from typing import Any, Final, Protocol, runtime_checkable
 
 from drivers.hal import http
 from hal_fakes.fake import Outside
@@ -32,7 +32,9 @@ Failures = Mapping[str, FailureMode]
 NONE: Final[Failures] = MappingProxyType({})
 
 
-def serve(settings: http.HttpSettings, stations: Sequence["HttpStation"]) -> "HttpServer":
+def serve(
+    settings: http.HttpSettings, stations: Sequence["HttpStation | FreeStation"]
+) -> "HttpServer":
     """Serve the stations of this bus on a free port of 127.0.0.1."""
     path = http.base(settings.api_base).path
     return HttpServer(stations, path, settings.timeout_s, settings.push_path or "")
@@ -64,6 +66,16 @@ class HttpStation(Protocol):
         """Let timers run out. Called often."""
 
 
+@runtime_checkable
+class FreeStation(Protocol):
+    """A station whose paths and bodies hold values of a command."""
+
+    plant: Plant
+
+    def reply(self, method: str, path: str, body: bytes, all_stations: Any) -> bytes | None:
+        """Answer a call; None if the call is not for this station."""
+
+
 class HttpServer:
     """A running server. `replace`: replacements for the bus's settings.
 
@@ -72,7 +84,11 @@ class HttpServer:
     """
 
     def __init__(
-        self, stations: Sequence[HttpStation], path: str, timeout_s: float, push_path: str = ""
+        self,
+        stations: Sequence[HttpStation | FreeStation],
+        path: str,
+        timeout_s: float,
+        push_path: str = "",
     ) -> None:
         self._server = _Listener(stations, path, timeout_s, push_path)
         host, port = self._server.server_address[:2]
@@ -95,9 +111,15 @@ class _Listener(ThreadingHTTPServer):
     daemon_threads = True
 
     def __init__(
-        self, stations: Sequence[HttpStation], path: str, timeout_s: float, push_path: str
+        self,
+        all_stations: Sequence[HttpStation | FreeStation],
+        path: str,
+        timeout_s: float,
+        push_path: str,
     ) -> None:
         self.api = path
+        self.free = [each for each in all_stations if isinstance(each, FreeStation)]
+        stations = [each for each in all_stations if not isinstance(each, FreeStation)]
         self.reads = {asked: station for station in stations for asked in station.reads}
         self.commands = {asked: (s, *does) for s in stations for asked, does in s.commands.items()}
         self.timeout_s = timeout_s
@@ -150,6 +172,9 @@ class _Call(BaseHTTPRequestHandler):
             self._push()
             return
         body = self.rfile.read(int(self.headers.get("Content-Length", "0"))).decode()
+        if self.server.free:
+            self._free(body.encode())
+            return
         asked = (self.command, self.path.removeprefix(self.server.api), body)
         commands = self.server.commands
         command = commands.get(asked) or commands.get((*asked[:2], ANY_BODY))
@@ -165,6 +190,26 @@ class _Call(BaseHTTPRequestHandler):
             self._answer(404, b"{}")
 
     do_POST = do_PUT = do_GET
+
+    def _free(self, sent: bytes) -> None:
+        """Let the station answer that the call is for. One station's failures are those of all."""
+        path, failures = self.path.removeprefix(self.server.api), dict[str, FailureMode]()
+        for station in self.server.free:
+            failures |= station.plant.failures
+        server = failures.get("server")
+        if server == "off":
+            self.close_connection = True
+            return
+        if server == "slow":
+            self._wait(2 * self.server.timeout_s)
+        replies = (s.reply(self.command, path, sent, self.server.free) for s in self.server.free)
+        answer = next((reply for reply in replies if reply is not None), None)
+        if answer is None:
+            self._answer(404, b"{}")
+        elif server == "garbage":
+            self._answer(200, PAGE, failures, "text/html")
+        else:
+            self._answer(200, answer, failures)
 
     def _read(self, station: HttpStation, asked: Asked) -> None:
         failures, body = station.plant.failures, station.answer(asked)

@@ -28,6 +28,7 @@ from hal_fakes.fake import Outside
 from hal_fakes.json_answers import put
 from hal_fakes.mosquitto import Mosquitto
 from hal_fakes.plants.plant import FailureMode, Plant
+from hal_fakes.vda5050 import FakeVdaRobot, VdaSite
 from hal_fakes.wiring import PlantWiring
 
 PARTS: Final = ("server", "unit")
@@ -60,9 +61,14 @@ class MqttStation(Protocol):
         """Return topic -> payload of each state."""
 
 
-def serve(settings: MqttSettings, stations: Sequence[PlantWiring | MqttStation]) -> "MqttSite":
+def serve(
+    settings: MqttSettings, stations: Sequence[PlantWiring | MqttStation | FakeVdaRobot]
+) -> "MqttSite | VdaSite":
     """Serve the devices of this bus behind a broker of their own."""
-    return MqttSite(settings, stations)
+    robots = [each for each in stations if isinstance(each, FakeVdaRobot)]
+    if robots:
+        return VdaSite(settings, robots)
+    return MqttSite(settings, [each for each in stations if not isinstance(each, FakeVdaRobot)])
 
 
 class MqttDevice:

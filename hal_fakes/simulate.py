@@ -8,6 +8,8 @@ the file has several buses.
 """
 
 import contextlib
+import importlib.util
+import logging
 import selectors
 import subprocess
 import sys
@@ -25,6 +27,7 @@ from hal_fakes.realtime import RealTime
 LogFormat = Literal["text", "json"]
 READY_S = 15.0
 """Time limit (s) for a child's start (a busy Raspberry Pi imports slowly)."""
+STAND_IN = "STAND-IN: rmf_adapter is not installed: no RMF directs these robots, and they patrol"
 PATIENCE_S = 1.5
 """A simulated bus waits at least this long (s) for an answer: its far side shares this machine,
 which may be busy. The wait is no longer, because a call may take only half of the shortest
@@ -58,6 +61,15 @@ class Simulation:
         if self._has_process(name):
             return self._config.bus_type(name).open_bus(self._pointed_at_child(name))
         return self._inside(name)
+
+    def rmf_adapter(self) -> object | None:
+        """Return the stand-in of RMF's fleet adapter, for a fleet on a machine without the real one."""
+        if self._config.kind != "fleet" or importlib.util.find_spec("rmf_adapter"):
+            return None
+        from hal_fakes.rmf.adapter import StandIn
+
+        logging.getLogger(__name__).warning(STAND_IN)
+        return StandIn()
 
     def close(self) -> None:
         """End every fake. Close the buses first. May be called twice."""

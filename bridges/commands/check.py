@@ -23,7 +23,8 @@ from bridges.system.written import not_written
 if TYPE_CHECKING:
     from bridges.settings.building_map import BuildingMap
 
-COORDINATOR = "charger_coordinator"
+COORDINATOR, FLEET = "charger_coordinator", "fleet"
+NAMED_BY_GRAPH = ("lift", "door", "charger", COORDINATOR)
 NOTHING_BESIDE = (
     "no YAML of a charger coordinator or a lift is given, with which this file could be compared"
 )
@@ -73,6 +74,8 @@ def run(args: argparse.Namespace) -> int:
     right, found = _read(args.files, building)
     for file in args.fleet_config:
         found |= _beside_fleet(file, right, found, building)
+    for file in [file for file, (config, _) in right.items() if config.kind == FLEET]:
+        found |= _of_fleet(file, right, found)
     together = across([config for config, _ in right.values()], not args.several_machines)
     files = [_with(found[file], together) for file in args.files]
     return _tell(files, args)
@@ -116,6 +119,31 @@ def _against(config: Config, building: "BuildingMap | None") -> tuple[list[Probl
     if not names:
         return [], [f"this file uses no names that {building.file} could confirm"]
     return [], [f"same names as in {building.file}: {names}"]
+
+
+def _of_fleet(
+    file: str, right: Mapping[str, tuple[Config, Findings]], found: Mapping[str, Findings]
+) -> dict[str, Findings]:
+    """Return the findings on a fleet's YAML, with those on RMF's files that it names; and the
+    findings on the coordinator and the lifts, compared with these files."""
+    from bridges.settings.building_map import load_map
+    from bridges.settings.fleet_site import read_site
+
+    try:
+        site = read_site(right[file][0])
+        graph = load_map(site.graph_file)
+    except SettingsError as error:
+        return {file: _more(found[file], errors=error.problems)}
+    told_of = {file: _more(found[file], notes=list(site.notes()))}
+    beside = [one for one, (config, _) in right.items() if config.kind in (COORDINATOR, "lift")]
+    if beside:
+        told_of |= _beside_fleet(site.config_file, right, {**found, **told_of}, graph)
+    for other, (config, _) in right.items():
+        if config.kind in NAMED_BY_GRAPH:
+            errors, notes = _against(config, graph)
+            before = told_of.get(other, found[other])
+            told_of[other] = _more(before, errors, notes=notes)
+    return told_of
 
 
 def _beside_fleet(

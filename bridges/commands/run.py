@@ -62,6 +62,12 @@ def run(args: argparse.Namespace) -> int:
     try:
         config = load(args.file)
         config = replace(config, rmf=overridden(config.rmf, args))
+        if (
+            config.kind == "fleet"
+        ):  # RMF's files: refused before anything starts, kept for recordings
+            from bridges.settings.fleet_site import read_site
+
+            read_site(config)
     except SettingsError as error:
         for problem in error.problems:
             logging.error(str(problem))
@@ -125,6 +131,7 @@ def _serve(
             localhost=not args.expose,
             simulated=True,
             ros_args=args.ros_args,
+            rmf=simulation.rmf_adapter(),
         ).serve()
     finally:
         simulation.close()

@@ -59,8 +59,10 @@ class Daemon:
         simulated: bool = False,
         ros_args: Sequence[str] = (),
         outputs_off: Sequence[str] = (),
+        rmf: Any = None,
     ) -> None:
-        """`outputs_off`: the command to switch the outputs off after the death of this process.
+        """`outputs_off`: the command to switch the outputs off after the death of this process. `rmf`:
+        the stand-in of RMF's fleet adapter.
 
         Raises TransportError or HalError if a transport or bus cannot be opened.
         """
@@ -86,7 +88,7 @@ class Daemon:
         open_bus = open_bus or config.open_bus
         self._writer = self._writer_of(ours)
         self._service = service(
-            config, self._transport, open_bus, kept, unsafe, self._writer, new=simulated
+            config, self._transport, open_bus, kept, unsafe, self._writer, new=simulated, rmf=rmf
         )
         self._loops = self._service.loops
         # The record, which `outputs-off` reads, is written once every bus is open: if a bus cannot be

@@ -90,12 +90,14 @@ def service(
     writer: NoWriter = NOBODY,
     *,
     new: bool = False,
+    rmf: Any = None,
 ) -> Service:
     """Return the service for this YAML. Raises HalError if a bus cannot be opened.
 
     `kept`: the store for the memory across restarts, if the kind has such a memory; None for no store.
     `new`: without a file in the store nothing has ever happened.
-    `unsafe`: devices that a dead daemon may have left on. `writer`: the recording's writer.
+    `unsafe`: devices that a dead daemon may have left on. `writer`: the recording's writer. `rmf`: the
+    stand-in of RMF's fleet adapter; None for the real one.
     """
     kind = kind_called(config.kind)
     named = partial(named_by, config)
@@ -103,6 +105,12 @@ def service(
     if isinstance(kind, GraphKind):
         node = GraphNode(kind, config.section, transport, clock, named, kept, writer)
         return GraphService(node, clock)
+    if kind.section:
+        from bridges.runtime.fleet.service import FleetDevices
+
+        return FleetDevices(
+            config, kind, transport, open_bus, named, clock, unsafe, writer, rmf=rmf
+        )
     memories = None
     if kind.keeping is not None and kept is not None:
         memories = DeviceMemories(kept, new=new)

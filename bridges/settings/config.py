@@ -24,7 +24,8 @@ class Config(Struct, frozen=True):
     the record of the bus type or driver knows. `bus_types`: name -> `type:`. `warnings`: legal settings
     that may be a mistake. `old_keys`: the warnings of keys with a new name. `notes`: intended settings
     whose effects the user should know. `section`: the settings of a kind without devices
-    (`bridges/kinds/shared/graph_kind.py`), which has no driver and no buses.
+    (`bridges/kinds/shared/graph_kind.py`), which has no driver and no buses; or the section that the
+    devices of a kind share.
     """
 
     path: Path

@@ -108,8 +108,10 @@ def _claims(config: Config, one_machine: bool) -> Iterator[ExclusiveUse]:
     if isinstance(kind, GraphKind):
         yield ExclusiveUse(config, f"kind: {kind.name}", ("kind",))
         return
+    of = f" of {config.section.config}" if kind.section else ""
+    what = "robot" if kind.section else kind.name
     for name in config.devices:
-        yield ExclusiveUse(config, f"the {kind.name} '{name}'", (kind.devices_key, name))
+        yield ExclusiveUse(config, f"the {what} '{name}'{of}", (kind.devices_key, name))
     for bus, where in _buses(config):
         if one_machine or not where.local:
             for device in config.devices_on(bus):

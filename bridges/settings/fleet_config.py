@@ -12,19 +12,20 @@
     reference_coordinates: {L1: {rmf: [[x, y], ...], robot: [[x, y], ...]}}
 
 Older files have `robots:` beside `rmf_fleet:`, with `rmf_config: {charger: {waypoint: charger_a}}`, and
-one pair of lists for all levels. Source: open-rmf/fleet_adapter_template, config.yaml and
-fleet_adapter.py. All other keys are ignored.
+one pair of lists for all levels; rmf_demos has them below `fleet_manager`. All other keys are ignored.
+Source: open-rmf/fleet_adapter_template, config.yaml and fleet_adapter.py.
 """
 
+import cmath
 import re
 from collections.abc import Iterator, Mapping
-from typing import Annotated
+from typing import Annotated, Any, Final, TypeVar, cast
 
 import msgspec
 from yaml import MappingNode, YAMLError
 from yaml.constructor import SafeConstructor
 
-from bridges.settings.similarity import Point
+from bridges.kinds.shared.similarity import Point, Similarity
 from bridges.yaml.parsing import Problem, SettingsError, Sort, YamlFile, compose, read
 from bridges.yaml.positions import Spot, locate
 
@@ -33,6 +34,8 @@ EVERY_LEVEL = ""
 """The level name for reference coordinates that apply to every level."""
 Soc = Annotated[float, msgspec.Meta(ge=0, le=1)]
 Path = tuple[str, ...]
+OF_ADAPTER: Final = "is this a fleet adapter's configuration?"
+T = TypeVar("T")
 
 
 class Charger(msgspec.Struct, frozen=True):
@@ -63,10 +66,40 @@ class RobotConfig(msgspec.Struct, frozen=True):
         return ("rmf_config", "charger", "waypoint"), older.waypoint if older else None
 
 
+class Limits(msgspec.Struct, frozen=True):
+    """The robots' limits: velocity and acceleration (m/s, m/s²; rad/s, rad/s²)."""
+
+    linear: tuple[float, float]
+    angular: tuple[float, float]
+
+
+class FootprintProfile(msgspec.Struct, frozen=True):
+    """The robots' radii (m)."""
+
+    footprint: float
+    vicinity: float | None = None
+
+
+class MapTransform(msgspec.Struct, frozen=True):
+    """RMF's own form of a transform, from RMF's map to the robot's map (m, rad)."""
+
+    translation: Point = (0.0, 0.0)
+    rotation: float = 0.0
+    scale: float = 1.0
+
+    def similarity(self) -> Similarity:
+        """Return the same transform as a similarity."""
+        return Similarity(cmath.rect(self.scale, self.rotation), complex(*self.translation), 0.0)
+
+
 class RmfFleet(msgspec.Struct, frozen=True):
     """The fleet. Percentages are fractions of 1 in this file."""
 
     name: str
+    limits: Limits | None = None
+    profile: FootprintProfile | None = None
+    actions: list[str] = msgspec.field(default_factory=list)
+    transforms: dict[str, MapTransform] = msgspec.field(default_factory=dict)
     recharge_threshold: Soc | None = None
     recharge_soc: Soc | None = None
     finishing_request: str | None = None
@@ -83,12 +116,19 @@ class Pairs(msgspec.Struct, frozen=True):
     robot: list[Point]
 
 
+class Manager(msgspec.Struct, frozen=True):
+    """The fleet manager's section, of which only the pairs concern us."""
+
+    reference_coordinates: Pairs | None = None
+
+
 class Contents(msgspec.Struct, frozen=True):
     """The whole file."""
 
     rmf_fleet: RmfFleet
     robots: dict[str, RobotConfig | None] = msgspec.field(default_factory=dict)
     reference_coordinates: dict[str, Pairs] | None = None
+    fleet_manager: Manager | None = None
 
 
 class FleetFile(msgspec.Struct, frozen=True):
@@ -114,35 +154,50 @@ class FleetFile(msgspec.Struct, frozen=True):
 
     def references(self) -> Mapping[str, Pairs]:
         """Return level -> pairs; the level is EVERY_LEVEL if the file has one list for all levels."""
+        manager = self.contents.fleet_manager
+        if manager and manager.reference_coordinates:
+            return {EVERY_LEVEL: manager.reference_coordinates}
         return self.contents.reference_coordinates or {}
 
     def problem(self, path: Path, text: str) -> Problem:
         """Return a problem at this path."""
-        return _problem(self.file, self.root, path, text)
+        return problem_at(self.file, self.root, path, text)
 
 
-def load_fleet(file: str) -> FleetFile:
-    """Read a fleet configuration. Raises SettingsError with its problems."""
+def load_fleet(file: str, text: bytes | None = None) -> FleetFile:
+    """Read a fleet configuration. `text`: its text, if it is known. Raises SettingsError with its
+    problems."""
     page = YamlFile(file)
-    root = compose(page, read(file, FLEET), FLEET)
+    root = compose(page, read(file, FLEET) if text is None else text, FLEET)
     page.check()
-    try:
-        plain = SafeConstructor().construct_document(root)
-    except (YAMLError, ValueError) as error:
-        reason = f"cannot be read: {' '.join(str(error).split())[:200]}"
-        raise SettingsError([page.problem(root, reason)]) from None
+    plain = plain_values(page, root)
     pairs = plain.get("reference_coordinates")
     if isinstance(pairs, dict) and {"rmf", "robot"} <= pairs.keys():
         plain["reference_coordinates"] = {EVERY_LEVEL: pairs}
+    return FleetFile(file, root, converted(file, root, plain, Contents, OF_ADAPTER))
+
+
+def plain_values(page: YamlFile, root: MappingNode) -> dict[str, Any]:
+    """Return a file's nodes as plain values. Raises SettingsError."""
     try:
-        return FleetFile(file, root, msgspec.convert(plain, Contents, strict=False))
+        return cast(dict[str, Any], SafeConstructor().construct_document(root))
+    except (YAMLError, ValueError) as error:
+        reason = f"cannot be read: {' '.join(str(error).split())[:200]}"
+        raise SettingsError([page.problem(root, reason)]) from None
+
+
+def converted(file: str, root: MappingNode, plain: dict[str, Any], wanted: type[T], asks: str) -> T:
+    """Convert plain values to a struct. `asks`: the question after a problem. Raises SettingsError."""
+    try:
+        return msgspec.convert(plain, wanted, strict=False)
     except msgspec.ValidationError as error:
         text, _, where = str(error).partition(" - at `$")
         path = tuple(part for part in re.split(r"[.\[\]`]+", where) if part not in ("", "..."))
-        what = f"{text[:1].lower()}{text[1:]}: is this a fleet adapter's configuration?"
-        raise SettingsError([_problem(file, root, path, what)]) from None
+        what = f"{text[:1].lower()}{text[1:]}: {asks}"
+        raise SettingsError([problem_at(file, root, path, what)]) from None
 
 
-def _problem(file: str, root: MappingNode, path: Path, text: str) -> Problem:
+def problem_at(file: str, root: MappingNode, path: Path, text: str) -> Problem:
+    """Return a problem at a path of a file."""
     spot = Spot(root, root, "the file")
     return YamlFile(file).problem(locate(spot, path).key, text)

@@ -14,10 +14,10 @@ from yaml import MappingNode
 
 from bridges.kinds.charger_coordinator.settings import CoordinatorSettings, FleetSettings, Waypoint
 from bridges.kinds.lift.settings import LiftSettings
+from bridges.kinds.shared.similarity import Point, Similarity, estimate
 from bridges.settings.building_map import BuildingMap
 from bridges.settings.config import Config
 from bridges.settings.fleet_config import EVERY_LEVEL, FleetFile
-from bridges.settings.similarity import Point, Similarity, estimate
 from bridges.yaml.parsing import Problem, YamlFile, compose
 from bridges.yaml.positions import Spot, locate
 from bridges.yaml.spelling import unknown

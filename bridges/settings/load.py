@@ -6,6 +6,7 @@
     buses: {name: {type: a file of drivers/hal/, ...}}
     recording: {...}        bridges.kinds.shared.recording_section.RecordingSettings
     lifts: {name: {...}}    the kind's own key; each device has the driver's `settings`
+    fleet: {...}            a section that the devices share, if the kind has one
 
 A kind without hardware has only `kind`, `rmf`, `recording` and one section of its own.
 
@@ -140,6 +141,9 @@ class _DeviceReading:
         if isinstance(self._kind, GraphKind):
             self._read_section(sections.get(self._kind.devices_key), self._kind)
         elif self._kind and self._kind.devices_key in sections:
+            if self._kind.section and self._kind.section[0] in sections:
+                key, struct = self._kind.section
+                self._section = self._values.make(struct, sections[key].spot())
             spot = sections[self._kind.devices_key].spot()
             self._read_devices(spot)
             of_rmf = sections["rmf"].spot() if "rmf" in sections else None

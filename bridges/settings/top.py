@@ -25,7 +25,9 @@ def top_keys(kind: AnyKind | None) -> dict[str, str | None]:
         return {**first, "rmf": None, "recording": None, kind.devices_key: None}
     if kind is None:
         all_kinds = map(kind_called, kind_names())
-        sections = dict.fromkeys(found.devices_key for found in all_kinds)
+        sections = dict[str, str | None]()
+        for found in all_kinds:
+            sections |= _sections(found)
         return {
             **first,
             "driver": "a driver of that kind",
@@ -36,7 +38,14 @@ def top_keys(kind: AnyKind | None) -> dict[str, str | None]:
         }
     driver = either(named.driver_names(kind.name))
     shared = {"rmf": None, "recording": None, "buses": MAPPING}
-    return {**first, "driver": driver, **shared, kind.devices_key: MAPPING}
+    section = {kind.section[0]: MAPPING} if kind.section else {}
+    return {**first, "driver": driver, **shared, **section, kind.devices_key: MAPPING}
+
+
+def _sections(kind: AnyKind) -> dict[str, None]:
+    """Return the keys of a kind's own sections."""
+    shared = [] if isinstance(kind, GraphKind) or not kind.section else [kind.section[0]]
+    return dict.fromkeys([*shared, kind.devices_key])
 
 
 def word(values: Values, entry: MappingEntry | None, words: list[str]) -> str | None:
@@ -54,6 +63,9 @@ def keys_below(kind: AnyKind | None, driver: AnyDriver | None) -> dict[str, str]
     if isinstance(kind, GraphKind):
         below_top |= {field.encode_name: kind.devices_key for field in fields(kind.settings)}
     elif kind and driver:
+        if kind.section:
+            key, struct = kind.section
+            below_top |= {field.encode_name: key for field in fields(struct)}
         place = f"{kind.devices_key}: <name>"
         below_top |= {field.encode_name: place for field in fields(driver.settings)}
     return below_top

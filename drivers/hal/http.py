@@ -101,6 +101,12 @@ class HttpBus(Bus):
         with self._attempt(self._safe_backoff if safe else self._backoff):
             self._call(method, url, body)
 
+    def ask(self, path: str, method: Method = "POST", body: str | None = None) -> dict[str, object]:
+        """Send a command as `send` does; return the JSON object of its answer, of status 200."""
+        url = self._base.url(path)
+        with self._attempt(self._backoff):
+            return json_object(url, *self._call(method, url, body, reads=True))
+
     def insist(self) -> None:
         """Make the next call at once, without waiting for the backoff."""
         self._backoff.insist()

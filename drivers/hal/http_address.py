@@ -10,7 +10,7 @@ from drivers.hal.hosts import misspelt_address
 Path = Annotated[
     str,
     msgspec.Meta(
-        pattern=r"^/[A-Za-z0-9._~/-]*(\?[A-Za-z0-9._~/:,;=&%+@!$*'()-]*)?$(?!\n)",
+        pattern=r"^/[A-Za-z0-9._~$/-]*(\?[A-Za-z0-9._~/:,;=&%+@!$*'()-]*)?$(?!\n)",
         max_length=256,
         extra={"pattern": "a path that begins with a slash (/relay/0?turn=on)"},
     ),

@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 from bridges.cli import main
+from bridges.kinds.shared.similarity import Point, estimate
 from bridges.settings.fleet_config import load_fleet
 from bridges.settings.load import SettingsError
-from bridges.settings.similarity import Point, estimate
 
 OURS = """\
 kind: charger_coordinator

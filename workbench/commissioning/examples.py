@@ -50,6 +50,8 @@ WRITTEN: dict[str, object] = {
     "state_words": {"READY": 0, "CHARGING": 2},
     "doors": ["ward_door"],
     "lifts": ["Lift1"],
+    "maps": {"L1": "ground floor"},
+    "paths": {"battery": "/robots/$robot/battery"},
 }
 """Examples for keys missing in shipped files. Each key has the same meaning in every section."""
 

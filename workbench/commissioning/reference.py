@@ -54,6 +54,14 @@ def shapes() -> Iterator[Shape]:
             yield Shape(kind, key, driver, named.driver_called(kind, driver))
 
 
+def shared_sections() -> Iterator[tuple[str, str, type]]:
+    """Yield each section that the devices of a kind share: the kind, the section's key, its struct."""
+    for name in kind_names():
+        kind = kind_called(name)
+        if not isinstance(kind, GraphKind) and kind.section:
+            yield name, *kind.section
+
+
 def graph_kinds() -> list[AnyGraphKind]:
     """Return every kind without devices."""
     kinds = (kind_called(name) for name in kind_names())
@@ -69,6 +77,7 @@ def schema() -> Schema:
         RecordingSettings,
         *buses.values(),
         *(shape.type.settings for shape in shapes()),
+        *(struct for _, _, struct in shared_sections()),
         *graph,
     ]
     refs, components = msgspec.json.schema_components(types, ref_template="#/$defs/{name}")
@@ -123,16 +132,22 @@ def _file(shape: Shape, buses: dict[str, type], by_type: dict[type, Schema]) -> 
         {"allOf": [by_type[other.type.settings], _named_by_device(other, shape)]}
         for other in of_kind
     ]
+    shared = {
+        key: {"description": _purpose(struct), **by_type[struct]}
+        for kind, key, struct in shared_sections()
+        if kind == shape.kind
+    }
     return {
         "type": "object",
         "additionalProperties": False,
-        "required": ["kind", "driver", "buses", shape.devices_key],
+        "required": ["kind", "driver", "buses", *shared, shape.devices_key],
         "properties": {
             **_key("kind", {"const": shape.kind}),
             **_key("driver", {"const": shape.driver}),
             **_key("rmf", by_type[Rmf]),
             **_key("recording", by_type[RecordingSettings]),
             **_key("buses", {"type": "object", "additionalProperties": {"oneOf": kinds_of_bus}}),
+            **shared,
             shape.devices_key: {
                 "description": f"a {shape.kind}'s name on RMF's graph -> its settings.",
                 "type": "object",
@@ -174,8 +189,8 @@ def page() -> str:
         " this line. For another file: `rmf-bridge schema > FILE`, again after each upgrade. Only"
         " `check` finds errors across several keys.",
         "A file has these keys, and its devices under the key of their kind (`lifts`, `doors`,"
-        " `chargers`, `dispensers` or `ingestors`). The file of a supervisor or coordinator has"
-        " `kind`, `rmf`, `recording` and one section of its own.",
+        " `chargers`, `robots`, `dispensers` or `ingestors`). The file of a supervisor or coordinator"
+        " has `kind`, `rmf`, `recording` and one section of its own.",
         "\n".join(["| key | meaning |", "|---|---|", *rows]),
     ]
     headings = _headings(_tops())
@@ -204,6 +219,8 @@ def _tops() -> Headings:
     found: Headings = {Rmf: "## `rmf`", RecordingSettings: "## `recording`"}
     for name in named.bus_types():
         found[named.bus_called(name).settings] = f"## Bus of `type: {name}`"
+    for name, key, struct in shared_sections():
+        found[struct] = f"## `{key}` of `kind: {name}`"
     of_driver: dict[type, list[Shape]] = {}
     for shape in shapes():
         of_driver.setdefault(shape.type.settings, []).append(shape)

@@ -27,6 +27,7 @@ from bridges.kinds import kind_called
 from bridges.kinds.shared.decision import Decision, IoFailed, Sampled
 from bridges.kinds.shared.graph_kind import GraphKind
 from bridges.settings.config import Config
+from bridges.settings.fleet_site import limits_of
 from bridges.settings.load import understood
 from bridges.system.log import plain
 from drivers.profiles import texts
@@ -120,6 +121,8 @@ class ReplayedCores:
             return None
         debounce = config.driver_type(subject).debounce(config.devices[subject])
         limits = kind.limits(config.devices[subject], debounce)
+        if kind.section:  # a fleet's limits hold RMF's files, whose texts the recording has
+            limits = limits_of(config, subject, debounce)
         return ReplayedCore(_with(kind.decide, limits), kind.published, types_of(kind.decide))
 
 

@@ -90,6 +90,7 @@ class Kind(Struct, Generic[S, L, M, X, E, O, R], frozen=True):
     `drives`: do its devices have outputs? Without outputs there is nothing to switch off.
     `results(name, report)`: messages that go out right after the state of this report; while there
     are any, the state is due. `stamped(message, stamp)`: a result or an answer with its time.
+    `section`: the key and the struct of a section that all devices of a file share.
     `keeping`: for a memory that must survive a restart.
     `attended_by`: a topic of requests; the core gets `Attended` when its publishers appear or vanish.
     `recorded`: topics with messages about the device that are recorded, and that no core gets.
@@ -116,6 +117,7 @@ class Kind(Struct, Generic[S, L, M, X, E, O, R], frozen=True):
     results: Callable[[str, R], tuple[Said, ...]] = lambda name, report: ()
     stamped: Callable[[Any, Time], Message] = lambda message, stamp: message
     keeping: Keeping[M] | None = None
+    section: tuple[str, type[Struct]] | None = None
     attended_by: Topic[Message] | None = None
     recorded: tuple[Topic[Message], ...] = ()
     drives: bool = True

@@ -78,7 +78,7 @@ def findings(config: Config, errors: Sequence[Problem] = (), notes: Sequence[str
         sha256=hashlib.sha256(config.text).hexdigest(),
         rmf=_rmf(config),
         buses=[_bus(config, bus) for bus in config.buses],
-        parts=[_graph(config)] if config.section is not None else _devices(config),
+        parts=_devices(config) if config.devices else [_graph(config)],
         notes=[*notes, *map(str, config.notes), *_lacking(config)],
         errors=list(errors),
         warnings=list(config.warnings),
@@ -126,7 +126,7 @@ def _tells_nobody(settings: object) -> bool:
 
 def _bus(config: Config, name: str) -> BusShown:
     settings = {key: text for key, text, _ in plain(config.buses[name]) if text != "-"}
-    tables = [*config.bus_type(name).tables(config.buses[name])]
+    tables = [table for table in config.bus_type(name).tables(config.buses[name]) if table.rows]
     return BusShown(name=name, type=config.bus_types[name], settings=settings, tables=tables)
 
 

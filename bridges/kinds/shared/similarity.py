@@ -36,6 +36,11 @@ class Similarity(Struct, frozen=True):
         """The root of `mse`, in units of `from`."""
         return float(self.mse**0.5 / self.scale)
 
+    def there(self, at: Point) -> Point:
+        """Transform a point of `from` to `to`."""
+        found = self.turn * complex(*at) + self.shift
+        return found.real, found.imag
+
     def back(self, at: Point) -> Point:
         """Transform a point of `to` back to `from`."""
         found = (complex(*at) - self.shift) / self.turn

@@ -1,0 +1,190 @@
+"""A robot's decision core: one pure decision for each event.
+
+Rules:
+FLEET-1. The last order of RMF counts. A command is sent once for each attempt; its number never
+   repeats.
+FLEET-2. A command counts as done by the place: the robot is within `arrived_m` of the goal, on the
+   goal's map. If the robot reports completed commands, it must have reported this one as well; else
+   it must stand, and look in the goal's direction. A robot that calls a command completed elsewhere
+   has not carried it out, and its word is a fault.
+FLEET-3. A command is sent again when the robot stands for `obeys_s` without being done, ever more
+   seldom. An action is sent again only if its manager refused it: an action must not be done twice.
+FLEET-4. A robot that was stopped is believed only when it stands; until then the stop is sent again
+   each `stops_s`. A new order replaces a stop.
+FLEET-5. RMF gets a place only with a fresh reading. A robot without one for `stale_after_s` is
+   silent.
+FLEET-6. On a map that the graph lacks, RMF gets no place. Off the graph it does, and the distance
+   is reported.
+FLEET-7. After a lift ride RMF gets no place until the robot is on the new floor's map, near the
+   place that RMF expects; then the command is done.
+FLEET-8. Docking at a charger is done when the robot, or the charger's own daemon, reports a charge;
+   if neither can report, when the robot has arrived. Without a charge for `docks_s` it docks again.
+FLEET-9. A robot that charges at another charger than that of its last goal is at the wrong station.
+FLEET-10. A robot gets no new task while it reports a fault, takes no orders, is silent, is on an
+   unknown map, or has let `attempts` attempts of one command pass. It gets tasks again when that is
+   over.
+FLEET-11. An activity that RMF has given up is stopped.
+FLEET-12. An operator's reset begins the attempts anew.
+"""
+
+from collections.abc import Iterator
+
+from msgspec.structs import replace
+
+from bridges.kinds.fleet.memory import Pad, RobotLimits, RobotMemory, silent_at
+from bridges.kinds.fleet.report import RobotReport, charges, report
+from bridges.kinds.fleet.sensing import faces, off_goal_m, stands, take
+from bridges.kinds.fleet.signals import (
+    Act,
+    Event,
+    Goal,
+    Localize,
+    Navigate,
+    PadHeard,
+    RobotCommand,
+    RobotOutputs,
+    Stop,
+)
+from bridges.kinds.shared.decision import Decision, IoFailed, OperatorReset, Sampled
+from bridges.kinds.shared.durations import NEVER
+
+MOST_PAUSES = 6
+"""The longest pause between two attempts is so many times `obeys_s`."""
+RELOCALISED_M = 3.0
+"""In a car the estimate of RMF is its waypoint, and a robot may stand anywhere in the car."""
+
+FleetDecision = Decision[RobotMemory, RobotOutputs, RobotReport]
+
+
+def initial(limits: RobotLimits, now: float) -> RobotMemory:
+    """Return the memory at start: nothing is known, and the robot is left alone."""
+    return RobotMemory(started_at=now)
+
+
+def decide(memory: RobotMemory, event: Event, now: float, limits: RobotLimits) -> FleetDecision:
+    """Decide one scan. `now`: monotonic s, never earlier than in the last scan. Never raises."""
+    memory = _hear(memory, event, now, limits)
+    memory = _advance(memory, now, limits)
+    wakes = (at for at in _wakes(memory, limits) if at > now)
+    return Decision(
+        memory=memory,
+        outputs=RobotOutputs(memory.command),
+        report=report(memory, now, limits),
+        wake_at=min(wakes, default=NEVER),
+    )
+
+
+def _hear(memory: RobotMemory, event: Event, now: float, limits: RobotLimits) -> RobotMemory:
+    match event:
+        case Sampled(sample):
+            return take(memory, sample, now, limits)
+        case IoFailed(reason):
+            return replace(memory, fresh=False, unread=reason)
+        case PadHeard(charger=charger):
+            return replace(memory, pads={**memory.pads, charger: Pad(event, now)})
+        case OperatorReset():
+            return replace(_again(memory, now), tries=1) if memory.command else memory
+        case Navigate() | Localize() | Act() | Stop():
+            return _order(memory, event, now, limits)
+    return memory
+
+
+def _order(
+    memory: RobotMemory, event: Navigate | Localize | Act | Stop, now: float, limits: RobotLimits
+) -> RobotMemory:
+    match event:
+        case Navigate(id, goal):
+            doing = "dock" if goal.dock else "navigate"
+            memory = replace(memory, charges_at=_charger(goal, limits) or memory.charges_at)
+            return _begin(memory, RobotCommand(id, doing, goal=goal), now)  # type: ignore[arg-type]
+        case Localize(id, goal):
+            return _begin(memory, RobotCommand(id, "localize", goal=goal), now)
+        case Act(id, category, description):
+            command = RobotCommand(id, "act", activity=category, description=description)
+            return _begin(memory, command, now)
+        case Stop(id, of):
+            if memory.command is None or memory.command.id != of:
+                return memory
+            return _begin(memory, RobotCommand(id, "stop", of=of), now)
+
+
+def _begin(memory: RobotMemory, command: RobotCommand, now: float) -> RobotMemory:
+    return replace(memory, command=command, asked_at=now, arrived_at=None, tries=1)
+
+
+def _charger(goal: Goal, limits: RobotLimits) -> str:
+    """Return the charger at the goal; "" if there is none."""
+    vertex = limits.site.graph.called(goal.name)
+    return goal.name if vertex and vertex.charger else ""
+
+
+def _advance(memory: RobotMemory, now: float, limits: RobotLimits) -> RobotMemory:
+    """End a command that is done, or begin the next attempt."""
+    command = memory.command
+    if command is None or not memory.fresh:
+        return memory
+    if command.doing == "stop":
+        if stands(memory, now):
+            return replace(memory, command=None)
+        return _again(memory, now) if now >= memory.asked_at + limits.t.stops_s else memory
+    memory = _arrival(memory, command, now, limits)
+    if _is_done(memory, command, now, limits):
+        return replace(memory, command=None, finished=command.id, arrived_at=None)
+    return _again(memory, now) if now >= _again_at(memory, command, now, limits) else memory
+
+
+def _again(memory: RobotMemory, now: float) -> RobotMemory:
+    assert memory.command is not None
+    command = replace(memory.command, attempt=memory.command.attempt + 1)
+    tries = memory.tries + 1
+    return replace(memory, command=command, asked_at=now, arrived_at=None, tries=tries)
+
+
+def _arrival(
+    memory: RobotMemory, command: RobotCommand, now: float, limits: RobotLimits
+) -> RobotMemory:
+    here = command.doing == "dock" and _is_there(memory, command, now, limits)
+    if not here:
+        return replace(memory, arrived_at=None)
+    return replace(memory, arrived_at=now) if memory.arrived_at is None else memory
+
+
+def _is_done(memory: RobotMemory, command: RobotCommand, now: float, limits: RobotLimits) -> bool:
+    assert memory.reading is not None
+    match command.doing:
+        case "act":
+            return memory.reading.completed == str(command.id)
+        case "localize":
+            assert command.goal is not None
+            return off_goal_m(memory, command.goal, limits) <= RELOCALISED_M
+    if not _is_there(memory, command, now, limits):
+        return False
+    assert command.goal is not None
+    at_charger = command.doing == "dock" and _charger(command.goal, limits)
+    return not at_charger or charges(memory, command.goal.name, now) is not False
+
+
+def _is_there(memory: RobotMemory, command: RobotCommand, now: float, limits: RobotLimits) -> bool:
+    assert command.goal is not None
+    assert memory.reading is not None
+    if off_goal_m(memory, command.goal, limits) > limits.t.arrived_m:
+        return False
+    if memory.reading.completed is not None:
+        return memory.reading.completed == str(command.id)
+    return stands(memory, now) and faces(memory, command.goal, limits)
+
+
+def _again_at(memory: RobotMemory, command: RobotCommand, now: float, limits: RobotLimits) -> float:
+    """Return the time of the next attempt; NEVER while the robot moves."""
+    assert memory.reading is not None
+    if memory.arrived_at is not None:
+        return memory.arrived_at + limits.t.docks_s
+    waits = memory.reading.refused if command.doing == "act" else stands(memory, now)
+    pause_s = limits.t.obeys_s * min(memory.tries, MOST_PAUSES)
+    since = memory.asked_at if command.doing == "act" else max(memory.asked_at, memory.moved_at)
+    return since + pause_s if waits else NEVER
+
+
+def _wakes(memory: RobotMemory, limits: RobotLimits) -> Iterator[float]:
+    """Yield each time at which the decision may change without a reading."""
+    yield silent_at(memory, limits)

@@ -1,0 +1,161 @@
+"""A robot's report: its place and its command for RMF's adapter, and its faults."""
+
+from collections.abc import Iterator
+
+import msgspec
+
+from bridges.kinds.fleet.memory import RobotLimits, RobotMemory, silent_at
+from bridges.kinds.fleet.sensing import off_goal_m, on_other_map, stands
+from bridges.kinds.fleet.signals import Pose
+from bridges.kinds.shared.decision import Fault
+from bridges.kinds.shared.durations import SILENT_S
+
+NEAR_M = 1.0
+"""A robot stands at the nearest waypoint within this distance."""
+UNFIT = frozenset(
+    ("ROBOT_SILENT", "ROBOT_FAULT", "ROBOT_TAKEN_OUT", "ROBOT_ON_OTHER_MAP", "ROBOT_NOT_OBEYING")
+)
+"""Faults with which a robot gets no new task."""
+
+
+class RobotReport(msgspec.Struct, frozen=True):
+    """The levels for RMF's adapter. `at`: a place of a fresh reading, on the robot's map; None if RMF
+    must get no place. `battery`: a fraction of 1. `activity`: the number of the command under way; 0
+    without one. `finished`: the number of the last command that was carried out. `fit`: may the robot
+    get new tasks?
+
+    `where`: the nearest waypoint, for people. `doing`: the command, for people.
+    """
+
+    at: Pose | None = None
+    battery: float = 0.0
+    activity: int = 0
+    finished: int = 0
+    fit: bool = False
+    where: str = ""
+    doing: str = ""
+    read_at: float | None = None
+    faults: tuple[Fault, ...] = ()
+
+    def news(self) -> object:
+        """Return the report without its age."""
+        return self.at, self.battery, self.activity, self.finished, self.fit, self.faults
+
+
+def report(memory: RobotMemory, now: float, limits: RobotLimits) -> RobotReport:
+    """Report the present state of the robot."""
+    found = tuple(faults(memory, now, limits))
+    command, reading = memory.command, memory.reading
+    return RobotReport(
+        at=_place(memory, limits),
+        battery=reading.battery if reading else 0.0,
+        activity=command.id if command and command.doing != "stop" else 0,
+        finished=memory.finished,
+        fit=reading is not None and not any(fault.code in UNFIT for fault in found),
+        where=_where(memory, limits),
+        doing=_doing(memory),
+        read_at=memory.read_at,
+        faults=found,
+    )
+
+
+def _place(memory: RobotMemory, limits: RobotLimits) -> Pose | None:
+    if memory.reading is None or not memory.fresh or on_other_map(memory, limits):
+        return None
+    command = memory.command
+    if command and command.doing == "localize" and command.goal:
+        return None  # the car is on another floor than the robot's map
+    return memory.reading.at
+
+
+def _where(memory: RobotMemory, limits: RobotLimits) -> str:
+    if memory.reading is None:
+        return "unknown"
+    at = limits.site.on_rmfs_map(memory.reading.at)
+    near = limits.site.graph.nearest(at, NEAR_M)
+    return f"{at.map} {near.name}" if near else f"{at.map} between waypoints"
+
+
+def _doing(memory: RobotMemory) -> str:
+    command = memory.command
+    if command is None:
+        return "nothing"
+    again = f" (attempt {command.attempt})" if command.attempt > 1 else ""
+    if command.goal is None:
+        return f"{command.activity or 'stop'}{again}"
+    at = command.goal.at
+    to = command.goal.dock or command.goal.name or f"{at.x:.1f}, {at.y:.1f}"
+    return f"{command.doing} to {at.map} {to}{again}"
+
+
+def charges(memory: RobotMemory, charger: str, now: float) -> bool | None:
+    """Does the robot charge, by its own word or that of the charger? None if neither has ever told."""
+    pad = memory.pads.get(charger)
+    own = memory.reading.charging if memory.reading else None
+    if pad is None and own is None:
+        return None
+    return bool(own) or bool(pad and pad.state.charging and now < pad.at + SILENT_S)
+
+
+def faults(memory: RobotMemory, now: float, limits: RobotLimits) -> Iterator[Fault]:
+    """Yield all present faults, most serious first. No text has a running number."""
+    if now >= silent_at(memory, limits):
+        yield Fault("ROBOT_SILENT", memory.unread or f"no reading for {limits.t.stale_after_s} s")
+    elif memory.unread and not memory.fresh:
+        yield Fault("ROBOT_NOT_READ", memory.unread)
+    if memory.reading is None:
+        return
+    if memory.reading.fault:
+        yield Fault("ROBOT_FAULT", memory.reading.fault)
+    if memory.reading.taken_out:
+        yield Fault("ROBOT_TAKEN_OUT", memory.reading.taken_out)
+    yield from _of_place(memory, limits)
+    yield from _of_charge(memory, now, limits)
+    yield from _of_command(memory, now, limits)
+
+
+def _of_place(memory: RobotMemory, limits: RobotLimits) -> Iterator[Fault]:
+    assert memory.reading is not None
+    if on_other_map(memory, limits):
+        known = ", ".join(limits.site.graph.levels())
+        text = f"it is on '{memory.reading.at.map}', and the graph has {known}"
+        yield Fault("ROBOT_ON_OTHER_MAP", text)
+    elif memory.off_m > limits.t.off_graph_m:
+        yield Fault("ROBOT_OFF_GRAPH", f"{memory.off_m:.0f} m from the nearest lane")
+
+
+def _of_charge(memory: RobotMemory, now: float, limits: RobotLimits) -> Iterator[Fault]:
+    assert memory.reading is not None
+    meant = memory.charges_at
+    at = limits.site.on_rmfs_map(memory.reading.at)
+    stands_at = limits.site.graph.nearest(at, NEAR_M, chargers=True)
+    if meant and memory.reading.charging and stands_at and stands_at.name != meant:
+        text = f"it charges at {stands_at.name}, and was sent to {meant}"
+        yield Fault("ROBOT_AT_WRONG_STATION", text)
+    for charger, pad in memory.pads.items():
+        concerned = charger in (meant, stands_at.name if stands_at else "")
+        if concerned and pad.state.error and now < pad.at + SILENT_S:
+            yield Fault("CHARGER_REPORTS_ERROR", f"{charger}: {pad.state.error}")
+
+
+def _of_command(memory: RobotMemory, now: float, limits: RobotLimits) -> Iterator[Fault]:
+    command, reading = memory.command, memory.reading
+    assert reading is not None
+    if command is None:
+        return
+    if reading.refused:
+        yield Fault("ROBOT_REFUSES", reading.refused)
+    if reading.unanswered and command.doing == "act":
+        text = f"nobody knows whether {command.activity} has begun: it is sent again after a reset"
+        yield Fault("ROBOT_ACTION_UNANSWERED", text)
+    if command.goal and reading.completed == str(command.id):
+        off_m = off_goal_m(memory, command.goal, limits)
+        if off_m > limits.t.arrived_m:
+            far = "on another map" if off_m == float("inf") else f"{off_m:.0f} m away"
+            yield Fault("ROBOT_NOT_THERE", f"it reports arrival, {far} from its goal")
+    if memory.arrived_at is not None and command.goal:
+        yield Fault("ROBOT_NOT_CHARGING", f"docked at {command.goal.dock} without a charge")
+    if memory.tries > limits.t.attempts:
+        yield Fault("ROBOT_NOT_OBEYING", f"{limits.t.attempts} attempts in vain: {command.doing}")
+    elif command.doing == "stop" and memory.tries > 1 and not stands(memory, now):
+        yield Fault("ROBOT_NOT_STOPPING", "it drives on after a stop")

@@ -1,0 +1,1 @@
+"""A fleet in service: RMF's adapter on one side, the robots' buses on the other."""

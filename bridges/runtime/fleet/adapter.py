@@ -1,0 +1,100 @@
+"""RMF's own fleet adapter, `rmf_adapter`, of which this is the only importer.
+
+Debian's package is ros-jazzy-rmf-fleet-adapter-python. Tasks, traffic and negotiation are done there.
+
+Its callbacks come on its own threads; `robot.py` makes an order of each. Facts about
+its interface: open-rmf/rmf_ros2, branch jazzy, rmf_fleet_adapter_python/src/adapter.cpp, and
+EasyFullControl.cpp of rmf_fleet_adapter.
+
+`Adapter.make` waits for RMF's schedule node, and the whole process waits with it, because the binding
+does not release Python's lock. So one attempt waits MAKE_S only.
+"""
+
+import datetime
+from collections.abc import Iterator
+from types import ModuleType
+from typing import Any, Final
+
+from bridges.kinds.fleet.places import EVERY_LEVEL
+from bridges.kinds.fleet.report import RobotReport
+from bridges.runtime.fleet.robot import Put, RmfRobot
+from bridges.settings.fleet_site import FleetSite
+from bridges.transports.transport import TransportError
+
+MAKE_S: Final = 3.0
+
+
+def installed() -> ModuleType:
+    """Import RMF's adapter. Raises TransportError with the package to install."""
+    try:
+        import rmf_adapter
+        import rmf_adapter.easy_full_control
+    except ImportError as error:
+        how = "sudo apt install ros-jazzy-rmf-fleet-adapter-python, and rmf: {ros_setup: …/setup.bash}"
+        raise TransportError(f"kind: fleet needs RMF's fleet adapter ({error}): {how}") from None
+    found: ModuleType = rmf_adapter
+    return found
+
+
+class FullControl:
+    """The adapter of one fleet, with `EasyFullControl`. `orders(robot, order)` takes its callbacks.
+
+    `update` is called by one thread for each robot. `failed`: robot -> why RMF did not take it.
+    """
+
+    def __init__(
+        self, rmf: Any, site: FleetSite, uri: str | None, orders: Put, numbers: Iterator[int]
+    ) -> None:
+        self.failed: dict[str, str] = {}
+        self.name = f"{site.fleet.fleet.name}_fleet_adapter"
+        self._rmf, self._site, self._uri = rmf, site, uri
+        self._orders, self._numbers = orders, numbers
+        self._fleet: Any = None
+        self._configuration: Any = None
+        self._robots: dict[str, RmfRobot] = {}
+        rmf.init_rclcpp()
+
+    def connect(self) -> bool:
+        """Join RMF; return False without a schedule node. Raises TransportError for files that RMF
+        refuses. The whole process waits for up to MAKE_S."""
+        easy = self._rmf.easy_full_control
+        files = self._site.config_file, self._site.graph_file
+        configuration = easy.FleetConfiguration.from_config_files(*files, self._uri)
+        if configuration is None:
+            raise TransportError(f"RMF's adapter refuses {files[0]}; its own log has the reason")
+        for level in self._site.graph.levels():
+            found = self._site.transforms.get(level, self._site.transforms.get(EVERY_LEVEL))
+            if found and self._site.estimated:
+                shift = [found.shift.real, found.shift.imag]
+                transform = self._rmf.Transformation(found.rotation, found.scale, shift)
+                configuration.add_robot_coordinates_transformation(level, transform)
+        wait = datetime.timedelta(seconds=MAKE_S)
+        self._adapter = self._rmf.Adapter.make(self.name, wait_time=wait)
+        if self._adapter is None:
+            return False
+        self._configuration = configuration
+        fleet = self._adapter.add_easy_fleet(configuration)
+        self._adapter.start()
+        self._fleet = fleet
+        return True
+
+    def update(self, name: str, report: RobotReport) -> None:
+        """Give RMF the levels of a robot's report: first its place, then the end of its command."""
+        if self._fleet is None:
+            return
+        robot = self._robots.setdefault(
+            name, RmfRobot(name, self._rmf, self._orders, self._numbers)
+        )
+        try:
+            if robot.handle is None:
+                self.failed[name] = robot.add(self._fleet, self._configuration, report)
+            else:
+                robot.update(report)
+        except RuntimeError as error:  # of C++
+            self.failed[name] = str(error)
+
+    def close(self) -> None:
+        """Leave RMF."""
+        if self._fleet is not None:
+            self._fleet = None
+            self._adapter.stop()

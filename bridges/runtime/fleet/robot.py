@@ -1,0 +1,133 @@
+"""One robot at RMF's adapter: its handle, the execution under way, its commission and its issues.
+
+RMF's callbacks come on foreign threads. They only put an order into the inbox of the robot's bus.
+"""
+
+import json
+import threading
+import time
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any, Final
+
+from bridges.kinds.fleet.report import RobotReport
+from bridges.kinds.fleet.signals import Act, Goal, Localize, Navigate, Order, Pose, Stop
+
+GIVEN_UP_S: Final = 2.0
+"""RMF gives up an activity a moment before it orders the next one, which must not cause a stop."""
+AGAIN_S: Final = 10.0
+"""The pause (s) after RMF has not taken a robot."""
+NOT_TAKEN: Final = "RMF does not take it: is it near the graph, on a level of the graph?"
+Put = Callable[[str, Order], None]
+
+
+class RmfRobot:
+    """One robot at RMF: its handle, the execution under way, and its issues."""
+
+    def __init__(self, name: str, rmf: Any, orders: Put, numbers: Iterator[int]) -> None:
+        self.handle: Any = None
+        self._name, self._rmf, self._orders, self._numbers = name, rmf, orders, numbers
+        self._now: tuple[int, Any] = (0, None)
+        self._lock = threading.Lock()
+        self._given_up_at: float | None = None
+        self._fit = True
+        self._issues: dict[str, Any] = {}
+        self._again_at = 0.0
+
+    def add(self, fleet: Any, configuration: Any, report: RobotReport) -> str:
+        """Add the robot at its first place; return why RMF did not take it, or ""."""
+        if report.at is None or time.monotonic() < self._again_at:
+            return "" if report.at is None else NOT_TAKEN
+        self._again_at = time.monotonic() + AGAIN_S
+        callbacks = self._rmf.easy_full_control.RobotCallbacks(
+            self._navigate, self._stop, self._act
+        )
+        callbacks.localize = self._localize
+        known = configuration.get_known_robot_configuration(self._name)
+        self.handle = fleet.add_robot(self._name, self._state(report), known, callbacks)
+        return "" if self.handle else NOT_TAKEN
+
+    def update(self, report: RobotReport) -> None:
+        number, execution = self._now
+        if report.at is not None:
+            goes_on = execution is not None and report.activity == number
+            activity = execution.identifier if execution is not None and goes_on else None
+            self.handle.update(self._state(report), activity)
+        if execution is not None and report.finished == number:
+            self._end(number)
+            execution.finished()
+        elif execution is not None and not execution.okay():
+            self._give_up(number)
+        more = self.handle.more()
+        if more is not None:
+            self._commission(more, report.fit)
+            self._issue(more, {fault.code: fault.detail for fault in report.faults})
+
+    def _state(self, report: RobotReport) -> Any:
+        assert report.at is not None
+        place = [report.at.x, report.at.y, report.at.yaw]
+        return self._rmf.easy_full_control.RobotState(report.at.map, place, report.battery)
+
+    def _give_up(self, number: int) -> None:
+        now = time.monotonic()
+        self._given_up_at = now if self._given_up_at is None else self._given_up_at
+        if now >= self._given_up_at + GIVEN_UP_S:
+            self._end(number)
+            self._orders(self._name, Stop(next(self._numbers), number))
+
+    def _end(self, number: int) -> None:
+        """Forget an execution, unless RMF has begun the next one meanwhile."""
+        with self._lock:
+            if self._now[0] == number:
+                self._now = (number, None)
+
+    def _commission(self, more: Any, fit: bool) -> None:
+        if fit == self._fit:
+            return
+        self._fit = fit
+        commission = more.commission()
+        commission.accept_dispatched_tasks = commission.accept_direct_tasks = fit
+        commission.perform_idle_behavior = fit
+        more.set_commission(commission)
+        if not fit:
+            more.reassign_dispatched_tasks()
+
+    def _issue(self, more: Any, faults: Mapping[str, str]) -> None:
+        for code in self._issues.keys() - faults.keys():
+            self._issues.pop(code).resolve({})
+        for code in faults.keys() - self._issues.keys():
+            tier = self._rmf.robot_update_handle.Tier.Error
+            self._issues[code] = more.create_issue(tier, code, {"detail": faults[code]})
+
+    def _begun(self, execution: Any) -> int:
+        with self._lock:
+            number = next(self._numbers)
+            self._now, self._given_up_at = (number, execution), None
+        return number
+
+    def _navigate(self, destination: Any, execution: Any) -> None:
+        self._orders(self._name, Navigate(self._begun(execution), _goal(destination)))
+
+    def _localize(self, estimate: Any, execution: Any) -> None:
+        self._orders(self._name, Localize(self._begun(execution), _goal(estimate)))
+
+    def _act(self, category: str, description: Any, execution: Any) -> None:
+        number = self._begun(execution)
+        self._orders(self._name, Act(number, category, json.dumps(description)))
+
+    def _stop(self, activity: Any) -> None:
+        number, execution = self._now
+        if execution is not None and execution.identifier.is_same(activity):
+            self._end(number)
+            self._orders(self._name, Stop(next(self._numbers), number))
+
+
+def _goal(destination: Any) -> Goal:
+    x, y, yaw = (float(part) for part in destination.position)
+    lift = destination.inside_lift
+    return Goal(
+        Pose(str(destination.map), x, y, yaw),
+        destination.name or "",
+        destination.dock or "",
+        destination.speed_limit,
+        lift.name if lift is not None else "",
+    )

@@ -1,0 +1,170 @@
+"""The service of a fleet: robots on buses, as devices are, with RMF's adapter in place of topics."""
+
+import itertools
+import logging
+import os
+from collections.abc import Collection
+from typing import Any, Final
+
+from bridges.kinds.fleet.report import RobotReport
+from bridges.kinds.fleet.settings import FleetFiles
+from bridges.kinds.fleet.signals import Order
+from bridges.kinds.shared.decision import Fault
+from bridges.kinds.shared.durations import AGES_AGO
+from bridges.kinds.shared.kind import AnyDeviceKind
+from bridges.messages.definitions import ChargerState, FleetState, Message
+from bridges.messages.topics import CHARGER_STATES, FLEET_STATES, Topic
+from bridges.runtime.clock import Clock
+from bridges.runtime.device import AnyNode, Node
+from bridges.runtime.fleet.adapter import FullControl, installed
+from bridges.runtime.fleet.robot import AGAIN_S
+from bridges.runtime.inbox import Inbox
+from bridges.runtime.outlet import Named
+from bridges.runtime.ring_writer import NOBODY, NoWriter
+from bridges.runtime.service import Devices, OpenBus
+from bridges.runtime.serving import Serving
+from bridges.runtime.subject import Status
+from bridges.settings.config import Config
+from bridges.settings.fleet_site import limits_of, read_site
+from bridges.system.log import pairs
+from bridges.transports.transport import Transport
+from drivers.hal import Bus
+
+log = logging.getLogger(__name__)
+
+LOOK_S: Final = 0.5
+
+
+class RobotNode(Node[Any, Any, Any, Any, Any, Any, RobotReport]):
+    """One robot in service: its report goes to RMF's adapter."""
+
+    adapter: FullControl
+
+    def _send(self, report: RobotReport) -> bool:
+        self.adapter.update(self.name, report)
+        return True
+
+
+class Joining:
+    """The thread that joins RMF, again and again until RMF's schedule node is there."""
+
+    name = "rmf-adapter"
+
+    def __init__(self, adapter: FullControl, clock: Clock) -> None:
+        self.inbox: Inbox[object] = Inbox()
+        self.joined = False
+        self.wake_at = AGES_AGO
+        self.finished = 0
+        self.ready = True
+        self._adapter = adapter
+        self._clock = clock
+        self._again_at = AGES_AGO
+
+    def round(self) -> None:
+        """Join RMF if it is time. READY does not wait for RMF."""
+        now = self._clock.monotonic()
+        self.wake_at = now + LOOK_S
+        if self.joined or now < self._again_at:
+            return
+        told = self._again_at > AGES_AGO
+        self.joined = self._adapter.connect()
+        self._again_at = self._clock.monotonic() + AGAIN_S
+        if self.joined:
+            log.info(pairs("rmf_joined", name=self._adapter.name))
+        elif not told:
+            log.warning(pairs("rmf_not_joined", reason=NO_SCHEDULE, again_s=AGAIN_S))
+
+    def end(self) -> bool:
+        """Leave RMF."""
+        self._adapter.close()
+        return True
+
+
+NO_SCHEDULE: Final = "no schedule node: is rmf_traffic_schedule running in this ROS domain?"
+
+
+class FleetDevices(Devices):
+    """The robots of one fleet."""
+
+    def __init__(
+        self,
+        config: Config,
+        kind: AnyDeviceKind,
+        transport: Transport,
+        open_bus: OpenBus,
+        named: Named,
+        clock: Clock,
+        unsafe: Collection[str] = (),
+        writer: NoWriter = NOBODY,
+        *,
+        rmf: Any,
+    ) -> None:
+        """`rmf`: the stand-in of the module `rmf_adapter`; None for the real one. Raises SettingsError
+        for RMF's files, and TransportError without the module."""
+        assert isinstance(config.section, FleetFiles)
+        self._site = read_site(config)
+        self._stands_in = rmf is not None
+        numbers = itertools.count(int(transport.wall()))
+        uri = config.section.server_uri
+        rmf = installed() if rmf is None else rmf
+        os.environ["ROS_DOMAIN_ID"] = str(
+            transport.domain_id
+        )  # RMF's adapter has a node of its own
+        if config.rmf.network == "localhost":
+            os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
+        self._adapter = FullControl(rmf, self._site, uri, self._order, numbers)
+        super().__init__(config, kind, transport, open_bus, named, clock, unsafe, writer)
+        if self._stands_in:
+            rmf.speak = self._speak
+        self._joining = Joining(self._adapter, clock)
+        self.loops = [*self.loops, Serving(self._joining, clock)]
+        for note in self._site.notes():
+            log.info(pairs("map", text=note))
+
+    def subscribe(self) -> None:
+        """Subscribe to the chargers' states."""
+        accept = self._kind.requests[CHARGER_STATES]
+        hear = self._to_inbox(CHARGER_STATES, accept)
+        ours = ("", self._site.fleet.fleet.name)
+
+        def ours_only(message: Message) -> None:
+            assert isinstance(message, ChargerState)
+            if message.robot_fleet in ours and message.robot_name in self._placed:
+                hear(message)
+
+        topic = self._named(CHARGER_STATES)
+        self._hears[CHARGER_STATES.name] = self._transport.subscribe(topic, ours_only)
+
+    def status(self) -> Status:
+        """Return the service's status, with RMF's part."""
+        found = super().status()
+        failed = self._adapter.failed.copy().items()
+        faults = [Fault("RMF_TAKES_NO_ROBOT", f"{name}: {why}") for name, why in failed if why]
+        if not self._joining.joined:
+            faults.append(Fault("RMF_NOT_JOINED", NO_SCHEDULE))
+        told = [{"code": fault.code, "detail": fault.detail} for fault in faults]
+        joined = "stand-in of RMF" if self._stands_in else "joined"
+        rmf = joined if self._joining.joined else "not joined"
+        return {**found, "faults": [*found["faults"], *told], "rmf_adapter": rmf}
+
+    def _topics(self) -> list[Topic[Message]]:
+        return [FLEET_STATES] if self._stands_in else []
+
+    def _node(self, name: str, bus: Bus) -> AnyNode:
+        device = self._config.devices[name]
+        driver_type = self._config.driver_type(name)
+        limits = limits_of(self._config, name, driver_type.debounce(device))
+        driver = driver_type.create(name, device, bus)
+        out, clock, writer = self._outlet, self._clock, self._writer
+        node = RobotNode(name, self._kind, device, limits, driver, out.publish, clock, writer)
+        node.adapter = self._adapter
+        return node
+
+    def _order(self, robot: str, order: Order) -> None:
+        """Take an order of RMF, on any thread."""
+        _, loop = self._placed[robot]
+        loop.inbox.put(robot, order)
+
+    def _speak(self, state: FleetState) -> None:
+        """Publish the fleet's state in place of RMF's adapter."""
+        self._outlet.publish(FLEET_STATES, state)

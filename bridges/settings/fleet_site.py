@@ -1,0 +1,205 @@
+"""Reads the two files of RMF that a fleet's YAML names, and compares them with it.
+
+RMF's adapter stops or dies at many mistakes in these files, so they are refused before it starts. The
+files' texts are stored with the daemon's claims, so that a recording can be decided again.
+"""
+
+from collections.abc import Iterator, Mapping
+from functools import cache
+from pathlib import Path
+from typing import Any, Final
+
+from msgspec import Struct
+from msgspec.structs import replace
+
+from bridges.kinds.fleet.memory import RobotLimits
+from bridges.kinds.fleet.places import EVERY_LEVEL, NavGraph, RobotSite
+from bridges.kinds.fleet.settings import FleetFiles
+from bridges.kinds.shared.similarity import Similarity, estimate
+from bridges.settings.building_map import MAP
+from bridges.settings.config import Config
+from bridges.settings.fleet_config import FLEET, FleetFile, load_fleet
+from bridges.settings.nav_graph import load_graph
+from bridges.yaml.parsing import Problem, SettingsError, Sort, YamlFile, compose, read
+from bridges.yaml.positions import Spot, below, locate
+from bridges.yaml.spelling import unknown
+from drivers.profiles import texts
+
+FINISHING: Final = ("charge", "park", "nothing")
+NEEDED: Final = (
+    ("limits", "linear"),
+    ("limits", "angular"),
+    ("profile", "footprint"),
+    ("profile", "vicinity"),
+    ("battery_system", "voltage"),
+    ("battery_system", "capacity"),
+    ("battery_system", "charging_current"),
+    ("mechanical_system", "mass"),
+    ("mechanical_system", "moment_of_inertia"),
+    ("mechanical_system", "friction_coefficient"),
+    ("ambient_system", "power"),
+    ("tool_system", "power"),
+)
+"""Keys below `rmf_fleet` without which RMF's adapter does not read the file (EasyFullControl.cpp,
+`from_config_files`)."""
+OFF_M: Final = 0.5
+"""Pairs of coordinates that fit worse are an error: a robot would be seen beside its lane."""
+
+
+class FleetSite(Struct, frozen=True):
+    """A fleet's two files. `transforms`: level -> from RMF's map to the robots' map. `estimated`: the
+    levels whose transform comes from pairs, and must be given to RMF."""
+
+    fleet: FleetFile
+    graph: NavGraph
+    transforms: Mapping[str, Similarity]
+    estimated: tuple[str, ...]
+    config_file: str
+    graph_file: str
+
+    def of(self, robot: str) -> RobotSite:
+        """Return the facts about one robot."""
+        return RobotSite(self.graph, self.transforms, self.chargers().get(robot) or "")
+
+    def chargers(self) -> dict[str, str | None]:
+        """Map robot -> its charger's waypoint."""
+        return {name: robot.waypoint()[1] for _, name, robot in self.fleet.robots()}
+
+    def notes(self) -> Iterator[str]:
+        """Yield the transforms and their errors, for people."""
+        name = Path(self.config_file).name
+        for level, found in self.transforms.items():
+            of = f" for {level}" if level else ""
+            yield (
+                f"{name}: the robots' map{of} is RMF's, turned by {found.rotation:.4f} rad and scaled"
+                f" by {found.scale:.5g}; the pairs are {found.error:.2f} m off on RMF's map"
+            )
+
+
+def limits_of(config: Config, robot: str, debounce: Mapping[str, float]) -> RobotLimits:
+    """Return the limits of a robot's core, with its site. Raises SettingsError."""
+    limits = RobotLimits.of(config.devices[robot], debounce)
+    return replace(limits, site=read_site(config).of(robot))
+
+
+def read_site(config: Config) -> FleetSite:
+    """Read the files of a fleet's YAML. Raises SettingsError with every problem."""
+    section = config.section
+    assert isinstance(section, FleetFiles)
+    comparing = _Comparing(config)
+    fleet = comparing.read(section.config, "config", FLEET, load_fleet)
+    graph = comparing.read(section.graph, "graph", MAP, load_graph)
+    if fleet is None or graph is None:
+        raise SettingsError(comparing.problems)
+    comparing.needed(fleet)
+    transforms = comparing.transforms(fleet, graph)
+    comparing.robots(fleet, graph)
+    comparing.names(fleet, graph)
+    if comparing.problems:
+        raise SettingsError(comparing.problems)
+    files = _file(config, section.config), _file(config, section.graph)
+    return FleetSite(fleet, graph, transforms, tuple(fleet.references()), *map(str, files))
+
+
+def _file(config: Config, path: str) -> Path:
+    return _folder(str(config.path.parent)) / path
+
+
+@cache
+def _folder(folder: str) -> Path:
+    """Return the whole path of a folder, which stays when the daemon changes its working directory."""
+    return Path(folder).absolute()
+
+
+class _Comparing:
+    def __init__(self, config: Config) -> None:
+        self.problems: list[Problem] = []
+        self._config = config
+        self._page = YamlFile(str(config.path))
+        self._root = compose(self._page, config.text)
+
+    def read(self, path: str, key: str, sort: Sort, load: Any) -> Any:
+        """Read one of the two files; None, with a problem, if that fails."""
+        file = _file(self._config, path)
+        try:
+            return load(str(file), texts.text(file, lambda: read(str(file), sort)))
+        except SettingsError as error:
+            self.problems += error.problems
+            first = error.problems[0]
+            if first.file == str(file) and not file.is_file():
+                self._ours(("fleet", key), f"{file} cannot be read")
+            return None
+
+    def needed(self, fleet: FleetFile) -> None:
+        """Check the keys that RMF's adapter needs."""
+        root = below(fleet.root, "rmf_fleet")
+        for section, key in NEEDED:
+            entry = root and below(root.value, section)
+            if not entry or not below(entry.value, key):
+                text = f"needs {section}: {key}, without which RMF's adapter does not start"
+                self.problems.append(fleet.problem(("rmf_fleet", section), text))
+        asked = fleet.fleet.finishing_request
+        if asked is not None and asked not in FINISHING:
+            text = unknown("finishing_request", asked, FINISHING)
+            self.problems.append(fleet.problem(("rmf_fleet", "finishing_request"), text))
+
+    def transforms(self, fleet: FleetFile, graph: NavGraph) -> dict[str, Similarity]:
+        """Return the transforms of both forms."""
+        found = {level: t.similarity() for level, t in fleet.fleet.transforms.items()}
+        for level, pairs in fleet.references().items():
+            path = ("reference_coordinates", *([level] if level else []))
+            try:
+                found[level] = estimate(pairs.rmf, pairs.robot)
+            except ValueError as error:
+                self.problems.append(fleet.problem(path, str(error)))
+                continue
+            if found[level].error > OFF_M:
+                text = f"the pairs do not fit: {found[level].error:.2f} m off on RMF's map"
+                self.problems.append(fleet.problem(path, text))
+            if level and level not in graph.levels():
+                self.problems.append(fleet.problem(path, unknown("level", level, graph.levels())))
+        lacking = [level for level in graph.levels() if level not in found]
+        if found and EVERY_LEVEL not in found and lacking:
+            text = f"no pairs for {', '.join(lacking)}: RMF cannot place a robot on that level"
+            self.problems.append(fleet.problem(("reference_coordinates",), text))
+        return found
+
+    def robots(self, fleet: FleetFile, graph: NavGraph) -> None:
+        """Compare the robots of both files, and their chargers with the graph."""
+        theirs = {name: (path, robot) for path, name, robot in fleet.robots()}
+        ours = self._config.devices
+        for name in ours:
+            if name not in theirs:
+                text = f"{Path(fleet.file).name} has an {unknown('robot', name, theirs)}"
+                self._ours(("robots", name), text)
+        for name, (path, robot) in theirs.items():
+            if name not in ours:
+                where = Path(self._config.path).name
+                text = f"{where} does not say how '{name}' is reached: write it below robots:"
+                self.problems.append(fleet.problem(path, text))
+            inner, charger = robot.waypoint()
+            vertex = graph.called(charger) if charger else None
+            known = [v.name for v in graph.vertices if v.charger] or [
+                v.name for v in graph.vertices if v.name
+            ]
+            if charger is None:
+                text = f"'{name}' has no charger: RMF's adapter does not add the robot"
+                self.problems.append(fleet.problem(path, text))
+            elif vertex is None:
+                text = f"the graph has no {unknown('waypoint', charger, known)[8:]}"
+                self.problems.append(fleet.problem((*path, *inner), text))
+
+    def names(self, fleet: FleetFile, graph: NavGraph) -> None:
+        """Compare the recall floors with the graph's lifts."""
+        lifts = {vertex.lift for vertex in graph.vertices if vertex.lift}
+        for lift, level in fleet.fleet.lift_emergency_levels.items():
+            path = ("rmf_fleet", "lift_emergency_levels", lift)
+            stops = [v.level for v in graph.vertices if v.lift == lift]
+            if lift not in lifts:
+                self.problems.append(fleet.problem(path, unknown("lift", lift, sorted(lifts))))
+            elif level not in stops:
+                self.problems.append(fleet.problem(path, unknown("floor", level, stops)))
+
+    def _ours(self, path: tuple[str, ...], text: str) -> None:
+        spot = Spot(self._root, self._root, "the file")
+        self.problems.append(self._page.problem(locate(spot, path).key, text))

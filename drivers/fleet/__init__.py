@@ -1,0 +1,1 @@
+"""Drivers of robots: their makers' interfaces, each in its own file."""

@@ -1,0 +1,218 @@
+"""A fleet manager's HTTP interface: the calls of the tutorial's RobotAPI as paths, fields and tests.
+
+Texts of paths and bodies may hold values of the command:
+
+    $robot        the robot's name at its manager
+    $id           the command's number, which the manager shall report as completed
+    $running      for stop, the number of the stopped command
+    $map $x $y $yaw   the goal, in the manager's units
+    $goal $dock   the goal's waypoint and its dock in RMF's graph
+    $speed_limit  m/s; null in a body without a limit
+    $activity     the action's category, or `dock`
+    $description  the action's description as JSON; $description.zone is one of its values
+
+In a body a text that is only `"$x"` becomes the value itself, a number for example.
+"""
+
+import math
+import re
+from collections.abc import Iterator, Mapping
+from typing import Annotated, Final, Literal
+from urllib.parse import quote
+
+import msgspec
+
+from bridges.kinds.fleet.signals import Pose, RobotCommand
+from bridges.kinds.shared.fields import Name, tells
+from bridges.kinds.shared.remarks import Remarks
+from drivers.hal import http
+from drivers.http_call import Call
+from drivers.json_fields import Field, JsonFlag
+
+PLACE: Final = re.compile(r"\$([a-z_]+)((?:\.[A-Za-z0-9_]+)*)")
+GOAL: Final = ("map", "x", "y", "yaw", "goal", "dock", "speed_limit")
+KNOWN: Final = ("robot", "id", "running", *GOAL, "activity", "description")
+Part = Literal["position", "map", "battery", "completed", "status"]
+Json = object
+LENGTHS: Final = {"m": 1.0, "cm": 0.01, "mm": 0.001}
+
+
+class RobotFields(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """The fields of one robot's answer: names with dots between them."""
+
+    map: Annotated[Field, tells("the name of the robot's map, as RMF's graph names the level.")]
+    x: Annotated[Field, tells("the robot's x coordinate.")]
+    y: Annotated[Field, tells("the robot's y coordinate.")]
+    yaw: Annotated[Field, tells("the robot's direction.")]
+    battery: Annotated[Field, tells("the battery's charge.")]
+    name: Annotated[
+        Field | None, tells("the robot's name or id: an answer about another robot is refused.")
+    ] = None
+    completed: Annotated[
+        Field | None, tells("the number of the last completed command; null before the first.")
+    ] = None
+    moving: Annotated[JsonFlag | None, tells("the robot drives or turns.")] = None
+    charging: Annotated[JsonFlag | None, tells("the robot is being charged.")] = None
+    ready: Annotated[
+        JsonFlag | None, tells("the robot takes orders: it is in automatic mode, for example.")
+    ] = None
+    fault: Annotated[
+        Field | None, tells("the robot's own fault: any text means a fault, null none.")
+    ] = None
+    time: Annotated[
+        Field | None,
+        tells("""the time or the counter of the robot's last report, a number that only grows: a manager
+        often goes on answering for a robot that it has lost."""),
+    ] = None
+
+    def part_of(self, field: str) -> Part:
+        """Return the part of a reading that a field belongs to."""
+        parts: dict[str, Part] = {"x": "position", "y": "position", "yaw": "position"}
+        own: dict[str, Part] = {"map": "map", "battery": "battery", "completed": "completed"}
+        return (parts | own).get(field, "status")
+
+
+class AllRobots(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """One answer for all robots: it is asked once in each round, whatever the number of robots."""
+
+    list: Annotated[Field, tells("the field with the list of robots.")]
+    name: Annotated[Field, tells("the robot's name or id in each item.")]
+
+
+class FleetUnits(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """The manager's units. `reference_coordinates` count in metres, with y upwards."""
+
+    length: Annotated[Literal["m", "cm", "mm"], tells("the unit of x and y.")] = "m"
+    angle: Annotated[Literal["rad", "deg"], tells("the unit of yaw.")] = "rad"
+    battery: Annotated[Literal["percent", "fraction"], tells("the unit of battery.")] = "percent"
+    y_axis: Annotated[
+        Literal["up", "down"],
+        tells("`down` for maps with pixels' axes: y and yaw turn their sign."),
+    ] = "up"
+
+    def read(self, at: Pose) -> Pose:
+        """Return a place in metres and radians, with y upwards."""
+        length, sign = LENGTHS[self.length], -1.0 if self.y_axis == "down" else 1.0
+        yaw = math.radians(at.yaw) if self.angle == "deg" else at.yaw
+        return Pose(at.map, at.x * length, sign * at.y * length, sign * yaw)
+
+    def written(self, at: Pose) -> Pose:
+        """Return a place in the manager's units."""
+        length, sign = LENGTHS[self.length], -1.0 if self.y_axis == "down" else 1.0
+        yaw = math.degrees(at.yaw) if self.angle == "deg" else at.yaw
+        return Pose(at.map, at.x / length, sign * at.y / length, sign * yaw)
+
+
+class FleetApi(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """The interface of one make. The paths follow the bus's `api_base`."""
+
+    state_path: Annotated[
+        http.Path, tells("the path that GET reads the robot, or all robots, from.")
+    ]
+    fields: Annotated[RobotFields, tells("the fields of one robot.")]
+    navigate: Annotated[Call, tells("sends the robot to a goal.")]
+    stop: Annotated[Call, tells("stops the robot.")]
+    robots: Annotated[
+        AllRobots | None,
+        tells("if `state_path` answers for all robots: their place in the answer."),
+    ] = None
+    paths: Annotated[
+        dict[Part, http.Path],
+        tells("""other paths for parts of a reading: `position`, `map`, `battery`, `completed`, or
+        `status` for all others. Each costs a call for each robot."""),
+    ] = {}
+    units: Annotated[FleetUnits, tells("the units, if they differ.")] = FleetUnits()
+    accepted: Annotated[
+        JsonFlag | None,
+        tells("""the test of every command's answer: a refusal is reported, and the command is sent
+        again later. When absent, the HTTP status decides."""),
+    ] = None
+    dock: Annotated[
+        Call | None, tells("docks the robot at `$dock`; when absent, `navigate` goes there.")
+    ] = None
+    localize: Annotated[
+        Call | None,
+        tells("tells the robot its place after a lift ride; when absent, the robot finds it."),
+    ] = None
+    actions: Annotated[
+        dict[Name, Call], tells("an action of `config.yaml` -> the call that begins it.")
+    ] = {}
+
+    def calls(self) -> Iterator[tuple[tuple[str, ...], Call]]:
+        """Yield each command with its path in the YAML."""
+        for name in ("navigate", "stop", "dock", "localize"):
+            if call := getattr(self, name):
+                yield (name,), call
+        for name, call in self.actions.items():
+            yield ("actions", name), call
+
+    def problems(self) -> Remarks:
+        """Yield placeholders without a value, and abilities without their fields."""
+        yield from _strangers(("state_path",), self.state_path, ("robot",))
+        for part, path in self.paths.items():
+            yield from _strangers(("paths", part), path, ("robot",))
+        for where, call in self.calls():
+            allowed = (
+                KNOWN if where[0] == "actions" else ("robot", "id", "running", *GOAL, "activity")
+            )
+            yield from _strangers((*where, "path"), call.path, allowed)
+            yield from _strangers((*where, "body"), call.body or "", allowed)
+        if self.robots and "$robot" in self.state_path:
+            yield ("robots",), "state_path asks for one robot: delete $robot there, or robots"
+        if self.actions and self.fields.completed is None:
+            yield ("actions",), "needs fields: completed, by which an action's end is seen"
+
+
+def _strangers(where: tuple[str, ...], text: str, allowed: tuple[str, ...]) -> Remarks:
+    for found in PLACE.finditer(text):
+        if found[1] not in allowed:
+            yield where, f"'${found[1]}' has no value here; there are ${', $'.join(allowed)}"
+
+
+def values(command: RobotCommand, robot: str, units: FleetUnits) -> Mapping[str, Json]:
+    """Return the values of the placeholders for one command."""
+    found: dict[str, Json] = {"robot": robot, "id": command.id, "running": command.of}
+    found["activity"] = command.activity or command.doing
+    found["description"] = msgspec.json.decode(command.description)
+    if goal := command.goal:
+        at = units.written(goal.at)
+        found |= {"map": at.map, "x": at.x, "y": at.y, "yaw": at.yaw}
+        found |= {"goal": goal.name, "dock": goal.dock, "speed_limit": goal.speed_limit}
+    return found
+
+
+def path_with(text: str, given: Mapping[str, Json]) -> str:
+    """Return a path with its values, made safe for an address."""
+    return PLACE.sub(lambda at: quote(_text(_value(at, given)), safe=""), text)
+
+
+def body_with(text: str, given: Mapping[str, Json]) -> str:
+    """Return a JSON body with its values."""
+    return msgspec.json.encode(_filled(msgspec.json.decode(text), given)).decode()
+
+
+def _filled(part: Json, given: Mapping[str, Json]) -> Json:
+    match part:
+        case dict():
+            return {key: _filled(value, given) for key, value in part.items()}
+        case list():
+            return [_filled(value, given) for value in part]
+        case str() if whole := PLACE.fullmatch(part):
+            return _value(whole, given)
+        case str():
+            return PLACE.sub(lambda at: _text(_value(at, given)), part)
+    return part
+
+
+def _value(place: re.Match[str], given: Mapping[str, Json]) -> Json:
+    """Return a placeholder's value; None for a value that the command lacks."""
+    value = given.get(place[1])
+    for key in filter(None, place[2].split(".")):
+        value = value.get(key) if isinstance(value, dict) else None
+    return value
+
+
+def _text(value: Json) -> str:
+    if value is None:
+        return ""
+    return value if isinstance(value, str) else msgspec.json.encode(value).decode()

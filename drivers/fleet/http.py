@@ -1,0 +1,261 @@
+"""A robot behind an HTTP interface: its manager's, or its own. The interface is described in the
+YAML, or by a profile (`rmf-demos`: the manager of RMF's tutorial and demos).
+
+A command's number (`$id`) never repeats, so a manager that reports completed commands by number cannot
+take an old one for a new one, even after a restart of the daemon.
+"""
+
+from collections.abc import Iterator, Mapping
+from typing import Annotated, Final, Protocol
+from weakref import WeakKeyDictionary
+
+import msgspec
+
+from bridges.kinds.fleet.settings import FleetRobotSettings
+from bridges.kinds.fleet.signals import Pose, RobotCommand, RobotOutputs, RobotSample
+from bridges.kinds.shared.fields import Name, tells
+from bridges.kinds.shared.remarks import Remarks
+from drivers import DriverError, json_fields
+from drivers.driver_type import DriverType
+from drivers.fleet.api import FleetApi, body_with, path_with, values
+from drivers.hal import HalError, http
+from drivers.http_call import Call
+from drivers.profiles import Profile
+
+PROFILE: Final = Profile("fleet_http", "api", FleetApi)
+Answer = Mapping[str, object]
+
+
+class HttpRobotSettings(FleetRobotSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """One robot and the interface of its manager."""
+
+    profile: Annotated[Name | None, tells("the interface of a known manager.")] = None
+    api: Annotated[FleetApi | None, tells("the interface of another manager.")] = None
+
+    def problems(self) -> Remarks:
+        """Yield a missing or unknown interface."""
+        yield from super().problems()
+        yield from PROFILE.problems(self.profile, self.api)
+
+    def interface(self) -> FleetApi:
+        """Return the interface."""
+        return PROFILE.chosen(self.profile, self.api)
+
+
+class FleetCalls(Protocol):
+    """A driver's calls on an HTTP bus."""
+
+    def get_json(self, path: str) -> dict[str, object]:
+        """Get one JSON object. Raises HalError."""
+
+    def send(
+        self, path: str, method: http.Method = "POST", body: str | None = None, safe: bool = False
+    ) -> None:
+        """Send one request, without retry. Raises HalError."""
+
+    def ask(
+        self, path: str, method: http.Method = "POST", body: str | None = None
+    ) -> dict[str, object]:
+        """Send one request, without retry; return its answer. Raises HalError."""
+
+
+class _AllAnswer:
+    """The last answer for all robots of one bus. A robot that asks twice wants a newer answer."""
+
+    def __init__(self) -> None:
+        self._robots: dict[str, Answer] = {}
+        self._asked: set[str] | None = None
+
+    def of(self, robot: str, bus: FleetCalls, path: str, api: FleetApi) -> Answer:
+        """Return the part of one robot. Raises DriverError."""
+        if self._asked is None or robot in self._asked:
+            self._asked = None
+            self._robots = dict(_listed(bus.get_json(path), api))
+            self._asked = set()
+        self._asked.add(robot)
+        if robot not in self._robots:
+            known = ", ".join(map(json_fields.clean, list(self._robots)[:5])) or "none"
+            raise DriverError(f"the manager has no robot '{robot}'; it has {known}")
+        return self._robots[robot]
+
+
+_all: WeakKeyDictionary[FleetCalls, dict[str, _AllAnswer]] = WeakKeyDictionary()
+
+
+def _listed(answer: Answer, api: FleetApi) -> Iterator[tuple[str, Answer]]:
+    assert api.robots
+    found = json_fields.needed(answer, api.robots.list)
+    if not isinstance(found, list):
+        raise json_fields.wrong(api.robots.list, found, "a list of robots")
+    for item in found:
+        if isinstance(item, dict):
+            yield json_fields.name(item, api.robots.name), item
+
+
+class HttpRobot:
+    """`drivers.Driver` for one robot."""
+
+    def __init__(self, name: str, settings: HttpRobotSettings, bus: FleetCalls) -> None:
+        self._robot = settings.known_as or name
+        self._settings = settings
+        self._api = settings.interface()
+        self._bus = bus
+        self._sent = (0, 0)
+        self._refused = ""
+        self._unanswered = False
+
+    def open(self) -> None:
+        """Do nothing: a restart must not stop a robot."""
+
+    def read(self) -> RobotSample:
+        """Read the robot. Raises DriverError for an answer without sense, or about another robot."""
+        answers = dict[str, Answer]()
+        fields = self._api.fields
+
+        def answer(field: str) -> Answer:
+            path = self._api.paths.get(fields.part_of(field), self._api.state_path)
+            if path not in answers:
+                answers[path] = self._answer(path)
+            return answers[path]
+
+        def number(field: str) -> float:
+            found = json_fields.number(answer(field), getattr(fields, field), 1.0)
+            if found is None:
+                raise DriverError(
+                    f"the answer has no {field}: '{getattr(fields, field)}' is missing"
+                )
+            return found
+
+        def flag(field: str) -> bool | None:
+            place = getattr(fields, field)
+            return None if place is None else json_fields.flag(answer(field), place)
+
+        if fields.name and (said := json_fields.name(answer("name"), fields.name)) != self._robot:
+            raise DriverError(f"the manager answers for '{said}' and was asked for '{self._robot}'")
+        level = json_fields.name(answer("map"), fields.map)
+        at = Pose(level, number("x"), number("y"), number("yaw"))
+        percent = self._api.units.battery == "percent"
+        completed = fields.completed and json_fields.name(answer("completed"), fields.completed)
+        return RobotSample(
+            at=self._settings.level_of(self._api.units.read(at)),
+            battery=number("battery") / (100.0 if percent else 1.0),
+            moving=flag("moving"),
+            charging=flag("charging"),
+            completed=completed,
+            fault=json_fields.text(answer("fault"), fields.fault) if fields.fault else "",
+            taken_out="" if flag("ready") in (None, True) else "its manager calls it not ready",
+            said_at=number("time") if fields.time else None,
+            refused=self._refused,
+            unanswered=self._unanswered,
+        )
+
+    def _answer(self, path: str) -> Answer:
+        if self._api.robots and path == self._api.state_path:
+            shared = _all.setdefault(self._bus, {}).setdefault(path, _AllAnswer())
+            return shared.of(self._robot, self._bus, path, self._api)
+        return self._bus.get_json(path_with(path, {"robot": self._robot}))
+
+    def write(self, outputs: RobotOutputs) -> None:
+        """Send the command, once for each attempt. An action without an answer may have begun, so it
+        counts as sent."""
+        command = outputs.command
+        if command is None or self._sent == (command.id, command.attempt):
+            return
+        call = self._call(command)
+        if call is None:
+            self._done(command, f"there is no call for the action '{command.activity}'")
+            return
+        try:
+            refused = self._send(call, command)
+        except HalError:
+            if command.doing == "act":
+                self._done(command, unanswered=True)
+            raise
+        self._done(command, refused)
+
+    def _done(self, command: RobotCommand, refused: str = "", unanswered: bool = False) -> None:
+        self._sent = (command.id, command.attempt)
+        self._refused, self._unanswered = refused, unanswered
+
+    def _call(self, command: RobotCommand) -> Call | None:
+        match command.doing:
+            case "act":
+                return self._api.actions.get(command.activity)
+            case "dock":
+                return self._api.dock or self._api.navigate
+            case "localize":
+                return self._api.localize or _NOTHING
+            case "stop":
+                return self._api.stop
+        return self._api.navigate
+
+    def _send(self, call: Call, command: RobotCommand) -> str:
+        """Send a call; return the manager's refusal, or ""."""
+        if call is _NOTHING:
+            return ""
+        given = values(self._settings.theirs(command), self._robot, self._api.units)
+        path = path_with(call.path, given)
+        body = None if call.body is None else body_with(call.body, given)
+        if self._api.accepted is None:
+            self._bus.send(path, call.method, body, safe=command.doing == "stop")
+            return ""
+        answer = self._bus.ask(path, call.method, body)
+        if json_fields.flag(answer, self._api.accepted):
+            return ""
+        why = json_fields.clean(str(answer.get("msg") or ""))
+        return f"{command.doing} is refused" + (f": {why}" if why else "")
+
+    def make_safe(self) -> None:
+        """Stop the robot with `on_death: stop`; else do nothing, because it finishes its last goal."""
+        if self._settings.on_death == "stop":
+            self._send(self._api.stop, RobotCommand(0, "stop"))
+
+    def close(self) -> None:
+        """Do nothing: the driver holds no resource."""
+
+
+_NOTHING: Final = Call(path="/")
+"""The call of a command that the robot carries out by itself."""
+
+
+def describe(settings: HttpRobotSettings, bus_settings: http.HttpSettings) -> list[tuple[str, str]]:
+    """Return rows that `check` prints instead of a wiring table: (subject, meaning)."""
+    api, base = settings.interface(), http.base(bus_settings.api_base)
+    whose = "all robots" if api.robots else "the robot"
+    rows = [("interface", base.url(""))]
+    rows += [("state", f"GET {api.state_path} every {bus_settings.scan_s:g} s: {whose}")]
+    rows += [(part, f"GET {path}") for part, path in api.paths.items()]
+    rows += [(" ".join(where), _described(call)) for where, call in api.calls()]
+    fields = msgspec.structs.asdict(api.fields)
+    for name, place in fields.items():
+        if place is not None:
+            text = place if isinstance(place, str) else json_fields.place_text(place)
+            rows.append((name, text))
+    rows.append(("on death", settings.on_death))
+    return rows
+
+
+def _described(call: Call) -> str:
+    return f"{call.method} {call.path}{f' {call.body}' if call.body else ''}"
+
+
+def warnings(settings: HttpRobotSettings) -> Remarks:
+    """Yield valid settings that deserve a second look."""
+    yield from PROFILE.warnings(settings.profile, "drive one robot through one patrol first")
+    fields = settings.interface().fields
+    key = ("profile",) if settings.profile else ("api", "fields")
+    if fields.time is None and settings.api:
+        yield (
+            key,
+            "without time nobody sees that the manager repeats the last place of a lost robot",
+        )
+
+
+DRIVER = DriverType(
+    settings=HttpRobotSettings,
+    buses=("http",),
+    create=HttpRobot,
+    describe=describe,
+    warnings=warnings,
+    fake="hal_fakes.http_fleet",
+)

@@ -1,0 +1,318 @@
+"""A robot that speaks VDA 5050 (2.1 or 3.0) over MQTT.
+
+    uagv/v2/MANUFACTURER/SERIAL/state           the robot's state: at each event, and each 30 s at
+    least …/visualization                             its place, more often; some robots lack it
+    …/connection                                ONLINE, OFFLINE or CONNECTIONBROKEN: retained, a
+    last will …/order, …/instantActions                   our messages
+
+A robot takes a new order only when it has none, so an order that is replaced is cancelled first. The
+robot reports the end of `cancelOrder` when all movement has stopped, and `driving` shows that too.
+"""
+
+from collections.abc import Iterator, Mapping
+from typing import Annotated, Final
+
+import msgspec
+from msgspec import Meta
+
+from bridges.kinds.fleet.settings import FleetRobotSettings
+from bridges.kinds.fleet.signals import Pose, RobotCommand, RobotOutputs, RobotSample
+from bridges.kinds.shared.fields import Name, tells
+from bridges.kinds.shared.remarks import Remarks
+from drivers import DriverError
+from drivers.driver_type import DriverType
+from drivers.fleet.vda_messages import DIALECTS, Json, Version, action, order
+from drivers.fleet.vda_state import (
+    errors,
+    flag,
+    number,
+    order_actions,
+    part,
+    references,
+    taken_out,
+    text,
+    told,
+)
+from drivers.hal.mqtt import Heard, MqttBus, MqttSettings
+from drivers.hal.timestamps import utc
+from drivers.json_fields import clean
+
+Age = Annotated[float, Meta(ge=1, le=120, extra={"unit": "s"})]
+TopicPart = Annotated[
+    str,
+    Meta(
+        pattern=r"^[^\x00-\x20\x7f-\x9f#+/$][^\x00-\x1f\x7f-\x9f#+/]*$(?!\n)",
+        max_length=64,
+        extra={"pattern": "one part of a topic, without / # +"},
+    ),
+]
+ENDED: Final = ("FINISHED", "FAILED")
+
+
+class VdaActionSettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """An action of the robot for an action of RMF. RMF's description becomes its parameters."""
+
+    type: Annotated[Name, tells("the robot's `actionType`, as its factsheet lists it.")]
+
+
+class VdaRobotSettings(FleetRobotSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """One robot by its names on the broker. Its serial number is `known_as`, or the robot's name."""
+
+    manufacturer: Annotated[TopicPart, tells("the manufacturer's name in the robot's topics.")]
+    version: Annotated[Version, tells("the version of VDA 5050 that the robot speaks.")] = "2.1"
+    interface: Annotated[TopicPart, tells("the interface's name in the robot's topics.")] = "uagv"
+    state_s: Annotated[
+        Age,
+        tells("""how old a state may be. The standard lets a standing robot be silent for 30 s."""),
+    ] = 35.0
+    place_s: Annotated[
+        Age, tells("how old the place of a driving robot may be, from its state or visualization.")
+    ] = 3.0
+    dock_action: Annotated[
+        Name | None,
+        tells("the action at the end of a lane with a dock; null for none."),
+    ] = "startCharging"
+    actions: Annotated[
+        dict[Name, VdaActionSettings], tells("an action of `config.yaml` -> the robot's action.")
+    ] = msgspec.field(default_factory=dict)
+
+    def topic(self, name: str, robot: str) -> str:
+        """Return a topic of this robot."""
+        version = DIALECTS[self.version].topics
+        serial = self.known_as or robot
+        return f"{self.interface}/{version}/{self.manufacturer}/{serial}/{name}"
+
+    def problems(self) -> Remarks:
+        """Yield contradictions between fields."""
+        yield from super().problems()
+        if self.known_as and any(sign in self.known_as for sign in "/#+"):
+            yield ("known_as",), "is a part of topics: write it without / # +"
+
+
+class VdaRobot:
+    """`drivers.Driver` for one robot."""
+
+    def __init__(self, name: str, settings: VdaRobotSettings, bus: MqttBus) -> None:
+        self._settings, self._bus = settings, bus
+        self._says = DIALECTS[settings.version]
+        topics = ("state", "visualization", "connection", "order", "instantActions")
+        self._topics = {topic: settings.topic(topic, name) for topic in topics}
+        self._serial = settings.known_as or name
+        self._sent, self._acts = (0, 0), False
+        self._headers = dict.fromkeys(topics, 0)
+        self._state: Json = {}
+        self._at: Pose | None = None
+        self._cancelled = ("", 0)
+        self._decoded: tuple[object, Json] = (None, {})
+        self._asked = False
+        for topic in ("state", "visualization", "connection"):
+            bus.listen(self._topics[topic])
+
+    def open(self) -> None:
+        """Do nothing: a restart must not stop a robot, and a death needs the broker only to stop it."""
+
+    def read(self) -> RobotSample:
+        """Read the robot's last state. Raises DriverError without a state of a connected robot."""
+        self._connected()
+        heard = self._live_state()
+        if heard.payload is not self._decoded[0]:
+            self._decoded = heard.payload, self._object("state", heard.payload)
+        state = self._decoded[1]
+        driving = flag(state, "driving")
+        at = self._place(state, heard.at or 0.0, driving)
+        power = part(state, self._says.power)
+        self._state, self._at = state, at
+        return RobotSample(
+            at=self._settings.level_of(at),
+            battery=number(power, self._says.charge) / 100.0,
+            moving=driving,
+            charging=flag(power, "charging"),
+            completed=self._completed(state),
+            fault=self._fault(state),
+            taken_out=taken_out(state),
+            refused=self._refused(state),
+        )
+
+    def write(self, outputs: RobotOutputs) -> None:
+        """Send the command, once for each attempt. An order waits until the robot has none."""
+        command = outputs.command and self._settings.theirs(outputs.command)
+        if command is None or self._sent == (command.id, command.attempt):
+            return
+        if command.doing == "stop":
+            self._cancel(command.attempt)
+        elif command.doing == "localize":
+            self._localize(command)
+        elif not self._active():
+            self._order(command)
+        elif self._ours() != str(command.id):
+            self._cancel(command.attempt)
+            return
+        self._sent, self._acts = (command.id, command.attempt), command.doing == "act"
+
+    def _ours(self) -> str:
+        """Return the number of our command that the robot's order is for."""
+        return text(self._state, "orderId").partition("-")[0]
+
+    def make_safe(self) -> None:
+        """Stop the robot with `on_death: stop`; else do nothing, because it finishes its order."""
+        if self._settings.on_death == "stop":
+            self._instant("cancelOrder", "on-death", {})
+
+    def close(self) -> None:
+        """Do nothing: the bus ends the connection."""
+
+    def _connected(self) -> None:
+        heard = self._bus.heard(self._topics["connection"])
+        if heard is None:
+            return  # the state proves a connection
+        said = self._object("connection", heard.payload).get("connectionState")
+        if said != "ONLINE":
+            raise DriverError(f"the robot has left the broker: {clean(str(said))}")
+
+    def _live_state(self) -> Heard:
+        """Return the last state; ask once for one, because a standing robot may be silent for long."""
+        heard = self._bus.heard(self._topics["state"])
+        live = heard is not None and heard.at is not None
+        if not live and not self._asked:
+            self._instant("stateRequest", f"state-{self._headers['instantActions']}", {})
+        self._asked = not live
+        return self._bus.fresh(self._topics["state"], self._settings.state_s)
+
+    def _object(self, what: str, payload: bytes) -> Json:
+        try:
+            found = msgspec.json.decode(payload)
+        except (msgspec.DecodeError, UnicodeDecodeError) as error:
+            raise DriverError(f"the robot's {what} is no JSON: {clean(str(error))}") from None
+        if not isinstance(found, dict):
+            raise DriverError(f"the robot's {what} is no JSON object")
+        serial = found.get("serialNumber", self._serial)
+        if serial != self._serial:
+            raise DriverError(f"the {what} is of robot {clean(str(serial))}, not {self._serial}")
+        return found
+
+    def _place(self, state: Json, said_at: float, driving: bool) -> Pose:
+        """Return the newest place, from the state or the visualization."""
+        place = state.get(self._says.place)
+        newer = self._bus.heard(self._topics["visualization"])
+        if newer is not None and newer.at is not None and newer.at > said_at:
+            shown = self._object("visualization", newer.payload).get(self._says.place)
+            if isinstance(shown, dict):
+                place, said_at = {**(place if isinstance(place, dict) else {}), **shown}, newer.at
+        if not isinstance(place, dict) or not place.get(self._says.known, True):
+            raise DriverError("the robot does not know its place: localize it")
+        age_s = self._bus.now() - said_at
+        if driving and age_s > self._settings.place_s:
+            raise DriverError(f"the robot drives, and its place is {age_s:.0f} s old")
+        numbers = (number(place, key) for key in ("x", "y", "theta"))
+        return Pose(text(place, "mapId"), *numbers)
+
+    def _completed(self, state: Json) -> str:
+        """Return the order that the robot has carried out; "" while it has one."""
+        found = [one.get("actionStatus") == "FINISHED" for one in order_actions(state)]
+        done = all(found) and (bool(found) or not self._acts)
+        ours = text(state, "orderId").partition("-")[0]
+        return ours if done and not self._active(state) else ""
+
+    def _active(self, state: Json | None = None) -> bool:
+        """Has the robot an order? Nodes, edges and unfinished actions are left of it."""
+        state = self._state if state is None else state
+        left = state.get("nodeStates") or state.get("edgeStates")
+        return bool(left) or any(a.get("actionStatus") not in ENDED for a in order_actions(state))
+
+    def _fault(self, state: Json) -> str:
+        stop = part(state, "safetyState").get(self._says.stop, "NONE")
+        found = [] if stop == "NONE" else [f"emergency stop: {clean(str(stop))}"]
+        for error in errors(state):
+            if error.get("errorLevel") in self._says.faults:
+                found.append(told(error))
+        return "; ".join(found)
+
+    def _refused(self, state: Json) -> str:
+        """Return the robot's errors and failed actions that refer to our last order."""
+        ours = str(self._sent[0])
+        about = (e for e in errors(state) if ours in {r.partition("-")[0] for r in references(e)})
+        found = [told(error) for error in about]
+        if text(state, "orderId").partition("-")[0] == ours:
+            failed = (a for a in order_actions(state) if a.get("actionStatus") == "FAILED")
+            found += [f"the action {clean(str(a.get('actionType')))} has failed" for a in failed]
+        return "; ".join(found)
+
+    def _cancel(self, attempt: int) -> None:
+        """Cancel the robot's order, once for each attempt."""
+        cancelled = (text(self._state, "orderId"), attempt)
+        if not self._active() or cancelled == self._cancelled:
+            return
+        self._instant("cancelOrder", f"cancel-{cancelled[0]}-{attempt}", {})
+        self._cancelled = cancelled
+
+    def _localize(self, command: RobotCommand) -> None:
+        assert command.goal is not None
+        at = command.goal.at
+        node = command.goal.name or "start"
+        where = {"x": at.x, "y": at.y, "theta": at.yaw, "mapId": at.map, "lastNodeId": node}
+        self._instant(self._says.initialize, f"place-{command.id}-{command.attempt}", where)
+
+    def _order(self, command: RobotCommand) -> None:
+        assert self._at is not None
+        last: list[Json] = []
+        if command.doing == "dock" and self._settings.dock_action:
+            last.append(action(self._settings.dock_action, f"dock-{command.id}", {}, "HARD"))
+        if command.doing == "act":
+            known = self._settings.actions.get(command.activity)
+            if known is None:
+                raise DriverError(f"the YAML has no action '{command.activity}' for this robot")
+            given = msgspec.json.decode(command.description)
+            parameters = given if isinstance(given, dict) else {"description": given}
+            last.append(action(known.type, f"act-{command.id}", parameters, "HARD"))
+        charging = part(self._state, self._says.power).get("charging")
+        first = []
+        if charging and command.goal is not None:
+            first.append(action("stopCharging", f"leave-{command.id}", {}, "HARD"))
+        node = text(self._state, "lastNodeId")
+        within_m = self._settings.limits.arrived_m
+        made = order(self._settings.version, command, self._at, node, within_m, (first, last))
+        self._publish("order", made)
+
+    def _instant(self, kind: str, action_id: str, parameters: Mapping[str, object]) -> None:
+        blocking = "NONE" if self._settings.version == "3.0" else "HARD"
+        made = action(kind, action_id, parameters, blocking)
+        self._publish("instantActions", {"actions": [made]})
+
+    def _publish(self, topic: str, message: Json) -> None:
+        self._headers[topic] += 1
+        header: Json = {
+            "headerId": self._headers[topic],
+            "timestamp": utc(),
+            "version": self._says.number,
+            "manufacturer": self._settings.manufacturer,
+            "serialNumber": self._serial,
+        }
+        payload = msgspec.json.encode({**header, **message})
+        self._bus.publish(self._topics[topic], payload, qos=0)
+
+
+def claims(settings: VdaRobotSettings) -> Iterator[tuple[str, tuple[str, ...]]]:
+    """Yield the robot's orders, which no other device or file may send."""
+    if settings.known_as:
+        yield settings.topic("order", settings.known_as), ("known_as",)
+
+
+def describe(settings: VdaRobotSettings, bus: MqttSettings) -> list[tuple[str, str]]:
+    """Return rows that `check` prints instead of a wiring table: (subject, meaning)."""
+    serial = settings.known_as or "ROBOT"
+    rows = [
+        (what, settings.topic(what, serial))
+        for what in ("state", "visualization", "connection", "order", "instantActions")
+    ]
+    rows += [(f"action {name}", each.type) for name, each in settings.actions.items()]
+    return [*rows, ("dock", settings.dock_action or "-"), ("on death", settings.on_death)]
+
+
+DRIVER = DriverType(
+    settings=VdaRobotSettings,
+    buses=("mqtt",),
+    create=VdaRobot,
+    describe=describe,
+    claims=claims,
+    fake="hal_fakes.vda5050",
+)

@@ -1,0 +1,205 @@
+"""The module `rmf_adapter` as an object: the names that the daemon uses (hal_fakes/rmf/__init__.py)."""
+
+import threading
+import time
+from collections.abc import Callable
+from types import SimpleNamespace
+from typing import Any, Final
+
+from bridges.kinds.fleet.places import RobotSite
+from bridges.kinds.fleet.signals import Pose
+from bridges.kinds.shared.similarity import Similarity
+from bridges.messages.definitions import FleetState
+from bridges.settings.fleet_config import load_fleet
+from bridges.settings.nav_graph import load_graph
+from bridges.yaml.problems import SettingsError
+from hal_fakes.rmf.patrol import PatrolRobot, Patrols
+
+STEP_S: Final = 0.2
+OFF_GRAPH_M: Final = 1.0
+
+
+class RobotState(SimpleNamespace):
+    """`easy_full_control.RobotState`."""
+
+    def __init__(self, map: str, position: list[float], battery_soc: float) -> None:
+        if len(position) != 3:
+            raise TypeError("position: a vector of three numbers")
+        self.map, self.position, self.battery_soc = map, position, battery_soc
+
+    def pose(self) -> Pose:
+        """Return the place on the robot's map."""
+        return Pose(self.map, *self.position)
+
+
+class RobotCallbacks(SimpleNamespace):
+    """`easy_full_control.RobotCallbacks`."""
+
+    localize: Callable[[Any, Any], None] | None = None
+
+    def __init__(self, navigate: Any, stop: Any, action_executor: Any) -> None:
+        self.navigate, self.stop, self.action_executor = navigate, stop, action_executor
+
+
+class FleetConfiguration:
+    """`easy_full_control.FleetConfiguration`."""
+
+    def __init__(self, config: str, graph: str) -> None:
+        self.file = load_fleet(config)
+        self.graph = load_graph(graph)
+        self.transforms: dict[str, Similarity] = {}
+
+    @staticmethod
+    def from_config_files(
+        config_file: str, nav_graph_path: str, server_uri: str | None = None
+    ) -> "FleetConfiguration | None":
+        """Return None for a configuration that RMF cannot read; raise RuntimeError for a graph."""
+        try:
+            return FleetConfiguration(config_file, nav_graph_path)
+        except SettingsError as error:
+            if any(problem.file == nav_graph_path for problem in error.problems):
+                raise RuntimeError(str(error.problems[0])) from None
+            return None
+
+    def add_robot_coordinates_transformation(self, level: str, transform: Similarity) -> None:
+        """Add a level's transform."""
+        self.transforms[level] = transform
+
+    def get_known_robot_configuration(self, robot: str) -> SimpleNamespace | None:
+        """Return a robot's charger."""
+        for _, name, settings in self.file.robots():
+            if name == robot:
+                return SimpleNamespace(compatible_chargers=[settings.waypoint()[1]])
+        return None
+
+
+def transformation(rotation: float, scale: float, translation: list[float]) -> Similarity:
+    """Return `Transformation`."""
+    from cmath import rect
+
+    return Similarity(rect(scale, rotation), complex(*translation), 0.0)
+
+
+class RobotHandle:
+    """`EasyRobotUpdateHandle` and, as `more()`, `RobotUpdateHandle`."""
+
+    def __init__(self, robot: PatrolRobot, lock: threading.RLock) -> None:
+        self.robot = robot
+        self.issues: dict[str, Any] = {}
+        self._lock = lock
+
+    def update(self, state: RobotState, activity: Any) -> None:
+        """Take the robot's state."""
+        with self._lock:
+            self.robot.update(state.pose(), state.battery_soc, activity)
+
+    def more(self) -> "RobotHandle":
+        """Return the further handle."""
+        return self
+
+    def commission(self) -> SimpleNamespace:
+        """Return a copy of the commission."""
+        return SimpleNamespace(accept_dispatched_tasks=self.robot.commissioned)
+
+    def set_commission(self, commission: Any) -> None:
+        """Set the commission."""
+        with self._lock:
+            self.robot.commissioned = commission.accept_dispatched_tasks
+
+    def reassign_dispatched_tasks(self) -> None:
+        """Do nothing: there are no tasks."""
+
+    def create_issue(self, tier: object, category: str, detail: dict[str, str]) -> Any:
+        """Note an issue until its ticket is resolved."""
+        self.issues[category] = detail
+        return SimpleNamespace(resolve=lambda message: self.issues.pop(category, None))
+
+
+class EasyFleet:
+    """`EasyFullControl`."""
+
+    def __init__(self, patrols: Patrols, lock: threading.RLock) -> None:
+        self.handles: dict[str, RobotHandle] = {}
+        self.patrols = patrols
+        self._lock = lock
+
+    def add_robot(
+        self, name: str, state: RobotState, configuration: Any, callbacks: RobotCallbacks
+    ) -> RobotHandle | None:
+        """Add a robot; return None for a robot that RMF does not take."""
+        if name in self.handles or configuration is None:
+            return None
+        site = RobotSite(
+            self.patrols.graph, self.patrols.transforms, configuration.compatible_chargers[0]
+        )
+        on_map = site.on_rmfs_map(state.pose())
+        charger = self.patrols.graph.called(site.charger)
+        if charger is None or self.patrols.graph.off_m(on_map) > OFF_GRAPH_M:
+            return None
+        with self._lock:
+            robot = PatrolRobot(name, site, callbacks, on_map, state.battery_soc)
+            self.patrols.robots.append(robot)
+            self.handles[name] = RobotHandle(robot, self._lock)
+        return self.handles[name]
+
+
+class StandInAdapter:
+    """`Adapter`, with a thread that runs the patrols."""
+
+    def __init__(self, owner: "StandIn") -> None:
+        self.fleet: EasyFleet | None = None
+        self._owner = owner
+        self._lock = threading.RLock()
+        self._ends = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="rmf stand-in", daemon=True)
+
+    def add_easy_fleet(self, configuration: FleetConfiguration) -> EasyFleet:
+        """Add the fleet."""
+        name, graph = configuration.file.fleet.name, configuration.graph
+        patrols = Patrols(name, graph, configuration.transforms, self._owner.patrols)
+        self.fleet = self._owner.fleet = EasyFleet(patrols, self._lock)
+        return self.fleet
+
+    def start(self) -> None:
+        """Begin to call back."""
+        self._thread.start()
+
+    def stop(self) -> None:
+        """End the thread."""
+        self._ends.set()
+        self._thread.join()
+
+    def _run(self) -> None:
+        while not self._ends.wait(STEP_S):
+            assert self.fleet
+            with self._lock:
+                due = self.fleet.patrols.due(time.monotonic())
+                state = self.fleet.patrols.state(time.time())
+            for call in due:  # without the lock: a callback may call update
+                call()
+            if state is not None:
+                self._owner.speak(state)
+
+
+class StandIn:
+    """The module. `speak`: publishes the fleet's state, as RMF's adapter does by itself. `schedule`: is
+    there a schedule node? `patrols`: do the robots patrol, or wait for `EasyFleet.patrols.send`?"""
+
+    def __init__(self, schedule: bool = True, patrols: bool = True) -> None:
+        self.schedule, self.patrols = schedule, patrols
+        self.fleet: EasyFleet | None = None
+        self.speak: Callable[[FleetState], object] = lambda state: None
+        self.Transformation = transformation
+        self.Adapter = SimpleNamespace(make=self._make)
+        self.robot_update_handle = SimpleNamespace(Tier=SimpleNamespace(Error="error"))
+        self.easy_full_control = SimpleNamespace(
+            FleetConfiguration=FleetConfiguration,
+            RobotState=RobotState,
+            RobotCallbacks=RobotCallbacks,
+        )
+
+    def init_rclcpp(self) -> None:
+        """Do nothing."""
+
+    def _make(self, name: str, wait_time: object = None) -> StandInAdapter | None:
+        return StandInAdapter(self) if self.schedule else None

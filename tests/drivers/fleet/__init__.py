@@ -1,0 +1,1 @@
+"""Drivers of robots, on real wires against robots that drive."""

@@ -1,0 +1,366 @@
+"""Robots that speak VDA 5050, behind a real broker: orders, cancelling, charging, floors, silence."""
+
+import json
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+import msgspec
+import pytest
+
+from bridges.kinds.fleet.signals import Goal, Pose, RobotCommand, RobotOutputs, RobotSample
+from drivers import DriverError
+from drivers.fleet.vda5050 import VdaActionSettings, VdaRobot, VdaRobotSettings
+from drivers.hal.mqtt import MqttBus, MqttSettings
+from hal_fakes.plants import robot as robot_plant
+from hal_fakes.plants.robot import RobotPlant
+from hal_fakes.realtime import RealTime
+from hal_fakes.vda5050 import FakeVdaRobot, VdaSite
+from tests.drivers.hal.modbus.module import Time
+from tests.drivers.hal.mqtt.broker import FarDevice
+from tests.waiting import wait_until
+
+START = Pose("L1", 1.0, 2.0, 0.5)
+CHARGER = Pose("L1", 4.0, 2.0)
+
+
+@dataclass
+class Bench:
+    """One robot on one broker, and its driver."""
+
+    plant: RobotPlant
+    driver: VdaRobot
+    site: VdaSite
+
+    def read(self) -> RobotSample | str:
+        """Read the robot; return the error's text if that fails."""
+        try:
+            return self.driver.read()
+        except DriverError as error:
+            return str(error)
+
+    def until(self, **wanted: Any) -> RobotSample:
+        """Read until the sample has these values."""
+        found: list[RobotSample] = []
+
+        def seen() -> bool:
+            sample = self.read()
+            if isinstance(sample, str):
+                return False
+            found.append(sample)
+            return all(getattr(sample, key) == value for key, value in wanted.items())
+
+        wait_until(seen, str(wanted))
+        return found[-1]
+
+    def send(self, command: RobotCommand, **until: Any) -> RobotSample:
+        """Write this command in each scan until the sample has these values."""
+
+        def seen() -> bool:
+            self.driver.write(RobotOutputs(command))
+            sample = self.read()
+            return not isinstance(sample, str) and all(
+                getattr(sample, key) == value for key, value in until.items()
+            )
+
+        wait_until(seen, str(until))
+        return self.until(**until)
+
+    def until_error(self, words: str) -> None:
+        """Read until the error has these words."""
+        wait_until(lambda: words in str(self.read()), words)
+
+
+@contextmanager
+def robot(**settings: Any) -> Iterator[Bench]:
+    made = VdaRobotSettings(manufacturer="acme", known_as="0001", **settings)
+    plant = RobotPlant("AMR01", START, chargers=(CHARGER,), parts=("unit", "server"))
+    world = RealTime({"AMR01": plant})
+    site = VdaSite(MqttSettings(host="x"), [FakeVdaRobot("AMR01", world.plants["AMR01"], made)])
+    found = msgspec.structs.replace(MqttSettings(host="x"), **site.replace)
+    bus = MqttBus(found)
+    try:
+        yield Bench(plant, VdaRobot("AMR01", made, bus), site)
+    finally:
+        bus.close()
+        site.close()
+        world.close()
+
+
+@pytest.fixture(params=["2.1", "3.0"])
+def bench(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Iterator[Bench]:
+    monkeypatch.setattr(robot_plant, "SPEED", 20.0)
+    monkeypatch.setattr(robot_plant, "TURNS", 50.0)
+    actions = {"clean": VdaActionSettings(type="startCleaning")}
+    with robot(version=request.param, actions=actions) as standing:
+        yield standing
+
+
+def to(x: float, number: int = 12, **more: Any) -> RobotCommand:
+    return RobotCommand(number, "navigate", goal=Goal(Pose("L1", x, 2.0, 0.25), "pantry"), **more)
+
+
+def test_a_robot_drives_to_its_goal_and_reports_the_order_done(bench: Bench) -> None:
+    sample = bench.until(moving=False)
+    assert (sample.at, sample.completed, sample.battery) == (START, "", 0.8)
+    sample = bench.send(to(8.0), completed="12", moving=False)
+    assert sample.at == Pose("L1", 8.0, 2.0, 0.25)
+    sample = bench.send(to(3.0, 13), completed="13", moving=False)
+    assert sample.at == Pose("L1", 3.0, 2.0, 0.25)
+
+
+def test_a_replaced_order_is_cancelled_first(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(robot_plant, "SPEED", 0.5)
+    bench.until(moving=False)
+    bench.send(to(400.0), moving=True)
+    monkeypatch.setattr(robot_plant, "SPEED", 20.0)
+    sample = bench.send(to(3.0, 13), completed="13", moving=False)
+    assert sample.at == Pose("L1", 3.0, 2.0, 0.25)
+    relays = [edge.signal for edge in bench.plant.edges if edge.what == "relay"]
+    assert relays == ["go", "stop", "go"]
+
+
+def test_a_stop_cancels_the_order_and_the_robot_stands(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(robot_plant, "SPEED", 0.5)
+    bench.until(moving=False)
+    bench.send(to(400.0), moving=True)
+    bench.send(RobotCommand(13, "stop", of=12), moving=False)
+    assert bench.plant.reading().at.x < 400.0
+
+
+def test_a_later_attempt_of_a_cancelled_order_has_an_id_of_its_own(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(robot_plant, "SPEED", 0.5)
+    bench.until(moving=False)
+    bench.send(to(400.0), moving=True)
+    bench.send(RobotCommand(13, "stop", of=12), moving=False)
+    monkeypatch.setattr(robot_plant, "SPEED", 500.0)
+    sample = bench.send(to(400.0, attempt=2), moving=False, completed="12", at=to(400.0).goal.at)  # type: ignore[union-attr]
+    assert sample.at.x == 400.0
+
+
+def test_a_robot_docks_charges_and_leaves(bench: Bench) -> None:
+    bench.until(moving=False)
+    dock = RobotCommand(12, "dock", goal=Goal(CHARGER, "charger_a", dock="dock_a"))
+    assert bench.send(dock, completed="12").charging
+    assert not bench.send(to(8.0, 13), completed="13", moving=False).charging
+
+
+def test_an_action_is_done_when_the_robot_has_finished_it(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(robot_plant, "ACTS_S", 0.1)
+    bench.until(moving=False)
+    act = RobotCommand(12, "act", activity="clean", description='{"zone": "lounge"}')
+    bench.driver.write(RobotOutputs(act))
+    wait_until(lambda: bench.plant.edges, "the action has begun")
+    bench.until(completed="12")
+
+
+def test_an_action_that_the_yaml_lacks_is_an_error(bench: Bench) -> None:
+    bench.until(moving=False)
+    with pytest.raises(DriverError, match="no action 'dance'"):
+        bench.driver.write(RobotOutputs(RobotCommand(12, "act", activity="dance")))
+
+
+def test_a_robot_is_localized_on_the_new_floor(bench: Bench) -> None:
+    bench.until(moving=False)
+    goal = Goal(Pose("L2", 1.0, 2.0, 0.5), "lift1_L2")
+    bench.send(RobotCommand(12, "localize", goal=goal), at=Pose("L2", 1.0, 2.0, 0.5))
+
+
+def test_a_map_of_another_name_is_its_level() -> None:
+    with robot(maps={"L1": "7f3c", "L2": "91aa"}) as bench:
+        assert bench.until(moving=False).at == START
+        assert bench.driver._at == msgspec.structs.replace(START, map="7f3c")
+        bench.send(to(1.5), completed="12", moving=False)
+        goal = Goal(Pose("L2", 1.0, 2.0, 0.5), "lift1_L2")
+        bench.send(
+            RobotCommand(13, "localize", goal=goal), at=msgspec.structs.replace(goal.at, yaw=0.25)
+        )
+
+
+def test_a_robot_in_manual_mode_is_taken_out_and_refuses(bench: Bench) -> None:
+    bench.until(moving=False)
+    bench.plant.press("manual", True, bench.plant.now)
+    assert bench.until(taken_out="operating mode MANUAL")
+    bench.send(to(8.0), refused="orderError: the robot is in manual mode")
+
+
+def test_a_fatal_error_is_a_fault(bench: Bench) -> None:
+    bench.until(moving=False)
+    bench.plant.press("fault", True, bench.plant.now)
+    bench.until(fault="driveError: wheel motor too hot")
+
+
+def test_a_robot_that_drops_off_the_net_has_no_place(bench: Bench) -> None:
+    bench.until(moving=False)
+    bench.plant.fail("unit", "off")
+    bench.until_error("the robot has left the broker: CONNECTION")
+    bench.plant.fail("unit", None)
+    bench.until(at=START)
+
+
+def test_noise_and_another_robots_state_are_no_place(bench: Bench) -> None:
+    bench.until(moving=False)
+    bench.plant.fail("unit", "garbage")
+    bench.plant.press("manual", True, bench.plant.now)  # an event, so that a state is published
+    bench.until_error("is no JSON")
+    bench.plant.fail("unit", "wrong")
+    bench.plant.press("manual", False, bench.plant.now)
+    bench.until_error("is of robot another, not 0001")
+
+
+def test_a_killed_broker_is_an_error_and_its_return_mends_it(bench: Bench) -> None:
+    bench.until(moving=False)
+    bench.plant.fail("server", "off")
+    wait_until(lambda: isinstance(bench.read(), str), "the broker is gone")
+    bench.plant.fail("server", None)
+    bench.until(at=START)
+
+
+class Scripted:
+    """A bus with these states, at its own time."""
+
+    def __init__(self) -> None:
+        self.clock = Time()
+        self.said: dict[str, Any] = {}
+
+    def listen(self, topic: str) -> None:
+        pass
+
+    def now(self) -> float:
+        return self.clock.now
+
+    def heard(self, topic: str) -> Any:
+        return self.said.get(topic.rpartition("/")[2])
+
+    def fresh(self, topic: str, stale_after_s: float) -> Any:
+        return self.heard(topic)
+
+    def says(self, what: str, message: dict[str, Any]) -> None:
+        from drivers.hal.mqtt import Heard
+
+        payload = json.dumps(message).encode()
+        self.said[what] = Heard(payload, self.clock.now, len(payload))
+
+
+STATE: dict[str, Any] = {
+    "orderId": "",
+    "nodeStates": [],
+    "edgeStates": [],
+    "actionStates": [],
+    "errors": [],
+    "driving": True,
+    "operatingMode": "AUTOMATIC",
+    "agvPosition": {"x": 1, "y": 2, "theta": 0, "mapId": "L1", "positionInitialized": True},
+    "batteryState": {"batteryCharge": 50, "charging": False},
+    "safetyState": {"eStop": "NONE", "fieldViolation": False},
+}
+
+
+def scripted(**changes: Any) -> tuple[Scripted, VdaRobot]:
+    bus = Scripted()
+    driver = VdaRobot("AMR01", VdaRobotSettings(manufacturer="acme"), bus)  # type: ignore[arg-type]
+    bus.says("state", {**STATE, **changes})
+    return bus, driver
+
+
+def test_a_driving_robots_place_is_the_newest_of_state_and_visualization() -> None:
+    bus, driver = scripted()
+    bus.clock.now += 2.0
+    bus.says("visualization", {"agvPosition": {"x": 3, "y": 2, "theta": 0, "mapId": "L1"}})
+    assert driver.read().at == Pose("L1", 3.0, 2.0, 0.0)
+
+
+def test_an_old_place_of_a_driving_robot_is_no_place_and_of_a_standing_one_it_is() -> None:
+    bus, driver = scripted()
+    bus.clock.now += 4.0
+    with pytest.raises(DriverError, match="the robot drives, and its place is 4 s old"):
+        driver.read()
+    bus.clock.now -= 4.0
+    bus.says("state", {**STATE, "driving": False})
+    bus.clock.now += 30.0
+    assert driver.read().at == Pose("L1", 1.0, 2.0, 0.0)
+
+
+def test_a_robot_that_is_not_localized_has_no_place() -> None:
+    _, driver = scripted(agvPosition={**STATE["agvPosition"], "positionInitialized": False})
+    with pytest.raises(DriverError, match="does not know its place"):
+        driver.read()
+
+
+def test_an_emergency_stop_is_a_fault() -> None:
+    _, driver = scripted(safetyState={"eStop": "MANUAL", "fieldViolation": False})
+    assert driver.read().fault == "emergency stop: MANUAL"
+
+
+@pytest.mark.parametrize("field", ["driving", "batteryState", "operatingMode", "orderId"])
+def test_a_state_without_a_needed_field_names_it(field: str) -> None:
+    _, driver = scripted(**{field: None})
+    with pytest.raises(DriverError, match=field):
+        driver.read()
+
+
+def test_a_failed_action_refuses() -> None:
+    failed = {"actionId": "act-12", "actionType": "startCleaning", "actionStatus": "FAILED"}
+    _, driver = scripted(orderId="12", actionStates=[failed], driving=False)
+    driver._sent, driver._acts = (12, 1), True
+    sample = driver.read()
+    assert (sample.refused, sample.completed) == ("the action startCleaning has failed", "")
+
+
+def test_our_orders_are_what_the_standard_asks_for() -> None:
+    with robot() as bench:
+        bench.until(moving=False)
+        far = FarDevice(bench.site._broker.port, "uagv/v2/acme/0001/order")
+        bench.driver.write(RobotOutputs(to(8.0)))
+        wait_until(lambda: far.taken, "the order")
+        far.close()
+    order = json.loads(far.taken[0][1])
+    assert order.pop("timestamp").endswith("Z")
+    place = {"mapId": "L1", "y": 2.0}
+    assert order == {
+        "headerId": 1,
+        "version": "2.1.0",
+        "manufacturer": "acme",
+        "serialNumber": "0001",
+        "orderId": "12",
+        "orderUpdateId": 0,
+        "nodes": [
+            {
+                "nodeId": "start",
+                "sequenceId": 0,
+                "released": True,
+                "nodePosition": {
+                    **place,
+                    "x": 1.0,
+                    "theta": 0.5,
+                    "allowedDeviationXY": 1.0,
+                    "allowedDeviationTheta": 3.141592,
+                },
+                "actions": [],
+            },
+            {
+                "nodeId": "pantry",
+                "sequenceId": 2,
+                "released": True,
+                "nodePosition": {**place, "x": 8.0, "theta": 0.25, "allowedDeviationXY": 0.5},
+                "actions": [],
+            },
+        ],
+        "edges": [
+            {
+                "edgeId": "start-pantry",
+                "sequenceId": 1,
+                "released": True,
+                "actions": [],
+                "startNodeId": "start",
+                "endNodeId": "pantry",
+            }
+        ],
+    }

@@ -1,0 +1,1 @@
+"""Stories of the robot's core in virtual time."""

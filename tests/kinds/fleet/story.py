@@ -1,0 +1,136 @@
+"""Stories for a robot's core: a robot that is read eight times a second, in virtual time.
+
+The site: a corridor from x 0 to x 10 on L1, with a charger at each end, a pantry in its middle and
+a lift at x 8, which goes to L2. The robot's map is RMF's, turned by a quarter and moved, in metres.
+"""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+from msgspec.structs import replace
+
+from bridges.kinds.fleet import core
+from bridges.kinds.fleet.memory import RobotLimits, RobotMemory
+from bridges.kinds.fleet.places import Lane, NavGraph, RobotSite, Vertex
+from bridges.kinds.fleet.report import RobotReport
+from bridges.kinds.fleet.settings import RobotDurations
+from bridges.kinds.fleet.signals import (
+    Event,
+    Goal,
+    Navigate,
+    Order,
+    Pose,
+    RobotCommand,
+    RobotSample,
+)
+from bridges.kinds.shared.decision import IoFailed, Sampled
+from bridges.kinds.shared.similarity import Similarity
+
+GRAPH = NavGraph(
+    vertices=(
+        Vertex("L1", 0.0, 0.0, "charger_a", charger=True),
+        Vertex("L1", 5.0, 0.0, "pantry"),
+        Vertex("L1", 8.0, 0.0, "lift1_L1", lift="Lift1"),
+        Vertex("L1", 10.0, 0.0, "charger_b", charger=True),
+        Vertex("L2", 8.0, 0.0, "lift1_L2", lift="Lift1"),
+        Vertex("L2", 8.0, 5.0, "ward"),
+    ),
+    lanes=(
+        Lane(0, 1),
+        Lane(1, 0, dock="dock_a"),
+        Lane(1, 2),
+        Lane(2, 1),
+        Lane(2, 3, dock="dock_b"),
+        Lane(4, 5),
+    ),
+)
+SITE = RobotSite(GRAPH, {"": Similarity(1j, complex(100, 0), 0.0)}, "charger_a")
+LIMITS = RobotLimits(RobotDurations(), SITE)
+SCAN_S = 0.125
+SILENT = IoFailed("192.168.1.80:22011 refuses the connection")
+
+
+def at(x: float, y: float = 0.0, level: str = "L1", yaw: float = 0.0) -> Pose:
+    """Return a place of RMF's map on the robot's map."""
+    return SITE.on_robots_map(Pose(level, x, y, yaw))
+
+
+def goal(x: float, y: float = 0.0, level: str = "L1", **more: Any) -> Goal:
+    """Return a goal at a place of RMF's map."""
+    return Goal(at(x, y, level), **more)
+
+
+PANTRY = goal(5.0, name="pantry")
+DOCK_A = goal(0.0, name="charger_a", dock="dock_a")
+
+
+@dataclass
+class Story:
+    """One robot. `sample`: its next readings. `sent`: (time, command) whenever the command changes."""
+
+    limits: RobotLimits = LIMITS
+    sample: RobotSample = RobotSample(at(0.0), 0.8)
+    now: float = 100.0
+    sent: list[tuple[float, RobotCommand | None]] = field(default_factory=list)
+    reports: list[RobotReport] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self.began = self.now
+        self.memory: RobotMemory = core.initial(self.limits, self.now)
+        self.wake_at = self.now
+
+    def take(self, event: Event) -> "Story":
+        """Let the core decide on an event."""
+        before = self.memory.command
+        decision = core.decide(self.memory, event, self.now, self.limits)
+        self.memory, self.wake_at = decision.memory, decision.wake_at
+        assert decision.outputs.command == self.memory.command
+        if self.memory.command != before:
+            self.sent.append((round(self.now - self.began, 3), self.memory.command))
+        self.reports.append(decision.report)
+        return self
+
+    def see(self, for_s: float = 0.0, **changes: Any) -> "Story":
+        """Read this sample once, or again and again for a time."""
+        self.sample = replace(self.sample, **changes)
+        self.take(Sampled(self.sample))
+        for _ in range(round(for_s / SCAN_S)):
+            self.now += SCAN_S
+            self.take(Sampled(self.sample))
+        return self
+
+    def silence(self, for_s: float) -> "Story":
+        """Fail to read for a time."""
+        for _ in range(round(for_s / SCAN_S)):
+            self.now += SCAN_S
+            self.take(SILENT)
+        return self
+
+    def order(self, order: Order) -> "Story":
+        """Take an order of RMF, with the last reading."""
+        self.take(Sampled(self.sample))
+        return self.take(order)
+
+    @property
+    def report(self) -> RobotReport:
+        """The last report."""
+        return self.reports[-1]
+
+    @property
+    def faults(self) -> list[str]:
+        """The codes of the present faults."""
+        return [fault.code for fault in self.report.faults]
+
+    @property
+    def commands(self) -> list[tuple[float, str]]:
+        """(time, command) whenever the command changed, in words."""
+        return [(at_s, _words(command)) for at_s, command in self.sent]
+
+
+def _words(command: RobotCommand | None) -> str:
+    return f"{command.doing} {command.id}, attempt {command.attempt}" if command else "none"
+
+
+def driving(number: int = 1, to: Goal = PANTRY, **sample: Any) -> Story:
+    """Return the story of a robot that stands at charger_a and is told to drive."""
+    return Story(sample=RobotSample(at(0.0), 0.8, **sample)).see().order(Navigate(number, to))

@@ -1,0 +1,181 @@
+"""Commands of a robot: sent, done, sent again, stopped (FLEET-1, FLEET-2, FLEET-3, FLEET-4)."""
+
+from bridges.kinds.fleet.signals import Act, Navigate, Stop
+from bridges.kinds.shared.decision import Fault, OperatorReset
+from tests.kinds.fleet.story import PANTRY, SCAN_S, Story, at, driving, goal
+
+
+def test_a_robot_that_reports_completed_commands_is_done_at_its_goal() -> None:  # FLEET-2
+    story = driving(7, completed="", moving=True)
+    story.see(3.0, at=at(2.0)).see(at=at(4.6))
+    assert (story.report.activity, story.report.finished) == (7, 0)
+    story.see(at=at(4.9), completed="7", moving=False)
+    assert story.commands == [(0.0, "navigate 7, attempt 1"), (3.0, "none")]
+    assert (story.report.activity, story.report.finished, story.report.at) == (0, 7, at(4.9))
+
+
+def test_a_robot_that_reports_no_commands_is_done_when_it_stands_at_its_goal() -> None:  # FLEET-2
+    story = driving(7)
+    story.see(at=at(4.6)).see(0.9)
+    assert story.report.finished == 0
+    story.see(0.2)
+    assert story.report.finished == 7
+    assert not story.faults
+
+
+def test_it_must_also_look_in_the_goals_direction() -> None:
+    story = driving(7)
+    story.see(2.0, at=at(5.0, yaw=1.0))
+    assert story.report.finished == 0
+    story.see(2.0, at=at(5.0, yaw=0.3))
+    assert story.report.finished == 7
+
+
+def test_a_robot_that_lies_about_its_arrival_is_not_believed() -> None:  # FLEET-2
+    story = driving(7, completed="", moving=False)
+    story.see(1.0, completed="7")
+    assert story.report.finished == 0
+    assert story.report.faults == (
+        Fault("ROBOT_NOT_THERE", "it reports arrival, 5 m away from its goal"),
+    )
+    story.see(at=at(5.0))
+    assert story.report.finished == 7
+
+
+def test_a_completed_number_of_an_earlier_command_completes_no_later_one() -> None:
+    story = driving(7, completed="6", moving=False, to=goal(0.2))
+    story.see(5.0)
+    assert story.report.finished == 0
+
+
+def test_a_goal_on_another_map_is_never_reached_by_its_numbers() -> None:
+    story = driving(7, to=goal(0.0, level="L2"), completed="7", moving=False)
+    story.see(1.0)
+    assert story.report.finished == 0
+    assert story.faults == ["ROBOT_NOT_THERE"]
+
+
+def test_a_robot_that_stands_is_told_again_ever_more_seldom() -> None:  # FLEET-3
+    story = driving(7, moving=False).see(100.0)
+    assert story.commands == [
+        (0.0, "navigate 7, attempt 1"),
+        (10.0, "navigate 7, attempt 2"),
+        (30.0, "navigate 7, attempt 3"),
+        (60.0, "navigate 7, attempt 4"),
+        (100.0, "navigate 7, attempt 5"),
+    ]
+    assert story.faults == ["ROBOT_NOT_OBEYING"]
+    assert not story.report.fit
+
+
+def test_a_robot_that_drives_is_not_told_again() -> None:  # FLEET-3
+    story = driving(7, moving=True).see(60.0)
+    assert story.commands == [(0.0, "navigate 7, attempt 1")]
+
+
+def test_the_pause_begins_when_the_robot_comes_to_stand() -> None:
+    story = driving(7)
+    for x in range(1, 10):
+        story.now += 1.0
+        story.see(at=at(x / 10))
+    story.see(9.0)
+    assert len(story.commands) == 1
+    story.see(1.1)
+    assert story.commands[1:] == [(19.0, "navigate 7, attempt 2")]
+
+
+def test_an_operators_reset_begins_the_attempts_anew() -> None:  # FLEET-12
+    story = driving(7, moving=False).see(100.0)
+    assert not story.report.fit
+    story.take(OperatorReset())
+    assert story.commands[-1] == (100.0, "navigate 7, attempt 6")
+    assert story.report.fit
+
+
+def test_a_reset_without_a_command_changes_nothing() -> None:
+    story = Story().see()
+    before = story.memory
+    assert story.take(OperatorReset()).memory == before
+
+
+def test_an_action_is_done_when_the_robot_says_so_and_is_never_sent_twice() -> None:  # FLEET-3
+    story = Story().see(completed="", moving=False).order(Act(9, "clean", '{"zone": "lounge"}'))
+    story.see(300.0)
+    assert story.commands == [(0.0, "act 9, attempt 1")]
+    story.see(completed="9")
+    assert story.report.finished == 9
+
+
+def test_a_refused_action_is_sent_again() -> None:  # FLEET-3
+    story = Story().see(completed="", moving=False).order(Act(9, "clean"))
+    story.see(10.0, refused="act is refused: no such zone")
+    assert story.commands[-1] == (10.0, "act 9, attempt 2")
+    assert story.report.faults == (Fault("ROBOT_REFUSES", "act is refused: no such zone"),)
+
+
+def test_an_action_without_an_answer_waits_for_a_person() -> None:
+    story = Story().see(completed="", moving=False).order(Act(9, "clean"))
+    story.see(60.0, unanswered=True)
+    assert story.faults == ["ROBOT_ACTION_UNANSWERED"]
+    story.take(OperatorReset())
+    assert story.commands[-1] == (60.0, "act 9, attempt 2")
+
+
+def test_a_new_order_replaces_the_old_one() -> None:  # FLEET-1
+    story = driving(7, completed="", moving=True).see(1.0, at=at(1.0))
+    story.order(Navigate(8, goal(8.0)))
+    story.see(1.0, completed="7", at=at(5.0))
+    assert story.commands == [(0.0, "navigate 7, attempt 1"), (1.0, "navigate 8, attempt 1")]
+    assert story.report.finished == 0
+
+
+def test_a_stop_ends_when_the_robot_stands() -> None:  # FLEET-4
+    story = driving(7, moving=True).see(1.0).order(Stop(8, of=7))
+    assert story.report.activity == 0
+    story.see(2.0)
+    assert story.memory.command is not None
+    story.see(moving=False)
+    assert story.commands == [
+        (0.0, "navigate 7, attempt 1"),
+        (1.0, "stop 8, attempt 1"),
+        (3.0, "none"),
+    ]
+
+
+def test_a_robot_that_drives_on_is_stopped_again() -> None:  # FLEET-4
+    story = driving(7, moving=True).order(Stop(8, of=7)).see(6.5)
+    assert story.commands[1:] == [
+        (0.0, "stop 8, attempt 1"),
+        (3.0, "stop 8, attempt 2"),
+        (6.0, "stop 8, attempt 3"),
+    ]
+    assert story.faults == ["ROBOT_NOT_STOPPING"]
+    story.see(4.0)
+    assert story.faults == ["ROBOT_NOT_OBEYING"]
+
+
+def test_a_stop_without_a_word_about_motion_is_believed_after_a_second_of_standing() -> None:
+    story = driving(7)
+    for x in range(1, 11):
+        story.now += SCAN_S
+        story.see(at=at(x / 10))
+    story.order(Stop(8, of=7)).see(0.9)
+    assert story.memory.command is not None
+    story.see(0.2)
+    assert story.memory.command is None
+
+
+def test_a_stop_of_an_earlier_command_stops_nothing() -> None:
+    story = driving(7, moving=True).order(Navigate(8, PANTRY)).order(Stop(9, of=7))
+    assert story.commands[-1] == (0.0, "navigate 8, attempt 1")
+
+
+def test_a_new_goal_replaces_a_stop() -> None:  # FLEET-4
+    story = driving(7, moving=True).order(Stop(8, of=7)).order(Navigate(9, PANTRY))
+    story.see(20.0)
+    assert story.commands[-1] == (0.0, "navigate 9, attempt 1")
+
+
+def test_what_rmf_has_given_up_is_stopped() -> None:  # FLEET-11
+    story = Story().see(completed="", moving=True).order(Act(9, "clean")).order(Stop(10, of=9))
+    assert story.commands[-1] == (0.0, "stop 10, attempt 1")

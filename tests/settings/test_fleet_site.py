@@ -1,0 +1,229 @@
+"""A fleet's YAML and the two files of RMF that it names: each mistake, before RMF's adapter dies of
+it."""
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from bridges.cli import main
+from bridges.settings.fleet_site import limits_of, read_site
+from bridges.settings.load import SettingsError, load
+from bridges.settings.nav_graph import load_graph
+from drivers.profiles import texts
+
+FOLDER = Path(__file__).parents[2] / "config"
+FILES = {
+    name: (FOLDER / name).read_text()
+    for name in ("robots_http.yaml", "fleet_tiny.yaml", "fleet_tiny_graph.yaml")
+}
+OURS, CONFIG, GRAPH = FILES
+Write = Callable[..., Path]
+
+
+@pytest.fixture
+def write(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Write:
+    """Write the shipped files with changes: (file, old text, new text)."""
+    monkeypatch.setattr(texts, "_texts", {})
+
+    def written(*changes: tuple[str, str, str]) -> Path:
+        found = dict(FILES)
+        for file, old, new in changes:
+            assert found[file].count(old) == 1, old
+            found[file] = found[file].replace(old, new)
+        for name, text in found.items():
+            (tmp_path / name).write_text(text)
+        return tmp_path / OURS
+
+    return written
+
+
+def problems(file: Path) -> list[str]:
+    try:
+        read_site(load(file))
+    except SettingsError as error:
+        return [str(problem).removeprefix(f"{file.parent}/") for problem in error.problems]
+    return []
+
+
+def test_the_shipped_files_are_one_site(write: Write) -> None:
+    file = write()
+    site = read_site(load(file))
+    assert site.graph.levels() == ["L1", "L2"]
+    assert site.of("AMR02").charger == "wait_2"
+    assert sorted(site.transforms) == ["L1", "L2"]
+    vertex = site.graph.called("pharmacy")
+    assert vertex
+    at = site.of("AMR01").on_robots_map(vertex.pose())
+    assert (round(at.x, 2), round(at.y, 2)) == (0.02, -7.98)
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        (
+            (OURS, "  AMR03:", "  AMR04:"),
+            [
+                "fleet_tiny.yaml:29:5: robots_http.yaml does not say how 'AMR03' is reached: write it"
+                " below robots:",
+                "robots_http.yaml:25:3: fleet_tiny.yaml has an unknown robot 'AMR04': did you mean"
+                " 'AMR03'? known here: AMR01, AMR02, AMR03",
+            ],
+        ),
+        (
+            (CONFIG, "AMR01: {charger: wait_1}", "AMR01: {charger: wait_9}"),
+            [
+                "fleet_tiny.yaml:27:13: the graph has no waypoint 'wait_9': known here: charger_a,"
+                " dock_b"
+            ],
+        ),
+        (
+            (CONFIG, "AMR01: {charger: wait_1}", "AMR01: {}"),
+            ["fleet_tiny.yaml:27:5: 'AMR01' has no charger: RMF's adapter does not add the robot"],
+        ),
+        (
+            (CONFIG, "  mechanical_system: {mass: 20.0,", "  mechanical_system: {weight: 20.0,"),
+            [
+                "fleet_tiny.yaml:14:3: needs mechanical_system: mass, without which RMF's adapter does"
+                " not start"
+            ],
+        ),
+        (
+            (CONFIG, "finishing_request: charge", "finishing_request: sleep"),
+            [
+                "fleet_tiny.yaml:23:3: unknown finishing_request 'sleep': known here: charge, park,"
+                " nothing"
+            ],
+        ),
+        (
+            (CONFIG, "lift_emergency_levels: {Lift1: L1}", "lift_emergency_levels: {Lift1: L7}"),
+            ["fleet_tiny.yaml:22:27: unknown floor 'L7': known here: L1, L2"],
+        ),
+        (
+            (CONFIG, "lift_emergency_levels: {Lift1: L1}", "lift_emergency_levels: {Lift: L1}"),
+            ["fleet_tiny.yaml:22:27: unknown lift 'Lift': did you mean 'Lift1'? known here: Lift1"],
+        ),
+        (
+            (CONFIG, "[6.98, -11.0]", "[16.98, -11.0]"),
+            ["fleet_tiny.yaml:33:3: the pairs do not fit: 2.38 m off on RMF's map"],
+        ),
+        (
+            (CONFIG, "  L2:\n    rmf", "  L3:\n    rmf"),
+            [
+                "fleet_tiny.yaml:32:1: no pairs for L2: RMF cannot place a robot on that level",
+                "fleet_tiny.yaml:36:3: unknown level 'L3': known here: L1, L2",
+            ],
+        ),
+        (
+            (GRAPH, "name: wait_2", "name: wait_1"),
+            [
+                "fleet_tiny_graph.yaml:10:9: a second waypoint 'wait_1': RMF's adapter ends at this"
+                " graph"
+            ],
+        ),
+        (
+            (GRAPH, "- [11, 10, {}]", "- [12, 10, {}]"),
+            ["fleet_tiny_graph.yaml:41:9: joins vertices 12 and 10, but 'L1' has 12 (from 0)"],
+        ),
+        (
+            (GRAPH, "lifts:\n  Lift1:", "lifts:\n  LiftA:"),
+            [
+                "fleet_tiny_graph.yaml:18:9: the lift 'Lift1' is not below 'lifts': RMF's adapter ends"
+                " there",
+                "fleet_tiny_graph.yaml:44:9: the lift 'Lift1' is not below 'lifts': RMF's adapter ends"
+                " there",
+            ],
+        ),
+        (
+            (GRAPH, "- [0, 5, {}]", "- [0, 5, {orientation_constraint: sideways}]"),
+            [
+                "fleet_tiny_graph.yaml:20:9: orientation_constraint is forward or backward, not"
+                " sideways"
+            ],
+        ),
+        (
+            (GRAPH, "- [7.0, 9.0, {name: pharmacy}]", "- [7.0, .nan, {name: pharmacy}]"),
+            ["fleet_tiny_graph.yaml:16:9: its place is no number"],
+        ),
+    ],
+)
+def test_a_mistake_is_told_with_its_place(
+    write: Write, change: tuple[str, str, str], says: list[str]
+) -> None:
+    assert problems(write(change)) == says
+
+
+def test_a_missing_file_is_told_at_the_key_that_names_it(write: Write) -> None:
+    file = write((OURS, "config: fleet_tiny.yaml ", "config: fleet_huge.yaml "))
+    said = problems(file)
+    assert said[-1].endswith("fleet_huge.yaml cannot be read")
+    assert said[-1].startswith("robots_http.yaml:12:3: ")
+
+
+def test_a_building_map_is_no_graph(write: Write) -> None:
+    file = write(
+        (GRAPH, "[10.0, 2.0, {name: charger_a", "[10.0, 2.0, 0.0, charger_a, {x: 1, name: a")
+    )
+    assert "is not one" in problems(file)[0]
+
+
+def test_the_older_form_and_the_demos_form_of_config_are_read(write: Write) -> None:
+    older = write(
+        (CONFIG, "AMR01: {charger: wait_1}", "AMR01: {rmf_config: {charger: {waypoint: wait_1}}}")
+    )
+    assert problems(older) == []
+    text = FILES[CONFIG]
+    pairs = "{rmf: [[0, 0], [1, 0]], robot: [[5, 5], [5, 6]]}"
+    pairs = f"\nfleet_manager:\n  reference_coordinates: {pairs}\n"
+    older.with_name(CONFIG).write_text(text[: text.index("# The same points")] + pairs)
+    texts._texts.clear()
+    site = read_site(load(older))
+    assert [round(t.rotation, 4) for t in site.transforms.values()] == [1.5708]
+
+
+def test_rmfs_own_transforms_are_read_and_not_given_again(write: Write) -> None:
+    line = "  finishing_request: charge"
+    own = "  transforms: {L1: {translation: [1, 2], rotation: 0.5}, L2: {scale: 2.0}}"
+    file = write((CONFIG, line, f"{own}\n{line}"))
+    text = file.with_name(CONFIG).read_text()
+    file.with_name(CONFIG).write_text(text[: text.index("# The same points")])
+    site = read_site(load(file))
+    assert site.estimated == ()
+    found = site.transforms["L1"]
+    assert (round(found.rotation, 3), found.shift) == (0.5, 1 + 2j)
+
+
+def test_the_limits_of_a_robot_hold_its_site(write: Write) -> None:
+    limits = limits_of(load(write()), "AMR01", {})
+    assert limits.site.graph.called("pharmacy")
+    assert limits.t.stale_after_s == 5.0
+
+
+def test_check_reads_the_files_and_tells_the_transforms(
+    write: Write, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["check", str(write())]) == 0
+    said = capsys.readouterr().out
+    assert "fleet_tiny.yaml: the robots' map for L1 is RMF's, turned by 1.5683 rad" in said
+    texts._texts.clear()
+    spoilt = write((CONFIG, "charger: wait_1", "charger: wait_9"))
+    assert main(["check", str(spoilt)]) == os.EX_CONFIG
+    assert "the graph has no waypoint 'wait_9'" in capsys.readouterr().err
+
+
+def test_check_compares_fleet_coordinator_and_lifts_as_one_site(
+    write: Write, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = write((CONFIG, "recharge_threshold: 0.20", "recharge_threshold: 0.95"))
+    others = [str(FOLDER / name) for name in ("charger_coordinator.yaml", "lift_dry_contact.yaml")]
+    assert main(["check", "-q", str(file), *others]) == os.EX_CONFIG
+    said = capsys.readouterr().err
+    assert "write again_percent above 95" in said
+    assert "the lift 'Lift1' does not stop at 'L3' on fleet_tiny_graph.yaml" in said
+
+
+def test_a_graph_of_an_older_editor_has_no_lists_of_lifts_and_doors(tmp_path: Path) -> None:
+    file = tmp_path / "graph.yaml"
+    file.write_text("levels: {L1: {vertices: [[0, 0, {name: a, lift: Lift1}]], lanes: []}}")
+    assert load_graph(str(file)).vertices[0].lift == "Lift1"
