@@ -40,8 +40,15 @@ LIBRARIES = {
     "urllib3": "requests", "xxhash": "xxhash", "yaml": "PyYAML", "zenoh": "eclipse-zenoh",
 }  # fmt: skip
 """The core's libraries: module -> the distribution that brings it."""
-ON_REQUEST = {("drivers.hal.http", "drivers.hal.http_push")}
-"""An extra that the core imports only where a YAML asks for it."""
+FLEET = ("bridges.runtime.fleet", "bridges.settings.fleet_site", "bridges.settings.nav_graph")
+"""A fleet's rooms, which stand in the core's folders and are extras."""
+ON_REQUEST = {
+    ("drivers.hal.http", "drivers.hal.http_push"),
+    ("bridges.runtime.service", "bridges.runtime.fleet.service"),
+    ("bridges.commands.run", "bridges.settings.fleet_site"),
+    ("bridges.commands.check", "bridges.settings.fleet_site"),
+}
+"""Extras that the core imports only where a YAML asks for them."""
 OF_ROS = {"rclpy", "launch", "launch_ros", "_typeshed"}
 
 
@@ -64,6 +71,7 @@ def extra_drivers() -> set[str]:
 def is_core(module: str) -> bool:
     """Is the module part of the core?"""
     listed = any(module == one or module.startswith(f"{one}.") for one in CORE)
+    listed = listed and not any(module == one or module.startswith(f"{one}.") for one in FLEET)
     return module in PACKAGES or (listed and module not in extra_drivers())
 
 
