@@ -327,6 +327,8 @@ Message = (
     | DiagnosticArray
 )
 
+OF_WORKCELLS: Final = frozenset({"rmf_dispenser_msgs", "rmf_ingestor_msgs"})
+"""Packages that a ROS machine needs only for workcells."""
 PACKAGES: Final[dict[type, str]] = {
     Time: "builtin_interfaces",
     Duration: "builtin_interfaces",

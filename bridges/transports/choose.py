@@ -12,13 +12,16 @@ import re
 from collections.abc import Mapping, Sequence
 
 from bridges.kinds.shared.rmf_section import Rmf
-from bridges.messages.definitions import PACKAGES
+from bridges.messages.definitions import OF_WORKCELLS, PACKAGES
 from bridges.messages.releases import RELEASES, Release
 from bridges.system.log import pairs
 from bridges.transports.cyclone import static_peers
 from bridges.transports.transport import Transport, TransportError
 
 log = logging.getLogger(__name__)
+
+NEEDED = sorted(set(PACKAGES.values()) - OF_WORKCELLS)
+"""The message packages that every daemon needs on `ros2`."""
 
 NO_CYCLONEDDS = (
     "transport dds needs the Python package cyclonedds 11.0.1, and {}. On x86-64 `pip install"
@@ -103,7 +106,7 @@ def _choice(rmf: Rmf) -> tuple[str, str]:
             else ("ros2", "rclpy and RMF's messages are installed")
         )
     if missing:
-        packages = " ".join(_apt_name(package) for package in sorted(set(PACKAGES.values())))
+        packages = " ".join(map(_apt_name, NEEDED))
         raise TransportError(NO_ROS.format(missing, packages))
     return "ros2", "configured"
 
@@ -129,7 +132,7 @@ def missing_of_ros() -> str:
         importlib.import_module("rclpy")
     except ImportError as error:
         return f"rclpy does not import: {error}"
-    for package in sorted(set(PACKAGES.values())):
+    for package in NEEDED:
         if importlib.util.find_spec(package) is None:
             return f"the ROS package {package} is not installed"
     return ""

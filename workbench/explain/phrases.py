@@ -9,7 +9,9 @@ from typing import Final
 
 from bridges.observe.requesters import Moment
 
-JOINS: Final = re.compile(r"`(rmf-bridge (doctor|explain|judge|page|release|send|watch)\b[^`]*)`")
+JOINS: Final = re.compile(
+    r"`(rmf-bridge (doctor|explain|exporter|judge|mqtt-out|notify|page|release|send|watch)\b[^`]*)`"
+)
 """A command in a sentence that joins RMF's graph."""
 
 

@@ -7,10 +7,10 @@ from queue import Empty, SimpleQueue
 from typing import Final
 
 from bridges.messages import topics
-from bridges.messages.definitions import Message
+from bridges.messages.definitions import OF_WORKCELLS, PACKAGES, Message
 from bridges.messages.heard import Heard, bounded
 from bridges.messages.topics import AnyTopic
-from bridges.transports.transport import Subscription, Transport
+from bridges.transports.transport import Subscription, Transport, TransportError
 
 OF_DEVICES: Final[tuple[AnyTopic, ...]] = (
     topics.LIFT_STATES,
@@ -39,7 +39,8 @@ OF_DEVICES: Final[tuple[AnyTopic, ...]] = (
 
 class Ear:
     """Hears these topics from now on. `others_only`: without this transport's own messages.
-    `ends`: the subscriptions by topic."""
+    `ends`: the subscriptions by topic. A ROS machine without the packages of workcells hears none.
+    """
 
     def __init__(
         self,
@@ -50,12 +51,16 @@ class Ear:
     ) -> None:
         self._sender = transport.sender
         self._waiting: SimpleQueue[Heard] = SimpleQueue()
-        self.ends: dict[str, Subscription] = {
-            topic.name: transport.subscribe(
-                topic, partial(self._received, topic.name), others_only=others_only
-            )
-            for topic in heard
-        }
+        self.ends: dict[str, Subscription] = {}
+        for topic in heard:
+            received = partial(self._received, topic.name)
+            try:
+                end = transport.subscribe(topic, received, others_only=others_only)
+            except TransportError:
+                if PACKAGES[topic.type] not in OF_WORKCELLS:
+                    raise
+            else:
+                self.ends[topic.name] = end
 
     def _received(self, topic: str, message: Message) -> None:
         at, wall = time.monotonic(), time.time()

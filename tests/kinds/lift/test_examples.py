@@ -12,7 +12,9 @@ from tests.kinds.lift.story import Story
 from tests.kinds.lift.wired import GatewayBuilding, WiredStory
 
 CONFIG = Path(__file__).parents[3] / "config"
-EXAMPLES = sorted({path.name for path in CONFIG.glob("lift_*.yaml")} - {"lift_supervisor.yaml"})
+ELSEWHERE = {"lift_supervisor.yaml", "lift_http.yaml"}
+"""No lift; and a lift whose ride over real HTTP is in tests/runtime/test_http_lift.py."""
+EXAMPLES = sorted({path.name for path in CONFIG.glob("lift_*.yaml")} - ELSEWHERE)
 A = "fleet/a"
 
 
