@@ -20,8 +20,8 @@ PACKAGES = (
 """Folders of the core whose contents are listed one by one."""
 INSIDE = {
     "bridges": "blackbox cli exit_codes messages observe runtime settings system yaml",
-    "bridges.commands": "backup check completion disable enable incident log migrate outputs_off recorder"
-    " reset run status",
+    "bridges.commands": "backup check completion disable enable incident log migrate outputs_off"
+    " recorder reset run status",
     "bridges.kinds": "lift door charger lift_supervisor door_supervisor charger_coordinator shared",
     "bridges.transports": "dds ros2 zenoh"
     " addresses choose cyclone notices peers senders threaded transport",
