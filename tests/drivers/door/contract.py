@@ -100,6 +100,7 @@ class DoorContract(Contract[Bench]):
         bench.open()
         for _ in range(3):
             bench.write(HOLD)
+        wait_until(bench.relay, "the hold has come through")
         assert bench.relay() == [True]
 
     def test_make_safe_and_close_each_release_the_door(self, bench: Bench) -> None:
